@@ -1,0 +1,13 @@
+#include "bindings/arrays.hpp"
+
+namespace jamshape {
+void export_spherocylinder(nanobind::module_ &m);
+void export_rattlers(nanobind::module_ &m);
+}  // namespace jamshape
+
+NB_MODULE(_contact, m)
+{
+  m.doc() = "Contact geometry and energies: arrays in, arrays out, over lammps_plugin/contact/.";
+  jamshape::export_spherocylinder(m);
+  jamshape::export_rattlers(m);
+}

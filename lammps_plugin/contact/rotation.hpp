@@ -1,0 +1,92 @@
+#pragma once
+
+#include "contact/vec.hpp"
+
+#include <cmath>
+
+namespace jamshape {
+
+/// Unit quaternion, w first as in LAMMPS; turns body coordinates into space coordinates.
+struct Quaternion {
+  double w, i, j, k;
+};
+
+inline Quaternion operator*(const Quaternion &p, const Quaternion &q)
+{
+  return {
+      p.w * q.w - p.i * q.i - p.j * q.j - p.k * q.k, p.w * q.i + p.i * q.w + p.j * q.k - p.k * q.j,
+      p.w * q.j - p.i * q.k + p.j * q.w + p.k * q.i, p.w * q.k + p.i * q.j - p.j * q.i + p.k * q.w};
+}
+
+inline Quaternion normalized(const Quaternion &q)
+{
+  const double inverse = 1.0 / std::sqrt(q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k);
+  return {inverse * q.w, inverse * q.i, inverse * q.j, inverse * q.k};
+}
+
+/// Body axis `b` (0, 1, 2 for x, y, z) in space coordinates.
+inline Vec<3> body_axis(const Quaternion &q, int b)
+{
+  switch (b) {
+    case 0:
+      return {{q.w * q.w + q.i * q.i - q.j * q.j - q.k * q.k, 2.0 * (q.i * q.j + q.w * q.k),
+               2.0 * (q.i * q.k - q.w * q.j)}};
+    case 1:
+      return {{2.0 * (q.i * q.j - q.w * q.k), q.w * q.w - q.i * q.i + q.j * q.j - q.k * q.k,
+               2.0 * (q.j * q.k + q.w * q.i)}};
+    default:
+      return {{2.0 * (q.i * q.k + q.w * q.j), 2.0 * (q.j * q.k - q.w * q.i),
+               q.w * q.w - q.i * q.i - q.j * q.j + q.k * q.k}};
+  }
+}
+
+/// The long axis of a particle: the body's x. In 2D the quaternion is a rotation about z only.
+template <int D> Vec<D> long_axis(const Quaternion &q);
+template <> inline Vec<2> long_axis<2>(const Quaternion &q)
+{
+  return {{(q.w - q.k) * (q.w + q.k), 2.0 * q.w * q.k}};
+}
+template <> inline Vec<3> long_axis<3>(const Quaternion &q) { return body_axis(q, 0); }
+
+/// Rotation by the angle |v| about v, in space coordinates.
+inline Quaternion rotation_by(const Vec<3> &v)
+{
+  const double angle = norm(v);
+  const double factor = angle > 1e-8 ? std::sin(0.5 * angle) / angle : 0.5;
+  return {std::cos(0.5 * angle), factor * v[0], factor * v[1], factor * v[2]};
+}
+inline Quaternion rotation_by(const Vec<1> &v)
+{
+  return {std::cos(0.5 * v[0]), 0.0, 0.0, std::sin(0.5 * v[0])};
+}
+
+/// `q` turned by the rotation vector `v`. A rotation of zero returns `q` to the last bit.
+template <int M> Quaternion turned(const Quaternion &q, const Vec<M> &v)
+{
+  if (norm_sq(v) == 0.0) return q;
+  return normalized(rotation_by(v) * q);
+}
+
+/// Inverse of rotation_by: the rotation vector of `q`, of length at most pi.
+inline Vec<3> rotation_vector(const Quaternion &q)
+{
+  const Vec<3> v = q.w < 0.0 ? Vec<3>{{-q.i, -q.j, -q.k}} : Vec<3>{{q.i, q.j, q.k}};
+  const double half_sine = norm(v);
+  const double half_angle = std::atan2(half_sine, std::abs(q.w));
+  return (half_sine > 1e-8 ? 2.0 * half_angle / half_sine : 2.0) * v;
+}
+
+/// Derivative of an energy with respect to the rotation vector v of the orientation, from the
+/// torque there: J(v)^T torque, J the left Jacobian of SO(3).
+inline Vec<3> torque_on_rotation_vector(const Vec<3> &v, const Vec<3> &torque)
+{
+  const double angle = norm(v);
+  // Near zero the closed forms lose all digits to cancellation; their series do not.
+  const double first = angle > 1e-4 ? (1.0 - std::cos(angle)) / (angle * angle) : 0.5;
+  const double second = angle > 1e-2 ? (angle - std::sin(angle)) / (angle * angle * angle)
+                                     : 1.0 / 6.0 - angle * angle / 120.0;
+  const Vec<3> once = cross(v, torque);
+  return torque - first * once + second * cross(v, once);
+}
+
+}  // namespace jamshape

@@ -1,0 +1,57 @@
+#pragma once
+
+#include "contact/vec.hpp"
+
+#include "pointers.h"
+
+namespace jamshape {
+
+/// The shrinking box (Marschall & Teitel 2018, Eq. 6): dL/dt = -kappa L towards a fixed point.
+/// Edges and positions follow from the absolute strain kappa t, never from multiplying step by
+/// step: at kappa = 1e-10 one step changes L by 1e-12, and the rounding of a product would add up.
+class AffineBox : protected LAMMPS_NS::Pointers {
+ public:
+  /// Which point of the box stays where it is.
+  enum class Reference { CENTER, CORNER };
+
+  /// What a restart must bring back to the last bit.
+  struct State {
+    double lo[3], hi[3];  // at strain 0
+    double strain_base;   // strain at step_base
+    double rate, dt;      // since then
+    LAMMPS_NS::bigint step_base;
+  };
+
+  AffineBox(LAMMPS_NS::LAMMPS *lmp, double kappa, Reference fixed_point);
+
+  const State &state() const { return now; }
+  void restore(const State &from);
+
+  /// At the start of a run: takes the present box as strain 0 unless it is the box of the present
+  /// strain, and goes on from the present strain when the rate or the time step changed.
+  void begin_run();
+
+  /// Time since the rate or the time step last changed.
+  double time(LAMMPS_NS::bigint step) const;
+  double strain(LAMMPS_NS::bigint step) const;
+  /// L(step) / L(strain 0).
+  double scale(LAMMPS_NS::bigint step) const;
+  /// Gives LAMMPS the box of that step.
+  void set_box(LAMMPS_NS::bigint step);
+
+  /// A position from its coordinates in the box of strain 0 (relative to the fixed point,
+  /// unwrapped), and back. `image` holds LAMMPS's periodic image counts.
+  Vec<3> position(const Vec<3> &reference, LAMMPS_NS::imageint image, double scale) const;
+  Vec<3> reference(const double *x, LAMMPS_NS::imageint image, double scale) const;
+
+ private:
+  Reference fixed;
+  State now;
+  bool started;
+
+  double fixed_point(int k) const;
+  double edge_at_start(int k) const { return now.hi[k] - now.lo[k]; }
+  void edges(double scale, double *lo, double *hi) const;
+};
+
+}  // namespace jamshape

@@ -1,0 +1,38 @@
+#pragma once
+
+#include "compute.h"
+#include "pair_contact.h"
+
+#include <vector>
+
+namespace jamshape {
+
+/// compute ID all contact/local NAME ...
+///
+/// One row a bond, columns in the order asked for:
+///   itag jtag             IDs, itag <= jtag
+///   kind                  0 tip-to-tip, 1 tip-to-side, 2 side-to-side
+///   bond                  0 or 1: the second bond of a side-to-side contact is 1
+///   dist sumrad overlap   r, d and 1 - r/d
+///   fx fy fz              force on i
+///   nx ny nz              unit normal into i
+///   cx cy cz              point of contact
+///   energy stiffness      V and its second derivative with respect to r
+///   sidei sidej           1 where the contact lies on the flat part of i, of j
+class ComputeContactLocal : public LAMMPS_NS::Compute {
+ public:
+  ComputeContactLocal(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);
+
+  void init() override;
+  void compute_local() override;
+  double memory_usage() override;
+
+ private:
+  using Column = double (*)(const LocalBond &, const LAMMPS_NS::Atom &);
+  std::vector<Column> columns;
+  std::vector<double> values;
+  std::vector<double *> rows;
+  PairContact *pair;
+};
+
+}  // namespace jamshape

@@ -1,0 +1,238 @@
+#include "compute_packing.h"
+
+#include "contact/rattlers.hpp"
+#include "contact/symmetric_eigen.hpp"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "force.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <mpi.h>
+#include <unordered_map>
+
+namespace jamshape {
+
+namespace {
+
+enum Value { PHI, U, P, Z, S_2, S_4, F_MAX, F_RMS, Z_SINGLE, RATTLERS, BONDS, OVERLAP, T_MAX };
+
+/// A contact as ranks exchange it; bytes over MPI, all ranks being the same program.
+struct SharedContact {
+  LAMMPS_NS::tagint itag, jtag;
+  Vec<3> normal;
+  int n_bonds;
+  bool flat_i, flat_j;
+};
+
+/// A side-to-side contact counts as two bonds also where it carries one force (`sides one`), and
+/// lies on the flat parts of both.
+SharedContact shared(const LocalBond &bond, const LAMMPS_NS::tagint *tag)
+{
+  const bool side_to_side = bond.kind == ContactKind::SIDE_TO_SIDE;
+  return {tag[bond.i],
+          tag[bond.j],
+          bond.normal,
+          side_to_side ? 2 : 1,
+          side_to_side || bond.on_side_i,
+          side_to_side || bond.on_side_j};
+}
+
+std::vector<SharedContact> gather(const std::vector<SharedContact> &mine, MPI_Comm world)
+{
+  int n_ranks, bytes = static_cast<int>(mine.size() * sizeof(SharedContact));
+  MPI_Comm_size(world, &n_ranks);
+  std::vector<int> counts(n_ranks), offsets(n_ranks + 1, 0);
+  MPI_Allgather(&bytes, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
+  for (int r = 0; r < n_ranks; ++r) offsets[r + 1] = offsets[r] + counts[r];
+  std::vector<SharedContact> all(offsets[n_ranks] / sizeof(SharedContact));
+  MPI_Allgatherv(mine.data(), bytes, MPI_BYTE, all.data(), counts.data(), offsets.data(), MPI_BYTE,
+                 world);
+  return all;
+}
+
+}  // namespace
+
+ComputePacking::ComputePacking(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
+    Compute(lmp, narg, arg), pair(nullptr)
+{
+  if (igroup != 0)
+    error->all(FLERR, std::string("compute packing found a group other than all, expected 'all'."));
+  if (narg != 3) error->all(FLERR, std::string("compute packing found arguments, expected none."));
+  vector_flag = 1;
+  size_vector = N_VALUES;
+  extvector = 0;
+  peflag = pressflag = timeflag = 1;  // LAMMPS then tallies energy and virial on the steps we need
+  vector = new double[N_VALUES]();
+}
+
+ComputePacking::~ComputePacking() { delete[] vector; }
+
+void ComputePacking::init()
+{
+  pair = dynamic_cast<PairContact *>(force->pair);
+  if (!pair) {
+    error->all(
+        FLERR,
+        std::string("compute packing found no pair style of this plugin, expected one such as "
+                    "'pair_style spherocylinder/harmonic'."));
+  }
+}
+
+double ComputePacking::sum(double mine) const
+{
+  double all;
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
+  return all;
+}
+
+double ComputePacking::largest(double mine) const
+{
+  double all;
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_MAX, world);
+  return all;
+}
+
+void ComputePacking::compute_vector()
+{
+  invoked_vector = update->ntimestep;
+  if (update->vflag_global != invoked_vector || update->eflag_global != invoked_vector) {
+    error->all(
+        FLERR,
+        std::string("compute packing found that energy and virial were not tallied on this step, "
+                    "expected them: use it in thermo output or in a fix that asks a step ahead."));
+  }
+  compute_density_and_stress();
+  compute_order();
+  compute_contacts();
+}
+
+void ComputePacking::compute_density_and_stress()
+{
+  const int d = domain->dimension;
+  double volume = 1.0, measure = 0.0, trace = 0.0;
+  for (int k = 0; k < d; ++k) {
+    volume *= domain->prd[k];
+    trace += pair->virial[k];
+  }
+  for (const Vec<3> &semi_axes : pair->particle_view().semi_axes(atom->nlocal)) {
+    measure += pair->drag(semi_axes).measure;
+  }
+  vector[PHI] = sum(measure) / volume;
+  vector[U] = sum(pair->eng_vdwl) / volume;
+  vector[P] = sum(trace) / (d * volume);
+}
+
+void ComputePacking::compute_order()
+{
+  ParticleView &view = pair->particle_view();
+  const std::vector<Vec<3>> semi_axes = view.semi_axes(atom->nlocal);
+  view.read_orientations(atom->nlocal);
+  std::vector<Vec<3>> axes;  // of particles that have a direction
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (semi_axes[i][0] != semi_axes[i][1]) axes.push_back(body_axis(view.orientation(i), 0));
+  }
+  const double n = sum(static_cast<double>(axes.size()));
+  vector[S_2] = vector[S_4] = 0.0;
+  if (n == 0.0) return;
+
+  if (domain->dimension == 2) {
+    double mine[4] = {}, all[4];
+    for (const Vec<3> &axis : axes) {
+      const double cos_2 = axis[0] * axis[0] - axis[1] * axis[1], sin_2 = 2.0 * axis[0] * axis[1];
+      mine[0] += cos_2;
+      mine[1] += sin_2;
+      mine[2] += cos_2 * cos_2 - sin_2 * sin_2;
+      mine[3] += 2.0 * cos_2 * sin_2;
+    }
+    MPI_Allreduce(mine, all, 4, MPI_DOUBLE, MPI_SUM, world);
+    vector[S_2] = std::hypot(all[0], all[1]) / n;
+    vector[S_4] = std::hypot(all[2], all[3]) / n;
+    return;
+  }
+
+  double mine[6] = {}, all[6];
+  for (const Vec<3> &axis : axes) {
+    int m = 0;
+    for (int a = 0; a < 3; ++a) {
+      for (int b = a; b < 3; ++b) mine[m++] += 1.5 * axis[a] * axis[b] - (a == b ? 0.5 : 0.0);
+    }
+  }
+  MPI_Allreduce(mine, all, 6, MPI_DOUBLE, MPI_SUM, world);
+  const SymmetricEigen nematic =
+      largest_eigenpair({all[0], all[1], all[2], all[3], all[4], all[5]});
+  vector[S_2] = nematic.value / n;
+  double tetratic = 0.0;
+  for (const Vec<3> &axis : axes) {
+    const double c_sq = std::pow(dot(nematic.vector, axis), 2);
+    tetratic += 0.125 * (c_sq * (35.0 * c_sq - 30.0) + 3.0);
+  }
+  vector[S_4] = sum(tetratic) / n;
+}
+
+void ComputePacking::compute_contacts()
+{
+  const std::vector<LocalBond> bonds = pair->reported_bonds();
+  std::vector<SharedContact> mine;
+  double force_sum = 0.0, overlap = 0.0;
+  for (const LocalBond &bond : bonds) {
+    force_sum += norm(bond.force);
+    overlap = std::max(overlap, (bond.reach - bond.distance) / bond.reach);
+    if (bond.first_of_contact) mine.push_back(shared(bond, atom->tag));
+  }
+  const double n_forces = sum(static_cast<double>(bonds.size()));
+  const double mean_force = n_forces > 0.0 ? sum(force_sum) / n_forces : 0.0;
+  vector[OVERLAP] = largest(overlap);
+  compute_residuals(mean_force);
+
+  // IDs need not be consecutive; particles without a contact are rattlers by definition.
+  const std::vector<SharedContact> contacts = gather(mine, world);
+  std::unordered_map<LAMMPS_NS::tagint, std::size_t> index;
+  std::vector<ContactEdge> edges;
+  for (const SharedContact &c : contacts) {
+    const std::size_t i = index.emplace(c.itag, index.size()).first->second;
+    const std::size_t j = index.emplace(c.jtag, index.size()).first->second;
+    edges.push_back({i, j, c.normal, c.flat_i, c.flat_j});
+  }
+  const std::vector<char> is_rattler = RattlerSearch(index.size(), edges, domain->dimension).find();
+  const double backbone =
+      static_cast<double>(std::count(is_rattler.begin(), is_rattler.end(), char(0)));
+  double held_bonds = 0.0, held_contacts = 0.0;
+  vector[BONDS] = 0.0;
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    vector[BONDS] += contacts[e].n_bonds;
+    if (is_rattler[edges[e].i] || is_rattler[edges[e].j]) continue;
+    held_bonds += contacts[e].n_bonds;
+    held_contacts += 1.0;
+  }
+  vector[Z] = backbone > 0.0 ? 2.0 * held_bonds / backbone : 0.0;
+  vector[Z_SINGLE] = backbone > 0.0 ? 2.0 * held_contacts / backbone : 0.0;
+  vector[RATTLERS] = static_cast<double>(atom->natoms) - backbone;
+}
+
+void ComputePacking::compute_residuals(double mean_bond_force)
+{
+  const std::vector<Vec<3>> semi_axes = pair->particle_view().semi_axes(atom->nlocal);
+  double sum_sq = 0.0, largest_sq = 0.0, largest_torque = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const double *f = atom->f[i], *t = atom->torque[i];
+    const double force_sq = f[0] * f[0] + f[1] * f[1] + f[2] * f[2];
+    sum_sq += force_sq;
+    largest_sq = std::max(largest_sq, force_sq);
+    const Vec<3> moment = pair->drag(semi_axes[i]).moment;
+    const double gyration = std::sqrt(std::max({moment[0], moment[1], moment[2]}));
+    largest_torque =
+        std::max(largest_torque, std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) / gyration);
+  }
+  const double scale = mean_bond_force > 0.0 ? 1.0 / mean_bond_force : 0.0;
+  vector[F_MAX] = scale * std::sqrt(largest(largest_sq));
+  vector[F_RMS] = scale * std::sqrt(sum(sum_sq) / static_cast<double>(atom->natoms));
+  vector[T_MAX] = scale * largest(largest_torque);
+}
+
+}  // namespace jamshape

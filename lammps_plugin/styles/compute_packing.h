@@ -1,0 +1,46 @@
+#pragma once
+
+#include "compute.h"
+#include "pair_contact.h"
+
+#include <vector>
+
+namespace jamshape {
+
+/// compute ID all packing
+///
+/// Global vector, all intensive:
+///    1 phi       packing fraction
+///    2 u         energy density U / L^d
+///    3 p         pressure, trace of the virial / (d L^d)
+///    4 z         bonds per non-rattler, a side-to-side contact counted as two
+///    5 S_2       nematic order (2D: Marschall & Teitel Eq. 16; 3D: largest eigenvalue of the Q
+///    tensor) 6 S_4       tetratic order (2D: Eq. 16; 3D: mean P_4 about the nematic director) 7
+///    fmax      largest net force on a particle over the mean bond force 8 frms      root mean
+///    square of the same 9 z_single  contacts per non-rattler, a side-to-side contact counted as
+///    one
+///   10 rattlers  their number
+///   11 bonds     the number of all bonds, a side-to-side contact counted as two
+///   12 overlap   largest overlap 1 - r/d
+///   13 tmax      largest net torque over mean bond force times the particle's radius of gyration
+class ComputePacking : public LAMMPS_NS::Compute {
+ public:
+  ComputePacking(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);
+  ~ComputePacking() override;
+
+  void init() override;
+  void compute_vector() override;
+
+ private:
+  static constexpr int N_VALUES = 13;
+  PairContact *pair;
+
+  double sum(double mine) const;
+  double largest(double mine) const;
+  void compute_density_and_stress();
+  void compute_order();
+  void compute_contacts();
+  void compute_residuals(double mean_bond_force);
+};
+
+}  // namespace jamshape

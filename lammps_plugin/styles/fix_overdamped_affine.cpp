@@ -1,0 +1,265 @@
+#include "fix_overdamped_affine.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "modify.h"
+#include "neighbor.h"
+#include "update.h"
+#include "utils.h"
+
+#include <cmath>
+#include <cstring>
+#include <string>
+
+namespace jamshape {
+
+using LAMMPS_NS::bigint;
+
+namespace {
+
+/// Closer to the stability limit than this fraction of it, the fix warns.
+constexpr double NEAR_LIMIT = 0.9;
+
+}  // namespace
+
+FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
+    Fix(lmp, narg, arg), check_every(1000), next_check(0), largest_rate(0.0), warned(false),
+    running(false)
+{
+  const auto fail = [&](const std::string &found_and_expected) {
+    error->all(FLERR, "fix overdamped/affine found " + found_and_expected);
+  };
+  const std::string syntax =
+      "'drag k_d compress kappa [integrator NAME] [reference center|corner] [check N]'.";
+  if (igroup != 0) fail("a group other than all, expected 'all': the whole box moves.");
+  if (narg < 7 || narg % 2 == 0 || std::strcmp(arg[3], "drag") || std::strcmp(arg[5], "compress")) {
+    fail("a wrong list of arguments, expected " + syntax);
+  }
+  const double k_d = LAMMPS_NS::utils::numeric(FLERR, arg[4], false, lmp);
+  const double kappa = LAMMPS_NS::utils::numeric(FLERR, arg[6], false, lmp);
+  if (!(k_d > 0.0) || !std::isfinite(k_d)) {
+    fail(std::string("drag ") + arg[4] + ", expected a positive number.");
+  }
+  if (!std::isfinite(kappa)) {
+    fail(std::string("compress ") + arg[6] + ", expected a finite rate.");
+  }
+  std::string method = "heun";
+  AffineBox::Reference reference = AffineBox::Reference::CENTER;
+  for (int k = 7; k < narg; k += 2) {
+    const std::string keyword = arg[k], value = arg[k + 1];
+    if (keyword == "integrator") {
+      method = value;
+    } else if (keyword == "reference" && (value == "center" || value == "corner")) {
+      reference = value == "center" ? AffineBox::Reference::CENTER : AffineBox::Reference::CORNER;
+    } else if (keyword == "check") {
+      check_every = LAMMPS_NS::utils::bnumeric(FLERR, arg[k + 1], false, lmp);
+      if (check_every < 0) fail("check " + value + ", expected a number of steps, or 0 for never.");
+    } else {
+      fail("'" + keyword + " " + value + "', expected " + syntax);
+    }
+  }
+  box = std::make_unique<AffineBox>(lmp, kappa, reference);
+  flow = std::make_unique<OverdampedFlow>(lmp, k_d, *box, this);
+  integrator = make_integrator(method, *box);
+  if (!integrator) {
+    fail("integrator " + method + ", expected one of: " + integrator_names() + ".");
+  }
+
+  time_integrate = 1;
+  time_depend = 1;
+  no_change_box = 1;
+  box_change = BOX_CHANGE_X | BOX_CHANGE_Y | (domain->dimension == 3 ? BOX_CHANGE_Z : 0);
+  restart_global = restart_peratom = 1;
+  create_attribute = 1;
+  maxexchange = flow->width();
+  comm_forward = OverdampedFlow::DIRECTION_SIZE;
+  vector_flag = 1;
+  size_vector = 7;
+  global_freq = 1;
+  extvector = 0;
+
+  grow_arrays(atom->nmax);
+  atom->add_callback(LAMMPS_NS::Atom::GROW);
+  atom->add_callback(LAMMPS_NS::Atom::RESTART);
+  for (int i = 0; i < atom->nlocal; ++i) set_arrays(i);
+}
+
+FixOverdampedAffine::~FixOverdampedAffine()
+{
+  if (copymode) return;
+  atom->delete_callback(id, LAMMPS_NS::Atom::GROW);
+  atom->delete_callback(id, LAMMPS_NS::Atom::RESTART);
+}
+
+int FixOverdampedAffine::setmask()
+{
+  return LAMMPS_NS::FixConst::INITIAL_INTEGRATE | LAMMPS_NS::FixConst::POST_NEIGHBOR;
+}
+
+void FixOverdampedAffine::init()
+{
+  for (int k = 0; k < domain->dimension; ++k) {
+    if (!domain->periodicity[k]) {
+      error->all(
+          FLERR,
+          std::string(
+              "fix overdamped/affine found a box that is not periodic, expected 'boundary p p "
+              "p': the whole box shrinks."));
+    }
+  }
+  // A contact that a late rebuild misses is lost without a word.
+  if (neighbor->every != 1 || neighbor->delay != 0 || !neighbor->dist_check) {
+    if (comm->me == 0) {
+      error->warning(
+          FLERR,
+          std::string("fix overdamped/affine uses 'neigh_modify every 1 delay 0 check yes'"));
+    }
+    neighbor->every = 1;
+    neighbor->delay = 0;
+    neighbor->dist_check = 1;
+  }
+  running = false;
+}
+
+/* ---------------------------------------------------------------------- */
+
+void FixOverdampedAffine::setup_post_neighbor()
+{
+  box->begin_run();
+  flow->begin_run();
+  running = true;
+}
+
+void FixOverdampedAffine::post_neighbor()
+{
+  if (running) flow->measure_particles();
+}
+
+void FixOverdampedAffine::setup(int)
+{
+  if (update->whichflag != 1) return;
+  next_check = update->ntimestep;
+  check_stability(update->ntimestep);
+}
+
+OverdampedFlow::Stage FixOverdampedAffine::stage_at(bigint step) const
+{
+  return {step, box->scale(step)};
+}
+
+void FixOverdampedAffine::initial_integrate(int)
+{
+  const bigint to = update->ntimestep, from = to - 1;
+  if (from >= next_check) check_stability(from);
+  integrator->step(*flow, stage_at(from), stage_at(to), update->dt);
+}
+
+double FixOverdampedAffine::largest_stable_dt() const
+{
+  return largest_rate > 0.0 ? integrator->stability_interval() / largest_rate : INFINITY;
+}
+
+void FixOverdampedAffine::check_stability(bigint step)
+{
+  if (check_every == 0 || update->dt == 0.0) return;
+  if (step < next_check) return;
+  next_check = step + check_every;
+  largest_rate = flow->largest_rate();
+  const double limit = largest_stable_dt();
+  if (update->dt <= NEAR_LIMIT * limit) {
+    warned = false;
+    return;
+  }
+  const std::string found = "fix overdamped/affine found timestep " + std::to_string(update->dt);
+  const std::string largest = std::to_string(limit) + " (2 over the largest relaxation rate " +
+                              std::to_string(largest_rate) + ")";
+  if (update->dt > limit) {
+    error->all(FLERR, found + " past the stability limit " + largest + ": use a timestep below " +
+                          std::to_string(NEAR_LIMIT * limit) + ".");
+  }
+  if (!warned && comm->me == 0) {
+    error->warning(FLERR, found + " close to the stability limit " + largest +
+                              ": a denser state may pass it.");
+  }
+  warned = true;
+}
+
+double FixOverdampedAffine::compute_vector(int n)
+{
+  const bigint step = update->ntimestep;
+  switch (n) {
+    case 0:
+      return box->time(step);
+    case 1:
+      return box->strain(step);
+    case 2:
+      return largest_rate;
+    case 3:
+      return largest_stable_dt();
+    case 4:
+      return flow->dissipated_power();
+    case 5:
+      return static_cast<double>(flow->n_evaluations());
+    default:
+      return static_cast<double>(flow->n_rebuilds());
+  }
+}
+
+double FixOverdampedAffine::memory_usage() { return flow->memory_usage(); }
+
+/* ----------------------------------------------------------------------
+   restart and migration
+------------------------------------------------------------------------- */
+
+void FixOverdampedAffine::write_restart(FILE *fp)
+{
+  if (comm->me != 0) return;
+  const AffineBox::State state = box->state();
+  const int size = sizeof(state);
+  fwrite(&size, sizeof(int), 1, fp);
+  fwrite(&state, size, 1, fp);
+}
+
+void FixOverdampedAffine::restart(char *buf)
+{
+  AffineBox::State state;
+  std::memcpy(&state, buf, sizeof(state));
+  box->restore(state);
+}
+
+void FixOverdampedAffine::grow_arrays(int nmax) { flow->grow(nmax); }
+void FixOverdampedAffine::copy_arrays(int from, int to, int) { flow->copy(from, to); }
+void FixOverdampedAffine::set_arrays(int i) { flow->set(i); }
+int FixOverdampedAffine::pack_exchange(int i, double *buf) { return flow->pack(i, buf); }
+int FixOverdampedAffine::unpack_exchange(int i, double *buf) { return flow->unpack(i, buf); }
+
+int FixOverdampedAffine::pack_restart(int i, double *buf)
+{
+  buf[0] = size_restart(i);  // LAMMPS skips by this number
+  std::memcpy(buf + 1, flow->coordinates(i), flow->n_coordinates() * sizeof(double));
+  return size_restart(i);
+}
+
+void FixOverdampedAffine::unpack_restart(int i, int nth)
+{
+  const double *from = atom->extra[i];
+  for (int skip = 0; skip < nth; ++skip) from += static_cast<int>(*from);
+  std::memcpy(flow->coordinates(i), from + 1, flow->n_coordinates() * sizeof(double));
+}
+
+int FixOverdampedAffine::size_restart(int) { return flow->n_coordinates() + 1; }
+int FixOverdampedAffine::maxsize_restart() { return flow->n_coordinates() + 1; }
+
+int FixOverdampedAffine::pack_forward_comm(int n, int *list, double *buf, int, int *)
+{
+  return flow->pack_direction(n, list, buf);
+}
+
+void FixOverdampedAffine::unpack_forward_comm(int n, int first, double *buf)
+{
+  flow->unpack_direction(n, first, buf);
+}
+
+}  // namespace jamshape

@@ -1,0 +1,60 @@
+#pragma once
+
+#include "affine_box.h"
+#include "fix.h"
+#include "integrator.h"
+#include "overdamped_flow.h"
+
+#include <memory>
+
+namespace jamshape {
+
+/// fix ID all overdamped/affine drag k_d compress kappa
+///     [integrator NAME] [reference center|corner] [check N]
+///
+/// Overdamped motion on a substrate that shrinks affinely with the box (Marschall & Teitel 2018,
+/// Eqs. 6-14). Global vector: time since strain 0, strain, largest relaxation rate, largest stable
+/// time step, dissipated power, force evaluations, list rebuilds inside steps.
+class FixOverdampedAffine : public LAMMPS_NS::Fix {
+ public:
+  FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);
+  ~FixOverdampedAffine() override;
+
+  int setmask() override;
+  void init() override;
+  void setup(int vflag) override;
+  void setup_post_neighbor() override;
+  void post_neighbor() override;
+  void initial_integrate(int vflag) override;
+  double compute_vector(int n) override;
+  double memory_usage() override;
+
+  void write_restart(FILE *fp) override;
+  void restart(char *buf) override;
+
+  void grow_arrays(int nmax) override;
+  void copy_arrays(int from, int to, int delflag) override;
+  void set_arrays(int i) override;
+  int pack_exchange(int i, double *buf) override;
+  int unpack_exchange(int i, double *buf) override;
+  int pack_restart(int i, double *buf) override;
+  void unpack_restart(int i, int nth) override;
+  int size_restart(int i) override;
+  int maxsize_restart() override;
+  int pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int *pbc) override;
+  void unpack_forward_comm(int n, int first, double *buf) override;
+
+ private:
+  std::unique_ptr<AffineBox> box;
+  std::unique_ptr<OverdampedFlow> flow;
+  std::unique_ptr<Integrator> integrator;
+  LAMMPS_NS::bigint check_every, next_check;
+  double largest_rate;
+  bool warned, running;
+
+  OverdampedFlow::Stage stage_at(LAMMPS_NS::bigint step) const;
+  double largest_stable_dt() const;
+  void check_stability(LAMMPS_NS::bigint step);
+};
+
+}  // namespace jamshape

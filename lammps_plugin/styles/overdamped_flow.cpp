@@ -1,0 +1,408 @@
+#include "overdamped_flow.h"
+
+#include "contact/contact.hpp"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "force.h"
+#include "memory.h"
+#include "modify.h"
+#include "neighbor.h"
+#include "pair_contact.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <mpi.h>
+
+namespace jamshape {
+
+using LAMMPS_NS::bigint;
+
+namespace {
+
+Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
+
+/// A particle may move at most this fraction of its shortest semi-axis in one step; beyond it
+/// contacts would be passed through.
+constexpr double LARGEST_STEP = 0.5;
+
+/// Coordinates that agree with the atom's position to this fraction of the box are its own.
+constexpr double SAME_POSITION = 1e-13;
+
+constexpr int POWER_ITERATIONS = 30;
+
+}  // namespace
+
+OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineBox &affine_box,
+                               LAMMPS_NS::Fix *owner) :
+    Pointers(lmp), drag(k_d), box(affine_box), dimension(domain->dimension),
+    n_rates(dimension == 2 ? 3 : 6), n_turns(dimension == 2 ? 2 : 4), pair(nullptr),
+    values(nullptr), evaluations(0), rebuilds(0), fix(owner)
+{
+}
+
+OverdampedFlow::~OverdampedFlow() { memory->destroy(values); }
+
+/* ----------------------------------------------------------------------
+   set-up
+------------------------------------------------------------------------- */
+
+void OverdampedFlow::begin_run()
+{
+  pair = dynamic_cast<PairContact *>(force->pair);
+  if (!pair) {
+    error->all(FLERR,
+               std::string("fix overdamped/affine found pair_style ") +
+                   (force->pair_style ? force->pair_style : "none") +
+                   ", expected one of this plugin's: use 'pair_style spherocylinder/harmonic'.");
+  }
+  measure_particles();
+  const double scale = box.scale(update->ntimestep);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const Vec<3> expected = box.position(read_coordinates(i), atom->image[i], scale);
+    bool same = true;
+    for (int k = 0; k < dimension; ++k) {
+      same = same && std::abs(expected[k] - atom->x[i][k]) <= SAME_POSITION * domain->prd[k];
+    }
+    if (!same) set(i);
+  }
+}
+
+void OverdampedFlow::measure_particles()
+{
+  const std::vector<Vec<3>> semi_axes = pair->particle_view().semi_axes(atom->nlocal);
+  mobility.resize(semi_axes.size());
+  for (std::size_t i = 0; i < semi_axes.size(); ++i) {
+    const SubstrateDrag of_particle = pair->drag(semi_axes[i]);
+    const double shift = 1.0 / (drag * of_particle.measure);
+    mobility[i].shift = shift;
+    for (int k = 0; k < 3; ++k) {
+      const double moment = of_particle.moment[k];
+      mobility[i].turn[k] = moment > 0.0 ? shift / moment : 0.0;
+    }
+    mobility[i].step_limit =
+        LARGEST_STEP * std::min({semi_axes[i][0], semi_axes[i][1], semi_axes[i][2]});
+  }
+}
+
+/* ----------------------------------------------------------------------
+   rates
+------------------------------------------------------------------------- */
+
+Rate OverdampedFlow::mobility_times(int i, const Vec<3> &force, const Vec<3> &torque) const
+{
+  const Mobility &m = mobility[i];
+  if (dimension == 2) return {m.shift * force, {{0.0, 0.0, m.turn[2] * torque[2]}}};
+  Vec<3> turn{};
+  const Quaternion q = pair->particle_view().orientation(i);
+  for (int b = 0; b < 3; ++b) {
+    const Vec<3> axis = body_axis(q, b);
+    turn += (m.turn[b] * dot(axis, torque)) * axis;
+  }
+  return {m.shift * force, turn};
+}
+
+Rate OverdampedFlow::present_rate(int i) const
+{
+  return mobility_times(i, vec3(atom->f[i]), vec3(atom->torque[i]));
+}
+
+Rate OverdampedFlow::stored_rate(int i) const
+{
+  const double *from = values[i] + dimension;
+  if (dimension == 2) return {{{from[0], from[1], 0.0}}, {{0.0, 0.0, from[2]}}};
+  return {vec3(from), vec3(from + 3)};
+}
+
+Vec<3> OverdampedFlow::read_coordinates(int i) const
+{
+  return {{values[i][0], values[i][1], dimension == 2 ? 0.0 : values[i][2]}};
+}
+
+Quaternion OverdampedFlow::orientation_at_start(int i) const
+{
+  const double *q = values[i] + dimension + n_rates;
+  if (dimension == 2) return {q[0], 0.0, 0.0, q[1]};
+  return {q[0], q[1], q[2], q[3]};
+}
+
+/* ----------------------------------------------------------------------
+   stages
+------------------------------------------------------------------------- */
+
+void OverdampedFlow::begin_step()
+{
+  if (!pair->particles_turn()) return;
+  pair->particle_view().read_orientations(atom->nlocal);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const Quaternion q = pair->particle_view().orientation(i);
+    double *to = values[i] + dimension + n_rates;
+    to[0] = q.w;
+    if (dimension == 2) {
+      to[1] = q.k;
+    } else {
+      to[1] = q.i;
+      to[2] = q.j;
+      to[3] = q.k;
+    }
+  }
+}
+
+void OverdampedFlow::store_rates(const Stage &stage)
+{
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const Rate rate = present_rate(i);
+    double *to = values[i] + dimension;
+    for (int k = 0; k < dimension; ++k) *to++ = rate.shift[k] / stage.scale;
+    if (dimension == 2) {
+      *to = rate.turn[2];
+    } else {
+      for (int k = 0; k < 3; ++k) *to++ = rate.turn[k];
+    }
+  }
+}
+
+void OverdampedFlow::require_small(int i, double moved) const
+{
+  if (moved <= mobility[i].step_limit) return;  // false for NaN
+  error->one(FLERR, "fix overdamped/affine found that one step moves atom " +
+                        std::to_string(atom->tag[i]) + " by " + std::to_string(moved) +
+                        ", expected at most half its radius: use a smaller timestep.");
+}
+
+void OverdampedFlow::place(int i, const Move &m, bool is_last)
+{
+  const Rate stored = stored_rate(i);
+  Vec<3> shift = (m.h * m.a) * stored.shift, turn = (m.h * m.a) * stored.turn;
+  if (m.b != 0.0) {
+    const Rate present = present_rate(i);
+    shift += (m.h * m.b / m.present.scale) * present.shift;
+    turn += (m.h * m.b) * present.turn;
+  }
+  require_small(i, m.target.scale * norm(shift));
+  const Vec<3> coordinates = read_coordinates(i) + shift;
+  const Vec<3> x = box.position(coordinates, atom->image[i], m.target.scale);
+  for (int k = 0; k < dimension; ++k) {
+    atom->x[i][k] = x[k];
+    if (is_last) values[i][k] = coordinates[k];
+  }
+  if (!pair->particles_turn()) return;
+  const Quaternion q = orientation_at_start(i);
+  pair->particle_view().set_orientation(i, dimension == 2 ? turned(q, Vec<1>{{turn[2]}})
+                                                          : turned(q, turn));
+}
+
+void OverdampedFlow::move(const Move &m, bool is_last)
+{
+  if (pair->particles_turn()) pair->particle_view().read_orientations(atom->nlocal);
+  for (int i = 0; i < atom->nlocal; ++i) place(i, m, is_last);
+  if (pair->particles_turn()) pair->particle_view().write_orientations(atom->nlocal);
+}
+
+void OverdampedFlow::move_by(const Move &m) { move(m, false); }
+void OverdampedFlow::finish_step(const Move &m) { move(m, true); }
+
+void OverdampedFlow::clear_forces()
+{
+  const std::size_t n = atom->nlocal + (force->newton ? atom->nghost : 0);
+  if (n == 0) return;
+  std::memset(&atom->f[0][0], 0, 3 * n * sizeof(double));
+  std::memset(&atom->torque[0][0], 0, 3 * n * sizeof(double));
+}
+
+/// As LAMMPS's own step: atoms change ranks, ghosts and lists are made anew.
+void OverdampedFlow::rebuild_lists()
+{
+  if (modify->n_pre_exchange) modify->pre_exchange();
+  domain->pbc();
+  if (domain->box_change) {
+    domain->reset_box();
+    comm->setup();
+    if (neighbor->style) neighbor->setup_bins();
+  }
+  comm->exchange();
+  comm->borders();
+  if (modify->n_pre_neighbor) modify->pre_neighbor();
+  neighbor->build(1);
+  if (modify->n_post_neighbor) modify->post_neighbor();
+  ++rebuilds;
+}
+
+void OverdampedFlow::evaluate_forces()
+{
+  if (neighbor->check_distance()) {
+    rebuild_lists();
+  } else {
+    comm->forward_comm();
+  }
+  clear_forces();
+  const int no_energy = 0, no_virial = 0;
+  if (modify->n_pre_force) modify->pre_force(no_virial);
+  force->pair->compute(no_energy, no_virial);
+  if (force->newton) comm->reverse_comm();
+  if (modify->n_post_force) modify->post_force(no_virial);
+  ++evaluations;
+}
+
+/* ----------------------------------------------------------------------
+   numbers about the flow
+------------------------------------------------------------------------- */
+
+namespace {
+
+/// A number in (-1, 1) that depends on the atom's ID only, so that ranks and orders do not matter.
+double hashed(std::uint64_t tag, std::uint64_t component)
+{
+  std::uint64_t z = 6 * tag + component + 0x9e3779b97f4a7c15ULL;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  z ^= z >> 31;
+  return 2.0 * static_cast<double>(z >> 11) * 0x1.0p-53 - 1.0;
+}
+
+}  // namespace
+
+double OverdampedFlow::sum(double mine) const
+{
+  double all;
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
+  return all;
+}
+
+int OverdampedFlow::pack_direction(int n, const int *list, double *buf) const
+{
+  for (int k = 0; k < n; ++k) {
+    const Rate &d = direction[list[k]];
+    buf = std::copy_n(d.shift.c, 3, buf);
+    buf = std::copy_n(d.turn.c, 3, buf);
+  }
+  return n * DIRECTION_SIZE;
+}
+
+void OverdampedFlow::unpack_direction(int n, int first, const double *buf)
+{
+  for (int i = first; i < first + n; ++i, buf += DIRECTION_SIZE) {
+    direction[i] = {vec3(buf), vec3(buf + 3)};
+  }
+}
+
+/// Replaces the direction v by mobility * stiffness * v and returns its squared norm in the metric
+/// of the drag, in which that product is symmetric. Uses the force arrays for the sum over bonds.
+double OverdampedFlow::apply_stiffness(const std::vector<LocalBond> &bonds)
+{
+  comm->forward_comm_fix(fix, DIRECTION_SIZE);
+  clear_forces();
+  const auto add = [&](int i, const Vec<3> &force_on, const Vec<3> &torque_on) {
+    for (int k = 0; k < 3; ++k) {
+      atom->f[i][k] += force_on[k];
+      atom->torque[i][k] += torque_on[k];
+    }
+  };
+  for (const LocalBond &b : bonds) {
+    const Rate &of_i = direction[b.i], &of_j = direction[b.j];
+    const Vec<3> lever_i = cross(b.arm_i, b.normal), lever_j = cross(b.arm_j, b.normal);
+    const double opening =
+        dot(b.normal, of_i.shift - of_j.shift) + dot(lever_i, of_i.turn) - dot(lever_j, of_j.turn);
+    const double tension = b.stiffness * opening;
+    add(b.i, tension * b.normal, tension * lever_i);
+    if (force->newton_pair || b.j < atom->nlocal) {
+      add(b.j, -tension * b.normal, -tension * lever_j);
+    }
+  }
+  if (force->newton) comm->reverse_comm();
+  double norm_sq_mine = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    direction[i] = present_rate(i);
+    norm_sq_mine +=
+        dot(direction[i].shift, vec3(atom->f[i])) + dot(direction[i].turn, vec3(atom->torque[i]));
+  }
+  return sum(norm_sq_mine);
+}
+
+double OverdampedFlow::largest_rate()
+{
+  const std::vector<LocalBond> bonds = pair->bonds();
+  const int nlocal = atom->nlocal;
+  pair->particle_view().read_orientations(nlocal);
+  std::vector<Rate> forces(nlocal);
+  direction.assign(nlocal + atom->nghost, {});
+  double norm_sq_mine = 0.0;
+  for (int i = 0; i < nlocal; ++i) {
+    forces[i] = {vec3(atom->f[i]), vec3(atom->torque[i])};
+    Vec<3> force_on{}, torque_on{};
+    for (int k = 0; k < dimension; ++k) force_on[k] = hashed(atom->tag[i], k);
+    for (int k = dimension == 2 ? 2 : 0; k < 3; ++k) torque_on[k] = hashed(atom->tag[i], 3 + k);
+    direction[i] = mobility_times(i, force_on, torque_on);
+    norm_sq_mine += dot(direction[i].shift, force_on) + dot(direction[i].turn, torque_on);
+  }
+
+  double norm_sq_now = sum(norm_sq_mine), rate = 0.0;
+  for (int k = 0; k < POWER_ITERATIONS && norm_sq_now > 0.0; ++k) {
+    const double scale = 1.0 / std::sqrt(norm_sq_now);
+    for (int i = 0; i < nlocal; ++i) {
+      direction[i] = {scale * direction[i].shift, scale * direction[i].turn};
+    }
+    norm_sq_now = apply_stiffness(bonds);
+    rate = std::max(rate, std::sqrt(norm_sq_now));
+  }
+  for (int i = 0; i < nlocal; ++i) {
+    std::copy_n(forces[i].shift.c, 3, atom->f[i]);
+    std::copy_n(forces[i].turn.c, 3, atom->torque[i]);
+  }
+  direction = {};
+  return rate;
+}
+
+double OverdampedFlow::dissipated_power() const
+{
+  pair->particle_view().read_orientations(atom->nlocal);
+  double mine = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const Rate rate = present_rate(i);
+    mine += dot(rate.shift, vec3(atom->f[i])) + dot(rate.turn, vec3(atom->torque[i]));
+  }
+  return sum(mine);
+}
+
+/* ----------------------------------------------------------------------
+   storage
+------------------------------------------------------------------------- */
+
+void OverdampedFlow::grow(int nmax)
+{
+  memory->grow(values, nmax, width(), "overdamped/affine:values");
+}
+
+void OverdampedFlow::copy(int from, int to) { std::copy_n(values[from], width(), values[to]); }
+
+void OverdampedFlow::set(int i)
+{
+  const Vec<3> y = box.reference(atom->x[i], atom->image[i], box.scale(update->ntimestep));
+  std::fill_n(values[i], width(), 0.0);
+  std::copy_n(y.c, dimension, values[i]);
+}
+
+int OverdampedFlow::pack(int i, double *buf) const
+{
+  std::copy_n(values[i], width(), buf);
+  return width();
+}
+
+int OverdampedFlow::unpack(int i, const double *buf)
+{
+  std::copy_n(buf, width(), values[i]);
+  return width();
+}
+
+double OverdampedFlow::memory_usage() const
+{
+  return static_cast<double>(atom->nmax * width() * sizeof(double) +
+                             mobility.capacity() * sizeof(Mobility));
+}
+
+}  // namespace jamshape

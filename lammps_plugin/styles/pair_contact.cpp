@@ -1,0 +1,307 @@
+#include "pair_contact.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "force.h"
+#include "memory.h"
+#include "neighbor.h"
+#include "update.h"
+#include "utils.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <mpi.h>
+
+namespace jamshape {
+
+using LAMMPS_NS::bigint;
+
+PairContact::PairContact(LAMMPS_NS::LAMMPS *lmp) :
+    Pair(lmp), particles(lmp), k_e(nullptr), any_turns(true)
+{
+  no_virial_fdotr_compute = 1;  // sum_i x_i F_i loses digits that the pairwise sum keeps
+  single_enable = 0;
+  restartinfo = 1;
+  centroidstressflag = LAMMPS_NS::CENTROID_NOTAVAIL;
+}
+
+PairContact::~PairContact()
+{
+  if (!allocated) return;
+  memory->destroy(setflag);
+  memory->destroy(cutsq);
+  memory->destroy(k_e);
+}
+
+void PairContact::allocate()
+{
+  const int n = atom->ntypes + 1;
+  memory->create(setflag, n, n, "pair:setflag");
+  memory->create(cutsq, n, n, "pair:cutsq");
+  memory->create(k_e, n, n, "pair:k_e");
+  for (int i = 0; i < n; ++i) std::fill_n(setflag[i], n, 0);
+  allocated = 1;
+}
+
+void PairContact::coeff(int narg, char **arg)
+{
+  if (narg != 3) {
+    error->all(FLERR, "pair_coeff of " + style_name() + " found " + std::to_string(narg) +
+                          " arguments, expected 'I J k_e'.");
+  }
+  if (!allocated) allocate();
+  int ilo, ihi, jlo, jhi;
+  LAMMPS_NS::utils::bounds(FLERR, std::string(arg[0]), 1, atom->ntypes, ilo, ihi, error);
+  LAMMPS_NS::utils::bounds(FLERR, std::string(arg[1]), 1, atom->ntypes, jlo, jhi, error);
+  const double stiffness = LAMMPS_NS::utils::numeric(FLERR, arg[2], false, lmp);
+  if (!(stiffness > 0.0) || !std::isfinite(stiffness)) {
+    error->all(FLERR,
+               "pair_coeff of " + style_name() + " found k_e = " + arg[2] +
+                   ", expected a positive energy: give the contacts a stiffness such as 1.0.");
+  }
+  for (int i = ilo; i <= ihi; ++i) {
+    for (int j = std::max(jlo, i); j <= jhi; ++j) {
+      k_e[i][j] = k_e[j][i] = stiffness;
+      setflag[i][j] = 1;
+    }
+  }
+}
+
+/// The largest particle of each type, and whether any particle can turn. Sizes are per particle, so
+/// cutoffs follow from the particles themselves, never from an input that could be too short.
+void PairContact::measure_particles()
+{
+  const std::vector<Vec<3>> semi_axes = particles.semi_axes(atom->nlocal);
+  std::vector<double> mine(atom->ntypes + 1, 0.0);
+  int turning = 0;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!is_valid_shape(semi_axes[i])) {
+      const Vec<3> diameters = 2.0 * semi_axes[i];
+      error->one(FLERR, style_name() + " found atom " + std::to_string(atom->tag[i]) +
+                            " with diameters " + std::to_string(diameters[0]) + " " +
+                            std::to_string(diameters[1]) + " " + std::to_string(diameters[2]) +
+                            ", expected that " + shape_rule() + ": correct its shape.");
+    }
+    double &largest = mine[atom->type[i]];
+    largest = std::max({largest, semi_axes[i][0], semi_axes[i][1], semi_axes[i][2]});
+    turning |= turns(semi_axes[i]);
+  }
+  bounding_radius.resize(mine.size());
+  MPI_Allreduce(mine.data(), bounding_radius.data(), static_cast<int>(mine.size()), MPI_DOUBLE,
+                MPI_MAX, world);
+  int anywhere;
+  MPI_Allreduce(&turning, &anywhere, 1, MPI_INT, MPI_MAX, world);
+  any_turns = anywhere;
+}
+
+void PairContact::init_style()
+{
+  particles.require_ellipsoids("pair_style " + style_name());
+  if (domain->triclinic) {
+    error->all(FLERR,
+               "pair_style " + style_name() +
+                   " found a triclinic box, expected an orthogonal one: use a box without tilt.");
+  }
+  measure_particles();
+  neighbor->request(this, instance_me);
+  if (update->whichflag == 2 && any_turns) request_minimiser();
+}
+
+void PairContact::request_minimiser()
+{
+  const std::string style = update->minimize_style;
+  if (style != "cg" && style != "sd") {
+    error->all(FLERR, "min_style " + style +
+                          " cannot turn particles: use 'min_style cg' or 'min_style "
+                          "sd', which relax positions and orientations together.");
+  }
+  const double max_move = 0.1;  // as min_modify dmax: rotations are lengths here too
+  update->minimize->request(this, rotations(), max_move);
+}
+
+double PairContact::init_one(int i, int j)
+{
+  if (!setflag[i][j]) {
+    if (!setflag[i][i] || !setflag[j][j])
+      error->all(FLERR, std::string("All pair coeffs are not set"));
+    k_e[i][j] = std::sqrt(k_e[i][i] * k_e[j][j]);
+  }
+  k_e[j][i] = k_e[i][j];
+  return bounding_radius[i] + bounding_radius[j];
+}
+
+void PairContact::setup()
+{
+  const double needed = cutforce + neighbor->skin;
+  for (int k = 0; k < domain->dimension; ++k) {
+    if (comm->mode == LAMMPS_NS::Comm::SINGLE && comm->cutghost[k] < needed) {
+      error->all(FLERR, "pair_style " + style_name() + " found a ghost cutoff of " +
+                            std::to_string(comm->cutghost[k]) + ", expected at least " +
+                            std::to_string(needed) +
+                            ": raise it with 'comm_modify cutoff' so that no contact is missed.");
+    }
+  }
+}
+
+void PairContact::require_same_bounds(const std::vector<Vec<3>> &semi_axes) const
+{
+  for (std::size_t i = 0; i < semi_axes.size(); ++i) {
+    const double largest = std::max({semi_axes[i][0], semi_axes[i][1], semi_axes[i][2]});
+    if (largest > bounding_radius[atom->type[i]]) {
+      error->one(FLERR,
+                 "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+                     " larger than at the start of the run, so the ghost cutoff is too short: "
+                     "do not use 'pre no' in the run after changing shapes.");
+    }
+  }
+}
+
+void PairContact::require_in_plane(int n) const
+{
+  for (int i = 0; i < n; ++i) {
+    const Quaternion q = particles.orientation(i);
+    if (q.i != 0.0 || q.j != 0.0) {
+      error->one(FLERR,
+                 "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+                     " turned out of the plane, expected a quaternion (w, 0, 0, k) in dimension "
+                     "2: turn it about z only.");
+    }
+  }
+}
+
+void PairContact::stop_at_crossing(int i, int j)
+{
+  error->one(FLERR,
+             "pair_style " + style_name() + " found atoms " + std::to_string(atom->tag[i]) +
+                 " and " + std::to_string(atom->tag[j]) +
+                 " with crossing spines or coinciding centres, where no contact force exists: "
+                 "start from a state without overlap, or use a smaller timestep.");
+}
+
+bool PairContact::is_mine(int i, int j) const
+{
+  if (force->newton_pair || j < atom->nlocal) return true;
+  if (atom->tag[i] != atom->tag[j]) return atom->tag[i] < atom->tag[j];
+  // A particle and its own image: both directions of the image are in the list.
+  const double *xi = atom->x[i], *xj = atom->x[j];
+  for (int k = 0; k < 3; ++k) {
+    if (xi[k] != xj[k]) return xi[k] < xj[k];
+  }
+  return false;
+}
+
+std::vector<LocalBond> PairContact::reported_bonds()
+{
+  std::vector<LocalBond> reported;
+  for (const LocalBond &b : bonds()) {
+    if (!is_mine(b.i, b.j)) continue;
+    if (atom->tag[b.i] <= atom->tag[b.j]) {
+      reported.push_back(b);
+    } else {
+      reported.push_back({b.j, b.i, b.kind, b.first_of_contact, -b.normal, -b.force, b.arm_j,
+                          b.arm_i, b.distance, b.reach, b.energy, b.stiffness, b.on_side_j,
+                          b.on_side_i});
+    }
+  }
+  return reported;
+}
+
+/* ---------------------------------------------------------------------- */
+
+void PairContact::write_restart(FILE *fp)
+{
+  for (int i = 1; i <= atom->ntypes; ++i) {
+    for (int j = i; j <= atom->ntypes; ++j) {
+      fwrite(&setflag[i][j], sizeof(int), 1, fp);
+      fwrite(&k_e[i][j], sizeof(double), 1, fp);
+    }
+  }
+}
+
+void PairContact::read_restart(FILE *fp)
+{
+  allocate();
+  for (int i = 1; i <= atom->ntypes; ++i) {
+    for (int j = i; j <= atom->ntypes; ++j) {
+      if (comm->me == 0) {
+        LAMMPS_NS::utils::sfread(FLERR, &setflag[i][j], sizeof(int), 1, fp, nullptr, error);
+        LAMMPS_NS::utils::sfread(FLERR, &k_e[i][j], sizeof(double), 1, fp, nullptr, error);
+      }
+      MPI_Bcast(&setflag[i][j], 1, MPI_INT, 0, world);
+      MPI_Bcast(&k_e[i][j], 1, MPI_DOUBLE, 0, world);
+      k_e[j][i] = k_e[i][j];
+    }
+  }
+}
+
+double PairContact::memory_usage()
+{
+  return Pair::memory_usage() + particles.memory_usage() +
+         static_cast<double>((x_extra.capacity() + f_extra.capacity() + gyration.capacity()) *
+                             sizeof(double));
+}
+
+/* ----------------------------------------------------------------------
+   minimisation: the extra coordinates of a particle are its rotation vector (its angle in 2D) times
+   a length, a function of its orientation alone, so that they survive migration between ranks
+------------------------------------------------------------------------- */
+
+int PairContact::rotations() const { return domain->dimension == 2 ? 1 : 3; }
+
+void PairContact::min_xf_pointers(int, double **x, double **f)
+{
+  const std::size_t n = static_cast<std::size_t>(atom->nlocal);
+  x_extra.resize(std::max<std::size_t>(1, n * rotations()));
+  f_extra.resize(x_extra.size());
+  const std::vector<Vec<3>> semi_axes = particles.semi_axes(atom->nlocal);
+  gyration.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec<3> moment = drag(semi_axes[i]).moment;
+    gyration[i] = std::sqrt(std::max({moment[0], moment[1], moment[2]}));
+  }
+  *x = x_extra.data();
+  *f = f_extra.data();
+}
+
+void PairContact::min_xf_get(int)
+{
+  double *x = nullptr, *f = nullptr;
+  min_xf_pointers(0, &x, &f);
+  const int nlocal = atom->nlocal;
+  particles.read_orientations(nlocal);
+  for (int i = 0; i < nlocal; ++i) {
+    const Quaternion q = particles.orientation(i);
+    const double *torque = atom->torque[i];
+    if (rotations() == 1) {
+      x[i] = gyration[i] * 2.0 * std::atan2(q.k, q.w);
+      f[i] = torque[2] / gyration[i];
+      continue;
+    }
+    const Vec<3> v = rotation_vector(q);
+    const Vec<3> gradient = torque_on_rotation_vector(v, {{torque[0], torque[1], torque[2]}});
+    for (int k = 0; k < 3; ++k) {
+      x[3 * i + k] = gyration[i] * v[k];
+      f[3 * i + k] = gradient[k] / gyration[i];
+    }
+  }
+}
+
+void PairContact::min_x_set(int)
+{
+  const int nlocal = atom->nlocal;
+  particles.read_orientations(nlocal);
+  for (int i = 0; i < nlocal; ++i) {
+    const double scale = 1.0 / gyration[i];
+    const Quaternion q =
+        rotations() == 1
+            ? rotation_by(Vec<1>{{scale * x_extra[i]}})
+            : rotation_by(scale * Vec<3>{{x_extra[3 * i], x_extra[3 * i + 1], x_extra[3 * i + 2]}});
+    particles.set_orientation(i, q);
+  }
+  particles.write_orientations(nlocal);
+}
+
+}  // namespace jamshape

@@ -1,0 +1,84 @@
+#pragma once
+
+#include "contact/contact.hpp"
+#include "contact/vec.hpp"
+
+#include "pair.h"
+#include "particle_view.h"
+
+#include <string>
+#include <vector>
+
+namespace jamshape {
+
+/// One bond between own atom i and own or ghost atom j (local indices); the normal points into i.
+struct LocalBond {
+  int i, j;
+  ContactKind kind;
+  bool first_of_contact;
+  Vec<3> normal, force, arm_i, arm_j;
+  double distance, reach, energy, stiffness;
+  bool on_side_i, on_side_j;
+};
+
+/// What every pair style of ours is, whatever its shape: coefficients, cutoffs from the particles'
+/// sizes, restarts, and orientation as extra degrees of freedom of LAMMPS's minimisers. The loop
+/// over contacts is in PairContactOf.
+class PairContact : public LAMMPS_NS::Pair {
+ public:
+  explicit PairContact(LAMMPS_NS::LAMMPS *lmp);
+  ~PairContact() override;
+
+  void coeff(int narg, char **arg) override;
+  void init_style() override;
+  double init_one(int i, int j) override;
+  void setup() override;
+  void write_restart(FILE *fp) override;
+  void read_restart(FILE *fp) override;
+  double memory_usage() override;
+
+  void min_xf_pointers(int ignore, double **x, double **f) override;
+  void min_xf_get(int ignore) override;
+  void min_x_set(int ignore) override;
+
+  /// Drag coefficients of a particle, and whether a contact can turn any particle of this scene.
+  virtual SubstrateDrag drag(const Vec<3> &semi_axes) const = 0;
+  bool particles_turn() const { return any_turns; }
+
+  /// All bonds of this rank's pairs at the current positions.
+  virtual std::vector<LocalBond> bonds() = 0;
+  /// The same, each bond once over all ranks and with tag[i] <= tag[j].
+  std::vector<LocalBond> reported_bonds();
+
+  ParticleView &particle_view() { return particles; }
+
+ protected:
+  ParticleView particles;
+  double **k_e;
+  bool any_turns;
+
+  /// Names the style in messages; checks one shape and says what it should be.
+  virtual std::string style_name() const = 0;
+  virtual bool is_valid_shape(const Vec<3> &semi_axes) const = 0;
+  virtual std::string shape_rule() const = 0;
+  virtual bool turns(const Vec<3> &semi_axes) const = 0;
+
+  [[noreturn]] void stop_at_crossing(int i, int j);
+  void require_same_bounds(const std::vector<Vec<3>> &semi_axes) const;
+  void require_in_plane(int n) const;
+
+  /// Whether the pair (own i, j) is this rank's to report: with newton off both owners see it.
+  bool is_mine(int i, int j) const;
+
+ private:
+  std::vector<double> bounding_radius;   // per type: the largest of its particles
+  std::vector<double> x_extra, f_extra;  // rotations as lengths, for the minimiser
+  std::vector<double> gyration;          // length per radian of each own particle
+
+  void allocate();
+  void measure_particles();
+  void request_minimiser();
+  int rotations() const;
+};
+
+}  // namespace jamshape

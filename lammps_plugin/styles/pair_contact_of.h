@@ -1,0 +1,300 @@
+#pragma once
+
+#include "contact/contact.hpp"
+#include "contact/rotation.hpp"
+#include "contact/vec.hpp"
+
+#include "atom.h"
+#include "domain.h"
+#include "force.h"
+#include "neigh_list.h"
+#include "neighbor.h"
+#include "pair_contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+namespace jamshape {
+
+/// The loop over contacts, once for all shapes, in 2D and 3D. LAMMPS's list holds pairs of bounding
+/// spheres; from it this class keeps the pairs whose surfaces are closer than a margin, and looks
+/// at LAMMPS's list again when particles have moved, turned or been pushed together by that margin.
+template <class Model> class PairContactOf : public PairContact {
+ public:
+  using PairContact::PairContact;
+
+  void init_list(int id, LAMMPS_NS::NeighList *neigh_list) override
+  {
+    PairContact::init_list(id, neigh_list);
+    margin = MARGIN_OVER_SKIN * neighbor->skin;
+  }
+
+  void compute(int eflag, int vflag) override
+  {
+    ev_init(eflag, vflag);
+    if (domain->dimension == 2) {
+      compute_in<2>();
+    } else {
+      compute_in<3>();
+    }
+  }
+
+  std::vector<LocalBond> bonds() override
+  {
+    return domain->dimension == 2 ? bonds_in<2>() : bonds_in<3>();
+  }
+
+  SubstrateDrag drag(const Vec<3> &semi_axes) const override
+  {
+    const auto shape = *Model::shape_from(semi_axes);
+    return domain->dimension == 2 ? Model::template drag<2>(shape) : Model::template drag<3>(shape);
+  }
+
+  double memory_usage() override
+  {
+    return PairContact::memory_usage() + in_2d.memory_usage() + in_3d.memory_usage() +
+           static_cast<double>((first.capacity() + partner.capacity()) * sizeof(int));
+  }
+
+ protected:
+  typename Model::Options options{};
+
+  bool is_valid_shape(const Vec<3> &semi_axes) const override
+  {
+    return Model::shape_from(semi_axes).has_value();
+  }
+  std::string shape_rule() const override { return Model::SHAPE_RULE; }
+  bool turns(const Vec<3> &semi_axes) const override
+  {
+    return Model::turns(*Model::shape_from(semi_axes));
+  }
+
+ private:
+  // A small margin keeps the list short, a large one keeps it longer; flat optimum near one half.
+  static constexpr double MARGIN_OVER_SKIN = 0.5;
+
+  template <int D> using Body = typename Model::template Body<D>;
+
+  typename Model::Law law_of(int i, int j) const
+  {
+    return Model::law(options, k_e[atom->type[i]][atom->type[j]]);
+  }
+
+  /// Where a particle was when the pairs were last chosen.
+  template <int D> struct Pose {
+    Vec<D> centre, axis;
+  };
+
+  template <int D> struct Bodies {
+    std::vector<Body<D>> now;
+    std::vector<Pose<D>> then;
+    Vec<D> box_then;
+
+    double memory_usage() const
+    {
+      return static_cast<double>(now.capacity() * sizeof(Body<D>) +
+                                 then.capacity() * sizeof(Pose<D>));
+    }
+  };
+
+  Bodies<2> in_2d;
+  Bodies<3> in_3d;
+  double margin = 0.0;
+  std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
+
+  template <int D> Bodies<D> &all()
+  {
+    if constexpr (D == 2) {
+      return in_2d;
+    } else {
+      return in_3d;
+    }
+  }
+
+  /* ---------------------------------------------------------------------- */
+
+  template <int D> void compute_in()
+  {
+    update_pairs<D>();
+    if (any_turns) {
+      evflag ? evaluate<D, true, true>() : evaluate<D, true, false>();
+    } else {
+      evflag ? evaluate<D, false, true>() : evaluate<D, false, false>();
+    }
+  }
+
+  template <int D, bool TURNS, bool TALLY> void evaluate()
+  {
+    const std::vector<Body<D>> &bodies = all<D>().now;
+    const int nlocal = atom->nlocal, newton = force->newton_pair;
+    double **const f = atom->f, **const torque = atom->torque;
+    for (int n = 0; n < list->inum; ++n) {
+      const int i = list->ilist[n];
+      const Body<D> body = bodies[i];
+      Vec<D> force_i{};
+      Torque<D> torque_i{};
+      for (int k = first[n]; k < first[n + 1]; ++k) {
+        const int j = partner[k];
+        const Contact<D> contact = contact_of(body, bodies[j], law_of(i, j));
+        if (contact.status == ContactStatus::APART) continue;
+        if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
+        force_i += contact.force;
+        if constexpr (TURNS) torque_i += contact.torque_i;
+        if (newton || j < nlocal) {
+          add_to<D>(f[j], -contact.force);
+          if constexpr (TURNS) add_torque<D>(torque[j], contact.torque_j);
+        }
+        if constexpr (TALLY) tally<D>(i, j, contact, body.centre - bodies[j].centre);
+      }
+      add_to<D>(f[i], force_i);
+      if constexpr (TURNS) add_torque<D>(torque[i], torque_i);
+    }
+  }
+
+  template <int D> static void add_to(double *to, const Vec<D> &v)
+  {
+    for (int k = 0; k < D; ++k) to[k] += v[k];
+  }
+
+  template <int D> static void add_torque(double *to, const Torque<D> &v)
+  {
+    if constexpr (D == 2) {
+      to[2] += v[0];
+    } else {
+      add_to<3>(to, v);
+    }
+  }
+
+  template <int D> void tally(int i, int j, const Contact<D> &contact, const Vec<D> &r)
+  {
+    const double fz = D == 2 ? 0.0 : contact.force[D - 1], z = D == 2 ? 0.0 : r[D - 1];
+    ev_tally_xyz(i, j, atom->nlocal, force->newton_pair, contact.energy, 0.0, contact.force[0],
+                 contact.force[1], fz, r[0], r[1], z);
+  }
+
+  /* ----------------------------------------------------------------------
+     close pairs
+  ------------------------------------------------------------------------- */
+
+  template <int D> void update_pairs()
+  {
+    // LAMMPS rebuilt its list, and with it the order of the atoms, when `ago` is 0.
+    if (neighbor->ago == 0 || static_cast<int>(all<D>().now.size()) != n_all()) {
+      read_shapes<D>();
+      read_poses<D>();
+      choose_pairs<D>();
+    } else {
+      read_poses<D>();
+      if (have_outrun_margin<D>()) choose_pairs<D>();
+    }
+  }
+
+  int n_all() const { return atom->nlocal + atom->nghost; }
+
+  template <int D> void read_shapes()
+  {
+    const std::vector<Vec<3>> semi_axes = particles.semi_axes(n_all());
+    require_same_bounds(semi_axes);
+    std::vector<Body<D>> &bodies = all<D>().now;
+    bodies.resize(semi_axes.size());
+    for (std::size_t i = 0; i < semi_axes.size(); ++i) {
+      bodies[i] = Model::template body<D>(*Model::shape_from(semi_axes[i]));
+    }
+  }
+
+  template <int D> void read_poses()
+  {
+    std::vector<Body<D>> &bodies = all<D>().now;
+    const int n = n_all();
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < D; ++k) bodies[i].centre[k] = atom->x[i][k];
+    }
+    if (!any_turns) return;
+    particles.read_orientations(n);
+    for (int i = 0; i < n; ++i) Model::template turn_to<D>(bodies[i], particles.orientation(i));
+  }
+
+  template <int D> void choose_pairs()
+  {
+    Bodies<D> &bodies = all<D>();
+    if (D == 2 && any_turns) require_in_plane(atom->nlocal);
+    first.assign(1, 0);
+    partner.clear();
+    for (int n = 0; n < list->inum; ++n) {
+      const int i = list->ilist[n];
+      const int *const neighbours = list->firstneigh[i];
+      for (int k = 0; k < list->numneigh[i]; ++k) {
+        const int j = neighbours[k] & NEIGHMASK;
+        if (Model::template closer_than<D>(margin, bodies.now[i], bodies.now[j]))
+          partner.push_back(j);
+      }
+      first.push_back(static_cast<int>(partner.size()));
+    }
+    bodies.then.resize(bodies.now.size());
+    for (std::size_t i = 0; i < bodies.now.size(); ++i) {
+      bodies.then[i] = {bodies.now[i].centre, bodies.now[i].axis};
+    }
+    for (int k = 0; k < D; ++k) bodies.box_then[k] = domain->prd[k];
+  }
+
+  /// Whether two particles may have come closer by the margin: their own motion on top of the box's
+  /// affine one, which takes a gap g to at least (1 - strain) g - strain * (sum of bounding radii).
+  template <int D> bool have_outrun_margin()
+  {
+    const Bodies<D> &bodies = all<D>();
+    Vec<D> centre, scale;
+    double strain = 0.0;
+    for (int k = 0; k < D; ++k) {
+      centre[k] = 0.5 * (domain->boxlo[k] + domain->boxhi[k]);
+      scale[k] = domain->prd[k] / bodies.box_then[k];
+      strain = std::max(strain, std::abs(1.0 - scale[k]));
+    }
+    const double left = margin - strain * (cutforce + margin);
+    if (left <= 0.0) return true;
+    double most_sq = 0.0;
+    for (std::size_t i = 0; i < bodies.now.size(); ++i) {
+      Vec<D> shift;
+      for (int k = 0; k < D; ++k) {
+        shift[k] =
+            bodies.now[i].centre[k] - centre[k] - scale[k] * (bodies.then[i].centre[k] - centre[k]);
+      }
+      most_sq = std::max(most_sq,
+                         Model::template motion_sq<D>(shift, bodies.now[i], bodies.then[i].axis));
+    }
+    return 4.0 * most_sq >= left * left;
+  }
+
+  /* ---------------------------------------------------------------------- */
+
+  template <int D> std::vector<LocalBond> bonds_in()
+  {
+    const std::vector<Body<D>> &bodies = all<D>().now;
+    std::vector<LocalBond> found;
+    for (int n = 0; n < list->inum; ++n) {
+      const int i = list->ilist[n];
+      for (int k = first[n]; k < first[n + 1]; ++k) {
+        const int j = partner[k];
+        const Contact<D> contact = contact_of(bodies[i], bodies[j], law_of(i, j));
+        if (contact.status != ContactStatus::TOUCHING) continue;
+        const Vec<D> r = bodies[i].centre - bodies[j].centre;
+        for (int b = 0; b < contact.n_bonds; ++b) {
+          const Bond<D> &bond = contact.bond[b];
+          found.push_back({i, j, contact.kind, b == 0, in_space<D>(bond.normal),
+                           in_space<D>(bond.force), in_space<D>(bond.arm_i),
+                           in_space<D>(bond.arm_i + r), bond.distance, bond.reach, bond.energy,
+                           bond.stiffness, bond.on_side_i, bond.on_side_j});
+        }
+      }
+    }
+    return found;
+  }
+
+  template <int D> static Vec<3> in_space(const Vec<D> &v)
+  {
+    return {{v[0], v[1], D == 2 ? 0.0 : v[D - 1]}};
+  }
+};
+
+}  // namespace jamshape

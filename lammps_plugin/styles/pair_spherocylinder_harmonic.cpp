@@ -1,0 +1,51 @@
+#include "pair_spherocylinder_harmonic.h"
+
+#include "comm.h"
+#include "error.h"
+#include "utils.h"
+
+#include <mpi.h>
+#include <string>
+
+namespace jamshape {
+
+void PairSpherocylinderHarmonic::settings(int narg, char **arg)
+{
+  const std::string keyword = narg == 2 ? arg[0] : "", value = narg == 2 ? arg[1] : "";
+  if (keyword != "sides" || (value != "one" && value != "two")) {
+    std::string found;
+    for (int k = 0; k < narg; ++k) found += std::string(" ") + arg[k];
+    error->all(FLERR, "pair_style spherocylinder/harmonic found '" + found +
+                          "', expected 'sides one' (the dynamics' single bond) or 'sides two' (two "
+                          "bonds for side-to-side contacts).");
+  }
+  options = value == "one" ? Sides::ONE : Sides::TWO;
+}
+
+void PairSpherocylinderHarmonic::write_restart(FILE *fp)
+{
+  write_restart_settings(fp);
+  PairContactOf::write_restart(fp);
+}
+
+void PairSpherocylinderHarmonic::read_restart(FILE *fp)
+{
+  read_restart_settings(fp);
+  PairContactOf::read_restart(fp);
+}
+
+void PairSpherocylinderHarmonic::write_restart_settings(FILE *fp)
+{
+  const int value = static_cast<int>(options);
+  fwrite(&value, sizeof(int), 1, fp);
+}
+
+void PairSpherocylinderHarmonic::read_restart_settings(FILE *fp)
+{
+  int value = 0;
+  if (comm->me == 0) LAMMPS_NS::utils::sfread(FLERR, &value, sizeof(int), 1, fp, nullptr, error);
+  MPI_Bcast(&value, 1, MPI_INT, 0, world);
+  options = static_cast<Sides>(value);
+}
+
+}  // namespace jamshape

@@ -1,0 +1,24 @@
+#pragma once
+
+#include "contact/spherocylinder.hpp"
+
+#include "pair_contact_of.h"
+
+namespace jamshape {
+
+/// pair_style spherocylinder/harmonic sides one|two; pair_coeff I J k_e
+class PairSpherocylinderHarmonic : public PairContactOf<SpherocylinderModel> {
+ public:
+  using PairContactOf::PairContactOf;
+
+  void settings(int narg, char **arg) override;
+  void write_restart(FILE *fp) override;
+  void read_restart(FILE *fp) override;
+  void write_restart_settings(FILE *fp) override;
+  void read_restart_settings(FILE *fp) override;
+
+ protected:
+  std::string style_name() const override { return "spherocylinder/harmonic"; }
+};
+
+}  // namespace jamshape

@@ -1,0 +1,59 @@
+// The plugin's table of contents: one line a style, and how LAMMPS gets to know them.
+
+#include "compat.h"
+#include "compute_contact_local.h"
+#include "compute_packing.h"
+#include "error.h"
+#include "fix_overdamped_affine.h"
+#include "force.h"
+#include "modify.h"
+#include "pair_spherocylinder_harmonic.h"
+
+#include <string>
+
+namespace {
+
+using LAMMPS_NS::LAMMPS;
+
+template <class T> LAMMPS_NS::Pair *pair(LAMMPS *lmp) { return new T(lmp); }
+template <class T> LAMMPS_NS::Fix *fix(LAMMPS *lmp, int narg, char **arg)
+{
+  return new T(lmp, narg, arg);
+}
+template <class T> LAMMPS_NS::Compute *compute(LAMMPS *lmp, int narg, char **arg)
+{
+  return new T(lmp, narg, arg);
+}
+
+void add_styles(LAMMPS *lmp)
+{
+  using namespace jamshape;
+  (*lmp->force->pair_map)["spherocylinder/harmonic"] = pair<PairSpherocylinderHarmonic>;
+  (*lmp->modify->fix_map)["overdamped/affine"] = fix<FixOverdampedAffine>;
+  (*lmp->modify->compute_map)["contact/local"] = compute<ComputeContactLocal>;
+  (*lmp->modify->compute_map)["packing"] = compute<ComputePacking>;
+}
+
+}  // namespace
+
+extern "C" {
+
+/// The LAMMPS version that this binary was compiled for, as an integer such as 20210929. (A
+/// variable, so that a test can pretend to be another build.)
+int jamshape_built_for = JAMSHAPE_LAMMPS_VERSION;
+
+/// Adds the styles of this plugin to a LAMMPS instance; stops it with one sentence when it is of
+/// another version than the one compiled for, whose objects are laid out differently.
+void jamshape_register(void *handle)
+{
+  auto *lmp = static_cast<LAMMPS *>(handle);
+  const int found = lammps_version(handle);
+  if (found != jamshape_built_for) {
+    lmp->error->all(FLERR,
+                    "jamshape found LAMMPS version " + std::to_string(found) + ", expected " +
+                        std::to_string(jamshape_built_for) +
+                        " for which this plugin was built: build jamshape again with this LAMMPS.");
+  }
+  add_styles(lmp);
+}
+}

@@ -1,0 +1,292 @@
+"""The state of a packing: one immutable record that every reader returns and every writer takes."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SHAPE_STYLES = ("spherocylinder", "superellipsoid")
+
+# Loose enough for the six digits of a text dump, tight enough to catch swapped columns.
+UNIT_QUATERNION_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Orthogonal periodic box.
+
+    Parameters
+    ----------
+    lo : (D,) array of float64, [length]
+        Lower corner.
+    edges : (D,) array of float64, [length]
+        Edge lengths.
+
+    Raises
+    ------
+    ValueError
+        If D is neither 2 nor 3, a number is not finite, or an edge is not positive.
+    """
+
+    lo: FloatArray
+    edges: FloatArray
+
+    def __post_init__(self) -> None:
+        shape = np.shape(self.edges)
+        if shape not in {(2,), (3,)}:
+            msg = f"box edges have shape {shape}, expected (2,) or (3,)"
+            raise ValueError(msg)
+        for name in ("lo", "edges"):
+            object.__setattr__(self, name, _floats(f"box {name}", getattr(self, name), shape))
+        if not (self.edges > 0).all():
+            msg = f"box edges are {self.edges.tolist()}, expected positive lengths"
+            raise ValueError(msg)
+
+    @property
+    def dimension(self) -> int:
+        """Number of dimensions, 2 or 3."""
+        return len(self.edges)
+
+    @property
+    def volume(self) -> float:
+        """Area in 2D, volume in 3D, [length^D]."""
+        return float(np.prod(self.edges))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Packing:
+    """Particles in a periodic box.
+
+    Arrays are copied and made read-only; use `with_` to change one.
+
+    Parameters
+    ----------
+    position : (N, D) array of float64, [length]
+    orientation : (N,) or (N, 4) array of float64
+        Angle of the body's x axis in radians in 2D, unit quaternion w i j k in 3D.
+    diameters : (N, 3) array of float64, [length]
+        Shape columns of LAMMPS: (2(A+R), 2R, 2R) for a spherocylinder, three equal for a disc,
+        (2a, 2b, 2c) for a superellipsoid.
+    species : (N,) array of int64
+        LAMMPS types, from 1.
+    id : (N,) array of int64
+        LAMMPS IDs, from 1, each once.
+    box : Box
+    image : (N, D) array of int64, optional
+        Periodic image counts; zeros when left out.
+    shape_style : str
+        One of `SHAPE_STYLES`.
+    step : int
+    time : float, [time]
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, a number is not finite, a diameter is not positive, an ID is there
+        twice, or the diameters are not those of the shape style.
+    """
+
+    position: FloatArray
+    orientation: FloatArray
+    diameters: FloatArray
+    species: IntArray
+    id: IntArray
+    box: Box
+    image: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
+    shape_style: str = "spherocylinder"
+    step: int = 0
+    time: float = 0.0
+
+    def __post_init__(self) -> None:
+        n, dimension = len(self.position), self.box.dimension
+        if n == 0:
+            msg = "packing has no particles, expected at least one"
+            raise ValueError(msg)
+        if np.size(self.image) == 0:
+            object.__setattr__(self, "image", np.zeros((n, dimension), dtype=np.int64))
+        vector = (n, dimension)
+        rotation = (n,) if dimension == 2 else (n, 4)
+        for name, shape in (("position", vector), ("orientation", rotation), ("diameters", (n, 3))):
+            object.__setattr__(self, name, _floats(name, getattr(self, name), shape))
+        for name, shape in (("species", (n,)), ("id", (n,)), ("image", vector)):
+            object.__setattr__(self, name, _integers(name, getattr(self, name), shape))
+        _check_labels(self)
+        _check_shapes(self)
+
+    @property
+    def n(self) -> int:
+        """Number of particles N."""
+        return len(self.position)
+
+    @property
+    def dimension(self) -> int:
+        """Number of dimensions, 2 or 3."""
+        return self.box.dimension
+
+    @property
+    def half_length(self) -> FloatArray:
+        """(N,) half lengths A of the spines of spherocylinders, [length]."""
+        return (self.diameters[:, 0] - self.diameters[:, 1]) / 2
+
+    @property
+    def radius(self) -> FloatArray:
+        """(N,) radii R of spherocylinders, [length]."""
+        return self.diameters[:, 1] / 2
+
+    @property
+    def aspect_ratio(self) -> FloatArray:
+        """(N,) ratios alpha = A / R of spherocylinders."""
+        return self.half_length / self.radius
+
+    @property
+    def quaternions(self) -> FloatArray:
+        """(N, 4) quaternions w i j k, in 2D rotations about z."""
+        if self.dimension == 3:
+            return self.orientation
+        half, zero = self.orientation / 2, np.zeros(self.n)
+        return np.column_stack([np.cos(half), zero, zero, np.sin(half)])
+
+    @property
+    def axes(self) -> FloatArray:
+        """(N, D) unit vectors along the body's x axis."""
+        if self.dimension == 2:
+            return np.column_stack([np.cos(self.orientation), np.sin(self.orientation)])
+        w, i, j, k = self.orientation.T
+        x_axis = np.column_stack(
+            [w * w + i * i - j * j - k * k, 2 * (i * j + w * k), 2 * (i * k - w * j)]
+        )
+        unit: FloatArray = x_axis / (self.orientation**2).sum(axis=1, keepdims=True)
+        return unit
+
+    @property
+    def phi(self) -> float:
+        """Packing fraction: sum of areas (volumes) over that of the box.
+
+        Raises
+        ------
+        ValueError
+            If the shape style is not ``spherocylinder``.
+        """
+        if self.shape_style != "spherocylinder":
+            msg = f"shape style is {self.shape_style!r}, phi is defined for 'spherocylinder' only"
+            raise ValueError(msg)
+        # Imported here so that reading and writing files needs no compiled module.
+        contact = importlib.import_module("jamshape._contact")
+        measure = contact.spherocylinder_measure(self.half_length, self.radius, self.dimension)
+        return float(np.sum(measure)) / self.box.volume
+
+    def sorted_by_id(self) -> Packing:
+        """Return the same packing with its particles in the order of their IDs."""
+        order = np.argsort(self.id)
+        names = ("position", "orientation", "diameters", "species", "id", "image")
+        return self.with_(**{name: getattr(self, name)[order] for name in names})
+
+    def with_(self, **changes: Any) -> Packing:
+        """Return a new packing with the named fields replaced."""
+        return dataclasses.replace(self, **changes)
+
+
+def angle_from_quaternion(quaternion: ArrayLike) -> FloatArray:
+    """Angle of a rotation about z, 2 atan2(k, w).
+
+    Parameters
+    ----------
+    quaternion : (..., 4) array_like
+        w i j k; the length does not matter.
+
+    Returns
+    -------
+    (...) array of float64
+        Radians in (-pi, pi].
+    """
+    q = np.asarray(quaternion, dtype=np.float64)
+    # q and -q are one rotation; with w >= 0 no multiple of 2 pi is subtracted, so no bit is lost.
+    q = np.where(q[..., :1] < 0, -q, q)
+    angle = 2 * np.arctan2(q[..., 3], q[..., 0])
+    return np.where(angle <= -np.pi, np.pi, angle)
+
+
+def guess_shape_style(diameters: ArrayLike) -> str:
+    """Name the shape style of (N, 3) diameters that come without one.
+
+    ``spherocylinder`` wherever these can be spherocylinders; a prolate superellipsoid of
+    revolution has the same diameters, so its reader must say what it is.
+    """
+    d = np.asarray(diameters)
+    return "spherocylinder" if _are_spherocylinders(d).all() else "superellipsoid"
+
+
+def _are_spherocylinders(diameters: FloatArray) -> NDArray[np.bool_]:
+    long, short, other = diameters.T
+    fits: NDArray[np.bool_] = (short == other) & (long >= short)
+    return fits
+
+
+def _floats(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    array = np.array(values, dtype=np.float64, order="C")
+    _check_shape(name, array.shape, shape)
+    if not np.isfinite(array).all():
+        msg = f"{name} holds NaN or infinity, expected finite numbers"
+        raise ValueError(msg)
+    array.flags.writeable = False
+    return array
+
+
+def _integers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> IntArray:
+    given = np.asarray(values)
+    if given.dtype.kind not in "iu":
+        msg = f"{name} has dtype {given.dtype}, expected integers"
+        raise ValueError(msg)
+    array = np.array(given, dtype=np.int64, order="C")
+    _check_shape(name, array.shape, shape)
+    array.flags.writeable = False
+    return array
+
+
+def _check_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    if found != expected:
+        msg = f"{name} has shape {found}, expected {expected}"
+        raise ValueError(msg)
+
+
+def _check_labels(packing: Packing) -> None:
+    if len(np.unique(packing.id)) != packing.n:
+        msg = "an id is there more than once, expected one for each particle"
+        raise ValueError(msg)
+    for name in ("species", "id"):
+        if getattr(packing, name).min() < 1:
+            msg = f"{name} holds {getattr(packing, name).min()}, expected numbers from 1"
+            raise ValueError(msg)
+    if packing.shape_style not in SHAPE_STYLES:
+        msg = f"shape style is {packing.shape_style!r}, expected one of {SHAPE_STYLES}"
+        raise ValueError(msg)
+    if not np.isfinite(packing.time):
+        msg = f"time is {packing.time}, expected a finite number"
+        raise ValueError(msg)
+
+
+def _check_shapes(packing: Packing) -> None:
+    if not (packing.diameters > 0).all():
+        msg = f"diameters hold {packing.diameters.min()}, expected positive lengths"
+        raise ValueError(msg)
+    if packing.shape_style == "spherocylinder":
+        wrong = ~_are_spherocylinders(packing.diameters)
+        if wrong.any():
+            found = packing.diameters[wrong][0].tolist()
+            msg = (
+                f"diameters of a spherocylinder are {found}, expected (2(A+R), 2R, 2R) with A >= 0"
+            )
+            raise ValueError(msg)
+    if packing.dimension == 3:
+        error = np.abs(np.linalg.norm(packing.orientation, axis=1) - 1).max()
+        if error > UNIT_QUATERNION_TOLERANCE:
+            msg = f"the length of a quaternion is off 1 by {error:.2g}, expected unit quaternions"
+            raise ValueError(msg)

@@ -1,0 +1,275 @@
+"""Pairs of spherocylinders built around a known contact, and the binding called on them.
+
+Each builder chooses the point of contact first (where it sits on either spine, the normal and the
+overlap) and places i last, so class, distance and lever arms are known before the code under test
+says anything.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from jamshape import _contact
+
+APART, TOUCHING, CROSSING = 0, 1, 2
+TIP_TO_TIP, TIP_TO_SIDE, SIDE_TO_SIDE = 0, 1, 2
+
+EPS = np.finfo(float).eps
+FADE_LENGTH = 0.05
+FADE_COSINE_START, FADE_COSINE_RANGE = 0.5, 0.35
+
+
+@dataclass
+class Pairs:
+    """M pairs; r is the centre of i relative to that of j."""
+
+    r: np.ndarray
+    u_i: np.ndarray
+    u_j: np.ndarray
+    A_i: np.ndarray
+    A_j: np.ndarray
+    R_i: np.ndarray
+    R_j: np.ndarray
+
+    @property
+    def dimension(self):
+        return self.r.shape[1]
+
+    @property
+    def d(self):
+        return self.R_i + self.R_j
+
+    @property
+    def extent(self):
+        """Largest coordinate that enters: what rounding is relative to."""
+        return np.linalg.norm(self.r, axis=1) + self.A_i + self.A_j
+
+    def __len__(self):
+        return len(self.r)
+
+    def __getitem__(self, which):
+        return type(self)(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
+
+    def replaced(self, **changes):
+        return Pairs(**({f.name: getattr(self, f.name) for f in fields(Pairs)} | changes))
+
+    def swapped(self):
+        return Pairs(-self.r, self.u_j, self.u_i, self.A_j, self.A_i, self.R_j, self.R_i)
+
+    def bodies(self, centre_j=0.0):
+        """Rows of i and of j as the binding reads them; j at the origin keeps r as it is."""
+        centre_j = np.broadcast_to(centre_j, self.r.shape)
+        i = np.column_stack([centre_j + self.r, self.u_i, self.A_i, self.R_i])
+        j = np.column_stack([centre_j, self.u_j, self.A_j, self.R_j])
+        return i, j
+
+
+@dataclass
+class BuiltPairs(Pairs):
+    """Pairs with the contact that they were built around: feet s and t, normal into i, overlap."""
+
+    s: np.ndarray
+    t: np.ndarray
+    normal: np.ndarray
+    overlap: np.ndarray
+
+    def swapped(self):
+        plain = super().swapped()
+        return BuiltPairs(**vars(plain), s=self.t, t=self.s, normal=-self.normal,
+                          overlap=self.overlap)  # fmt: skip
+
+
+def contacts(pairs, sides, k_e=1.0):
+    return _contact.spherocylinder_contacts(*pairs.bodies(), k_e, sides)
+
+
+def energies(pairs, sides, k_e=1.0):
+    return contacts(pairs, sides, k_e)["energy"]
+
+
+def concatenated(*parts):
+    kind = BuiltPairs if all(isinstance(p, BuiltPairs) for p in parts) else Pairs
+    return kind(**{f.name: np.concatenate([getattr(p, f.name) for p in parts])
+                   for f in fields(kind)})  # fmt: skip
+
+
+def swapped_every_other(pairs):
+    """Every second pair with i and j exchanged, so that neither is favoured by construction."""
+    return concatenated(pairs[0::2], pairs[1::2].swapped())
+
+
+# --- vectors -----------------------------------------------------------------------------------
+
+
+def row_dot(a, b):
+    return np.einsum("mk,mk->m", a, b)
+
+
+def cross(a, b):
+    """Columns of the cross product: one in 2D (about z), three in 3D."""
+    if a.shape[1] == 2:
+        return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])[:, None]
+    return np.cross(a, b)
+
+
+def scaled(factor, vectors):
+    return np.asarray(factor)[:, None] * vectors
+
+
+def normalised(v):
+    return v / np.linalg.norm(v, axis=1)[:, None]
+
+
+def random_directions(rng, n, dimension):
+    return normalised(rng.normal(size=(n, dimension)))
+
+
+def random_perpendicular(rng, axis):
+    v = rng.normal(size=axis.shape)
+    return normalised(v - scaled(row_dot(v, axis), axis))
+
+
+def turned(u, angle, component):
+    """Axes turned by `angle` about z (2D) or about the coordinate axis `component` (3D)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    if u.shape[1] == 2:
+        return np.column_stack([cosine * u[:, 0] - sine * u[:, 1],
+                                sine * u[:, 0] + cosine * u[:, 1]])  # fmt: skip
+    first, second = (component + 1) % 3, (component + 2) % 3
+    result = u.copy()
+    result[:, first] = cosine * u[:, first] - sine * u[:, second]
+    result[:, second] = sine * u[:, first] + cosine * u[:, second]
+    return result
+
+
+# --- shapes and builders -----------------------------------------------------------------------
+
+
+def log_uniform(rng, low, high, n):
+    return np.exp(rng.uniform(np.log(low), np.log(high), n))
+
+
+def random_shapes(rng, n, alpha=(1e-6, 100.0)):
+    """A_i, A_j, R_i, R_j: size ratios to 10, alpha log-uniform and unequal, in any unit of length."""
+    unit = log_uniform(rng, 0.1, 10.0, n)
+    R_i, R_j = unit * log_uniform(rng, 1.0, 10.0, n), unit * log_uniform(rng, 1.0, 10.0, n)
+    return R_i * log_uniform(rng, *alpha, n), R_j * log_uniform(rng, *alpha, n), R_i, R_j
+
+
+def placed(shapes, u_i, u_j, s, t, normal, overlap):
+    """Place i so that foot s on its spine lies along `normal` from foot t on the spine of j."""
+    A_i, A_j, R_i, R_j = shapes
+    delta = scaled((1.0 - overlap) * (R_i + R_j), normal)
+    r = delta - scaled(s, u_i) + scaled(t, u_j)
+    return BuiltPairs(r, u_i, u_j, A_i, A_j, R_i, R_j, s, t, normal, overlap)
+
+
+def facing(rng, u, direction):
+    """u or -u, whichever has a positive component along `direction`; never quite zero."""
+    sign = np.where(row_dot(u, direction) < 0.0, -1.0, 1.0)
+    return normalised(scaled(sign, u) + scaled(1e-3 * rng.uniform(0.5, 1.0, len(u)), direction))
+
+
+def tip_to_tip(rng, n, dimension, overlap, alpha=(1e-6, 100.0)):
+    shapes = random_shapes(rng, n, alpha)
+    normal = random_directions(rng, n, dimension)
+    end_i, end_j = rng.choice([-1.0, 1.0], n), rng.choice([-1.0, 1.0], n)
+    into_i = facing(rng, random_directions(rng, n, dimension), normal)  # from the tip inwards
+    into_j = facing(rng, random_directions(rng, n, dimension), -normal)
+    return placed(shapes, scaled(-end_i, into_i), scaled(-end_j, into_j), end_i * shapes[0],
+                  end_j * shapes[1], normal, overlap)  # fmt: skip
+
+
+def tip_to_side(rng, n, dimension, overlap, alpha=(1e-6, 100.0)):
+    shapes = random_shapes(rng, n, alpha)
+    u_j = random_directions(rng, n, dimension)
+    normal = random_perpendicular(rng, u_j)
+    end = rng.choice([-1.0, 1.0], n)
+    into_i = facing(rng, random_directions(rng, n, dimension), normal)
+    t = 0.999 * shapes[1] * rng.uniform(-1.0, 1.0, n)
+    return swapped_every_other(
+        placed(shapes, scaled(-end, into_i), u_j, end * shapes[0], t, normal, overlap)
+    )
+
+
+def disc_to_rod(rng, n, dimension, overlap, alpha=(1e-6, 100.0)):
+    """A disc against the side of a rod (first half) and against its tip (second half)."""
+    A_i, A_j, R_i, R_j = random_shapes(rng, n, alpha)
+    shapes = (np.zeros(n), A_j, R_i, R_j)
+    u_i, u_j = random_directions(rng, n, dimension), random_directions(rng, n, dimension)
+    at_side = np.arange(n) < n // 2
+    end = rng.choice([-1.0, 1.0], n)
+    outward = facing(rng, random_directions(rng, n, dimension), scaled(end, u_j))
+    normal = np.where(at_side[:, None], random_perpendicular(rng, u_j), outward)
+    t = np.where(at_side, 0.999 * A_j * rng.uniform(-1.0, 1.0, n), end * A_j)
+    return swapped_every_other(placed(shapes, u_i, u_j, np.zeros(n), t, normal, overlap))
+
+
+def disc_to_disc(rng, n, dimension, overlap):
+    _, _, R_i, R_j = random_shapes(rng, n)
+    zero = np.zeros(n)
+    u_i, u_j = random_directions(rng, n, dimension), random_directions(rng, n, dimension)
+    normal = random_directions(rng, n, dimension)
+    return placed((zero, zero, R_i, R_j), u_i, u_j, zero, zero, normal, overlap)
+
+
+def skew(rng, n, overlap, angle, alpha=(1e-6, 100.0)):
+    """3D: spines that pass each other at `angle`, closest inside both."""
+    shapes = random_shapes(rng, n, alpha)
+    normal = random_directions(rng, n, 3)
+    u_j = random_perpendicular(rng, normal)
+    sideways = np.cross(normal, u_j)
+    u_i = scaled(np.cos(angle), u_j) + scaled(np.sin(angle), sideways)
+    u_i = scaled(rng.choice([-1.0, 1.0], n), u_i)
+    s = 0.999 * shapes[0] * rng.uniform(-1.0, 1.0, n)
+    t = 0.999 * shapes[1] * rng.uniform(-1.0, 1.0, n)
+    return placed(shapes, u_i, u_j, s, t, normal, overlap)
+
+
+def parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0)):
+    """Exactly parallel, spines that overlap; s and t are the middle of the overlap of the spines.
+
+    Returns the pairs and half the length of the overlap.
+    """
+    shapes = random_shapes(rng, n, alpha)
+    A_i, A_j = shapes[:2]
+    u_j = random_directions(rng, n, dimension)
+    sign = rng.choice([-1.0, 1.0], n)
+    offset = 0.999 * (A_i + A_j) * rng.uniform(-1.0, 1.0, n)  # of i's centre along u_j
+    low, high = np.maximum(offset - A_i, -A_j), np.minimum(offset + A_i, A_j)
+    t = 0.5 * (low + high)
+    s = sign * (t - offset)
+    built = placed(shapes, scaled(sign, u_j), u_j, s, t, random_perpendicular(rng, u_j), overlap)
+    return built, 0.5 * (high - low)
+
+
+def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), smallest_angle=1e-3):
+    """A tip of one on the side of the other at so small an angle that the far ends overlap too.
+
+    Half of them have spines that overlap by no more than the length over which the second bond
+    fades in.
+    """
+    shapes = random_shapes(rng, n, alpha)
+    A_i, A_j, d = shapes[0], shapes[1], shapes[2] + shapes[3]
+    u_j = random_directions(rng, n, dimension)
+    normal = random_perpendicular(rng, u_j)
+    towards = rng.choice([-1.0, 1.0], n)  # i's spine leaves its tip along towards * u_j
+    fading = np.arange(n) % 4 < 2
+    shorter = np.minimum(A_i, A_j)
+    stretch = np.where(fading, 1.2 * FADE_LENGTH * shorter, 2.0 * A_j) * rng.uniform(1e-3, 0.999, n)
+    t = towards * (A_j - stretch)
+    common = np.minimum(2.0 * A_i, stretch)
+
+    room = overlap * d / common
+    tilt = np.minimum(room, 1.0) * np.maximum(rng.uniform(0.0, 0.9, n), smallest_angle)
+    into_i = scaled(np.cos(tilt) * towards, u_j) + scaled(np.sin(tilt), normal)
+    if dimension == 3:  # and twisted about the normal
+        twist = np.minimum(np.sqrt(room * d / common), 0.8) * rng.uniform(-0.4, 0.4, n)
+        sideways = np.cross(normal, u_j)
+        into_i = scaled(np.cos(tilt), scaled(towards * np.cos(twist), u_j)
+                        + scaled(np.sin(twist), sideways)) + scaled(np.sin(tilt), normal)  # fmt: skip
+    end = rng.choice([-1.0, 1.0], n)
+    return swapped_every_other(
+        placed(shapes, scaled(-end, into_i), u_j, end * A_i, t, normal, overlap)
+    )

@@ -1,0 +1,181 @@
+import math
+
+import numpy as np
+import pytest
+
+from jamshape.packing import Box, Packing, angle_from_quaternion, guess_shape_style
+
+NASTY = [0.1 + 0.2, 1 / 3, -0.0, np.finfo(float).tiny, np.nextafter(1, 2), -np.finfo(float).max]
+ARRAYS = ("position", "orientation", "diameters", "species", "id", "image")
+
+
+def nasty_packing(dimension, **changes):
+    """Six particles, two of them discs, with doubles that short decimals do not hold."""
+    rng = np.random.default_rng(dimension)
+    n = len(NASTY)
+    half_length, radius = rng.random(n) * (np.arange(n) > 1), 1 / rng.uniform(1, 2, n)
+    position = rng.normal(size=(n, dimension))
+    position[:, 0] = NASTY
+    quaternion = rng.normal(size=(n, 4))
+    fields = {
+        "position": position,
+        "orientation": rng.uniform(-np.pi, np.pi, n)
+        if dimension == 2
+        else quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
+        "diameters": np.column_stack([2 * (half_length + radius), 2 * radius, 2 * radius]),
+        "species": np.arange(n) % 2 + 1,
+        "id": rng.permutation(n) + 1,
+        "image": rng.integers(-3, 4, (n, dimension)),
+        "box": Box(lo=np.full(dimension, -1 / 3), edges=np.full(dimension, np.nextafter(7, 8))),
+        "step": 12345678901,
+        "time": 1 / 7,
+    }
+    return Packing(**(fields | changes))
+
+
+def assert_identical(a, b):
+    """Compare bit for bit, so that -0.0 differs from 0.0."""
+    for name in ARRAYS:
+        x, y = getattr(a, name), getattr(b, name)
+        assert (x.dtype, x.shape, x.tobytes()) == (y.dtype, y.shape, y.tobytes()), name
+    assert a.box.lo.tobytes() == b.box.lo.tobytes()
+    assert a.box.edges.tobytes() == b.box.edges.tobytes()
+    assert (a.shape_style, a.step, a.time) == (b.shape_style, b.step, b.time)
+
+
+def rotate_x_axis(quaternion):
+    w, v, x = quaternion[0], quaternion[1:], np.array([1.0, 0, 0])
+    return x + 2 * np.cross(v, np.cross(v, x) + w * x)
+
+
+def test_box_measures_itself():
+    assert Box(lo=[0, 0], edges=[2, 3]).volume == 6
+    assert Box(lo=[0, 0, 0], edges=[2, 3, 4]).volume == 24
+    assert Box(lo=[0, 0, 0], edges=[2, 3, 4]).dimension == 3
+
+
+@pytest.mark.parametrize(
+    ("lo", "edges", "sentence"),
+    [
+        ([0], [1], r"box edges have shape \(1,\), expected \(2,\) or \(3,\)"),
+        ([0, 0, 0], [1, 1], r"box lo has shape \(3,\), expected \(2,\)"),
+        ([0, np.nan], [1, 1], "box lo holds NaN or infinity, expected finite numbers"),
+        ([0, 0], [1, 0], r"box edges are \[1.0, 0.0\], expected positive lengths"),
+    ],
+)
+def test_box_refuses(lo, edges, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        Box(lo=lo, edges=edges)
+
+
+def test_lengths_of_spherocylinders():
+    packing = nasty_packing(2, diameters=np.tile([5.0, 1.0, 1.0], (6, 1)))
+    np.testing.assert_array_equal(packing.half_length, 2)
+    np.testing.assert_array_equal(packing.radius, 0.5)
+    np.testing.assert_array_equal(packing.aspect_ratio, 4)
+    assert (packing.n, packing.dimension) == (6, 2)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_axes_are_the_rotated_x_axis(dimension):
+    packing = nasty_packing(dimension)
+    expected = [rotate_x_axis(q)[:dimension] for q in packing.quaternions]
+    np.testing.assert_allclose(packing.axes, expected, rtol=0, atol=1e-15)
+
+
+def test_axes_are_unit_for_rounded_quaternions():
+    packing = nasty_packing(3)
+    rounded = packing.with_(orientation=packing.orientation.round(5))
+    np.testing.assert_allclose(np.linalg.norm(rounded.axes, axis=1), 1, rtol=0, atol=1e-15)
+
+
+def test_angle_survives_its_quaternion():
+    packing = nasty_packing(2)
+    assert not packing.quaternions[:, 1:3].any()
+    for sign in (1, -1):
+        angle = angle_from_quaternion(sign * packing.quaternions)
+        np.testing.assert_allclose(angle, packing.orientation, rtol=0, atol=5e-16)
+
+
+def test_angle_lies_above_minus_pi():
+    quaternions = [[0, 0, 0, 1], [0, 0, 0, -1], [1e-300, 0, 0, -1], [-1, 0, 0, 0], [-1, 0, 0, 1]]
+    expected = [math.pi, math.pi, math.pi, 0, -math.pi / 2]
+    np.testing.assert_array_equal(angle_from_quaternion(quaternions), expected)
+
+
+def test_sorted_by_id():
+    packing = nasty_packing(3)
+    ordered = packing.sorted_by_id()
+    np.testing.assert_array_equal(ordered.id, [1, 2, 3, 4, 5, 6])
+    for name in ARRAYS:
+        expected = getattr(packing, name)[packing.id.argsort()]
+        np.testing.assert_array_equal(getattr(ordered, name), expected)
+
+
+def test_arrays_are_copied_and_read_only():
+    position = np.zeros((6, 2))
+    packing = nasty_packing(2, position=position)
+    position[0] = 1
+    assert not packing.position.any()
+    with pytest.raises(ValueError, match="read-only"):
+        packing.position[0] = 1
+
+
+def test_image_defaults_to_zero():
+    packing = nasty_packing(3, image=np.empty((0, 0), int))
+    np.testing.assert_array_equal(packing.image, np.zeros((6, 3)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"position": np.empty((0, 2))}, "packing has no particles, expected at least one"),
+        ({"position": np.zeros((6, 3))}, r"position has shape \(6, 3\), expected \(6, 2\)"),
+        ({"orientation": np.zeros(5)}, r"orientation has shape \(5,\), expected \(6,\)"),
+        ({"diameters": np.ones((6, 2))}, r"diameters has shape \(6, 2\), expected \(6, 3\)"),
+        ({"species": np.ones(5, int)}, r"species has shape \(5,\), expected \(6,\)"),
+        ({"image": np.zeros((6, 3), int)}, r"image has shape \(6, 3\), expected \(6, 2\)"),
+        ({"id": np.arange(6.0)}, "id has dtype float64, expected integers"),
+        ({"id": np.ones(6, int)}, "an id is there more than once, expected one for each particle"),
+        ({"id": np.arange(6)}, "id holds 0, expected numbers from 1"),
+        ({"species": np.zeros(6, int)}, "species holds 0, expected numbers from 1"),
+        ({"orientation": np.full(6, np.inf)}, "orientation holds NaN or infinity, expected finite"),
+        ({"diameters": np.zeros((6, 3))}, "diameters hold 0.0, expected positive lengths"),
+        ({"diameters": np.tile([1, 2, 2], (6, 1))}, r"\[1.0, 2.0, 2.0\], expected \(2\(A\+R\), 2R"),
+        ({"diameters": np.tile([3, 2, 1], (6, 1))}, r"\[3.0, 2.0, 1.0\], expected \(2\(A\+R\), 2R"),
+        ({"shape_style": "rod"}, "shape style is 'rod', expected one of"),
+        ({"time": np.nan}, "time is nan, expected a finite number"),
+    ],
+)
+def test_packing_refuses(changes, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        nasty_packing(2, **changes)
+
+
+def test_packing_refuses_quaternions_that_are_not_unit():
+    with pytest.raises(ValueError, match="is off 1 by 1, expected unit quaternions"):
+        nasty_packing(3, orientation=np.tile([2.0, 0, 0, 0], (6, 1)))
+
+
+def test_phi_belongs_to_spherocylinders():
+    with pytest.raises(ValueError, match="'superellipsoid', phi is defined for 'spherocylinder'"):
+        _ = nasty_packing(3, shape_style="superellipsoid").phi
+
+
+@pytest.mark.parametrize(
+    ("dimension", "measure"),
+    [(2, 4 * 2 * 0.5 + np.pi * 0.5**2), (3, np.pi * 0.5**2 * 4 + 4 / 3 * np.pi * 0.5**3)],
+)
+def test_phi_is_the_sum_of_the_measures_over_the_box(dimension, measure):
+    pytest.importorskip("jamshape._contact")
+    packing = nasty_packing(
+        dimension,
+        diameters=np.tile([5.0, 1.0, 1.0], (6, 1)),
+        box=Box(lo=np.zeros(dimension), edges=np.full(dimension, 10.0)),
+    )
+    assert packing.phi == pytest.approx(6 * measure / 10**dimension, rel=1e-14)
+
+
+def test_shape_style_is_guessed_from_the_diameters():
+    assert guess_shape_style([[1, 1, 1], [3, 1, 1]]) == "spherocylinder"
+    assert guess_shape_style([[1, 1, 1], [1, 3, 3]]) == "superellipsoid"
