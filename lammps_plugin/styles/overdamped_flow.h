@@ -4,7 +4,7 @@
 #include "contact/vec.hpp"
 
 #include "affine_box.h"
-#include "pointers.h"
+#include "fix.h"
 
 #include <vector>
 

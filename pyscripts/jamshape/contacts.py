@@ -20,6 +20,8 @@ BoolArray = NDArray[np.bool_]
 
 _TOUCHING, _CROSSING = 1, 2  # ContactStatus of contact/contact.hpp
 
+_BOND_COLUMNS = ("normal", "force", "arm_i", "distance", "energy", "on_side_i", "on_side_j")
+
 # Bounding spheres are larger by this fraction, so that rounding never drops a contact.
 _BOUNDING_MARGIN = 1e-9
 
@@ -141,6 +143,10 @@ class NearPairs(NamedTuple):
     shift: IntArray
     """(M, D) box edges to add to the second."""
 
+    def take(self, rows: NDArray[Any]) -> NearPairs:
+        """Select rows by index or mask."""
+        return NearPairs(self.first[rows], self.second[rows], self.shift[rows])
+
 
 def bodies(packing: Packing) -> FloatArray:
     """Pack shapes and poses into the rows that `jamshape._contact` takes.
@@ -226,12 +232,149 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
         If two spines cross, or an argument is out of its range.
     """
     rows = bodies(packing)
-    near = near_pairs(rows, rows, packing.box)
-    near = _take(near, _each_once(near))
+    near = _each_once(near_pairs(rows, rows, packing.box))
     i, j = rows[near.first], shifted(rows[near.second], near.shift, packing.box)
     found = _contact.spherocylinder_contacts(i, j, k_e, sides)
     _refuse_crossing(packing, near, found["status"])
 
-    touching = np.flatnonzero(found["status"] == _TOUCHING)
-    order = touching[np.lexsort((*near.shift.T[::-1], near.second, near.first))[touching]]
-    return order
+    touching = found["status"] == _TOUCHING
+    i, j, near = i[touching], j[touching], near.take(touching)
+    found = {name: values[touching] for name, values in found.items()}
+    D = packing.dimension
+    return ContactNetwork(
+        pairs=np.column_stack([near.first, near.second]),
+        shift=near.shift,
+        separation=i[:, :D] - j[:, :D],
+        kind=found["kind"].astype(np.int64),
+        n_bonds=found["n_bonds"].astype(np.int64),
+        energy=found["energy"],
+        force=found["force"],
+        torque_i=_rotation(found["torque_i"]),
+        torque_j=_rotation(found["torque_j"]),
+        bonds=_bonds(found, i, j),
+    )
+
+
+def forces(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Forces:
+    """Sum energy, forces, torques and pressure; arguments and errors as `find_contacts`."""
+    return sum_forces(packing, find_contacts(packing, k_e, sides))
+
+
+def sum_forces(packing: Packing, network: ContactNetwork) -> Forces:
+    """Sum energy, forces, torques and pressure of the contacts that `find_contacts` found."""
+    i, j = network.pairs.T
+    force = np.zeros((packing.n, packing.dimension))
+    np.add.at(force, i, network.force)
+    np.subtract.at(force, j, network.force)
+    torque = np.zeros((packing.n, *network.torque_i.shape[1:]))
+    np.add.at(torque, i, network.torque_i)
+    np.add.at(torque, j, network.torque_j)
+    virial: FloatArray = network.separation.T @ network.force
+    return Forces(
+        energy=float(network.energy.sum()),
+        force=force,
+        torque=torque,
+        virial=virial,
+        pressure=float(np.trace(virial)) / (packing.dimension * packing.box.volume),
+    )
+
+
+def find_rattlers(packing: Packing, network: ContactNetwork) -> BoolArray:
+    """Flag the particles that no contacts hold in place.
+
+    Marschall & Teitel 2018, Sec. III C: fewer than two contacts, or two unless on opposite flat
+    sides; repeated until none is left. In 3D fewer than four contacts.
+
+    Returns
+    -------
+    (N,) array of bool
+    """
+    bonds = network.bonds
+    normals = np.zeros((len(network.pairs), 3))
+    flat = np.repeat((network.kind == ContactKind.SIDE_TO_SIDE)[:, None], 2, axis=1)
+    nearer_bond = np.searchsorted(bonds.contact, np.arange(len(normals)))
+    normals[:, : packing.dimension] = bonds.normal[nearer_bond]
+    np.logical_or.at(flat, bonds.contact, bonds.on_side)
+    return _contact.find_rattlers(packing.n, packing.dimension, network.pairs, normals, flat)
+
+
+def coordination(packing: Packing, network: ContactNetwork) -> Coordination:
+    """Count bonds and contacts per particle, without rattlers and their contacts.
+
+    In the plane a side-to-side contact is two bonds, also where `find_contacts` was asked for one;
+    in 3D bonds are counted as they are, since skew rods touch side to side at one point.
+
+    Returns
+    -------
+    Coordination
+        With z = 0 where all particles are rattlers.
+    """
+    rattlers = find_rattlers(packing, network)
+    held = ~rattlers[network.pairs].any(axis=1)
+    bonds = network.n_bonds[held]
+    if packing.dimension == 2:
+        bonds = np.where(network.kind[held] == ContactKind.SIDE_TO_SIDE, 2, bonds)
+    n_particles, n_bonds, n_contacts = int((~rattlers).sum()), int(bonds.sum()), int(held.sum())
+    per_particle = 2 / max(n_particles, 1)
+    return Coordination(
+        z=per_particle * n_bonds,
+        z_single=per_particle * n_contacts,
+        n_rattlers=int(rattlers.sum()),
+        n_bonds=n_bonds,
+        n_contacts=n_contacts,
+    )
+
+
+def _images_near_box(
+    inside: FloatArray, edges: FloatArray, reach: float
+) -> tuple[IntArray, IntArray]:
+    """List all images of points in [0, edges) within `reach` of it: their owner, their shift."""
+    owner = np.arange(len(inside))
+    shift = np.zeros((len(inside), 0), dtype=np.int64)
+    for d, edge in enumerate(edges):
+        turns = np.arange(-np.ceil(reach / edge), np.ceil(reach / edge) + 1, dtype=np.int64)
+        coordinate = inside[owner, d, None] + turns * edge
+        row, column = np.nonzero((coordinate > -reach) & (coordinate < edge + reach))
+        owner, shift = owner[row], np.column_stack([shift[row], turns[column]])
+    return owner, shift
+
+
+def _each_once(near: NearPairs) -> NearPairs:
+    """Keep of each pair of images the row with i < j, of own images one of two, and sort."""
+    i, j, shift = near
+    leading = np.take_along_axis(shift, np.argmax(shift != 0, axis=1)[:, None], axis=1)[:, 0]
+    near = near.take((i < j) | ((i == j) & (leading > 0)))
+    return near.take(np.lexsort((*near.shift.T[::-1], near.second, near.first)))
+
+
+def _refuse_crossing(packing: Packing, near: NearPairs, status: NDArray[np.int32]) -> None:
+    crossing = np.flatnonzero(status == _CROSSING)
+    if len(crossing):
+        first, second = packing.id[near.first[crossing[0]]], packing.id[near.second[crossing[0]]]
+        msg = (
+            f"the spines of particles {first} and {second} cross ({len(crossing)} such pairs),"
+            " expected rods that overlap by less than their width; start again from a packing"
+            " without overlaps"
+        )
+        raise ValueError(msg)
+
+
+def _rotation(torque: FloatArray) -> FloatArray:
+    """(M,) about z in 2D, (M, 3) in 3D."""
+    return torque[:, 0] if torque.shape[1] == 1 else torque
+
+
+def _bonds(found: dict[str, Any], i: FloatArray, j: FloatArray) -> Bonds:
+    D = found["force"].shape[1]
+    contact, slot = np.nonzero(np.arange(2) < found["n_bonds"][:, None])
+    bond = {name: found[f"bond_{name}"][contact, slot] for name in _BOND_COLUMNS}
+    return Bonds(
+        contact=contact,
+        normal=bond["normal"],
+        force=bond["force"],
+        point=i[contact, :D] + bond["arm_i"],
+        distance=bond["distance"],
+        reach=(i[:, -1] + j[:, -1])[contact],
+        energy=bond["energy"],
+        on_side=np.column_stack([bond["on_side_i"], bond["on_side_j"]]),
+    )
