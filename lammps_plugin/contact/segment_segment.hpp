@@ -32,27 +32,56 @@ template <int D> Feet<D> feet_at(const SpinePair<D> &p, double s, double t)
 }
 
 /// Foot on spine j of the point s of spine i, and the reverse.
-template <int D> Feet<D> foot_on_j(const SpinePair<D> &p, double s)
+template <int D> double foot_on_j(const SpinePair<D> &p, double s)
 {
-  const Vec<D> from_j = p.r + s * p.u_i;
-  const double t = std::clamp(dot(p.u_j, from_j), -p.A_j, p.A_j);
-  const Vec<D> delta = from_j - t * p.u_j;
-  return {s, t, delta, norm_sq(delta)};
+  return std::clamp(dot(p.u_j, p.r + s * p.u_i), -p.A_j, p.A_j);
 }
 
-template <int D> Feet<D> foot_on_i(const SpinePair<D> &p, double t)
+template <int D> double foot_on_i(const SpinePair<D> &p, double t)
 {
-  const Vec<D> to_i = p.r - t * p.u_j;
-  const double s = std::clamp(-dot(p.u_i, to_i), -p.A_i, p.A_i);
-  const Vec<D> delta = to_i + s * p.u_i;
-  return {s, t, delta, norm_sq(delta)};
+  return std::clamp(dot(p.u_i, t * p.u_j - p.r), -p.A_i, p.A_i);
 }
+
+/// The four tips with their feet on the other spine: tips +, - of i, then +, - of j. Kept as
+/// numbers in arrays: most pairs of a list are apart, and `least` is all that is asked of them.
+template <int D> struct TipFeet {
+  double s[4], t[4], distance_sq[4];
+
+  explicit TipFeet(const SpinePair<D> &p)
+  {
+    for (int k = 0; k < 2; ++k) {
+      const double sign = k == 0 ? 1.0 : -1.0;
+      s[k] = sign * p.A_i;
+      t[k] = foot_on_j(p, s[k]);
+      t[2 + k] = sign * p.A_j;
+      s[2 + k] = foot_on_i(p, t[2 + k]);
+    }
+    for (int k = 0; k < 4; ++k) distance_sq[k] = norm_sq(p.r + s[k] * p.u_i - t[k] * p.u_j);
+  }
+
+  double least() const
+  {
+    return std::min(std::min(distance_sq[0], distance_sq[1]),
+                    std::min(distance_sq[2], distance_sq[3]));
+  }
+};
 
 /// The closest approach at either end of the pair: at end e = +, - the shorter of (tip e of i to
 /// spine j) and (tip of j at the same end to spine i), the spines aligned by the sign of u_i.u_j.
 /// For nearly parallel rods these are the two ends of the overlap of the spines.
 template <int D> struct EndFeet {
   Feet<D> plus, minus;
+
+  EndFeet(const SpinePair<D> &p, const TipFeet<D> &tips)
+  {
+    const int j_plus = dot(p.u_i, p.u_j) < 0.0 ? 3 : 2, j_minus = 5 - j_plus;
+    const auto shorter = [&](int a, int b) {
+      const int k = tips.distance_sq[b] < tips.distance_sq[a] ? b : a;
+      return feet_at(p, tips.s[k], tips.t[k]);
+    };
+    plus = shorter(0, j_plus);
+    minus = shorter(1, j_minus);
+  }
 
   const Feet<D> &nearer() const { return minus.distance_sq < plus.distance_sq ? minus : plus; }
   const Feet<D> &farther() const { return minus.distance_sq < plus.distance_sq ? plus : minus; }
@@ -63,35 +92,35 @@ template <int D> struct EndFeet {
   double spread() const { return 0.5 * (std::abs(plus.s - minus.s) + std::abs(plus.t - minus.t)); }
 };
 
-template <int D> EndFeet<D> end_feet(const SpinePair<D> &p)
+/// The closest points of two spines, from the nearer end. In the plane, spines that do not cross
+/// are closest at a tip; which one, rounding cannot tell by comparing distances when a spine is
+/// very short, so each foot is projected once more: the closest points are each other's feet. Skew
+/// spines in 3D may be closest inside both.
+template <int D> Feet<D> each_others_feet(const SpinePair<D> &p, double t)
 {
-  const double aligned_A_j = std::copysign(p.A_j, dot(p.u_i, p.u_j));
-  const auto shorter = [](const Feet<D> &a, const Feet<D> &b) {
-    return b.distance_sq < a.distance_sq ? b : a;
-  };
-  return {shorter(foot_on_j(p, p.A_i), foot_on_i(p, aligned_A_j)),
-          shorter(foot_on_j(p, -p.A_i), foot_on_i(p, -aligned_A_j))};
+  const double s = foot_on_i(p, t);
+  return feet_at(p, s, foot_on_j(p, s));
 }
 
-/// Closest approach of the two spines. In 2D, spines that do not cross are closest at a tip; skew
-/// spines in 3D may be closest inside both. Crossing spines in 2D are a state to detect
-/// (`spines_cross`): their shortest distance, zero, is not what this returns.
-inline Feet<2> closest_feet(const SpinePair<2> &, const EndFeet<2> &ends) { return ends.nearer(); }
+inline Feet<2> closest_feet(const SpinePair<2> &p, const Feet<2> &nearer_end)
+{
+  return each_others_feet(p, nearer_end.t);
+}
 
-inline Feet<3> closest_feet(const SpinePair<3> &p, const EndFeet<3> &ends)
+inline Feet<3> closest_feet(const SpinePair<3> &p, const Feet<3> &nearer_end)
 {
   // The part of u_i across u_j, from the difference of the axes: nearly parallel spines lose no
   // digits.
   const Vec<3> turn = p.u_i - std::copysign(1.0, dot(p.u_i, p.u_j)) * p.u_j;
   const Vec<3> across = turn - dot(turn, p.u_j) * p.u_j;
   const double sin_sq = norm_sq(across);
-  if (sin_sq == 0.0) return ends.nearer();
+  if (sin_sq == 0.0) return each_others_feet(p, nearer_end.t);
   const double s = -dot(p.r, across) / sin_sq;
   const double t = dot(p.u_j, p.r + s * p.u_i);
   // Feet inside both spines are the minimum, the distance being convex: comparing it with that at
   // the ends would leave it to rounding where the feet of nearly parallel spines sit.
-  if (std::abs(s) < p.A_i && std::abs(t) < p.A_j) return foot_on_i(p, t);
-  return ends.nearer();
+  if (std::abs(s) < p.A_i && std::abs(t) < p.A_j) return feet_at(p, foot_on_i(p, t), t);
+  return each_others_feet(p, nearer_end.t);
 }
 
 /// |sin| of the angle between the spines: the one measure of being parallel used everywhere; it
@@ -108,10 +137,14 @@ inline bool spines_cross(const SpinePair<2> &p)
 inline bool spines_cross(const SpinePair<3> &) { return false; }
 
 /// Squared shortest distance of the two spines, zero where they cross.
-template <int D> double spine_distance_sq(const SpinePair<D> &p)
+inline double spine_distance_sq(const SpinePair<2> &p)
 {
-  if (spines_cross(p)) return 0.0;
-  return closest_feet(p, end_feet(p)).distance_sq;
+  return spines_cross(p) ? 0.0 : TipFeet<2>(p).least();
+}
+
+inline double spine_distance_sq(const SpinePair<3> &p)
+{
+  return closest_feet(p, EndFeet<3>(p, TipFeet<3>(p)).nearer()).distance_sq;
 }
 
 }  // namespace jamshape

@@ -170,11 +170,15 @@ template <int D> class SpherocylinderContact {
   Contact<D> evaluate() const
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0) return discs();
-    const EndFeet<D> ends = end_feet(pair);
-    const Feet<D> closest = closest_feet(pair, ends);
+    const TipFeet<D> tips(pair);
     // Before the reach: the tips of long rods that cross may all be out of it.
-    if (is_coincident(closest) || spines_cross(pair)) return crossing();
-    if (!(closest.distance_sq < reach * reach)) return {};
+    if (spines_cross(pair)) return empty(ContactStatus::CROSSING);
+    // Skew spines in 3D can be closer than at any tip.
+    if (D == 2 && !(tips.least() < reach * reach)) return empty(ContactStatus::APART);
+    const EndFeet<D> ends(pair, tips);
+    const Feet<D> closest = closest_feet(pair, ends.nearer());
+    if (!(closest.distance_sq < reach * reach)) return empty(ContactStatus::APART);
+    if (is_coincident(closest)) return empty(ContactStatus::CROSSING);
     return law.sides == Sides::ONE ? one_bond(ends, closest) : two_bonds(ends, closest);
   }
 
@@ -188,10 +192,16 @@ template <int D> class SpherocylinderContact {
     return feet.distance_sq <= COINCIDENT * reach * COINCIDENT * reach;
   }
 
-  static Contact<D> crossing()
+  /// No bond yet; the bonds themselves stay unset, most pairs of a list being apart.
+  static Contact<D> empty(ContactStatus status)
   {
-    Contact<D> contact{};
-    contact.status = ContactStatus::CROSSING;
+    Contact<D> contact;
+    contact.status = status;
+    contact.kind = ContactKind::TIP_TO_TIP;
+    contact.n_bonds = 0;
+    contact.energy = 0.0;
+    contact.force = {};
+    contact.torque_i = contact.torque_j = {};
     return contact;
   }
 
@@ -199,19 +209,16 @@ template <int D> class SpherocylinderContact {
   Contact<D> discs() const
   {
     const Feet<D> centres{0.0, 0.0, pair.r, norm_sq(pair.r)};
-    if (!(centres.distance_sq < reach * reach)) return {};
-    if (is_coincident(centres)) return crossing();
-    Contact<D> contact{};
-    contact.status = ContactStatus::TOUCHING;
-    contact.kind = ContactKind::TIP_TO_TIP;
+    if (!(centres.distance_sq < reach * reach)) return empty(ContactStatus::APART);
+    if (is_coincident(centres)) return empty(ContactStatus::CROSSING);
+    Contact<D> contact = empty(ContactStatus::TOUCHING);
     add_bond(contact, centres, std::sqrt(centres.distance_sq), 1.0);
     return contact;
   }
 
   Contact<D> one_bond(const EndFeet<D> &ends, const Feet<D> &closest) const
   {
-    Contact<D> contact{};
-    contact.status = ContactStatus::TOUCHING;
+    Contact<D> contact = empty(ContactStatus::TOUCHING);
     const double distance = std::sqrt(closest.distance_sq);
     if (ends.spread() > 0.0 && abs_sine(pair) < PARALLEL_SINE) {
       const Feet<D> middle =
@@ -228,8 +235,7 @@ template <int D> class SpherocylinderContact {
 
   Contact<D> two_bonds(const EndFeet<D> &ends, const Feet<D> &closest) const
   {
-    Contact<D> contact{};
-    contact.status = ContactStatus::TOUCHING;
+    Contact<D> contact = empty(ContactStatus::TOUCHING);
     contact.kind = kind_of(pair, closest);
     add_bond(contact, closest, std::sqrt(closest.distance_sq), 1.0);
     const Feet<D> &far_end = ends.farther();

@@ -76,7 +76,7 @@ FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char 
   maxexchange = flow->width();
   comm_forward = OverdampedFlow::DIRECTION_SIZE;
   vector_flag = 1;
-  size_vector = 7;
+  size_vector = 8;
   global_freq = 1;
   extvector = 0;
 
@@ -202,8 +202,10 @@ double FixOverdampedAffine::compute_vector(int n)
       return flow->dissipated_power();
     case 5:
       return static_cast<double>(flow->n_evaluations());
-    default:
+    case 6:
       return static_cast<double>(flow->n_rebuilds());
+    default:
+      return flow->stage_difference();
   }
 }
 

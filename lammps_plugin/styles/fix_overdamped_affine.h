@@ -14,7 +14,8 @@ namespace jamshape {
 ///
 /// Overdamped motion on a substrate that shrinks affinely with the box (Marschall & Teitel 2018,
 /// Eqs. 6-14). Global vector: time since strain 0, strain, largest relaxation rate, largest stable
-/// time step, dissipated power, force evaluations, list rebuilds inside steps.
+/// time step, dissipated power, force evaluations, list rebuilds inside steps, largest difference
+/// of the stages of the last step.
 class FixOverdampedAffine : public LAMMPS_NS::Fix {
  public:
   FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);

@@ -42,7 +42,7 @@ OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineB
                                LAMMPS_NS::Fix *owner) :
     Pointers(lmp), drag(k_d), box(affine_box), dimension(domain->dimension),
     n_rates(dimension == 2 ? 3 : 6), n_turns(dimension == 2 ? 2 : 4), pair(nullptr),
-    values(nullptr), evaluations(0), rebuilds(0), fix(owner)
+    values(nullptr), largest_difference(0.0), evaluations(0), rebuilds(0), fix(owner)
 {
 }
 
@@ -175,12 +175,15 @@ void OverdampedFlow::require_small(int i, double moved) const
                         ", expected at most half its radius: use a smaller timestep.");
 }
 
-void OverdampedFlow::place(int i, const Move &m, bool is_last)
+/// Returns the distance from where the stored rates alone lead.
+double OverdampedFlow::place(int i, const Move &m, bool is_last)
 {
   const Rate stored = stored_rate(i);
   Vec<3> shift = (m.h * m.a) * stored.shift, turn = (m.h * m.a) * stored.turn;
+  double difference = 0.0;
   if (m.b != 0.0) {
     const Rate present = present_rate(i);
+    difference = m.h * m.b * norm(present.shift - m.target.scale * stored.shift);
     shift += (m.h * m.b / m.present.scale) * present.shift;
     turn += (m.h * m.b) * present.turn;
   }
@@ -191,17 +194,22 @@ void OverdampedFlow::place(int i, const Move &m, bool is_last)
     atom->x[i][k] = x[k];
     if (is_last) values[i][k] = coordinates[k];
   }
-  if (!pair->particles_turn()) return;
+  if (!pair->particles_turn()) return difference;
   const Quaternion q = orientation_at_start(i);
   pair->particle_view().set_orientation(i, dimension == 2 ? turned(q, Vec<1>{{turn[2]}})
                                                           : turned(q, turn));
+  return difference;
 }
 
 void OverdampedFlow::move(const Move &m, bool is_last)
 {
-  if (pair->particles_turn()) pair->particle_view().read_orientations(atom->nlocal);
-  for (int i = 0; i < atom->nlocal; ++i) place(i, m, is_last);
-  if (pair->particles_turn()) pair->particle_view().write_orientations(atom->nlocal);
+  ParticleView &view = pair->particle_view();
+  if (pair->particles_turn()) view.read_orientations(atom->nlocal);
+  largest_difference = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    largest_difference = std::max(largest_difference, place(i, m, is_last));
+  }
+  if (pair->particles_turn()) view.write_orientations(atom->nlocal);
 }
 
 void OverdampedFlow::move_by(const Move &m) { move(m, false); }
@@ -367,6 +375,13 @@ double OverdampedFlow::dissipated_power() const
     mine += dot(rate.shift, vec3(atom->f[i])) + dot(rate.turn, vec3(atom->torque[i]));
   }
   return sum(mine);
+}
+
+double OverdampedFlow::stage_difference() const
+{
+  double all;
+  MPI_Allreduce(&largest_difference, &all, 1, MPI_DOUBLE, MPI_MAX, world);
+  return all;
 }
 
 /* ----------------------------------------------------------------------

@@ -65,6 +65,9 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   double largest_rate();
   /// Power that the drag takes: sum F^2/(k_d A) + tau^2/(k_d A I), over all ranks.
   double dissipated_power() const;
+  /// Largest distance between the end of the last step and where the stored rates alone had led: of
+  /// the order of the local error of Euler's method, a bound of Heun's.
+  double stage_difference() const;
   LAMMPS_NS::bigint n_evaluations() const { return evaluations; }
   LAMMPS_NS::bigint n_rebuilds() const { return rebuilds; }
 
@@ -93,6 +96,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   PairContact *pair;
   double *
       *values;  // per atom: coordinates, rates of the stored stage, orientation at the step's start
+  double largest_difference;
   LAMMPS_NS::bigint evaluations, rebuilds;
   LAMMPS_NS::Fix *fix;
   std::vector<Rate> direction;
@@ -110,7 +114,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   Vec<3> read_coordinates(int i) const;
   Quaternion orientation_at_start(int i) const;
   void require_small(int i, double moved) const;
-  void place(int i, const Move &move, bool is_last);
+  double place(int i, const Move &move, bool is_last);
   void move(const Move &move, bool is_last);
   void clear_forces();
   double sum(double mine) const;

@@ -201,9 +201,9 @@ std::vector<LocalBond> PairContact::reported_bonds()
     if (atom->tag[b.i] <= atom->tag[b.j]) {
       reported.push_back(b);
     } else {
-      reported.push_back({b.j, b.i, b.kind, b.first_of_contact, -b.normal, -b.force, b.arm_j,
-                          b.arm_i, b.distance, b.reach, b.energy, b.stiffness, b.on_side_j,
-                          b.on_side_i});
+      reported.push_back({b.j, b.i, b.kind, b.first_of_contact, Vec<3>{} - b.normal,
+                          Vec<3>{} - b.force, b.arm_j, b.arm_i, b.distance, b.reach, b.energy,
+                          b.stiffness, b.on_side_j, b.on_side_i});
     }
   }
   return reported;

@@ -20,8 +20,6 @@ BoolArray = NDArray[np.bool_]
 
 _TOUCHING, _CROSSING = 1, 2  # ContactStatus of contact/contact.hpp
 
-_BOND_COLUMNS = ("normal", "force", "arm_i", "distance", "energy", "on_side_i", "on_side_j")
-
 # Bounding spheres are larger by this fraction, so that rounding never drops a contact.
 _BOUNDING_MARGIN = 1e-9
 
@@ -194,7 +192,7 @@ def near_pairs(first: FloatArray, second: FloatArray, box: Box) -> NearPairs:
         for rows, turn in zip((first, second), turns, strict=True)
     ]
     bounds = [(1 + _BOUNDING_MARGIN) * rows[:, -2:].sum(axis=1) for rows in (first, second)]
-    reach = bounds[0].max() + bounds[1].max()
+    reach = bounds[0].max(initial=0) + bounds[1].max(initial=0)
     owner, shift = _images_near_box(inside[1], edges, reach)
     near = cKDTree(inside[0]).sparse_distance_matrix(
         cKDTree(inside[1][owner] + shift * edges), reach, output_type="ndarray"
@@ -203,6 +201,20 @@ def near_pairs(first: FloatArray, second: FloatArray, box: Box) -> NearPairs:
     keep = near["v"] < bounds[0][i] + bounds[1][j]
     i, j, shift = i[keep], j[keep], shift[near["j"][keep]]
     return NearPairs(i, j, shift + turns[0][i] - turns[1][j])
+
+
+def each_once(near: NearPairs) -> NearPairs:
+    """Of the `near_pairs` of bodies among themselves, keep one of (i, j) and (j, i), and sort.
+
+    Returns
+    -------
+    NearPairs
+        i <= j, ascending; of a body and its own images one of each two that are opposite.
+    """
+    i, j, shift = near
+    leading = np.take_along_axis(shift, np.argmax(shift != 0, axis=1)[:, None], axis=1)[:, 0]
+    near = near.take((i < j) | ((i == j) & (leading > 0)))
+    return near.take(np.lexsort((*near.shift.T[::-1], near.second, near.first)))
 
 
 def shifted(rows: FloatArray, shift: IntArray, box: Box) -> FloatArray:
@@ -232,7 +244,7 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
         If two spines cross, or an argument is out of its range.
     """
     rows = bodies(packing)
-    near = _each_once(near_pairs(rows, rows, packing.box))
+    near = each_once(near_pairs(rows, rows, packing.box))
     i, j = rows[near.first], shifted(rows[near.second], near.shift, packing.box)
     found = _contact.spherocylinder_contacts(i, j, k_e, sides)
     _refuse_crossing(packing, near, found["status"])
@@ -292,8 +304,8 @@ def find_rattlers(packing: Packing, network: ContactNetwork) -> BoolArray:
     bonds = network.bonds
     normals = np.zeros((len(network.pairs), 3))
     flat = np.repeat((network.kind == ContactKind.SIDE_TO_SIDE)[:, None], 2, axis=1)
-    nearer_bond = np.searchsorted(bonds.contact, np.arange(len(normals)))
-    normals[:, : packing.dimension] = bonds.normal[nearer_bond]
+    first_bond = np.searchsorted(bonds.contact, np.arange(len(normals)))
+    normals[:, : packing.dimension] = bonds.normal[first_bond]
     np.logical_or.at(flat, bonds.contact, bonds.on_side)
     return _contact.find_rattlers(packing.n, packing.dimension, network.pairs, normals, flat)
 
@@ -339,22 +351,13 @@ def _images_near_box(
     return owner, shift
 
 
-def _each_once(near: NearPairs) -> NearPairs:
-    """Keep of each pair of images the row with i < j, of own images one of two, and sort."""
-    i, j, shift = near
-    leading = np.take_along_axis(shift, np.argmax(shift != 0, axis=1)[:, None], axis=1)[:, 0]
-    near = near.take((i < j) | ((i == j) & (leading > 0)))
-    return near.take(np.lexsort((*near.shift.T[::-1], near.second, near.first)))
-
-
 def _refuse_crossing(packing: Packing, near: NearPairs, status: NDArray[np.int32]) -> None:
     crossing = np.flatnonzero(status == _CROSSING)
     if len(crossing):
         first, second = packing.id[near.first[crossing[0]]], packing.id[near.second[crossing[0]]]
         msg = (
-            f"the spines of particles {first} and {second} cross ({len(crossing)} such pairs),"
-            " expected rods that overlap by less than their width; start again from a packing"
-            " without overlaps"
+            f"the spines of particles {first} and {second} cross (1 of {len(crossing)} such"
+            " pairs), expected overlaps smaller than the particles; take a packing without crossings"
         )
         raise ValueError(msg)
 
@@ -364,17 +367,19 @@ def _rotation(torque: FloatArray) -> FloatArray:
     return torque[:, 0] if torque.shape[1] == 1 else torque
 
 
-def _bonds(found: dict[str, Any], i: FloatArray, j: FloatArray) -> Bonds:
-    D = found["force"].shape[1]
+def _bonds(found: dict[str, NDArray[Any]], i: FloatArray, j: FloatArray) -> Bonds:
     contact, slot = np.nonzero(np.arange(2) < found["n_bonds"][:, None])
-    bond = {name: found[f"bond_{name}"][contact, slot] for name in _BOND_COLUMNS}
+
+    def column(name: str) -> NDArray[Any]:
+        return found[f"bond_{name}"][contact, slot]
+
     return Bonds(
         contact=contact,
-        normal=bond["normal"],
-        force=bond["force"],
-        point=i[contact, :D] + bond["arm_i"],
-        distance=bond["distance"],
+        normal=column("normal"),
+        force=column("force"),
+        point=i[contact, : found["force"].shape[1]] + column("arm_i"),
+        distance=column("distance"),
         reach=(i[:, -1] + j[:, -1])[contact],
-        energy=bond["energy"],
-        on_side=np.column_stack([bond["on_side_i"], bond["on_side_j"]]),
+        energy=column("energy"),
+        on_side=np.column_stack([column("on_side_i"), column("on_side_j")]),
     )

@@ -180,7 +180,7 @@ class Packing:
             raise ValueError(msg)
         # Imported here so that reading and writing files needs no compiled module.
         contact = importlib.import_module("jamshape._contact")
-        measure = contact.spherocylinder_measure(self.half_length, self.radius, self.dimension)
+        measure, _ = contact.spherocylinder_drag(self.half_length, self.radius, self.dimension)
         return float(np.sum(measure)) / self.box.volume
 
     def sorted_by_id(self) -> Packing:

@@ -1,30 +1,49 @@
-"""Derivatives of the pair energy by differences, with the step chosen from the energies alone."""
+"""Central differences of the energy that the binding returns."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from reference_energy import fade_arguments, far_square
 from spherocylinder_pairs import EPS, FADE_LENGTH, energies, turned
 
-# Steps fall geometrically from the first to the last of step_range.
-N_STEPS = 14
+# Steps of this many d: short enough to straddle the switch of a clamped foot, where the second
+# derivative jumps, at no cost. Differences over several steps are fitted by a constant and a square,
+# which removes the error of second order and averages rounding.
+STEP = 7e-8
+MULTIPLES = np.linspace(1.0, 3.0, 9)
+# Of the length over which the second bond fades.
+STEP_IN_FADE = 1e-4
 
 
-@dataclass
-class Differences:
-    """Columns: the components of r, then the rotations of i, then those of j."""
-
-    gradient: np.ndarray
-    left: np.ndarray
-    right: np.ndarray
+def fit_weights():
+    """Of the slopes in their value at step zero; a slope's rounding is inverse to its step."""
+    columns = np.column_stack([np.ones_like(MULTIPLES), MULTIPLES**2])
+    return np.linalg.pinv(columns * MULTIPLES[:, None])[0] * MULTIPLES
 
 
-def shortest_length(pairs, sides):
-    """Length on which the energy varies: that of the shorter rod, and of its fade with two bonds."""
-    shorter = np.minimum(np.where(pairs.A_i > 0.0, pairs.A_i, pairs.d),
-                         np.where(pairs.A_j > 0.0, pairs.A_j, pairs.d))  # fmt: skip
-    return np.minimum(pairs.d, shorter if sides == 1 else FADE_LENGTH * shorter)
+def is_clear_of_fade(pairs):
+    """No second bond within the steps, or one that they leave at full strength."""
+    by_length, by_cosine = fade_arguments(pairs)
+    shorter = np.minimum(pairs.A_i, pairs.A_j)
+    margin = 10.0 * STEP * pairs.d
+    none = (shorter == 0.0) | (np.sqrt(far_square(pairs)) > pairs.d + margin) | (by_cosine < -1e-3)
+    full = (by_length > 1.0 + margin / np.where(shorter > 0.0, FADE_LENGTH * shorter, 1.0)) & (
+        by_cosine > 1.0 + 1e-3
+    )
+    return none | full
+
+
+def step_lengths(pairs, sides):
+    step = STEP * pairs.d
+    if sides == 1:
+        return step
+    in_fade = STEP_IN_FADE * FADE_LENGTH * np.minimum(pairs.A_i, pairs.A_j)
+    return np.where(is_clear_of_fade(pairs), step, np.minimum(step, in_fade))
+
+
+def rounding_of_differences(pairs, sides):
+    """Error of the differences from the rounding of coordinates, relative to the force."""
+    return EPS * pairs.extent / step_lengths(pairs, sides)
 
 
 def displacements(pairs):
@@ -44,51 +63,52 @@ def displacements(pairs):
 
         return move
 
-    dimension = pairs.dimension
-    rotations = 1 if dimension == 2 else 3
-    unity = np.ones(len(pairs))
-    moves = [(translation(c), unity) for c in range(dimension)]
-    moves += [(rotation("u_i", c), pairs.A_i + pairs.d) for c in range(rotations)]
-    moves += [(rotation("u_j", c), pairs.A_j + pairs.d) for c in range(rotations)]
-    return moves
+    rotations = 1 if pairs.dimension == 2 else 3
+    by_r = [(translation(c), np.ones(len(pairs))) for c in range(pairs.dimension)]
+    by_i = [(rotation("u_i", c), pairs.A_i + pairs.d) for c in range(rotations)]
+    by_j = [(rotation("u_j", c), pairs.A_j + pairs.d) for c in range(rotations)]
+    return by_r, by_i, by_j
 
 
-def longest_consistent(estimates, noise):
-    """Per pair, the estimate of the longest step that no shorter step contradicts.
+def central_differences(pairs, sides, k_e):
+    """Derivatives by r, by rotations of i and by rotations of j, one array each."""
 
-    Long steps have the least rounding but may straddle a kink or the switch of a clamped foot, or
-    miss a short rod altogether; the shorter ones then differ by more than their own noise.
-    """
-    consistent = np.ones(estimates.shape[1:], dtype=bool)
-    best = estimates[-1].copy()
-    low, high = estimates[-1] - noise[-1], estimates[-1] + noise[-1]
-    for estimate, error in zip(estimates[-2::-1], noise[-2::-1], strict=True):
-        consistent &= (estimate >= low) & (estimate <= high)
-        best = np.where(consistent, estimate, best)
-        low, high = np.maximum(low, estimate - error), np.minimum(high, estimate + error)
-    return best
-
-
-def differentiate(pairs, sides, k_e=1.0):
-    at_rest = energies(pairs, sides, k_e)
-    length = shortest_length(pairs, sides)
-    longest, shortest = 0.02 * pairs.d, np.minimum(3e-7 * pairs.d, 1e-3 * length)
-    ratio = (longest / shortest) ** (1.0 / (N_STEPS - 1))
-    rounding = EPS * pairs.extent * (np.sqrt(2.0 * k_e * at_rest) / pairs.d + 4.0 * at_rest / length)
-    columns = []
-    for move, lever in displacements(pairs):
-        central, right, left, noise = [], [], [], []
-        for level in range(N_STEPS):
-            step = longest * ratio**-level / lever
+    def derivative(move, lever):
+        fitted = np.zeros(len(pairs))
+        for multiple, fit_weight in zip(MULTIPLES, fit_weights(), strict=True):
+            step = multiple * step_lengths(pairs, sides) / lever
             (forth, ahead), (back, behind) = move(step), move(-step)
-            up, down = energies(forth, sides, k_e), energies(back, sides, k_e)
-            central.append((up - down) / (ahead - behind))
-            right.append((up - at_rest) / ahead)
-            left.append((down - at_rest) / behind)
-            noise.append(8.0 * rounding / step)
-        central, right, left = np.array(central), np.array(right), np.array(left)
-        noise = np.array(noise)[1:]
-        even = (ratio**2 * central[1:] - central[:-1]) / (ratio**2 - 1.0)
-        one_sided = [(ratio * x[1:] - x[:-1]) / (ratio - 1.0) for x in (left, right)]
-        columns.append([longest_consistent(x, noise) for x in (even, *one_sided)])
-    return Differences(*(np.column_stack(c) for c in zip(*columns, strict=True)))
+            rise = energies(forth, sides, k_e) - energies(back, sides, k_e)
+            fitted += fit_weight * rise / (ahead - behind)
+        return fitted
+
+    return tuple(
+        np.column_stack([derivative(*displacement) for displacement in group])
+        for group in displacements(pairs)
+    )
+
+
+def one_sided_differences(pairs, sides, k_e):
+    """Derivatives from the left and from the right, each as central_differences returns them."""
+    at_rest = energies(pairs, sides, k_e)
+
+    def derivative(move, lever, direction):
+        step = direction * 5.0 * STEP * pairs.d / lever
+        (near, _), (far, twice) = move(step), move(2.0 * step)
+        rise = 4.0 * energies(near, sides, k_e) - energies(far, sides, k_e) - 3.0 * at_rest
+        return rise / twice
+
+    return tuple(
+        tuple(
+            np.column_stack([derivative(*displacement, direction) for displacement in group])
+            for group in displacements(pairs)
+        )
+        for direction in (-1.0, 1.0)
+    )
+
+
+def outside(gradient, left, right):
+    """How far each component of `gradient` lies outside the interval of the one-sided ones."""
+    above = gradient - np.maximum(left, right)
+    below = np.minimum(left, right) - gradient
+    return np.maximum(np.maximum(above, below), 0.0)

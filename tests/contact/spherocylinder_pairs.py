@@ -8,8 +8,10 @@ says anything.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cache
 
 import numpy as np
+
 from jamshape import _contact
 
 APART, TOUCHING, CROSSING = 0, 1, 2
@@ -88,6 +90,22 @@ def energies(pairs, sides, k_e=1.0):
     return contacts(pairs, sides, k_e)["energy"]
 
 
+def force_scale(pairs, result, k_e):
+    """The force of one bond of the built overlap, or the force if that is larger."""
+    return np.maximum(k_e * pairs.overlap / pairs.d, np.linalg.norm(result["force"], axis=1))
+
+
+def relative_errors(pairs, result, gradient, k_e):
+    """Largest error of each pair: of the force over its scale, of the torques over force (A + R)."""
+    by_r, by_i, by_j = gradient
+    force = force_scale(pairs, result, k_e)
+    return np.max([
+        np.abs(by_r + result["force"]).max(axis=1) / force,
+        np.abs(by_i + result["torque_i"]).max(axis=1) / (force * (pairs.A_i + pairs.R_i)),
+        np.abs(by_j + result["torque_j"]).max(axis=1) / (force * (pairs.A_j + pairs.R_j)),
+    ], axis=0)  # fmt: skip
+
+
 def concatenated(*parts):
     kind = BuiltPairs if all(isinstance(p, BuiltPairs) for p in parts) else Pairs
     return kind(**{f.name: np.concatenate([getattr(p, f.name) for p in parts])
@@ -126,8 +144,14 @@ def random_directions(rng, n, dimension):
 
 
 def random_perpendicular(rng, axis):
+    if axis.shape[1] == 2:
+        return scaled(
+            rng.choice([-1.0, 1.0], len(axis)), np.column_stack([-axis[:, 1], axis[:, 0]])
+        )
     v = rng.normal(size=axis.shape)
-    return normalised(v - scaled(row_dot(v, axis), axis))
+    for _ in range(2):  # the second pass removes what cancellation left in the first
+        v = normalised(v - scaled(row_dot(v, axis), axis))
+    return v
 
 
 def turned(u, angle, component):
@@ -165,6 +189,10 @@ def placed(shapes, u_i, u_j, s, t, normal, overlap):
     return BuiltPairs(r, u_i, u_j, A_i, A_j, R_i, R_j, s, t, normal, overlap)
 
 
+def overlaps(rng, n, low=1e-3, high=1.0 / 3.0):
+    return log_uniform(rng, low, high, n)
+
+
 def facing(rng, u, direction):
     """u or -u, whichever has a positive component along `direction`; never quite zero."""
     sign = np.where(row_dot(u, direction) < 0.0, -1.0, 1.0)
@@ -193,16 +221,17 @@ def tip_to_side(rng, n, dimension, overlap, alpha=(1e-6, 100.0)):
     )
 
 
-def disc_to_rod(rng, n, dimension, overlap, alpha=(1e-6, 100.0)):
-    """A disc against the side of a rod (first half) and against its tip (second half)."""
-    A_i, A_j, R_i, R_j = random_shapes(rng, n, alpha)
+def disc_to_rod(rng, n, dimension, overlap, at_side):
+    """A disc against the side of a rod, or against its tip."""
+    _, A_j, R_i, R_j = random_shapes(rng, n)
     shapes = (np.zeros(n), A_j, R_i, R_j)
     u_i, u_j = random_directions(rng, n, dimension), random_directions(rng, n, dimension)
-    at_side = np.arange(n) < n // 2
-    end = rng.choice([-1.0, 1.0], n)
-    outward = facing(rng, random_directions(rng, n, dimension), scaled(end, u_j))
-    normal = np.where(at_side[:, None], random_perpendicular(rng, u_j), outward)
-    t = np.where(at_side, 0.999 * A_j * rng.uniform(-1.0, 1.0, n), end * A_j)
+    if at_side:
+        normal, t = random_perpendicular(rng, u_j), 0.999 * A_j * rng.uniform(-1.0, 1.0, n)
+    else:
+        end = rng.choice([-1.0, 1.0], n)
+        normal = facing(rng, random_directions(rng, n, dimension), scaled(end, u_j))
+        t = end * A_j
     return swapped_every_other(placed(shapes, u_i, u_j, np.zeros(n), t, normal, overlap))
 
 
@@ -227,25 +256,29 @@ def skew(rng, n, overlap, angle, alpha=(1e-6, 100.0)):
     return placed(shapes, u_i, u_j, s, t, normal, overlap)
 
 
-def parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0)):
+def parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), fading=False):
     """Exactly parallel, spines that overlap; s and t are the middle of the overlap of the spines.
 
-    Returns the pairs and half the length of the overlap.
+    With `fading` they overlap by less than the length over which the second bond fades in. Returns
+    the pairs and half the length of the overlap.
     """
     shapes = random_shapes(rng, n, alpha)
     A_i, A_j = shapes[:2]
     u_j = random_directions(rng, n, dimension)
     sign = rng.choice([-1.0, 1.0], n)
-    offset = 0.999 * (A_i + A_j) * rng.uniform(-1.0, 1.0, n)  # of i's centre along u_j
+    most = FADE_LENGTH * np.minimum(A_i, A_j) if fading else A_i + A_j
+    offset = rng.choice([-1.0, 1.0], n) * (A_i + A_j - most * rng.uniform(1e-3, 0.999, n))
     low, high = np.maximum(offset - A_i, -A_j), np.minimum(offset + A_i, A_j)
     t = 0.5 * (low + high)
-    s = sign * (t - offset)
+    s = sign * (t - offset)  # offset is that of i's centre along u_j
     built = placed(shapes, scaled(sign, u_j), u_j, s, t, random_perpendicular(rng, u_j), overlap)
     return built, 0.5 * (high - low)
 
 
-def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), smallest_angle=1e-3):
+def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), least_tilt=1e-3):
     """A tip of one on the side of the other at so small an angle that the far ends overlap too.
+
+    The far ends are `least_tilt` to 0.9 of the built overlap further apart.
 
     Half of them have spines that overlap by no more than the length over which the second bond
     fades in.
@@ -262,7 +295,7 @@ def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), smallest_an
     common = np.minimum(2.0 * A_i, stretch)
 
     room = overlap * d / common
-    tilt = np.minimum(room, 1.0) * np.maximum(rng.uniform(0.0, 0.9, n), smallest_angle)
+    tilt = np.minimum(room, 1.0) * rng.uniform(least_tilt, 0.9, n)
     into_i = scaled(np.cos(tilt) * towards, u_j) + scaled(np.sin(tilt), normal)
     if dimension == 3:  # and twisted about the normal
         twist = np.minimum(np.sqrt(room * d / common), 0.8) * rng.uniform(-0.4, 0.4, n)
@@ -273,3 +306,71 @@ def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), smallest_an
     return swapped_every_other(
         placed(shapes, scaled(-end, into_i), u_j, end * A_i, t, normal, overlap)
     )
+
+
+# --- samples of the three classes --------------------------------------------------------------
+
+
+def tip_pairs(rng, n, dimension):
+    return concatenated(
+        tip_to_tip(rng, n, dimension, overlaps(rng, n)),
+        disc_to_rod(rng, n // 4, dimension, overlaps(rng, n // 4), at_side=False),
+        disc_to_disc(rng, n // 4, dimension, overlaps(rng, n // 4)),
+    )
+
+
+def tip_and_side_pairs(rng, n, dimension):
+    return concatenated(
+        tip_to_side(rng, n, dimension, overlaps(rng, n)),
+        disc_to_rod(rng, n // 4, dimension, overlaps(rng, n // 4), at_side=True),
+        nearly_parallel(rng, n // 2, dimension, overlaps(rng, n // 2)),
+    )
+
+
+def side_pairs(rng, n, dimension, sides):
+    """With one bond: skew rods in 3D. With two also nearly parallel and parallel ones.
+
+    Of the parallel ones only those whose second bond has its full strength: the others sit on a kink.
+    """
+    parts = []
+    if sides == 2:
+        both, half_overlap = parallel(rng, n // 4, dimension, overlaps(rng, n // 4))
+        whole = 2.0 * half_overlap > 1.001 * FADE_LENGTH * np.minimum(both.A_i, both.A_j)
+        parts += [nearly_parallel(rng, n, dimension, overlaps(rng, n)), both[whole]]
+    if dimension == 3:
+        parts.append(skew(rng, n, overlaps(rng, n), rng.uniform(0.5, 0.5 * np.pi, n)))
+    return concatenated(*parts)
+
+
+@cache
+def touching(dimension, sides, kind):
+    """More than 1e4 pairs that the code under test puts in the class `kind`.
+
+    With one bond that is the class they were built for, but for tips placed within rounding of the
+    end of a short rod. With two, nearly round rods that meet tip to tip or tip to side have their far
+    ends in reach as well and become side to side.
+    """
+    rng = np.random.default_rng([1, dimension, sides, kind])
+    n = 12_000 if sides == 1 else 25_000
+    if kind == SIDE_TO_SIDE:
+        pairs = side_pairs(rng, n, dimension, sides)
+    else:
+        pairs = (tip_pairs if kind == TIP_TO_TIP else tip_and_side_pairs)(rng, n, dimension)
+    result = contacts(pairs, sides)
+    assert np.all(result["status"] == TOUCHING)
+    as_built = result["kind"] == kind
+    if sides == 1:
+        assert np.mean(as_built) > 0.99
+    else:
+        assert np.mean(as_built | (result["kind"] == SIDE_TO_SIDE)) > 0.99
+    return pairs[rng.permutation(np.flatnonzero(as_built))]
+
+
+EVERY_CLASS = [
+    (dimension, sides, kind)
+    for dimension in (2, 3)
+    for sides in (1, 2)
+    for kind in (TIP_TO_TIP, TIP_TO_SIDE, SIDE_TO_SIDE)
+    # One bond between flat sides in 2D is for parallel rods only, where the energy has a kink.
+    if (dimension, sides, kind) != (2, 1, SIDE_TO_SIDE)
+]

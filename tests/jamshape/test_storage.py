@@ -1,3 +1,5 @@
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -229,6 +231,19 @@ def test_file_is_closed_between_appends(path):
     copy.write_bytes(path.read_bytes())
     assert_identical(read_packing(copy), frame(20))
     writer.append(frame(30))
+    assert count_frames(path) == 4
+
+
+def test_run_survives_the_sudden_end_of_its_process(path):
+    # os._exit as when LAMMPS's error->all ends the process
+    script = (
+        "import os, sys; path, *sys.path = sys.argv[1:]\n"
+        "from test_storage import run_of_three; run_of_three(path); os._exit(3)"
+    )
+    command = [sys.executable, "-c", script, str(path), *sys.path]
+    assert subprocess.run(command, check=False).returncode == 3
+    assert_identical(read_packing(path), frame(20))
+    RunWriter.open(path).append(frame(30))
     assert count_frames(path) == 4
 
 

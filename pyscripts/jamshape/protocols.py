@@ -1,0 +1,285 @@
+"""Compression through jamming, driven in LAMMPS (Marschall & Teitel 2018, Sec. II)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jamshape.lammps_files import write_data
+from jamshape.packing import Box, Packing, angle_from_quaternion
+from jamshape.storage import RunWriter, read_attributes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from jamshape.session import Session
+
+# Columns of `compute packing` and elements of `fix overdamped/affine`, as their doc comments list them.
+_PACKING = {
+    "phi": 0, "u": 1, "p": 2, "z": 3, "S_2": 4, "S_4": 5, "fmax": 6, "frms": 7,
+    "z_single": 8, "rattlers": 9, "bonds": 10, "overlap": 11, "tmax": 12,
+}  # fmt: skip
+_FLOW = {"strain": 1, "lambda_max": 2, "dt_max": 3, "evaluations": 5, "step_error": 7}
+
+_LONGEST_RUN = 1_000_000_000  # steps in one `run` command, which counts in 32 bits
+
+
+@dataclass(frozen=True)
+class Compression:
+    """How to compress.
+
+    Parameters
+    ----------
+    kappa
+        Rate, dL/dt = -kappa L, [1/time].
+    phi_end
+        Packing fraction to reach.
+    dt
+        Time step, [time].
+    sides
+        Bonds of a side-to-side contact, 1 or 2.
+    k_e, k_d
+        Stiffness [energy] and drag [energy time / length^(D + 2)].
+    integrator
+        A name that `fix overdamped/affine` knows.
+
+    Raises
+    ------
+    ValueError
+        If a rate, step, stiffness or drag is not positive, or `sides` neither 1 nor 2.
+    """
+
+    kappa: float = 1e-4
+    phi_end: float = 0.9
+    dt: float = 0.05
+    sides: int = 1
+    k_e: float = 1.0
+    k_d: float = 1.0
+    integrator: str = "heun"
+
+    def __post_init__(self) -> None:
+        for name in ("kappa", "phi_end", "dt", "k_e", "k_d"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                msg = f"{name} is {value}, expected a positive number."
+                raise ValueError(msg)
+        if self.sides not in (1, 2):
+            msg = f"sides is {self.sides}, expected 1 or 2."
+            raise ValueError(msg)
+
+    def steps(self, phi: float) -> int:
+        """Count the time steps from packing fraction `phi` to `phi_end`."""
+        strain = math.log(self.phi_end / phi)
+        return max(0, math.ceil(strain / (2 * self.kappa * self.dt) - 1e-6))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One row of a compression: where it is and what it measures."""
+
+    step: int
+    time: float
+    wall_seconds: float
+    observables: dict[str, float]
+
+
+class CompressionRun:
+    """A compression in a LAMMPS session, from a packing or from a restart file.
+
+    Parameters
+    ----------
+    session
+        A fresh one.
+    settings
+    start
+        The state to begin with, or the path of a restart file of an earlier run.
+
+    Raises
+    ------
+    ValueError
+        If the state is already denser than `settings.phi_end`.
+    """
+
+    def __init__(
+        self, session: Session, settings: Compression, start: Packing | str | Path
+    ) -> None:
+        self.session, self.settings = session, settings
+        self._began = time.perf_counter()
+        # Styles need a dimension and an atom style before the state, a restart file brings both.
+        session.commands("units lj\natom_style ellipsoid\natom_modify map array")
+        if isinstance(start, Packing):
+            session.commands(f"dimension {start.dimension}")
+            self._read(start)
+        else:
+            session.commands(f"read_restart {start}")
+        self._set_up()
+        phi = self.measure()["phi"]
+        if phi > settings.phi_end:
+            msg = f"The state has phi = {phi:.6g}, expected one below phi_end = {settings.phi_end}."
+            raise ValueError(msg)
+        self.last_step = session.step + settings.steps(phi)
+
+    def _read(self, packing: Packing) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "start.data"
+            write_data(path, packing)
+            self.session.commands(f"read_data {path}")
+
+    def _set_up(self) -> None:
+        s = self.settings
+        self.session.commands(f"""
+            pair_style spherocylinder/harmonic sides {("one", "two")[s.sides - 1]}
+            pair_coeff * * {s.k_e!r}
+            neighbor 0.3 bin
+            neigh_modify every 1 delay 0 check yes one 10000 page 1000000
+            fix flow all overdamped/affine drag {s.k_d!r} compress {s.kappa!r} integrator {s.integrator}
+            timestep {s.dt!r}
+            compute packing all packing
+            compute orient all property/atom quatw quati quatj quatk
+            compute shape all property/atom shapex shapey shapez
+            thermo_style custom step c_packing[1]
+            thermo_modify norm no lost error
+            run 0 post no
+        """)
+
+    def keep_restarts(self, every: int, path: Path) -> None:
+        """Write restart files `path`.a and `path`.b in turn, every so many steps."""
+        self.session.commands(f"restart {every} {path}.a {path}.b")
+
+    def samples(self, every: int) -> Iterator[Sample]:
+        """Run to the end and yield a row at each multiple of `every` steps, and at the end."""
+        while self.session.step < self.last_step:
+            self.advance(min(self.last_step, (self.session.step // every + 1) * every))
+            yield self.sample()
+
+    def advance(self, step: int) -> None:
+        """Run to `step`."""
+        while self.session.step < step:
+            steps = min(step - self.session.step, _LONGEST_RUN)
+            self.session.commands(f"run {steps} pre no post no")
+
+    def sample(self) -> Sample:
+        """Measure the present state."""
+        step = self.session.step
+        wall = time.perf_counter() - self._began
+        return Sample(step, step * self.settings.dt, wall, self.measure())
+
+    def measure(self) -> dict[str, float]:
+        """Return observables of the present state, named as in `compute packing`."""
+        lmp = self.session.lmp
+        values = lmp.extract_compute("packing", 0, 1)
+        found = {name: float(values[column]) for name, column in _PACKING.items()}
+        found |= {name: float(lmp.extract_fix("flow", 0, 1, k)) for name, k in _FLOW.items()}
+        return found
+
+    def packing(self) -> Packing:
+        """Return the present state, sorted by ID."""
+        lmp = self.session.lmp
+        n = lmp.get_natoms()
+        lo, hi, *_ = lmp.extract_box()
+        d = int(lmp.extract_setting("dimension"))
+
+        def rows(name: str, kind: int, width: int) -> np.ndarray:
+            return np.array(lmp.gather(name, kind, width)).reshape(n, width)
+
+        quaternion = rows("c_orient", 1, 4)
+        return Packing(
+            position=rows("x", 1, 3)[:, :d],
+            orientation=angle_from_quaternion(quaternion) if d == 2 else quaternion,
+            diameters=rows("c_shape", 1, 3),
+            species=rows("type", 0, 1)[:, 0],
+            id=np.arange(1, n + 1),
+            image=rows("image", 0, 3)[:, :d],
+            box=Box(np.array(lo[:d]), np.array(hi[:d]) - np.array(lo[:d])),
+            step=self.session.step,
+            time=self.session.step * self.settings.dt,
+        )
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a compression leaves in its H5MD file.
+
+    Parameters
+    ----------
+    path
+        The file; restart files lie beside it, as ``path.restart.a`` and ``.b``.
+    rows, frames
+        How many samples of the observables and how many snapshots, over the whole run.
+    attributes
+        Stored with the run, beside its settings: what made the initial state.
+    """
+
+    path: Path
+    rows: int = 400
+    frames: int = 20
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def restart_prefix(self) -> Path:
+        """Path of the restart files without their last letter."""
+        return self.path.with_name(self.path.name + ".restart")
+
+    def newest_restart(self) -> Path:
+        """Find the last restart file of a run that was killed.
+
+        Raises
+        ------
+        FileNotFoundError
+            When there is none.
+        """
+        paths = [Path(f"{self.restart_prefix}.{end}") for end in "ab"]
+        found = [path for path in paths if path.is_file()]
+        if not found:
+            msg = f"Found neither {paths[0]} nor {paths[1].name}, expected one: start anew."
+            raise FileNotFoundError(msg)
+        return max(found, key=lambda path: path.stat().st_mtime)
+
+
+def is_finished(path: Path) -> bool:
+    """Whether the file holds a compression that reached its end."""
+    return path.exists() and bool(read_attributes(path).get("finished"))
+
+
+def begin(session: Session, settings: Compression, start: Packing, to: Recording) -> CompressionRun:
+    """Start a compression and its file."""
+    run = CompressionRun(session, settings, start)
+    attributes = dataclasses.asdict(settings) | dict(to.attributes)
+    attributes |= {"phi_start": start.phi, "rows": to.rows, "frames": to.frames, "finished": False}
+    RunWriter.create(to.path, run.packing(), attributes, run.measure())
+    return run
+
+
+def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
+    """Go on with a compression that was killed, from its last restart file, as it was set."""
+    stored = read_attributes(path)
+    settings = Compression(**{f.name: stored[f.name] for f in dataclasses.fields(Compression)})
+    to = Recording(path, int(stored["rows"]), int(stored["frames"]))
+    run = CompressionRun(session, settings, to.newest_restart())
+    RunWriter.open(path).truncate(session.step)
+    return run, to
+
+
+def record(run: CompressionRun, to: Recording) -> Iterator[Sample]:
+    """Run to the end, writing each sample to the file before it is yielded."""
+    writer = RunWriter.open(to.path)
+    whole = run.settings.steps(float(read_attributes(to.path)["phi_start"]))
+    every = max(1, whole // to.rows)
+    per_frame = every * max(1, to.rows // to.frames)
+    run.keep_restarts(per_frame, to.restart_prefix)
+    for sample in run.samples(every):
+        if sample.step % per_frame == 0 or sample.step == run.last_step:
+            writer.append(run.packing(), sample.observables)
+        else:
+            writer.append_observables(sample.step, sample.time, sample.observables)
+        error = sample.observables["step_error"]
+        writer.append_report(sample.step, sample.wall_seconds, error)
+        yield sample
+    writer.set_attributes({"finished": True})

@@ -1,0 +1,310 @@
+"""The energy of two bonds has no jumps, and where they sit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import pytest
+from reference_energy import (
+    bond_energy,
+    end_feet,
+    fade_arguments,
+    far_square,
+    one_bond_energy,
+    printed_two_bond_energy,
+    smooth_step,
+)
+from spherocylinder_pairs import (
+    EPS,
+    FADE_LENGTH,
+    SIDE_TO_SIDE,
+    TIP_TO_SIDE,
+    TOUCHING,
+    Pairs,
+    contacts,
+    log_uniform,
+    overlaps,
+    parallel,
+    random_perpendicular,
+    random_shapes,
+    scaled,
+)
+
+# --- smooth paths through contact --------------------------------------------------------------
+
+N_PATHS = 250
+GRID = np.linspace(0.0, 1.0, 801)
+WORST_INTERVALS = 24
+HALVINGS = 36  # leaves a path step of 1.8e-14 of a path that moves rods by their own size
+DEEPEST = 0.5  # overlaps beyond are on their way to spines that cross
+
+
+@dataclass
+class Wave:
+    """middle + amplitude sin(2 pi (frequency path + phase)), one of each a path."""
+
+    middle: np.ndarray
+    amplitude: np.ndarray
+    frequency: np.ndarray
+    phase: np.ndarray
+
+    @classmethod
+    def random(cls, rng, middle, amplitude):
+        n = len(middle)
+        return cls(middle, amplitude, rng.uniform(0.3, 1.5, n), rng.uniform(0.0, 1.0, n))
+
+    def at(self, which, path):
+        middle, amplitude, frequency, phase = (getattr(self, f.name)[which] for f in fields(self))
+        return middle + amplitude * np.sin(2.0 * np.pi * (frequency * path + phase))
+
+
+class Paths:
+    """Relative poses held together at two anchors that slide over the spines, ends included.
+
+    The anchors stay within reach, so that the rods touch all along; they tilt and, in 3D, twist about
+    parallel (or about some other angle), roll about each other, and sink in by up to 0.3.
+    """
+
+    def __init__(self, rng, shapes, dimension):
+        self.A_i, self.A_j, self.R_i, self.R_j = shapes
+        n, d = len(self.A_i), self.R_i + self.R_j
+        self.dimension = dimension
+        self.s = Wave.random(rng, np.zeros(n), self.A_i * rng.uniform(0.5, 1.0, n))
+        self.t = Wave.random(rng, np.zeros(n), self.A_j * rng.uniform(0.5, 1.0, n))
+        self.overlap = Wave.random(rng, np.full(n, 0.15), rng.uniform(0.0, 0.15, n))
+        self.elevation = Wave.random(rng, np.full(n, 0.5 * np.pi), rng.uniform(0.0, 1.2, n))
+        flat = np.minimum(1.0, d / (self.A_i + self.A_j)) * log_uniform(rng, 1e-3, 1.5, n)
+        middle = np.where(rng.uniform(size=n) < 0.7, 0.0, rng.uniform(-np.pi, np.pi, n))
+        self.tilt = Wave.random(rng, middle, np.minimum(flat, 1.5))
+        self.twist = Wave.random(rng, np.zeros(n), np.minimum(flat, 1.5)[::-1])
+        self.roll = Wave.random(rng, np.zeros(n), rng.uniform(0.0, 1.0, n))
+
+    def pairs(self, which, path):
+        tilt, elevation = self.tilt.at(which, path), self.elevation.at(which, path)
+        u_i = np.column_stack([np.cos(tilt), np.sin(tilt)])
+        normal = np.column_stack([np.cos(elevation), np.sin(elevation)])
+        u_j = np.zeros_like(u_i)
+        u_j[:, 0] = 1.0
+        if self.dimension == 3:
+            twist, roll = self.twist.at(which, path), self.roll.at(which, path)
+            u_i = np.column_stack([u_i[:, 0] * np.cos(twist), u_i[:, 1], u_i[:, 0] * np.sin(twist)])
+            normal = np.column_stack(
+                [normal[:, 0], normal[:, 1] * np.cos(roll), normal[:, 1] * np.sin(roll)]
+            )
+            u_j = np.column_stack([u_j, np.zeros(len(u_j))])
+        A_i, A_j, R_i, R_j = (x[which] for x in (self.A_i, self.A_j, self.R_i, self.R_j))
+        r = (
+            scaled((1.0 - self.overlap.at(which, path)) * (R_i + R_j), normal)
+            - scaled(self.s.at(which, path), u_i)
+            + scaled(self.t.at(which, path), u_j)
+        )
+        return Pairs(r, u_i, u_j, A_i, A_j, R_i, R_j)
+
+
+def equal(rng, n):
+    A, R = log_uniform(rng, 0.2, 20.0, n), np.ones(n)
+    return A, A, R, R
+
+
+def unequal(rng, n):
+    A, R = log_uniform(rng, 0.2, 20.0, n), np.ones(n)
+    return A, 1.4 * A * rng.uniform(0.7, 1.3, n), R, 1.4 * R
+
+
+def nearly_round(rng, n):
+    alpha = log_uniform(rng, 3e-3, 0.03, n)
+    return alpha, 1.4 * alpha, np.ones(n), np.full(n, 1.4)
+
+
+def very_unequal(rng, n):
+    A_i, A_j, R_i, R_j = random_shapes(rng, n, alpha=(0.05, 20.0))
+    return A_i, A_j, R_i, R_j
+
+
+def library(sides):
+    def energy(pairs):
+        result = contacts(pairs, sides)
+        shallow = (result["status"] == TOUCHING) & (result["energy"] < 2.0 * 0.5 * DEEPEST**2)
+        closest = np.where(shallow, result["bond_distance"][:, 0], 0.0)
+        return result["energy"], shallow & (closest > (1.0 - DEEPEST) * pairs.d)
+
+    return energy
+
+
+def as_printed(pairs):
+    _, shallow = library(1)(pairs)
+    return printed_two_bond_energy(pairs), shallow
+
+
+def largest_jump(paths, energy):
+    """Largest step of the energy left in each path when its worst intervals are halved many times.
+
+    Each halving keeps the half with the larger step: what is smooth shrinks with the interval, a
+    jump stays. Also returns which points of the grid count.
+    """
+    n = len(paths.A_i)
+    which = np.repeat(np.arange(n), len(GRID))
+    values, valid = energy(paths.pairs(which, np.tile(GRID, n)))
+    values, valid = values.reshape(n, -1), valid.reshape(n, -1)
+    steps = np.diff(values, axis=1)
+    usable = valid[:, 1:] & valid[:, :-1]
+    bend = np.abs(2.0 * steps[:, 1:-1] - steps[:, :-2] - steps[:, 2:])
+    bend = np.pad(bend, ((0, 0), (1, 1)))
+    half = WORST_INTERVALS // 2
+    chosen = np.hstack([
+        np.argsort(np.where(usable, -np.abs(steps), 0.0), axis=1)[:, :half],
+        np.argsort(np.where(usable, -bend, 0.0), axis=1)[:, :half],
+    ])  # fmt: skip
+    row = np.repeat(np.arange(n), WORST_INTERVALS)
+    chosen = chosen.ravel()
+    kept = usable[row, chosen]
+    row, chosen = row[kept], chosen[kept]
+    low, high = GRID[chosen], GRID[chosen + 1]
+    at_low, at_high = values[row, chosen], values[row, chosen + 1]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        at_middle, fine = energy(paths.pairs(row, middle))
+        right = np.abs(at_high - at_middle) > np.abs(at_middle - at_low)
+        low, at_low = np.where(right, middle, low), np.where(right, at_middle, at_low)
+        high, at_high = np.where(right, high, middle), np.where(right, at_high, at_middle)
+        at_low = np.where(fine, at_low, at_high)  # ran into spines that cross: no step to speak of
+    left = np.zeros(n)
+    np.maximum.at(left, row, np.abs(at_high - at_low))
+    return left, valid
+
+
+SHAPES = [equal, unequal, nearly_round, very_unequal]
+
+
+def paths_of(shapes, dimension):
+    rng = np.random.default_rng([31, dimension, SHAPES.index(shapes)])
+    return Paths(rng, shapes(rng, N_PATHS), dimension)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("shapes", SHAPES, ids=lambda shapes: shapes.__name__)
+@pytest.mark.parametrize("sides", [1, 2])
+def test_energy_has_no_jumps(shapes, dimension, sides, measured):
+    paths = paths_of(shapes, dimension)
+    jumps, valid = largest_jump(paths, library(sides))
+    measured(largest_jump=jumps.max(), scanned=valid.mean())
+    assert valid.mean() > 0.5
+    assert jumps.max() < 1e-9
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("shapes", SHAPES, ids=lambda shapes: shapes.__name__)
+def test_the_same_scan_sees_the_printed_rule_jump(shapes, dimension, measured):
+    jumps, _ = largest_jump(paths_of(shapes, dimension), as_printed)
+    measured(largest_jump=jumps.max(), paths_that_jump=np.mean(jumps > 1e-4))
+    assert jumps.max() > 1e-2
+    assert np.mean(jumps > 1e-4) > 0.1
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_same_scan_sees_a_spread_on_one_spine_jump(dimension, measured):
+    """Were l the distance of the feet on spine i alone: it changes with the nearer tip of an end."""
+
+    def one_spine_energy(pairs):
+        plus, minus = end_feet(pairs)
+        shorter = np.minimum(pairs.A_i, pairs.A_j)
+        fade = smooth_step(np.abs(plus.s - minus.s) / (FADE_LENGTH * shorter))
+        second = fade * smooth_step(fade_arguments(pairs)[1])
+        _, shallow = library(1)(pairs)
+        return one_bond_energy(pairs) + second * bond_energy(far_square(pairs), pairs.d), shallow
+
+    jumps, _ = largest_jump(paths_of(nearly_round, dimension), one_spine_energy)
+    measured(largest_jump=jumps.max(), paths_that_jump=np.mean(jumps > 1e-4))
+    assert jumps.max() > 1e-3
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("shapes", SHAPES, ids=lambda shapes: shapes.__name__)
+def test_the_scan_visits_whole_fading_and_absent_second_bonds(shapes, dimension):
+    paths = paths_of(shapes, dimension)
+    which = np.repeat(np.arange(N_PATHS), len(GRID))
+    pairs = paths.pairs(which, np.tile(GRID, N_PATHS))
+    result = contacts(pairs, 2)
+    alone = 0.5 * (1.0 - result["bond_distance"][:, 1] / pairs.d) ** 2
+    share = np.where(result["n_bonds"] == 2, result["bond_energy"][:, 1] / alone, 0.0)
+    for share_of in (share > 0.999, (share > 0.001) & (share < 0.999), share == 0.0):
+        assert share_of.mean() > 0.01
+
+
+# --- the parallel band of the one-bond law -----------------------------------------------------
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_one_bond_energy_is_continuous_through_the_parallel_band(dimension, measured):
+    """|sin| = 1e-8, where the bond leaves the middle: the lever arm jumps, the energy does not."""
+    rng = np.random.default_rng([32, dimension])
+    pairs, _ = parallel(rng, 4000, dimension, overlaps(rng, 4000), alpha=(0.1, 100.0))
+    sideways = random_perpendicular(rng, pairs.u_i)
+
+    def tilted_by(sine):
+        return pairs.replaced(u_i=np.sqrt(1.0 - sine**2) * pairs.u_i + sine * sideways)
+
+    within, beyond = contacts(tilted_by(0.999e-8), 1), contacts(tilted_by(1.001e-8), 1)
+    assert np.all(within["kind"] == SIDE_TO_SIDE)
+    assert np.mean(beyond["kind"] == TIP_TO_SIDE) > (0.99 if dimension == 2 else 0.5)
+    # No more than the 2e-11 in between are worth, and rounding.
+    overlap = np.sqrt(2.0 * within["energy"])
+    worth = overlap * (pairs.extent * 2e-11 + 8.0 * EPS * pairs.extent) / pairs.d
+    step = np.abs(beyond["energy"] - within["energy"])
+    jump = np.linalg.norm(beyond["torque_i"] - within["torque_i"], axis=1) / (
+        np.linalg.norm(within["force"], axis=1) * pairs.extent
+    )
+    measured(energy_step=step.max(), of_what_the_turn_is_worth=np.max(step / worth),
+             torque_step=jump.max())  # fmt: skip
+    assert np.all(step < worth)
+    assert jump.max() > 0.1
+
+
+# --- where the bonds sit -----------------------------------------------------------------------
+
+
+def bonds_of_tilted_rods(A_i, A_j, offset, angle, height=0.9):
+    """j along x at the origin; i above it, tilted about its own centre."""
+    i = Pairs(np.array([[offset, height]]), np.array([[np.cos(angle), np.sin(angle)]]),
+              np.array([[1.0, 0.0]]), np.array([A_i]), np.array([A_j]), np.array([0.5]),
+              np.array([0.5]))  # fmt: skip
+    return i, contacts(i, 2)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.004, -0.004])
+@pytest.mark.parametrize("head", [1.0, -1.0])
+def test_staggered_rods_are_held_at_a_tip_of_each(angle, head):
+    """Eqs. 25-29 with the second term of 29 corrected: the tip of i over j, the tip of j under i."""
+    A, offset, height = 4.0, 3.0, 0.9
+    pairs, _ = bonds_of_tilted_rods(A, A, offset, angle, height)
+    result = contacts(pairs.replaced(u_i=head * pairs.u_i), 2)
+    tip_of_i = height - A * np.sin(angle)
+    tip_of_j = height * np.cos(angle) + (A - offset) * np.sin(angle)
+    assert result["n_bonds"] == 2
+    assert result["kind"] == SIDE_TO_SIDE
+    np.testing.assert_allclose(np.sort(result["bond_distance"][0]), np.sort([tip_of_i, tip_of_j]))
+    expected = 0.5 * np.sum((1.0 - np.array([tip_of_i, tip_of_j])) ** 2)
+    np.testing.assert_allclose(result["energy"], expected)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.004, -0.004])
+def test_nested_rods_are_held_at_both_tips_of_the_shorter(angle):
+    """Where Eq. 29 as printed does not apply: both tips of i lie over the spine of j."""
+    pairs, result = bonds_of_tilted_rods(3.0, 8.0, 1.0, angle)
+    tips = 0.9 + 3.0 * np.sin(angle) * np.array([1.0, -1.0])
+    assert result["n_bonds"] == 2
+    np.testing.assert_allclose(np.sort(result["bond_distance"][0]), np.sort(tips))
+    np.testing.assert_allclose(result["energy"], 0.5 * np.sum((1.0 - tips) ** 2))
+    # and of the shorter, whichever comes first
+    swapped = contacts(pairs.swapped(), 2)
+    np.testing.assert_allclose(swapped["energy"], result["energy"])
+    np.testing.assert_allclose(np.sort(swapped["bond_distance"][0]), np.sort(tips))
+
+
+def test_rods_that_only_meet_at_a_tip_have_one_bond():
+    _, past_the_end = bonds_of_tilted_rods(4.0, 4.0, 8.2, 0.0)
+    assert past_the_end["n_bonds"] == 1
+    _, tilted_away = bonds_of_tilted_rods(4.0, 4.0, 1.0, 0.3, height=1.9)
+    assert tilted_away["n_bonds"] == 1
+    assert tilted_away["kind"] == TIP_TO_SIDE

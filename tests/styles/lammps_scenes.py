@@ -1,0 +1,374 @@
+"""Packings, and LAMMPS instances and processes that hold them, for the tests of the styles."""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import tempfile
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jamshape import contacts
+from jamshape.initial import Mixture, random_packing
+from jamshape.lammps_files import write_data
+from jamshape.packing import Box, Packing, angle_from_quaternion
+from jamshape.session import Session, plugin_path
+
+REPOSITORY = Path(__file__).parents[2]
+SIDES = {"one": 1, "two": 2}
+
+POSE = "id type x y z ix iy iz quatw quati quatj quatk shapex shapey shapez"
+FORCE = "fx fy fz tqx tqy tqz"
+
+MPIRUN = ["mpirun", "--mca", "mpi_yield_when_idle", "1", "--oversubscribe"]
+ENVIRONMENT = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMP_NUM_THREADS": "1",
+}
+
+
+# --- input ---------------------------------------------------------------------------------------
+
+
+def before_box(dimension, newton="on", extra=""):
+    return f"""
+        units lj
+        dimension {dimension}
+        boundary p p p
+        newton {newton}
+        atom_style ellipsoid
+        atom_modify map array
+        {extra}"""
+
+
+def after_box(sides="one", skin=0.3, k_e=1.0):
+    return f"""
+        pair_style spherocylinder/harmonic sides {sides}
+        pair_coeff * * {k_e}
+        neighbor {skin} bin
+        neigh_modify every 1 delay 0 check yes one 10000 page 1000000
+        thermo_modify norm no
+        compute state all property/atom {POSE} {FORCE}"""
+
+
+def load_plugin():
+    return f"include {REPOSITORY / 'inputs' / 'load_plugin.lmp'}"
+
+
+def scene(packing, data, *, newton="on", extra="", **forces):
+    """Input from the start to the pair style, for a data file that is written here."""
+    write_data(data, packing)
+    return before_box(packing.dimension, newton, extra) + f"\nread_data {data}" + after_box(**forces)
+
+
+def dump(path, every=1):
+    """Input that dumps states with all digits."""
+    return f"""
+        dump dumped all custom {every} {path} c_state[*]
+        dump_modify dumped format float %.17g"""
+
+
+# --- runs ----------------------------------------------------------------------------------------
+
+
+def command_line(*arguments, ranks=1):
+    lmp = ["lmp", "-nocite", "-log", "none", *map(str, arguments)]
+    return [*MPIRUN, "-np", str(ranks), *lmp] if ranks > 1 else lmp
+
+
+def environment():
+    return {**os.environ, **ENVIRONMENT, "JAMSHAPE_PLUGIN": str(plugin_path())}
+
+
+def run_lmp(text, folder, ranks=1):
+    """`lmp` with this input in a process of its own; standard error is with standard output."""
+    with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".in", delete=False) as file:
+        file.write("\n".join(line.strip() for line in text.strip().splitlines()) + "\n")
+    return subprocess.run(
+        command_line("-in", file.name, ranks=ranks),
+        env=environment(),
+        cwd=folder,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=120,
+        check=False,
+    )
+
+
+def run_lmp_well(text, folder, ranks=1):
+    done = run_lmp(text, folder, ranks)
+    assert done.returncode == 0, done.stdout[-3000:]
+    return done.stdout
+
+
+@contextmanager
+def loaded(packing, folder, **keywords):
+    """A LAMMPS instance in this process that holds a packing and its pair style."""
+    with Session() as session:
+        session.commands(scene(packing, Path(folder) / "scene.data", **keywords))
+        yield session
+
+
+@contextmanager
+def restarted(path, folder, text=""):
+    """A LAMMPS instance in this process that goes on from a restart file."""
+    with Session() as session:
+        session.commands(f"read_restart {Path(folder) / path}\n" + text)
+        yield session
+
+
+# --- what came out -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PackingInLammps(Packing):
+    """Axes from LAMMPS's quaternions to the last bit, not by way of angles or unit lengths."""
+
+    quaternion: np.ndarray
+
+    @property
+    def axes(self):
+        w, i, j, k = self.quaternion.T
+        if self.dimension == 2:
+            return np.column_stack([(w - k) * (w + k), 2.0 * w * k])
+        x = w * w + i * i - j * j - k * k
+        return np.column_stack([x, 2.0 * (i * j + w * k), 2.0 * (i * k - w * j)])
+
+
+@dataclass(frozen=True)
+class State:
+    """Rows in the order of the IDs."""
+
+    packing: PackingInLammps
+    force: np.ndarray
+    torque: np.ndarray
+
+    @property
+    def quaternion(self):
+        return self.packing.quaternion
+
+
+def state_from(table, lo, hi, step=0):
+    """State of a table with the columns POSE and FORCE."""
+    table = table[np.argsort(table[:, 0])]
+    D = 2 if (lo[2], hi[2]) == (-0.5, 0.5) else 3
+    lo, hi = np.array(lo[:D]), np.array(hi[:D])
+    quaternion, force, torque = table[:, 8:12], table[:, 15:18], table[:, 18:21]
+    if D == 2:
+        for zero in (table[:, 4], quaternion[:, 1:3], force[:, 2], torque[:, :2]):
+            assert not zero.any(), "2D: z and rotations out of the plane are exactly zero"
+        torque = torque[:, 2]
+    packing = PackingInLammps(
+        quaternion=quaternion,
+        position=table[:, 2 : 2 + D],
+        orientation=angle_from_quaternion(quaternion) if D == 2 else quaternion,
+        diameters=table[:, 12:15],
+        species=table[:, 1].astype(int),
+        id=table[:, 0].astype(int),
+        image=table[:, 5 : 5 + D].astype(int),
+        box=Box(lo=lo, edges=hi - lo),
+        step=step,
+    )
+    return State(packing, force[:, :D], torque)
+
+
+def state_of(session):
+    """State and forces of the last run."""
+    per_atom, array = 1, 2
+    table = session.lmp.numpy.extract_compute("state", per_atom, array)
+    lo, hi = session.lmp.extract_box()[:2]
+    return state_from(table.copy(), lo, hi, session.step)
+
+
+def states_from_dump(path):
+    """States of the frames that `dump` made LAMMPS write."""
+    states = []
+    for text in Path(path).read_text().split("ITEM: TIMESTEP\n")[1:]:
+        lines = text.splitlines()
+        step, n = int(lines[0]), int(lines[2])
+        bounds = np.array([line.split() for line in lines[4:7]], dtype=float)
+        table = np.array([line.split() for line in lines[8 : 8 + n]], dtype=float)
+        states.append(state_from(table, tuple(bounds[:, 0]), tuple(bounds[:, 1]), step))
+    return states
+
+
+def global_vector(session, compute):
+    style_global, vector = 0, 1
+    return session.lmp.numpy.extract_compute(compute, style_global, vector).copy()
+
+
+def fix_vector(session, fix, element):
+    """Element of a fix's global vector, counted from 1 as in input files."""
+    style_global, vector = 0, 1
+    return session.lmp.extract_fix(fix, style_global, vector, element - 1, 0)
+
+
+# --- comparisons ---------------------------------------------------------------------------------
+
+
+def bindings_forces(state, sides="one", k_e=1.0):
+    return contacts.forces(state.packing, k_e, SIDES[sides])
+
+
+def difference_from_bindings(state, sides="one", k_e=1.0):
+    """Largest difference of forces and of torques, relative to the largest of a contact."""
+    network = contacts.find_contacts(state.packing, k_e, SIDES[sides])
+    expected = contacts.sum_forces(state.packing, network)
+    torques = np.stack([network.torque_i, network.torque_j])
+    return max(
+        np.abs(found - wanted).max() / (np.abs(of_contacts).max(initial=0.0) or 1.0)
+        for found, wanted, of_contacts in (
+            (state.force, expected.force, network.force),
+            (state.torque, expected.torque, torques),
+        )
+    )
+
+
+def nearest_image(separation, box):
+    return separation - box.edges * np.round(separation / box.edges)
+
+
+def angle_between(quaternion, other):
+    """Angles of the rotations from one to the other; small ones to full relative accuracy."""
+    other = np.where((quaternion * other).sum(axis=1, keepdims=True) < 0, -other, other)
+    half_chord = 0.5 * np.linalg.norm(quaternion - other, axis=1)
+    return 4.0 * np.arcsin(np.minimum(half_chord, 1.0))
+
+
+def pose_differences(a, b):
+    """Largest distance over the box edge and largest angle between two states of one system."""
+    np.testing.assert_array_equal(a.packing.id, b.packing.id)
+    apart = nearest_image(a.packing.position - b.packing.position, a.packing.box)
+    largest = np.abs(apart / a.packing.box.edges).max()
+    return largest, angle_between(a.quaternion, b.quaternion).max()
+
+
+# --- packings ------------------------------------------------------------------------------------
+
+
+def rods(position, angle, half_length, radius, edges, **fields):
+    """Packing of the plane from arrays; one radius and half length may stand for all."""
+    n = len(position)
+    A, R = np.broadcast_to(half_length, n), np.broadcast_to(radius, n)
+    box = Box(lo=-0.5 * np.asarray(edges, float), edges=np.asarray(edges, float))
+    arrays = {
+        "position": np.asarray(position, float),
+        "orientation": np.broadcast_to(angle, n),
+        "diameters": np.column_stack([2 * (A + R), 2 * R, 2 * R]),
+        "species": np.ones(n, int),
+        "id": np.arange(1, n + 1),
+        "box": box,
+    }
+    return Packing(**(arrays | fields))
+
+
+def rods_3d(position, quaternion, half_length, radius, edges, **fields):
+    n = len(position)
+    q = np.broadcast_to(quaternion, (n, 4))
+    q = q / np.linalg.norm(q, axis=1, keepdims=True)
+    flat = rods(np.zeros((n, 2)), 0.0, half_length, radius, [1.0, 1.0])
+    box = Box(lo=-0.5 * np.asarray(edges, float), edges=np.asarray(edges, float))
+    arrays = {"position": np.asarray(position, float), "orientation": q, "box": box}
+    return flat.with_(**({"image": np.empty((0, 0), int)} | arrays | fields))
+
+
+def quaternion_product(p, q):
+    (a, b, c, d), (e, f, g, h) = np.moveaxis(p, -1, 0), np.moveaxis(q, -1, 0)
+    return np.stack(
+        [
+            a * e - b * f - c * g - d * h,
+            a * f + b * e + c * h - d * g,
+            a * g - b * h + c * e + d * f,
+            a * h + b * g - c * f + d * e,
+        ],
+        axis=-1,
+    )
+
+
+def rotation_by(vectors):
+    """Quaternions of rotations by the angle |v| about v."""
+    angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(angle / 2), np.sinc(angle / 2 / np.pi) * vectors / 2], axis=-1)
+
+
+def turned(packing, vectors):
+    """Every particle turned: by angles (N,) in the plane, by rotation vectors (N, 3) in space."""
+    if packing.dimension == 2:
+        return packing.with_(orientation=packing.orientation + vectors)
+    return packing.with_(orientation=quaternion_product(rotation_by(vectors), packing.orientation))
+
+
+def kicked(packing, amplitude, seed):
+    """Every particle moved at random by up to this many radii; tips move no farther by turning."""
+    rng = np.random.default_rng(seed)
+    step = amplitude * packing.radius
+    shift = step[:, None] * rng.uniform(-1, 1, (packing.n, packing.dimension))
+    shape = (packing.n,) if packing.dimension == 2 else (packing.n, 3)
+    reach = packing.diameters[:, 0] / 2
+    angle = (rng.uniform(-1, 1, shape).T * step / reach).T
+    return turned(packing.with_(position=packing.position + shift), angle)
+
+
+def compressed(packing, phi, kappa=0.004, dt=0.1, sides="two"):
+    """Driven by fix overdamped/affine to a packing fraction."""
+    steps = int(np.log(phi / packing.phi) / (packing.dimension * kappa * dt))
+    with tempfile.TemporaryDirectory() as folder, loaded(packing, folder, sides=sides) as session:
+        session.commands(f"""
+            fix compress all overdamped/affine drag 1.0 compress {kappa}
+            timestep {dt}
+            run {steps}""")
+        return state_of(session).packing
+
+
+def on_grid(packing, bits=32):
+    """Positions and box rounded to multiples of 2^-bits: periodic images are then exact."""
+    unit = 2.0**-bits
+    edges = 2 * unit * np.round(packing.box.edges / (2 * unit))
+    position = unit * np.round(packing.position / unit)
+    return packing.with_(position=position, box=Box(lo=-edges / 2, edges=edges))
+
+
+def with_odd_ids(packing, seed):
+    """IDs shuffled, with gaps."""
+    rng = np.random.default_rng(seed)
+    return packing.with_(id=rng.permutation(3 * packing.n)[: packing.n] + 1)
+
+
+def wrapped(packing):
+    """Positions in the box, image counts to match."""
+    turns = np.floor((packing.position - packing.box.lo) / packing.box.edges).astype(int)
+    return packing.with_(
+        position=packing.position - turns * packing.box.edges, image=packing.image + turns
+    )
+
+
+def moved(packing, fraction):
+    """All positions shifted by these fractions of the box and wrapped, image counts forgotten."""
+    shift = np.asarray(fraction)[: packing.dimension] * packing.box.edges
+    shifted = wrapped(packing.with_(position=packing.position + shift))
+    return shifted.with_(image=np.zeros_like(shifted.image))
+
+
+@functools.cache
+def dense(dimension=2, alpha=4.0, n=48, phi=0.95, seed=1, kick=0.05, size_ratio=1.4):
+    """Far above jamming and kicked off every kink of the energy: contacts of all classes."""
+    mixture = Mixture.bidisperse(alpha, size_ratio)
+    start = random_packing(n, 0.3 if dimension == 2 else 0.15, seed, mixture, dimension=dimension)
+    packing = kicked(compressed(start, phi), kick, seed)
+    return wrapped(on_grid(packing))
+
+
+@functools.cache
+def dense_mixture(dimension=2, n=48, phi=0.95, seed=1, kick=0.05):
+    """As `dense`, of discs (spheres) and of rods with alpha up to 5 and sizes up to a factor 3."""
+    rng = np.random.default_rng(seed)
+    radius = 0.5 * rng.uniform(1, 3, n)
+    half_length = radius * rng.uniform(0, 5, n) * (np.arange(n) % 3 > 0)
+    mixture = Mixture.from_arrays(half_length, radius, np.arange(n) % 2 + 1)
+    start = random_packing(n, 0.25 if dimension == 2 else 0.1, seed, mixture, dimension=dimension)
+    return wrapped(on_grid(kicked(compressed(start, phi), kick, seed)))

@@ -1,0 +1,352 @@
+"""Forces, torques, energy and pressure in LAMMPS against the bindings and against differences."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+from lammps_scenes import (
+    SIDES,
+    after_box,
+    before_box,
+    bindings_forces,
+    compressed,
+    dense,
+    dense_mixture,
+    difference_from_bindings,
+    dump,
+    global_vector,
+    kicked,
+    load_plugin,
+    loaded,
+    moved,
+    nearest_image,
+    on_grid,
+    quaternion_product,
+    rods,
+    rods_3d,
+    rotation_by,
+    run_lmp_well,
+    state_of,
+    states_from_dump,
+    pose_differences,
+    angle_between,
+    fix_vector,
+    with_odd_ids,
+    wrapped,
+)
+
+from jamshape import contacts
+from jamshape.initial import Mixture, random_packing
+from jamshape.lammps_files import write_data
+
+pytestmark = pytest.mark.lammps
+
+# Relative to the largest force (torque) of the packing.
+TOLERANCE = 1e-14
+
+
+THERMO = """
+    compute packing all packing
+    thermo_style custom step pe press c_packing[1] c_packing[2] c_packing[3]
+    thermo_modify norm no format float %.17g"""
+
+# --- scenes --------------------------------------------------------------------------------------
+
+
+def tiny_box():
+    """Two rods that touch their own images and several images of each other."""
+    return rods([[0.0, 0.0], [0.25, 1.0]], [0.0, 0.02], 1.5, [0.6, 0.5], [4.0, 2.0])
+
+
+def lone_rod():
+    """A rod tip to tip with its own image, and side to side with the next row's."""
+    return rods([[0.1, 0.2]], 0.01, 1.0, 0.5, [2.9, 0.9375])
+
+
+def tiny_box_3d():
+    quaternion = [[1.0, 0.0, 0.02, 0.0], [1.0, 0.03, 0.0, 0.01]]
+    return rods_3d([[0, 0, 0], [0.25, 1.0, 0.1]], quaternion, 1.5, [0.6, 0.5], [4.0, 2.0, 1.0625])
+
+
+SCENES = {
+    "rods": dense,
+    "mixture": dense_mixture,
+    "nearly discs": lambda: dense(alpha=0.01, phi=1.0),
+    "discs": lambda: dense(alpha=0.0, phi=1.0),
+    "odd ids": lambda: with_odd_ids(dense(), 5),
+    "shifted": lambda: on_grid(moved(dense(), [0.37, 0.61])),
+    "tiny box": tiny_box,
+    "lone rod": lone_rod,
+    "rods 3d": lambda: dense(3, alpha=3.0, phi=0.8),
+    "mixture 3d": lambda: dense_mixture(3, phi=0.8),
+    "spheres": lambda: dense(3, alpha=0.0, phi=0.85),
+    "tiny box 3d": tiny_box_3d,
+}
+CASES = [
+    (name, sides, newton)
+    for name in SCENES
+    for sides in SIDES
+    for newton in ("on", "off")
+]  # fmt: skip
+
+
+@functools.cache
+def packing_of(name):
+    return SCENES[name]()
+
+
+def assert_energy_and_pressure(packing, expected, *, pe, press, phi, u, p):
+    assert expected.energy > 0
+    np.testing.assert_allclose(pe, expected.energy, rtol=TOLERANCE)
+    np.testing.assert_allclose(press, expected.pressure, rtol=TOLERANCE)
+    np.testing.assert_allclose(u, expected.energy / packing.box.volume, rtol=TOLERANCE)
+    np.testing.assert_allclose(p, expected.pressure, rtol=TOLERANCE)
+    np.testing.assert_allclose(phi, packing.phi, rtol=TOLERANCE)
+
+
+@pytest.mark.parametrize(("name", "sides", "newton"), CASES)
+def test_forces_equal_the_bindings(name, sides, newton, tmp_path, measured):
+    packing = packing_of(name)
+    with loaded(packing, tmp_path, sides=sides, newton=newton) as session:
+        session.commands(f"{THERMO}\nrun 0")
+        state = state_of(session)
+        thermo = {key: session.lmp.get_thermo(key) for key in ("pe", "press")}
+        phi, u, p = global_vector(session, "packing")[:3]
+    difference = difference_from_bindings(state, sides)
+    measured(difference=difference)
+    assert difference < TOLERANCE
+    expected = bindings_forces(state, sides)
+    assert_energy_and_pressure(packing, expected, **thermo, phi=phi, u=u, p=p)
+
+
+# --- two ranks: all scenes in one process --------------------------------------------------------
+
+
+def one_scene(case, folder):
+    name, sides, newton = case
+    label = "-".join(case).replace(" ", "_")
+    write_data(folder / f"{label}.data", packing_of(name))
+    return f"""
+        clear
+        {load_plugin()}
+        {before_box(packing_of(name).dimension, newton)}
+        read_data {label}.data
+        {after_box(sides)}
+        {THERMO}
+        {dump(f"{label}.dump")}
+        run 0
+        print "{label} $(pe:%.17g) $(press:%.17g) $(c_packing[1]:%.17g) $(c_packing[2]:%.17g) &
+            $(c_packing[3]:%.17g)" append thermo"""
+
+
+@pytest.fixture(scope="module")
+def on_two_ranks(tmp_path_factory):
+    """State and thermo output of every case."""
+    folder = tmp_path_factory.mktemp("ranks")
+    run_lmp_well("".join(one_scene(case, folder) for case in CASES), folder, ranks=2)
+    rows = [line.split() for line in (folder / "thermo").read_text().splitlines()]
+    thermo = {label: [float(number) for number in numbers] for label, *numbers in rows}
+    return {
+        case: (states_from_dump(folder / f"{label}.dump")[0], thermo[label])
+        for case in CASES
+        for label in ["-".join(case).replace(" ", "_")]
+    }
+
+
+@pytest.mark.parametrize("case", CASES, ids="-".join)
+def test_forces_on_two_ranks_equal_the_bindings(case, on_two_ranks, measured):
+    name, sides, _ = case
+    state, (pe, press, phi, u, p) = on_two_ranks[case]
+    difference = difference_from_bindings(state, sides)
+    measured(difference=difference)
+    assert difference < TOLERANCE
+    expected = bindings_forces(state, sides)
+    assert_energy_and_pressure(
+        packing_of(name), expected, pe=pe, press=press, phi=phi, u=u, p=p
+    )
+
+
+# --- what the scenes hold, and what forces must not depend on ------------------------------------
+
+
+def test_scenes_hold_what_they_stand_for():
+    kinds = contacts.find_contacts(dense(), sides=2).kind
+    assert set(kinds) == {0, 1, 2}
+    for name in ("tiny box", "tiny box 3d"):
+        network = contacts.find_contacts(packing_of(name), sides=1)
+        i, j = network.pairs.T
+        assert (i == j).any(), "own image in reach"
+        assert ((i == 0) & (j == 1)).sum() > 1, "several images of the neighbour in reach"
+    lone = contacts.find_contacts(packing_of("lone rod"), sides=2)
+    assert set(lone.kind) == {0, 2}
+
+
+@pytest.mark.parametrize("sides", SIDES)
+def test_forces_do_not_depend_on_ids_or_origin(sides, on_two_ranks):
+    def sorted_forces(name):
+        state, _ = on_two_ranks[name, sides, "on"]
+        rank = np.argsort(packing_of(name).id)  # rows of the packing in the order of the IDs
+        force, torque = np.empty_like(state.force), np.empty_like(state.torque)
+        force[rank], torque[rank] = state.force, state.torque
+        return force, torque
+
+    force, torque = sorted_forces("rods")
+    for name in ("odd ids", "shifted"):
+        other_force, other_torque = sorted_forces(name)
+        np.testing.assert_allclose(other_force, force, rtol=0, atol=1e-14 * np.abs(force).max())
+        np.testing.assert_allclose(other_torque, torque, rtol=0, atol=1e-14 * np.abs(torque).max())
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_discs_alone_take_the_same_path_to_rounding(dimension, tmp_path, measured):
+    """A rod that touches nothing makes LAMMPS keep torques and quaternions of all."""
+    discs = dense(dimension, alpha=0.0, n=24, phi=0.95 if dimension == 2 else 0.75)
+    tree = cKDTree(discs.position - discs.box.lo, boxsize=discs.box.edges)
+    trial = np.random.default_rng(1).uniform(0, discs.box.edges, (20000, dimension))
+    distance, nearest = tree.query(trial, k=4)
+    gap = (distance - discs.radius[nearest]).min(axis=1)
+    rod_at, room = trial[gap.argmax()] + discs.box.lo, gap.max()
+    assert room > 0
+    rod = [room / 2, room / 4, room / 4]
+    zero = {2: np.zeros(1), 3: [[1.0, 0, 0, 0]]}[dimension]
+    with_rod = discs.with_(
+        position=np.vstack([discs.position, rod_at]),
+        orientation=np.concatenate([discs.orientation, zero]),
+        diameters=np.vstack([discs.diameters, rod]),
+        species=np.append(discs.species, 1),
+        id=np.append(discs.id, discs.id.max() + 1),
+        image=np.vstack([discs.image, np.zeros(dimension, int)]),
+    )
+    found = []
+    for packing in (discs, with_rod):
+        with loaded(packing, tmp_path) as session:
+            session.commands("run 0")
+            found.append((state_of(session), session.lmp.get_thermo("pe")))
+    (alone, pe), (together, pe_together) = found
+    assert np.abs(alone.force).max() > 1e-3
+    assert not together.force[-1].any()
+    assert not together.torque.any()
+    assert not alone.torque.any()
+    difference = np.abs(together.force[:-1] - alone.force).max() / np.abs(alone.force).max()
+    measured(difference=difference)
+    assert difference < 1e-15
+    np.testing.assert_allclose(pe_together, pe, rtol=1e-14)
+
+
+# --- the gradient of the energy ------------------------------------------------------------------
+
+
+def gradient_by_differences(session, state, step):
+    """Central differences of the energy by every position and every rotation, through `run 0`."""
+    D, n = state.packing.dimension, state.packing.n
+    x = session.lmp.numpy.extract_atom("x")
+
+    def energy_after(command=""):
+        session.commands(f"{command}\nrun 0 post no")
+        return session.lmp.get_thermo("pe")
+
+    by_position = np.zeros((n, D))
+    for row, k in np.ndindex(n, D):
+        atom = session.lmp.numpy.extract_atom("id")[:n].tolist().index(state.packing.id[row])
+        at = x[atom, k]
+        x[atom, k] = ahead = at + step
+        rise = energy_after()
+        x[atom, k] = behind = at - step
+        rise -= energy_after()
+        x[atom, k] = at
+        by_position[row, k] = rise / (ahead - behind)
+
+    axes = np.eye(3)[2:] if D == 2 else np.eye(3)
+    by_rotation = np.zeros((n, len(axes)))
+    for row, k in np.ndindex(*by_rotation.shape):
+        q, rise = state.quaternion[row], 0.0
+        lever = state.packing.diameters[row, 0] / 2
+        for sign in (1, -1):
+            turn = quaternion_product(rotation_by(sign * step / lever * axes[k]), q)
+            rise += sign * energy_after(set_quaternion(state.packing.id[row], turn))
+        energy_after(set_quaternion(state.packing.id[row], q))
+        by_rotation[row, k] = rise * lever / (2 * step)
+    return by_position, by_rotation if D == 3 else by_rotation[:, 0]
+
+
+def set_quaternion(tag, q):
+    """LAMMPS takes an axis and an angle in degrees."""
+    length = np.linalg.norm(q[1:])
+    axis = q[1:] / length if length else np.array([0.0, 0.0, 1.0])
+    degrees = np.degrees(2 * np.arctan2(length, q[0]))
+    return f"set atom {tag} quat {' '.join(f'{c:.17g}' for c in axis)} {degrees:.17g}"
+
+
+@pytest.mark.parametrize("sides", SIDES)
+@pytest.mark.parametrize("name", ["rods", "mixture", "rods 3d"])
+def test_forces_are_the_gradient_of_the_energy(name, sides, tmp_path, measured):
+    packing = packing_of(name)
+    with loaded(packing, tmp_path, sides=sides, extra="atom_modify sort 0 0.0") as session:
+        session.commands("run 0")
+        state = state_of(session)
+        by_position, by_rotation = gradient_by_differences(session, state, 1e-6)
+        np.testing.assert_array_equal(state_of(session).packing.position, packing.position)
+    of_force = np.abs(by_position + state.force).max() / np.abs(state.force).max()
+    of_torque = np.abs(by_rotation + state.torque).max() / np.abs(state.torque).max()
+    measured(force=of_force, torque=of_torque)
+    assert of_force < 1e-7
+    assert of_torque < 1e-7
+
+
+# --- pruning of pairs ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("skin", [0.02, 0.3, 3.0])
+def test_no_contact_is_missed_while_rods_turn_and_jump(dimension, skin, tmp_path, measured):
+    """Poses change by small and by large steps under LAMMPS's feet, as in no real run."""
+    rng = np.random.default_rng(dimension)
+    alpha = {2: 6.0, 3: 4.0}[dimension]
+    packing = dense(dimension, alpha=alpha, n=24, phi={2: 0.6, 3: 0.35}[dimension], seed=3)
+    largest, n_contacts = 0.0, []
+    with loaded(packing, tmp_path, skin=skin) as session:
+        session.commands("run 0")
+        for step in range(60):
+            state = state_of(session)
+            n_contacts.append(len(contacts.find_contacts(state.packing).pairs))
+            difference = difference_from_bindings(state)
+            largest = max(largest, difference)
+            # Tips move by up to this; the largest make LAMMPS rebuild, others only our list.
+            reach = [0.003, 0.03, 0.1][step % 3]
+            moved_on = kicked(state.packing, reach / state.packing.radius.max(), rng)
+            session.commands("\n".join(map(set_quaternion, moved_on.id, moved_on.quaternions)))
+            order = np.searchsorted(moved_on.id, session.lmp.numpy.extract_atom("id")[: packing.n])
+            x = session.lmp.numpy.extract_atom("x")[: packing.n]
+            x[:, :dimension] = moved_on.position[order]
+            session.commands("run 1 pre no post no")
+    assert len(set(n_contacts)) > 5
+    measured(difference=largest, contacts=np.mean(n_contacts))
+    assert largest < 1e-13
+
+
+@pytest.mark.parametrize("name", ["rods", "mixture", "rods 3d"])
+def test_skin_changes_nothing_in_a_run(name, tmp_path, measured):
+    """Violent relaxation: torques are large, rods turn fast."""
+    packing = kicked(packing_of(name), 0.2, 4)
+    found, rebuilds = {}, {}
+    for skin in (0.05, 4.0):
+        with loaded(packing, tmp_path, sides="two", skin=skin) as session:
+            session.commands("""
+                fix compress all overdamped/affine drag 0.1 compress -0.05
+                timestep 0.005
+                run 400""")
+            found[skin] = state_of(session)
+            rebuilds[skin] = fix_vector(session, "compress", 7)
+    turned_by = angle_between(found[0.05].quaternion, packing.sorted_by_id().quaternions)
+    distance, angle = pose_differences(found[0.05], found[4.0])
+    forces = max(difference_from_bindings(state, "two") for state in found.values())
+    measured(distance=distance, angle=angle, forces=forces, rebuilds=rebuilds[0.05],
+             turned=turned_by.max())  # fmt: skip
+    assert turned_by.max() > 0.1
+    assert rebuilds[0.05] > 10 * max(rebuilds[4.0], 0.5)
+    assert distance < 1e-12
+    assert angle < 1e-12
+    assert forces < TOLERANCE

@@ -1,0 +1,303 @@
+"""fix overdamped/affine: the equations of motion (Marschall & Teitel 2018, Eqs. 6-14)."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from lammps_scenes import (
+    SIDES,
+    angle_between,
+    compressed,
+    dense,
+    dense_mixture,
+    difference_from_bindings,
+    fix_vector,
+    kicked,
+    loaded,
+    moved,
+    nearest_image,
+    pose_differences,
+    rods,
+    rods_3d,
+    run_lmp,
+    load_plugin,
+    run_lmp_well,
+    scene,
+    state_of,
+    turned,
+    wrapped,
+)
+
+from jamshape import _contact, contacts
+
+pytestmark = pytest.mark.lammps
+
+
+def drag_of(packing, k_d=1.0):
+    """Drag coefficients of translation (N,) and of rotation about the long axis and across (N, 3)."""
+    measure, moment = _contact.spherocylinder_drag(
+        packing.half_length, packing.radius, packing.dimension
+    )
+    return k_d * measure, k_d * measure[:, None] * moment
+
+
+def run_fix(packing, folder, *commands, kappa=0.0, k_d=1.0, dt=0.01, options="", **forces):
+    """State after each of the commands, and the instance's fix vector after the last."""
+    states = []
+    with loaded(packing, folder, **forces) as session:
+        session.commands(f"""
+            fix move all overdamped/affine drag {k_d} compress {kappa} {options}
+            timestep {dt}""")
+        for command in commands:
+            session.commands(command)
+            states.append(state_of(session))
+    return states
+
+
+# --- no contact: Eq. 6 exactly -------------------------------------------------------------------
+
+
+def lonely_particles(dimension, edge):
+    """Rods, discs and all between on a jittered grid, with image counts."""
+    rng = np.random.default_rng(dimension)
+    side = 4
+    n = side**dimension
+    cells = np.stack(np.unravel_index(np.arange(n), (side,) * dimension), axis=1)
+    position = edge * ((cells + 0.5 + rng.uniform(-0.1, 0.1, cells.shape)) / side - 0.5)
+    radius, ratio = rng.uniform(0.1, 0.3, n), rng.choice([0, 1e-6, 1, 5], n)
+    image = rng.integers(-3, 4, (n, dimension))
+    if dimension == 2:
+        return rods(position, rng.uniform(-4, 4, n), ratio * radius, radius, [edge] * 2, image=image)
+    return rods_3d(position, rng.normal(size=(n, 4)), ratio * radius, radius, [edge] * 3,
+                   image=image)  # fmt: skip
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("reference", ["center", "corner"])
+@pytest.mark.parametrize(("kappa", "steps"), [(np.log(10) / 20, 2000), (1e-10, 100_000)])
+def test_without_contact_particles_follow_the_box(
+    kappa, steps, reference, dimension, tmp_path, measured
+):
+    dt = 0.01
+    packing = wrapped(lonely_particles(dimension, 200.0 if kappa > 1e-3 else 30.0))
+    options = f"reference {reference}"
+    start, end = run_fix(packing, tmp_path, "run 0", f"run {steps}", kappa=kappa, dt=dt,
+                         options=options)  # fmt: skip
+    assert not len(contacts.find_contacts(end.packing).pairs)
+    scale = np.exp(-kappa * dt * steps)
+    fixed = {"center": np.zeros(dimension), "corner": packing.box.lo}[reference]
+
+    def unwrapped(state):
+        p = state.packing
+        return p.position + p.image * p.box.edges
+
+    edge_error = np.abs(end.packing.box.edges / (scale * packing.box.edges) - 1).max()
+    lo_error = np.abs(end.packing.box.lo - fixed - scale * (packing.box.lo - fixed)).max()
+    path = unwrapped(end) - fixed - scale * (unwrapped(start) - fixed)
+    position_error = np.abs(path / end.packing.box.edges).max()
+    measured(edge=edge_error, lo=lo_error, position=position_error)
+    # To the change itself where it is small: 1e-7 of the box in the slow case.
+    assert edge_error < 1e-14
+    assert lo_error < 1e-14 * packing.box.edges.max()
+    assert position_error < 1e-14
+    np.testing.assert_array_equal(end.packing.image, start.packing.image)
+    assert end.quaternion.tobytes() == start.quaternion.tobytes()
+
+
+# --- one contact ---------------------------------------------------------------------------------
+
+
+def touching_discs():
+    return rods([[-0.4, 0.1], [0.2, 0.3]], 0.3, 0.0, [0.5, 0.3], [10.0, 10.0])
+
+
+def touching_rods():
+    u = np.array([np.cos(0.3), np.sin(0.3)])
+    A, R = np.array([2.0, 1.0]), np.array([0.5, 0.3])
+    return rods([[0, 0], (A.sum() + 0.75) * u], 0.3, A, R, [15.0, 15.0])
+
+
+def touching_rods_3d():
+    q = np.array([0.9, 0.1, 0.3, -0.2]) / np.linalg.norm([0.9, 0.1, 0.3, -0.2])
+    A, R = np.array([2.0, 1.0]), np.array([0.5, 0.3])
+    u = rods_3d([[0, 0, 0]], q, 1.0, 1.0, [9.0] * 3).axes[0]
+    return rods_3d([[0, 0, 0], (A.sum() + 0.75) * u], q, A, R, [15.0] * 3)
+
+
+@pytest.mark.parametrize("sides", SIDES)
+@pytest.mark.parametrize("build", [touching_discs, touching_rods, touching_rods_3d])
+def test_one_contact_opens_exponentially(build, sides, tmp_path, measured):
+    """Discs, and rods tip to tip: the overlap decays with k_e/d^2 times the two mobilities."""
+    packing, k_e, k_d, steps = build(), 1.7, 2.5, 150
+    mobility = 1.0 / drag_of(packing, k_d)[0]
+    d = packing.radius.sum()
+    rate = k_e / d**2 * mobility.sum()
+    dt = 0.02 / rate
+
+    def overlap(state):
+        separation = np.diff(state.packing.position, axis=0)[0]
+        tips = state.packing.half_length.sum()
+        return d - (np.linalg.norm(separation) - tips)
+
+    start, end = run_fix(packing, tmp_path, "run 0", f"run {steps}", k_d=k_d, dt=dt, sides=sides,
+                         k_e=k_e)  # fmt: skip
+    remaining = overlap(end) / overlap(start)
+    heun = (1 - rate * dt + (rate * dt) ** 2 / 2) ** steps
+    measured(remaining=remaining, of_heun=remaining / heun - 1,
+             of_exponential=np.log(remaining) / (-rate * dt * steps) - 1)  # fmt: skip
+    assert overlap(start) > 0.01
+    np.testing.assert_allclose(remaining, heun, rtol=1e-12)
+    np.testing.assert_allclose(np.log(remaining), -rate * dt * steps, rtol=(rate * dt) ** 2 / 3)
+    # Each moves by its own mobility, both along the line between them.
+    moved_by = end.packing.position - start.packing.position
+    np.testing.assert_allclose(moved_by[0] * mobility[1], -moved_by[1] * mobility[0], atol=1e-12)
+    assert angle_between(end.quaternion, start.quaternion).max() < 1e-13
+
+
+def tip_on_side(dimension):
+    """A tip on a side, both turning, in the same class all the while."""
+    if dimension == 2:
+        return rods([[0, 0], [0.8, 1.55]], [0.0, 1.2], [2.0, 1.0], [0.5, 0.3], [12.0, 12.0])
+    q = [[1.0, 0.05, 0.02, 0.0], np.array([np.cos(0.6), 0.1, 0.2, np.sin(0.6)])]
+    return rods_3d([[0, 0, 0], [0.8, 1.3, 0.1]], q, [2.0, 1.0], [0.5, 0.3], [12.0] * 3)
+
+
+@pytest.mark.parametrize("kappa", [0.0, 0.01])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_heun_is_of_second_order(dimension, kappa, tmp_path, measured):
+    packing, time = tip_on_side(dimension), 1.6
+
+    def end_of(steps):
+        before, after = run_fix(packing, tmp_path, "run 0", f"run {steps}", dt=time / steps,
+                                kappa=kappa)  # fmt: skip
+        for state in (before, after):
+            assert contacts.find_contacts(state.packing).kind.tolist() == [1]
+        return before, after
+
+    start, exact = end_of(12800)
+    turned_by = angle_between(exact.quaternion, start.quaternion)
+    assert (turned_by > 0.004).all()
+    number = np.array([80, 160, 320, 640])
+    errors = np.array([pose_differences(end_of(steps)[1], exact) for steps in number])
+    slopes = -np.polyfit(np.log(number), np.log(errors), 1)[0]
+    measured(position_slope=slopes[0], angle_slope=slopes[1], coarsest=errors.max())
+    assert errors.min() > 1e-11
+    np.testing.assert_allclose(slopes, 2.0, atol=0.1)
+
+
+# --- many contacts: what a trajectory must not depend on -----------------------------------------
+
+
+def trajectory_end(packing, folder, *, reference="center", steps=400, kappa=2e-3):
+    """Through the boundaries: a violent start, then compression."""
+    states = run_fix(packing, folder, f"run {steps}", kappa=kappa, dt=0.05, sides="two",
+                     options=f"reference {reference}", skin=0.1)  # fmt: skip
+    return states[-1]
+
+
+def relative_to_first(state):
+    """Positions relative to particle 1, as fractions of the box, and quaternions."""
+    return (state.packing.position - state.packing.position[0]) / state.packing.box.edges
+
+
+@pytest.mark.parametrize("name", ["rods", "discs", "rods 3d"])
+def test_neither_reference_nor_origin_matter(name, tmp_path, measured):
+    build = {
+        "rods": lambda: dense(n=32, phi=0.9),
+        "discs": lambda: dense(alpha=0.0, n=32, phi=0.9),
+        "rods 3d": lambda: dense(3, alpha=2.0, n=32, phi=0.7),
+    }
+    packing = kicked(build[name](), 0.15, 7)
+    expected = trajectory_end(packing, tmp_path)
+    others = {
+        "corner": trajectory_end(packing, tmp_path, reference="corner"),
+        "shifted": trajectory_end(moved(packing, [0.37, 0.61, 0.23]), tmp_path),
+    }
+    crossed = np.abs(others["shifted"].packing.image).max()
+    assert crossed > 0, "particles wrap through the boundaries on the way"
+    for label, other in others.items():
+        apart = relative_to_first(other) - relative_to_first(expected)
+        apart -= np.round(apart)
+        angle = angle_between(other.quaternion, expected.quaternion).max()
+        measured(**{f"{label}_position": np.abs(apart).max(), f"{label}_angle": angle})
+        assert np.abs(apart).max() < 1e-13
+        assert angle < 1e-12
+        np.testing.assert_allclose(other.packing.box.edges, expected.packing.box.edges, rtol=1e-15)
+
+
+def test_positions_stay_in_the_box_and_paths_stay_whole(tmp_path):
+    """Every particle, followed from dump to dump, never jumps by more than it can move."""
+    packing = kicked(dense(n=32, phi=0.9), 0.15, 7)
+    states = run_fix(packing, tmp_path, *["run 10"] * 60, kappa=0.01, dt=0.05, sides="two")
+    previous = None
+    for state in states:
+        p = state.packing
+        inside = (p.position - p.box.lo) / p.box.edges
+        # LAMMPS wraps on rebuilds, so a particle may be outside by up to half the skin.
+        assert (inside > -0.01).all()
+        assert (inside < 1.01).all()
+        path = p.position + p.image * p.box.edges
+        if previous is not None:
+            assert np.abs(path - previous).max() < 0.05
+        previous = path
+
+
+# --- pressure, energy and power ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sides", SIDES)
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_pressure_is_minus_dU_dV(dimension, sides, tmp_path, measured):
+    packing = dense(dimension, alpha=3.0, phi={2: 0.95, 3: 0.8}[dimension])
+    step, axes = 1e-6, "xyz"[:dimension]
+    with loaded(packing, tmp_path, sides=sides) as session:
+        session.commands("run 0")
+        pressure = session.lmp.get_thermo("press")
+        edges = packing.box.edges
+
+        def energy_at(factor):
+            bounds = " ".join(
+                f"{x} final {-edge * factor / 2:.17g} {edge * factor / 2:.17g}"
+                for x, edge in zip(axes, edges, strict=True)
+            )
+            session.commands(f"change_box all {bounds} remap units box\nrun 0")
+            return session.lmp.get_thermo("pe")
+
+        rise = energy_at(1 + step) - energy_at(1 - step)
+    volume_change = packing.box.volume * ((1 + step) ** dimension - (1 - step) ** dimension)
+    measured(relative=-rise / volume_change / pressure - 1)
+    np.testing.assert_allclose(-rise / volume_change, pressure, rtol=1e-8)
+
+
+def power_sample(session, kappa, dt):
+    """dU/dt by a central difference over two steps, and the two terms of its balance between."""
+    dimension = session.lmp.extract_setting("dimension")
+    session.commands(f"timestep {dt}\nrun 0 post no")
+    before = session.lmp.get_thermo("pe")
+    session.commands("run 1 post no")
+    volume = np.prod(state_of(session).packing.box.edges)
+    work = dimension * kappa * session.lmp.get_thermo("press") * volume
+    dissipation = fix_vector(session, "drive", 5)
+    session.commands("run 1 post no")
+    rise = session.lmp.get_thermo("pe") - before
+    return rise / (2 * dt), work, dissipation
+
+
+@pytest.mark.parametrize("sides", SIDES)
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_power_balance_along_a_driven_run(dimension, sides, tmp_path, measured):
+    """dU/dt = d kappa p V - sum F^2/(k_d A) - sum tau^2/(k_d A I)."""
+    kappa, dt, k_d = 0.01, 1e-4, 1.3
+    packing = dense(dimension, alpha=3.0, phi={2: 0.85, 3: 0.7}[dimension], kick=0.02)
+    errors = []
+    with loaded(packing, tmp_path, sides=sides) as session:
+        session.commands(f"fix drive all overdamped/affine drag {k_d} compress {kappa}")
+        for _ in range(30):
+            session.commands("timestep 0.05\nrun 10 post no")
+            rate, work, dissipation = power_sample(session, kappa, dt)
+            errors.append(abs(rate - work + dissipation) / max(abs(rate), work, dissipation))
+    errors = np.array(errors)
+    measured(median=np.median(errors), largest=errors.max(), above=(errors > 1e-6).sum())
+    assert errors.max() < 1e-6
