@@ -48,16 +48,31 @@ template <> inline Vec<2> long_axis<2>(const Quaternion &q)
 }
 template <> inline Vec<3> long_axis<3>(const Quaternion &q) { return body_axis(q, 0); }
 
+struct CosSin {
+  double cosine, sine;
+};
+
+/// Both at once; one step of a slow flow turns particles by so little that series to rounding do.
+inline CosSin cos_sin(double x)
+{
+  if (std::abs(x) > 0.01) return {std::cos(x), std::sin(x)};
+  const double y = x * x;
+  return {1.0 - y / 2.0 * (1.0 - y / 12.0 * (1.0 - y / 30.0)),
+          x * (1.0 - y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0)))};
+}
+
 /// Rotation by the angle |v| about v, in space coordinates.
 inline Quaternion rotation_by(const Vec<3> &v)
 {
   const double angle = norm(v);
-  const double factor = angle > 1e-8 ? std::sin(0.5 * angle) / angle : 0.5;
-  return {std::cos(0.5 * angle), factor * v[0], factor * v[1], factor * v[2]};
+  const CosSin half = cos_sin(0.5 * angle);
+  const double factor = angle > 0.0 ? half.sine / angle : 0.5;
+  return {half.cosine, factor * v[0], factor * v[1], factor * v[2]};
 }
 inline Quaternion rotation_by(const Vec<1> &v)
 {
-  return {std::cos(0.5 * v[0]), 0.0, 0.0, std::sin(0.5 * v[0])};
+  const CosSin half = cos_sin(0.5 * v[0]);
+  return {half.cosine, 0.0, 0.0, half.sine};
 }
 
 /// `q` turned by the rotation vector `v`. A rotation of zero returns `q` to the last bit.

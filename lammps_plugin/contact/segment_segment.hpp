@@ -31,19 +31,22 @@ template <int D> Feet<D> feet_at(const SpinePair<D> &p, double s, double t)
   return {s, t, delta, norm_sq(delta)};
 }
 
+/// `x` limited to [-bound, bound], in the two instructions that std::clamp does not become.
+inline double limited(double x, double bound) { return std::min(std::max(x, -bound), bound); }
+
 /// Foot on spine j of the point s of spine i, and the reverse.
 template <int D> double foot_on_j(const SpinePair<D> &p, double s)
 {
-  return std::clamp(dot(p.u_j, p.r + s * p.u_i), -p.A_j, p.A_j);
+  return limited(dot(p.u_j, p.r + s * p.u_i), p.A_j);
 }
 
 template <int D> double foot_on_i(const SpinePair<D> &p, double t)
 {
-  return std::clamp(dot(p.u_i, t * p.u_j - p.r), -p.A_i, p.A_i);
+  return limited(dot(p.u_i, t * p.u_j - p.r), p.A_i);
 }
 
 /// The four tips with their feet on the other spine: tips +, - of i, then +, - of j. Kept as
-/// numbers in arrays: most pairs of a list are apart, and `least` is all that is asked of them.
+/// numbers in arrays: `nearest` is all that is asked of most pairs.
 template <int D> struct TipFeet {
   double s[4], t[4], distance_sq[4];
 
@@ -59,12 +62,30 @@ template <int D> struct TipFeet {
     for (int k = 0; k < 4; ++k) distance_sq[k] = norm_sq(p.r + s[k] * p.u_i - t[k] * p.u_j);
   }
 
-  double least() const
+  /// Index of the least distance; without branches, which nothing could predict.
+  int nearest() const
   {
-    return std::min(std::min(distance_sq[0], distance_sq[1]),
-                    std::min(distance_sq[2], distance_sq[3]));
+    const int of_i = distance_sq[1] < distance_sq[0], of_j = 2 + (distance_sq[3] < distance_sq[2]);
+    return distance_sq[of_j] < distance_sq[of_i] ? of_j : of_i;
   }
 };
+
+/// Whether feet `a` are closer than `b`, each a tip and its foot on the other spine. Where they
+/// share a tip, the one whose other foot lies inside the spine is: its distance is the least from
+/// that tip. Rounded distances cannot tell that of feet within 1e-8 of each other, and would leave
+/// normal and lever arms with half of the digits.
+template <int D> bool is_closer(const SpinePair<D> &p, const Feet<D> &a, const Feet<D> &b)
+{
+  if (a.s == b.s) {
+    const bool a_inside = std::abs(a.t) < p.A_j, b_inside = std::abs(b.t) < p.A_j;
+    if (a_inside != b_inside) return a_inside;
+  }
+  if (a.t == b.t) {
+    const bool a_inside = std::abs(a.s) < p.A_i, b_inside = std::abs(b.s) < p.A_i;
+    if (a_inside != b_inside) return a_inside;
+  }
+  return a.distance_sq < b.distance_sq;
+}
 
 /// The closest approach at either end of the pair: at end e = +, - the shorter of (tip e of i to
 /// spine j) and (tip of j at the same end to spine i), the spines aligned by the sign of u_i.u_j.
@@ -75,52 +96,62 @@ template <int D> struct EndFeet {
   EndFeet(const SpinePair<D> &p, const TipFeet<D> &tips)
   {
     const int j_plus = dot(p.u_i, p.u_j) < 0.0 ? 3 : 2, j_minus = 5 - j_plus;
-    const auto shorter = [&](int a, int b) {
-      const int k = tips.distance_sq[b] < tips.distance_sq[a] ? b : a;
-      return feet_at(p, tips.s[k], tips.t[k]);
+    const auto feet = [&](int k) { return feet_at(p, tips.s[k], tips.t[k]); };
+    const auto closer = [&](const Feet<D> &a, const Feet<D> &b) {
+      return is_closer(p, b, a) ? b : a;
     };
-    plus = shorter(0, j_plus);
-    minus = shorter(1, j_minus);
+    plus = closer(feet(0), feet(j_plus));
+    minus = closer(feet(1), feet(j_minus));
+    minus_is_nearer = is_closer(p, minus, plus);
   }
 
-  const Feet<D> &nearer() const { return minus.distance_sq < plus.distance_sq ? minus : plus; }
-  const Feet<D> &farther() const { return minus.distance_sq < plus.distance_sq ? plus : minus; }
+  const Feet<D> &nearer() const { return minus_is_nearer ? minus : plus; }
+  const Feet<D> &farther() const { return minus_is_nearer ? plus : minus; }
 
   /// Distance between the two ends, the mean over both spines. The mean, not the value on one
   /// spine: it does not change when i and j are exchanged, nor when the nearer tip of an end
   /// changes.
   double spread() const { return 0.5 * (std::abs(plus.s - minus.s) + std::abs(plus.t - minus.t)); }
+
+  /// The middle between the two ends, on both spines.
+  Feet<D> middle(const SpinePair<D> &p) const
+  {
+    return feet_at(p, 0.5 * (plus.s + minus.s), 0.5 * (plus.t + minus.t));
+  }
+
+ private:
+  bool minus_is_nearer;
 };
 
-/// The closest points of two spines, from the nearer end. In the plane, spines that do not cross
-/// are closest at a tip; which one, rounding cannot tell by comparing distances when a spine is
-/// very short, so each foot is projected once more: the closest points are each other's feet. Skew
-/// spines in 3D may be closest inside both.
+/// The closest points of two spines, from the point t of the nearest tip or its foot. In the plane,
+/// spines that do not cross are closest at a tip; which one, rounding cannot tell by comparing
+/// distances when a spine is very short, so each foot is projected once more: the closest points
+/// are each other's feet. Skew spines in 3D may be closest inside both.
 template <int D> Feet<D> each_others_feet(const SpinePair<D> &p, double t)
 {
   const double s = foot_on_i(p, t);
   return feet_at(p, s, foot_on_j(p, s));
 }
 
-inline Feet<2> closest_feet(const SpinePair<2> &p, const Feet<2> &nearer_end)
+inline Feet<2> closest_feet(const SpinePair<2> &p, double t_nearest)
 {
-  return each_others_feet(p, nearer_end.t);
+  return each_others_feet(p, t_nearest);
 }
 
-inline Feet<3> closest_feet(const SpinePair<3> &p, const Feet<3> &nearer_end)
+inline Feet<3> closest_feet(const SpinePair<3> &p, double t_nearest)
 {
   // The part of u_i across u_j, from the difference of the axes: nearly parallel spines lose no
   // digits.
   const Vec<3> turn = p.u_i - std::copysign(1.0, dot(p.u_i, p.u_j)) * p.u_j;
   const Vec<3> across = turn - dot(turn, p.u_j) * p.u_j;
   const double sin_sq = norm_sq(across);
-  if (sin_sq == 0.0) return each_others_feet(p, nearer_end.t);
+  if (sin_sq == 0.0) return each_others_feet(p, t_nearest);
   const double s = -dot(p.r, across) / sin_sq;
   const double t = dot(p.u_j, p.r + s * p.u_i);
   // Feet inside both spines are the minimum, the distance being convex: comparing it with that at
   // the ends would leave it to rounding where the feet of nearly parallel spines sit.
   if (std::abs(s) < p.A_i && std::abs(t) < p.A_j) return feet_at(p, foot_on_i(p, t), t);
-  return each_others_feet(p, nearer_end.t);
+  return each_others_feet(p, t_nearest);
 }
 
 /// |sin| of the angle between the spines: the one measure of being parallel used everywhere; it
@@ -137,14 +168,11 @@ inline bool spines_cross(const SpinePair<2> &p)
 inline bool spines_cross(const SpinePair<3> &) { return false; }
 
 /// Squared shortest distance of the two spines, zero where they cross.
-inline double spine_distance_sq(const SpinePair<2> &p)
+template <int D> double spine_distance_sq(const SpinePair<D> &p)
 {
-  return spines_cross(p) ? 0.0 : TipFeet<2>(p).least();
-}
-
-inline double spine_distance_sq(const SpinePair<3> &p)
-{
-  return closest_feet(p, EndFeet<3>(p, TipFeet<3>(p)).nearer()).distance_sq;
+  if (spines_cross(p)) return 0.0;
+  const TipFeet<D> tips(p);
+  return closest_feet(p, tips.t[tips.nearest()]).distance_sq;
 }
 
 }  // namespace jamshape

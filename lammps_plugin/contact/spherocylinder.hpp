@@ -171,21 +171,23 @@ template <int D> class SpherocylinderContact {
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0) return discs();
     const TipFeet<D> tips(pair);
-    // Before the reach: the tips of long rods that cross may all be out of it.
+    // Skew spines in 3D can be closer than at any tip, and so can crossing ones in 2D, both of them
+    // longer than the reach.
+    const bool tips_tell = D == 2 && std::min(pair.A_i, pair.A_j) < reach;
+    if (tips_tell && !touches(tips.distance_sq[tips.nearest()])) return empty(ContactStatus::APART);
     if (spines_cross(pair)) return empty(ContactStatus::CROSSING);
-    // Skew spines in 3D can be closer than at any tip.
-    if (D == 2 && !(tips.least() < reach * reach)) return empty(ContactStatus::APART);
-    const EndFeet<D> ends(pair, tips);
-    const Feet<D> closest = closest_feet(pair, ends.nearer());
-    if (!(closest.distance_sq < reach * reach)) return empty(ContactStatus::APART);
+    const Feet<D> closest = closest_feet(pair, tips.t[tips.nearest()]);
+    if (!touches(closest.distance_sq)) return empty(ContactStatus::APART);
     if (is_coincident(closest)) return empty(ContactStatus::CROSSING);
-    return law.sides == Sides::ONE ? one_bond(ends, closest) : two_bonds(ends, closest);
+    return law.sides == Sides::ONE ? one_bond(tips, closest) : two_bonds(tips);
   }
 
  private:
   SpinePair<D> pair;
   double radius_i, reach;
   SpherocylinderLaw law;
+
+  bool touches(double distance_sq) const { return distance_sq < reach * reach; }
 
   bool is_coincident(const Feet<D> &feet) const
   {
@@ -209,37 +211,41 @@ template <int D> class SpherocylinderContact {
   Contact<D> discs() const
   {
     const Feet<D> centres{0.0, 0.0, pair.r, norm_sq(pair.r)};
-    if (!(centres.distance_sq < reach * reach)) return empty(ContactStatus::APART);
+    if (!touches(centres.distance_sq)) return empty(ContactStatus::APART);
     if (is_coincident(centres)) return empty(ContactStatus::CROSSING);
     Contact<D> contact = empty(ContactStatus::TOUCHING);
     add_bond(contact, centres, std::sqrt(centres.distance_sq), 1.0);
     return contact;
   }
 
-  Contact<D> one_bond(const EndFeet<D> &ends, const Feet<D> &closest) const
+  Contact<D> one_bond(const TipFeet<D> &tips, const Feet<D> &closest) const
   {
     Contact<D> contact = empty(ContactStatus::TOUCHING);
     const double distance = std::sqrt(closest.distance_sq);
-    if (ends.spread() > 0.0 && abs_sine(pair) < PARALLEL_SINE) {
-      const Feet<D> middle =
-          feet_at(pair, 0.5 * (ends.plus.s + ends.minus.s), 0.5 * (ends.plus.t + ends.minus.t));
-      contact.kind = ContactKind::SIDE_TO_SIDE;
-      // The energy stays that of the shortest distance, so that it does not jump at PARALLEL_SINE.
-      add_bond(contact, middle, distance, 1.0);
-    } else {
-      contact.kind = kind_of(pair, closest);
-      add_bond(contact, closest, distance, 1.0);
+    if (abs_sine(pair) < PARALLEL_SINE) {
+      const EndFeet<D> ends(pair, tips);
+      if (ends.spread() > 0.0) {
+        contact.kind = ContactKind::SIDE_TO_SIDE;
+        // The energy stays that of the shortest distance, so that it does not jump at
+        // PARALLEL_SINE.
+        add_bond(contact, ends.middle(pair), distance, 1.0);
+        return contact;
+      }
     }
+    contact.kind = kind_of(pair, closest);
+    add_bond(contact, closest, distance, 1.0);
     return contact;
   }
 
-  Contact<D> two_bonds(const EndFeet<D> &ends, const Feet<D> &closest) const
+  Contact<D> two_bonds(const TipFeet<D> &tips) const
   {
+    const EndFeet<D> ends(pair, tips);
+    const Feet<D> closest = closest_feet(pair, ends.nearer().t);  // never the far end, at a tie
     Contact<D> contact = empty(ContactStatus::TOUCHING);
     contact.kind = kind_of(pair, closest);
     add_bond(contact, closest, std::sqrt(closest.distance_sq), 1.0);
     const Feet<D> &far_end = ends.farther();
-    if (!(far_end.distance_sq < reach * reach)) return contact;
+    if (!touches(far_end.distance_sq)) return contact;
     const BondWeight<D> weight = second_bond_weight(pair, ends);
     if (weight.value == 0.0) return contact;
 

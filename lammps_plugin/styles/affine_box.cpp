@@ -11,7 +11,7 @@ using LAMMPS_NS::bigint;
 using LAMMPS_NS::imageint;
 
 AffineBox::AffineBox(LAMMPS_NS::LAMMPS *lmp, double kappa, Reference fixed_point) :
-    Pointers(lmp), fixed(fixed_point), now{}, started(false)
+    Pointers(lmp), fixed(fixed_point), dimension(domain->dimension), now{}, started(false)
 {
   now.rate = kappa;
 }
@@ -63,15 +63,10 @@ double AffineBox::strain(bigint step) const { return now.strain_base + now.rate 
 
 double AffineBox::scale(bigint step) const { return std::exp(-strain(step)); }
 
-double AffineBox::fixed_point(int k) const
-{
-  return fixed == Reference::CENTER ? 0.5 * (now.lo[k] + now.hi[k]) : now.lo[k];
-}
-
 void AffineBox::edges(double scale, double *lo, double *hi) const
 {
   for (int k = 0; k < 3; ++k) {
-    const bool shrinks = k < domain->dimension;
+    const bool shrinks = k < dimension;
     const double point = fixed_point(k);
     lo[k] = shrinks ? point + scale * (now.lo[k] - point) : now.lo[k];
     hi[k] = shrinks ? point + scale * (now.hi[k] - point) : now.hi[k];
@@ -85,33 +80,11 @@ void AffineBox::set_box(bigint step)
   domain->set_local_box();
 }
 
-namespace {
-
-/// Signed image counts from LAMMPS's packed ones.
-Vec<3> image_counts(imageint image)
-{
-  return {{static_cast<double>((image & IMGMASK) - IMGMAX),
-           static_cast<double>((image >> IMGBITS & IMGMASK) - IMGMAX),
-           static_cast<double>((image >> IMG2BITS) - IMGMAX)}};
-}
-
-}  // namespace
-
-Vec<3> AffineBox::position(const Vec<3> &reference, imageint image, double scale) const
-{
-  const Vec<3> images = image_counts(image);
-  Vec<3> x{};
-  for (int k = 0; k < domain->dimension; ++k) {
-    x[k] = fixed_point(k) + scale * (reference[k] - images[k] * edge_at_start(k));
-  }
-  return x;
-}
-
 Vec<3> AffineBox::reference(const double *x, imageint image, double scale) const
 {
   const Vec<3> images = image_counts(image);
   Vec<3> y{};
-  for (int k = 0; k < domain->dimension; ++k) {
+  for (int k = 0; k < dimension; ++k) {
     y[k] = (x[k] - fixed_point(k)) / scale + images[k] * edge_at_start(k);
   }
   return y;

@@ -41,15 +41,35 @@ class AffineBox : protected LAMMPS_NS::Pointers {
 
   /// A position from its coordinates in the box of strain 0 (relative to the fixed point,
   /// unwrapped), and back. `image` holds LAMMPS's periodic image counts.
-  Vec<3> position(const Vec<3> &reference, LAMMPS_NS::imageint image, double scale) const;
+  Vec<3> position(const Vec<3> &reference, LAMMPS_NS::imageint image, double scale) const
+  {
+    const Vec<3> images = image_counts(image);
+    Vec<3> x{};
+    for (int k = 0; k < dimension; ++k) {
+      x[k] = fixed_point(k) + scale * (reference[k] - images[k] * edge_at_start(k));
+    }
+    return x;
+  }
   Vec<3> reference(const double *x, LAMMPS_NS::imageint image, double scale) const;
 
  private:
-  Reference fixed;
+  const Reference fixed;
+  const int dimension;
   State now;
   bool started;
 
-  double fixed_point(int k) const;
+  /// Signed image counts from LAMMPS's packed ones.
+  static Vec<3> image_counts(LAMMPS_NS::imageint image)
+  {
+    return {{static_cast<double>((image & IMGMASK) - IMGMAX),
+             static_cast<double>((image >> IMGBITS & IMGMASK) - IMGMAX),
+             static_cast<double>((image >> IMG2BITS) - IMGMAX)}};
+  }
+
+  double fixed_point(int k) const
+  {
+    return fixed == Reference::CENTER ? 0.5 * (now.lo[k] + now.hi[k]) : now.lo[k];
+  }
   double edge_at_start(int k) const { return now.hi[k] - now.lo[k]; }
   void edges(double scale, double *lo, double *hi) const;
 };

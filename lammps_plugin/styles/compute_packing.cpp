@@ -30,15 +30,14 @@ struct SharedContact {
   bool flat_i, flat_j;
 };
 
-/// A side-to-side contact counts as two bonds also where it carries one force (`sides one`), and
-/// lies on the flat parts of both.
+/// A contact by its first bond. A side-to-side contact lies on the flat parts of both.
 SharedContact shared(const LocalBond &bond, const LAMMPS_NS::tagint *tag)
 {
   const bool side_to_side = bond.kind == ContactKind::SIDE_TO_SIDE;
   return {tag[bond.i],
           tag[bond.j],
           bond.normal,
-          side_to_side ? 2 : 1,
+          1,
           side_to_side || bond.on_side_i,
           side_to_side || bond.on_side_j};
 }
@@ -183,7 +182,14 @@ void ComputePacking::compute_contacts()
   for (const LocalBond &bond : bonds) {
     force_sum += norm(bond.force);
     overlap = std::max(overlap, (bond.reach - bond.distance) / bond.reach);
-    if (bond.first_of_contact) mine.push_back(shared(bond, atom->tag));
+    if (bond.first_of_contact) {
+      mine.push_back(shared(bond, atom->tag));
+    } else {
+      ++mine.back().n_bonds;
+    }
+    // In the plane such a contact counts as two also where it carries one force (`sides one`); in
+    // space skew rods touch side to side at one point.
+    if (domain->dimension == 2 && bond.kind == ContactKind::SIDE_TO_SIDE) mine.back().n_bonds = 2;
   }
   const double n_forces = sum(static_cast<double>(bonds.size()));
   const double mean_force = n_forces > 0.0 ? sum(force_sum) / n_forces : 0.0;

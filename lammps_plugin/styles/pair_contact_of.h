@@ -73,7 +73,7 @@ template <class Model> class PairContactOf : public PairContact {
 
  private:
   // A small margin keeps the list short, a large one keeps it longer; flat optimum near one half.
-  static constexpr double MARGIN_OVER_SKIN = 0.5;
+  static constexpr double MARGIN_OVER_SKIN = 0.15;
 
   template <int D> using Body = typename Model::template Body<D>;
 

@@ -36,6 +36,7 @@ void add_styles(LAMMPS *lmp)
 
 }  // namespace
 
+#pragma GCC visibility push(default)
 extern "C" {
 
 /// The LAMMPS version that this binary was compiled for, as an integer such as 20210929. (A
@@ -57,3 +58,4 @@ void jamshape_register(void *handle)
   add_styles(lmp);
 }
 }
+#pragma GCC visibility pop

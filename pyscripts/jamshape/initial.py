@@ -14,8 +14,8 @@ from jamshape.contacts import BoolArray, NearPairs, bodies, each_once, near_pair
 from jamshape.packing import Box, FloatArray, IntArray, Packing
 
 # Trials that are tested in one go, and pairs of bodies among them, which bounds the memory.
-_MOST_TRIALS = 2048
-_MOST_PAIRS = 2**18
+_MOST_TRIALS = 4096
+_MOST_PAIRS = 2**19
 
 # This share of the particles competes in one go: few enough that the longest stay ahead.
 _COMPETING = 1 / 16
@@ -162,8 +162,7 @@ def random_packing(
         raise ValueError(msg)
     rng = np.random.default_rng(seed)
     sizes = (mixture or Mixture.bidisperse()).sample(n, rng)
-    particles = _longest_first(sizes, phi, dimension)
-    insertion = _Insertion(particles, rng)
+    insertion = _Insertion(_longest_first(sizes, phi, dimension), rng)
     insertion.require_room_for_longest()
     insertion.run(200_000 + 500 * n if max_attempts is None else max_attempts)
     return insertion.shuffled()
@@ -183,8 +182,7 @@ class _Insertion:
         self.particles, self.rng = particles, rng
         self.rows = bodies(particles)
         self.orientation = np.array(particles.orientation)
-        self.waiting = np.arange(particles.n)
-        """Ascending; `rows` and `orientation` of all others are final."""
+        self.waiting = np.arange(particles.n)  # `rows` and `orientation` of all others are final
 
         longest = self.rows[:1]
         reach = 2 * longest[0, -2:].sum()
@@ -197,7 +195,7 @@ class _Insertion:
     def require_room_for_longest(self) -> None:
         """Raise InsertionError if all directions bring the longest onto its own images."""
         longest = np.zeros(self.most_trials, dtype=np.int64)
-        for _ in range(_DIRECTIONS // self.most_trials):
+        for _ in range(0, _DIRECTIONS, self.most_trials):
             if len(self._clear_of_own_images(bodies(self._anywhere(longest)))):
                 return
         raise self._too_short()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,28 +14,34 @@ from jamshape.packing import FloatArray
 # Up to this fraction of the largest pressure counts as none.
 _FLOOR = 1e-4
 
-# A fall below the largest pressure so far by more than this fraction of it is a plastic drop.
+# A fall by more than this fraction of the pressure is a drop; by more than that one, a collapse.
 _DROP = 0.02
+_COLLAPSE = 0.5
 
 # A line has this many rows, rises by this fraction of the largest pressure,
 _MIN_ROWS = 5
 _MIN_RISE = 0.02
 
-# ends at this multiple of the pressure where it starts: it is longer than its extrapolation,
-_MIN_GROWTH = 2.0
+# ends at this multiple of the pressure where it starts,
+_MIN_GROWTH = 1.5
 
-# knows its zero to this fraction of the way from there to its end,
+# and knows its zero to this fraction of the way from there to its end.
 _MAX_ERROR = 0.1
 
-# and has this fraction of the slope of the longest line; a foot has less below phi_J.
-_MIN_SLOPE = 0.5
+# It has this fraction of the slope of the steepest of the long lines, those that rise by
+# that fraction of what the longest does.
+_MIN_SLOPE = 0.6
+_LONG = 0.25
+
+# Of the lines with an error up to this multiple of the smallest one the longest is taken.
+_NEARLY_BEST = 2.0
 
 # Smaller drops and smaller rises are noise, in its standard deviations.
 _NOISE_DROP = 6
 _NOISE_RISE = 10
 
-# Of the lines with an error up to this multiple of the smallest one the longest is taken.
-_NEARLY_BEST = 2.0
+# Scatter that persists from row to row counts for fewer rows; this is the largest correlation.
+_MAX_MEMORY = 0.9
 
 # Ends of lines that are tried, evenly spread; more only cost time.
 _TRIED_ENDS = 40
@@ -45,9 +52,9 @@ _ROUNDING = 1e-14
 class OnsetFit(NamedTuple):
     """The line p = slope (phi - phi_J) through the rows from `first` to `last`, both included."""
 
-    phi_J: float
-    phi_J_error: float
-    """Standard error of the fit and what a quadratic term moves phi_J by, added in squares."""
+    phi_J: float  # noqa: N815 - the paper's symbol
+    phi_J_error: float  # noqa: N815
+    """Of the fit: from scatter, curvature and the choice of the rows, added in squares."""
     slope: float
     first: int
     last: int
@@ -61,12 +68,13 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     rearrangements". Here:
 
     1. The curve after its last row without pressure is cut into parts wherever the pressure drops.
-    2. Lines are fitted between all pairs of ends within each part. One counts if it rises out of
-       the noise and further than its extrapolation to zero, if its slope is not far below that of
-       the longest one, and if a quadratic term hardly moves its zero. So the rounded foot that
-       a finite rate of compression makes is left out: lines through it fail the last two.
+       Parts are left out if more than half of their pressure is lost later: they were no onset.
+    2. Lines are fitted between all pairs of ends within each part. A line counts if it rises out
+       of the noise, if a quadratic term hardly moves its zero, and if its slope is not far below
+       the steepest. So the rounded foot that a finite rate of compression makes is left out:
+       lines through it fail the last two.
     3. Of the first part that has such lines the one with the smallest error is taken, or
-       the longest of those nearly as good.
+       the longest of those nearly as good. How far the others put phi_J adds to the error.
 
     Parameters
     ----------
@@ -74,14 +82,14 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
         Packing fractions of a compression, ascending.
     p : (T,) array_like, [energy / length^D]
     p_error : (T,) array_like, optional
-        Standard errors, such as those of a mean over samples, which weigh the rows. When left out
-        the weights are equal and the scatter about the line gives the error.
+        Standard errors, such as those of a mean over samples. Only their ratios matter, as weights
+        of the rows; the scatter about the line tells the error of the fit.
 
     Returns
     -------
     OnsetFit
-        The error is that of the fit: samples of one ensemble differ by more, and at a finite rate
-        of compression phi_J is that of the rate.
+        Its error says nothing of other samples, which differ by more, and nothing of the rate:
+        phi_J rises as kappa falls, until kappa is about 1e-9.
 
     Raises
     ------
@@ -90,32 +98,132 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
         range.
     """
     x, y, weight = _checked(phi, p, p_error)
-    quiet = np.flatnonzero(y <= _FLOOR * y.max())
-    onset = int(quiet[-1]) + 1 if len(quiet) else 0
-    noise = _noise(y[:onset] if onset > 2 * _MIN_ROWS else y)
-    enough = max(_MIN_RISE * y.max(), _NOISE_RISE * noise)
-    parts = [
-        part
-        for part in _between_drops(y, onset, _NOISE_DROP * noise)
-        if np.ptp(y[part]) >= enough > 0
-    ]
+    parts, min_rise = _lasting_rises(y)
     if not parts:
         msg = (
             f"p has no onset of jamming up to phi = {x[-1]:.6g}, expected a lasting rise from zero;"
             " compress further"
         )
         raise ValueError(msg)
-    lines = [list(_lines(x, y, weight, part, enough)) for part in parts]
-    longest = max((line for part in lines for line in part), key=_rise_of(x), default=None)
+    lines = [
+        [line for line in _lines(x, y, weight, part) if line.rise >= min_rise] for part in parts
+    ]
+    everywhere = list(itertools.chain(*lines))
+    long = _LONG * max((line.rise for line in everywhere), default=0.0)
+    steepest = max((line.fit.slope for line in everywhere if line.rise >= long), default=0.0)
     for part in lines:
-        steep = [line for line in part if longest and line.slope >= _MIN_SLOPE * longest.slope]
+        steep = [line for line in part if line.fit.slope >= _MIN_SLOPE * steepest]
         if steep:
-            best = min(line.phi_J_error for line in steep)
-            good = [line for line in steep if line.phi_J_error <= _NEARLY_BEST * best]
-            return max(good, key=_rise_of(x))
+            return _best(steep)
     msg = (
         f"p rises after phi = {x[parts[0].start]:.6g} but nowhere in a line that leads to zero,"
         " expected a linear stretch above the onset; compress further, or more slowly, or"
         " take more rows"
     )
     raise ValueError(msg)
+
+
+class _Line(NamedTuple):
+    fit: OnsetFit
+    rise: float
+    """Of the pressure along the line."""
+
+
+def _checked(
+    phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return phi, p and the weights."""
+    x, y = np.asarray(phi, dtype=np.float64), np.asarray(p, dtype=np.float64)
+    sigma = np.ones_like(x) if p_error is None else np.asarray(p_error, dtype=np.float64)
+    if x.ndim != 1 or not x.shape == y.shape == sigma.shape or len(x) < _MIN_ROWS:
+        msg = f"phi and p have shapes {x.shape} and {y.shape}, expected (T,) with T >= {_MIN_ROWS}"
+        raise ValueError(msg)
+    if not (np.isfinite([x, y, sigma]).all() and (np.diff(x) > 0).all() and (sigma > 0).all()):
+        msg = "phi, p or p_error is not that of a compression, expected ascending phi, finite p"
+        raise ValueError(msg)
+    return x, y, (sigma.min() / sigma) ** 2
+
+
+def _noise(y: FloatArray) -> float:
+    """Estimate the standard deviation of white noise on a smooth curve, by its second differences."""
+    return float(np.median(np.abs(np.diff(y, 2))) / (0.6745 * np.sqrt(6)))
+
+
+def _lasting_rises(y: FloatArray) -> tuple[list[slice], float]:
+    """Find the parts of y that rise without drops or later collapse, by at least what follows."""
+    quiet = np.flatnonzero(y <= _FLOOR * y.max())
+    onset = int(quiet[-1]) + 1 if len(quiet) else 0
+    noise = _noise(y[:onset] if onset > 2 * _MIN_ROWS else y)
+    min_rise = max(_MIN_RISE * float(y.max()), _NOISE_RISE * noise)
+    rises = [
+        part
+        for part in _between_drops(y, onset, _NOISE_DROP * noise)
+        if len(y[part]) >= _MIN_ROWS
+        and np.ptp(y[part]) >= min_rise > 0
+        and y[part.stop :].min(initial=np.inf) >= _COLLAPSE * y[part].max()
+    ]
+    return rises, min_rise
+
+
+def _between_drops(y: FloatArray, onset: int, min_drop: float) -> Iterator[slice]:
+    start = top = onset
+    for row in range(onset, len(y)):
+        if y[row] > y[top]:
+            top = row
+        elif y[top] - y[row] > max(min_drop, _DROP * y[top]):
+            yield slice(start, top + 1)
+            start = top = row
+    yield slice(start, len(y))
+
+
+def _lines(x: FloatArray, y: FloatArray, weight: FloatArray, part: slice) -> Iterator[_Line]:
+    """Fit lines to the rows between all pairs of some rows of the part."""
+    tried = np.unique(np.linspace(part.start, part.stop - 1, _TRIED_ENDS).astype(int))
+    for first, last in itertools.combinations(tried.tolist(), 2):
+        if last - first + 1 >= _MIN_ROWS:
+            rows = slice(first, last + 1)
+            fit = _fit(x[rows], y[rows], weight[rows])
+            if fit:
+                yield _Line(
+                    fit._replace(first=first, last=last), fit.slope * float(x[last] - x[first])
+                )
+
+
+def _fit(x: FloatArray, y: FloatArray, weight: FloatArray) -> OnsetFit | None:
+    """Fit a line by weighted least squares; None if it does not lead to zero."""
+    w = weight / weight.sum()
+    x_mean, y_mean = float(w @ x), float(w @ y)
+    t = x - x_mean
+    t_2 = float(w @ t**2)
+    slope = float(w @ (t * y)) / t_2
+    start, end = y_mean + slope * t[[0, -1]]
+    if slope <= 0 or end < _MIN_GROWTH * start:
+        return None
+    zero = -y_mean / slope
+
+    # The parabola is y_mean + slope t + c q with q orthogonal to 1 and t, so a + b t + c t^2.
+    t_3 = float(w @ t**3) / t_2
+    q = t**2 - t_3 * t - t_2
+    c = float(w @ (q * y)) / float(w @ q**2)
+    a, b = y_mean - c * t_2, slope - c * t_3
+    discriminant = b**2 - 4 * a * c
+    if b <= 0 or discriminant < 0:
+        return None
+    bent_zero = -2 * a / (b + np.sqrt(discriminant))
+
+    scatter = y - y_mean - slope * t
+    memory = np.clip(scatter[1:] @ scatter[:-1] / (scatter @ scatter or 1.0), 0, _MAX_MEMORY)
+    variance = float(w @ scatter**2) / (len(x) - 2) * (1 + memory) / (1 - memory)
+    error = np.hypot(np.sqrt(variance * (1 + zero**2 / t_2)) / slope, bent_zero - zero)
+    if error > _MAX_ERROR * (t[-1] - zero):
+        return None
+    phi_J = x_mean + zero
+    return OnsetFit(phi_J, max(float(error), _ROUNDING * abs(phi_J)), slope, 0, len(x) - 1)
+
+
+def _best(lines: Sequence[_Line]) -> OnsetFit:
+    phi_J, error = np.array([line.fit[:2] for line in lines]).T
+    good = [line for line in lines if line.fit.phi_J_error <= _NEARLY_BEST * error.min()]
+    best = max(good, key=lambda line: line.rise).fit
+    spread = np.sqrt(np.average((phi_J - best.phi_J) ** 2, weights=error**-2))
+    return best._replace(phi_J_error=float(np.hypot(best.phi_J_error, spread)))

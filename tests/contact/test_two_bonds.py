@@ -177,9 +177,9 @@ def largest_jump(paths, energy):
 SHAPES = [equal, unequal, nearly_round, very_unequal]
 
 
-def paths_of(shapes, dimension):
+def paths_of(shapes, dimension, n=N_PATHS):
     rng = np.random.default_rng([31, dimension, SHAPES.index(shapes)])
-    return Paths(rng, shapes(rng, N_PATHS), dimension)
+    return Paths(rng, shapes(rng, n), dimension)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -196,7 +196,7 @@ def test_energy_has_no_jumps(shapes, dimension, sides, measured):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("shapes", SHAPES, ids=lambda shapes: shapes.__name__)
 def test_the_same_scan_sees_the_printed_rule_jump(shapes, dimension, measured):
-    jumps, _ = largest_jump(paths_of(shapes, dimension), as_printed)
+    jumps, _ = largest_jump(paths_of(shapes, dimension, 60), as_printed)
     measured(largest_jump=jumps.max(), paths_that_jump=np.mean(jumps > 1e-4))
     assert jumps.max() > 1e-2
     assert np.mean(jumps > 1e-4) > 0.1
@@ -214,7 +214,7 @@ def test_the_same_scan_sees_a_spread_on_one_spine_jump(dimension, measured):
         _, shallow = library(1)(pairs)
         return one_bond_energy(pairs) + second * bond_energy(far_square(pairs), pairs.d), shallow
 
-    jumps, _ = largest_jump(paths_of(nearly_round, dimension), one_spine_energy)
+    jumps, _ = largest_jump(paths_of(nearly_round, dimension, 60), one_spine_energy)
     measured(largest_jump=jumps.max(), paths_that_jump=np.mean(jumps > 1e-4))
     assert jumps.max() > 1e-3
 

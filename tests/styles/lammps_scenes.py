@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import re
 import subprocess
 import tempfile
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from jamshape import contacts
 from jamshape.initial import Mixture, random_packing
 from jamshape.lammps_files import write_data
@@ -18,6 +20,9 @@ from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.session import Session, plugin_path
 
 REPOSITORY = Path(__file__).parents[2]
+# An error of LAMMPS ends this process: LAMMPS_SCREEN=1 with `pytest -s` shows its sentence.
+SHOW = "LAMMPS_SCREEN" in os.environ
+
 SIDES = {"one": 1, "two": 2}
 
 POSE = "id type x y z ix iy iz quatw quati quatj quatk shapex shapey shapez"
@@ -49,6 +54,12 @@ def after_box(sides="one", skin=0.3, k_e=1.0):
     return f"""
         pair_style spherocylinder/harmonic sides {sides}
         pair_coeff * * {k_e}
+        {after_restart(skin)}"""
+
+
+def after_restart(skin=0.3):
+    """What a restart file does not hold."""
+    return f"""
         neighbor {skin} bin
         neigh_modify every 1 delay 0 check yes one 10000 page 1000000
         thermo_modify norm no
@@ -62,7 +73,9 @@ def load_plugin():
 def scene(packing, data, *, newton="on", extra="", **forces):
     """Input from the start to the pair style, for a data file that is written here."""
     write_data(data, packing)
-    return before_box(packing.dimension, newton, extra) + f"\nread_data {data}" + after_box(**forces)
+    return (
+        before_box(packing.dimension, newton, extra) + f"\nread_data {data}" + after_box(**forces)
+    )
 
 
 def dump(path, every=1):
@@ -106,19 +119,27 @@ def run_lmp_well(text, folder, ranks=1):
     return done.stdout
 
 
+def error_of(done):
+    """The sentence with which LAMMPS stopped: one, on one line, without the place in its source."""
+    assert done.returncode != 0, done.stdout[-3000:]
+    lines = [re.match(r"ERROR(?: on proc \d+)?: (.*)", line) for line in done.stdout.splitlines()]
+    (found,) = [line for line in lines if line]
+    return re.sub(r" \(\S+:\d+\)$", "", found[1])
+
+
 @contextmanager
 def loaded(packing, folder, **keywords):
     """A LAMMPS instance in this process that holds a packing and its pair style."""
-    with Session() as session:
+    with Session(screen=SHOW) as session:
         session.commands(scene(packing, Path(folder) / "scene.data", **keywords))
         yield session
 
 
 @contextmanager
-def restarted(path, folder, text=""):
+def restarted(path, text):
     """A LAMMPS instance in this process that goes on from a restart file."""
-    with Session() as session:
-        session.commands(f"read_restart {Path(folder) / path}\n" + text)
+    with Session(screen=SHOW) as session:
+        session.commands(f"read_restart {path}\n{text}")
         yield session
 
 
@@ -126,7 +147,7 @@ def restarted(path, folder, text=""):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PackingInLammps(Packing):
+class ExactPacking(Packing):
     """Axes from LAMMPS's quaternions to the last bit, not by way of angles or unit lengths."""
 
     quaternion: np.ndarray
@@ -142,15 +163,16 @@ class PackingInLammps(Packing):
 
 @dataclass(frozen=True)
 class State:
-    """Rows in the order of the IDs."""
+    """Rows in the order of the IDs; quaternions as LAMMPS holds them."""
 
-    packing: PackingInLammps
+    packing: Packing
+    quaternion: np.ndarray
     force: np.ndarray
     torque: np.ndarray
 
     @property
-    def quaternion(self):
-        return self.packing.quaternion
+    def exact(self):
+        return ExactPacking(**vars(self.packing), quaternion=self.quaternion)
 
 
 def state_from(table, lo, hi, step=0):
@@ -163,8 +185,7 @@ def state_from(table, lo, hi, step=0):
         for zero in (table[:, 4], quaternion[:, 1:3], force[:, 2], torque[:, :2]):
             assert not zero.any(), "2D: z and rotations out of the plane are exactly zero"
         torque = torque[:, 2]
-    packing = PackingInLammps(
-        quaternion=quaternion,
+    packing = Packing(
         position=table[:, 2 : 2 + D],
         orientation=angle_from_quaternion(quaternion) if D == 2 else quaternion,
         diameters=table[:, 12:15],
@@ -174,7 +195,7 @@ def state_from(table, lo, hi, step=0):
         box=Box(lo=lo, edges=hi - lo),
         step=step,
     )
-    return State(packing, force[:, :D], torque)
+    return State(packing, quaternion, force[:, :D], torque)
 
 
 def state_of(session):
@@ -212,13 +233,13 @@ def fix_vector(session, fix, element):
 
 
 def bindings_forces(state, sides="one", k_e=1.0):
-    return contacts.forces(state.packing, k_e, SIDES[sides])
+    return contacts.forces(state.exact, k_e, SIDES[sides])
 
 
 def difference_from_bindings(state, sides="one", k_e=1.0):
     """Largest difference of forces and of torques, relative to the largest of a contact."""
-    network = contacts.find_contacts(state.packing, k_e, SIDES[sides])
-    expected = contacts.sum_forces(state.packing, network)
+    network = contacts.find_contacts(state.exact, k_e, SIDES[sides])
+    expected = contacts.sum_forces(state.exact, network)
     torques = np.stack([network.torque_i, network.torque_j])
     return max(
         np.abs(found - wanted).max() / (np.abs(of_contacts).max(initial=0.0) or 1.0)
@@ -320,6 +341,16 @@ def compressed(packing, phi, kappa=0.004, dt=0.1, sides="two"):
     with tempfile.TemporaryDirectory() as folder, loaded(packing, folder, sides=sides) as session:
         session.commands(f"""
             fix compress all overdamped/affine drag 1.0 compress {kappa}
+            timestep {dt}
+            run {steps}""")
+        return state_of(session).packing
+
+
+def relaxed(packing, steps, dt=0.1, sides="two"):
+    """Left to itself for a while."""
+    with tempfile.TemporaryDirectory() as folder, loaded(packing, folder, sides=sides) as session:
+        session.commands(f"""
+            fix relax all overdamped/affine drag 1.0 compress 0.0
             timestep {dt}
             run {steps}""")
         return state_of(session).packing

@@ -6,24 +6,24 @@ import functools
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 from lammps_scenes import (
     SIDES,
     after_box,
+    angle_between,
     before_box,
     bindings_forces,
-    compressed,
     dense,
     dense_mixture,
     difference_from_bindings,
     dump,
+    fix_vector,
     global_vector,
     kicked,
     load_plugin,
     loaded,
     moved,
-    nearest_image,
     on_grid,
+    pose_differences,
     quaternion_product,
     rods,
     rods_3d,
@@ -31,15 +31,11 @@ from lammps_scenes import (
     run_lmp_well,
     state_of,
     states_from_dump,
-    pose_differences,
-    angle_between,
-    fix_vector,
     with_odd_ids,
-    wrapped,
 )
+from scipy.spatial import cKDTree
 
 from jamshape import contacts
-from jamshape.initial import Mixture, random_packing
 from jamshape.lammps_files import write_data
 
 pytestmark = pytest.mark.lammps
@@ -164,9 +160,7 @@ def test_forces_on_two_ranks_equal_the_bindings(case, on_two_ranks, measured):
     measured(difference=difference)
     assert difference < TOLERANCE
     expected = bindings_forces(state, sides)
-    assert_energy_and_pressure(
-        packing_of(name), expected, pe=pe, press=press, phi=phi, u=u, p=p
-    )
+    assert_energy_and_pressure(packing_of(name), expected, pe=pe, press=press, phi=phi, u=u, p=p)
 
 
 # --- what the scenes hold, and what forces must not depend on ------------------------------------

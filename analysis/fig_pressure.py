@@ -1,0 +1,132 @@
+"""Draw pressure against packing fraction and where it sets in (Figs. 3 and 4 of the paper below).
+
+    python analysis/fig_pressure.py RUN.h5 [MORE.h5 ...] --out pressure.png
+
+Runs are those of pyscripts/compress.py. The jamming packing fraction phi_J of each is where the
+line through its pressure just above the onset leads to zero. The last line of standard output is
+one JSON object with each phi_J and, if the runs differ in nothing but their seed, the mean.
+
+Marschall & Teitel, Phys. Rev. E 97, 012905 (2018).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.jamming import OnsetFit, fit_onset
+from jamshape.packing import FloatArray
+from jamshape.storage import read_attributes, read_observables
+
+# Marschall & Teitel, Secs. III A and B: bidisperse, N = 1024, quasistatic.
+PAPER_PHI_J = {0.0: 0.8412, 1.0: 0.8875, 4.0: 0.866}
+
+ENSEMBLE = ("alpha", "n", "kappa", "size_ratio")
+NAMED = 10  # runs, at most, that the legend names
+
+
+class Run(NamedTuple):
+    """A compression and its onset, or the sentence that says why there is none."""
+
+    path: Path
+    attributes: dict[str, Any]
+    phi: FloatArray
+    p: FloatArray
+    fit: OnsetFit | None = None
+    problem: str = ""
+
+
+def read(path: Path) -> Run:
+    """Read p(phi) and fit its onset."""
+    observables = read_observables(path)
+    if not {"phi", "p"} <= observables.keys():
+        msg = f"{path}: has no observables phi and p, expected a run of compress.py"
+        raise ValueError(msg)
+    run = Run(path, read_attributes(path), observables["phi"], observables["p"])
+    try:
+        return run._replace(fit=fit_onset(run.phi, run.p))
+    except ValueError as error:
+        return run._replace(problem=f"{path}: {error}")
+
+
+def mean_phi_J(runs: list[Run]) -> tuple[float, float] | None:
+    """Average over several runs of one ensemble; with the standard error."""
+    found = [run.fit.phi_J for run in runs if run.fit]
+    if len(found) < 2 or len({tuple(map(run.attributes.get, ENSEMBLE)) for run in runs}) > 1:
+        return None
+    return float(np.mean(found)), float(np.std(found, ddof=1) / np.sqrt(len(found)))
+
+
+def written(phi_J: float, error: float) -> str:
+    """Write the digits that the error leaves."""
+    digits = int(np.clip(np.ceil(-np.log10(error or 1e-9)), 3, 9))
+    return rf"${phi_J:.{digits}f} \pm {error:.{digits}f}$"
+
+
+def draw(runs: list[Run], mean: tuple[float, float] | None, out: Path) -> None:
+    """Draw all of each curve on the left; on the right the onsets with their lines."""
+    import matplotlib as mpl  # noqa: PLC0415 - not needed for --help and for errors
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    figure = Figure(figsize=(8, 3.7), dpi=200, layout="constrained")
+    whole, onset = figure.subplots(1, 2)
+    colors = mpl.colormaps["viridis"](np.linspace(0, 0.9, len(runs)))
+    if len(runs) <= NAMED:
+        colors = mpl.colormaps["tab10"](range(len(runs)))
+    for run, color in zip(runs, colors, strict=True):
+        label = f"{run.path.stem}: {written(*run.fit[:2]) if run.fit else 'none'}"
+        label = label if len(runs) <= NAMED else ""
+        whole.semilogy(run.phi, run.p, color=color, lw=1)
+        onset.plot(run.phi, run.p, ".-", color=color, ms=3, lw=0.5, label=label)
+        if run.fit:
+            ends = np.array([run.fit.phi_J, run.phi[run.fit.last]])
+            onset.plot(ends, run.fit.slope * (ends - ends[0]), "k", lw=1)
+            onset.plot(ends[0], 0, "o", color=color, mec="k", ms=5, clip_on=False, zorder=4)
+    for phi in {PAPER_PHI_J.get(run.attributes.get("alpha", -1.0)) for run in runs} - {None}:
+        whole.axvline(phi, color="0.4", ls=":", lw=1)
+        onset.axvline(phi, color="0.4", ls=":", lw=1, label=f"{phi} quasistatic (paper)")
+    for axes in (whole, onset):
+        axes.set(xlabel=r"packing fraction $\phi$", ylabel=r"pressure $p$  [$k_e/(2R_s)^2$]")
+    onset.set_title(rf"$\phi_J =$ {written(*mean)}, mean of {len(runs)}" if mean else "", size=9)
+    if (top := max(run.p.max() for run in runs)) > 0:
+        whole.set_ylim(bottom=1e-6 * top)
+    if fitted := [(run, run.fit) for run in runs if run.fit]:
+        left = min(fit.phi_J for _, fit in fitted)
+        right = max(run.phi[fit.last] for run, fit in fitted)
+        top = max(run.p[fit.last] for run, fit in fitted)
+        onset.set(xlim=(1.4 * left - 0.4 * right, 1.1 * right - 0.1 * left))
+        onset.set(ylim=(-0.02 * top, 1.15 * top))
+    if onset.get_legend_handles_labels()[0]:
+        onset.legend(title=r"$\phi_J$", loc="upper left", fontsize=7, title_fontsize=8)
+    figure.savefig(out)
+
+
+def main() -> None:
+    """Read, draw, report."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN.h5", help="of compress.py")
+    parser.add_argument("--out", type=Path, default=Path("pressure.png"), help="(pressure.png)")
+    options = parser.parse_args()
+    runs = [read(path) for path in options.runs]
+    mean = mean_phi_J(runs)
+    draw(runs, mean, options.out)
+    fits = [run.fit._asdict() if run.fit else {"phi_J": None} for run in runs]
+    named = [{"run": str(run.path), **fit} for run, fit in zip(runs, fits, strict=True)]
+    phi_J, error = mean or (None, None)
+    print(json.dumps({"out": str(options.out), "runs": named, "mean": phi_J, "error": error}))
+    if problems := [run.problem for run in runs if run.problem]:
+        sys.exit(f"fig_pressure.py: {problems[0]}")
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (OSError, ValueError) as error:
+        sys.exit(f"fig_pressure.py: {error}")
