@@ -2,7 +2,7 @@
 
     python analysis/benchmark_pair.py --quick
     python analysis/benchmark_pair.py --only ours-one --phi 0.86 --n 1024 --measure force
-    python analysis/benchmark_pair.py --only ours-one ours-two --against OLD_PLUGIN.so
+                                      --against AN_OLDER_jamshape_plugin.so
 
 ours-one, ours-two: spherocylinder/harmonic; polygon: body/rounded/polygon with the same centres,
 angles, spines and radii; wca: lj/cut discs with sigma = R_i + R_j at the same N and phi.
@@ -208,7 +208,7 @@ def about() -> Row:
     text = subprocess.run(["lmp", "-h"], capture_output=True, text=True, check=True).stdout
     version, date = re.search(r"Simulator - (.+)", text), time.strftime("%Y-%m-%d %H:%M %z")
     found = {"machine": cpu and cpu[1], "LAMMPS": version and version[1], "date": date}
-    return found | {"cores": os.cpu_count(), "command": " ".join(["python", *sys.argv])}
+    return found | {"command": " ".join(["python", *sys.argv])}
 
 
 def parse() -> Namespace:
@@ -231,18 +231,18 @@ def parse() -> Namespace:
 def main() -> None:
     """Measure, and write what was found."""
     options = parse()
-    options.work.mkdir(parents=True, exist_ok=True)
+    for folder in (options.work, options.out.parent):
+        folder.mkdir(parents=True, exist_ok=True)
     rows: list[Row] = []
-    for phi, n in product(options.phi, [1024] if options.quick else options.n):
-        for measure in options.measure:
-            rows += rates(options, measure, phi, n) if measure != "memory" else []
+    sizes = [1024] if options.quick else options.n
+    for phi, n, measure in product(options.phi, sizes, options.measure):
+        rows += rates(options, measure, phi, n) if measure != "memory" else []
     if "memory" in options.measure:
         rows += memory(options, options.phi[-1], 1024)
     head = "".join(f"{key}: {value}  \n" for key, value in about().items())
     options.out.write_text(f"{head}\n{markdown(rows)}")
-    result = json.dumps(about() | {"rows": rows})
-    options.out.with_suffix(".json").write_text(result + "\n")
-    print(options.out.read_text(), result, sep="\n")
+    options.out.with_suffix(".json").write_text(json.dumps(about() | {"rows": rows}) + "\n")
+    print(options.out.read_text(), options.out.with_suffix(".json").read_text(), sep="\n", end="")
 
 
 if __name__ == "__main__":

@@ -2,9 +2,9 @@
 
     python analysis/fig_pressure.py RUN.h5 [MORE.h5 ...] --out pressure.png
 
-Runs are those of pyscripts/compress.py. The jamming packing fraction phi_J of each is where the
-line through its pressure just above the onset leads to zero. The last line of standard output is
-one JSON object with each phi_J and, if the runs differ in nothing but their seed, the mean.
+The jamming packing fraction phi_J of a run of pyscripts/compress.py is where the line through its
+pressure just above the onset leads to zero. The last line of standard output is one JSON object
+with each phi_J and, if the runs differ in nothing but their seed, the mean.
 
 Marschall & Teitel, Phys. Rev. E 97, 012905 (2018).
 """
@@ -23,9 +23,7 @@ from jamshape.jamming import OnsetFit, fit_onset
 from jamshape.packing import FloatArray
 from jamshape.storage import read_attributes, read_observables
 
-# Marschall & Teitel, Secs. III A and B: bidisperse, N = 1024, quasistatic.
-PAPER_PHI_J = {0.0: 0.8412, 1.0: 0.8875, 4.0: 0.866}
-
+PAPER_PHI_J = {0.0: 0.8412, 1.0: 0.8875, 4.0: 0.866}  # Secs. III A, B; by alpha, at N = 1024
 ENSEMBLE = ("alpha", "n", "kappa", "size_ratio")
 NAMED = 10  # runs, at most, that the legend names
 
@@ -70,37 +68,32 @@ def written(phi_J: float, error: float) -> str:
 
 def draw(runs: list[Run], mean: tuple[float, float] | None, out: Path) -> None:
     """Draw all of each curve on the left; on the right the onsets with their lines."""
-    import matplotlib as mpl  # noqa: PLC0415 - not needed for --help and for errors
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(8, 3.7), dpi=200, layout="constrained")
     whole, onset = figure.subplots(1, 2)
-    colors = mpl.colormaps["viridis"](np.linspace(0, 0.9, len(runs)))
-    if len(runs) <= NAMED:
-        colors = mpl.colormaps["tab10"](range(len(runs)))
-    for run, color in zip(runs, colors, strict=True):
-        label = f"{run.path.stem}: {written(*run.fit[:2]) if run.fit else 'none'}"
-        label = label if len(runs) <= NAMED else ""
-        whole.semilogy(run.phi, run.p, color=color, lw=1)
-        onset.plot(run.phi, run.p, ".-", color=color, ms=3, lw=0.5, label=label)
-        if run.fit:
-            ends = np.array([run.fit.phi_J, run.phi[run.fit.last]])
-            onset.plot(ends, run.fit.slope * (ends - ends[0]), "k", lw=1)
-            onset.plot(ends[0], 0, "o", color=color, mec="k", ms=5, clip_on=False, zorder=4)
+    fits = [(k, run, run.fit) for k, run in enumerate(runs) if run.fit]
+    for k, run, fit in fits:
+        ends = np.array([fit.phi_J, run.phi[fit.last]])
+        onset.plot(ends, fit.slope * (ends - fit.phi_J), "k", lw=1, zorder=3)
+        onset.plot(fit.phi_J, 0, "o", color=f"C{k}", mec="k", ms=5, zorder=4)
+    if fits:  # the right shows the lines and what is around them, the left everything
+        onset.margins(x=0.3, y=0.3)
+        onset.autoscale_view()
+        onset.set_ylim(bottom=-0.03 * onset.get_ylim()[1])
+        onset.set_autoscale_on(False)
+    for k, run in enumerate(runs):
+        phi_J = written(*run.fit[:2]) if run.fit else "none"
+        label = f"{run.path.stem}: {phi_J}" if len(runs) <= NAMED else ""
+        whole.semilogy(run.phi, run.p, color=f"C{k}", lw=1)
+        onset.plot(run.phi, run.p, ".-", color=f"C{k}", ms=3, lw=0.5, label=label)
     for phi in {PAPER_PHI_J.get(run.attributes.get("alpha", -1.0)) for run in runs} - {None}:
         whole.axvline(phi, color="0.4", ls=":", lw=1)
         onset.axvline(phi, color="0.4", ls=":", lw=1, label=f"{phi} quasistatic (paper)")
     for axes in (whole, onset):
         axes.set(xlabel=r"packing fraction $\phi$", ylabel=r"pressure $p$  [$k_e/(2R_s)^2$]")
-    onset.set_title(rf"$\phi_J =$ {written(*mean)}, mean of {len(runs)}" if mean else "", size=9)
-    if (top := max(run.p.max() for run in runs)) > 0:
-        whole.set_ylim(bottom=1e-6 * top)
-    if fitted := [(run, run.fit) for run in runs if run.fit]:
-        left = min(fit.phi_J for _, fit in fitted)
-        right = max(run.phi[fit.last] for run, fit in fitted)
-        top = max(run.p[fit.last] for run, fit in fitted)
-        onset.set(xlim=(1.4 * left - 0.4 * right, 1.1 * right - 0.1 * left))
-        onset.set(ylim=(-0.02 * top, 1.15 * top))
+    whole.set_ylim(bottom=1e-6 * max(run.p.max() for run in runs) or None)
+    onset.set_title(rf"$\phi_J =$ {written(*mean)}, mean of {len(fits)}" if mean else "", size=9)
     if onset.get_legend_handles_labels()[0]:
         onset.legend(title=r"$\phi_J$", loc="upper left", fontsize=7, title_fontsize=8)
     figure.savefig(out)
@@ -117,12 +110,12 @@ def main() -> None:
     runs = [read(path) for path in options.runs]
     mean = mean_phi_J(runs)
     draw(runs, mean, options.out)
-    fits = [run.fit._asdict() if run.fit else {"phi_J": None} for run in runs]
-    named = [{"run": str(run.path), **fit} for run, fit in zip(runs, fits, strict=True)]
+    none = dict.fromkeys(OnsetFit._fields)
+    fits = [{"run": str(run.path), **(run.fit._asdict() if run.fit else none)} for run in runs]
     phi_J, error = mean or (None, None)
-    print(json.dumps({"out": str(options.out), "runs": named, "mean": phi_J, "error": error}))
-    if problems := [run.problem for run in runs if run.problem]:
-        sys.exit(f"fig_pressure.py: {problems[0]}")
+    print(json.dumps({"out": str(options.out), "runs": fits, "mean": phi_J, "error": error}))
+    if problem := next((run.problem for run in runs if run.problem), None):
+        raise ValueError(problem)
 
 
 if __name__ == "__main__":

@@ -137,6 +137,7 @@ Quaternion OverdampedFlow::orientation_at_start(int i) const
 
 void OverdampedFlow::begin_step()
 {
+  ++evaluations;  // LAMMPS's own, at the end of the last step
   if (!pair->particles_turn()) return;
   pair->particle_view().read_orientations(atom->nlocal);
   for (int i = 0; i < atom->nlocal; ++i) {

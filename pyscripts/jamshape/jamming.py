@@ -25,15 +25,17 @@ _MIN_RISE = 0.02
 # ends at this multiple of the pressure where it starts,
 _MIN_GROWTH = 1.5
 
-# and knows its zero to this fraction of the way from there to its end.
-_MAX_ERROR = 0.1
+# knows its zero to this fraction of the way from there to its end,
+_MAX_ERROR = 0.15
 
-# It has this fraction of the slope of the steepest of the long lines, those that rise by
-# that fraction of what the longest does.
-_MIN_SLOPE = 0.6
-_LONG = 0.25
+# and has the first of these fractions of the slope of the steepest chord, or if no line does, the
+# second. Chords rise by that fraction of the pressure where they end, which is up to
+# this multiple of where the line does.
+_MIN_SLOPES = (0.7, 0.5)
+_CHORD_RISE = 0.25
+_CHORD_END = 10.0
 
-# Of the lines with an error up to this multiple of the smallest one the longest is taken.
+# Of the lines with an error up to this multiple of the smallest one the lowest is taken.
 _NEARLY_BEST = 2.0
 
 # Smaller drops and smaller rises are noise, in its standard deviations.
@@ -43,7 +45,7 @@ _NOISE_RISE = 10
 # Scatter that persists from row to row counts for fewer rows; this is the largest correlation.
 _MAX_MEMORY = 0.9
 
-# Ends of lines that are tried, evenly spread; more only cost time.
+# Ends of lines that are tried, evenly spread in pressure; more only cost time.
 _TRIED_ENDS = 40
 
 _ROUNDING = 1e-14
@@ -70,11 +72,12 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     1. The curve after its last row without pressure is cut into parts wherever the pressure drops.
        Parts are left out if more than half of their pressure is lost later: they were no onset.
     2. Lines are fitted between all pairs of ends within each part. A line counts if it rises out
-       of the noise, if a quadratic term hardly moves its zero, and if its slope is not far below
-       the steepest. So the rounded foot that a finite rate of compression makes is left out:
-       lines through it fail the last two.
-    3. Of the first part that has such lines the one with the smallest error is taken, or
-       the longest of those nearly as good. How far the others put phi_J adds to the error.
+       of the noise, if a quadratic term hardly moves its zero, and if the curve is not much steeper
+       soon after. So the rounded foot that a finite rate of compression makes is left out: lines
+       through it fail the last two.
+    3. Of the first part that has such lines the one with the smallest error is taken, or the one
+       that starts first of those nearly as good. How far off the others that overlap it put phi_J
+       adds to its error.
 
     Parameters
     ----------
@@ -105,16 +108,17 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
             " compress further"
         )
         raise ValueError(msg)
-    lines = [
-        [line for line in _lines(x, y, weight, part) if line.rise >= min_rise] for part in parts
-    ]
-    everywhere = list(itertools.chain(*lines))
-    long = _LONG * max((line.rise for line in everywhere), default=0.0)
-    steepest = max((line.fit.slope for line in everywhere if line.rise >= long), default=0.0)
-    for part in lines:
-        steep = [line for line in part if line.fit.slope >= _MIN_SLOPE * steepest]
-        if steep:
-            return _best(steep)
+    chords = _Chords(x, y, [pair for part in parts for pair in _pairs(y, part)])
+    for min_slope, part in itertools.product(_MIN_SLOPES, parts):
+        lines = [
+            line
+            for first, last in _pairs(y, part)
+            if y[last] - y[first] >= min_rise
+            and (line := _line(x, y, weight, first, last))
+            and line.slope >= min_slope * chords.steepest(_CHORD_END * y[last])
+        ]
+        if lines:
+            return _best(lines)
     msg = (
         f"p rises after phi = {x[parts[0].start]:.6g} but nowhere in a line that leads to zero,"
         " expected a linear stretch above the onset; compress further, or more slowly, or"
@@ -123,10 +127,22 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     raise ValueError(msg)
 
 
-class _Line(NamedTuple):
-    fit: OnsetFit
-    rise: float
-    """Of the pressure along the line."""
+class _Chords:
+    """Slopes of the chords between pairs of rows, by the pressure where they end."""
+
+    def __init__(self, x: FloatArray, y: FloatArray, pairs: Sequence[tuple[int, int]]) -> None:
+        first, last = np.array(pairs).T
+        high = y[last] - y[first] >= _CHORD_RISE * y[last]
+        first, last = first[high], last[high]
+        order = np.argsort(y[last])
+        self._end = y[last][order]
+        slope = ((y[last] - y[first]) / (x[last] - x[first]))[order]
+        self._steepest = np.maximum.accumulate(slope)
+
+    def steepest(self, end: float) -> float:
+        """Return the largest slope of those that end at or below that pressure."""
+        n = int(np.searchsorted(self._end, end, side="right"))
+        return float(self._steepest[n - 1]) if n else 0.0
 
 
 def _checked(
@@ -176,22 +192,22 @@ def _between_drops(y: FloatArray, onset: int, min_drop: float) -> Iterator[slice
     yield slice(start, len(y))
 
 
-def _lines(x: FloatArray, y: FloatArray, weight: FloatArray, part: slice) -> Iterator[_Line]:
-    """Fit lines to the rows between all pairs of some rows of the part."""
-    tried = np.unique(np.linspace(part.start, part.stop - 1, _TRIED_ENDS).astype(int))
+def _pairs(y: FloatArray, part: slice) -> Iterator[tuple[int, int]]:
+    """Yield the ends of all lines that are tried in one part."""
+    highest = np.maximum.accumulate(y[part])
+    levels = np.linspace(highest[0], highest[-1], _TRIED_ENDS)
+    tried = np.unique([*(part.start + np.searchsorted(highest, levels)), part.stop - 1])
     for first, last in itertools.combinations(tried.tolist(), 2):
         if last - first + 1 >= _MIN_ROWS:
-            rows = slice(first, last + 1)
-            fit = _fit(x[rows], y[rows], weight[rows])
-            if fit:
-                yield _Line(
-                    fit._replace(first=first, last=last), fit.slope * float(x[last] - x[first])
-                )
+            yield first, last
 
 
-def _fit(x: FloatArray, y: FloatArray, weight: FloatArray) -> OnsetFit | None:
+def _line(
+    phi: FloatArray, p: FloatArray, weight: FloatArray, first: int, last: int
+) -> OnsetFit | None:
     """Fit a line by weighted least squares; None if it does not lead to zero."""
-    w = weight / weight.sum()
+    x, y, w = (values[first : last + 1] for values in (phi, p, weight))
+    w = w / w.sum()
     x_mean, y_mean = float(w @ x), float(w @ y)
     t = x - x_mean
     t_2 = float(w @ t**2)
@@ -218,12 +234,14 @@ def _fit(x: FloatArray, y: FloatArray, weight: FloatArray) -> OnsetFit | None:
     if error > _MAX_ERROR * (t[-1] - zero):
         return None
     phi_J = x_mean + zero
-    return OnsetFit(phi_J, max(float(error), _ROUNDING * abs(phi_J)), slope, 0, len(x) - 1)
+    return OnsetFit(phi_J, max(float(error), _ROUNDING * abs(phi_J)), slope, first, last)
 
 
-def _best(lines: Sequence[_Line]) -> OnsetFit:
-    phi_J, error = np.array([line.fit[:2] for line in lines]).T
-    good = [line for line in lines if line.fit.phi_J_error <= _NEARLY_BEST * error.min()]
-    best = max(good, key=lambda line: line.rise).fit
+def _best(lines: Sequence[OnsetFit]) -> OnsetFit:
+    """Choose one, and add to its error how far off the others that overlap it put phi_J."""
+    smallest = min(line.phi_J_error for line in lines)
+    good = [line for line in lines if line.phi_J_error <= _NEARLY_BEST * smallest]
+    best = min(good, key=lambda line: (line.first, -line.last))
+    phi_J, error = np.array([line[:2] for line in lines if line.first < best.last]).T
     spread = np.sqrt(np.average((phi_J - best.phi_J) ** 2, weights=error**-2))
     return best._replace(phi_J_error=float(np.hypot(best.phi_J_error, spread)))

@@ -46,7 +46,7 @@ def solved(pairs):
         free = bounds > 0.0
         feet = np.zeros(2)
         if free.any():
-            # In units of the half lengths, and polished by projecting either foot onto the other spine.
+            # In units of the half lengths.
             feet[free] = (
                 bounds[free]
                 * lsq_linear(

@@ -89,6 +89,12 @@ def test_shallow_bumps_of_the_foot_are_no_onset():
     assert fit_onset(phi, p).phi_J == pytest.approx(PHI_J, abs=2e-5)
 
 
+def test_curve_that_stiffens_far_above():
+    phi = np.linspace(0.8, 1.0, 1000)
+    fit = fit_onset(phi, rounded(phi, 1e-3) * (1 + 2 * line(phi, slope=1)))
+    assert abs(fit.phi_J - PHI_J) < min(1e-3, 3 * fit.phi_J_error)
+
+
 def test_few_rows_after_a_long_wait():
     phi = np.linspace(0.4, 0.86, 200)  # as many rows as the decks take: 8 above the onset
     assert fit_onset(phi, line(phi)).phi_J == pytest.approx(PHI_J, abs=1e-13)

@@ -1,0 +1,292 @@
+"""Wrong input stops with one sentence that names what was found, what is expected and the cure."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from lammps_scenes import (
+    after_box,
+    before_box,
+    environment,
+    error_of,
+    load_plugin,
+    rods,
+    rods_3d,
+    run_lmp,
+    scene,
+)
+
+from jamshape.lammps_files import write_data
+
+pytestmark = pytest.mark.lammps
+
+FIX = "fix drive all overdamped/affine drag 1.0 compress 1e-3"
+
+
+def two_rods(**changes):
+    """Side by side, not touching."""
+    fields = {"position": [[0.0, 0.0], [0.5, 2.0]], "angle": [0.0, 0.3], "half_length": 1.0,
+              "radius": 0.5, "edges": [12.0, 12.0]}  # fmt: skip
+    return rods(**(fields | changes))
+
+
+@pytest.fixture
+def sentence_of(tmp_path):
+    """The error of an input that follows the set-up of two rods, or of other particles."""
+
+    def run(commands, packing=None, ranks=1):
+        text = scene(packing or two_rods(), tmp_path / "s.data")
+        done = run_lmp(f"{load_plugin()}\n{text}\n{commands}", tmp_path, ranks)
+        return error_of(done)
+
+    return run
+
+
+# --- commands ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", ["0.0", "-1.0", "-0.0"])
+def test_stiffness_must_be_positive(value, sentence_of):
+    assert sentence_of(f"pair_coeff 1 1 {value}") == (
+        f"pair_coeff of spherocylinder/harmonic found k_e = {value}, expected a positive energy: "
+        "give the contacts a stiffness such as 1.0."
+    )
+
+
+@pytest.mark.parametrize(
+    "command", ["pair_coeff 1 1 {}", FIX.replace("1.0", "{}"), FIX.replace("1e-3", "{}")]
+)
+@pytest.mark.parametrize("word", ["strong", "nan", "inf", "1,5"])
+def test_what_is_not_a_number_is_named(command, word, sentence_of):
+    """LAMMPS's own sentence."""
+    assert sentence_of(command.format(word)) == (
+        f"Expected floating point parameter instead of '{word}' in input script or data file"
+    )
+
+
+@pytest.mark.parametrize("value", ["0.0", "-2.0", "1e400"])
+def test_drag_must_be_positive(value, sentence_of):
+    expected = f"fix overdamped/affine found drag {value}, expected a positive number."
+    assert sentence_of(FIX.replace("1.0", value)) == expected
+
+
+def test_rate_must_be_finite(sentence_of):
+    expected = "fix overdamped/affine found compress -1e400, expected a finite rate."
+    assert sentence_of(FIX.replace("1e-3", "-1e400")) == expected
+
+
+@pytest.mark.parametrize("words", ["sides three", "sides", "", "side one", "sides one two"])
+def test_sides_are_one_or_two(words, sentence_of):
+    found = sentence_of(f"pair_style spherocylinder/harmonic {words}")
+    shown = f" {words}" if words else ""
+    assert found == (
+        f"pair_style spherocylinder/harmonic found '{shown}', expected 'sides one' (the dynamics' "
+        "single bond) or 'sides two' (two bonds for side-to-side contacts)."
+    )
+
+
+def test_pair_coeff_has_three_arguments(sentence_of):
+    assert sentence_of("pair_coeff 1 1 1.0 0.5") == (
+        "pair_coeff of spherocylinder/harmonic found 4 arguments, expected 'I J k_e'."
+    )
+
+
+SYNTAX = "'drag k_d compress kappa [integrator NAME] [reference center|corner] [check N]'."
+
+
+@pytest.mark.parametrize(
+    ("command", "sentence"),
+    [
+        (f"{FIX} integrator leapfrog", r"integrator leapfrog, expected one of: (\w+, )*heun.*"),
+        (f"{FIX} reference middle", f"'reference middle', expected {re.escape(SYNTAX)}"),
+        (f"{FIX} speed 3", f"'speed 3', expected {re.escape(SYNTAX)}"),
+        (f"{FIX} integrator", f"a wrong list of arguments, expected {re.escape(SYNTAX)}"),
+        ("fix drive all overdamped/affine", f"a wrong list .* expected {re.escape(SYNTAX)}"),
+        (
+            "fix drive all overdamped/affine compress 1.0 drag 1.0",
+            f"a wrong list of arguments, expected {re.escape(SYNTAX)}",
+        ),
+        (f"{FIX} check -1", "check -1, expected a number of steps, or 0 for never."),
+        (
+            f"group one id 1\n{FIX.replace('all', 'one')}",
+            "a group other than all, expected 'all': the whole box moves.",
+        ),
+    ],
+)
+def test_wrong_fix_commands(command, sentence, sentence_of):
+    assert re.fullmatch(f"fix overdamped/affine found {sentence}", sentence_of(command))
+
+
+def test_fix_needs_a_pair_style_of_ours(sentence_of):
+    assert sentence_of(f"pair_style zero 1.0\npair_coeff * *\n{FIX}\nrun 1") == (
+        "fix overdamped/affine found pair_style zero, expected one of this plugin's: use "
+        "'pair_style spherocylinder/harmonic'."
+    )
+    assert sentence_of(f"pair_style none\n{FIX}\nrun 1") == (
+        "fix overdamped/affine found pair_style none, expected one of this plugin's: use "
+        "'pair_style spherocylinder/harmonic'."
+    )
+
+
+def test_unset_coefficients_are_noticed(tmp_path):
+    packing = two_rods(species=np.array([1, 2]))
+    text = scene(packing, tmp_path / "s.data").replace("pair_coeff * *", "pair_coeff 1 1")
+    done = run_lmp(f"{load_plugin()}\n{text}\nrun 0", tmp_path)
+    assert error_of(done) == "All pair coeffs are not set"
+
+
+# --- particles -----------------------------------------------------------------------------------
+
+
+def test_atom_style_must_be_ellipsoid(tmp_path):
+    done = run_lmp(
+        f"""{load_plugin()}
+        {before_box(2).replace("atom_style ellipsoid", "atom_style sphere")}
+        region box block -5 5 -5 5 -0.5 0.5
+        create_box 1 box
+        create_atoms 1 single 0 0 0
+        pair_style spherocylinder/harmonic sides one
+        pair_coeff * * 1.0
+        run 0""",
+        tmp_path,
+    )
+    assert error_of(done) == (
+        "pair_style spherocylinder/harmonic found atom_style sphere, expected ellipsoid: use "
+        "'atom_style ellipsoid' and give every atom a shape."
+    )
+
+
+def test_every_atom_needs_a_shape(sentence_of):
+    assert sentence_of("create_atoms 1 single 0 4 0\nrun 0") == (
+        "pair_style spherocylinder/harmonic found atom 3 without a shape, expected an ellipsoid: "
+        "list it in the data file's Ellipsoids section or use 'set atom ... shape'."
+    )
+
+
+@pytest.mark.parametrize(
+    "diameters",
+    [(3.0, 1.0, 1.1), (1.0, 3.0, 1.0), (1.0, 1.0, 3.0), (1.0, 2.0, 2.0)],
+    ids=["unequal short axes", "long y", "long z", "oblate"],
+)
+def test_shapes_must_be_spherocylinders(diameters, sentence_of):
+    shape = " ".join(map(str, diameters))
+    listed = " ".join(f"{d:.6f}" for d in diameters)
+    assert sentence_of(f"set atom 2 shape {shape}\nrun 0") == (
+        f"spherocylinder/harmonic found atom 2 with diameters {listed}, expected that a "
+        "spherocylinder has diameters (2(A+R), 2R, 2R), its long axis the body's x: correct its "
+        "shape."
+    )
+
+
+def test_plane_needs_quaternions_about_z(tmp_path):
+    packing = rods_3d([[0, 0, 0], [0, 2, 0]], [[1, 0, 0, 0], [1, 0, 0.1, 0]], 1.0, 0.5, [12] * 3)
+    packing = packing.with_(box=type(packing.box)(lo=[-6, -6, -0.5], edges=[12, 12, 1]))
+    write_data(tmp_path / "s.data", packing)
+    text = f"{before_box(2)}\nread_data {tmp_path / 's.data'}\n{after_box()}\nrun 0"
+    assert error_of(run_lmp(f"{load_plugin()}\n{text}", tmp_path)) == (
+        "pair_style spherocylinder/harmonic found atom 2 turned out of the plane, expected a "
+        "quaternion (w, 0, 0, k) in dimension 2: turn it about z only."
+    )
+
+
+CROSSING = (
+    "pair_style spherocylinder/harmonic found atoms {} and {} with crossing spines or coinciding "
+    "centres, where no contact force exists: start from a state without overlap, or use a smaller "
+    "timestep."
+)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize(
+    "packing",
+    [
+        two_rods(position=[[0.0, 0.0], [0.1, 0.2]], angle=[0.0, 1.5]),
+        two_rods(position=[[1.0, 1.0], [1.0, 1.0]], angle=0.3),
+        two_rods(position=[[1.0, 1.0], [1.5, 1.0]], angle=0.0),
+        two_rods(position=[[1.0, 1.0], [1.0, 1.0]], half_length=0.0),
+        two_rods(position=[[5.9, 0.0], [-5.9, 0.2]], angle=[0.0, 1.5]),
+        rods_3d([[0, 0, 0], [0, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 1]], 1.0, 0.5, [12] * 3),
+        rods_3d([[0, 0, 0], [0, 0, 0]], [1, 0, 0, 0], 0.0, 0.5, [12] * 3),
+    ],
+    ids=["crossing", "same rod", "collinear", "same disc", "periodic", "3d", "same sphere"],
+)
+def test_crossing_spines_and_coinciding_centres(packing, ranks, sentence_of):
+    found = sentence_of("run 0", packing, ranks)
+    assert found in {CROSSING.format(1, 2), CROSSING.format(2, 1)}
+
+
+# --- box and communication -----------------------------------------------------------------------
+
+
+def test_triclinic_box_is_refused(sentence_of):
+    assert sentence_of("change_box all triclinic\nrun 0") == (
+        "pair_style spherocylinder/harmonic found a triclinic box, expected an orthogonal one: use "
+        "a box without tilt."
+    )
+
+
+@pytest.mark.parametrize("boundary", ["f p p", "p s p", "p m p"])
+def test_fix_needs_a_periodic_box(boundary, sentence_of):
+    assert sentence_of(f"change_box all boundary {boundary}\n{FIX}\nrun 1") == (
+        "fix overdamped/affine found a box that is not periodic, expected 'boundary p p p': the "
+        "whole box shrinks."
+    )
+
+
+def test_pair_style_alone_needs_no_periodic_box(tmp_path):
+    text = scene(two_rods(), tmp_path / "s.data")
+    done = run_lmp(
+        f"{load_plugin()}\n{text}\nchange_box all boundary f p p\nrun 0", tmp_path
+    )  # fmt: skip
+    assert done.returncode == 0
+
+
+def test_shapes_that_grow_behind_our_back_are_noticed(sentence_of):
+    """`run ... pre no` leaves out the set-up that measures shapes and cutoffs."""
+    found = sentence_of(
+        """neigh_modify every 1 delay 0 check no
+        run 0
+        set atom 2 shape 9.0 1.0 1.0
+        run 1 pre no"""
+    )
+    assert found == (
+        "pair_style spherocylinder/harmonic found atom 2 larger than at the start of the run, so "
+        "the ghost cutoff is too short: do not use 'pre no' in the run after changing shapes."
+    )
+
+
+def test_late_list_rebuilds_are_set_right(tmp_path):
+    text = scene(two_rods(), tmp_path / "s.data")
+    done = run_lmp(
+        f"{load_plugin()}\n{text}\nneigh_modify every 10 delay 20\n{FIX}\nrun 1", tmp_path
+    )
+    assert done.returncode == 0
+    warning = "fix overdamped/affine uses 'neigh_modify every 1 delay 0 check yes'"
+    assert done.stdout.count(warning) == 1
+
+
+# --- versions ------------------------------------------------------------------------------------
+
+
+def test_another_version_of_lammps_is_refused():
+    code = """
+import ctypes
+from jamshape.session import Session, plugin_path
+Session().close()
+plugin = ctypes.CDLL(str(plugin_path()))
+ctypes.c_int.in_dll(plugin, "jamshape_built_for").value = 20200101
+Session(screen=True)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment(), text=True, stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT, timeout=60, check=False,
+    )  # fmt: skip
+    assert re.fullmatch(
+        r"jamshape found LAMMPS version \d{8}, expected 20200101 for which this plugin was built: "
+        r"build jamshape again with this LAMMPS\.",
+        error_of(done),
+    )
