@@ -22,7 +22,8 @@ import numpy as np
 from jamshape.packing import FloatArray
 from jamshape.storage import read_attributes, read_observables
 
-ENSEMBLE = {"n": "N", "alpha": r"\alpha", "kappa": r"\kappa", "size_ratio": "R_b/R_s"}
+ENSEMBLE = ("n", "alpha", "kappa", "size_ratio")
+SYMBOLS = ("N", r"\alpha", r"\kappa", "R_b/R_s")
 ORDERS = ("S_2", "S_4")
 POINTS = 30
 RANDOM = np.sqrt(np.pi) / 2
@@ -43,13 +44,13 @@ def read(paths: list[Path]) -> dict[Ensemble, list[dict[str, FloatArray]]]:
     return dict(sorted(runs.items()))
 
 
-def average(n: int, runs: list[dict[str, FloatArray]]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mean of sqrt(N) S_n over the samples, with its error, where all samples have been.
+def average(n: int, runs: list[dict[str, FloatArray]]) -> tuple[FloatArray, FloatArray]:
+    """Average sqrt(N) S_n over samples where all have been; errors of the mean if there are two.
 
     Returns
     -------
     phi : (POINTS,)
-    mean, error : (2, POINTS), for `ORDERS`; the error is NaN where there is one sample only.
+    mean and error : (2, 2, POINTS), each for both of `ORDERS`; the error of one sample is 0.
     """
     start, end = max(run["phi"][0] for run in runs), min(run["phi"][-1] for run in runs)
     if not start < end:
@@ -57,17 +58,62 @@ def average(n: int, runs: list[dict[str, FloatArray]]) -> tuple[FloatArray, Floa
         raise ValueError(msg)
     phi = np.linspace(start, end, POINTS)
     S = np.array([[np.interp(phi, run["phi"], run[name]) for name in ORDERS] for run in runs])
-    samples = len(runs)
-    error = S.std(axis=0) / np.sqrt(samples - 1) if samples > 1 else np.full(S.shape[1:], np.nan)
-    return phi, np.sqrt(n) * S.mean(axis=0), np.sqrt(n) * error
+    return phi, np.sqrt(n) * np.array([S.mean(axis=0), S.std(axis=0) / np.sqrt(max(len(S) - 1, 1))])
 
 
 def label(key: Ensemble, keys: list[Ensemble], samples: int) -> str:
-    """N, and what else differs between the ensembles."""
-    differ = [len(set(values)) > 1 for values in zip(*keys, strict=True)]
-    shown = [
-        rf"${symbol} = {value:g}$"
-        for k, (symbol, value) in enumerate(zip(ENSEMBLE.values(), key, strict=True))
-        if k == 0 or differ[k]
-    ]
-    return ", ".join(shown) + (f" ({samples} samples)" if samples > 1 else "")
+    """Name N, what else differs between the ensembles, and the number of samples."""
+    columns = zip(SYMBOLS, key, *keys, strict=True)
+    shown = [f"${a} = {v:g}$" for a, v, *all_v in columns if a == "N" or len(set(all_v)) > 1]
+    return ", ".join(shown) + f" ({samples} sample{'s' * (samples > 1)})"
+
+
+def draw(
+    curves: dict[Ensemble, tuple[FloatArray, FloatArray]], labels: list[str], out: Path
+) -> None:
+    """Draw S_2 on the left and S_4 on the right."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
+
+    figure = Figure(figsize=(8, 3.7), dpi=200, layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, name, order in zip(panels, ("nematic", "tetratic"), (0, 1), strict=True):
+        for k, (phi, values) in enumerate(curves.values()):
+            mean, error = values[:, order]
+            bars = error if error.any() else None
+            style = {"marker": "osDv^"[k % 5], "ms": 3.5, "lw": 0.8, "elinewidth": 0.8}
+            axes.errorbar(phi, mean, bars, capsize=1.5, mfc="none", label=labels[k], **style)
+        axes.axhline(RANDOM, color="0.3", ls="--", lw=1, label=r"random, $\sqrt{\pi}/2$", zorder=0)
+        ylabel = rf"{name} order $\sqrt{{N}}\,\langle {ORDERS[order]} \rangle$"
+        axes.set(xlabel=r"packing fraction $\phi$", ylabel=ylabel)
+        axes.tick_params(labelleft=True)
+    panels[0].set_ylim(bottom=0)
+    handles = panels[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside upper center", ncols=3, fontsize=8, frameon=False)
+    figure.savefig(out)
+
+
+def main() -> None:
+    """Read, average, draw, report."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN.h5", help="of compress.py")
+    parser.add_argument("--out", type=Path, default=Path("order.png"), help="(order.png)")
+    options = parser.parse_args()
+    runs = read(options.runs)
+    curves = {key: average(key[0], samples) for key, samples in runs.items()}
+    labels = [label(key, list(runs), len(samples)) for key, samples in runs.items()]
+    draw(curves, labels, options.out)
+    report = []
+    for key, (phi, values) in curves.items():
+        means = {f"sqrtN_{n}": m.mean() for n, m in zip(ORDERS, values[0], strict=True)}
+        known = dict(zip(ENSEMBLE, key, strict=True)) | {"samples": len(runs[key])}
+        report.append(known | {"phi_start": phi[0], "phi_end": phi[-1]} | means)
+    print(json.dumps({"out": str(options.out), "random": RANDOM, "ensembles": report}))
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (OSError, ValueError) as error:
+        sys.exit(f"fig_order.py: {error}")

@@ -346,6 +346,12 @@ def compressed(packing, phi, kappa=0.004, dt=0.1, sides="two"):
         return state_of(session).packing
 
 
+def squeezed(packing, factor):
+    """Positions and box shrunk at once."""
+    box = Box(lo=factor * packing.box.lo, edges=factor * packing.box.edges)
+    return packing.with_(position=factor * packing.position, box=box)
+
+
 def relaxed(packing, steps, dt=0.1, sides="two"):
     """Left to itself for a while."""
     with tempfile.TemporaryDirectory() as folder, loaded(packing, folder, sides=sides) as session:
@@ -386,9 +392,9 @@ def moved(packing, fraction):
 
 
 @functools.cache
-def dense(dimension=2, alpha=4.0, n=48, phi=0.95, seed=1, kick=0.05, size_ratio=1.4):
+def dense(dimension=2, alpha=4.0, n=48, phi=0.95, seed=1, kick=0.05):
     """Far above jamming and kicked off every kink of the energy: contacts of all classes."""
-    mixture = Mixture.bidisperse(alpha, size_ratio)
+    mixture = Mixture.bidisperse(alpha)
     start = random_packing(n, 0.3 if dimension == 2 else 0.15, seed, mixture, dimension=dimension)
     packing = kicked(compressed(start, phi), kick, seed)
     return wrapped(on_grid(packing))
