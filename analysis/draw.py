@@ -1,20 +1,18 @@
-"""Draw a packing of 2D spherocylinders or discs (Fig. 7 of the paper below).
+"""Draw a packing of 2D spherocylinders or discs: Fig. 7 of Marschall & Teitel, PRE 97, 012905.
 
     python analysis/draw.py FILE [--frame -1] --out packing.png
 
-FILE is a packing or run of ours (H5MD), a LAMMPS dump or a data file. Particles are blue if big,
-green if small, grey if rattlers; black lines are along the spines, and red dots are where they
-touch. The last line of standard output is one JSON object with what was counted.
-
-Marschall & Teitel, Phys. Rev. E 97, 012905 (2018).
+FILE is H5MD, a LAMMPS dump or a data file. Big particles are blue, small ones green and rattlers grey
+(unless all are); black lines are along the spines, red dots where they touch. The last line of
+standard output is one JSON object with what was counted.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 from typing import Any
 
@@ -27,75 +25,95 @@ from jamshape.packing import Box, FloatArray, IntArray, Packing
 from jamshape.storage import FileFormatError, read_attributes
 
 SMALL, BIG, RATTLER, CONTACT = "#86c98a", "#6ea6dc", "#cfcfcf", "#d7191c"
-INCHES = 7.0  # width or height of the box, whichever is larger
-DOT = 0.2  # radius of a contact's dot over the smallest R
-SHORTEST = 0.6  # half length of a line along a spine, where A is less, over R
+INCHES, MARGIN = 7.0, np.array([0.1, 0.35])  # of the longer edge, around the box
+SHORTEST = 0.6  # half length of a line along a spine where A is less, over R
 
 
 def images(position: FloatArray, reach: FloatArray, box: Box) -> tuple[IntArray, FloatArray]:
     """Find the owners and positions of all periodic images that reach into the box."""
     inside = box.lo + (position - box.lo) % box.edges
-    turns = np.ceil(reach.max(axis=0) / box.edges).astype(int)
+    turns = np.ceil(reach.max(axis=0, initial=0) / box.edges).astype(int)
     found = []
     for shift in np.ndindex(*(2 * turns + 1)):
         moved = inside + (np.array(shift) - turns) * box.edges
         seen = ((moved > box.lo - reach) & (moved < box.lo + box.edges + reach)).all(axis=1)
         found.append((np.flatnonzero(seen), moved[seen]))
-    owners, positions = zip(*found, strict=True)
-    return np.concatenate(owners), np.concatenate(positions)
+    return np.concatenate([i for i, _ in found]), np.concatenate([x for _, x in found])
 
 
 def outlines(center: FloatArray, axis: FloatArray, A: ArrayLike, R: ArrayLike) -> FloatArray:
     """Trace spherocylinders: (N, V, 2) vertices; half length and radius may be one number."""
-    vertices = int(np.clip(400 / np.sqrt(len(center)), 8, 64))
+    vertices = int(np.clip(400 / np.sqrt(len(center) + 1), 8, 64))
     angle = np.linspace(-np.pi / 2, np.pi / 2, vertices)
     cap = np.column_stack([np.cos(angle), np.sin(angle)])
     unit = np.concatenate([cap, -cap])
     along = np.multiply.outer(R, unit[:, 0]) + np.multiply.outer(A, np.repeat([1, -1], vertices))
     across = np.multiply.outer(R, unit[:, 1])
-    normal = axis[:, ::-1] * [-1, 1]
-    xy = along[..., None] * axis[:, None] + across[..., None] * normal[:, None]
-    return center[:, None] + xy
+    normal = axis[:, None, ::-1] * [-1, 1]
+    return np.asarray(
+        center[:, None] + along[..., None] * axis[:, None] + across[..., None] * normal
+    )
 
 
-def title(packing: Packing, network: ContactNetwork, z: float) -> str:
-    """Write what is drawn in one line."""
-    words = [rf"$N = {packing.n}$", rf"$\phi = {packing.phi:.4f}$", f"$z = {z:.3f}$"]
-    if u := network.energy.sum() / packing.box.volume:
-        digits, power = f"{u:.2e}".split("e")
-        words.append(rf"$u = {digits} \times 10^{{{int(power)}}}$")
-    return "    ".join(words + [f"step {packing.step}"] * (packing.step > 0))
-
-
-def draw(packing: Packing, network: ContactNetwork, words: str, out: Path) -> None:
+def draw(packing: Packing, network: ContactNetwork, title: str, out: Path) -> None:
     """Draw the box and what is in it."""
     from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415
     from matplotlib.colors import LinearSegmentedColormap, to_rgba  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415 - none of them needed for --help
+    from matplotlib.figure import Figure  # noqa: PLC0415 - none of these is needed for --help
 
     box, A, R = packing.box, packing.half_length, packing.radius
-    size = (A + R - (A + R).min()) / (np.ptp(A + R) or 1.0) if np.ptp(A + R) else np.ones(packing.n)
+    size = np.interp(A + R, [(A + R).min(), (A + R).max()], [0, 1])
     color = LinearSegmentedColormap.from_list("size", [SMALL, BIG])(size)
-    color[find_rattlers(packing, network)] = to_rgba(RATTLER)
-    width, height = box.edges * INCHES / box.edges.max()
-    figure = Figure(figsize=(width + 0.3, height + 0.5), dpi=200)
-    axes = figure.add_axes((0.15 / (width + 0.3), 0.15 / (height + 0.5), width / (width + 0.3), height / (height + 0.5)))
-    points = 72 * INCHES / box.edges.max() * R.min()  # of the smallest radius
-
+    grey = find_rattlers(packing, network)
+    color[grey & ~grey.all()] = to_rgba(RATTLER)
+    scale = INCHES / box.edges.max()
+    figure = Figure(figsize=scale * box.edges + MARGIN, dpi=200, layout="constrained")
+    axes = figure.subplots()
+    line = np.clip(0.05 * 72 * scale * R.min(), 0.1, 1.0)  # points
+    dot = np.clip(0.016 / scale, 0.18 * R.min(), 0.5 * R.min())
     i, center = images(packing.position, A[:, None] * np.abs(packing.axes) + R[:, None], box)
-    shapes = outlines(center, packing.axes[i], A[i], R[i])
-    line = np.clip(0.05 * points, 0.12, 1.0)
-    axes.add_collection(PolyCollection(shapes, facecolors=color[i], edgecolors="k", linewidths=line))
-    rods = A[i] > 0
-    half = np.maximum(A, SHORTEST * R)[i, None] * packing.axes[i]
-    spines = np.stack([center - half, center + half], axis=1)[rods]
-    axes.add_collection(LineCollection(spines, colors="k", linewidths=1.5 * line))
-    dot = np.full((len(network.bonds.point), 2), DOT * R.min())
-    if len(dot):
-        _, center = images(network.bonds.point, dot, box)
-        dots = outlines(center, np.tile([1.0, 0.0], (len(center), 1)), 0.0, dot[0, 0])
-        axes.add_collection(PolyCollection(dots, facecolors=CONTACT, linewidths=0))
-    axes.set(xticks=[], yticks=[])
-    axes.set(xlim=box.lo[0] + [0, box.edges[0]], ylim=box.lo[1] + [0, box.edges[1]])
-    axes.set_title(words, fontsize=9)
+    bodies = list(outlines(center, packing.axes[i], A[i], R[i]))
+    axes.add_collection(PolyCollection(bodies, facecolors=color[i], edgecolors="k", lw=line))
+    half = (np.maximum(A, SHORTEST * R) * (A > 0))[i, None] * packing.axes[i]
+    spines = list(np.stack([center - half, center + half], axis=1))
+    axes.add_collection(LineCollection(spines, colors="k", lw=1.5 * line))
+    i, center = images(network.bonds.point, np.full_like(network.bonds.point, dot), box)
+    dots = list(outlines(center, np.eye(2)[0 * i], 0.0, dot))
+    axes.add_collection(PolyCollection(dots, facecolors=CONTACT, lw=0))
+    xlim, ylim = np.transpose([box.lo, box.lo + box.edges])
+    axes.set(xlim=xlim, ylim=ylim, aspect="equal", xticks=[], yticks=[])
+    axes.set_title(title, fontsize=9)
     figure.savefig(out)
+
+
+def main() -> None:
+    """Read, find the contacts, draw, report."""
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path, metavar="FILE", help="H5MD file, dump or data file")
+    parser.add_argument("--frame", type=int, default=-1, help="negative: from the end (-1)")
+    parser.add_argument("--out", type=Path, default=Path("packing.png"), help="(packing.png)")
+    sides = "points of a side-to-side contact; auto: as the file says, or else 2 (auto)"
+    parser.add_argument("--sides", choices=("auto", "1", "2"), default="auto", help=sides)
+    options = parser.parse_args()
+    packing = read_any(options.file, options.frame)
+    if packing.dimension != 2:
+        msg = f"{options.file}: is three-dimensional, expected two dimensions; OVITO draws 3D dumps"
+        raise ValueError(msg)
+    known: dict[str, Any] = {"sides": 2, "k_e": 1.0}
+    with contextlib.suppress(FileFormatError):  # dumps and data files have no attributes
+        known |= read_attributes(options.file)
+    n_sides = known["sides"] if options.sides == "auto" else int(options.sides)
+    network = find_contacts(packing, known["k_e"], n_sides)
+    z, _, rattlers, _, _ = coordination(packing, network)
+    u = float(network.energy.sum()) / packing.box.volume
+    title = rf"$N={packing.n}$    $\phi={packing.phi:.5f}$    $u=${u:.1e}    $z={z:.3f}$"
+    draw(packing, network, title + f"    step {packing.step}" * (packing.step > 0), options.out)
+    report = {"out": str(options.out), "n": packing.n, "rattlers": rattlers}
+    print(json.dumps(report | {"contacts": len(network.pairs), "phi": packing.phi, "u": u, "z": z}))
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (OSError, ValueError) as error:
+        sys.exit(f"draw.py: {error}")

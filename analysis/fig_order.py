@@ -1,19 +1,17 @@
-"""Draw orientational order against packing fraction (Fig. 2 of the paper below).
+"""Draw orientational order against packing fraction: Fig. 2 of Marschall & Teitel, PRE 97, 012905.
 
     python analysis/fig_order.py RUN.h5 [MORE.h5 ...] --out order.png
 
 Runs of pyscripts/compress.py that differ in their seed only are averaged. sqrt(N) S_n that depends
 neither on N nor on phi, at the dashed line, is the order of random orientations: none. The last
 line of standard output is one JSON object with the averages over phi.
-
-Marschall & Teitel, Phys. Rev. E 97, 012905 (2018).
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 from typing import Any
 
@@ -94,9 +92,7 @@ def draw(
 
 def main() -> None:
     """Read, average, draw, report."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN.h5", help="of compress.py")
     parser.add_argument("--out", type=Path, default=Path("order.png"), help="(order.png)")
     options = parser.parse_args()

@@ -1,19 +1,17 @@
-"""Draw pressure against packing fraction and where it sets in (Figs. 3 and 4 of the paper below).
+"""Draw pressure against packing fraction: Figs. 3 and 4 of Marschall & Teitel, PRE 97, 012905.
 
     python analysis/fig_pressure.py RUN.h5 [MORE.h5 ...] --out pressure.png
 
-The jamming packing fraction phi_J of a run of pyscripts/compress.py is where the line through its
-pressure just above the onset leads to zero. The last line of standard output is one JSON object
-with each phi_J and, if the runs differ in nothing but their seed, the mean.
-
-Marschall & Teitel, Phys. Rev. E 97, 012905 (2018).
+At the jamming packing fraction phi_J of a run of pyscripts/compress.py the line through its pressure
+just above the onset leads to zero. The last line of standard output is one JSON object with each
+phi_J and, if the runs differ in nothing but their seed, the mean.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -52,12 +50,12 @@ def read(path: Path) -> Run:
         return run._replace(problem=f"{path}: {error}")
 
 
-def mean_phi_J(runs: list[Run]) -> tuple[float, float] | None:
-    """Average over several runs of one ensemble; with the standard error."""
+def mean_phi_J(runs: list[Run]) -> list[float]:
+    """Average over several runs of one ensemble, with the standard error; else empty."""
     found = [run.fit.phi_J for run in runs if run.fit]
     if len(found) < 2 or len({tuple(map(run.attributes.get, ENSEMBLE)) for run in runs}) > 1:
-        return None
-    return float(np.mean(found)), float(np.std(found, ddof=1) / np.sqrt(len(found)))
+        return []
+    return [float(np.mean(found)), float(np.std(found, ddof=1) / np.sqrt(len(found)))]
 
 
 def written(phi_J: float, error: float) -> str:
@@ -66,7 +64,7 @@ def written(phi_J: float, error: float) -> str:
     return rf"${phi_J:.{digits}f} \pm {error:.{digits}f}$"
 
 
-def draw(runs: list[Run], mean: tuple[float, float] | None, out: Path) -> None:
+def draw(runs: list[Run], mean: list[float], out: Path) -> None:
     """Draw all of each curve on the left; on the right the onsets with their lines."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
@@ -74,36 +72,31 @@ def draw(runs: list[Run], mean: tuple[float, float] | None, out: Path) -> None:
     whole, onset = figure.subplots(1, 2)
     fits = [(k, run, run.fit) for k, run in enumerate(runs) if run.fit]
     for k, run, fit in fits:
-        ends = np.array([fit.phi_J, run.phi[fit.last]])
-        onset.plot(ends, fit.slope * (ends - fit.phi_J), "k", lw=1, zorder=3)
+        rise = fit.slope * (run.phi[fit.last] - fit.phi_J)
+        onset.plot([fit.phi_J, run.phi[fit.last]], [0, rise], "k", lw=1, zorder=3)
         onset.plot(fit.phi_J, 0, "o", color=f"C{k}", mec="k", ms=5, zorder=4)
-    if fits:  # the right shows the lines and what is around them, the left everything
+    if fits:
         onset.margins(x=0.3, y=0.3)
-        onset.autoscale_view()
-        onset.set_ylim(bottom=-0.03 * onset.get_ylim()[1])
-        onset.set_autoscale_on(False)
+        onset.set(xlim=onset.get_xlim(), ylim=(-0.03 * onset.get_ylim()[1], None))
     for k, run in enumerate(runs):
-        phi_J = written(*run.fit[:2]) if run.fit else "none"
-        label = f"{run.path.stem}: {phi_J}" if len(runs) <= NAMED else ""
+        label = f"{run.path.stem}: {written(*run.fit[:2]) if run.fit else 'none'}"
+        label = label if len(runs) <= NAMED else f"{len(runs)} runs" * (k == 0)
         whole.semilogy(run.phi, run.p, color=f"C{k}", lw=1)
         onset.plot(run.phi, run.p, ".-", color=f"C{k}", ms=3, lw=0.5, label=label)
-    for phi in {PAPER_PHI_J.get(run.attributes.get("alpha", -1.0)) for run in runs} - {None}:
-        whole.axvline(phi, color="0.4", ls=":", lw=1)
-        onset.axvline(phi, color="0.4", ls=":", lw=1, label=f"{phi} quasistatic (paper)")
+    paper = {PAPER_PHI_J.get(run.attributes.get("alpha", -1.0)) for run in runs} - {None}
     for axes in (whole, onset):
+        for phi in paper:
+            axes.axvline(phi, color="0.4", ls=":", lw=1, label=f"{phi} quasistatic (paper)")
         axes.set(xlabel=r"packing fraction $\phi$", ylabel=r"pressure $p$  [$k_e/(2R_s)^2$]")
     whole.set_ylim(bottom=1e-6 * max(run.p.max() for run in runs) or None)
     onset.set_title(rf"$\phi_J =$ {written(*mean)}, mean of {len(fits)}" if mean else "", size=9)
-    if onset.get_legend_handles_labels()[0]:
-        onset.legend(title=r"$\phi_J$", loc="upper left", fontsize=7, title_fontsize=8)
+    onset.legend(title=r"$\phi_J$", loc="upper left", fontsize=7, title_fontsize=8)
     figure.savefig(out)
 
 
 def main() -> None:
     """Read, draw, report."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN.h5", help="of compress.py")
     parser.add_argument("--out", type=Path, default=Path("pressure.png"), help="(pressure.png)")
     options = parser.parse_args()
@@ -114,8 +107,8 @@ def main() -> None:
     fits = [{"run": str(run.path), **(run.fit._asdict() if run.fit else none)} for run in runs]
     phi_J, error = mean or (None, None)
     print(json.dumps({"out": str(options.out), "runs": fits, "mean": phi_J, "error": error}))
-    if problem := next((run.problem for run in runs if run.problem), None):
-        raise ValueError(problem)
+    if problems := [run.problem for run in runs if run.problem]:
+        raise ValueError(problems[0])
 
 
 if __name__ == "__main__":

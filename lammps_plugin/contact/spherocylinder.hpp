@@ -79,8 +79,10 @@ struct SpherocylinderLaw {
 inline constexpr double PARALLEL_SINE = 1e-8;
 
 /// The second bond fades in over this fraction of the shorter half length of spine overlap, and
-/// over this range of |cos| of the angle.
+/// over this range of |cos| of the angle; it fades out while its overlap (as a length) grows from
+/// A_min^2 / d to FADE_DEPTH times that.
 inline constexpr double FADE_LENGTH = 0.05;
+inline constexpr double FADE_DEPTH = 16.0;
 inline constexpr double FADE_COSINE_START = 0.5;
 inline constexpr double FADE_COSINE_RANGE = 0.35;
 
@@ -93,31 +95,44 @@ SpinePair<D> spine_pair(const SpherocylinderBody<D> &i, const SpherocylinderBody
   return {i.centre - j.centre, i.axis, i.half_length, j.axis, j.half_length};
 }
 
-/// Weight of the second bond with its derivatives with respect to r and to rotations of i and j.
+/// Weight of the second bond with its derivatives with respect to r and to rotations of i and j,
+/// the bond's own distance apart.
 template <int D> struct BondWeight {
   double value;
+  double per_distance;
   Vec<D> per_r;
   Torque<D> per_rotation_i;
   Torque<D> per_rotation_j;
 };
 
-/// w = S(l / (c A_min)) S((|u_i.u_j| - 0.5) / 0.35), l the spread of the two ends. It is 1 for
-/// side-to-side contacts and goes to 0 smoothly where the second bond ends, at spines that just
-/// begin to overlap and at large angles, where the rule of Marschall & Teitel (Fig. 6) jumps.
-template <int D> BondWeight<D> second_bond_weight(const SpinePair<D> &p, const EndFeet<D> &ends)
+/// w = S(l / (c A_min)) S((|u_i.u_j| - 0.5) / 0.35) (1 - S(ln y / ln 16)), l the spread of the two
+/// ends, y the overlap of the farther one over A_min^2 / d. It is 1 for side-to-side contacts and
+/// goes to 0 smoothly where the second bond ends: at spines that just begin to overlap and at large
+/// angles, where the rule of Marschall & Teitel (Fig. 6) jumps, and for nearly round particles that
+/// overlap by so much that their two bonds are one (the fading would push them apart harder than
+/// the contact).
+template <int D>
+BondWeight<D> second_bond_weight(const SpinePair<D> &p, const EndFeet<D> &ends, double overlap,
+                                 double reach)
 {
   const double shorter = std::min(p.A_i, p.A_j);
   if (shorter == 0.0) return {};
   const double cosine = dot(p.u_i, p.u_j);
   const double x_length = ends.spread() / (FADE_LENGTH * shorter);
   const double x_cosine = (std::abs(cosine) - FADE_COSINE_START) / FADE_COSINE_RANGE;
+  const double depth = overlap * reach * reach / (shorter * shorter);
+  const double x_depth = depth > 1.0 ? std::log(depth) / std::log(FADE_DEPTH) : 0.0;
   const double by_length = smooth_step(x_length), by_cosine = smooth_step(x_cosine);
+  const double by_depth = 1.0 - smooth_step(x_depth);
 
   BondWeight<D> weight{};
-  weight.value = by_length * by_cosine;
+  weight.value = by_length * by_cosine * by_depth;
   if (weight.value == 0.0 || weight.value == 1.0) return weight;
 
-  const double per_spread = by_cosine * smooth_step_gradient(x_length) / (FADE_LENGTH * shorter);
+  weight.per_distance = by_length * by_cosine * smooth_step_gradient(x_depth) /
+                        (std::log(FADE_DEPTH) * overlap * reach);
+  const double per_spread =
+      by_cosine * by_depth * smooth_step_gradient(x_length) / (FADE_LENGTH * shorter);
   const double sign_s = std::copysign(0.5 * per_spread, ends.plus.s - ends.minus.s);
   const double sign_t = std::copysign(0.5 * per_spread, ends.plus.t - ends.minus.t);
   const auto add_foot = [&](const Feet<D> &feet, double per_s, double per_t) {
@@ -134,8 +149,8 @@ template <int D> BondWeight<D> second_bond_weight(const SpinePair<D> &p, const E
   add_foot(ends.plus, sign_s, sign_t);
   add_foot(ends.minus, -sign_s, -sign_t);
 
-  const double per_cosine =
-      std::copysign(by_length * smooth_step_gradient(x_cosine) / FADE_COSINE_RANGE, cosine);
+  const double per_cosine = std::copysign(
+      by_length * by_depth * smooth_step_gradient(x_cosine) / FADE_COSINE_RANGE, cosine);
   const Torque<D> turn = per_cosine * cross(p.u_i, p.u_j);
   weight.per_rotation_i += turn;
   weight.per_rotation_j -= turn;
@@ -187,6 +202,12 @@ template <int D> class SpherocylinderContact {
   double radius_i, reach;
   SpherocylinderLaw law;
 
+  /// The share of a bond in the energy, and the energy that it loses as it fades with distance.
+  struct Share {
+    double weight, fading;
+  };
+  static constexpr Share WHOLE{1.0, 0.0};
+
   bool touches(double distance_sq) const { return distance_sq < reach * reach; }
 
   bool is_coincident(const Feet<D> &feet) const
@@ -214,7 +235,7 @@ template <int D> class SpherocylinderContact {
     if (!touches(centres.distance_sq)) return empty(ContactStatus::APART);
     if (is_coincident(centres)) return empty(ContactStatus::CROSSING);
     Contact<D> contact = empty(ContactStatus::TOUCHING);
-    add_bond(contact, centres, std::sqrt(centres.distance_sq), 1.0);
+    add_bond(contact, centres, std::sqrt(centres.distance_sq), WHOLE);
     return contact;
   }
 
@@ -228,12 +249,12 @@ template <int D> class SpherocylinderContact {
         contact.kind = ContactKind::SIDE_TO_SIDE;
         // The energy stays that of the shortest distance, so that it does not jump at
         // PARALLEL_SINE.
-        add_bond(contact, ends.middle(pair), distance, 1.0);
+        add_bond(contact, ends.middle(pair), distance, WHOLE);
         return contact;
       }
     }
     contact.kind = kind_of(pair, closest);
-    add_bond(contact, closest, distance, 1.0);
+    add_bond(contact, closest, distance, WHOLE);
     return contact;
   }
 
@@ -243,16 +264,17 @@ template <int D> class SpherocylinderContact {
     const Feet<D> closest = closest_feet(pair, ends.nearer().t);  // never the far end, at a tie
     Contact<D> contact = empty(ContactStatus::TOUCHING);
     contact.kind = kind_of(pair, closest);
-    add_bond(contact, closest, std::sqrt(closest.distance_sq), 1.0);
+    add_bond(contact, closest, std::sqrt(closest.distance_sq), WHOLE);
     const Feet<D> &far_end = ends.farther();
     if (!touches(far_end.distance_sq)) return contact;
-    const BondWeight<D> weight = second_bond_weight(pair, ends);
+    const double distance = std::sqrt(far_end.distance_sq);
+    const double overlap = (reach - distance) / reach;
+    const BondWeight<D> weight = second_bond_weight(pair, ends, overlap, reach);
     if (weight.value == 0.0) return contact;
 
     contact.kind = ContactKind::SIDE_TO_SIDE;
-    const double distance = std::sqrt(far_end.distance_sq);
-    add_bond(contact, far_end, distance, weight.value);
-    const double V_b = law.harmonic.energy((reach - distance) / reach);
+    const double V_b = law.harmonic.energy(overlap);
+    add_bond(contact, far_end, distance, {weight.value, V_b * weight.per_distance});
     const Vec<D> fade_force = -V_b * weight.per_r;
     contact.force += fade_force;
     contact.bond[1].force += fade_force;
@@ -263,19 +285,20 @@ template <int D> class SpherocylinderContact {
 
   /// Adds a bond with the lever arms of `feet` and the overlap of `distance`. Any point on the line
   /// of `feet` gives the same torque; the one reported lies where the surfaces interpenetrate.
-  void add_bond(Contact<D> &contact, const Feet<D> &feet, double distance, double weight) const
+  void add_bond(Contact<D> &contact, const Feet<D> &feet, double distance, const Share &share) const
   {
     const double overlap = (reach - distance) / reach;
     const Vec<D> normal = (1.0 / std::sqrt(feet.distance_sq)) * feet.delta;
-    const Vec<D> force = (weight * law.harmonic.energy_gradient(overlap) / reach) * normal;
-    const double energy = weight * law.harmonic.energy(overlap);
+    const double push = share.weight * law.harmonic.energy_gradient(overlap) / reach - share.fading;
+    const Vec<D> force = push * normal;
+    const double energy = share.weight * law.harmonic.energy(overlap);
     contact.bond[contact.n_bonds++] = {normal,
                                        force,
                                        feet.s * pair.u_i - (radius_i * distance / reach) * normal,
                                        distance,
                                        reach,
                                        energy,
-                                       weight * law.harmonic.energy_hessian(overlap) /
+                                       share.weight * law.harmonic.energy_hessian(overlap) /
                                            (reach * reach),
                                        std::abs(feet.s) < pair.A_i,
                                        std::abs(feet.t) < pair.A_j};

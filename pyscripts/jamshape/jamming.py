@@ -101,6 +101,8 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
         range.
     """
     x, y, weight = _checked(phi, p, p_error)
+    scale = float(np.abs(y).max()) or 1.0
+    y = y / scale
     parts, min_rise = _lasting_rises(y)
     if not parts:
         msg = (
@@ -118,7 +120,8 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
             and line.slope >= min_slope * chords.steepest(_CHORD_END * y[last])
         ]
         if lines:
-            return _best(lines)
+            best = _best(lines)
+            return best._replace(slope=scale * best.slope)
     msg = (
         f"p rises after phi = {x[parts[0].start]:.6g} but nowhere in a line that leads to zero,"
         " expected a linear stretch above the onset; compress further, or more slowly, or"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from reference_energy import fade_arguments, far_square
-from spherocylinder_pairs import EPS, FADE_LENGTH, energies, turned
+from reference_energy import fade_arguments, fade_length, far_square
+from spherocylinder_pairs import EPS, energies, turned
 
 # Steps of this many d: short enough to straddle the switch of a clamped foot, where the second
 # derivative jumps, at no cost. Differences over several steps are fitted by a constant and a square,
@@ -27,9 +27,7 @@ def is_clear_of_fade(pairs):
     shorter = np.minimum(pairs.A_i, pairs.A_j)
     margin = 10.0 * STEP * pairs.d
     none = (shorter == 0.0) | (np.sqrt(far_square(pairs)) > pairs.d + margin) | (by_cosine < -1e-3)
-    full = (by_length > 1.0 + margin / np.where(shorter > 0.0, FADE_LENGTH * shorter, 1.0)) & (
-        by_cosine > 1.0 + 1e-3
-    )
+    full = (by_length > 1.0 + margin / fade_length(pairs)) & (by_cosine > 1.0 + 1e-3)
     return none | full
 
 
@@ -37,7 +35,7 @@ def step_lengths(pairs, sides):
     step = STEP * pairs.d
     if sides == 1:
         return step
-    in_fade = STEP_IN_FADE * FADE_LENGTH * np.minimum(pairs.A_i, pairs.A_j)
+    in_fade = STEP_IN_FADE * fade_length(pairs)
     return np.where(is_clear_of_fade(pairs), step, np.minimum(step, in_fade))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from spherocylinder_pairs import (
     FADE_COSINE_RANGE,
     FADE_COSINE_START,
+    FADE_DEPTH,
     FADE_LENGTH,
     row_dot,
     scaled,
@@ -102,17 +103,31 @@ def spread(pairs):
     return 0.5 * (absolute(plus.s - minus.s) + absolute(plus.t - minus.t))
 
 
+def fade_length(pairs):
+    """Spine overlap over which the second bond fades in; none for discs, which have no second."""
+    shorter = np.minimum(pairs.A_i, pairs.A_j)
+    return np.where(shorter > 0.0, FADE_LENGTH * shorter, np.inf)
+
+
 def fade_arguments(pairs):
     """What the two quintic steps of the second bond's weight are taken of."""
-    shorter = np.minimum(pairs.A_i, pairs.A_j)
-    by_length = spread(pairs) / np.where(shorter > 0.0, FADE_LENGTH * shorter, np.inf)
+    by_length = spread(pairs) / fade_length(pairs)
     cosine = absolute(row_dot(pairs.u_i, pairs.u_j))
     return by_length, (cosine - FADE_COSINE_START) / FADE_COSINE_RANGE
 
 
+def fade_depth(pairs):
+    """Overlap of the second bond over A^2 / d, at least 1: there it begins to fade out."""
+    shorter = np.minimum(pairs.A_i, pairs.A_j)
+    overlap = pairs.d - np.sqrt(far_square(pairs))
+    depth = overlap * pairs.d / np.where(shorter > 0.0, shorter, np.inf) ** 2
+    return np.where(depth.real > 1.0, depth, 1.0)
+
+
 def weight(pairs):
     by_length, by_cosine = fade_arguments(pairs)
-    return smooth_step(by_length) * smooth_step(by_cosine)
+    by_depth = 1.0 - smooth_step(np.log(fade_depth(pairs)) / np.log(FADE_DEPTH))
+    return smooth_step(by_length) * smooth_step(by_cosine) * by_depth
 
 
 def bond_energy(square, d):

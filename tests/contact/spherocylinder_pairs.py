@@ -18,7 +18,7 @@ APART, TOUCHING, CROSSING = 0, 1, 2
 TIP_TO_TIP, TIP_TO_SIDE, SIDE_TO_SIDE = 0, 1, 2
 
 EPS = np.finfo(float).eps
-FADE_LENGTH = 0.05
+FADE_LENGTH, FADE_DEPTH = 0.05, 16.0
 FADE_COSINE_START, FADE_COSINE_RANGE = 0.5, 0.35
 
 
@@ -256,13 +256,20 @@ def skew(rng, n, overlap, angle, alpha=(1e-6, 100.0)):
     return placed(shapes, u_i, u_j, s, t, normal, overlap)
 
 
-def parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), fading=False):
+def limited_to_depth(shapes, overlap, depth):
+    """Overlaps up to `depth` times (A_min / d)^2, beyond which the second bond fades out."""
+    A_i, A_j, R_i, R_j = shapes
+    return np.minimum(overlap, depth * (np.minimum(A_i, A_j) / (R_i + R_j)) ** 2)
+
+
+def parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), fading=False, depth=np.inf):
     """Exactly parallel, spines that overlap; s and t are the middle of the overlap of the spines.
 
     With `fading` they overlap by less than the length over which the second bond fades in. Returns
     the pairs and half the length of the overlap.
     """
     shapes = random_shapes(rng, n, alpha)
+    overlap = limited_to_depth(shapes, overlap, depth)
     A_i, A_j = shapes[:2]
     u_j = random_directions(rng, n, dimension)
     sign = rng.choice([-1.0, 1.0], n)
@@ -275,7 +282,7 @@ def parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), fading=False):
     return built, 0.5 * (high - low)
 
 
-def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), least_tilt=1e-3):
+def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), least_tilt=1e-3, depth=np.inf):
     """A tip of one on the side of the other at so small an angle that the far ends overlap too.
 
     The far ends are `least_tilt` to 0.9 of the built overlap further apart.
@@ -284,6 +291,7 @@ def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), least_tilt=
     fades in.
     """
     shapes = random_shapes(rng, n, alpha)
+    overlap = limited_to_depth(shapes, overlap, depth)
     A_i, A_j, d = shapes[0], shapes[1], shapes[2] + shapes[3]
     u_j = random_directions(rng, n, dimension)
     normal = random_perpendicular(rng, u_j)
@@ -334,9 +342,14 @@ def side_pairs(rng, n, dimension, sides):
     """
     parts = []
     if sides == 2:
-        both, half_overlap = parallel(rng, n // 4, dimension, overlaps(rng, n // 4))
+        # Below, overlaps that leave two bonds are too small to be differenced.
+        alpha = (0.1, 100.0)
+        both, half_overlap = parallel(
+            rng, n // 4, dimension, overlaps(rng, n // 4), alpha, depth=0.999
+        )
         whole = 2.0 * half_overlap > 1.001 * FADE_LENGTH * np.minimum(both.A_i, both.A_j)
-        parts += [nearly_parallel(rng, n, dimension, overlaps(rng, n)), both[whole]]
+        tilted = nearly_parallel(rng, n, dimension, overlaps(rng, n), alpha, depth=0.5 * FADE_DEPTH)
+        parts += [tilted, both[whole]]
     if dimension == 3:
         parts.append(skew(rng, n, overlaps(rng, n), rng.uniform(0.5, 0.5 * np.pi, n)))
     return concatenated(*parts)

@@ -10,11 +10,16 @@ from differences import (
     outside,
     rounding_of_differences,
 )
-from reference_energy import ENERGIES, complex_step_gradient, fade_arguments
+from reference_energy import (
+    ENERGIES,
+    complex_step_gradient,
+    fade_arguments,
+    fade_depth,
+    fade_length,
+)
 from spherocylinder_pairs import (
     EPS,
     EVERY_CLASS,
-    FADE_LENGTH,
     SIDE_TO_SIDE,
     contacts,
     force_scale,
@@ -89,19 +94,18 @@ def energy_rounding(pairs, sides, energy):
     rounding = EPS * pairs.extent
     result = np.sqrt(2.0 * energy) * rounding / pairs.d
     if sides == 2:
-        by_length, _ = fade_arguments(pairs)
-        fading = by_length < 1.0
-        fade_length = FADE_LENGTH * np.minimum(pairs.A_i, pairs.A_j)[fading]
-        result[fading] += np.divide(4.0 * (energy * rounding)[fading], fade_length,
-                                    where=fade_length > 0.0, out=np.zeros_like(fade_length))  # fmt: skip
+        fading = fade_arguments(pairs)[0] < 1.0
+        result[fading] += (4.0 * energy * rounding / fade_length(pairs))[fading]
     return result
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_second_bonds_that_fade_are_among_the_pairs(dimension):
-    by_length, by_cosine = fade_arguments(touching(dimension, 2, SIDE_TO_SIDE))
-    assert np.sum((by_length > 0.01) & (by_length < 0.99)) > 3000
-    assert np.sum((by_cosine > 0.01) & (by_cosine < 0.99)) > 3000
+    pairs = touching(dimension, 2, SIDE_TO_SIDE)
+    by_length, by_cosine = fade_arguments(pairs)
+    for faded in (by_length, by_cosine):
+        assert np.sum((faded > 0.01) & (faded < 0.99)) > 2000
+    assert np.sum(fade_depth(pairs) > 1.1) > 1000
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -131,7 +135,9 @@ def test_parallel_rods_with_one_bond_sit_in_the_middle_of_their_kink(dimension, 
 def test_parallel_rods_with_a_fading_second_bond_lie_within_their_kink(dimension, measured):
     """V_a + w V_b: where a and b change places the torque jumps by (1 - w) force times spread."""
     rng = np.random.default_rng([3, dimension])
-    pairs, _ = parallel(rng, N, dimension, overlaps(rng, N), alpha=(1.0, 100.0), fading=True)
+    pairs, _ = parallel(
+        rng, N, dimension, overlaps(rng, N), alpha=(1.0, 100.0), fading=True, depth=1.0
+    )
     assert np.all(contacts(pairs, 2, K_E)["n_bonds"] == 2)
     beyond, jump = one_sided_comparison(pairs, 2)
     measured(outside=beyond.max(), largest_jump=jump.max())

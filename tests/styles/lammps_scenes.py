@@ -7,7 +7,7 @@ import os
 import re
 import subprocess
 import tempfile
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -325,14 +325,22 @@ def turned(packing, vectors):
 
 
 def kicked(packing, amplitude, seed):
-    """Every particle moved at random by up to this many radii; tips move no farther by turning."""
+    """Every particle moved at random by up to this many radii; tips move no farther by turning.
+
+    Drawn again, and smaller, while spines cross.
+    """
     rng = np.random.default_rng(seed)
-    step = amplitude * packing.radius
-    shift = step[:, None] * rng.uniform(-1, 1, (packing.n, packing.dimension))
     shape = (packing.n,) if packing.dimension == 2 else (packing.n, 3)
-    reach = packing.diameters[:, 0] / 2
-    angle = (rng.uniform(-1, 1, shape).T * step / reach).T
-    return turned(packing.with_(position=packing.position + shift), angle)
+    for attempt in range(20):
+        step = amplitude * 0.8**attempt * packing.radius
+        shift = step[:, None] * rng.uniform(-1, 1, (packing.n, packing.dimension))
+        reach = packing.diameters[:, 0] / 2
+        angle = (rng.uniform(-1, 1, shape).T * step / reach).T
+        result = turned(packing.with_(position=packing.position + shift), angle)
+        with suppress(ValueError):
+            contacts.find_contacts(result)
+            return result
+    raise AssertionError
 
 
 def compressed(packing, phi, kappa=0.004, dt=0.1, sides="two"):

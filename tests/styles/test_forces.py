@@ -343,4 +343,4 @@ def test_skin_changes_nothing_in_a_run(name, tmp_path, measured):
     assert rebuilds[0.05] > 10 * max(rebuilds[4.0], 0.5)
     assert distance < 1e-12
     assert angle < 1e-12
-    assert forces < TOLERANCE
+    assert forces < 1e-13  # positions are off the grid now: periodic images are rounded

@@ -11,6 +11,7 @@ from lammps_scenes import (
     SIDES,
     angle_between,
     dense,
+    dense_mixture,
     dump,
     error_of,
     fix_vector,
@@ -18,6 +19,7 @@ from lammps_scenes import (
     load_plugin,
     loaded,
     moved,
+    nearest_image,
     pose_differences,
     relaxed,
     rods,
@@ -25,6 +27,7 @@ from lammps_scenes import (
     run_lmp,
     run_lmp_well,
     scene,
+    squeezed,
     state_of,
     states_from_dump,
     turned,
@@ -188,6 +191,66 @@ def test_heun_is_of_second_order(dimension, kappa, tmp_path, measured):
     measured(position_slope=slopes[0], angle_slope=slopes[1], coarsest=errors.max())
     assert errors.min() > 1e-11
     np.testing.assert_allclose(slopes, 2.0, atol=0.1)
+
+
+# --- many contacts: Eqs. 11-14 integrated once more, with the bindings' forces ------------------------
+
+
+def rates(packing, sides, k_d):
+    """Velocities relative to the substrate and angular velocities (rotation vectors in space)."""
+    found = contacts.forces(packing, sides=SIDES[sides])
+    shift, turn = drag_of(packing, k_d)
+    velocity = found.force / shift[:, None]
+    if packing.dimension == 2:
+        return velocity, found.torque / turn[:, 2]
+    axes = packing.axes
+    along = (axes * found.torque).sum(axis=1, keepdims=True) * axes
+    # Nothing can turn a rod about its axis, but rounding; a sphere has no axis.
+    return velocity, along / turn[:, :1] + (found.torque - along) / turn[:, 1:2]
+
+
+def heun_step(packing, sides, kappa, k_d, dt):
+    """One step from a box around the origin."""
+    shrunk = squeezed(packing, np.exp(-kappa * dt))
+    velocity, spin = rates(packing, sides, k_d)
+
+    def after(change, rotation):
+        position = packing.position + change
+        moved_on = packing.with_(position=position)
+        return turned(squeezed(moved_on, np.exp(-kappa * dt)), rotation)
+
+    predicted = after(dt * velocity, dt * spin)
+    velocity_1, spin_1 = rates(predicted, sides, k_d)
+    # Velocities in units of the box of the start.
+    mean = 0.5 * (velocity + np.exp(kappa * dt) * velocity_1)
+    corrected = after(dt * mean, 0.5 * dt * (spin + spin_1))
+    assert corrected.box.volume == shrunk.box.volume
+    return corrected
+
+
+@pytest.mark.parametrize("sides", SIDES)
+@pytest.mark.parametrize("name", ["rods", "mixture", "discs", "rods 3d", "mixture 3d"])
+def test_steps_are_those_of_heun(name, sides, tmp_path, measured):
+    build = {
+        "rods": lambda: dense(n=24, phi=0.9),
+        "mixture": lambda: dense_mixture(n=24, phi=0.9),
+        "discs": lambda: dense(alpha=0.0, n=24, phi=0.9),
+        "rods 3d": lambda: dense(3, alpha=2.0, n=24, phi=0.7),
+        "mixture 3d": lambda: dense_mixture(3, n=24, phi=0.7),
+    }
+    kappa, k_d, dt, steps = 0.01, 1.3, 0.05, 20
+    packing = build[name]().sorted_by_id()
+    (found,) = run_fix(packing, tmp_path, f"run {steps}", kappa=kappa, k_d=k_d, dt=dt, sides=sides)
+    expected = packing
+    for _ in range(steps):
+        expected = heun_step(expected, sides, kappa, k_d, dt)
+    apart = nearest_image(found.packing.position - expected.position, expected.box)
+    moved_by = nearest_image(expected.position - squeezed(packing, 0.99).position, expected.box)
+    angle = angle_between(found.quaternion, expected.quaternions).max()
+    measured(position=np.abs(apart).max(), angle=angle, moved=np.abs(moved_by).max())
+    assert np.abs(moved_by).max() > 0.01
+    assert np.abs(apart).max() < 1e-12
+    assert angle < 1e-12
 
 
 # --- many contacts: what a trajectory must not depend on -----------------------------------------
@@ -433,7 +496,8 @@ def test_estimated_rate_is_the_largest_eigenvalue(dimension, alpha, tmp_path, me
     )  # fmt: skip
     two_ranks = float(out.split("rate ")[-1].split()[0])
     measured(rate=rate, of_eigenvalue=rate / expected - 1, of_two_ranks=two_ranks / rate - 1)
-    np.testing.assert_allclose(rate, expected, rtol=0.03)
+    # From below, by the power iteration; the prestress that it leaves out is of either sign.
+    assert 0.95 * expected < rate < 1.02 * expected
     np.testing.assert_allclose(two_ranks, rate, rtol=1e-12)
     np.testing.assert_allclose(limit * rate, 2.0, rtol=1e-14)
 
