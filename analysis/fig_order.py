@@ -62,7 +62,7 @@ def average(n: int, runs: list[dict[str, FloatArray]]) -> tuple[FloatArray, Floa
 def label(key: Ensemble, keys: list[Ensemble], samples: int) -> str:
     """Name N, what else differs between the ensembles, and the number of samples."""
     columns = zip(SYMBOLS, key, *keys, strict=True)
-    shown = [f"${a} = {v:g}$" for a, v, *all_v in columns if a == "N" or len(set(all_v)) > 1]
+    shown = [f"${a} =${v:g}" for a, v, *all_v in columns if a == "N" or len(set(all_v)) > 1]
     return ", ".join(shown) + f" ({samples} sample{'s' * (samples > 1)})"
 
 

@@ -178,7 +178,8 @@ template <int D> class SpherocylinderContact {
  public:
   SpherocylinderContact(const SpherocylinderBody<D> &i, const SpherocylinderBody<D> &j,
                         const SpherocylinderLaw &contact_law) :
-      pair(spine_pair(i, j)), radius_i(i.radius), reach(i.radius + j.radius), law(contact_law)
+      pair(spine_pair(i, j)), radius_i(i.radius), reach(i.radius + j.radius),
+      inverse_reach(1.0 / reach), law(contact_law)
   {
   }
 
@@ -199,7 +200,7 @@ template <int D> class SpherocylinderContact {
 
  private:
   SpinePair<D> pair;
-  double radius_i, reach;
+  double radius_i, reach, inverse_reach;
   SpherocylinderLaw law;
 
   /// The share of a bond in the energy, and the energy that it loses as it fades with distance.
@@ -268,7 +269,7 @@ template <int D> class SpherocylinderContact {
     const Feet<D> &far_end = ends.farther();
     if (!touches(far_end.distance_sq)) return contact;
     const double distance = std::sqrt(far_end.distance_sq);
-    const double overlap = (reach - distance) / reach;
+    const double overlap = (reach - distance) * inverse_reach;
     const BondWeight<D> weight = second_bond_weight(pair, ends, overlap, reach);
     if (weight.value == 0.0) return contact;
 
@@ -287,21 +288,23 @@ template <int D> class SpherocylinderContact {
   /// of `feet` gives the same torque; the one reported lies where the surfaces interpenetrate.
   void add_bond(Contact<D> &contact, const Feet<D> &feet, double distance, const Share &share) const
   {
-    const double overlap = (reach - distance) / reach;
+    const double overlap = (reach - distance) * inverse_reach;
     const Vec<D> normal = (1.0 / std::sqrt(feet.distance_sq)) * feet.delta;
-    const double push = share.weight * law.harmonic.energy_gradient(overlap) / reach - share.fading;
+    const double push =
+        share.weight * law.harmonic.energy_gradient(overlap) * inverse_reach - share.fading;
     const Vec<D> force = push * normal;
     const double energy = share.weight * law.harmonic.energy(overlap);
-    contact.bond[contact.n_bonds++] = {normal,
-                                       force,
-                                       feet.s * pair.u_i - (radius_i * distance / reach) * normal,
-                                       distance,
-                                       reach,
-                                       energy,
-                                       share.weight * law.harmonic.energy_hessian(overlap) /
-                                           (reach * reach),
-                                       std::abs(feet.s) < pair.A_i,
-                                       std::abs(feet.t) < pair.A_j};
+    Bond<D> &bond = contact.bond[contact.n_bonds++];
+    bond.normal = normal;
+    bond.force = force;
+    bond.arm_i = feet.s * pair.u_i - (radius_i * distance * inverse_reach) * normal;
+    bond.distance = distance;
+    bond.reach = reach;
+    bond.energy = energy;
+    bond.stiffness =
+        share.weight * law.harmonic.energy_hessian(overlap) * inverse_reach * inverse_reach;
+    bond.on_side_i = std::abs(feet.s) < pair.A_i;
+    bond.on_side_j = std::abs(feet.t) < pair.A_j;
     contact.energy += energy;
     contact.force += force;
     contact.torque_i += feet.s * cross(pair.u_i, force);
