@@ -74,7 +74,7 @@ FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char 
   restart_global = restart_peratom = 1;
   create_attribute = 1;
   maxexchange = flow->width();
-  comm_forward = OverdampedFlow::DIRECTION_SIZE;
+  comm_forward = flow->width();
   vector_flag = 1;
   size_vector = 8;
   global_freq = 1;

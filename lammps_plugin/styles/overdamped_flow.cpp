@@ -154,17 +154,22 @@ void OverdampedFlow::begin_step()
   }
 }
 
+void OverdampedFlow::store_rate(int i, const Rate &rate)
+{
+  double *to = values[i] + dimension;
+  to = std::copy_n(rate.shift.c, dimension, to);
+  if (dimension == 2) {
+    *to = rate.turn[2];
+  } else {
+    std::copy_n(rate.turn.c, 3, to);
+  }
+}
+
 void OverdampedFlow::store_rates(const Stage &stage)
 {
   for (int i = 0; i < atom->nlocal; ++i) {
     const Rate rate = present_rate(i);
-    double *to = values[i] + dimension;
-    for (int k = 0; k < dimension; ++k) *to++ = rate.shift[k] / stage.scale;
-    if (dimension == 2) {
-      *to = rate.turn[2];
-    } else {
-      for (int k = 0; k < 3; ++k) *to++ = rate.turn[k];
-    }
+    store_rate(i, {(1.0 / stage.scale) * rate.shift, rate.turn});
   }
 }
 
@@ -283,28 +288,36 @@ double OverdampedFlow::sum(double mine) const
   return all;
 }
 
+// The direction of the power iteration takes the place of the stored rates, free between steps.
+
 int OverdampedFlow::pack_direction(int n, const int *list, double *buf) const
 {
-  for (int k = 0; k < n; ++k) {
-    const Rate &d = direction[list[k]];
-    buf = std::copy_n(d.shift.c, 3, buf);
-    buf = std::copy_n(d.turn.c, 3, buf);
-  }
-  return n * DIRECTION_SIZE;
+  for (int k = 0; k < n; ++k) buf = std::copy_n(values[list[k]] + dimension, n_rates, buf);
+  return n * n_rates;
 }
 
 void OverdampedFlow::unpack_direction(int n, int first, const double *buf)
 {
-  for (int i = first; i < first + n; ++i, buf += DIRECTION_SIZE) {
-    direction[i] = {vec3(buf), vec3(buf + 3)};
+  for (int i = first; i < first + n; ++i, buf += n_rates) {
+    std::copy_n(buf, n_rates, values[i] + dimension);
   }
 }
 
-/// Replaces the direction v by mobility * stiffness * v and returns its squared norm in the metric
-/// of the drag, in which that product is symmetric. Uses the force arrays for the sum over bonds.
-double OverdampedFlow::apply_stiffness(const std::vector<LocalBond> &bonds)
+/// Stores scale times the rate of a force and torque on i as its direction; returns the squared
+/// norm of the unscaled rate in the metric of the drag, in which mobility times stiffness is
+/// symmetric.
+double OverdampedFlow::set_direction(int i, const Vec<3> &force_on, const Vec<3> &torque_on,
+                                     double scale)
 {
-  comm->forward_comm_fix(fix, DIRECTION_SIZE);
+  const Rate rate = mobility_times(i, force_on, torque_on);
+  store_rate(i, {scale * rate.shift, scale * rate.turn});
+  return dot(rate.shift, force_on) + dot(rate.turn, torque_on);
+}
+
+/// Sums stiffness times the direction over all bonds into the force arrays.
+void OverdampedFlow::apply_stiffness()
+{
+  comm->forward_comm_fix(fix, n_rates);
   clear_forces();
   const auto add = [&](int i, const Vec<3> &force_on, const Vec<3> &torque_on) {
     for (int k = 0; k < 3; ++k) {
@@ -312,8 +325,8 @@ double OverdampedFlow::apply_stiffness(const std::vector<LocalBond> &bonds)
       atom->torque[i][k] += torque_on[k];
     }
   };
-  for (const LocalBond &b : bonds) {
-    const Rate &of_i = direction[b.i], &of_j = direction[b.j];
+  pair->for_each_bond([&](const LocalBond &b) {
+    const Rate of_i = stored_rate(b.i), of_j = stored_rate(b.j);
     const Vec<3> lever_i = cross(b.arm_i, b.normal), lever_j = cross(b.arm_j, b.normal);
     const double opening =
         dot(b.normal, of_i.shift - of_j.shift) + dot(lever_i, of_i.turn) - dot(lever_j, of_j.turn);
@@ -322,48 +335,44 @@ double OverdampedFlow::apply_stiffness(const std::vector<LocalBond> &bonds)
     if (force->newton_pair || b.j < atom->nlocal) {
       add(b.j, -tension * b.normal, -tension * lever_j);
     }
-  }
+  });
   if (force->newton) comm->reverse_comm();
-  double norm_sq_mine = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    direction[i] = present_rate(i);
-    norm_sq_mine +=
-        dot(direction[i].shift, vec3(atom->f[i])) + dot(direction[i].turn, vec3(atom->torque[i]));
-  }
-  return sum(norm_sq_mine);
 }
 
 double OverdampedFlow::largest_rate()
 {
-  const std::vector<LocalBond> bonds = pair->bonds();
   const int nlocal = atom->nlocal;
   pair->particle_view().read_orientations(nlocal);
-  std::vector<Rate> forces(nlocal);
-  direction.assign(nlocal + atom->nghost, {});
+  std::vector<double> saved;
   double norm_sq_mine = 0.0;
   for (int i = 0; i < nlocal; ++i) {
-    forces[i] = {vec3(atom->f[i]), vec3(atom->torque[i])};
+    saved.insert(saved.end(), atom->f[i], atom->f[i] + 3);
+    saved.insert(saved.end(), atom->torque[i], atom->torque[i] + 3);
     Vec<3> force_on{}, torque_on{};
     for (int k = 0; k < dimension; ++k) force_on[k] = hashed(atom->tag[i], k);
     for (int k = dimension == 2 ? 2 : 0; k < 3; ++k) torque_on[k] = hashed(atom->tag[i], 3 + k);
-    direction[i] = mobility_times(i, force_on, torque_on);
-    norm_sq_mine += dot(direction[i].shift, force_on) + dot(direction[i].turn, torque_on);
+    norm_sq_mine += set_direction(i, force_on, torque_on, 1.0);
   }
 
-  double norm_sq_now = sum(norm_sq_mine), rate = 0.0;
-  for (int k = 0; k < POWER_ITERATIONS && norm_sq_now > 0.0; ++k) {
-    const double scale = 1.0 / std::sqrt(norm_sq_now);
+  double before = sum(norm_sq_mine), rate = 0.0;
+  for (int k = 0; k < POWER_ITERATIONS && before > 0.0; ++k) {
+    // Scaled to what the direction before was, its square being the eigenvalue's, the numbers stay
+    // of one size.
+    apply_stiffness();
+    norm_sq_mine = 0.0;
     for (int i = 0; i < nlocal; ++i) {
-      direction[i] = {scale * direction[i].shift, scale * direction[i].turn};
+      norm_sq_mine +=
+          set_direction(i, vec3(atom->f[i]), vec3(atom->torque[i]), rate > 0.0 ? 1.0 / rate : 1.0);
     }
-    norm_sq_now = apply_stiffness(bonds);
-    rate = std::max(rate, std::sqrt(norm_sq_now));
+    const double after = sum(norm_sq_mine), ratio = std::sqrt(after / before);
+    before = rate > 0.0 ? after / (rate * rate) : after;
+    rate = std::max(rate, ratio);
   }
-  for (int i = 0; i < nlocal; ++i) {
-    std::copy_n(forces[i].shift.c, 3, atom->f[i]);
-    std::copy_n(forces[i].turn.c, 3, atom->torque[i]);
+  const double *from = saved.data();
+  for (int i = 0; i < nlocal; ++i, from += 6) {
+    std::copy_n(from, 3, atom->f[i]);
+    std::copy_n(from + 3, 3, atom->torque[i]);
   }
-  direction = {};
   return rate;
 }
 

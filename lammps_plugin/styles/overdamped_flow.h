@@ -11,7 +11,6 @@
 namespace jamshape {
 
 class PairContact;
-struct LocalBond;
 
 /// Velocity and angular velocity of a particle relative to the affine motion, in space coordinates.
 struct Rate {
@@ -85,7 +84,6 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
 
   /* the direction of the power iteration, sent to ghosts */
 
-  static constexpr int DIRECTION_SIZE = 6;
   int pack_direction(int n, const int *list, double *buf) const;
   void unpack_direction(int n, int first, const double *buf);
 
@@ -99,7 +97,6 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   double largest_difference;
   LAMMPS_NS::bigint evaluations, rebuilds;
   LAMMPS_NS::Fix *fix;
-  std::vector<Rate> direction;
 
   struct Mobility {
     double shift;
@@ -111,6 +108,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   Rate mobility_times(int i, const Vec<3> &force, const Vec<3> &torque) const;
   Rate present_rate(int i) const;
   Rate stored_rate(int i) const;
+  void store_rate(int i, const Rate &rate);
   Vec<3> read_coordinates(int i) const;
   Quaternion orientation_at_start(int i) const;
   void require_small(int i, double moved) const;
@@ -118,7 +116,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   void move(const Move &move, bool is_last);
   void clear_forces();
   double sum(double mine) const;
-  double apply_stiffness(const std::vector<LocalBond> &bonds);
+  double set_direction(int i, const Vec<3> &force_on, const Vec<3> &torque_on, double scale);
+  void apply_stiffness();
   void rebuild_lists();
 };
 

@@ -196,16 +196,17 @@ bool PairContact::is_mine(int i, int j) const
 std::vector<LocalBond> PairContact::reported_bonds()
 {
   std::vector<LocalBond> reported;
-  for (const LocalBond &b : bonds()) {
-    if (!is_mine(b.i, b.j)) continue;
+  for_each_bond([&](const LocalBond &b) {
+    if (!is_mine(b.i, b.j)) return;
     if (atom->tag[b.i] <= atom->tag[b.j]) {
       reported.push_back(b);
     } else {
-      reported.push_back({b.j, b.i, b.kind, b.first_of_contact, Vec<3>{} - b.normal,
-                          Vec<3>{} - b.force, b.arm_j, b.arm_i, b.distance, b.reach, b.energy,
-                          b.stiffness, b.on_side_j, b.on_side_i});
+      const Vec<3> zero{};  // 0 - 0 is 0; -0 would be written as such
+      reported.push_back({b.j, b.i, b.kind, b.first_of_contact, zero - b.normal, zero - b.force,
+                          b.arm_j, b.arm_i, b.distance, b.reach, b.energy, b.stiffness, b.on_side_j,
+                          b.on_side_i});
     }
-  }
+  });
   return reported;
 }
 

@@ -6,6 +6,7 @@
 #include "pair.h"
 #include "particle_view.h"
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -45,9 +46,9 @@ class PairContact : public LAMMPS_NS::Pair {
   virtual SubstrateDrag drag(const Vec<3> &semi_axes) const = 0;
   bool particles_turn() const { return any_turns; }
 
-  /// All bonds of this rank's pairs at the current positions.
-  virtual std::vector<LocalBond> bonds() = 0;
-  /// The same, each bond once over all ranks and with tag[i] <= tag[j].
+  /// Shows every bond of this rank's pairs, at the current positions, to `visit`.
+  virtual void for_each_bond(const std::function<void(const LocalBond &)> &visit) = 0;
+  /// Each bond once over all ranks and with tag[i] <= tag[j].
   std::vector<LocalBond> reported_bonds();
 
   ParticleView &particle_view() { return particles; }

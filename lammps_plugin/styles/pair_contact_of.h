@@ -41,9 +41,9 @@ template <class Model> class PairContactOf : public PairContact {
     }
   }
 
-  std::vector<LocalBond> bonds() override
+  void for_each_bond(const std::function<void(const LocalBond &)> &visit) override
   {
-    return domain->dimension == 2 ? bonds_in<2>() : bonds_in<3>();
+    domain->dimension == 2 ? visit_bonds<2>(visit) : visit_bonds<3>(visit);
   }
 
   SubstrateDrag drag(const Vec<3> &semi_axes) const override
@@ -268,10 +268,9 @@ template <class Model> class PairContactOf : public PairContact {
 
   /* ---------------------------------------------------------------------- */
 
-  template <int D> std::vector<LocalBond> bonds_in()
+  template <int D> void visit_bonds(const std::function<void(const LocalBond &)> &visit)
   {
     const std::vector<Body<D>> &bodies = all<D>().now;
-    std::vector<LocalBond> found;
     for (int n = 0; n < list->inum; ++n) {
       const int i = list->ilist[n];
       for (int k = first[n]; k < first[n + 1]; ++k) {
@@ -281,14 +280,12 @@ template <class Model> class PairContactOf : public PairContact {
         const Vec<D> r = bodies[i].centre - bodies[j].centre;
         for (int b = 0; b < contact.n_bonds; ++b) {
           const Bond<D> &bond = contact.bond[b];
-          found.push_back({i, j, contact.kind, b == 0, in_space<D>(bond.normal),
-                           in_space<D>(bond.force), in_space<D>(bond.arm_i),
-                           in_space<D>(bond.arm_i + r), bond.distance, bond.reach, bond.energy,
-                           bond.stiffness, bond.on_side_i, bond.on_side_j});
+          visit({i, j, contact.kind, b == 0, in_space<D>(bond.normal), in_space<D>(bond.force),
+                 in_space<D>(bond.arm_i), in_space<D>(bond.arm_i + r), bond.distance, bond.reach,
+                 bond.energy, bond.stiffness, bond.on_side_i, bond.on_side_j});
         }
       }
     }
-    return found;
   }
 
   template <int D> static Vec<3> in_space(const Vec<D> &v)

@@ -163,7 +163,6 @@ def random_packing(
     rng = np.random.default_rng(seed)
     sizes = (mixture or Mixture.bidisperse()).sample(n, rng)
     insertion = _Insertion(_longest_first(sizes, phi, dimension), rng)
-    insertion.require_room_for_longest()
     insertion.run(200_000 + 500 * n if max_attempts is None else max_attempts)
     return insertion.shuffled()
 
@@ -181,8 +180,7 @@ class _Insertion:
     def __init__(self, particles: Packing, rng: np.random.Generator) -> None:
         self.particles, self.rng = particles, rng
         self.rows = bodies(particles)
-        self.orientation = np.array(particles.orientation)
-        self.waiting = np.arange(particles.n)  # `rows` and `orientation` of all others are final
+        self.waiting = np.arange(particles.n)  # `rows` of all others are final
 
         longest = self.rows[:1]
         reach = 2 * longest[0, -2:].sum()
@@ -191,12 +189,22 @@ class _Insertion:
             raise self._too_short()
         self.most_trials = min(int(_MOST_PAIRS / pairs_per_trial), _MOST_TRIALS)
         self.own_shifts = each_once(near_pairs(longest, longest, particles.box)).shift
+        self.orientation = np.array(particles.orientation)
+        self._turn(self.waiting)
 
-    def require_room_for_longest(self) -> None:
-        """Raise InsertionError if all directions bring the longest onto its own images."""
-        longest = np.zeros(self.most_trials, dtype=np.int64)
-        for _ in range(0, _DIRECTIONS, self.most_trials):
-            if len(self._clear_of_own_images(bodies(self._anywhere(longest)))):
+    def _turn(self, index: IntArray) -> None:
+        """Draw orientations of the particles `index` that do not bring them onto their own images.
+
+        Once, not for each trial: that would favour those aligned with what is already there.
+        """
+        for _ in range(_DIRECTIONS):
+            self.orientation[index] = _random_orientations(
+                len(index), self.particles.dimension, self.rng
+            )
+            parts = np.array_split(index, 1 + len(index) // self.most_trials)
+            clear = [part[self._clear_of_own_images(self._rows(part))] for part in parts]
+            index = np.setdiff1d(index, np.concatenate(clear))
+            if not len(index):
                 return
         raise self._too_short()
 
@@ -210,6 +218,8 @@ class _Insertion:
             index = np.resize(self.waiting[:competing], n_trials)
             n_attempts += n_trials
             n_placed = self._place(index)
+            if n_placed == 0 and n_trials == self.most_trials:
+                self._turn(self.waiting)  # no room for them as they are
             if 2 * n_placed < min(competing, n_trials):
                 n_trials = min(2 * n_trials, self.most_trials)
 
@@ -223,28 +233,28 @@ class _Insertion:
             species=self.particles.species[order],
         )
 
-    def _anywhere(self, index: IntArray) -> Packing:
-        """Draw poses for the particles `index`, any of them any number of times."""
+    def _rows(self, index: IntArray) -> FloatArray:
+        """Put the particles `index`, any of them any number of times, anywhere in the box."""
         box = self.particles.box
-        return Packing(
-            position=box.edges * self.rng.random((len(index), box.dimension)),
-            orientation=_random_orientations(len(index), box.dimension, self.rng),
-            diameters=self.particles.diameters[index],
-            species=self.particles.species[index],
-            id=1 + np.arange(len(index)),
-            box=box,
+        return bodies(
+            Packing(
+                position=box.edges * self.rng.random((len(index), box.dimension)),
+                orientation=self.orientation[index],
+                diameters=self.particles.diameters[index],
+                species=self.particles.species[index],
+                id=1 + np.arange(len(index)),
+                box=box,
+            )
         )
 
     def _place(self, index: IntArray) -> int:
         """Try each of the particles `index` once anywhere; return how many found a place."""
-        trials = self._anywhere(index)
-        rows = bodies(trials)
-        free = self._clear_of_placed(rows, self._clear_of_own_images(rows))
+        rows = self._rows(index)
+        free = self._clear_of_placed(rows, np.arange(len(rows)))
         _, first_of_particle = np.unique(index[free], return_index=True)
         free = free[first_of_particle]
         free = free[self._clear_of_earlier(rows[free])]
         self.rows[index[free]] = rows[free]
-        self.orientation[index[free]] = trials.orientation[free]
         self.waiting = np.setdiff1d(self.waiting, index[free])
         return len(free)
 
