@@ -29,7 +29,7 @@ from jamshape.storage import read_packing, write_packing
 KAPPA = 1e-4
 PHI_START, PHI_FROM, PHI_TO = 0.4, 0.84, 0.88
 INTERVAL = 6.0  # time between samples, a multiple of every time step below
-STEPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+STEPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 1.0)
 REFERENCE = 0.00025
 
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jamshape.jamming import fit_onset
 from jamshape.lammps_files import write_data
 from jamshape.packing import Box, Packing, angle_from_quaternion
-from jamshape.storage import RunWriter, read_attributes
+from jamshape.storage import RunWriter, read_attributes, read_observables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -283,3 +284,14 @@ def record(run: CompressionRun, to: Recording) -> Iterator[Sample]:
         writer.append_report(sample.step, sample.wall_seconds, error)
         yield sample
     writer.set_attributes({"finished": True})
+
+
+def summary(path: Path) -> dict[str, object]:
+    """Summarise a run: its end and, where the pressure rises, the onset of jamming."""
+    observables = read_observables(path)
+    last = {name: float(observables[name][-1]) for name in ("phi", "p", "z", "S_2", "S_4")}
+    try:
+        fit = fit_onset(observables["phi"], observables["p"])
+    except ValueError:  # the run ends below jamming
+        return {"out": str(path), **last, "phi_J": None}
+    return {"out": str(path), **last, "phi_J": fit.phi_J, "phi_J_error": fit.phi_J_error}
