@@ -93,8 +93,9 @@ template <int D> bool is_closer(const SpinePair<D> &p, const Feet<D> &a, const F
 template <int D> struct EndFeet {
   Feet<D> plus, minus;
 
-  EndFeet(const SpinePair<D> &p, const TipFeet<D> &tips)
+  explicit EndFeet(const SpinePair<D> &p)
   {
+    const TipFeet<D> tips(p);
     const int j_plus = dot(p.u_i, p.u_j) < 0.0 ? 3 : 2, j_minus = 5 - j_plus;
     const auto feet = [&](int k) { return feet_at(p, tips.s[k], tips.t[k]); };
     const auto closer = [&](const Feet<D> &a, const Feet<D> &b) {
@@ -123,35 +124,50 @@ template <int D> struct EndFeet {
   bool minus_is_nearer;
 };
 
-/// The closest points of two spines, from the point t of the nearest tip or its foot. In the plane,
-/// spines that do not cross are closest at a tip; which one, rounding cannot tell by comparing
-/// distances when a spine is very short, so each foot is projected once more: the closest points
-/// are each other's feet. Skew spines in 3D may be closest inside both.
+/// The closest points from a point t close to that on spine j: they are each other's feet.
 template <int D> Feet<D> each_others_feet(const SpinePair<D> &p, double t)
 {
   const double s = foot_on_i(p, t);
   return feet_at(p, s, foot_on_j(p, s));
 }
 
-inline Feet<2> closest_feet(const SpinePair<2> &p, double t_nearest)
-{
-  return each_others_feet(p, t_nearest);
-}
+/// The closest points of two spines, from the point t on j of their nearer end. In the plane,
+/// spines that do not cross are closest there; skew spines in 3D may be closest inside both.
+inline Feet<2> closest_from_end(const SpinePair<2> &p, double t) { return each_others_feet(p, t); }
 
-inline Feet<3> closest_feet(const SpinePair<3> &p, double t_nearest)
+inline Feet<3> closest_from_end(const SpinePair<3> &p, double t_at_end)
 {
   // The part of u_i across u_j, from the difference of the axes: nearly parallel spines lose no
   // digits.
   const Vec<3> turn = p.u_i - std::copysign(1.0, dot(p.u_i, p.u_j)) * p.u_j;
   const Vec<3> across = turn - dot(turn, p.u_j) * p.u_j;
   const double sin_sq = norm_sq(across);
-  if (sin_sq == 0.0) return each_others_feet(p, t_nearest);
+  if (sin_sq == 0.0) return each_others_feet(p, t_at_end);
   const double s = -dot(p.r, across) / sin_sq;
   const double t = dot(p.u_j, p.r + s * p.u_i);
   // Feet inside both spines are the minimum, the distance being convex: comparing it with that at
   // the ends would leave it to rounding where the feet of nearly parallel spines sit.
   if (std::abs(s) < p.A_i && std::abs(t) < p.A_j) return feet_at(p, foot_on_i(p, t), t);
-  return each_others_feet(p, t_nearest);
+  return each_others_feet(p, t_at_end);
+}
+
+/// Below this squared sine of the angle the intersection of the lines through two spines does not
+/// tell where the spines are closest.
+inline constexpr double NO_INTERSECTION_SINE_SQ = 1e-8;
+
+/// The closest points of two spines. In the plane they are at the tip towards the intersection of
+/// their lines, which saves the search over four tips; crossing spines, a state to detect
+/// (`spines_cross`), end up at it.
+template <int D> Feet<D> closest_feet(const SpinePair<D> &p)
+{
+  if constexpr (D == 2) {
+    const double sine = cross(p.u_i, p.u_j)[0];
+    if (sine * sine > NO_INTERSECTION_SINE_SQ) {
+      return each_others_feet(p, foot_on_j(p, limited(cross(p.u_j, p.r)[0] / sine, p.A_i)));
+    }
+  }
+  const TipFeet<D> tips(p);
+  return closest_from_end(p, tips.t[tips.nearest()]);
 }
 
 /// |sin| of the angle between the spines: the one measure of being parallel used everywhere; it
@@ -170,9 +186,7 @@ inline bool spines_cross(const SpinePair<3> &) { return false; }
 /// Squared shortest distance of the two spines, zero where they cross.
 template <int D> double spine_distance_sq(const SpinePair<D> &p)
 {
-  if (spines_cross(p)) return 0.0;
-  const TipFeet<D> tips(p);
-  return closest_feet(p, tips.t[tips.nearest()]).distance_sq;
+  return spines_cross(p) ? 0.0 : closest_feet(p).distance_sq;
 }
 
 }  // namespace jamshape

@@ -186,16 +186,10 @@ template <int D> class SpherocylinderContact {
   Contact<D> evaluate() const
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0) return discs();
-    const TipFeet<D> tips(pair);
-    // Skew spines in 3D can be closer than at any tip, and so can crossing ones in 2D, both of them
-    // longer than the reach.
-    const bool tips_tell = D == 2 && std::min(pair.A_i, pair.A_j) < reach;
-    if (tips_tell && !touches(tips.distance_sq[tips.nearest()])) return empty(ContactStatus::APART);
-    if (spines_cross(pair)) return empty(ContactStatus::CROSSING);
-    const Feet<D> closest = closest_feet(pair, tips.t[tips.nearest()]);
+    const Feet<D> closest = closest_feet(pair);
     if (!touches(closest.distance_sq)) return empty(ContactStatus::APART);
-    if (is_coincident(closest)) return empty(ContactStatus::CROSSING);
-    return law.sides == Sides::ONE ? one_bond(tips, closest) : two_bonds(tips);
+    if (is_coincident(closest) || spines_cross(pair)) return empty(ContactStatus::CROSSING);
+    return law.sides == Sides::ONE ? one_bond(closest) : two_bonds();
   }
 
  private:
@@ -240,12 +234,12 @@ template <int D> class SpherocylinderContact {
     return contact;
   }
 
-  Contact<D> one_bond(const TipFeet<D> &tips, const Feet<D> &closest) const
+  Contact<D> one_bond(const Feet<D> &closest) const
   {
     Contact<D> contact = empty(ContactStatus::TOUCHING);
     const double distance = std::sqrt(closest.distance_sq);
     if (abs_sine(pair) < PARALLEL_SINE) {
-      const EndFeet<D> ends(pair, tips);
+      const EndFeet<D> ends(pair);
       if (ends.spread() > 0.0) {
         contact.kind = ContactKind::SIDE_TO_SIDE;
         // The energy stays that of the shortest distance, so that it does not jump at
@@ -259,10 +253,10 @@ template <int D> class SpherocylinderContact {
     return contact;
   }
 
-  Contact<D> two_bonds(const TipFeet<D> &tips) const
+  Contact<D> two_bonds() const
   {
-    const EndFeet<D> ends(pair, tips);
-    const Feet<D> closest = closest_feet(pair, ends.nearer().t);  // never the far end, at a tie
+    const EndFeet<D> ends(pair);
+    const Feet<D> closest = closest_from_end(pair, ends.nearer().t);  // never the farther, at a tie
     Contact<D> contact = empty(ContactStatus::TOUCHING);
     contact.kind = kind_of(pair, closest);
     add_bond(contact, closest, std::sqrt(closest.distance_sq), WHOLE);

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from jamshape import contacts
-from jamshape.initial import Mixture, random_packing
 from jamshape.lammps_files import write_data
 from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.session import Session, plugin_path
@@ -399,13 +398,30 @@ def moved(packing, fraction):
     return shifted.with_(image=np.zeros_like(shifted.image))
 
 
+def scattered(half_length, radius, species, dimension, rng):
+    """Turned at random on a grid as wide as the longest particle, in random order."""
+    n = len(radius)
+    order = rng.permutation(n)
+    A, R = np.asarray(half_length)[order], np.asarray(radius)[order]
+    side, cell = int(np.ceil(n ** (1 / dimension))), 2 * (A + R).max()
+    sites = rng.permutation(side**dimension)[:n]
+    cells = np.stack(np.unravel_index(sites, (side,) * dimension), axis=1)
+    position, edges = cell * (cells + 0.5 - side / 2), [side * cell] * dimension
+    if dimension == 2:
+        angle = rng.uniform(-np.pi, np.pi, n)
+        return rods(position, angle, A, R, edges, species=np.asarray(species)[order])
+    quaternion = rng.normal(size=(n, 4))
+    return rods_3d(position, quaternion, A, R, edges, species=np.asarray(species)[order])
+
+
 @functools.cache
 def dense(dimension=2, alpha=4.0, n=48, phi=0.95, seed=1, kick=0.05):
     """Far above jamming and kicked off every kink of the energy: contacts of all classes."""
-    mixture = Mixture.bidisperse(alpha)
-    start = random_packing(n, 0.3 if dimension == 2 else 0.15, seed, mixture, dimension=dimension)
-    packing = kicked(compressed(start, phi), kick, seed)
-    return wrapped(on_grid(packing))
+    species = 1 + np.arange(n) % 2
+    radius = np.array([0.5, 0.7])[species - 1]
+    rng = np.random.default_rng(seed)
+    start = scattered(alpha * radius, radius, species, dimension, rng)
+    return wrapped(on_grid(kicked(compressed(start, phi), kick, seed)))
 
 
 @functools.cache
@@ -414,6 +430,5 @@ def dense_mixture(dimension=2, n=48, phi=0.95, seed=1, kick=0.05):
     rng = np.random.default_rng(seed)
     radius = 0.5 * rng.uniform(1, 3, n)
     half_length = radius * rng.uniform(0, 5, n) * (np.arange(n) % 3 > 0)
-    mixture = Mixture.from_arrays(half_length, radius, np.arange(n) % 2 + 1)
-    start = random_packing(n, 0.25 if dimension == 2 else 0.1, seed, mixture, dimension=dimension)
+    start = scattered(half_length, radius, 1 + np.arange(n) % 2, dimension, rng)
     return wrapped(on_grid(kicked(compressed(start, phi), kick, seed)))

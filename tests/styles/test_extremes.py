@@ -58,14 +58,14 @@ def stack(angle, dimension=2, n=6):
 
 def unequal(dimension, phi):
     start = random_packing(60, phi, 1, Mixture.bidisperse(1.0, 10.0), dimension=dimension)
-    return squeezed(start, 0.93)
+    return squeezed(start, 0.9)
 
 
 SCENES = {
     "alpha 1e-6": lambda: dense(alpha=1e-6, n=32, phi=0.9),
     "alpha 1e-6, 3d": lambda: dense(3, alpha=1e-6, n=32, phi=0.7),
-    "sizes 1 to 10": lambda: unequal(2, 0.6),
-    "sizes 1 to 10, 3d": lambda: unequal(3, 0.3),
+    "sizes 1 to 10": lambda: unequal(2, 0.45),
+    "sizes 1 to 10, 3d": lambda: unequal(3, 0.2),
     "long rods in a small box": longer_than_the_box,
     "alpha 30": lambda: dense(alpha=30.0, n=8, phi=0.5),
     **{f"stack to {a:.0e}": functools.partial(stack, a) for a in (1e-2, 1e-6, 1e-9, 1e-12, 0.0)},

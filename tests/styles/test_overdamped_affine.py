@@ -509,19 +509,19 @@ def test_time_steps_near_the_limit_warn_and_past_it_stop(sides, tmp_path):
         session.commands("fix move all overdamped/affine drag 1.0 compress 0.0\nrun 0")
         limit = fix_vector(session, "move", 4)
 
-    def run_at(fraction, steps):
+    def run_at(fraction):
+        """The limit is looked at once, at the start: it changes as contacts come and go."""
         return run_lmp(
             f"""{load_plugin()}
             {scene(packing, tmp_path / "s.data", sides=sides)}
-            fix move all overdamped/affine drag 1.0 compress 0.0 check 10
+            fix move all overdamped/affine drag 1.0 compress 0.0
             timestep {fraction * limit:.17g}
-            {dump("s.dump", every=steps)}
-            run {steps}""",
+            run 30""",
             tmp_path,
         )
 
-    warning = f"found timestep {0.95 * limit:.6f} close to the stability limit"
-    calm, near, past = (run_at(fraction, 100) for fraction in (0.75, 0.95, 1.05))
+    warning = f"found timestep {0.95 * limit:.6f} close to the stability limit {limit:.6f}"
+    calm, near, past = (run_at(fraction) for fraction in (0.85, 0.95, 1.05))
     assert calm.returncode == 0
     assert "WARNING: fix overdamped/affine" not in calm.stdout
     assert near.returncode == 0
