@@ -55,7 +55,7 @@ def outlines(center: FloatArray, axis: FloatArray, A: ArrayLike, R: ArrayLike) -
     )
 
 
-def draw(packing: Packing, network: ContactNetwork, title: str, out: Path) -> None:
+def draw(packing: Packing, network: ContactNetwork, title: str, out: Path, dpi: int) -> None:
     """Draw the box and what is in it."""
     from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415
     from matplotlib.colors import LinearSegmentedColormap, to_rgba  # noqa: PLC0415
@@ -67,7 +67,7 @@ def draw(packing: Packing, network: ContactNetwork, title: str, out: Path) -> No
     grey = find_rattlers(packing, network)
     color[grey & ~grey.all()] = to_rgba(RATTLER)
     scale = INCHES / box.edges.max()
-    figure = Figure(figsize=scale * box.edges + MARGIN, dpi=200, layout="constrained")
+    figure = Figure(figsize=scale * box.edges + MARGIN, layout="constrained")
     axes = figure.subplots()
     line = np.clip(0.05 * 72 * scale * R.min(), 0.1, 1.0)  # points
     dot = np.clip(0.016 / scale, 0.18 * R.min(), 0.5 * R.min())
@@ -83,7 +83,7 @@ def draw(packing: Packing, network: ContactNetwork, title: str, out: Path) -> No
     xlim, ylim = np.transpose([box.lo, box.lo + box.edges])
     axes.set(xlim=xlim, ylim=ylim, aspect="equal", xticks=[], yticks=[])
     axes.set_title(title, fontsize=9)
-    figure.savefig(out)
+    figure.savefig(out, dpi=dpi)
 
 
 def main() -> None:
@@ -94,6 +94,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("packing.png"), help="(packing.png)")
     sides = "points of a side-to-side contact; auto: as the file says, or else 2 (auto)"
     parser.add_argument("--sides", choices=("auto", "1", "2"), default="auto", help=sides)
+    parser.add_argument("--dpi", type=int, default=200, help="dots per inch (200)")
     options = parser.parse_args()
     packing = read_any(options.file, options.frame)
     if packing.dimension != 2:
@@ -107,7 +108,8 @@ def main() -> None:
     z, _, rattlers, _, _ = coordination(packing, network)
     u = float(network.energy.sum()) / packing.box.volume
     title = rf"$N={packing.n}$    $\phi={packing.phi:.5f}$    $u=${u:.1e}    $z={z:.3f}$"
-    draw(packing, network, title + f"    step {packing.step}" * (packing.step > 0), options.out)
+    title += f"    step {packing.step}" * (packing.step > 0)
+    draw(packing, network, title, options.out, options.dpi)
     report = {"out": str(options.out), "n": packing.n, "rattlers": rattlers}
     print(json.dumps(report | {"contacts": len(network.pairs), "phi": packing.phi, "u": u, "z": z}))
 

@@ -342,14 +342,19 @@ def kicked(packing, amplitude, seed):
     raise AssertionError
 
 
-def compressed(packing, phi, kappa=0.004, dt=0.1, sides="two"):
-    """Driven by fix overdamped/affine to a packing fraction."""
-    steps = int(np.log(phi / packing.phi) / (packing.dimension * kappa * dt))
-    with tempfile.TemporaryDirectory() as folder, loaded(packing, folder, sides=sides) as session:
-        session.commands(f"""
-            fix compress all overdamped/affine drag 1.0 compress {kappa}
-            timestep {dt}
-            run {steps}""")
+def compressed(packing, phi, speed=0.03, dt=0.1):
+    """Driven by fix overdamped/affine to a packing fraction; walls move at about this speed."""
+    with tempfile.TemporaryDirectory() as folder, loaded(packing, folder, sides="two") as session:
+        session.commands(f"timestep {dt}")
+        reached = packing.phi
+        while reached < 0.999 * phi:
+            kappa = speed / session.lmp.extract_box()[1][0]
+            goal = min(phi, 1.3 * reached)
+            session.commands(f"""
+                fix compress all overdamped/affine drag 1.0 compress {kappa}
+                run {round(np.log(goal / reached) / (packing.dimension * kappa * dt))} post no
+                unfix compress""")
+            reached = state_of(session).packing.phi
         return state_of(session).packing
 
 
@@ -415,13 +420,13 @@ def scattered(half_length, radius, species, dimension, rng):
 
 
 @functools.cache
-def dense(dimension=2, alpha=4.0, n=48, phi=0.95, seed=1, kick=0.05):
+def dense(dimension=2, alpha=4.0, n=48, phi=0.95, seed=1, kick=0.05, speed=0.03):
     """Far above jamming and kicked off every kink of the energy: contacts of all classes."""
     species = 1 + np.arange(n) % 2
     radius = np.array([0.5, 0.7])[species - 1]
     rng = np.random.default_rng(seed)
     start = scattered(alpha * radius, radius, species, dimension, rng)
-    return wrapped(on_grid(kicked(compressed(start, phi), kick, seed)))
+    return wrapped(on_grid(kicked(compressed(start, phi, speed), kick, seed)))
 
 
 @functools.cache

@@ -67,7 +67,7 @@ SCENES = {
     "sizes 1 to 10": lambda: unequal(2, 0.45),
     "sizes 1 to 10, 3d": lambda: unequal(3, 0.2),
     "long rods in a small box": longer_than_the_box,
-    "alpha 30": lambda: dense(alpha=30.0, n=8, phi=0.5),
+    "alpha 30": lambda: dense(alpha=30.0, n=8, phi=0.5, speed=0.005),
     **{f"stack to {a:.0e}": functools.partial(stack, a) for a in (1e-2, 1e-6, 1e-9, 1e-12, 0.0)},
     **{f"stack to {a:.0e}, 3d": functools.partial(stack, a, 3) for a in (1e-6, 1e-12, 0.0)},
 }
