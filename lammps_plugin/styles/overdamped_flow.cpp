@@ -34,7 +34,10 @@ constexpr double LARGEST_STEP = 0.5;
 /// Coordinates that agree with the atom's position to this fraction of the box are its own.
 constexpr double SAME_POSITION = 1e-13;
 
-constexpr int POWER_ITERATIONS = 30;
+constexpr int LANCZOS_STEPS = 30;
+
+/// A direction shorter than this against the first is rounding: all eigenvalues have been found.
+constexpr double EXHAUSTED = 1e-12;
 
 }  // namespace
 
@@ -269,6 +272,29 @@ void OverdampedFlow::evaluate_forces()
 
 namespace {
 
+/// Largest eigenvalue of a symmetric tridiagonal matrix, by bisection; 0 for an empty one.
+double largest_eigenvalue(const std::vector<double> &diagonal,
+                          const std::vector<double> &off_diagonal)
+{
+  double low = 0.0, high = 0.0;
+  for (const double d : diagonal) high = std::max(high, d);
+  if (!off_diagonal.empty()) {
+    high += 2.0 * *std::max_element(off_diagonal.begin(), off_diagonal.end());
+  }
+  const auto is_below_all = [&](double x) {  // all pivots of the matrix minus x are negative
+    double pivot = -1.0;
+    for (std::size_t k = 0; k < diagonal.size() && pivot < 0.0; ++k) {
+      const double coupling = k ? off_diagonal[k - 1] : 0.0;
+      pivot = diagonal[k] - x - coupling * coupling / pivot;
+    }
+    return pivot >= 0.0;
+  };
+  for (double middle = 0.5 * high; low < middle && middle < high; middle = 0.5 * (low + high)) {
+    (is_below_all(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
 /// A number in (-1, 1) that depends on the atom's ID only, so that ranks and orders do not matter.
 double hashed(std::uint64_t tag, std::uint64_t component)
 {
@@ -288,7 +314,7 @@ double OverdampedFlow::sum(double mine) const
   return all;
 }
 
-// The direction of the power iteration takes the place of the stored rates, free between steps.
+// The direction of the Lanczos iteration takes the place of the stored rates, free between steps.
 
 int OverdampedFlow::pack_direction(int n, const int *list, double *buf) const
 {
@@ -301,17 +327,6 @@ void OverdampedFlow::unpack_direction(int n, int first, const double *buf)
   for (int i = first; i < first + n; ++i, buf += n_rates) {
     std::copy_n(buf, n_rates, values[i] + dimension);
   }
-}
-
-/// Stores scale times the rate of a force and torque on i as its direction; returns the squared
-/// norm of the unscaled rate in the metric of the drag, in which mobility times stiffness is
-/// symmetric.
-double OverdampedFlow::set_direction(int i, const Vec<3> &force_on, const Vec<3> &torque_on,
-                                     double scale)
-{
-  const Rate rate = mobility_times(i, force_on, torque_on);
-  store_rate(i, {scale * rate.shift, scale * rate.turn});
-  return dot(rate.shift, force_on) + dot(rate.turn, torque_on);
 }
 
 /// Sums stiffness times the direction over all bonds into the force arrays.
@@ -339,41 +354,72 @@ void OverdampedFlow::apply_stiffness()
   if (force->newton) comm->reverse_comm();
 }
 
+/// Force and torque on i without the components that are zero in the plane, and back.
+void OverdampedFlow::pack_force(int i, double *to) const
+{
+  to = std::copy_n(atom->f[i], dimension, to);
+  std::copy_n(atom->torque[i] + (dimension == 2 ? 2 : 0), n_rates - dimension, to);
+}
+
+void OverdampedFlow::unpack_force(int i, const double *from)
+{
+  std::copy_n(from, dimension, atom->f[i]);
+  std::copy_n(from + dimension, n_rates - dimension, atom->torque[i] + (dimension == 2 ? 2 : 0));
+}
+
 double OverdampedFlow::largest_rate()
 {
   const int nlocal = atom->nlocal;
+  const std::size_t size = static_cast<std::size_t>(n_rates) * nlocal;
   pair->particle_view().read_orientations(nlocal);
-  std::vector<double> saved;
-  double norm_sq_mine = 0.0;
+  std::vector<double> saved(size), now(size), before(size, 0.0);
   for (int i = 0; i < nlocal; ++i) {
-    saved.insert(saved.end(), atom->f[i], atom->f[i] + 3);
-    saved.insert(saved.end(), atom->torque[i], atom->torque[i] + 3);
-    Vec<3> force_on{}, torque_on{};
-    for (int k = 0; k < dimension; ++k) force_on[k] = hashed(atom->tag[i], k);
-    for (int k = dimension == 2 ? 2 : 0; k < 3; ++k) torque_on[k] = hashed(atom->tag[i], 3 + k);
-    norm_sq_mine += set_direction(i, force_on, torque_on, 1.0);
+    pack_force(i, &saved[n_rates * i]);
+    double start[6];
+    for (int k = 0; k < n_rates; ++k) start[k] = hashed(atom->tag[i], k);
+    unpack_force(i, start);
   }
 
-  double before = sum(norm_sq_mine), rate = 0.0;
-  for (int k = 0; k < POWER_ITERATIONS && before > 0.0; ++k) {
-    // Scaled to what the direction before was, its square being the eigenvalue's, the numbers stay
-    // of one size.
-    apply_stiffness();
-    norm_sq_mine = 0.0;
+  // Lanczos' method in the metric of the drag, in which mobility times stiffness is symmetric. Each
+  // direction is the rate of a force, `now`; what is left of the next one is in the force arrays.
+  std::vector<double> diagonal, off_diagonal;
+  for (int step = 0; step < LANCZOS_STEPS; ++step) {
+    double mine = 0.0;
     for (int i = 0; i < nlocal; ++i) {
-      norm_sq_mine +=
-          set_direction(i, vec3(atom->f[i]), vec3(atom->torque[i]), rate > 0.0 ? 1.0 / rate : 1.0);
+      const Rate rate = present_rate(i);
+      mine += dot(rate.shift, vec3(atom->f[i])) + dot(rate.turn, vec3(atom->torque[i]));
     }
-    const double after = sum(norm_sq_mine), ratio = std::sqrt(after / before);
-    before = rate > 0.0 ? after / (rate * rate) : after;
-    rate = std::max(rate, ratio);
+    const double length = std::sqrt(sum(mine));
+    if (step > 0) {
+      if (!(length > EXHAUSTED * diagonal[0])) break;
+      off_diagonal.push_back(length);
+    }
+    now.swap(before);
+    for (int i = 0; i < nlocal; ++i) {
+      const Rate rate = present_rate(i);
+      store_rate(i, {(1.0 / length) * rate.shift, (1.0 / length) * rate.turn});
+      pack_force(i, &now[n_rates * i]);
+      for (int k = 0; k < n_rates; ++k) now[n_rates * i + k] /= length;
+    }
+    apply_stiffness();
+    mine = 0.0;
+    for (int i = 0; i < nlocal; ++i) {
+      const Rate rate = stored_rate(i);
+      mine += dot(rate.shift, vec3(atom->f[i])) + dot(rate.turn, vec3(atom->torque[i]));
+    }
+    diagonal.push_back(sum(mine));
+    for (int i = 0; i < nlocal; ++i) {
+      double left[6];
+      pack_force(i, left);
+      for (int k = 0; k < n_rates; ++k) {
+        left[k] -= diagonal.back() * now[n_rates * i + k];
+        if (step > 0) left[k] -= length * before[n_rates * i + k];
+      }
+      unpack_force(i, left);
+    }
   }
-  const double *from = saved.data();
-  for (int i = 0; i < nlocal; ++i, from += 6) {
-    std::copy_n(from, 3, atom->f[i]);
-    std::copy_n(from + 3, 3, atom->torque[i]);
-  }
-  return rate;
+  for (int i = 0; i < nlocal; ++i) unpack_force(i, &saved[n_rates * i]);
+  return largest_eigenvalue(diagonal, off_diagonal);
 }
 
 double OverdampedFlow::dissipated_power() const

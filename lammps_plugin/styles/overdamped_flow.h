@@ -59,8 +59,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /* numbers about the flow */
 
   /// Largest relaxation rate: the largest eigenvalue of mobility times stiffness (the second
-  /// derivative of the energy without the prestress, which is smaller by the overlap), by power
-  /// iteration, from below. Kinks of the energy, where differences of forces blow up, do not enter.
+  /// derivative of the energy without the prestress, which is smaller by the overlap), by Lanczos'
+  /// method, from below. Kinks of the energy, where differences of forces blow up, do not enter.
   double largest_rate();
   /// Power that the drag takes: sum F^2/(k_d A) + tau^2/(k_d A I), over all ranks.
   double dissipated_power() const;
@@ -82,7 +82,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   int width() const { return dimension + n_rates + n_turns; }
   double memory_usage() const;
 
-  /* the direction of the power iteration, sent to ghosts */
+  /* the direction of the Lanczos iteration, sent to ghosts */
 
   int pack_direction(int n, const int *list, double *buf) const;
   void unpack_direction(int n, int first, const double *buf);
@@ -116,7 +116,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   void move(const Move &move, bool is_last);
   void clear_forces();
   double sum(double mine) const;
-  double set_direction(int i, const Vec<3> &force_on, const Vec<3> &torque_on, double scale);
+  void pack_force(int i, double *to) const;
+  void unpack_force(int i, const double *from);
   void apply_stiffness();
   void rebuild_lists();
 };

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -52,7 +53,8 @@ class Session:
     Notes
     -----
     Debian's LAMMPS has no C++ exceptions: an error in a command prints its sentence and ends the
-    process. Close what must survive before each call.
+    process. Close what must survive before each call. Without `screen`, its errors and warnings
+    still reach standard error, through a filter that outlives the process.
     """
 
     def __init__(
@@ -68,8 +70,13 @@ class Session:
             raise PluginError(msg) from error
         plugin = plugin_path()
         options = ["-nocite", "-log", str(log) if log else "none"]
+        self._complaints: subprocess.Popen[bytes] | None = None
         if not screen:
-            options += ["-screen", "none"]
+            self._complaints = subprocess.Popen(
+                ["sed", "-u", "-n", "-E", "/^(ERROR|WARNING)/p"], stdin=subprocess.PIPE, stdout=2
+            )
+            assert self._complaints.stdin is not None
+            options += ["-screen", f"/dev/fd/{self._complaints.stdin.fileno()}"]
         self.lmp: Any = lammps(cmdargs=[*options, *arguments])
         library = ctypes.CDLL(str(plugin))
         library.jamshape_register.argtypes = [ctypes.c_void_p]
@@ -89,6 +96,8 @@ class Session:
     def close(self) -> None:
         """End the instance."""
         self.lmp.close()
+        if self._complaints:
+            self._complaints.communicate()
 
     def commands(self, text: str) -> None:
         """Run LAMMPS input, one command a line."""
