@@ -22,6 +22,9 @@ namespace {
 /// Closer to the stability limit than this fraction of it, the fix warns.
 constexpr double NEAR_LIMIT = 0.9;
 
+/// The limit is estimated anew at the latest after this strain, in which contacts may form.
+constexpr double STRAIN_BETWEEN_CHECKS = 0.005;
+
 }  // namespace
 
 FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
@@ -165,7 +168,11 @@ void FixOverdampedAffine::check_stability(bigint step)
 {
   if (check_every == 0 || update->dt == 0.0) return;
   if (step < next_check) return;
-  next_check = step + check_every;
+  const double strain_a_step = std::abs(box->state().rate) * update->dt;
+  const double until_strained = std::ceil(STRAIN_BETWEEN_CHECKS / strain_a_step);
+  next_check = step + (until_strained < static_cast<double>(check_every)
+                           ? static_cast<bigint>(until_strained)
+                           : check_every);
   largest_rate = flow->largest_rate();
   const double limit = largest_stable_dt();
   if (update->dt <= NEAR_LIMIT * limit) {

@@ -15,7 +15,7 @@ import numpy as np
 from jamshape.jamming import fit_onset
 from jamshape.lammps_files import write_data
 from jamshape.packing import Box, Packing, angle_from_quaternion
-from jamshape.storage import RunWriter, read_attributes, read_observables
+from jamshape.storage import RunWriter, read_attributes, read_observables, read_series
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -275,14 +275,21 @@ def record(run: CompressionRun, to: Recording) -> Iterator[Sample]:
     every = max(1, whole // to.rows)
     per_frame = every * max(1, to.rows // to.frames)
     run.keep_restarts(per_frame, to.restart_prefix)
-    for sample in run.samples(every):
+
+    def keep(sample: Sample) -> Sample:
         if sample.step % per_frame == 0 or sample.step == run.last_step:
             writer.append(run.packing(), sample.observables)
         else:
             writer.append_observables(sample.step, sample.time, sample.observables)
         error = sample.observables["step_error"]
         writer.append_report(sample.step, sample.wall_seconds, error)
-        yield sample
+        return sample
+
+    # A restart file is older than the row of its step, which a kill may have cut off.
+    if run.session.step > read_series(to.path, "p").step[-1]:
+        yield keep(run.sample())
+    for sample in run.samples(every):
+        yield keep(sample)
     writer.set_attributes({"finished": True})
 
 

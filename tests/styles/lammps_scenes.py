@@ -347,12 +347,12 @@ def compressed(packing, phi, speed=0.03, dt=0.1):
     with tempfile.TemporaryDirectory() as folder, loaded(packing, folder, sides="two") as session:
         session.commands(f"timestep {dt}")
         reached = packing.phi
-        while reached < 0.999 * phi:
-            kappa = speed / session.lmp.extract_box()[1][0]
-            goal = min(phi, 1.3 * reached)
+        while reached < phi * (1 - 1e-9):
+            strain = np.log(min(phi / reached, 1.3)) / packing.dimension
+            steps = np.ceil(strain * session.lmp.extract_box()[1][0] / (speed * dt))
             session.commands(f"""
-                fix compress all overdamped/affine drag 1.0 compress {kappa}
-                run {round(np.log(goal / reached) / (packing.dimension * kappa * dt))} post no
+                fix compress all overdamped/affine drag 1.0 compress {strain / (steps * dt)}
+                run {steps:.0f} post no
                 unfix compress""")
             reached = state_of(session).packing.phi
         return state_of(session).packing

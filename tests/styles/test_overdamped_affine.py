@@ -533,12 +533,13 @@ def test_estimated_rate_is_the_largest_eigenvalue(dimension, alpha, tmp_path, me
         np.testing.assert_allclose(limit * rate, 2.0, rtol=1e-14)
     measured(bonds=min(of_bonds) - 1, bonds_max=max(of_bonds) - 1,
              differences=min(of_differences) - 1, differences_max=max(of_differences) - 1)  # fmt: skip
-    # The power iteration comes from below.
-    assert min(of_bonds) > 0.95
-    assert max(of_bonds) < 1 + 1e-9
-    # With the prestress, and with kinks: nearly parallel rods next to one have rates without bound.
+    assert min(of_bonds) > 1 - 1e-10
+    assert max(of_bonds) < 1 + 1e-10
+    # With the prestress, and with kinks, next to which nearly parallel rods have rates without
+    # bound; in space, where these are smoothed, they are all over long rods.
     assert max(of_differences) < 1.02
-    assert sorted(of_differences)[2] > 0.97
+    if dimension == 2 or alpha < 1:
+        assert sorted(of_differences)[2] > 0.97
 
 
 @pytest.mark.parametrize("sides", SIDES)

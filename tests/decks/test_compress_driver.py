@@ -1,0 +1,109 @@
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jamshape.storage import read_attributes, read_observables, read_packing, read_report
+
+pytestmark = pytest.mark.lammps
+
+DRIVER = Path(__file__).parents[2] / "pyscripts" / "compress.py"
+SMALL = ("--n", "48", "--kappa", "3e-4", "--dt", "0.1", "--phi-end", "0.86", "--rows", "60")
+
+# Counted, or last estimated, since the process began: not properties of the state.
+OF_THE_PROCESS = {"evaluations", "lambda_max", "dt_max", "step_error"}
+
+
+def command(out, *options):
+    return [sys.executable, str(DRIVER), *SMALL, "--out", str(out), *options]
+
+
+def run(out, *options):
+    return subprocess.run(command(out, *options), capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    out = tmp_path_factory.mktemp("driver") / "whole.h5"
+    finished = run(out)
+    assert finished.returncode == 0, finished.stderr
+    return out, json.loads(finished.stdout.splitlines()[-1])
+
+
+def test_a_run_reaches_its_end_and_reports_it(whole):
+    out, report = whole
+    assert report["phi"] == pytest.approx(0.86, abs=1e-4)
+    assert read_packing(out).phi == pytest.approx(report["phi"], rel=1e-12)
+    observables, history = read_observables(out), read_report(out)
+    assert 60 <= len(observables["p"]) <= 63
+    assert np.all(np.diff(observables["phi"]) > 0)
+    assert np.all(np.diff(history.wall_seconds) > 0)
+    assert read_attributes(out)["finished"]
+
+
+def test_a_killed_run_goes_on_as_if_nothing_had_happened(whole, tmp_path):
+    out = tmp_path / "killed.h5"
+    with subprocess.Popen(
+        command(out), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+    ) as going:
+        deadline = time.monotonic() + 60
+        while not Path(f"{out}.restart.b").exists() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        going.send_signal(signal.SIGKILL)
+    assert not read_attributes(out)["finished"]
+    resumed = run(out, "--resume")
+    assert resumed.returncode == 0, resumed.stderr
+    for name, values in read_observables(whole[0]).items():
+        if name in OF_THE_PROCESS:
+            continue
+        np.testing.assert_allclose(read_observables(out)[name], values, rtol=1e-9, atol=1e-10)
+    one, other = read_packing(whole[0]), read_packing(out)
+    np.testing.assert_allclose(other.position, one.position, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(other.orientation, one.orientation, rtol=0, atol=1e-10)
+
+
+def test_a_finished_run_is_left_alone(whole):
+    out, report = whole
+    before = out.read_bytes()
+    again = run(out, "--resume")
+    assert again.returncode == 0
+    assert json.loads(again.stdout.splitlines()[-1]) == report
+    assert out.read_bytes() == before
+
+
+def test_a_step_past_the_stability_limit_fails_with_a_sentence_and_a_readable_file(tmp_path):
+    out = tmp_path / "unstable.h5"
+    failed = run(out, "--dt", "1.7", "--kappa", "2e-3", "--phi-end", "0.95", "--rows", "20")
+    assert failed.returncode != 0
+    sentences = [line for line in failed.stderr.split("\n") if "ERROR" in line]
+    assert len(sentences) == 1
+    assert "use a " in sentences[0]
+    assert "timestep" in sentences[0]
+    assert len(read_observables(out)["p"]) >= 1
+    assert np.all(np.isfinite(read_packing(out).position))
+    assert not read_attributes(out)["finished"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--alpha", "-1"), "alpha is -1.0"),
+        (("--kappa", "nan"), "kappa is nan"),
+        (("--phi-start", "0.7"), "stalled at phi"),
+        (("--sides", "3"), "sides is 3"),
+        (("--n", "0"), "0"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path):
+    out = tmp_path / "none.h5"
+    failed = run(out, *options)
+    assert failed.returncode == 1
+    assert failed.stderr.startswith("compress.py: ")
+    assert len(failed.stderr.strip().splitlines()) == 1
+    assert words in failed.stderr
+    assert not out.exists()
