@@ -198,7 +198,7 @@ template <class Model> class PairContactOf : public PairContact {
     const std::vector<Vec<3>> semi_axes = particles.semi_axes(n_all());
     require_same_bounds(semi_axes);
     std::vector<Body<D>> &bodies = all<D>().now;
-    bodies.resize(semi_axes.size());
+    resize_closely(bodies, semi_axes.size());
     for (std::size_t i = 0; i < semi_axes.size(); ++i) {
       bodies[i] = Model::template body<D>(*Model::shape_from(semi_axes[i]));
     }
@@ -232,7 +232,7 @@ template <class Model> class PairContactOf : public PairContact {
       }
       first.push_back(static_cast<int>(partner.size()));
     }
-    bodies.then.resize(bodies.now.size());
+    resize_closely(bodies.then, bodies.now.size());
     for (std::size_t i = 0; i < bodies.now.size(); ++i) {
       bodies.then[i] = {bodies.now[i].centre, bodies.now[i].axis};
     }

@@ -3,6 +3,7 @@
 #include "atom.h"
 #include "error.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <numeric>
 
@@ -41,7 +42,7 @@ int *ParticleView::first_indices(int n)
 
 void ParticleView::read_orientations(int n)
 {
-  orientations.resize(static_cast<std::size_t>(PER_ORIENTATION) * n);
+  resize_closely(orientations, static_cast<std::size_t>(PER_ORIENTATION) * n);
   if (n) ellipsoids()->pack_comm_bonus(n, first_indices(n), orientations.data());
 }
 
@@ -53,12 +54,16 @@ Quaternion ParticleView::orientation(int i) const
 
 std::vector<Vec<3>> ParticleView::semi_axes(int n)
 {
-  std::vector<double> packed(static_cast<std::size_t>(PER_SHAPE) * n);
-  if (n) ellipsoids()->pack_border_bonus(n, first_indices(n), packed.data());
   std::vector<Vec<3>> axes(n);
-  for (int i = 0; i < n; ++i) {
-    const double *shape = &packed[static_cast<std::size_t>(PER_SHAPE) * i] + 1;
-    axes[i] = {{shape[0], shape[1], shape[2]}};
+  int *const index = first_indices(n);
+  double packed[PER_SHAPE * BLOCK];  // of some at a time: all would be most of the memory at work
+  for (int begin = 0; begin < n; begin += BLOCK) {
+    const int size = std::min(BLOCK, n - begin);
+    ellipsoids()->pack_border_bonus(size, index + begin, packed);
+    for (int k = 0; k < size; ++k) {
+      const double *shape = packed + PER_SHAPE * k + 1;
+      axes[begin + k] = {{shape[0], shape[1], shape[2]}};
+    }
   }
   return axes;
 }

@@ -6,10 +6,18 @@
 #include "compat.h"
 #include "pointers.h"
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
 namespace jamshape {
+
+/// Resizes without the doubling that resize() grows by: numbers of ghosts vary by little.
+template <class T> void resize_closely(std::vector<T> &values, std::size_t n)
+{
+  if (values.capacity() < n) values.reserve(n + n / 16);
+  values.resize(n);
+}
 
 /// The only reader and writer of how LAMMPS stores ellipsoids: orientations and semi-axes of own
 /// and ghost atoms, gathered into plain arrays.
@@ -34,7 +42,7 @@ class ParticleView : protected LAMMPS_NS::Pointers {
   double memory_usage() const;
 
  private:
-  static constexpr int PER_ORIENTATION = 4, PER_SHAPE = 8;
+  static constexpr int PER_ORIENTATION = 4, PER_SHAPE = 8, BLOCK = 256;
 
   std::vector<int> indices;
   std::vector<double> orientations;
