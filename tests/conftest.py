@@ -21,7 +21,7 @@ def measured(request):
 
 def pytest_terminal_summary(terminalreporter, config):
     if config.get_verbosity() > 0 and config.stash.get(MEASURED, {}):
-        terminalreporter.section("measured in tests/contact")
+        terminalreporter.section("measured")
         for name, numbers in config.stash[MEASURED].items():
             values = "  ".join(f"{key} {value:.3g}" for key, value in numbers.items())
             terminalreporter.write_line(f"{name}: {values}")
