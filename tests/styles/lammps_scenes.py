@@ -437,3 +437,8 @@ def dense_mixture(dimension=2, n=48, phi=0.95, seed=1, kick=0.05):
     half_length = radius * rng.uniform(0, 5, n) * (np.arange(n) % 3 > 0)
     start = scattered(half_length, radius, 1 + np.arange(n) % 2, dimension, rng)
     return wrapped(on_grid(kicked(compressed(start, phi), kick, seed)))
+
+
+def tiny_box():
+    """Two rods that touch their own images and several images of each other."""
+    return rods([[0.0, 0.0], [0.25, 1.0]], [0.0, 0.02], 1.5, [0.6, 0.5], [4.0, 2.0])

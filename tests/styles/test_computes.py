@@ -19,6 +19,7 @@ from lammps_scenes import (
     run_lmp_well,
     scene,
     state_of,
+    tiny_box,
     with_odd_ids,
 )
 
@@ -49,11 +50,6 @@ COLUMNS = [
     "sidei",
     "sidej",
 ]
-
-
-def tiny_box():
-    """Two rods that touch their own images and several images of each other."""
-    return rods([[0.0, 0.0], [0.25, 1.0]], [0.0, 0.02], 1.5, [0.6, 0.5], [4.0, 2.0])
 
 
 SCENES = {

@@ -32,6 +32,7 @@ from lammps_scenes import (
     run_lmp_well,
     state_of,
     states_from_dump,
+    tiny_box,
     turned,
     with_odd_ids,
 )
@@ -52,11 +53,6 @@ THERMO = """
     thermo_modify norm no format float %.17g"""
 
 # --- scenes --------------------------------------------------------------------------------------
-
-
-def tiny_box():
-    """Two rods that touch their own images and several images of each other."""
-    return rods([[0.0, 0.0], [0.25, 1.0]], [0.0, 0.02], 1.5, [0.6, 0.5], [4.0, 2.0])
 
 
 def lone_rod():
