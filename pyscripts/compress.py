@@ -16,6 +16,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from jamshape.initial import Mixture, random_packing
+from jamshape.packing import Packing
 from jamshape.protocols import Compression, Recording, begin, is_finished, record, resume, summary
 from jamshape.session import Session
 
@@ -46,19 +47,21 @@ def parse() -> argparse.Namespace:
     return parser.parse_args()
 
 
+def fresh(options: argparse.Namespace) -> tuple[Compression, Packing, Recording]:
+    """Make settings and initial state, before LAMMPS is started."""
+    settings = Compression(options.kappa, options.phi_end, options.dt, options.sides)
+    mixture = Mixture.bidisperse(options.alpha, options.size_ratio)
+    start = random_packing(options.n, options.phi_start, options.seed, mixture)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    made_from = {key: getattr(options, key) for key in ("alpha", "n", "seed", "size_ratio")}
+    return settings, start, Recording(options.out, options.rows, options.frames, made_from)
+
+
 def compress(options: argparse.Namespace) -> None:
     """Run, or go on."""
+    new = None if options.resume and options.out.exists() else fresh(options)
     with Session() as session:
-        if options.resume and options.out.exists():
-            run, to = resume(session, options.out)
-        else:
-            settings = Compression(options.kappa, options.phi_end, options.dt, options.sides)
-            mixture = Mixture.bidisperse(options.alpha, options.size_ratio)
-            start = random_packing(options.n, options.phi_start, options.seed, mixture)
-            options.out.parent.mkdir(parents=True, exist_ok=True)
-            made_from = {key: getattr(options, key) for key in ("alpha", "n", "seed", "size_ratio")}
-            to = Recording(options.out, options.rows, options.frames, made_from)
-            run = begin(session, settings, start, to)
+        run, to = (begin(session, *new), new[2]) if new else resume(session, options.out)
         with tqdm(total=run.last_step, initial=session.step, unit="step", mininterval=1) as bar:
             for sample in record(run, to):
                 bar.set_postfix_str(f"phi {sample.observables['phi']:.4f}", refresh=False)
