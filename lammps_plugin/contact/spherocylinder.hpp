@@ -170,10 +170,11 @@ template <int D> ContactKind kind_of(const SpinePair<D> &p, const Feet<D> &feet)
 /// the spines (Marschall & Teitel 2018, Eqs. 3, 5, 22), and with Sides::TWO a second bond at the
 /// far end of the overlap of the spines (Fig. 6), faded in by `second_bond_weight`:
 ///     V = V_a + w V_b.
-/// Force and torques are its exact derivatives. Only kinks of relative size of the angle between
-/// the rods are left, where the nearer tip changes. Exactly parallel rods with Sides::ONE sit on
-/// such a kink: the lever arm is the middle of the overlap of the spines, which lies between both
-/// sides' and is the same for i, j exchanged.
+/// Force and torques are its exact derivatives. What is left are kinks: where the nearer tip
+/// changes, of relative size of the angle between the rods; where the two bonds change places while
+/// w < 1, of size 1 - w; and in 3D, for twisted rods, of full strength. Exactly parallel rods with
+/// Sides::ONE sit on such a kink: the lever arm is the middle of the overlap of the spines, which
+/// lies between both sides' and is the same for i, j exchanged.
 template <int D> class SpherocylinderContact {
  public:
   SpherocylinderContact(const SpherocylinderBody<D> &i, const SpherocylinderBody<D> &j,

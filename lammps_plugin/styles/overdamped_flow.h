@@ -59,8 +59,9 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /* numbers about the flow */
 
   /// Largest relaxation rate: the largest eigenvalue of mobility times stiffness (the second
-  /// derivative of the energy without the prestress, which is smaller by the overlap), by Lanczos'
-  /// method, from below. Kinks of the energy, where differences of forces blow up, do not enter.
+  /// derivative of the energy without the prestress), by Lanczos' method, from below. Kinks of the
+  /// energy, where differences of forces blow up, do not enter. The prestress is smaller by the
+  /// overlap, but for long nearly parallel rods in 3D, whose true rate may be twice this one.
   double largest_rate();
   /// Power that the drag takes: sum F^2/(k_d A) + tau^2/(k_d A I), over all ranks.
   double dissipated_power() const;

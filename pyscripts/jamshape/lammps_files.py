@@ -34,10 +34,6 @@ _POSITION = ("x", "y", "z")
 _IMAGE = ("ix", "iy", "iz")
 _QUATERNION = ("quatw", "quati", "quatj", "quatk")
 _DIAMETERS = ("shapex", "shapey", "shapez")
-_COMPUTE_COLUMNS = {
-    **{f"c_orient[{k + 1}]": name for k, name in enumerate((*_QUATERNION[1:], _QUATERNION[0]))},
-    **{f"c_shape[{k + 1}]": name for k, name in enumerate(_DIAMETERS)},
-}
 _DUMP_COLUMNS = ("id", "type", *_POSITION, *_QUATERNION, *_DIAMETERS)
 _ATOMS = ("id", "type", "ellipsoidflag", "density", *_POSITION)
 _ELLIPSOIDS = ("id", *_DIAMETERS, *_QUATERNION)
@@ -127,8 +123,7 @@ def iter_dump(path: PathLike, dimension: int | None = None) -> Iterator[Packing]
         Of ``dump custom`` with the columns ``id type x y z quatw quati quatj quatk shapex shapey
         shapez`` in any order, ``ix iy iz`` if wanted, and others, which are ignored. Quaternions
         and shapes may come from a compute of their name, ``compute quatw all property/atom
-        quatw`` and the column ``c_quatw``, and so on, or from the computes ``orient`` (quati quatj
-        quatk quatw) and ``shape``, whose columns OVITO knows too.
+        quatw`` and the column ``c_quatw``, and so on.
     dimension : {2, 3, None}
         As in `read_data`.
 
@@ -342,8 +337,6 @@ def _dump_frame(title: str, lines: TextIO) -> _Frame:
 
 def _plain_name(column: str) -> str:
     """`quatw` for `c_quatw`, the only name that a LAMMPS before ``dump_modify colname`` can give."""
-    if column in _COMPUTE_COLUMNS:
-        return _COMPUTE_COLUMNS[column]
     name = column[2:] if column[:2] in {"c_", "f_", "v_"} else column
     return name if name in (*_QUATERNION, *_DIAMETERS) else column
 
