@@ -19,6 +19,8 @@ template <typename T>
 using Array1 = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 template <typename T>
 using Array2 = nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+template <typename T>
+using Array3 = nb::ndarray<const T, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 /// A NumPy array under construction: filled with zeros, handed over to Python once.
 template <typename T> class NewArray {
@@ -57,9 +59,9 @@ template <int D> Vec<D> read_vec(const double *from)
   return v;
 }
 
-template <int D> void write_vec(const Vec<D> &v, double *to)
+template <int D, class S> void write_vec(const Vec<D, S> &v, double *to)
 {
-  for (int k = 0; k < D; ++k) to[k] = v[k];
+  for (int k = 0; k < D; ++k) to[k] = static_cast<double>(v[k]);
 }
 
 inline void require(bool condition, const std::string &sentence)

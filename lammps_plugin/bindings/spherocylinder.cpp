@@ -1,6 +1,7 @@
 #include "contact/spherocylinder.hpp"
 
 #include "bindings/arrays.hpp"
+#include "bindings/pairs.hpp"
 
 namespace jamshape {
 
@@ -80,15 +81,39 @@ nb::dict contacts(const Bodies &bodies_i, const Bodies &bodies_j, const Spherocy
   return result;
 }
 
+SpherocylinderLaw law_of(double k_e, int sides)
+{
+  require(sides == 1 || sides == 2, "sides is " + std::to_string(sides) + ", expected 1 or 2.");
+  require(k_e > 0.0, "k_e is " + std::to_string(k_e) + ", expected a positive energy.");
+  return SpherocylinderModel::law(static_cast<Sides>(sides), k_e);
+}
+
 nb::dict spherocylinder_contacts(const Bodies &bodies_i, const Bodies &bodies_j, double k_e,
                                  int sides)
 {
   require_same_shape(bodies_i, bodies_j);
-  require(sides == 1 || sides == 2, "sides is " + std::to_string(sides) + ", expected 1 or 2.");
-  require(k_e > 0.0, "k_e is " + std::to_string(k_e) + ", expected a positive energy.");
-  const SpherocylinderLaw law{{k_e}, static_cast<Sides>(sides)};
+  const SpherocylinderLaw law = law_of(k_e, sides);
   return dimension_of(bodies_i) == 2 ? contacts<2>(bodies_i, bodies_j, law)
                                      : contacts<3>(bodies_i, bodies_j, law);
+}
+
+nb::dict spherocylinder_sums(const Array2<double> &diameters, const Array3<double> &position,
+                             const Array3<double> &orientation, const Array2<double> &edges,
+                             const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
+                             double k_e, int sides, bool extended)
+{
+  return pair_sums<SpherocylinderModel>({diameters, position, orientation, edges, pairs, shift},
+                                        law_of(k_e, sides), extended);
+}
+
+nb::dict spherocylinder_derivatives(const Array2<double> &diameters, const Array3<double> &position,
+                                    const Array3<double> &orientation, const Array2<double> &edges,
+                                    const Array2<std::int64_t> &pairs,
+                                    const Array2<std::int64_t> &shift, double k_e, int sides,
+                                    bool extended)
+{
+  return pair_derivatives<SpherocylinderModel>(
+      {diameters, position, orientation, edges, pairs, shift}, law_of(k_e, sides), extended);
 }
 
 template <int D>
@@ -142,6 +167,23 @@ void export_spherocylinder(nb::module_ &m)
       "radius. Returns a dict of arrays: status (0 apart, 1 touching, 2 crossing), kind, n_bonds,\n"
       "energy, force (on i), torque_i, torque_j and, of up to two bonds, bond_normal (into i),\n"
       "bond_force, bond_arm_i, bond_distance, bond_energy, bond_on_side_i, bond_on_side_j.");
+  m.def(
+      "spherocylinder_sums", &spherocylinder_sums, "diameters"_a, "position"_a, "orientation"_a,
+      "edges"_a, "pairs"_a, "shift"_a, "k_e"_a, "sides"_a, "extended"_a,
+      "Sums over M pairs of N particles. Diameters (N, 3); position (2, N, D), orientation (2, N, 1)\n"
+      "angles or (2, N, 4) quaternions and edges (2, D) as a double and its small rest; pairs\n"
+      "(M, 2), shift (M, D) box edges to add to the second; extended: in long double. Returns a\n"
+      "dict: energy, force (N, D), torque (N, 1 or 3), virial (D, D), bond_force (sum of\n"
+      "magnitudes), n_bonds, crossing (a pair that cannot be computed, or -1).");
+  m.def(
+      "spherocylinder_derivatives", &spherocylinder_derivatives, "diameters"_a, "position"_a,
+      "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "k_e"_a, "sides"_a, "extended"_a,
+      "Second derivatives of the C touching pairs, arguments as in spherocylinder_sums. The\n"
+      "variables are r_i - r_j and the rotations of i and j, n = 4 in 2D, 9 in 3D. Returns a dict:\n"
+      "pair (C,) rows of pairs; n_bonds, kind, energy (C,); separation, force (C, D); of up to two\n"
+      "bonds stiffness, distance, bond_force (C, 2), on_side (C, 2, 2) and gradient (C, 2, n) of the\n"
+      "distance;\n"
+      "curvature (C, n, n), all but stiffness gradient (x) gradient.");
   m.def("spine_distances", &spine_distances, "bodies_i"_a, "bodies_j"_a,
         "Shortest distances (M,) of the spines of M pairs, 0 where they cross.");
   m.def("spherocylinder_drag", &spherocylinder_drag, "half_length"_a, "radius"_a, "dimension"_a,

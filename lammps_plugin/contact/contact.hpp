@@ -13,29 +13,31 @@ enum class ContactStatus { APART, TOUCHING, CROSSING };
 enum class ContactKind { TIP_TO_TIP = 0, TIP_TO_SIDE = 1, SIDE_TO_SIDE = 2 };
 
 /// One point of contact that carries one force. Vectors are in space coordinates.
-template <int D> struct Bond {
-  Vec<D> normal;     // unit, into i
-  Vec<D> force;      // on i; j carries the opposite
-  Vec<D> arm_i;      // from the centre of i to the point of contact
-  double distance;   // the r of the overlap 1 - r/d
-  double reach;      // the d of it
-  double energy;     // this bond's share of the contact's energy
-  double stiffness;  // its second derivative with respect to the distance
+template <int D, class S = double> struct Bond {
+  Vec<D, S> normal;     // unit, into i
+  Vec<D, S> force;      // on i; j carries the opposite
+  Vec<D, S> arm_i;      // from the centre of i to the point of contact
+  Torque<D, S> lever_i;  // derivative of the distance by a rotation of i
+  Torque<D, S> lever_j;  // and of j
+  S distance;   // the r of the overlap 1 - r/d
+  S reach;      // the d of it
+  S energy;     // this bond's share of the contact's energy
+  S stiffness;  // its second derivative with respect to the distance
   bool on_side_i;    // the foot lies strictly inside the flat part of i
   bool on_side_j;
 };
 
 /// Energy of one pair with its exact derivatives: force on i (j carries the opposite) and the
 /// torques about the two centres. At most two bonds.
-template <int D> struct Contact {
+template <int D, class S = double> struct Contact {
   ContactStatus status;
   ContactKind kind;
   int n_bonds;
-  Bond<D> bond[2];
-  double energy;
-  Vec<D> force;
-  Torque<D> torque_i;
-  Torque<D> torque_j;
+  Bond<D, S> bond[2];
+  S energy;
+  Vec<D, S> force;
+  Torque<D, S> torque_i;
+  Torque<D, S> torque_j;
 };
 
 /// What the drag on the substrate needs of a particle (Marschall & Teitel 2018, Eqs. 8-12): its

@@ -7,9 +7,9 @@ namespace jamshape {
 struct Harmonic {
   double k_e;
 
-  double energy(double overlap) const { return 0.5 * k_e * overlap * overlap; }
-  double energy_gradient(double overlap) const { return k_e * overlap; }
-  double energy_hessian(double) const { return k_e; }
+  template <class S> S energy(const S &overlap) const { return 0.5 * k_e * overlap * overlap; }
+  template <class S> S energy_gradient(const S &overlap) const { return k_e * overlap; }
+  template <class S> S energy_hessian(const S &) const { return k_e; }
 };
 
 }  // namespace jamshape

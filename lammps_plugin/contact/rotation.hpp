@@ -7,25 +7,27 @@
 namespace jamshape {
 
 /// Unit quaternion, w first as in LAMMPS; turns body coordinates into space coordinates.
-struct Quaternion {
-  double w, i, j, k;
+template <class S> struct QuaternionOf {
+  S w, i, j, k;
 };
+using Quaternion = QuaternionOf<double>;
 
-inline Quaternion operator*(const Quaternion &p, const Quaternion &q)
+template <class S>
+QuaternionOf<S> operator*(const QuaternionOf<S> &p, const QuaternionOf<S> &q)
 {
   return {
       p.w * q.w - p.i * q.i - p.j * q.j - p.k * q.k, p.w * q.i + p.i * q.w + p.j * q.k - p.k * q.j,
       p.w * q.j - p.i * q.k + p.j * q.w + p.k * q.i, p.w * q.k + p.i * q.j - p.j * q.i + p.k * q.w};
 }
 
-inline Quaternion normalized(const Quaternion &q)
+template <class S> QuaternionOf<S> normalized(const QuaternionOf<S> &q)
 {
-  const double inverse = 1.0 / std::sqrt(q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k);
+  const S inverse = 1.0 / sqrt(q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k);
   return {inverse * q.w, inverse * q.i, inverse * q.j, inverse * q.k};
 }
 
 /// Body axis `b` (0, 1, 2 for x, y, z) in space coordinates.
-inline Vec<3> body_axis(const Quaternion &q, int b)
+template <class S> Vec<3, S> body_axis(const QuaternionOf<S> &q, int b)
 {
   switch (b) {
     case 0:
@@ -41,12 +43,14 @@ inline Vec<3> body_axis(const Quaternion &q, int b)
 }
 
 /// The long axis of a particle: the body's x. In 2D the quaternion is a rotation about z only.
-template <int D> Vec<D> long_axis(const Quaternion &q);
-template <> inline Vec<2> long_axis<2>(const Quaternion &q)
+template <int D, class S> Vec<D, S> long_axis(const QuaternionOf<S> &q)
 {
-  return {{(q.w - q.k) * (q.w + q.k), 2.0 * q.w * q.k}};
+  if constexpr (D == 2) {
+    return {{(q.w - q.k) * (q.w + q.k), 2.0 * q.w * q.k}};
+  } else {
+    return body_axis(q, 0);
+  }
 }
-template <> inline Vec<3> long_axis<3>(const Quaternion &q) { return body_axis(q, 0); }
 
 struct CosSin {
   double cosine, sine;

@@ -9,48 +9,51 @@ namespace jamshape {
 
 /// Two spines (segments) in relative coordinates: r = centre of i - centre of j; u unit vectors,
 /// A half lengths. Only differences of positions enter, so no digits are lost far from the origin.
-template <int D> struct SpinePair {
-  Vec<D> r;
-  Vec<D> u_i;
+template <int D, class S = double> struct SpinePair {
+  Vec<D, S> r;
+  Vec<D, S> u_i;
   double A_i;
-  Vec<D> u_j;
+  Vec<D, S> u_j;
   double A_j;
 };
 
 /// A point on each spine, s along u_i from the centre of i and t along u_j from the centre of j,
 /// and the vector from the point on j to the point on i.
-template <int D> struct Feet {
-  double s, t;
-  Vec<D> delta;
-  double distance_sq;
+template <int D, class S = double> struct Feet {
+  S s, t;
+  Vec<D, S> delta;
+  S distance_sq;
 };
 
-template <int D> Feet<D> feet_at(const SpinePair<D> &p, double s, double t)
+template <int D, class S> Feet<D, S> feet_at(const SpinePair<D, S> &p, const S &s, const S &t)
 {
-  const Vec<D> delta = p.r + s * p.u_i - t * p.u_j;
+  const Vec<D, S> delta = p.r + s * p.u_i - t * p.u_j;
   return {s, t, delta, norm_sq(delta)};
 }
 
 /// `x` limited to [-bound, bound], in the two instructions that std::clamp does not become.
-inline double limited(double x, double bound) { return std::min(std::max(x, -bound), bound); }
+template <class S> S limited(const S &x, double bound)
+{
+  return std::min<S>(bound, std::max<S>(-bound, x));
+}
 
 /// Foot on spine j of the point s of spine i, and the reverse.
-template <int D> double foot_on_j(const SpinePair<D> &p, double s)
+template <int D, class S> S foot_on_j(const SpinePair<D, S> &p, const S &s)
 {
   return limited(dot(p.u_j, p.r + s * p.u_i), p.A_j);
 }
 
-template <int D> double foot_on_i(const SpinePair<D> &p, double t)
+template <int D, class S> S foot_on_i(const SpinePair<D, S> &p, const S &t)
 {
   return limited(dot(p.u_i, t * p.u_j - p.r), p.A_i);
 }
 
 /// The four tips with their feet on the other spine: tips +, - of i, then +, - of j. Kept as
 /// numbers in arrays: `nearest` is all that is asked of most pairs.
-template <int D> struct TipFeet {
-  double s[4], t[4], distance_sq[4];
+template <int D, class S> struct TipFeet {
+  S s[4], t[4], distance_sq[4];
 
-  explicit TipFeet(const SpinePair<D> &p)
+  explicit TipFeet(const SpinePair<D, S> &p)
   {
     for (int k = 0; k < 2; ++k) {
       const double sign = k == 0 ? 1.0 : -1.0;
@@ -74,14 +77,14 @@ template <int D> struct TipFeet {
 /// share a tip, the one whose other foot lies inside the spine is: its distance is the least from
 /// that tip. Rounded distances cannot tell that of feet within 1e-8 of each other, and would leave
 /// normal and lever arms with half of the digits.
-template <int D> bool is_closer(const SpinePair<D> &p, const Feet<D> &a, const Feet<D> &b)
+template <int D, class S> bool is_closer(const SpinePair<D, S> &p, const Feet<D, S> &a, const Feet<D, S> &b)
 {
   if (a.s == b.s) {
-    const bool a_inside = std::abs(a.t) < p.A_j, b_inside = std::abs(b.t) < p.A_j;
+    const bool a_inside = abs(a.t) < p.A_j, b_inside = abs(b.t) < p.A_j;
     if (a_inside != b_inside) return a_inside;
   }
   if (a.t == b.t) {
-    const bool a_inside = std::abs(a.s) < p.A_i, b_inside = std::abs(b.s) < p.A_i;
+    const bool a_inside = abs(a.s) < p.A_i, b_inside = abs(b.s) < p.A_i;
     if (a_inside != b_inside) return a_inside;
   }
   return a.distance_sq < b.distance_sq;
@@ -90,15 +93,15 @@ template <int D> bool is_closer(const SpinePair<D> &p, const Feet<D> &a, const F
 /// The closest approach at either end of the pair: at end e = +, - the shorter of (tip e of i to
 /// spine j) and (tip of j at the same end to spine i), the spines aligned by the sign of u_i.u_j.
 /// For nearly parallel rods these are the two ends of the overlap of the spines.
-template <int D> struct EndFeet {
-  Feet<D> plus, minus;
+template <int D, class S> struct EndFeet {
+  Feet<D, S> plus, minus;
 
-  explicit EndFeet(const SpinePair<D> &p)
+  explicit EndFeet(const SpinePair<D, S> &p)
   {
-    const TipFeet<D> tips(p);
+    const TipFeet<D, S> tips(p);
     const int j_plus = dot(p.u_i, p.u_j) < 0.0 ? 3 : 2, j_minus = 5 - j_plus;
     const auto feet = [&](int k) { return feet_at(p, tips.s[k], tips.t[k]); };
-    const auto closer = [&](const Feet<D> &a, const Feet<D> &b) {
+    const auto closer = [&](const Feet<D, S> &a, const Feet<D, S> &b) {
       return is_closer(p, b, a) ? b : a;
     };
     plus = closer(feet(0), feet(j_plus));
@@ -106,16 +109,16 @@ template <int D> struct EndFeet {
     minus_is_nearer = is_closer(p, minus, plus);
   }
 
-  const Feet<D> &nearer() const { return minus_is_nearer ? minus : plus; }
-  const Feet<D> &farther() const { return minus_is_nearer ? plus : minus; }
+  const Feet<D, S> &nearer() const { return minus_is_nearer ? minus : plus; }
+  const Feet<D, S> &farther() const { return minus_is_nearer ? plus : minus; }
 
   /// Distance between the two ends, the mean over both spines. The mean, not the value on one
   /// spine: it does not change when i and j are exchanged, nor when the nearer tip of an end
   /// changes.
-  double spread() const { return 0.5 * (std::abs(plus.s - minus.s) + std::abs(plus.t - minus.t)); }
+  S spread() const { return 0.5 * (abs(plus.s - minus.s) + abs(plus.t - minus.t)); }
 
   /// The middle between the two ends, on both spines.
-  Feet<D> middle(const SpinePair<D> &p) const
+  Feet<D, S> middle(const SpinePair<D, S> &p) const
   {
     return feet_at(p, 0.5 * (plus.s + minus.s), 0.5 * (plus.t + minus.t));
   }
@@ -125,30 +128,46 @@ template <int D> struct EndFeet {
 };
 
 /// The closest points from a point t close to that on spine j: they are each other's feet.
-template <int D> Feet<D> each_others_feet(const SpinePair<D> &p, double t)
+template <int D, class S> Feet<D, S> each_others_feet(const SpinePair<D, S> &p, const S &t)
 {
-  const double s = foot_on_i(p, t);
+  const S s = foot_on_i(p, t);
   return feet_at(p, s, foot_on_j(p, s));
 }
 
 /// The closest points of two spines, from the point t on j of their nearer end. In the plane,
 /// spines that do not cross are closest there; skew spines in 3D may be closest inside both.
-inline Feet<2> closest_from_end(const SpinePair<2> &p, double t) { return each_others_feet(p, t); }
+template <class S> Feet<2, S> closest_from_end(const SpinePair<2, S> &p, const S &t)
+{
+  return each_others_feet(p, t);
+}
 
-inline Feet<3> closest_from_end(const SpinePair<3> &p, double t_at_end)
+template <class S> Feet<3, S> closest_from_end(const SpinePair<3, S> &p, const S &t_at_end)
 {
   // The part of u_i across u_j, from the difference of the axes: nearly parallel spines lose no
   // digits.
-  const Vec<3> turn = p.u_i - std::copysign(1.0, dot(p.u_i, p.u_j)) * p.u_j;
-  const Vec<3> across = turn - dot(turn, p.u_j) * p.u_j;
-  const double sin_sq = norm_sq(across);
+  const Vec<3, S> turn = p.u_i - copysign(S(1.0), dot(p.u_i, p.u_j)) * p.u_j;
+  const Vec<3, S> across = turn - dot(turn, p.u_j) * p.u_j;
+  const S sin_sq = norm_sq(across);
   if (sin_sq == 0.0) return each_others_feet(p, t_at_end);
-  const double s = -dot(p.r, across) / sin_sq;
-  const double t = dot(p.u_j, p.r + s * p.u_i);
+  const S s = -dot(p.r, across) / sin_sq;
+  const S t = dot(p.u_j, p.r + s * p.u_i);
   // Feet inside both spines are the minimum, the distance being convex: comparing it with that at
   // the ends would leave it to rounding where the feet of nearly parallel spines sit.
-  if (std::abs(s) < p.A_i && std::abs(t) < p.A_j) return feet_at(p, foot_on_i(p, t), t);
+  if (abs(s) < p.A_i && abs(t) < p.A_j) return feet_at(p, foot_on_i(p, t), t);
   return each_others_feet(p, t_at_end);
+}
+
+template <class S> Feet<2, S> closest_to_end(const SpinePair<2, S> &, const Feet<2, S> &end) { return end; }
+template <class S> Feet<3, S> closest_to_end(const SpinePair<3, S> &p, const Feet<3, S> &end)
+{
+  const Vec<3, S> turn = p.u_i - copysign(S(1.0), dot(p.u_i, p.u_j)) * p.u_j;
+  const Vec<3, S> across = turn - dot(turn, p.u_j) * p.u_j;
+  const S sin_sq = norm_sq(across);
+  if (sin_sq == 0.0) return end;
+  const S s = -dot(p.r, across) / sin_sq;
+  const S t = dot(p.u_j, p.r + s * p.u_i);
+  if (abs(s) < p.A_i && abs(t) < p.A_j) return feet_at(p, foot_on_i(p, t), t);
+  return end;
 }
 
 /// Below this squared sine of the angle the intersection of the lines through two spines does not
@@ -158,35 +177,35 @@ inline constexpr double NO_INTERSECTION_SINE_SQ = 1e-8;
 /// The closest points of two spines. In the plane they are at the tip towards the intersection of
 /// their lines, which saves the search over four tips; crossing spines, a state to detect
 /// (`spines_cross`), end up at it.
-template <int D> Feet<D> closest_feet(const SpinePair<D> &p)
+template <int D, class S> Feet<D, S> closest_feet(const SpinePair<D, S> &p)
 {
   if constexpr (D == 2) {
-    const double sine = cross(p.u_i, p.u_j)[0];
+    const S sine = cross(p.u_i, p.u_j)[0];
     if (sine * sine > NO_INTERSECTION_SINE_SQ) {
       return each_others_feet(p, foot_on_j(p, limited(cross(p.u_j, p.r)[0] / sine, p.A_i)));
     }
   }
-  const TipFeet<D> tips(p);
+  const TipFeet<D, S> tips(p);
   return closest_from_end(p, tips.t[tips.nearest()]);
 }
 
 /// |sin| of the angle between the spines: the one measure of being parallel used everywhere; it
 /// takes angles modulo pi, since rods have no head.
-template <int D> double abs_sine(const SpinePair<D> &p) { return norm(cross(p.u_i, p.u_j)); }
+template <int D, class S> S abs_sine(const SpinePair<D, S> &p) { return norm(cross(p.u_i, p.u_j)); }
 
 /// True when the two segments cross in the plane: each has its tips on opposite sides of the other.
-inline bool spines_cross(const SpinePair<2> &p)
+template <class S> bool spines_cross(const SpinePair<2, S> &p)
 {
-  const double sine = std::abs(cross(p.u_i, p.u_j)[0]);
-  return std::abs(cross(p.u_j, p.r)[0]) < p.A_i * sine &&
-         std::abs(cross(p.u_i, p.r)[0]) < p.A_j * sine;
+  const S sine = abs(cross(p.u_i, p.u_j)[0]);
+  return abs(cross(p.u_j, p.r)[0]) < p.A_i * sine &&
+         abs(cross(p.u_i, p.r)[0]) < p.A_j * sine;
 }
-inline bool spines_cross(const SpinePair<3> &) { return false; }
+template <class S> bool spines_cross(const SpinePair<3, S> &) { return false; }
 
 /// Squared shortest distance of the two spines, zero where they cross.
-template <int D> double spine_distance_sq(const SpinePair<D> &p)
+template <int D, class S> S spine_distance_sq(const SpinePair<D, S> &p)
 {
-  return spines_cross(p) ? 0.0 : closest_feet(p).distance_sq;
+  return spines_cross(p) ? S(0.0) : closest_feet(p).distance_sq;
 }
 
 }  // namespace jamshape

@@ -58,9 +58,9 @@ template <> inline SubstrateDrag substrate_drag<3>(const Spherocylinder &shape)
 }
 
 /// Shape and pose of one particle, as the pair loops read it.
-template <int D> struct SpherocylinderBody {
-  Vec<D> centre;
-  Vec<D> axis;
+template <int D, class S = double> struct SpherocylinderBody {
+  Vec<D, S> centre;
+  Vec<D, S> axis;
   double half_length;
   double radius;
 };
@@ -79,142 +79,178 @@ struct SpherocylinderLaw {
 inline constexpr double PARALLEL_SINE = 1e-8;
 
 /// The second bond fades in over this fraction of the shorter half length of spine overlap, and
-/// over this range of |cos| of the angle; it fades out while its overlap (as a length) grows from
-/// A_min^2 / d to FADE_DEPTH times that.
+/// over this range of |cos| of the angle.
 inline constexpr double FADE_LENGTH = 0.05;
-inline constexpr double FADE_DEPTH = 16.0;
 inline constexpr double FADE_COSINE_START = 0.5;
 inline constexpr double FADE_COSINE_RANGE = 0.35;
+
+/// Two bonds become one while their mean overlap (as a length) grows from A_min^2 / d to DEEP times
+/// that; the one is then free of a kink for rods that are parallel to this sine, in units of A_min / d.
+/// At larger angles the feet of the two ends, moving by d sin, are too far from where the ends are.
+inline constexpr double DEEP = 16.0;
+inline constexpr double DEEP_SINE = 0.1;
 
 /// Feet closer than this times R_i + R_j are one point: no direction is left to push along.
 inline constexpr double COINCIDENT = 1e-14;
 
-template <int D>
-SpinePair<D> spine_pair(const SpherocylinderBody<D> &i, const SpherocylinderBody<D> &j)
+template <int D, class S>
+SpinePair<D, S> spine_pair(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j)
 {
   return {i.centre - j.centre, i.axis, i.half_length, j.axis, j.half_length};
 }
 
-/// Weight of the second bond with its derivatives with respect to r and to rotations of i and j,
-/// the bond's own distance apart.
-template <int D> struct BondWeight {
-  double value;
-  double per_distance;
-  Vec<D> per_r;
-  Torque<D> per_rotation_i;
-  Torque<D> per_rotation_j;
+/// Weights of the second bond and of the mean bond, with their derivatives by the spread of the two
+/// ends and by u_i.u_j.
+template <class S> struct BondWeights {
+  S second, mean;
+  S second_per_spread, mean_per_spread;
+  S second_per_cosine, mean_per_cosine;
 };
 
-/// w = S(l / (c A_min)) S((|u_i.u_j| - 0.5) / 0.35) (1 - S(ln y / ln 16)), l the spread of the two
-/// ends, y the overlap of the farther one over A_min^2 / d. It is 1 for side-to-side contacts and
-/// goes to 0 smoothly where the second bond ends: at spines that just begin to overlap and at large
-/// angles, where the rule of Marschall & Teitel (Fig. 6) jumps, and for nearly round particles that
-/// overlap by so much that their two bonds are one (the fading would push them apart harder than
-/// the contact).
-template <int D>
-BondWeight<D> second_bond_weight(const SpinePair<D> &p, const EndFeet<D> &ends, double overlap,
-                                 double reach)
+/// W_b = S(l / (c A_min)) S((|cos| - 0.5) / 0.35) and W_m = S(l / (c A_min)) (1 - S((sin d / (0.1 A_min))^2)),
+/// l the spread of the two ends, S the smooth step. Both go to 0 smoothly where the second bond
+/// ends: at spines that just begin to overlap and at large angles, where the rule of Marschall &
+/// Teitel (Fig. 6) jumps.
+template <int D, class S>
+BondWeights<S> bond_weights(const SpinePair<D, S> &p, const EndFeet<D, S> &ends, double reach)
 {
   const double shorter = std::min(p.A_i, p.A_j);
   if (shorter == 0.0) return {};
-  const double cosine = dot(p.u_i, p.u_j);
-  const double x_length = ends.spread() / (FADE_LENGTH * shorter);
-  const double x_cosine = (std::abs(cosine) - FADE_COSINE_START) / FADE_COSINE_RANGE;
-  const double depth = overlap * reach * reach / (shorter * shorter);
-  const double x_depth = depth > 1.0 ? std::log(depth) / std::log(FADE_DEPTH) : 0.0;
-  const double by_length = smooth_step(x_length), by_cosine = smooth_step(x_cosine);
-  const double by_depth = 1.0 - smooth_step(x_depth);
+  const S cosine = dot(p.u_i, p.u_j);
+  const S x_length = ends.spread() / (FADE_LENGTH * shorter);
+  const S x_cosine = (abs(cosine) - FADE_COSINE_START) / FADE_COSINE_RANGE;
+  const double sine = DEEP_SINE * shorter / reach;
+  const S x_sine = norm_sq(cross(p.u_i, p.u_j)) / (sine * sine);
+  const S by_length = smooth_step(x_length), by_cosine = smooth_step(x_cosine);
+  const S by_sine = 1.0 - smooth_step(x_sine);
+  const S per_spread = smooth_step_gradient(x_length) / (FADE_LENGTH * shorter);
+  const S by_cosine_gradient =
+      copysign(smooth_step_gradient(x_cosine) / FADE_COSINE_RANGE, cosine);
+  const S by_sine_gradient =
+      2.0 * cosine * smooth_step_gradient(x_sine) / (sine * sine);
+  return {by_length * by_cosine,          by_length * by_sine,
+          per_spread * by_cosine,         per_spread * by_sine,
+          by_length * by_cosine_gradient, by_length * by_sine_gradient};
+}
 
-  BondWeight<D> weight{};
-  weight.value = by_length * by_cosine * by_depth;
-  if (weight.value == 0.0 || weight.value == 1.0) return weight;
+/// How much of the two bonds is left at a mean overlap, D = 1 - S(ln y / ln 16) of y = overlap over
+/// (A_min / d)^2, and its derivative.
+template <class S> struct Depth {
+  S two_bonds;
+  S gradient;
+};
 
-  weight.per_distance = by_length * by_cosine * smooth_step_gradient(x_depth) /
-                        (std::log(FADE_DEPTH) * overlap * reach);
-  const double per_spread =
-      by_cosine * by_depth * smooth_step_gradient(x_length) / (FADE_LENGTH * shorter);
-  const double sign_s = std::copysign(0.5 * per_spread, ends.plus.s - ends.minus.s);
-  const double sign_t = std::copysign(0.5 * per_spread, ends.plus.t - ends.minus.t);
-  const auto add_foot = [&](const Feet<D> &feet, double per_s, double per_t) {
-    if (std::abs(feet.s) < p.A_i) {  // s = u_i.(t u_j - r) slides; at a tip it is fixed
-      weight.per_r -= per_s * p.u_i;
-      weight.per_rotation_i += per_s * cross(p.u_i, feet.t * p.u_j - p.r);
-      weight.per_rotation_j += (per_s * feet.t) * cross(p.u_j, p.u_i);
-    } else if (std::abs(feet.t) < p.A_j) {  // t = u_j.(r + s u_i)
-      weight.per_r += per_t * p.u_j;
-      weight.per_rotation_j += per_t * cross(p.u_j, p.r + feet.s * p.u_i);
-      weight.per_rotation_i += (per_t * feet.s) * cross(p.u_i, p.u_j);
+template <int D, class S>
+Depth<S> depth_at(const S &mean_overlap, const SpinePair<D, S> &p, double reach)
+{
+  const double shorter = std::min(p.A_i, p.A_j);
+  const S y = mean_overlap * reach * reach / (shorter * shorter);
+  if (y <= 1.0) return {1.0, 0.0};
+  const S x = log(y) / log(DEEP);
+  return {1.0 - smooth_step(x), -smooth_step_gradient(x) / (log(DEEP) * mean_overlap)};
+}
+
+/// Gradient of an energy of the pair with respect to r and to rotations of i and j.
+template <int D, class S> struct PairGradient {
+  Vec<D, S> r;
+  Torque<D, S> rotation_i;
+  Torque<D, S> rotation_j;
+};
+
+/// From the derivatives by the spread of the two ends and by u_i.u_j.
+template <int D, class S>
+PairGradient<D, S> gradient_through(const SpinePair<D, S> &p, const EndFeet<D, S> &ends,
+                                    const S &per_spread, const S &per_cosine)
+{
+  PairGradient<D, S> gradient{};
+  const S sign_s = copysign(S(0.5), ends.plus.s - ends.minus.s) * per_spread;
+  const S sign_t = copysign(S(0.5), ends.plus.t - ends.minus.t) * per_spread;
+  const auto add_foot = [&](const Feet<D, S> &feet, const S &per_s, const S &per_t) {
+    if (abs(feet.s) < p.A_i) {  // s = u_i.(t u_j - r) slides; at a tip it is fixed
+      gradient.r -= per_s * p.u_i;
+      gradient.rotation_i += per_s * cross(p.u_i, feet.t * p.u_j - p.r);
+      gradient.rotation_j += (per_s * feet.t) * cross(p.u_j, p.u_i);
+    } else if (abs(feet.t) < p.A_j) {  // t = u_j.(r + s u_i)
+      gradient.r += per_t * p.u_j;
+      gradient.rotation_j += per_t * cross(p.u_j, p.r + feet.s * p.u_i);
+      gradient.rotation_i += (per_t * feet.s) * cross(p.u_i, p.u_j);
     }
   };
   add_foot(ends.plus, sign_s, sign_t);
   add_foot(ends.minus, -sign_s, -sign_t);
 
-  const double per_cosine = std::copysign(
-      by_length * by_depth * smooth_step_gradient(x_cosine) / FADE_COSINE_RANGE, cosine);
-  const Torque<D> turn = per_cosine * cross(p.u_i, p.u_j);
-  weight.per_rotation_i += turn;
-  weight.per_rotation_j -= turn;
-  return weight;
+  const Torque<D, S> turn = per_cosine * cross(p.u_i, p.u_j);
+  gradient.rotation_i += turn;
+  gradient.rotation_j -= turn;
+  return gradient;
 }
 
 /// Class of a contact with one bond. Two feet inside the flat parts happen only for skew rods in
 /// 3D.
-template <int D> ContactKind kind_of(const SpinePair<D> &p, const Feet<D> &feet)
+template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Feet<D, S> &feet)
 {
-  const bool on_i = std::abs(feet.s) < p.A_i, on_j = std::abs(feet.t) < p.A_j;
+  const bool on_i = abs(feet.s) < p.A_i, on_j = abs(feet.t) < p.A_j;
   if (on_i && on_j) return ContactKind::SIDE_TO_SIDE;
   return on_i || on_j ? ContactKind::TIP_TO_SIDE : ContactKind::TIP_TO_TIP;
 }
 
-/// Contact of two spherocylinders in 2D or 3D: V = k_e/2 (1 - r/d)^2 of the shortest distance of
-/// the spines (Marschall & Teitel 2018, Eqs. 3, 5, 22), and with Sides::TWO a second bond at the
-/// far end of the overlap of the spines (Fig. 6), faded in by `second_bond_weight`:
-///     V = V_a + w V_b.
-/// Force and torques are its exact derivatives. What is left are kinks: where the nearer tip
-/// changes, of relative size of the angle between the rods; where the two bonds change places while
-/// w < 1, of size 1 - w; and in 3D, for twisted rods, of full strength. Exactly parallel rods with
-/// Sides::ONE sit on such a kink: the lever arm is the middle of the overlap of the spines, which
-/// lies between both sides' and is the same for i, j exchanged.
-template <int D> class SpherocylinderContact {
+/// Contact of two spherocylinders in 2D or 3D. With overlaps a of the shortest distance of the
+/// spines and b of the far end of the overlap of the spines, E the harmonic law, m = (a + b) / 2:
+///     Sides::ONE  V = E(a)                     (Marschall & Teitel 2018, Eqs. 3, 5, 22)
+///     Sides::TWO  V = E(a) + W_b D E(b) + W_m (1 - D) (E(m) - E(a))
+/// In the second, W_b and W_m are `bond_weights`, D the `depth_at` m. Overlaps below (A_min / d)^2
+/// have D = 1: the paper's two bonds (Fig. 6), without the jumps of its rule. Particles that are
+/// nearly round for their overlap have D = 0: their two bonds are one contact, which a fading second
+/// bond would push aside harder than the contact pushes; E(m) leaves of it the one bond without its
+/// kink for parallel rods.
+///
+/// Force and torques are its exact derivatives. What is left are kinks: where the nearer tip of the
+/// far end changes, of relative size of the angle between the rods; where the two bonds change
+/// places while the weights are below 1, of size 1 - W; and in 3D, for twisted rods, of full
+/// strength. Exactly parallel rods with Sides::ONE sit on such a kink: the lever arm is the middle
+/// of the overlap of the spines, which lies between both sides' and is the same for i, j exchanged.
+template <int D, class S> class SpherocylinderContact {
  public:
-  SpherocylinderContact(const SpherocylinderBody<D> &i, const SpherocylinderBody<D> &j,
+  SpherocylinderContact(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j,
                         const SpherocylinderLaw &contact_law) :
       pair(spine_pair(i, j)), radius_i(i.radius), reach(i.radius + j.radius),
-      inverse_reach(1.0 / reach), law(contact_law)
+      inverse_reach(S(1.0) / reach), law(contact_law)
   {
   }
 
-  Contact<D> evaluate() const
+  Contact<D, S> evaluate() const
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0) return discs();
-    const Feet<D> closest = closest_feet(pair);
+    const Feet<D, S> closest = closest_feet(pair);
     if (!touches(closest.distance_sq)) return empty(ContactStatus::APART);
     if (is_coincident(closest) || spines_cross(pair)) return empty(ContactStatus::CROSSING);
     return law.sides == Sides::ONE ? one_bond(closest) : two_bonds();
   }
 
  private:
-  SpinePair<D> pair;
-  double radius_i, reach, inverse_reach;
+  SpinePair<D, S> pair;
+  double radius_i, reach;
+  S inverse_reach;
   SpherocylinderLaw law;
 
-  /// The share of a bond in the energy, and the energy that it loses as it fades with distance.
+  /// How a bond enters the energy: `law` times the harmonic law of its own overlap, with
+  /// `energy` and `slope` (by the overlap) that do not come from that law.
   struct Share {
-    double weight, fading;
+    S law, energy, slope;
   };
-  static constexpr Share WHOLE{1.0, 0.0};
+  static Share whole() { return {1.0, 0.0, 0.0}; }
 
-  bool touches(double distance_sq) const { return distance_sq < reach * reach; }
+  bool touches(const S &distance_sq) const { return distance_sq < S(reach) * reach; }
 
-  bool is_coincident(const Feet<D> &feet) const
+  bool is_coincident(const Feet<D, S> &feet) const
   {
     return feet.distance_sq <= COINCIDENT * reach * COINCIDENT * reach;
   }
 
   /// No bond yet; the bonds themselves stay unset, most pairs of a list being apart.
-  static Contact<D> empty(ContactStatus status)
+  static Contact<D, S> empty(ContactStatus status)
   {
-    Contact<D> contact;
+    Contact<D, S> contact;
     contact.status = status;
     contact.kind = ContactKind::TIP_TO_TIP;
     contact.n_bonds = 0;
@@ -225,81 +261,122 @@ template <int D> class SpherocylinderContact {
   }
 
   /// What the general path gives for two spines of no length, without the search for feet.
-  Contact<D> discs() const
+  Contact<D, S> discs() const
   {
-    const Feet<D> centres{0.0, 0.0, pair.r, norm_sq(pair.r)};
+    const Feet<D, S> centres{0.0, 0.0, pair.r, norm_sq(pair.r)};
     if (!touches(centres.distance_sq)) return empty(ContactStatus::APART);
     if (is_coincident(centres)) return empty(ContactStatus::CROSSING);
-    Contact<D> contact = empty(ContactStatus::TOUCHING);
-    add_bond(contact, centres, std::sqrt(centres.distance_sq), WHOLE);
+    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
+    add_bond(contact, centres, sqrt(centres.distance_sq), whole());
     return contact;
   }
 
-  Contact<D> one_bond(const Feet<D> &closest) const
+  Contact<D, S> one_bond(const Feet<D, S> &closest) const
   {
-    Contact<D> contact = empty(ContactStatus::TOUCHING);
-    const double distance = std::sqrt(closest.distance_sq);
+    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
+    const S distance = sqrt(closest.distance_sq);
     if (abs_sine(pair) < PARALLEL_SINE) {
-      const EndFeet<D> ends(pair);
+      const EndFeet<D, S> ends(pair);
       if (ends.spread() > 0.0) {
         contact.kind = ContactKind::SIDE_TO_SIDE;
         // The energy stays that of the shortest distance, so that it does not jump at
         // PARALLEL_SINE.
-        add_bond(contact, ends.middle(pair), distance, WHOLE);
+        add_bond(contact, ends.middle(pair), distance, whole());
         return contact;
       }
     }
     contact.kind = kind_of(pair, closest);
-    add_bond(contact, closest, distance, WHOLE);
+    add_bond(contact, closest, distance, whole());
     return contact;
   }
 
-  Contact<D> two_bonds() const
-  {
-    const EndFeet<D> ends(pair);
-    const Feet<D> closest = closest_from_end(pair, ends.nearer().t);  // never the farther, at a tie
-    Contact<D> contact = empty(ContactStatus::TOUCHING);
-    contact.kind = kind_of(pair, closest);
-    add_bond(contact, closest, std::sqrt(closest.distance_sq), WHOLE);
-    const Feet<D> &far_end = ends.farther();
-    if (!touches(far_end.distance_sq)) return contact;
-    const double distance = std::sqrt(far_end.distance_sq);
-    const double overlap = (reach - distance) * inverse_reach;
-    const BondWeight<D> weight = second_bond_weight(pair, ends, overlap, reach);
-    if (weight.value == 0.0) return contact;
+  S overlap_at(const S &distance) const { return (reach - distance) * inverse_reach; }
 
+  Contact<D, S> two_bonds() const
+  {
+    const EndFeet<D, S> ends(pair);
+    const Feet<D, S> closest =
+        closest_to_end(pair, ends.nearer());  // never the farther, at a tie
+    const Feet<D, S> &far_end = ends.farther();
+    const S distance = sqrt(closest.distance_sq), a = overlap_at(distance);
+    const double shorter = std::min(pair.A_i, pair.A_j);
+    if (touches(far_end.distance_sq) || 0.5 * a * reach * reach > shorter * shorter) {
+      const BondWeights<S> weights = bond_weights(pair, ends, reach);
+      const S far_distance = sqrt(far_end.distance_sq), b = overlap_at(far_distance);
+      const Depth<S> depth = depth_at(0.5 * (a + b), pair, reach);
+      const bool has_second = weights.second > 0.0 && depth.two_bonds > 0.0 && b > 0.0;
+      if (has_second || (weights.mean > 0.0 && depth.two_bonds < 1.0)) {
+        return side_to_side(ends, closest, weights, depth);
+      }
+    }
+    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
+    contact.kind = kind_of(pair, closest);
+    add_bond(contact, closest, distance, whole());
+    return contact;
+  }
+
+  Contact<D, S> side_to_side(const EndFeet<D, S> &ends, const Feet<D, S> &closest,
+                             const BondWeights<S> &weights, const Depth<S> &depth) const
+  {
+    const Harmonic &law_of = law.harmonic;
+    const S distance = sqrt(closest.distance_sq), far_distance = sqrt(ends.farther().distance_sq);
+    const S a = overlap_at(distance), b = overlap_at(far_distance), mean = 0.5 * (a + b);
+    const S E_b = b > 0.0 ? law_of.energy(b) : S(0.0);
+    // E(m) - E(a) from the difference of the feet, since the overlaps differ by less than they round.
+    const Feet<D, S> &far_end = ends.farther();
+    const Vec<D, S> step = (far_end.s - closest.s) * pair.u_i - (far_end.t - closest.t) * pair.u_j;
+    const S drop = 0.5 * inverse_reach * dot(step, far_end.delta + closest.delta) / (far_distance + distance);
+    const S excess = -drop * law_of.energy_gradient(a - 0.5 * drop), deep = 1.0 - depth.two_bonds;
+    const S by_mean = weights.mean * deep;
+    const S slope =  // by a and by b alike, through their mean
+        0.5 * (depth.gradient * (weights.second * E_b - weights.mean * excess) +
+               by_mean * law_of.energy_gradient(mean));
+
+    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
-    const double V_b = law.harmonic.energy(overlap);
-    add_bond(contact, far_end, distance, {weight.value, V_b * weight.per_distance});
-    const Vec<D> fade_force = -V_b * weight.per_r;
-    contact.force += fade_force;
-    contact.bond[1].force += fade_force;
-    contact.torque_i -= V_b * weight.per_rotation_i;
-    contact.torque_j -= V_b * weight.per_rotation_j;
+    add_bond(contact, closest, distance, {1.0 - by_mean, 0.0, slope});
+    const S second = b > 0.0 ? weights.second * depth.two_bonds : S(0.0);
+    add_bond(contact, ends.farther(), far_distance,
+             {second, by_mean * law_of.energy(mean), slope});
+
+    const S per_second = depth.two_bonds * E_b, per_mean = deep * excess;
+    const S per_spread =
+        per_second * weights.second_per_spread + per_mean * weights.mean_per_spread;
+    const S per_cosine =
+        per_second * weights.second_per_cosine + per_mean * weights.mean_per_cosine;
+    if (per_spread == 0.0 && per_cosine == 0.0) return contact;
+    const PairGradient<D, S> fading = gradient_through(pair, ends, per_spread, per_cosine);
+    contact.force -= fading.r;
+    contact.bond[1].force -= fading.r;
+    contact.torque_i -= fading.rotation_i;
+    contact.torque_j -= fading.rotation_j;
     return contact;
   }
 
   /// Adds a bond with the lever arms of `feet` and the overlap of `distance`. Any point on the line
   /// of `feet` gives the same torque; the one reported lies where the surfaces interpenetrate.
-  void add_bond(Contact<D> &contact, const Feet<D> &feet, double distance, const Share &share) const
+  void add_bond(Contact<D, S> &contact, const Feet<D, S> &feet, const S &distance, const Share &share) const
   {
-    const double overlap = (reach - distance) * inverse_reach;
-    const Vec<D> normal = (1.0 / std::sqrt(feet.distance_sq)) * feet.delta;
-    const double push =
-        share.weight * law.harmonic.energy_gradient(overlap) * inverse_reach - share.fading;
-    const Vec<D> force = push * normal;
-    const double energy = share.weight * law.harmonic.energy(overlap);
-    Bond<D> &bond = contact.bond[contact.n_bonds++];
+    const S overlap = overlap_at(distance);
+    const Vec<D, S> normal = (1.0 / sqrt(feet.distance_sq)) * feet.delta;
+    // In dual numbers the law's own slope is left out here: `stiffness` stands for it, so that what
+    // the derivatives of force and torque hold is the small rest, not its sum with a large number.
+    const S slope = share.law * law.harmonic.energy_gradient(constant(overlap)) + share.slope;
+    const Vec<D, S> force = (slope * inverse_reach) * normal;
+    const S energy = share.law * law.harmonic.energy(overlap) + share.energy;
+    Bond<D, S> &bond = contact.bond[contact.n_bonds++];
     bond.normal = normal;
     bond.force = force;
     bond.arm_i = feet.s * pair.u_i - (radius_i * distance * inverse_reach) * normal;
+    bond.lever_i = feet.s * cross(pair.u_i, normal);
+    bond.lever_j = -feet.t * cross(pair.u_j, normal);
     bond.distance = distance;
     bond.reach = reach;
     bond.energy = energy;
     bond.stiffness =
-        share.weight * law.harmonic.energy_hessian(overlap) * inverse_reach * inverse_reach;
-    bond.on_side_i = std::abs(feet.s) < pair.A_i;
-    bond.on_side_j = std::abs(feet.t) < pair.A_j;
+        share.law * law.harmonic.energy_hessian(overlap) * inverse_reach * inverse_reach;
+    bond.on_side_i = abs(feet.s) < pair.A_i;
+    bond.on_side_j = abs(feet.t) < pair.A_j;
     contact.energy += energy;
     contact.force += force;
     contact.torque_i += feet.s * cross(pair.u_i, force);
@@ -307,11 +384,11 @@ template <int D> class SpherocylinderContact {
   }
 };
 
-template <int D>
-Contact<D> contact_of(const SpherocylinderBody<D> &i, const SpherocylinderBody<D> &j,
+template <int D, class S>
+Contact<D, S> contact_of(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j,
                       const SpherocylinderLaw &law)
 {
-  return SpherocylinderContact<D>(i, j, law).evaluate();
+  return SpherocylinderContact<D, S>(i, j, law).evaluate();
 }
 
 /// What a pair style, its neighbour list and the drag need to know of a shape; every shape has one
@@ -320,7 +397,7 @@ struct SpherocylinderModel {
   using Shape = Spherocylinder;
   using Law = SpherocylinderLaw;
   using Options = Sides;
-  template <int D> using Body = SpherocylinderBody<D>;
+  template <int D, class S = double> using Body = SpherocylinderBody<D, S>;
 
   static constexpr const char *SHAPE_RULE =
       "a spherocylinder has diameters (2(A+R), 2R, 2R), its long axis the body's x";
@@ -340,16 +417,16 @@ struct SpherocylinderModel {
     return substrate_drag<D>(shape);
   }
 
-  template <int D> static Body<D> body(const Shape &shape)
+  template <int D, class S = double> static Body<D, S> body(const Shape &shape)
   {
-    Vec<D> along_x{};
+    Vec<D, S> along_x{};
     along_x[0] = 1.0;
     return {{}, along_x, shape.half_length, shape.radius};
   }
 
-  template <int D> static void turn_to(Body<D> &body, const Quaternion &q)
+  template <int D, class S> static void turn_to(Body<D, S> &body, const QuaternionOf<S> &q)
   {
-    body.axis = long_axis<D>(q);
+    body.axis = long_axis<D, S>(q);
   }
 
   /// Whether the surfaces of i and j are closer than `margin`.

@@ -12,8 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+LongArray = NDArray[np.longdouble]
 
 SHAPE_STYLES = ("spherocylinder", "superellipsoid")
+
+# What goes with each of these when it is replaced.
+_REST_OF = {
+    "position": "position_rest",
+    "orientation": "orientation_rest",
+    "box": "edges_rest",
+}
 
 # Loose enough for the six digits of a text dump, tight enough to catch swapped columns.
 UNIT_QUATERNION_TOLERANCE = 1e-4
@@ -86,6 +94,9 @@ class Packing:
         One of `SHAPE_STYLES`.
     step : int
     time : float, [time]
+    position_rest, orientation_rest, edges_rest : arrays as above, of float64, optional
+        What the doubles of position, orientation and box edges leave out of coordinates that are
+        known to more digits; zeros when left out. See `poses`.
 
     Raises
     ------
@@ -104,6 +115,9 @@ class Packing:
     shape_style: str = "spherocylinder"
     step: int = 0
     time: float = 0.0
+    position_rest: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    orientation_rest: FloatArray = field(default_factory=lambda: np.empty(0))
+    edges_rest: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         n, dimension = len(self.position), self.box.dimension
@@ -114,7 +128,12 @@ class Packing:
             object.__setattr__(self, "image", np.zeros((n, dimension), dtype=np.int64))
         vector = (n, dimension)
         rotation = (n,) if dimension == 2 else (n, 4)
-        for name, shape in (("position", vector), ("orientation", rotation), ("diameters", (n, 3))):
+        rests = {"position_rest": vector, "orientation_rest": rotation, "edges_rest": (dimension,)}
+        for name, shape in rests.items():
+            if np.size(getattr(self, name)) == 0:
+                object.__setattr__(self, name, np.zeros(shape))
+        floats = {"position": vector, "orientation": rotation, "diameters": (n, 3), **rests}
+        for name, shape in floats.items():
             object.__setattr__(self, name, _floats(name, getattr(self, name), shape))
         for name, shape in (("species", (n,)), ("id", (n,)), ("image", vector)):
             object.__setattr__(self, name, _integers(name, getattr(self, name), shape))
@@ -183,14 +202,46 @@ class Packing:
         measure, _ = contact.spherocylinder_drag(self.half_length, self.radius, self.dimension)
         return float(np.sum(measure)) / self.box.volume
 
+    def poses(self) -> tuple[LongArray, LongArray, LongArray]:
+        """Position, orientation and box edges to all digits that are known, as longdouble."""
+        pairs = (
+            (self.position, self.position_rest),
+            (self.orientation, self.orientation_rest),
+            (self.box.edges, self.edges_rest),
+        )
+        position, orientation, edges = (np.longdouble(x) + rest for x, rest in pairs)
+        return position, orientation, edges
+
+    def with_poses(
+        self, position: LongArray, orientation: LongArray, edges: LongArray
+    ) -> Packing:
+        """Return the packing with these poses, each number kept as a double and its rest."""
+        doubles = [np.asarray(x, np.float64) for x in (position, orientation, edges)]
+        rests = [
+            np.asarray(x - double, np.float64)
+            for x, double in zip((position, orientation, edges), doubles, strict=True)
+        ]
+        return self.with_(
+            position=doubles[0],
+            orientation=doubles[1],
+            box=Box(self.box.lo, doubles[2]),
+            position_rest=rests[0],
+            orientation_rest=rests[1],
+            edges_rest=rests[2],
+        )
+
     def sorted_by_id(self) -> Packing:
         """Return the same packing with its particles in the order of their IDs."""
         order = np.argsort(self.id)
         names = ("position", "orientation", "diameters", "species", "id", "image")
+        names += ("position_rest", "orientation_rest")
         return self.with_(**{name: getattr(self, name)[order] for name in names})
 
     def with_(self, **changes: Any) -> Packing:
-        """Return a new packing with the named fields replaced."""
+        """Return a new packing with the named fields replaced; new poses are exact doubles."""
+        for name, rest in _REST_OF.items():
+            if name in changes:
+                changes.setdefault(rest, np.empty(0))
         return dataclasses.replace(self, **changes)
 
 

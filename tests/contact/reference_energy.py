@@ -1,4 +1,13 @@
-"""The pair energies written a second time, in NumPy, from PHYSICS and not from the C++.
+"""The pair energies written a second time, in NumPy, from the formula and not from the C++.
+
+With overlaps a of the shortest distance and b of the far end of the overlap of the spines (b of any
+sign), m = (a + b) / 2, E(x) = x^2 / 2, S the quintic step, l the distance between the two ends:
+
+    sides one   V = E(a)
+    sides two   V = E(a) + W_b D E(b)_+ + W_m (1 - D) (E(m) - E(a))
+    W_b = S(l / (0.05 A_min)) S((|cos| - 0.5) / 0.35)
+    W_m = S(l / (0.05 A_min)) (1 - S((|sin| / (0.1 A_min / d))^2))
+    D = 1 - S(ln y / ln 16),  y = m / (A_min / d)^2
 
 Every formula is analytic between its branches and branches look at real parts only, so that a step
 along the imaginary axis gives derivatives to rounding, without a step size.
@@ -6,14 +15,17 @@ along the imaginary axis gives derivatives to rounding, without a step size.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from spherocylinder_pairs import (
+    DEEP_SINE,
     FADE_COSINE_RANGE,
     FADE_COSINE_START,
     FADE_DEPTH,
     FADE_LENGTH,
+    cross,
     row_dot,
     scaled,
 )
@@ -74,9 +86,8 @@ def end_feet(pairs):
     ]
 
 
-def closest_foot(pairs):
-    """Shortest distance; of crossing spines in 2D that of a tip, as there is no energy to take."""
-    best = nearer_of(*end_feet(pairs))
+def closest_foot(pairs, plus, minus):
+    best = nearer_of(plus, minus)
     if pairs.dimension == 2:
         return best
     # u_i less its part along u_j, through the difference of nearly parallel axes; |across| is |sin|.
@@ -97,64 +108,156 @@ def smooth_step(x):
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
-def spread(pairs):
-    """Distance between the two bonds along the spines, the mean over both."""
-    plus, minus = end_feet(pairs)
-    return 0.5 * (absolute(plus.s - minus.s) + absolute(plus.t - minus.t))
+def shorter_or(pairs, of_discs):
+    """A_min, or a number to put in its place where there are no two ends: A_min = 0."""
+    shorter = np.minimum(pairs.A_i, pairs.A_j)
+    return np.where(shorter > 0.0, shorter, of_discs)
 
 
 def fade_length(pairs):
-    """Spine overlap over which the second bond fades in; none for discs, which have no second."""
-    shorter = np.minimum(pairs.A_i, pairs.A_j)
-    return np.where(shorter > 0.0, FADE_LENGTH * shorter, np.inf)
+    """Spine overlap over which two bonds fade in; none for discs, which have no second."""
+    return FADE_LENGTH * shorter_or(pairs, np.inf)
 
 
-def fade_arguments(pairs):
-    """What the two quintic steps of the second bond's weight are taken of."""
-    by_length = spread(pairs) / fade_length(pairs)
-    cosine = absolute(row_dot(pairs.u_i, pairs.u_j))
-    return by_length, (cosine - FADE_COSINE_START) / FADE_COSINE_RANGE
+def sine_range(pairs):
+    """|sin| of the angle over which the mean of the two bonds fades out."""
+    return DEEP_SINE * shorter_or(pairs, np.inf) / pairs.d
 
 
-def fade_depth(pairs):
-    """Overlap of the second bond over A^2 / d, at least 1: there it begins to fade out."""
-    shorter = np.minimum(pairs.A_i, pairs.A_j)
-    overlap = pairs.d - np.sqrt(far_square(pairs))
-    depth = overlap * pairs.d / np.where(shorter > 0.0, shorter, np.inf) ** 2
-    return np.where(depth.real > 1.0, depth, 1.0)
+class Approach:
+    """The two ends of the overlap of the spines, and what their energy is made of."""
+
+    def __init__(self, pairs):
+        self.pairs = pairs
+        self.plus, self.minus = end_feet(pairs)
+
+    @cached_property
+    def closest(self):
+        """Of crossing spines in 2D that of a tip, as there is no energy to take."""
+        return closest_foot(self.pairs, self.plus, self.minus)
+
+    @cached_property
+    def far_end(self):
+        nearer = self.plus.exact <= self.minus.exact
+        return Foot(*(np.where(nearer, y, x) for x, y in zip(self.plus, self.minus, strict=True)))
+
+    @cached_property
+    def spread(self):
+        """Distance between the two bonds along the spines, the mean over both."""
+        plus, minus = self.plus, self.minus
+        return 0.5 * (absolute(plus.s - minus.s) + absolute(plus.t - minus.t))
+
+    @cached_property
+    def by_length(self):
+        """What the step of both weights is taken of."""
+        return self.spread / fade_length(self.pairs)
+
+    @cached_property
+    def by_cosine(self):
+        cosine = absolute(row_dot(self.pairs.u_i, self.pairs.u_j))
+        return (cosine - FADE_COSINE_START) / FADE_COSINE_RANGE
+
+    @cached_property
+    def by_sine(self):
+        turn = cross(self.pairs.u_i, self.pairs.u_j)
+        return row_dot(turn, turn) / sine_range(self.pairs) ** 2
+
+    @cached_property
+    def second_weight(self):
+        return smooth_step(self.by_length) * smooth_step(self.by_cosine)
+
+    @cached_property
+    def mean_weight(self):
+        return smooth_step(self.by_length) * (1.0 - smooth_step(self.by_sine))
+
+    @cached_property
+    def overlap(self):
+        """a of the shortest distance."""
+        return overlap_of(self.closest.square, self.pairs.d)
+
+    @cached_property
+    def far_overlap(self):
+        """b of the far end; negative where that is out of reach."""
+        return overlap_of(self.far_end.square, self.pairs.d)
+
+    @cached_property
+    def drop(self):
+        """a - b through the difference of the squares: of nearly round rods a rounds by more."""
+        near, far, pairs = self.closest, self.far_end, self.pairs
+        apart = scaled(far.s - near.s, pairs.u_i) - scaled(far.t - near.t, pairs.u_j)
+        s, t = 0.5 * (far.s + near.s), 0.5 * (far.t + near.t)
+        middle = pairs.r + scaled(s, pairs.u_i) - scaled(t, pairs.u_j)
+        distances = np.sqrt(far.square) + np.sqrt(near.square)
+        return 2.0 * row_dot(apart, middle) / (distances * pairs.d)
+
+    @cached_property
+    def depth(self):
+        """y, the mean overlap over (A_min / d)^2; 0 for discs, which have no second bond."""
+        mean = 0.5 * (self.overlap + self.far_overlap)
+        return mean / (shorter_or(self.pairs, np.inf) / self.pairs.d) ** 2
+
+    @cached_property
+    def two_bonds(self):
+        """D, how much of the two bonds is left."""
+        y = np.where(self.depth.real > 1.0, self.depth, 1.0)
+        return 1.0 - smooth_step(np.log(y) / np.log(FADE_DEPTH))
 
 
-def weight(pairs):
-    by_length, by_cosine = fade_arguments(pairs)
-    by_depth = 1.0 - smooth_step(np.log(fade_depth(pairs)) / np.log(FADE_DEPTH))
-    return smooth_step(by_length) * smooth_step(by_cosine) * by_depth
+def overlap_of(square, d):
+    return (d - np.sqrt(square)) / d
 
 
-def bond_energy(square, d):
-    overlap = (d - np.sqrt(square)) / d
-    return np.where(overlap.real > 0.0, 0.5 * overlap**2, 0.0)
+def law(overlap):
+    return 0.5 * overlap**2
 
 
-def far_square(pairs):
-    plus, minus = end_feet(pairs)
-    return np.where(plus.exact <= minus.exact, minus.square, plus.square)
+def repulsive_law(overlap):
+    return np.where(overlap.real > 0.0, law(overlap), 0.0)
 
 
 def one_bond_energy(pairs):
-    return bond_energy(closest_foot(pairs).square, pairs.d)
+    return repulsive_law(Approach(pairs).overlap)
 
 
 def two_bond_energy(pairs):
-    return one_bond_energy(pairs) + weight(pairs) * bond_energy(far_square(pairs), pairs.d)
+    x = Approach(pairs)
+    a, b, D = x.overlap, x.far_overlap, x.two_bonds
+    excess = -0.5 * x.drop * (a - 0.25 * x.drop)  # E(m) - E(a)
+    second = x.second_weight * D * repulsive_law(b)
+    return repulsive_law(a) + second + x.mean_weight * (1.0 - D) * excess
 
 
 def printed_two_bond_energy(pairs):
     """The rule as printed: both ends of the overlap of the spines counted wherever both overlap."""
-    second = np.where(spread(pairs).real > 0.0, bond_energy(far_square(pairs), pairs.d), 0.0)
-    return one_bond_energy(pairs) + second
+    x = Approach(pairs)
+    second = np.where(x.spread.real > 0.0, repulsive_law(x.far_overlap), 0.0)
+    return repulsive_law(x.overlap) + second
 
 
 ENERGIES = {1: one_bond_energy, 2: two_bond_energy}
+
+
+def branches(pairs, sides):
+    """Integers (M, ...) that stay the same where the energy is smooth.
+
+    Where two whole bonds change places nothing happens, so the nearer end is left out there.
+    """
+    x = Approach(pairs)
+
+    def sliding(foot):
+        return [np.sign(y.real) * (np.abs(y.real) >= A)
+                for y, A in ((foot.s, pairs.A_i), (foot.t, pairs.A_j))]  # fmt: skip
+
+    shares = x.second_weight * x.two_bonds + x.mean_weight * (1.0 - x.two_bonds)
+    whole = (sides == 2) & (shares > 1.0 - 1e-10)
+    inside = (np.abs(x.closest.s.real) < pairs.A_i) & (np.abs(x.closest.t.real) < pairs.A_j)
+    columns = [*sliding(x.plus), *sliding(x.minus), np.sign(row_dot(pairs.u_i, pairs.u_j)), inside]
+    columns.append(np.where(whole, 0.0, x.plus.exact <= x.minus.exact))
+    by_depth = np.log(np.maximum(x.depth, 0.1)) / np.log(FADE_DEPTH)
+    for step in (x.by_length, x.by_cosine, by_depth):
+        columns.append(np.sign(step) + np.sign(step - 1.0))
+    columns += [x.by_sine > 1.0, x.overlap > 0.0, x.far_overlap > 0.0]
+    return np.column_stack(columns).astype(int)
 
 
 def complex_step_gradient(pairs, energy):

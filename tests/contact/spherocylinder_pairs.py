@@ -20,6 +20,7 @@ TIP_TO_TIP, TIP_TO_SIDE, SIDE_TO_SIDE = 0, 1, 2
 EPS = np.finfo(float).eps
 FADE_LENGTH, FADE_DEPTH = 0.05, 16.0
 FADE_COSINE_START, FADE_COSINE_RANGE = 0.5, 0.35
+DEEP_SINE = 0.1
 
 
 @dataclass
@@ -257,7 +258,7 @@ def skew(rng, n, overlap, angle, alpha=(1e-6, 100.0)):
 
 
 def limited_to_depth(shapes, overlap, depth):
-    """Overlaps up to `depth` times (A_min / d)^2, beyond which the second bond fades out."""
+    """Overlaps up to `depth` times (A_min / d)^2, beyond which two bonds become one."""
     A_i, A_j, R_i, R_j = shapes
     return np.minimum(overlap, depth * (np.minimum(A_i, A_j) / (R_i + R_j)) ** 2)
 
@@ -316,6 +317,32 @@ def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), least_tilt=
     )
 
 
+def deep(rng, n, dimension, overlap, depth=(0.5, 1e4)):
+    """Two bonds on their way to one, or past it: overlaps of `depth` times (A_min / d)^2.
+
+    Tilted, in 3D in any direction, by up to the sine over which the mean of the two bonds fades out;
+    half of them with spines that overlap by no more than the length over which it fades in.
+    """
+    _, _, R_i, R_j = random_shapes(rng, n)
+    d = R_i + R_j
+    shorter = d * np.sqrt(overlap / log_uniform(rng, *depth, n))
+    longer = shorter * log_uniform(rng, 1.0, 10.0, n)
+    i_is_shorter = rng.uniform(size=n) < 0.5
+    A_i, A_j = np.where(i_is_shorter, [shorter, longer], [longer, shorter])
+    u_j = random_directions(rng, n, dimension)
+    normal = random_perpendicular(rng, u_j)
+    sine = DEEP_SINE * shorter / d * rng.uniform(0.0, 0.999, n)
+    sideways = random_perpendicular(rng, u_j)
+    away = scaled(np.where(row_dot(sideways, normal) < 0.0, -1.0, 1.0), sideways)
+    towards, end = rng.choice([-1.0, 1.0], (2, n))  # i's spine leaves its tip along towards * u_j
+    into_i = scaled(np.sqrt(1.0 - sine**2) * towards, u_j) + scaled(sine, away)
+    most = np.where(np.arange(n) % 4 < 2, 1.2 * FADE_LENGTH * shorter, 2.0 * A_j)
+    t = towards * (A_j - most * rng.uniform(1e-3, 0.999, n))
+    return swapped_every_other(
+        placed((A_i, A_j, R_i, R_j), scaled(-end, into_i), u_j, end * A_i, t, normal, overlap)
+    )
+
+
 # --- samples of the three classes --------------------------------------------------------------
 
 
@@ -344,12 +371,14 @@ def side_pairs(rng, n, dimension, sides):
     if sides == 2:
         # Below, overlaps that leave two bonds are too small to be differenced.
         alpha = (0.1, 100.0)
-        both, half_overlap = parallel(
-            rng, n // 4, dimension, overlaps(rng, n // 4), alpha, depth=0.999
-        )
-        whole = 2.0 * half_overlap > 1.001 * FADE_LENGTH * np.minimum(both.A_i, both.A_j)
-        tilted = nearly_parallel(rng, n, dimension, overlaps(rng, n), alpha, depth=0.5 * FADE_DEPTH)
-        parts += [tilted, both[whole]]
+        for m, depth in ((n // 4, 0.999), (n // 8, np.inf)):
+            both, half_overlap = parallel(rng, m, dimension, overlaps(rng, m), alpha, depth=depth)
+            whole = 2.0 * half_overlap > 1.001 * FADE_LENGTH * np.minimum(both.A_i, both.A_j)
+            parts.append(both[whole])
+        parts += [
+            nearly_parallel(rng, n, dimension, overlaps(rng, n), alpha, depth=0.5 * FADE_DEPTH),
+            deep(rng, n // 2, dimension, overlaps(rng, n // 2)),
+        ]
     if dimension == 3:
         parts.append(skew(rng, n, overlaps(rng, n), rng.uniform(0.5, 0.5 * np.pi, n)))
     return concatenated(*parts)
@@ -357,7 +386,7 @@ def side_pairs(rng, n, dimension, sides):
 
 @cache
 def touching(dimension, sides, kind):
-    """1e4 to 2e4 pairs that the code under test puts in the class `kind`.
+    """1e4 to 3e4 pairs that the code under test puts in the class `kind`.
 
     With one bond that is the class they were built for, but for tips placed within rounding of the
     end of a short rod. With two, nearly round rods that meet tip to tip or tip to side have their far
@@ -376,7 +405,8 @@ def touching(dimension, sides, kind):
         assert np.mean(as_built) > 0.99
     else:
         assert np.mean(as_built | (result["kind"] == SIDE_TO_SIDE)) > 0.99
-    return pairs[rng.permutation(np.flatnonzero(as_built))[:20_000]]
+    most = 30_000 if (sides, kind) == (2, SIDE_TO_SIDE) else 20_000
+    return pairs[rng.permutation(np.flatnonzero(as_built))[:most]]
 
 
 EVERY_CLASS = [

@@ -12,9 +12,8 @@ from differences import (
 )
 from reference_energy import (
     ENERGIES,
+    Approach,
     complex_step_gradient,
-    fade_arguments,
-    fade_depth,
     fade_length,
 )
 from spherocylinder_pairs import (
@@ -94,18 +93,29 @@ def energy_rounding(pairs, sides, energy):
     rounding = EPS * pairs.extent
     result = np.sqrt(2.0 * energy) * rounding / pairs.d
     if sides == 2:
-        fading = fade_arguments(pairs)[0] < 1.0
+        fading = Approach(pairs).by_length < 1.0
         result[fading] += (4.0 * energy * rounding / fade_length(pairs))[fading]
     return result
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_second_bonds_that_fade_are_among_the_pairs(dimension):
-    pairs = touching(dimension, 2, SIDE_TO_SIDE)
-    by_length, by_cosine = fade_arguments(pairs)
-    for faded in (by_length, by_cosine):
-        assert np.sum((faded > 0.01) & (faded < 0.99)) > 2000
-    assert np.sum(fade_depth(pairs) > 1.1) > 1000
+def test_bonds_that_fade_and_bonds_that_are_one_are_among_the_pairs(dimension):
+    x = Approach(touching(dimension, 2, SIDE_TO_SIDE))
+    not_two = x.two_bonds < 0.99
+
+    def is_between(weight):
+        return (weight > 0.01) & (weight < 0.99)
+
+    for least, among in (
+        (2000, is_between(x.by_length) & ~not_two),
+        (2000, is_between(x.by_length) & not_two),
+        (2000, is_between(x.by_cosine)),
+        (2000, is_between(x.by_sine) & not_two),
+        (1000, is_between(x.two_bonds) & (x.mean_weight > 0.0)),
+        (1000, is_between(x.two_bonds) & (x.mean_weight == 0.0)),
+        (500, (x.two_bonds == 0.0) & (x.mean_weight > 0.99)),
+    ):
+        assert np.sum(among) > least
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -133,7 +143,7 @@ def test_parallel_rods_with_one_bond_sit_in_the_middle_of_their_kink(dimension, 
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_parallel_rods_with_a_fading_second_bond_lie_within_their_kink(dimension, measured):
-    """V_a + w V_b: where a and b change places the torque jumps by (1 - w) force times spread."""
+    """E(a) + W E(b): where a and b change places the torque jumps by (1 - W) force times spread."""
     rng = np.random.default_rng([3, dimension])
     pairs, _ = parallel(
         rng, N, dimension, overlaps(rng, N), alpha=(1.0, 100.0), fading=True, depth=1.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference_energy import fade_arguments, fade_length
+from reference_energy import Approach, fade_length
 from spherocylinder_pairs import (
     APART,
     CROSSING,
@@ -157,9 +157,14 @@ def test_discs_are_discs_to_the_last_bits(dimension, sides):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_rods_become_discs_continuously(dimension):
-    """One bond: the spines are no further from the centres than A, so the overlap moves by 2A/d."""
+    """The spines are no further from the centres than A, so overlaps move by (A_i + A_j) / d.
+
+    Two bonds lie between one of their mean overlap and two of the larger; where that is deep in
+    units of (A_min / d)^2, they are no more than one.
+    """
     rng = np.random.default_rng([14, dimension])
     discs = disc_to_disc(rng, 4000, dimension, overlaps(rng, 4000))
+    discs.u_i[::2] = discs.u_j[::2]
     as_discs = contacts(discs, 1, K_E)
     for alpha in (1e-2, 1e-4, 1e-6, 1e-9, 1e-300, 5e-324):
         rods = discs.replaced(A_i=alpha * discs.R_i, A_j=alpha * discs.R_j)
@@ -170,8 +175,14 @@ def test_rods_become_discs_continuously(dimension):
         force = np.linalg.norm(result["force"], axis=1)
         assert np.all(torque <= force * rods.A_i * (1.0 + 1e-9))
         two = contacts(rods, 2, K_E)
-        assert np.all(two["energy"] >= result["energy"])
-        assert np.all(two["energy"] <= 2.0 * result["energy"] * (1.0 + 4.0 * EPS))
+        overlap = np.sqrt(2.0 / K_E * result["energy"])
+        least_mean = np.maximum(overlap - alpha, 0.0)
+        deep = least_mean > 16.0 * (np.minimum(rods.A_i, rods.A_j) / rods.d) ** 2
+        assert deep.mean() > 0.5
+        most = np.where(deep, 1.0, 2.0) * result["energy"]
+        assert np.all(two["energy"] <= most * (1.0 + 4.0 * EPS))
+        least = 0.5 * K_E * least_mean**2 * (1.0 - 1e-9 - 8.0 * EPS / overlap)
+        assert np.all(two["energy"] >= least)
         assert all(np.all(np.isfinite(x)) for x in two.values())
 
 
@@ -217,7 +228,7 @@ def relative_rounding(pairs, sides, result):
     unit = rounding / (pairs.d * pairs.overlap)
     if sides == 2:
         length = fade_length(pairs)
-        fading = (result["n_bonds"] == 2) & (fade_arguments(pairs)[0] < 1.0)
+        fading = (result["n_bonds"] == 2) & (Approach(pairs).by_length < 1.0)
         length = np.where(fading, length, np.inf)
         # The force of a fading bond is of order V_b / length, its derivative of V_b / length^2.
         unknown = 6.0 * result["energy"] * rounding / length**2

@@ -7,15 +7,15 @@ from dataclasses import dataclass, fields
 import numpy as np
 import pytest
 from reference_energy import (
-    bond_energy,
-    end_feet,
-    fade_arguments,
-    far_square,
+    Approach,
     one_bond_energy,
     printed_two_bond_energy,
+    repulsive_law,
+    sine_range,
     smooth_step,
 )
 from spherocylinder_pairs import (
+    DEEP_SINE,
     EPS,
     FADE_LENGTH,
     SIDE_TO_SIDE,
@@ -26,8 +26,11 @@ from spherocylinder_pairs import (
     log_uniform,
     overlaps,
     parallel,
+    placed,
+    random_directions,
     random_perpendicular,
     random_shapes,
+    row_dot,
     scaled,
 )
 
@@ -80,6 +83,9 @@ class Paths:
         self.twist = Wave.random(rng, np.zeros(n), np.minimum(flat, 1.5)[::-1])
         self.roll = Wave.random(rng, np.zeros(n), rng.uniform(0.0, 1.0, n))
 
+    def overlap_at(self, which, path):
+        return self.overlap.at(which, path)
+
     def pairs(self, which, path):
         tilt, elevation = self.tilt.at(which, path), self.elevation.at(which, path)
         u_i = np.column_stack([np.cos(tilt), np.sin(tilt)])
@@ -95,7 +101,7 @@ class Paths:
             u_j = np.column_stack([u_j, np.zeros(len(u_j))])
         A_i, A_j, R_i, R_j = (x[which] for x in (self.A_i, self.A_j, self.R_i, self.R_j))
         r = (
-            scaled((1.0 - self.overlap.at(which, path)) * (R_i + R_j), normal)
+            scaled((1.0 - self.overlap_at(which, path)) * (R_i + R_j), normal)
             - scaled(self.s.at(which, path), u_i)
             + scaled(self.t.at(which, path), u_j)
         )
@@ -207,31 +213,220 @@ def test_the_same_scan_sees_a_spread_on_one_spine_jump(dimension, measured):
     """Were l the distance of the feet on spine i alone: it changes with the nearer tip of an end."""
 
     def one_spine_energy(pairs):
-        plus, minus = end_feet(pairs)
+        x = Approach(pairs)
         shorter = np.minimum(pairs.A_i, pairs.A_j)
-        fade = smooth_step(np.abs(plus.s - minus.s) / (FADE_LENGTH * shorter))
-        second = fade * smooth_step(fade_arguments(pairs)[1])
+        fade = smooth_step(np.abs(x.plus.s - x.minus.s) / (FADE_LENGTH * shorter))
+        second = fade * smooth_step(x.by_cosine)
         _, shallow = library(1)(pairs)
-        return one_bond_energy(pairs) + second * bond_energy(far_square(pairs), pairs.d), shallow
+        return one_bond_energy(pairs) + second * repulsive_law(x.far_overlap), shallow
 
     jumps, _ = largest_jump(paths_of(nearly_round, dimension, 60), one_spine_energy)
     measured(largest_jump=jumps.max(), paths_that_jump=np.mean(jumps > 1e-4))
     assert jumps.max() > 1e-3
 
 
+def shares_on(paths):
+    """Of the second bond and of the mean of both, at all points of the grid."""
+    which = np.repeat(np.arange(len(paths.A_i)), len(GRID))
+    x = Approach(paths.pairs(which, np.tile(GRID, len(paths.A_i))))
+    second = np.where(x.far_overlap > 0.0, x.second_weight * x.two_bonds, 0.0)
+    return second, x.mean_weight * (1.0 - x.two_bonds), x
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("shapes", SHAPES, ids=lambda shapes: shapes.__name__)
 def test_the_scan_visits_whole_fading_and_absent_second_bonds(shapes, dimension):
-    paths = paths_of(shapes, dimension)
-    which = np.repeat(np.arange(N_PATHS), len(GRID))
-    pairs = paths.pairs(which, np.tile(GRID, N_PATHS))
-    result = contacts(pairs, 2)
-    alone = 0.5 * (1.0 - result["bond_distance"][:, 1] / pairs.d) ** 2
-    share = np.where(result["n_bonds"] == 2, result["bond_energy"][:, 1] / alone, 0.0)
+    share, _, _ = shares_on(paths_of(shapes, dimension))
     # Nearly round rods overlap by more than A^2 / d on most of their paths.
     least = 1e-4 if shapes is nearly_round else 0.01
     for share_of in (share > 0.999, (share > 0.001) & (share < 0.999), share == 0.0):
         assert share_of.mean() > least
+
+
+# --- nearly round rods ------------------------------------------------------------------------
+
+
+class RoundPaths(Paths):
+    """alpha of 1e-6 to 0.01, side by side within the sines and overlaps where two bonds are one.
+
+    The overlap of the anchors moves by decades between 1e-8 and 0.1, in most paths through 1 to 16
+    times (A_min / d)^2.
+    """
+
+    def __init__(self, rng, n, dimension, *, aligned):
+        self.dimension = dimension
+        self.R_i, self.R_j = np.ones(n), rng.uniform(1.0, 1.4, n)
+        d = self.R_i + self.R_j
+        middle = log_uniform(rng, 1e-8, 0.1, n)
+        room = np.log(np.minimum(middle / 1e-8, 0.1 / middle))
+        self.log_overlap = Wave.random(rng, np.log(middle), room * rng.uniform(0.3, 1.0, n))
+        least, most = 1e-6 * self.R_j, 0.01 * self.R_i
+        shorter = np.clip(d * np.sqrt(middle / log_uniform(rng, 0.3, 300.0, n)), least, most)
+        longer = np.minimum(shorter * rng.uniform(1.0, 3.0, n), most)
+        self.A_i, self.A_j = (longer, longer) if aligned else (shorter, longer)
+        sine = DEEP_SINE * shorter / d
+        self.tilt = Wave.random(rng, np.zeros(n), sine * log_uniform(rng, 0.1, 10.0, n))
+        self.twist = Wave.random(rng, np.zeros(n), sine * log_uniform(rng, 0.1, 10.0, n))
+        self.roll = Wave.random(rng, np.zeros(n), rng.uniform(0.0, 1.0, n))
+        self.s = Wave.random(rng, np.zeros(n), self.A_i * rng.uniform(0.0, 1.0, n))
+        if aligned:  # at no tilt, tip by tip
+            self.t, past = self.s, np.zeros(n)
+        else:
+            self.t = Wave.random(rng, np.zeros(n), self.A_j * rng.uniform(0.0, 1.0, n))
+            past = (self.A_i + self.A_j) / d * rng.uniform(0.0, 1.0, n)
+        self.elevation = Wave.random(rng, np.full(n, 0.5 * np.pi), past)
+
+    def overlap_at(self, which, path):
+        return np.exp(self.log_overlap.at(which, path))
+
+
+def over_one_bond(pairs):
+    energy, shallow = library(2)(pairs)
+    one, _ = library(1)(pairs)
+    return energy / np.where(one > 0.0, one, 1.0), shallow & (one > 0.0)
+
+
+def round_paths(dimension, aligned):
+    rng = np.random.default_rng([33, dimension, aligned])
+    return RoundPaths(rng, 120, dimension, aligned=aligned)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("aligned", [False, True])
+def test_energy_of_nearly_round_rods_has_no_jumps_in_units_of_one_bond(
+    dimension, aligned, measured
+):
+    paths = round_paths(dimension, aligned)
+    jumps, valid = largest_jump(paths, over_one_bond)
+    assert valid.mean() > 0.9
+    rounding = EPS / np.exp(paths.log_overlap.middle - paths.log_overlap.amplitude)
+    in_roundings = np.max(jumps / rounding)
+    measured(largest_jump=jumps.max(), in_roundings=in_roundings, scanned=valid.mean())
+    assert np.all(jumps < 1e-9 + 16.0 * rounding)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("aligned", [False, True])
+def test_the_scan_of_nearly_round_rods_visits_two_bonds_one_bond_and_what_is_between(
+    dimension, aligned
+):
+    second, mean, x = shares_on(round_paths(dimension, aligned))
+    for share in (second, mean):
+        for share_of in (share > 0.999, (share > 0.001) & (share < 0.999), share == 0.0):
+            assert share_of.mean() > 0.02
+    between = (x.two_bonds > 0.001) & (x.two_bonds < 0.999)
+    for weight in (x.second_weight, x.mean_weight):
+        assert np.mean(between & (weight > 0.999)) > 0.01
+        fading = between & (weight > 0.001) & (weight < 0.999)
+        assert np.mean(fading) > 0.001 or (aligned and weight is x.second_weight)
+    assert x.overlap[x.overlap > 0.0].min() < 1e-7
+    assert x.overlap.max() > 0.05
+
+
+# --- two bonds that become one ----------------------------------------------------------------
+
+
+def side_by_side(rng, n, dimension, overlap, depth):
+    """Exactly parallel rods whose mean overlap is `depth` times (A_min / d)^2, weights of 1."""
+    _, _, R_i, R_j = random_shapes(rng, n)
+    shorter = (R_i + R_j) * np.sqrt(overlap / depth)
+    longer = shorter * log_uniform(rng, 1.0, 10.0, n)
+    i_is_shorter = rng.uniform(size=n) < 0.5
+    A_i, A_j = np.where(i_is_shorter, [shorter, longer], [longer, shorter])
+    u_j = random_directions(rng, n, dimension)
+    normal = random_perpendicular(rng, u_j)
+    past = (A_i + A_j - 1.01 * FADE_LENGTH * shorter) * rng.uniform(-1.0, 1.0, n)
+    u_i = scaled(rng.choice([-1.0, 1.0], n), u_j)
+    zero = np.zeros(n)
+    pairs = placed((A_i, A_j, R_i, R_j), u_i, u_j, zero, zero, normal, overlap)
+    return pairs.replaced(r=pairs.r + scaled(past, u_j)), normal
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_parallel_rods_have_two_bonds_when_shallow_and_one_when_deep(dimension, measured):
+    rng = np.random.default_rng([34, dimension])
+    n = 10_000
+    depth, overlap = log_uniform(rng, 0.1, 100.0, n), overlaps(rng, n, 1e-6)
+    pairs, _ = side_by_side(rng, n, dimension, overlap, depth)
+    result = contacts(pairs, 2)
+    one = contacts(pairs, 1)["energy"]
+    rounding = 4.0 * EPS * pairs.extent / (pairs.d * overlap)
+    for bonds, among in ((2.0, depth < 0.999), (1.0, depth > 16.001)):
+        assert among.sum() > 2000
+        error = np.abs(result["energy"] / (bonds * one) - 1.0)[among] / rounding[among]
+        measured(**{f"bonds_{bonds:.0f}_in_roundings": error.max()})
+        assert np.all(error < 1.0)
+    between = (depth > 1.01) & (depth < 15.9)
+    assert np.all((result["energy"] / one)[between] < 2.0)
+    assert np.all((result["energy"] / one)[between] > 1.0)
+    assert np.all(result["kind"] == SIDE_TO_SIDE)
+    assert np.all(result["n_bonds"] == 2)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_energy_of_parallel_rods_grows_on_approach_and_never_pulls(dimension, measured):
+    """From 0.1 to 100 times (A_min / d)^2, at whole and at fading overlap of the spines."""
+    rng = np.random.default_rng([35, dimension])
+    n, steps = 400, 400
+    deepest = overlaps(rng, n, 1e-4)
+    start, normal = side_by_side(rng, n, dimension, deepest, np.full(n, 100.0))
+    slid = row_dot(start.r, start.u_j)
+    whole = start.A_i + start.A_j
+    lengths = FADE_LENGTH * np.minimum(start.A_i, start.A_j) * rng.uniform(0.1, 1.2, n)
+    fading = np.arange(n) % 2 == 0
+    slide = np.where(fading, np.sign(slid) * (whole - lengths) - slid, 0.0)
+    start = start.replaced(r=start.r + scaled(slide, start.u_j))
+
+    before = np.zeros(n)
+    least_push, least_rise = np.inf, np.inf
+    for depth in np.geomspace(0.1, 100.0, steps):
+        overlap = deepest * depth / 100.0
+        pairs = start.replaced(r=start.r + scaled((deepest - overlap) * start.d, normal))
+        result = contacts(pairs, 2)
+        least_push = min(
+            least_push, np.min(row_dot(result["force"], normal) * pairs.d / overlap)
+        )
+        least_rise = min(least_rise, np.min(result["energy"] / np.maximum(before, 1e-300)))
+        before = result["energy"]
+    measured(least_push_over_one_bond=least_push, least_rise=least_rise)
+    # V = (1 + W D) E(m) pushes by 1 + W (D + m D'(m) / 2) of one bond, at least 0.91.
+    assert least_push > 0.9
+    assert least_rise > 1.0
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_deep_contacts_of_parallel_rods_have_no_kink(dimension, measured):
+    """Force and torques change in proportion to the turn through sin = 0; one bond's jump there."""
+    rng = np.random.default_rng([36, dimension])
+    n = 5000
+    pairs, _ = side_by_side(
+        rng, n, dimension, overlaps(rng, n), log_uniform(rng, 16.1, 1e4, n)
+    )
+    sideways = random_perpendicular(rng, pairs.u_i)
+
+    def torques_at(fraction, sides):
+        sine = fraction * sine_range(pairs)
+        turned = scaled(np.sqrt(1.0 - sine**2), pairs.u_i) + scaled(sine, sideways)
+        result = contacts(pairs.replaced(u_i=turned), sides)
+        # in units of one bond at an end of the shorter rod
+        force = np.linalg.norm(result["force"], axis=1)
+        lever = (force * np.minimum(pairs.A_i, pairs.A_j))[:, None]
+        return (
+            result["force"] / force[:, None],
+            result["torque_i"] / lever,
+            result["torque_j"] / lever,
+        )
+
+    def jump(fraction, sides):
+        across = zip(torques_at(fraction, sides), torques_at(-fraction, sides), strict=True)
+        return np.array([np.abs(a - b).max(axis=1) for a, b in across])
+
+    near, nearer, one_bond = jump(1e-3, 2), jump(1e-6, 2), jump(1e-3, 1)
+    measured(force=nearer[0].max(), torque=nearer[1:].max(), at_a_wider_turn=near.max(),
+             one_bond=np.median(one_bond[1]))  # fmt: skip
+    assert near.max() < 1e-3
+    assert nearer.max() < 1e-6
+    assert np.median(one_bond[1]) > 0.5
 
 
 # --- the parallel band of the one-bond law -----------------------------------------------------

@@ -1,0 +1,83 @@
+#pragma once
+
+#include "contact/scalar.hpp"
+
+#include <cmath>
+
+namespace jamshape {
+
+/// A number with its derivatives by N variables: forward-mode differentiation, to rounding. Where
+/// the force is written for any scalar, its exact derivative is that code run on these numbers, and
+/// no formula of a second derivative stands anywhere. Branches look at the values alone.
+template <int N, class S = double> struct Dual {
+  S value;
+  S d[N];
+
+  Dual() = default;
+  Dual(S x) : value(x), d{} {}  // constants convert by themselves
+
+  /// The k-th variable, with value x.
+  static Dual variable(S x, int k)
+  {
+    Dual a(x);
+    a.d[k] = 1;
+    return a;
+  }
+
+  /// The function value f(x) with f'(x) times the derivatives of x.
+  Dual chain(S f, S slope) const
+  {
+    Dual a(f);
+    for (int k = 0; k < N; ++k) a.d[k] = slope * d[k];
+    return a;
+  }
+
+  Dual &operator+=(const Dual &b)
+  {
+    value += b.value;
+    for (int k = 0; k < N; ++k) d[k] += b.d[k];
+    return *this;
+  }
+  Dual &operator-=(const Dual &b)
+  {
+    value -= b.value;
+    for (int k = 0; k < N; ++k) d[k] -= b.d[k];
+    return *this;
+  }
+  Dual &operator*=(const Dual &b)
+  {
+    for (int k = 0; k < N; ++k) d[k] = d[k] * b.value + value * b.d[k];
+    value *= b.value;
+    return *this;
+  }
+  Dual &operator/=(const Dual &b) { return *this *= b.chain(1 / b.value, -1 / (b.value * b.value)); }
+
+  friend Dual operator+(Dual a, const Dual &b) { return a += b; }
+  friend Dual operator-(Dual a, const Dual &b) { return a -= b; }
+  friend Dual operator*(Dual a, const Dual &b) { return a *= b; }
+  friend Dual operator/(Dual a, const Dual &b) { return a /= b; }
+  friend Dual operator-(const Dual &a) { return a.chain(-a.value, -1); }
+
+  friend bool operator<(const Dual &a, const Dual &b) { return a.value < b.value; }
+  friend bool operator>(const Dual &a, const Dual &b) { return a.value > b.value; }
+  friend bool operator<=(const Dual &a, const Dual &b) { return a.value <= b.value; }
+  friend bool operator==(const Dual &a, const Dual &b) { return a.value == b.value; }
+  friend bool operator!=(const Dual &a, const Dual &b) { return a.value != b.value; }
+
+  friend Dual sqrt(const Dual &a)
+  {
+    const S root = std::sqrt(a.value);
+    return a.chain(root, 1 / (2 * root));
+  }
+  friend Dual log(const Dual &a) { return a.chain(std::log(a.value), 1 / a.value); }
+  friend Dual abs(const Dual &a) { return a.value < 0 ? -a : a; }
+  friend Dual copysign(const Dual &a, const Dual &b)
+  {
+    return std::signbit(a.value) == std::signbit(b.value) ? a : -a;
+  }
+};
+
+template <int N, class S> S value_of(const Dual<N, S> &x) { return x.value; }
+template <int N, class S> Dual<N, S> constant(const Dual<N, S> &x) { return x.value; }
+
+}  // namespace jamshape

@@ -1,0 +1,113 @@
+#pragma once
+
+#include "contact/contact.hpp"
+#include "contact/dual.hpp"
+#include "contact/rotation.hpp"
+#include "contact/vec.hpp"
+
+namespace jamshape {
+
+/// A pair's energy depends on r = x_i - x_j and on the rotation vectors of i and of j (space
+/// coordinates, about the present pose), in this order: 4 variables in 2D, 9 in 3D.
+template <int D> inline constexpr int PAIR_VARIABLES = D + 2 * ROTATIONS<D>;
+
+/// Shape, orientation and law of a pair, and r.
+template <class Model, int D, class S> struct PosedPair {
+  typename Model::Shape shape_i, shape_j;
+  Vec<D, S> r;
+  QuaternionOf<S> orientation_i, orientation_j;
+  typename Model::Law law;
+};
+
+/// A contact with the second derivatives of its energy, in two parts: the sum over bonds of
+/// stiffness * gradient (x) gradient, and `curvature`, all that comes from the forces themselves
+/// (Marschall & Teitel 2018, Eqs. 38-40: H and -S). Kept apart since the second is smaller by the
+/// overlap and would drown in their sum.
+template <int D, class S> struct ContactDerivatives {
+  static constexpr int N = PAIR_VARIABLES<D>;
+  Contact<D, S> contact;
+  S gradient[2][N];  // of the distance of each bond
+  S curvature[N][N];
+};
+
+namespace detail {
+
+template <int N, class S>
+QuaternionOf<Dual<N, S>> turned_by_variables(const QuaternionOf<S> &q, const Vec<1, int> &first)
+{
+  const Dual<N, S> one(1.0), zero(0.0);
+  const QuaternionOf<Dual<N, S>> turn{one, zero, zero, 0.5 * Dual<N, S>::variable(0.0, first[0])};
+  return turn * QuaternionOf<Dual<N, S>>{q.w, q.i, q.j, q.k};
+}
+
+template <int N, class S>
+QuaternionOf<Dual<N, S>> turned_by_variables(const QuaternionOf<S> &q, const Vec<3, int> &first)
+{
+  const auto half = [&](int k) { return 0.5 * Dual<N, S>::variable(0.0, first[k]); };
+  const QuaternionOf<Dual<N, S>> turn{Dual<N, S>(1.0), half(0), half(1), half(2)};
+  return turn * QuaternionOf<Dual<N, S>>{q.w, q.i, q.j, q.k};
+}
+
+/// ROTATIONS<D> variables from `first` on.
+template <int D> Torque<D, int> variables_from(int first)
+{
+  Torque<D, int> index;
+  for (int k = 0; k < ROTATIONS<D>; ++k) index[k] = first + k;
+  return index;
+}
+
+}  // namespace detail
+
+/// The contact of a pair as its energy and forces alone.
+template <class Model, int D, class S> Contact<D, S> contact_at(const PosedPair<Model, D, S> &pair)
+{
+  auto body_i = Model::template body<D, S>(pair.shape_i);
+  auto body_j = Model::template body<D, S>(pair.shape_j);
+  body_i.centre = pair.r;
+  if (Model::turns(pair.shape_i)) Model::template turn_to<D, S>(body_i, pair.orientation_i);
+  if (Model::turns(pair.shape_j)) Model::template turn_to<D, S>(body_j, pair.orientation_j);
+  return contact_of(body_i, body_j, pair.law);
+}
+
+/// Adds the second derivatives, by running the code of the forces on dual numbers.
+template <class Model, int D, class S>
+ContactDerivatives<D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
+{
+  constexpr int N = PAIR_VARIABLES<D>, M = ROTATIONS<D>;
+  using Number = Dual<N, S>;
+  auto body_i = Model::template body<D, Number>(pair.shape_i);
+  auto body_j = Model::template body<D, Number>(pair.shape_j);
+  for (int k = 0; k < D; ++k) body_i.centre[k] = Number::variable(pair.r[k], k);
+  const auto turn_i = detail::variables_from<D>(D), turn_j = detail::variables_from<D>(D + M);
+  Model::template turn_to<D, Number>(
+      body_i, detail::turned_by_variables<N, S>(pair.orientation_i, turn_i));
+  Model::template turn_to<D, Number>(
+      body_j, detail::turned_by_variables<N, S>(pair.orientation_j, turn_j));
+  const Contact<D, Number> dual = contact_of(body_i, body_j, pair.law);
+
+  ContactDerivatives<D, S> result{};
+  result.contact = contact_at(pair);
+  if (dual.status != ContactStatus::TOUCHING) return result;
+  for (int b = 0; b < dual.n_bonds; ++b) {
+    const Bond<D, S> &bond = result.contact.bond[b];
+    for (int k = 0; k < D; ++k) result.gradient[b][k] = bond.normal[k];
+    for (int k = 0; k < M; ++k) result.gradient[b][D + k] = bond.lever_i[k];
+    for (int k = 0; k < M; ++k) result.gradient[b][D + M + k] = bond.lever_j[k];
+  }
+  for (int col = 0; col < N; ++col) {
+    for (int k = 0; k < D; ++k) result.curvature[k][col] = -dual.force[k].d[col];
+    for (int k = 0; k < M; ++k) result.curvature[D + k][col] = -dual.torque_i[k].d[col];
+    for (int k = 0; k < M; ++k) result.curvature[D + M + k][col] = -dual.torque_j[k].d[col];
+  }
+  // Rotations in space do not commute: the torque's derivative by a rotation vector is that of the
+  // energy and an antisymmetric part.
+  for (int row = 0; row < N; ++row) {
+    for (int col = 0; col < row; ++col) {
+      const S mean = 0.5 * (result.curvature[row][col] + result.curvature[col][row]);
+      result.curvature[row][col] = result.curvature[col][row] = mean;
+    }
+  }
+  return result;
+}
+
+}  // namespace jamshape

@@ -1,0 +1,71 @@
+"""Sparse Newton steps on an energy landscape: factorisation, regularisation, step control."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+from scipy.sparse.linalg import splu
+
+from jamshape.packing import FloatArray
+
+# The smallest shift, relative to the largest diagonal element: rounding in the factorisation is
+# just below it, and so is what it does to modes that are stiff at all.
+LEAST_SHIFT = 1e-13
+
+_GROWTH = 10.0
+_DECAY = 3.0
+
+# A step that needed more evaluations to find its length was in a wrong direction.
+_FAR_OFF = 6
+
+
+class Factorisation:
+    """Factors of M + shift: SuperLU without pivoting, so that the signs of the pivots are those of
+    the eigenvalues (Sylvester's law of inertia).
+    """
+
+    def __init__(self, matrix: Any, shift: float) -> None:
+        shifted = matrix + shift * scipy.sparse.identity(matrix.shape[0], format="csc")
+        self._lu = splu(
+            shifted.tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        pivots = self._lu.U.diagonal()
+        self.n_negative = int((pivots < 0).sum())
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve for one (n,) or several (n, k) right-hand sides."""
+        solution: FloatArray = self._lu.solve(right)
+        return solution
+
+
+@dataclass
+class Regularised:
+    """Keeps the shift that makes a Hessian positive definite, from one step to the next."""
+
+    shift: float = 1e-6
+
+    def factorise(self, matrix: Any) -> Factorisation:
+        """Factorise with the least shift, by powers of ten, that leaves no negative pivot."""
+        scale = float(np.abs(matrix.diagonal()).max(initial=0.0)) or 1.0
+        self.shift = max(self.shift, LEAST_SHIFT * scale)
+        while True:
+            try:
+                factors = Factorisation(matrix, self.shift)
+            except RuntimeError:  # exactly singular
+                factors = None
+            if factors is not None and factors.n_negative == 0:
+                return factors
+            self.shift *= _GROWTH
+
+    def learn(self, tries: int) -> None:
+        """Shift less after a step that was right at once, more after one that was far off."""
+        if tries == 1:
+            self.shift /= _DECAY
+        elif tries > _FAR_OFF:
+            self.shift *= _GROWTH

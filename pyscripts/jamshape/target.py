@@ -1,0 +1,324 @@
+"""Packings at a chosen energy density: the box and the coordinates of a minimum with u = u0."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from jamshape.landscape import CrossingError, Landscape, State
+from jamshape.minimise import (
+    Descent,
+    History,
+    Minimum,
+    Outcome,
+    Stop,
+    limited,
+    minimise,
+    residual_of,
+    search_along,
+)
+from jamshape.newton import Regularised
+from jamshape.packing import FloatArray
+
+# A minimum this good is jammed.
+_GOOD = 1e-2
+
+# One this good can follow a change of the box: rods that slide along flat sides, the faster the
+# higher the energy, have found where they stop. A move is not made if it leaves a residual above.
+_GOOD_TO_MOVE = 1e-4
+_FAR = 0.3
+
+# At u0, minima this good are kept while a better one, by that factor, is looked for in so many steps.
+_SLIDING = 1e-5
+_GAIN = 0.7
+_SLIDING_STEPS = 60
+
+# At most this factor in sqrt(u), which is linear in phi - phi_J, from one step to the next.
+_LARGEST_FACTOR = 4.0
+
+# Below this fraction of u0 the energy is falling to nothing: the box was opened too far.
+_FALLEN = 1e-4
+
+# Steps grow again after so many that left the state unjammed.
+_GROW_AFTER = 4
+
+_PATIENCE = 1500
+_SMALLEST_STEP = 1e-12
+
+
+class TargetError(RuntimeError):
+    """No minimum of the asked energy was found; the sentence says what was."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What to look for.
+
+    Parameters
+    ----------
+    u0
+        Energy density U / L^D, [energy / length^D].
+    accuracy
+        Of |u - u0| / u0.
+    tolerance
+        Of the residual of the minimum.
+    step
+        Strain of the box by which unjammed states are compressed, at first.
+    method
+        Minimiser of the halving search.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive.
+    """
+
+    u0: float = 1e-15
+    accuracy: float = 1e-7
+    tolerance: float = 1e-8
+    step: float = 5e-4
+    method: str = "auto"
+
+    def __post_init__(self) -> None:
+        for name in ("u0", "accuracy", "tolerance", "step"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                msg = f"{name} is {value}, expected a positive number"
+                raise ValueError(msg)
+
+    def is_met(self, u: float) -> bool:
+        """Whether an energy density is u0."""
+        return abs(u - self.u0) <= self.accuracy * self.u0
+
+
+@dataclass(eq=False)
+class Search:
+    """A search between two minimisations: all that is needed to go on from here.
+
+    Parameters
+    ----------
+    state
+        To be minimised next.
+    step
+        Strain by which to compress or open the box next.
+    loose, loose_in_a_row
+        The densest state known to be unjammed, if any; how many were found one after another.
+    opening
+        Whether the last step opened the box.
+    minimum
+        The result, once it is found.
+    """
+
+    state: State
+    step: float
+    loose: State | None = None
+    loose_in_a_row: int = 0
+    opening: bool | None = None
+    minimum: Minimum | None = None
+    history: History = field(default_factory=History)
+
+
+def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Search]:
+    """Find the packing by Newton's method on coordinates and box at once.
+
+    Unjammed states are compressed by small strains and minimised, until one stays jammed. From
+    there sqrt(u), which is linear in the strain, is led to sqrt(u0) by steps that move the box and
+    let the particles follow it to second order. A box opened too far is closed in finer steps.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    search : Search
+        Where to begin, or to go on.
+    target : Target
+
+    Yields
+    ------
+    Search
+        The same object after each minimisation. The last one has a minimum.
+
+    Raises
+    ------
+    TargetError
+        If steps become too small.
+    """
+    while search.minimum is None:
+        landscape.forget_pairs()  # what follows depends on `search` alone
+        stop = Stop(tolerance=_GOOD, lowest=_FALLEN * target.u0)
+        found = minimise(landscape, search.state, "auto", stop, search.history)
+        if found.outcome is Outcome.CONVERGED:
+            found = _lead_to(landscape, found, target)
+            if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):
+                search.minimum, search.state = found, found.state
+                yield search
+                return
+            search.step, search.loose_in_a_row = search.step / 4, 0
+        if found.outcome is Outcome.UNJAMMED:
+            search.loose, search.loose_in_a_row = found.state, search.loose_in_a_row + 1
+            if search.opening:
+                search.step /= 4
+            elif search.loose_in_a_row % _GROW_AFTER == 0:
+                search.step = min(2 * search.step, target.step)
+            search.opening = False
+            search.state = found.state.strained(-search.step)
+        elif search.loose is not None:  # jammed, but too far above: go there in a smaller step
+            search.step /= 4
+            search.state = search.loose.strained(-search.step)
+        else:
+            if search.opening:
+                search.step *= 2
+            search.opening = True
+            search.state = found.state.strained(search.step)
+        if search.step < _SMALLEST_STEP:
+            u = found.energy_density
+            msg = (
+                f"the search ended between an unjammed state and one of u = {u:.3g} that has a"
+                f" residual of {found.residual.largest:.2g}, expected a minimum with u = {target.u0:.3g};"
+                " take another u0 or another start"
+            )
+            raise TargetError(msg)
+        yield search
+
+
+def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Minimum:
+    """Lead a minimum to u0; unjammed if the energy falls to nothing, stalled if stuck."""
+    stop = Stop(tolerance=target.tolerance, lowest=_FALLEN * target.u0)
+    descent = Descent(landscape, start.state, stop, start.history)
+    descent.be_patient(_PATIENCE)
+    regularised, best = Regularised(), _Best()
+    while True:
+        met = target.is_met(descent.evaluation.energy / descent.state.volume)
+        outcome = descent.outcome()
+        if outcome is Outcome.CONVERGED and met:
+            return descent.minimum(outcome)
+        if outcome not in {None, Outcome.CONVERGED} and best.minimum is None:
+            return descent.minimum(outcome)
+        stiff = _joint_step(descent, regularised, target)
+        if met or best.minimum:
+            best.offer(descent, met, stiff)
+        if best.minimum and (best.is_old() or outcome is Outcome.UNJAMMED):
+            return best.minimum
+
+
+@dataclass
+class _Best:
+    """The best minimum at u0 so far, when it takes long to find a better one."""
+
+    minimum: Minimum | None = None
+    age: int = 0
+
+    def offer(self, descent: Descent, met: bool, stiff: float) -> None:
+        self.age += 1
+        if not met or descent.residual > _SLIDING:
+            return
+        if self.minimum is None or descent.residual < _GAIN * self.minimum.residual.largest:
+            sliding = stiff <= descent.stop.tolerance
+            self.minimum = descent.minimum(Outcome.SLIDING if sliding else Outcome.STALLED)
+            self.age = 0
+
+    def is_old(self) -> bool:
+        return self.age > _SLIDING_STEPS
+
+
+def _joint_step(descent: Descent, regularised: Regularised, target: Target) -> float:
+    """Take a step of Newton's method for the coordinates and, at a minimum, the box.
+
+    Returns the residual before it without what lies along soft modes.
+    """
+    landscape, state, evaluation = descent.landscape, descent.state, descent.evaluation
+    curvature = landscape.curvature(state)
+    factors = regularised.factorise(curvature.hessian)
+    right = np.column_stack([evaluation.gradient, curvature.coupling])
+    relax, follow = -factors.solve(right).T
+    # What the shift keeps Newton's method from removing lies along modes softer than it.
+    stiff_part = evaluation._replace(gradient=evaluation.gradient + regularised.shift * relax)
+    stiff = residual_of(landscape, stiff_part).largest
+    # Energy of the minimum nearby and its slope along the minima, at the present box.
+    energy = evaluation.energy + 0.5 * float(evaluation.gradient @ relax)
+    slope = evaluation.strain_gradient + float(curvature.coupling @ relax)
+    if descent.residual <= _GOOD_TO_MOVE:
+        strain = _strain_to(descent, target, energy, slope)
+        step = relax + strain * follow
+        if np.array_equal(limited(landscape, step), step) and _move(descent, strain, step):
+            regularised.learn(1)
+            return stiff
+    along = search_along(descent, limited(landscape, relax))
+    regularised.learn(along.tries)
+    descent.move_to(along.state, along.evaluation)
+    return stiff
+
+
+def _move(descent: Descent, strain: float, step: FloatArray) -> bool:
+    """Move box and coordinates, unless that leads far from equilibrium; say whether it did."""
+    landscape = descent.landscape
+    trial = landscape.displaced(descent.state.strained(strain), step)
+    try:
+        found = landscape.evaluate(trial, extended=descent.extended)
+    except CrossingError:
+        return False
+    if found.bond_force == 0.0 or residual_of(landscape, found).largest > _FAR:
+        return False
+    descent.move_to(trial, found)
+    return True
+
+
+def _strain_to(descent: Descent, target: Target, energy: float, slope: float) -> float:
+    """Strain after which sqrt(u) is that of the target, or nearer to it by a bounded factor."""
+    volume = descent.state.volume
+    if energy <= 0.0:
+        return 0.0
+    now, aim = math.sqrt(energy / volume), math.sqrt(target.u0)
+    aim = min(max(aim, now / _LARGEST_FACTOR), now * _LARGEST_FACTOR)
+    per_strain = (slope - descent.state.dimension * energy) / (2 * now * volume)
+    return (aim - now) / per_strain if per_strain < 0 else 0.0
+
+
+def halving(
+    landscape: Landscape, search: Search, target: Target, shortest: float = 1e-16
+) -> Iterator[Search]:
+    """Find the packing by the halving search of Marschall & Teitel 2018, Sec. III C, as written.
+
+    L and r are scaled by 1 -+ lambda and minimised until U crosses U0; then lambda is halved and
+    the direction reversed. `Search.step` is lambda, 1e-6 to begin with in the paper.
+
+    Arguments and results as of `direct`.
+
+    Raises
+    ------
+    TargetError
+        If lambda falls below `shortest` before u is u0.
+    """
+    while search.minimum is None:
+        landscape.forget_pairs()
+        stop = Stop(tolerance=target.tolerance)
+        found = minimise(landscape, search.state, target.method, stop, search.history)
+        u = found.energy_density
+        if target.is_met(u):
+            search.minimum, search.state = found, found.state
+            yield search
+            return
+        opens = u > target.u0
+        if search.opening is not None and search.opening != opens:
+            search.step /= 2
+        if search.step < shortest:
+            msg = (
+                f"lambda fell below {shortest:g} at u = {u:.9g}, expected u = {target.u0:.9g};"
+                " use the direct search"
+            )
+            raise TargetError(msg)
+        search.opening = opens
+        search.state = found.state.strained(search.step if opens else -search.step)
+        yield search
+
+
+def find(landscape: Landscape, start: State, target: Target) -> Minimum:
+    """Run the direct search from a state to its end; errors as `direct`."""
+    search = Search(start, target.step)
+    for search in direct(landscape, search, target):
+        pass
+    assert search.minimum is not None
+    return search.minimum
