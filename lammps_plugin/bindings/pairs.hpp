@@ -14,12 +14,12 @@ namespace jamshape {
 
 /// Arguments of the functions over all pairs of a packing, as they come from Python.
 struct PackingArrays {
-  const Array2<double> &diameters;       // (N, 3)
-  const Array3<double> &position;        // (2, N, D)
-  const Array3<double> &orientation;     // (2, N, 1) or (2, N, 4)
-  const Array2<double> &edges;           // (2, D)
-  const Array2<std::int64_t> &pairs;     // (M, 2)
-  const Array2<std::int64_t> &shift;     // (M, D)
+  const Array2<double> &diameters;    // (N, 3)
+  const Array3<double> &position;     // (2, N, D)
+  const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
+  const Array2<double> &edges;        // (2, D)
+  const Array2<std::int64_t> &pairs;  // (M, 2)
+  const Array2<std::int64_t> &shift;  // (M, D)
 
   int dimension() const { return static_cast<int>(edges.shape(1)); }
   std::size_t n() const { return diameters.shape(0); }
@@ -37,9 +37,10 @@ struct PackingArrays {
     require(pairs.shape(1) == 2 && shift.shape(1) == D && shift.shape(0) == pairs.shape(0),
             "pairs and shift have no shapes (M, 2) and (M, D).");
     const std::int64_t *const first = pairs.data(), *const last = first + pairs.size();
-    require(std::all_of(first, last,
-                        [&](std::int64_t i) { return i >= 0 && static_cast<std::size_t>(i) < n(); }),
-            "a pair names a particle that does not exist.");
+    require(
+        std::all_of(first, last,
+                    [&](std::int64_t i) { return i >= 0 && static_cast<std::size_t>(i) < n(); }),
+        "a pair names a particle that does not exist.");
   }
 
   SplitPoses poses() const
@@ -63,8 +64,8 @@ struct PackingArrays {
     result.reserve(n());
     for (std::size_t i = 0; i < n(); ++i) {
       const auto shape = Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i));
-      require(shape.has_value(), "particle " + std::to_string(i) + " is no such shape: " +
-                                     Model::SHAPE_RULE + ".");
+      require(shape.has_value(),
+              "particle " + std::to_string(i) + " is no such shape: " + Model::SHAPE_RULE + ".");
       result.push_back(*shape);
     }
     return result;
@@ -75,8 +76,8 @@ template <class Model, int D, class S>
 nb::dict sums_in(const PackingArrays &arrays, const typename Model::Law &law)
 {
   const auto shapes = arrays.shapes<Model>();
-  const auto sums = sum_over(
-      PosedPairs<Model, D, S>(shapes, arrays.poses(), arrays.list(), law), shapes.size());
+  const auto sums =
+      sum_over(PosedPairs<Model, D, S>(shapes, arrays.poses(), arrays.list(), law), shapes.size());
   NewArray<double> force({shapes.size(), D}), torque({shapes.size(), ROTATIONS<D>});
   for (std::size_t n = 0; n < shapes.size(); ++n) {
     write_vec(sums.force[n], force.row(n));
@@ -167,7 +168,8 @@ nb::dict pair_sums(const PackingArrays &arrays, const typename Model::Law &law, 
 }
 
 template <class Model>
-nb::dict pair_derivatives(const PackingArrays &arrays, const typename Model::Law &law, bool extended)
+nb::dict pair_derivatives(const PackingArrays &arrays, const typename Model::Law &law,
+                          bool extended)
 {
   arrays.check();
   if (arrays.dimension() == 2) {

@@ -167,23 +167,25 @@ void export_spherocylinder(nb::module_ &m)
       "radius. Returns a dict of arrays: status (0 apart, 1 touching, 2 crossing), kind, n_bonds,\n"
       "energy, force (on i), torque_i, torque_j and, of up to two bonds, bond_normal (into i),\n"
       "bond_force, bond_arm_i, bond_distance, bond_energy, bond_on_side_i, bond_on_side_j.");
-  m.def(
-      "spherocylinder_sums", &spherocylinder_sums, "diameters"_a, "position"_a, "orientation"_a,
-      "edges"_a, "pairs"_a, "shift"_a, "k_e"_a, "sides"_a, "extended"_a,
-      "Sums over M pairs of N particles. Diameters (N, 3); position (2, N, D), orientation (2, N, 1)\n"
-      "angles or (2, N, 4) quaternions and edges (2, D) as a double and its small rest; pairs\n"
-      "(M, 2), shift (M, D) box edges to add to the second; extended: in long double. Returns a\n"
-      "dict: energy, force (N, D), torque (N, 1 or 3), virial (D, D), bond_force (sum of\n"
-      "magnitudes), n_bonds, crossing (a pair that cannot be computed, or -1).");
-  m.def(
-      "spherocylinder_derivatives", &spherocylinder_derivatives, "diameters"_a, "position"_a,
-      "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "k_e"_a, "sides"_a, "extended"_a,
-      "Second derivatives of the C touching pairs, arguments as in spherocylinder_sums. The\n"
-      "variables are r_i - r_j and the rotations of i and j, n = 4 in 2D, 9 in 3D. Returns a dict:\n"
-      "pair (C,) rows of pairs; n_bonds, kind, energy (C,); separation, force (C, D); of up to two\n"
-      "bonds stiffness, distance, bond_force (C, 2), on_side (C, 2, 2) and gradient (C, 2, n) of the\n"
-      "distance;\n"
-      "curvature (C, n, n), all but stiffness gradient (x) gradient.");
+  m.def("spherocylinder_sums", &spherocylinder_sums, "diameters"_a, "position"_a, "orientation"_a,
+        "edges"_a, "pairs"_a, "shift"_a, "k_e"_a, "sides"_a, "extended"_a,
+        "Sums over M pairs of N particles. Diameters (N, 3); position (2, N, D), orientation (2, "
+        "N, 1)\n"
+        "angles or (2, N, 4) quaternions and edges (2, D) as a double and its small rest; pairs\n"
+        "(M, 2), shift (M, D) box edges to add to the second; extended: in long double. Returns a\n"
+        "dict: energy, force (N, D), torque (N, 1 or 3), virial (D, D), bond_force (sum of\n"
+        "magnitudes), n_bonds, crossing (a pair that cannot be computed, or -1).");
+  m.def("spherocylinder_derivatives", &spherocylinder_derivatives, "diameters"_a, "position"_a,
+        "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "k_e"_a, "sides"_a, "extended"_a,
+        "Second derivatives of the C touching pairs, arguments as in spherocylinder_sums. The\n"
+        "variables are r_i - r_j and the rotations of i and j, n = 4 in 2D, 9 in 3D. Returns a "
+        "dict:\n"
+        "pair (C,) rows of pairs; n_bonds, kind, energy (C,); separation, force (C, D); of up to "
+        "two\n"
+        "bonds stiffness, distance, bond_force (C, 2), on_side (C, 2, 2) and gradient (C, 2, n) of "
+        "the\n"
+        "distance;\n"
+        "curvature (C, n, n), all but stiffness gradient (x) gradient.");
   m.def("spine_distances", &spine_distances, "bodies_i"_a, "bodies_j"_a,
         "Shortest distances (M,) of the spines of M pairs, 0 where they cross.");
   m.def("spherocylinder_drag", &spherocylinder_drag, "half_length"_a, "radius"_a, "dimension"_a,

@@ -14,16 +14,16 @@ enum class ContactKind { TIP_TO_TIP = 0, TIP_TO_SIDE = 1, SIDE_TO_SIDE = 2 };
 
 /// One point of contact that carries one force. Vectors are in space coordinates.
 template <int D, class S = double> struct Bond {
-  Vec<D, S> normal;     // unit, into i
-  Vec<D, S> force;      // on i; j carries the opposite
-  Vec<D, S> arm_i;      // from the centre of i to the point of contact
+  Vec<D, S> normal;      // unit, into i
+  Vec<D, S> force;       // on i; j carries the opposite
+  Vec<D, S> arm_i;       // from the centre of i to the point of contact
   Torque<D, S> lever_i;  // derivative of the distance by a rotation of i
   Torque<D, S> lever_j;  // and of j
-  S distance;   // the r of the overlap 1 - r/d
-  S reach;      // the d of it
-  S energy;     // this bond's share of the contact's energy
-  S stiffness;  // its second derivative with respect to the distance
-  bool on_side_i;    // the foot lies strictly inside the flat part of i
+  S distance;            // the r of the overlap 1 - r/d
+  S reach;               // the d of it
+  S energy;              // this bond's share of the contact's energy
+  S stiffness;           // its second derivative with respect to the distance
+  bool on_side_i;        // the foot lies strictly inside the flat part of i
   bool on_side_j;
 };
 

@@ -50,7 +50,10 @@ template <int N, class S = double> struct Dual {
     value *= b.value;
     return *this;
   }
-  Dual &operator/=(const Dual &b) { return *this *= b.chain(1 / b.value, -1 / (b.value * b.value)); }
+  Dual &operator/=(const Dual &b)
+  {
+    return *this *= b.chain(1 / b.value, -1 / (b.value * b.value));
+  }
 
   friend Dual operator+(Dual a, const Dual &b) { return a += b; }
   friend Dual operator-(Dual a, const Dual &b) { return a -= b; }

@@ -79,10 +79,10 @@ ContactDerivatives<D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
   auto body_j = Model::template body<D, Number>(pair.shape_j);
   for (int k = 0; k < D; ++k) body_i.centre[k] = Number::variable(pair.r[k], k);
   const auto turn_i = detail::variables_from<D>(D), turn_j = detail::variables_from<D>(D + M);
-  Model::template turn_to<D, Number>(
-      body_i, detail::turned_by_variables<N, S>(pair.orientation_i, turn_i));
-  Model::template turn_to<D, Number>(
-      body_j, detail::turned_by_variables<N, S>(pair.orientation_j, turn_j));
+  Model::template turn_to<D, Number>(body_i,
+                                     detail::turned_by_variables<N, S>(pair.orientation_i, turn_i));
+  Model::template turn_to<D, Number>(body_j,
+                                     detail::turned_by_variables<N, S>(pair.orientation_j, turn_j));
   const Contact<D, Number> dual = contact_of(body_i, body_j, pair.law);
 
   ContactDerivatives<D, S> result{};

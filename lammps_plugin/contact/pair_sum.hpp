@@ -66,7 +66,8 @@ template <class Model, int D, class S> class PosedPairs {
       Long difference = 0.0;
       for (int part = 0; part < 2; ++part) {
         const double *const x = poses.position[part];
-        difference += (static_cast<Long>(x[D * i + k]) - x[D * j + k]) - turns * poses.edges[part][k];
+        difference +=
+            (static_cast<Long>(x[D * i + k]) - x[D * j + k]) - turns * poses.edges[part][k];
       }
       r[k] = static_cast<S>(difference);
     }
@@ -94,8 +95,8 @@ template <int D, class S> struct PairSums {
   S energy = 0.0;
   std::vector<Vec<D, S>> force;
   std::vector<Torque<D, S>> torque;
-  Vec<D * D, S> virial{};      // sum of r (x) force on i
-  S bond_force = 0.0;          // sum of the magnitudes
+  Vec<D * D, S> virial{};  // sum of r (x) force on i
+  S bond_force = 0.0;      // sum of the magnitudes
   std::size_t n_bonds = 0;
   std::size_t crossing = NONE;  // the first pair that cannot be computed
 

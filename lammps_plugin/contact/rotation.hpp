@@ -12,8 +12,7 @@ template <class S> struct QuaternionOf {
 };
 using Quaternion = QuaternionOf<double>;
 
-template <class S>
-QuaternionOf<S> operator*(const QuaternionOf<S> &p, const QuaternionOf<S> &q)
+template <class S> QuaternionOf<S> operator*(const QuaternionOf<S> &p, const QuaternionOf<S> &q)
 {
   return {
       p.w * q.w - p.i * q.i - p.j * q.j - p.k * q.k, p.w * q.i + p.i * q.w + p.j * q.k - p.k * q.j,

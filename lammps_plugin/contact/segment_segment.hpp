@@ -77,7 +77,8 @@ template <int D, class S> struct TipFeet {
 /// share a tip, the one whose other foot lies inside the spine is: its distance is the least from
 /// that tip. Rounded distances cannot tell that of feet within 1e-8 of each other, and would leave
 /// normal and lever arms with half of the digits.
-template <int D, class S> bool is_closer(const SpinePair<D, S> &p, const Feet<D, S> &a, const Feet<D, S> &b)
+template <int D, class S>
+bool is_closer(const SpinePair<D, S> &p, const Feet<D, S> &a, const Feet<D, S> &b)
 {
   if (a.s == b.s) {
     const bool a_inside = abs(a.t) < p.A_j, b_inside = abs(b.t) < p.A_j;
@@ -157,7 +158,10 @@ template <class S> Feet<3, S> closest_from_end(const SpinePair<3, S> &p, const S
   return each_others_feet(p, t_at_end);
 }
 
-template <class S> Feet<2, S> closest_to_end(const SpinePair<2, S> &, const Feet<2, S> &end) { return end; }
+template <class S> Feet<2, S> closest_to_end(const SpinePair<2, S> &, const Feet<2, S> &end)
+{
+  return end;
+}
 template <class S> Feet<3, S> closest_to_end(const SpinePair<3, S> &p, const Feet<3, S> &end)
 {
   const Vec<3, S> turn = p.u_i - copysign(S(1.0), dot(p.u_i, p.u_j)) * p.u_j;
@@ -197,8 +201,7 @@ template <int D, class S> S abs_sine(const SpinePair<D, S> &p) { return norm(cro
 template <class S> bool spines_cross(const SpinePair<2, S> &p)
 {
   const S sine = abs(cross(p.u_i, p.u_j)[0]);
-  return abs(cross(p.u_j, p.r)[0]) < p.A_i * sine &&
-         abs(cross(p.u_i, p.r)[0]) < p.A_j * sine;
+  return abs(cross(p.u_j, p.r)[0]) < p.A_i * sine && abs(cross(p.u_i, p.r)[0]) < p.A_j * sine;
 }
 template <class S> bool spines_cross(const SpinePair<3, S> &) { return false; }
 

@@ -85,8 +85,9 @@ inline constexpr double FADE_COSINE_START = 0.5;
 inline constexpr double FADE_COSINE_RANGE = 0.35;
 
 /// Two bonds become one while their mean overlap (as a length) grows from A_min^2 / d to DEEP times
-/// that; the one is then free of a kink for rods that are parallel to this sine, in units of A_min / d.
-/// At larger angles the feet of the two ends, moving by d sin, are too far from where the ends are.
+/// that; the one is then free of a kink for rods that are parallel to this sine, in units of A_min
+/// / d. At larger angles the feet of the two ends, moving by d sin, are too far from where the ends
+/// are.
 inline constexpr double DEEP = 16.0;
 inline constexpr double DEEP_SINE = 0.1;
 
@@ -107,10 +108,10 @@ template <class S> struct BondWeights {
   S second_per_cosine, mean_per_cosine;
 };
 
-/// W_b = S(l / (c A_min)) S((|cos| - 0.5) / 0.35) and W_m = S(l / (c A_min)) (1 - S((sin d / (0.1 A_min))^2)),
-/// l the spread of the two ends, S the smooth step. Both go to 0 smoothly where the second bond
-/// ends: at spines that just begin to overlap and at large angles, where the rule of Marschall &
-/// Teitel (Fig. 6) jumps.
+/// W_b = S(l / (c A_min)) S((|cos| - 0.5) / 0.35) and W_m = S(l / (c A_min)) (1 - S((sin d / (0.1
+/// A_min))^2)), l the spread of the two ends, S the smooth step. Both go to 0 smoothly where the
+/// second bond ends: at spines that just begin to overlap and at large angles, where the rule of
+/// Marschall & Teitel (Fig. 6) jumps.
 template <int D, class S>
 BondWeights<S> bond_weights(const SpinePair<D, S> &p, const EndFeet<D, S> &ends, double reach)
 {
@@ -124,10 +125,8 @@ BondWeights<S> bond_weights(const SpinePair<D, S> &p, const EndFeet<D, S> &ends,
   const S by_length = smooth_step(x_length), by_cosine = smooth_step(x_cosine);
   const S by_sine = 1.0 - smooth_step(x_sine);
   const S per_spread = smooth_step_gradient(x_length) / (FADE_LENGTH * shorter);
-  const S by_cosine_gradient =
-      copysign(smooth_step_gradient(x_cosine) / FADE_COSINE_RANGE, cosine);
-  const S by_sine_gradient =
-      2.0 * cosine * smooth_step_gradient(x_sine) / (sine * sine);
+  const S by_cosine_gradient = copysign(smooth_step_gradient(x_cosine) / FADE_COSINE_RANGE, cosine);
+  const S by_sine_gradient = 2.0 * cosine * smooth_step_gradient(x_sine) / (sine * sine);
   return {by_length * by_cosine,          by_length * by_sine,
           per_spread * by_cosine,         per_spread * by_sine,
           by_length * by_cosine_gradient, by_length * by_sine_gradient};
@@ -200,9 +199,9 @@ template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Fe
 ///     Sides::TWO  V = E(a) + W_b D E(b) + W_m (1 - D) (E(m) - E(a))
 /// In the second, W_b and W_m are `bond_weights`, D the `depth_at` m. Overlaps below (A_min / d)^2
 /// have D = 1: the paper's two bonds (Fig. 6), without the jumps of its rule. Particles that are
-/// nearly round for their overlap have D = 0: their two bonds are one contact, which a fading second
-/// bond would push aside harder than the contact pushes; E(m) leaves of it the one bond without its
-/// kink for parallel rods.
+/// nearly round for their overlap have D = 0: their two bonds are one contact, which a fading
+/// second bond would push aside harder than the contact pushes; E(m) leaves of it the one bond
+/// without its kink for parallel rods.
 ///
 /// Force and torques are its exact derivatives. What is left are kinks: where the nearer tip of the
 /// far end changes, of relative size of the angle between the rods; where the two bonds change
@@ -295,8 +294,7 @@ template <int D, class S> class SpherocylinderContact {
   Contact<D, S> two_bonds() const
   {
     const EndFeet<D, S> ends(pair);
-    const Feet<D, S> closest =
-        closest_to_end(pair, ends.nearer());  // never the farther, at a tie
+    const Feet<D, S> closest = closest_to_end(pair, ends.nearer());  // never the farther, at a tie
     const Feet<D, S> &far_end = ends.farther();
     const S distance = sqrt(closest.distance_sq), a = overlap_at(distance);
     const double shorter = std::min(pair.A_i, pair.A_j);
@@ -322,10 +320,12 @@ template <int D, class S> class SpherocylinderContact {
     const S distance = sqrt(closest.distance_sq), far_distance = sqrt(ends.farther().distance_sq);
     const S a = overlap_at(distance), b = overlap_at(far_distance), mean = 0.5 * (a + b);
     const S E_b = b > 0.0 ? law_of.energy(b) : S(0.0);
-    // E(m) - E(a) from the difference of the feet, since the overlaps differ by less than they round.
+    // E(m) - E(a) from the difference of the feet, since the overlaps differ by less than they
+    // round.
     const Feet<D, S> &far_end = ends.farther();
     const Vec<D, S> step = (far_end.s - closest.s) * pair.u_i - (far_end.t - closest.t) * pair.u_j;
-    const S drop = 0.5 * inverse_reach * dot(step, far_end.delta + closest.delta) / (far_distance + distance);
+    const S drop =
+        0.5 * inverse_reach * dot(step, far_end.delta + closest.delta) / (far_distance + distance);
     const S excess = -drop * law_of.energy_gradient(a - 0.5 * drop), deep = 1.0 - depth.two_bonds;
     const S by_mean = weights.mean * deep;
     const S slope =  // by a and by b alike, through their mean
@@ -336,8 +336,7 @@ template <int D, class S> class SpherocylinderContact {
     contact.kind = ContactKind::SIDE_TO_SIDE;
     add_bond(contact, closest, distance, {1.0 - by_mean, 0.0, slope});
     const S second = b > 0.0 ? weights.second * depth.two_bonds : S(0.0);
-    add_bond(contact, ends.farther(), far_distance,
-             {second, by_mean * law_of.energy(mean), slope});
+    add_bond(contact, ends.farther(), far_distance, {second, by_mean * law_of.energy(mean), slope});
 
     const S per_second = depth.two_bonds * E_b, per_mean = deep * excess;
     const S per_spread =
@@ -355,7 +354,8 @@ template <int D, class S> class SpherocylinderContact {
 
   /// Adds a bond with the lever arms of `feet` and the overlap of `distance`. Any point on the line
   /// of `feet` gives the same torque; the one reported lies where the surfaces interpenetrate.
-  void add_bond(Contact<D, S> &contact, const Feet<D, S> &feet, const S &distance, const Share &share) const
+  void add_bond(Contact<D, S> &contact, const Feet<D, S> &feet, const S &distance,
+                const Share &share) const
   {
     const S overlap = overlap_at(distance);
     const Vec<D, S> normal = (1.0 / sqrt(feet.distance_sq)) * feet.delta;
@@ -386,7 +386,7 @@ template <int D, class S> class SpherocylinderContact {
 
 template <int D, class S>
 Contact<D, S> contact_of(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j,
-                      const SpherocylinderLaw &law)
+                         const SpherocylinderLaw &law)
 {
   return SpherocylinderContact<D, S>(i, j, law).evaluate();
 }

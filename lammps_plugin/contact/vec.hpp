@@ -54,10 +54,7 @@ template <int D, class S> S dot(const Vec<D, S> &a, const Vec<D, S> &b)
 
 template <int D, class S> S norm_sq(const Vec<D, S> &a) { return dot(a, a); }
 
-template <int D, class S> S norm(const Vec<D, S> &a)
-{
-  return sqrt(norm_sq(a));
-}
+template <int D, class S> S norm(const Vec<D, S> &a) { return sqrt(norm_sq(a)); }
 
 template <class S> Vec<1, S> cross(const Vec<2, S> &a, const Vec<2, S> &b)
 {

@@ -24,3 +24,25 @@ def find_rattlers(
     normals: NDArray[np.float64],
     flat: NDArray[np.bool_],
 ) -> NDArray[np.bool_]: ...
+def spherocylinder_sums(
+    diameters: NDArray[np.float64],
+    position: NDArray[np.float64],
+    orientation: NDArray[np.float64],
+    edges: NDArray[np.float64],
+    pairs: NDArray[np.int64],
+    shift: NDArray[np.int64],
+    k_e: float,
+    sides: int,
+    extended: bool,
+) -> dict[str, Any]: ...
+def spherocylinder_derivatives(
+    diameters: NDArray[np.float64],
+    position: NDArray[np.float64],
+    orientation: NDArray[np.float64],
+    edges: NDArray[np.float64],
+    pairs: NDArray[np.int64],
+    shift: NDArray[np.int64],
+    k_e: float,
+    sides: int,
+    extended: bool,
+) -> dict[str, NDArray[Any]]: ...

@@ -112,6 +112,9 @@ class Curvature(NamedTuple):
     """(N,) particles that no contacts hold in place."""
 
 
+_Arrays = tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray]
+
+
 class Landscape:
     """Elastic energy of the particles of a packing, with all periodic images.
 
@@ -279,7 +282,7 @@ class Landscape:
         flat = found["on_side"].any(axis=1) | (found["n_bonds"] == 2)[:, None]
         return _contact.find_rattlers(n, D, found["particles"], normals, flat)
 
-    def _arrays(self, state: State, pairs: _Pairs) -> tuple[NDArray[Any], ...]:
+    def _arrays(self, state: State, pairs: _Pairs) -> _Arrays:
         return (self.particles.diameters, *state.split, pairs.particles, pairs.shift)
 
     def _pairs_at(self, state: State) -> _Pairs:

@@ -6,6 +6,8 @@ and return a `Minimum` that says how it ended and how the residual fell with run
 
 from __future__ import annotations
 
+import contextlib
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -29,7 +31,10 @@ _NEWTON_BELOW = 1e-2
 
 # A method no longer gains if its best residual did not fall by this factor in so many evaluations.
 _GAIN = 0.7
-_PATIENCE = {"lbfgs": 300, "newton": 2000}
+_PATIENCE = {"lbfgs": 1000, "newton": 2000}
+
+# L-BFGS begins anew when it gives up; not more often than this within so few evaluations.
+_STUCK, _SOON = 3, 30
 
 # Newton and L-BFGS take turns so many times before `auto` calls it a stall.
 _ROUNDS = 3
@@ -222,7 +227,7 @@ def minimise(
     landscape : Landscape
     start : State
     method : str
-        One of `METHODS`: ``auto``, ``newton``, ``lbfgs``, ``paper``.
+        One of `METHODS`: ``auto``, ``newton``, ``lbfgs``, ``paper``, ``lammps``.
     stop : Stop, optional
     history : History, optional
         One to append to.
@@ -279,7 +284,7 @@ def limited(landscape: Landscape, step: FloatArray) -> FloatArray:
     excess = max(
         np.sqrt((shift**2).sum(axis=1)).max() / longest, np.abs(turn).max() / _WIDEST_TURN, 1.0
     )
-    return step / excess
+    return np.asarray(step / excess)
 
 
 class LineSearch(NamedTuple):
@@ -350,39 +355,47 @@ class _LeaveError(Exception):
 def _lbfgs(descent: Descent, below: float = 0.0) -> Outcome:
     """SciPy's L-BFGS, in doubles, on displacements from the present state."""
     descent.be_patient(_PATIENCE["lbfgs"])
-    landscape = descent.landscape
+    particles = descent.landscape.particles
     # Its first step is of unit length in its own coordinates.
-    unit = 0.01 * float(landscape.particles.radius.min()) * np.sqrt(landscape.particles.n)
+    unit = 0.01 * float(particles.radius.min()) * math.sqrt(particles.n)
     stuck = 0
-    while not (outcome := descent.outcome()) and descent.residual > below and stuck < 3:
-        base, scale = descent.state, descent.evaluation.energy
+    while not (outcome := descent.outcome()) and descent.residual > below and stuck < _STUCK:
         evaluations = descent.evaluations
-
-        def energy(x: FloatArray) -> tuple[float, FloatArray]:
-            state = landscape.displaced(base, unit * x)
-            try:
-                found = landscape.evaluate(state, extended=False)
-            except CrossingError:
-                raise _LeaveError from None
-            if found.energy <= descent.evaluation.energy:
-                descent.move_to(state, found)
-                if descent.outcome() or descent.residual <= below:
-                    raise _LeaveError
-            elif descent.evaluations >= descent.stop.evaluations:
-                raise _LeaveError
-            return found.energy / scale, unit / scale * found.gradient
-
-        limits = {"maxiter": 10**8, "maxfun": 10**8, "maxcor": 20, "ftol": 0.0, "gtol": 0.0}
-        try:
+        with contextlib.suppress(_LeaveError):
             scipy.optimize.minimize(
-                energy, np.zeros(landscape.size), jac=True, method="L-BFGS-B", options=limits
+                _Objective(descent, unit, below),
+                np.zeros(descent.landscape.size),
+                jac=True,
+                method="L-BFGS-B",
+                options={"maxiter": 10**8, "maxfun": 10**8, "maxcor": 20, "ftol": 0.0, "gtol": 0.0},
             )
-        except _LeaveError:
-            pass
         # It gives up where its line search does, at kinks or in rounding: begin again from there.
-        stuck = stuck + 1 if descent.evaluations - evaluations < 30 else 0
+        stuck = stuck + 1 if descent.evaluations - evaluations < _SOON else 0
         unit *= 0.1 if stuck else 1.0
     return outcome or Outcome.STALLED
+
+
+class _Objective:
+    """The energy as SciPy sees it: of displacements in units, over the energy at the start."""
+
+    def __init__(self, descent: Descent, unit: float, below: float) -> None:
+        self.descent, self.unit, self.below = descent, unit, below
+        self.base, self.scale = descent.state, descent.evaluation.energy
+
+    def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
+        descent = self.descent
+        state = descent.landscape.displaced(self.base, self.unit * x)
+        try:
+            found = descent.landscape.evaluate(state, extended=False)
+        except CrossingError:
+            raise _LeaveError from None
+        if found.energy <= descent.evaluation.energy:
+            descent.move_to(state, found)
+            if descent.outcome() or descent.residual <= self.below:
+                raise _LeaveError
+        elif descent.evaluations >= descent.stop.evaluations:
+            raise _LeaveError
+        return found.energy / self.scale, self.unit / self.scale * found.gradient
 
 
 def _paper(descent: Descent) -> Outcome:
@@ -432,9 +445,17 @@ def _line_search_of_paper(descent: Descent, direction: FloatArray, epsilon: floa
     return min(epsilon, 1e-17)
 
 
+def _lammps(descent: Descent) -> Outcome:
+    """LAMMPS's conjugate gradients; LAMMPS is started only here."""
+    from jamshape.lammps_minimise import descend  # noqa: PLC0415
+
+    return descend(descent) or Outcome.STALLED
+
+
 METHODS: dict[str, Callable[[Descent], Outcome]] = {
     "auto": _auto,
     "newton": _newton,
     "lbfgs": _lbfgs,
     "paper": _paper,
+    "lammps": _lammps,
 }

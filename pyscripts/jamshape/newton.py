@@ -23,8 +23,10 @@ _FAR_OFF = 6
 
 
 class Factorisation:
-    """Factors of M + shift: SuperLU without pivoting, so that the signs of the pivots are those of
-    the eigenvalues (Sylvester's law of inertia).
+    """Factors of M + shift, by SuperLU.
+
+    Without pivoting, so that the signs of the pivots are those of the eigenvalues (Sylvester's law of
+    inertia).
     """
 
     def __init__(self, matrix: Any, shift: float) -> None:

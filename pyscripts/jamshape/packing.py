@@ -212,9 +212,7 @@ class Packing:
         position, orientation, edges = (np.longdouble(x) + rest for x, rest in pairs)
         return position, orientation, edges
 
-    def with_poses(
-        self, position: LongArray, orientation: LongArray, edges: LongArray
-    ) -> Packing:
+    def with_poses(self, position: LongArray, orientation: LongArray, edges: LongArray) -> Packing:
         """Return the packing with these poses, each number kept as a double and its rest."""
         doubles = [np.asarray(x, np.float64) for x in (position, orientation, edges)]
         rests = [
@@ -233,8 +231,8 @@ class Packing:
     def sorted_by_id(self) -> Packing:
         """Return the same packing with its particles in the order of their IDs."""
         order = np.argsort(self.id)
-        names = ("position", "orientation", "diameters", "species", "id", "image")
-        names += ("position_rest", "orientation_rest")
+        names = ["position", "orientation", "diameters", "species", "id", "image"]
+        names += ["position_rest", "orientation_rest"]
         return self.with_(**{name: getattr(self, name)[order] for name in names})
 
     def with_(self, **changes: Any) -> Packing:

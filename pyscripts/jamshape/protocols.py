@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import tempfile
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from jamshape.jamming import fit_onset
-from jamshape.lammps_files import write_data
-from jamshape.packing import Box, Packing, angle_from_quaternion
+from jamshape.packing import Packing
 from jamshape.storage import RunWriter, read_attributes, read_observables, read_series
 
 if TYPE_CHECKING:
@@ -39,7 +35,7 @@ class Compression:
     Parameters
     ----------
     kappa
-        Rate, dL/dt = -kappa L, [1/time].
+        Rate, dL/dt = -kappa L, [1/time]; negative to open the box.
     phi_end
         Packing fraction to reach.
     dt
@@ -66,7 +62,10 @@ class Compression:
     integrator: str = "heun"
 
     def __post_init__(self) -> None:
-        for name in ("kappa", "phi_end", "dt", "k_e", "k_d"):
+        if not (math.isfinite(self.kappa) and self.kappa != 0):
+            msg = f"kappa is {self.kappa}, expected a rate other than zero."
+            raise ValueError(msg)
+        for name in ("phi_end", "dt", "k_e", "k_d"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 msg = f"{name} is {value}, expected a positive number."
@@ -101,6 +100,8 @@ class CompressionRun:
     settings
     start
         The state to begin with, or the path of a restart file of an earlier run.
+    time
+        Of that state; step times time step when left out.
 
     Raises
     ------
@@ -109,29 +110,27 @@ class CompressionRun:
     """
 
     def __init__(
-        self, session: Session, settings: Compression, start: Packing | str | Path
+        self,
+        session: Session,
+        settings: Compression,
+        start: Packing | str | Path,
+        time: float | None = None,
     ) -> None:
         self.session, self.settings = session, settings
-        self._began = time.perf_counter()
-        # Styles need a dimension and an atom style before the state, a restart file brings both.
-        session.commands("units lj\natom_style ellipsoid\natom_modify map array")
+        self._began = perf_counter()
+        self._time, self._step_of_time = 0.0, 0
         if isinstance(start, Packing):
-            session.commands(f"dimension {start.dimension}")
-            self._read(start)
+            session.load(start)
         else:
-            session.commands(f"read_restart {start}")
+            session.load_restart(start)
         self._set_up()
         phi = self.measure()["phi"]
         if phi > settings.phi_end:
             msg = f"The state has phi = {phi:.6g}, expected one below phi_end = {settings.phi_end}."
             raise ValueError(msg)
         self.last_step = session.step + settings.steps(phi)
-
-    def _read(self, packing: Packing) -> None:
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "start.data"
-            write_data(path, packing)
-            self.session.commands(f"read_data {path}")
+        if time is not None:
+            self._time, self._step_of_time = time, session.step
 
     def _set_up(self) -> None:
         s = self.settings
@@ -140,15 +139,34 @@ class CompressionRun:
             pair_coeff * * {s.k_e!r}
             neighbor 0.3 bin
             neigh_modify every 1 delay 0 check yes one 10000 page 1000000
-            fix flow all overdamped/affine drag {s.k_d!r} compress {s.kappa!r} integrator {s.integrator}
+            {self._fix()}
             timestep {s.dt!r}
             compute packing all packing
-            compute orient all property/atom quatw quati quatj quatk
-            compute shape all property/atom shapex shapey shapez
             thermo_style custom step c_packing[1]
             thermo_modify norm no lost error
             run 0 post no
         """)
+
+    def _fix(self) -> str:
+        s = self.settings
+        return (
+            f"fix flow all overdamped/affine drag {s.k_d!r} compress {s.kappa!r}"
+            f" integrator {s.integrator}"
+        )
+
+    def change(self, kappa: float | None = None, dt: float | None = None) -> None:
+        """Go on with another rate or time step."""
+        self._time, self._step_of_time = self.time, self.session.step
+        old = self.settings
+        self.settings = dataclasses.replace(old, kappa=kappa or old.kappa, dt=dt or old.dt)
+        self.session.commands(
+            f"unfix flow\n{self._fix()}\ntimestep {self.settings.dt!r}\nrun 0 post no"
+        )
+
+    @property
+    def time(self) -> float:
+        """Since the start, also if the time step has changed."""
+        return self._time + (self.session.step - self._step_of_time) * self.settings.dt
 
     def keep_restarts(self, every: int, path: Path) -> None:
         """Write restart files `path`.a and `path`.b in turn, every so many steps."""
@@ -169,8 +187,8 @@ class CompressionRun:
     def sample(self) -> Sample:
         """Measure the present state."""
         step = self.session.step
-        wall = time.perf_counter() - self._began
-        return Sample(step, step * self.settings.dt, wall, self.measure())
+        wall = perf_counter() - self._began
+        return Sample(step, self.time, wall, self.measure())
 
     def measure(self) -> dict[str, float]:
         """Return observables of the present state, named as in `compute packing`."""
@@ -182,26 +200,7 @@ class CompressionRun:
 
     def packing(self) -> Packing:
         """Return the present state, sorted by ID."""
-        lmp = self.session.lmp
-        n = lmp.get_natoms()
-        lo, hi, *_ = lmp.extract_box()
-        d = int(lmp.extract_setting("dimension"))
-
-        def rows(name: str, kind: int, width: int) -> np.ndarray:
-            return np.array(lmp.gather(name, kind, width)).reshape(n, width)
-
-        quaternion = rows("c_orient", 1, 4)
-        return Packing(
-            position=rows("x", 1, 3)[:, :d],
-            orientation=angle_from_quaternion(quaternion) if d == 2 else quaternion,
-            diameters=rows("c_shape", 1, 3),
-            species=rows("type", 0, 1)[:, 0],
-            id=np.arange(1, n + 1),
-            image=rows("image", 0, 3)[:, :d],
-            box=Box(np.array(lo[:d]), np.array(hi[:d]) - np.array(lo[:d])),
-            step=self.session.step,
-            time=self.session.step * self.settings.dt,
-        )
+        return self.session.packing(self.time)
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jamshape.lammps_files import write_data
+from jamshape.packing import Box, Packing, angle_from_quaternion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import TracebackType
+
+# Styles need a dimension and an atom style before the state; a restart file brings both.
+_ATOMS = "units lj\natom_style ellipsoid\natom_modify map array"
+_POSES = """compute orient all property/atom quatw quati quatj quatk
+            compute shape all property/atom shapex shapey shapez"""
 
 PLUGIN_NAME = "jamshape_plugin.so"
 
@@ -103,6 +115,42 @@ class Session:
         """Run LAMMPS input, one command a line."""
         for line in text.strip().splitlines():
             self.lmp.command(line.strip())
+
+    def load(self, packing: Packing) -> None:
+        """Read a packing into a fresh instance."""
+        self.commands(f"{_ATOMS}\ndimension {packing.dimension}")
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "start.data"
+            write_data(path, packing)
+            self.commands(f"read_data {path}")
+        self.commands(_POSES)
+
+    def load_restart(self, path: str | Path) -> None:
+        """Read a restart file into a fresh instance."""
+        self.commands(f"{_ATOMS}\nread_restart {path}\n{_POSES}")
+
+    def packing(self, time: float = 0.0) -> Packing:
+        """Return the present state, sorted by ID, with the time that it is told."""
+        lmp = self.lmp
+        n = lmp.get_natoms()
+        lo, hi, *_ = lmp.extract_box()
+        d = int(lmp.extract_setting("dimension"))
+
+        def rows(name: str, kind: int, width: int) -> NDArray[Any]:
+            return np.array(lmp.gather(name, kind, width)).reshape(n, width)
+
+        quaternion = rows("c_orient", 1, 4)
+        return Packing(
+            position=rows("x", 1, 3)[:, :d],
+            orientation=angle_from_quaternion(quaternion) if d == 2 else quaternion,
+            diameters=rows("c_shape", 1, 3),
+            species=rows("type", 0, 1)[:, 0],
+            id=np.arange(1, n + 1),
+            image=rows("image", 0, 3)[:, :d],
+            box=Box(np.array(lo[:d]), np.array(hi[:d]) - np.array(lo[:d])),
+            step=self.step,
+            time=time,
+        )
 
     @property
     def step(self) -> int:

@@ -9,6 +9,8 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
         position        {step, time, value (T, N, D)}
         orientation     {step, time, value (T, N) angles in 2D, (T, N, 4) quaternions w i j k in 3D}
         image           {step, time, value (T, N, D)}
+        position_rest, orientation_rest, box/edges_rest    what the doubles of these leave out, as more
+                        doubles, in files of states that are known to more digits (not in H5MD)
         species, id     (N,)
         diameters       (N, 3), the shape columns of LAMMPS (not in H5MD)
     /observables/NAME   {step, time, value (T', ...)}, each sampled when its caller likes
@@ -51,6 +53,12 @@ PathLike = str | os.PathLike[str]
 # Large enough for a long series to be a few chunks, small enough to keep a packing's file small.
 _CHUNK_BYTES = 1024
 _ATTRIBUTE_BYTES = 60_000  # HDF5 refuses attributes of 64 kB and more
+# Fields of a packing and their elements under /particles/all.
+_RESTS = {
+    "position_rest": "position_rest",
+    "orientation_rest": "orientation_rest",
+    "edges_rest": "box/edges_rest",
+}
 _REPORT = {"step": np.int64, "wall_seconds": np.float64, "error": np.float64}
 
 
@@ -255,6 +263,38 @@ class RunWriter:
         with self._file() as file:
             _append_observables(file["observables"], step, time, observables)
 
+    def append_series(
+        self, steps: ArrayLike, times: ArrayLike, observables: Mapping[str, ArrayLike]
+    ) -> None:
+        """Append (T,) rows of scalar observables at once, which costs little more than one.
+
+        Raises
+        ------
+        ValueError
+            If lengths differ, or steps do not ascend from the last one of the same observable.
+        """
+        steps, times = np.asarray(steps, np.int64), np.asarray(times, np.float64)
+        columns = {name: np.asarray(value, np.float64) for name, value in observables.items()}
+        if any(column.shape != steps.shape for column in (times, *columns.values())):
+            msg = f"{self.path}: rows of a series differ in length, expected {steps.shape}"
+            raise ValueError(msg)
+        if not len(steps):
+            return
+        if (np.diff(steps) <= 0).any():
+            msg = f"{self.path}: the steps of a series do not ascend, expected ascending ones"
+            raise ValueError(msg)
+        with self._file() as file:
+            group = file["observables"]
+            first = {name: column[0] for name, column in columns.items()}
+            _append_observables(group, int(steps[0]), float(times[0]), first)
+            for name, column in columns.items():
+                rows = {"value": column, "time": times, "step": steps}
+                for part, row in rows.items():
+                    dataset = group[name][part]
+                    n = len(dataset)
+                    dataset.resize(n + len(row) - 1, axis=0)
+                    dataset[n:] = row[1:]
+
     def append_report(self, step: ArrayLike, wall_seconds: ArrayLike, error: ArrayLike) -> None:
         """Append one row, or (T,) rows at once, to the convergence history.
 
@@ -290,7 +330,8 @@ class RunWriter:
             raise ValueError(msg)
         with self._file() as file:
             frames = file["particles/all"]
-            values = [frames[name]["value"] for name in _frame_values(self._first)]
+            names = _frame_values(self._first, rests="position_rest" in frames)
+            values = [frames[name]["value"] for name in names]
             _truncate(step, frames["position"], values)
             for element in (*file["observables"].values(), file["report"]):
                 _truncate(step, element)
@@ -393,6 +434,9 @@ def _packing(file: h5py.File, frame: int) -> Packing:
 
     fields = {name: fixed(name) for name in ("diameters", "species", "id")}
     fields |= {name: row(f"{name}/value") for name in ("position", "orientation", "image")}
+    for name, element in _RESTS.items():
+        if f"particles/all/{element}" in file:
+            fields[name] = row(f"{element}/value")
     fields["shape_style"] = _item(file, "particles/all").attrs.get("shape_style")
     fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
     lo, edges = row("box/lo/value"), row("box/edges/value")
@@ -420,21 +464,25 @@ def _write_metadata(file: h5py.File) -> None:
     creator.attrs["version"] = np.bytes_(version)
 
 
-def _frame_values(packing: Packing) -> dict[str, NDArray[Any]]:
-    return {
+def _frame_values(packing: Packing, *, rests: bool) -> dict[str, NDArray[Any]]:
+    values = {
         "position": packing.position,
         "orientation": packing.orientation,
         "image": packing.image,
         "box/edges": packing.box.edges,
         "box/lo": packing.box.lo,
     }
+    if rests:
+        values |= {element: getattr(packing, name) for name, element in _RESTS.items()}
+    return values
 
 
 def _create_particles(group: h5py.Group, packing: Packing) -> None:
     group.attrs["shape_style"] = packing.shape_style
     for name in ("species", "id", "diameters"):
         group[name] = getattr(packing, name)
-    for name, value in _frame_values(packing).items():
+    rests = any(getattr(packing, name).any() for name in _RESTS)
+    for name, value in _frame_values(packing, rests=rests).items():
         element = group.create_group(name)
         _create_rows(element, "value", value)
         if name == "position":
@@ -466,7 +514,7 @@ def _create_rows(group: h5py.Group, name: str, row: NDArray[Any]) -> None:
 def _append_frame(group: h5py.Group, packing: Packing) -> None:
     position = group["position"]
     n = len(position["step"])
-    for name, value in _frame_values(packing).items():
+    for name, value in _frame_values(packing, rests="position_rest" in group).items():
         _put(group[name]["value"], n, value)
     _put(position["time"], n, packing.time)
     _put(position["step"], n, packing.step)

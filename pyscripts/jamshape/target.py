@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import collections
 import math
-import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,11 +31,12 @@ _GOOD = 1e-2
 # higher the energy, have found where they stop. A move is not made if it leaves a residual above.
 _GOOD_TO_MOVE = 1e-4
 _FAR = 0.3
+_PARTS = (1.0, 0.3, 0.1, 0.01, 1e-3, 1e-4)
 
 # At u0, minima this good are kept while a better one, by that factor, is looked for in so many steps.
 _SLIDING = 1e-5
 _GAIN = 0.7
-_SLIDING_STEPS = 60
+_SLIDING_STEPS = 100
 
 # At most this factor in sqrt(u), which is linear in phi - phi_J, from one step to the next.
 _LARGEST_FACTOR = 4.0
@@ -195,13 +196,13 @@ def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Minimum:
         outcome = descent.outcome()
         if outcome is Outcome.CONVERGED and met:
             return descent.minimum(outcome)
-        if outcome not in {None, Outcome.CONVERGED} and best.minimum is None:
-            return descent.minimum(outcome)
-        stiff = _joint_step(descent, regularised, target)
-        if met or best.minimum:
-            best.offer(descent, met, stiff)
-        if best.minimum and (best.is_old() or outcome is Outcome.UNJAMMED):
+        if outcome not in {None, Outcome.CONVERGED}:
+            return best.minimum or descent.minimum(outcome)
+        directions = _Directions.at(descent, regularised)
+        best.offer(descent, directions, met)
+        if best.minimum and best.age > _SLIDING_STEPS:
             return best.minimum
+        _joint_step(descent, directions, regularised, target)
 
 
 @dataclass
@@ -211,45 +212,63 @@ class _Best:
     minimum: Minimum | None = None
     age: int = 0
 
-    def offer(self, descent: Descent, met: bool, stiff: float) -> None:
+    def offer(self, descent: Descent, directions: _Directions, met: bool) -> None:
         self.age += 1
         if not met or descent.residual > _SLIDING:
             return
         if self.minimum is None or descent.residual < _GAIN * self.minimum.residual.largest:
-            sliding = stiff <= descent.stop.tolerance
+            sliding = directions.stiff <= descent.stop.tolerance
             self.minimum = descent.minimum(Outcome.SLIDING if sliding else Outcome.STALLED)
             self.age = 0
 
-    def is_old(self) -> bool:
-        return self.age > _SLIDING_STEPS
 
+@dataclass(frozen=True, eq=False)
+class _Directions:
+    """Where Newton's method leads: `relax` at fixed box, and `follow` for each unit of its strain.
 
-def _joint_step(descent: Descent, regularised: Regularised, target: Target) -> float:
-    """Take a step of Newton's method for the coordinates and, at a minimum, the box.
-
-    Returns the residual before it without what lies along soft modes.
+    `energy` and `slope` are those of the minimum nearby at the present box, the slope along minima.
+    `stiff` is the residual without what lies along modes softer than the shift.
     """
-    landscape, state, evaluation = descent.landscape, descent.state, descent.evaluation
-    curvature = landscape.curvature(state)
-    factors = regularised.factorise(curvature.hessian)
-    right = np.column_stack([evaluation.gradient, curvature.coupling])
-    relax, follow = -factors.solve(right).T
-    # What the shift keeps Newton's method from removing lies along modes softer than it.
-    stiff_part = evaluation._replace(gradient=evaluation.gradient + regularised.shift * relax)
-    stiff = residual_of(landscape, stiff_part).largest
-    # Energy of the minimum nearby and its slope along the minima, at the present box.
-    energy = evaluation.energy + 0.5 * float(evaluation.gradient @ relax)
-    slope = evaluation.strain_gradient + float(curvature.coupling @ relax)
+
+    relax: FloatArray
+    follow: FloatArray
+    energy: float
+    slope: float
+    stiff: float
+
+    @classmethod
+    def at(cls, descent: Descent, regularised: Regularised) -> _Directions:
+        evaluation = descent.evaluation
+        curvature = descent.landscape.curvature(descent.state)
+        factors = regularised.factorise(curvature.hessian)
+        right = np.column_stack([evaluation.gradient, curvature.coupling])
+        relax, follow = -factors.solve(right).T
+        stiff_part = evaluation._replace(gradient=evaluation.gradient + regularised.shift * relax)
+        return cls(
+            relax=relax,
+            follow=follow,
+            energy=evaluation.energy + 0.5 * float(evaluation.gradient @ relax),
+            slope=evaluation.strain_gradient + float(curvature.coupling @ relax),
+            stiff=residual_of(descent.landscape, stiff_part).largest,
+        )
+
+
+def _joint_step(
+    descent: Descent, directions: _Directions, regularised: Regularised, target: Target
+) -> None:
+    """Take a step of Newton's method for the coordinates and, at a minimum, the box."""
+    landscape, relax = descent.landscape, directions.relax
     if descent.residual <= _GOOD_TO_MOVE:
-        strain = _strain_to(descent, target, energy, slope)
-        step = relax + strain * follow
-        if np.array_equal(limited(landscape, step), step) and _move(descent, strain, step):
-            regularised.learn(1)
-            return stiff
+        strain = _strain_to(descent, target, directions)
+        for part in _PARTS:
+            step = relax + part * strain * directions.follow
+            small = np.array_equal(limited(landscape, step), step)
+            if small and _move(descent, part * strain, step):
+                regularised.learn(1)
+                return
     along = search_along(descent, limited(landscape, relax))
     regularised.learn(along.tries)
     descent.move_to(along.state, along.evaluation)
-    return stiff
 
 
 def _move(descent: Descent, strain: float, step: FloatArray) -> bool:
@@ -266,14 +285,14 @@ def _move(descent: Descent, strain: float, step: FloatArray) -> bool:
     return True
 
 
-def _strain_to(descent: Descent, target: Target, energy: float, slope: float) -> float:
+def _strain_to(descent: Descent, target: Target, directions: _Directions) -> float:
     """Strain after which sqrt(u) is that of the target, or nearer to it by a bounded factor."""
-    volume = descent.state.volume
+    volume, energy = descent.state.volume, directions.energy
     if energy <= 0.0:
         return 0.0
     now, aim = math.sqrt(energy / volume), math.sqrt(target.u0)
     aim = min(max(aim, now / _LARGEST_FACTOR), now * _LARGEST_FACTOR)
-    per_strain = (slope - descent.state.dimension * energy) / (2 * now * volume)
+    per_strain = (directions.slope - descent.state.dimension * energy) / (2 * now * volume)
     return (aim - now) / per_strain if per_strain < 0 else 0.0
 
 
@@ -318,7 +337,6 @@ def halving(
 def find(landscape: Landscape, start: State, target: Target) -> Minimum:
     """Run the direct search from a state to its end; errors as `direct`."""
     search = Search(start, target.step)
-    for search in direct(landscape, search, target):
-        pass
+    collections.deque(direct(landscape, search, target), maxlen=0)
     assert search.minimum is not None
     return search.minimum

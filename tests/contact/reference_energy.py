@@ -254,8 +254,8 @@ def branches(pairs, sides):
     columns = [*sliding(x.plus), *sliding(x.minus), np.sign(row_dot(pairs.u_i, pairs.u_j)), inside]
     columns.append(np.where(whole, 0.0, x.plus.exact <= x.minus.exact))
     by_depth = np.log(np.maximum(x.depth, 0.1)) / np.log(FADE_DEPTH)
-    for step in (x.by_length, x.by_cosine, by_depth):
-        columns.append(np.sign(step) + np.sign(step - 1.0))
+    steps = (x.by_length, x.by_cosine, by_depth)
+    columns += [np.sign(step) + np.sign(step - 1.0) for step in steps]
     columns += [x.by_sine > 1.0, x.overlap > 0.0, x.far_overlap > 0.0]
     return np.column_stack(columns).astype(int)
 

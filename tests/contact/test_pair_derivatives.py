@@ -367,9 +367,7 @@ def test_curvature_is_symmetric_and_that_of_the_pair_seen_from_the_other_particl
     )
     swapped = other.derivatives(sides, K_E)
     D, turns = packing.dimension, packing.rotations
-    order = np.concatenate(
-        [np.arange(D), D + turns + np.arange(turns), D + np.arange(turns)]
-    )
+    order = np.concatenate([np.arange(D), D + turns + np.arange(turns), D + np.arange(turns)])
     sign = np.concatenate([-np.ones(D), np.ones(2 * turns)])
     seen = (sign[:, None] * sign * swapped["curvature"])[:, order[:, None], order]
     error = np.abs(largest(packing, seen - curvature) / largest(packing, curvature))

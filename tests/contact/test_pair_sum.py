@@ -61,9 +61,7 @@ def arguments(packing):
 @EVERY_LAW
 @EVERY_PACKING
 @pytest.mark.parametrize("extended", [False, True])
-def test_sums_are_those_of_the_forces_of_the_packing(
-    mixture, dimension, sides, extended, measured
-):
+def test_sums_are_those_of_the_forces_of_the_packing(mixture, dimension, sides, extended, measured):
     packing = compressed(mixture, dimension)
     network, expected = find_contacts(packing, K_E, sides), forces(packing, K_E, sides)
     found = _contact.spherocylinder_sums(*arguments(packing), K_E, sides, extended)
@@ -281,7 +279,7 @@ def test_bad_arguments_are_refused_in_one_sentence(function, name, value):
 
 @FUNCTIONS
 def test_quaternions_are_asked_for_in_space(function):
-    with pytest.raises(ValueError, match="quaternions|4"):
+    with pytest.raises(ValueError, match=r"quaternions|4"):
         function(**(two_rods(3) | {"orientation": np.zeros((2, 2, 1))}))
 
 

@@ -383,9 +383,7 @@ def test_energy_of_parallel_rods_grows_on_approach_and_never_pulls(dimension, me
         overlap = deepest * depth / 100.0
         pairs = start.replaced(r=start.r + scaled((deepest - overlap) * start.d, normal))
         result = contacts(pairs, 2)
-        least_push = min(
-            least_push, np.min(row_dot(result["force"], normal) * pairs.d / overlap)
-        )
+        least_push = min(least_push, np.min(row_dot(result["force"], normal) * pairs.d / overlap))
         least_rise = min(least_rise, np.min(result["energy"] / np.maximum(before, 1e-300)))
         before = result["energy"]
     measured(least_push_over_one_bond=least_push, least_rise=least_rise)
@@ -399,9 +397,7 @@ def test_deep_contacts_of_parallel_rods_have_no_kink(dimension, measured):
     """Force and torques change in proportion to the turn through sin = 0; one bond's jump there."""
     rng = np.random.default_rng([36, dimension])
     n = 5000
-    pairs, _ = side_by_side(
-        rng, n, dimension, overlaps(rng, n), log_uniform(rng, 16.1, 1e4, n)
-    )
+    pairs, _ = side_by_side(rng, n, dimension, overlaps(rng, n), log_uniform(rng, 16.1, 1e4, n))
     sideways = random_perpendicular(rng, pairs.u_i)
 
     def torques_at(fraction, sides):

@@ -1,0 +1,88 @@
+"""Make many packings on all cores, several samples of every aspect ratio.
+
+    python pyscripts/sweep.py --alpha 0 0.01 1 4 --samples 6 --n 256 --out sweep/
+
+Each sample is one run of make_packing.py in a process of its own, one a core. Started again after a kill it
+goes on: packings that are there are not made again, those under way go on from their own files. A sample
+that fails is listed, the others go on. The last line of standard output is one JSON object; the exit code
+is 0 only if all samples are there. For clusters see pyscripts/sweep.smk.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from tqdm import tqdm
+
+from jamshape.jammed import is_done
+
+MAKE_PACKING = Path(__file__).with_name("make_packing.py")
+
+# One core a process: threads of BLAS would only wait for each other.
+_ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+
+def parse() -> argparse.Namespace:
+    """Read the command line; what it does not know goes to make_packing.py."""
+    parser = argparse.ArgumentParser(
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="Other options (--n, --u0, --kappa ...) are those of make_packing.py.",
+    )
+    parser.add_argument("--alpha", type=float, nargs="+", required=True, help="aspect ratios A/R")
+    parser.add_argument("--samples", type=int, default=6, help="seeds 1 to this (6)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes (all cores)")
+    parser.add_argument("--out", type=Path, required=True, help="folder")
+    options, extra = parser.parse_known_args()
+    options.extra = extra
+    return options
+
+
+def make(alpha: float, seed: int, options: argparse.Namespace) -> str | None:
+    """Make one sample; return its complaint if it fails."""
+    out = options.out / f"alpha{alpha:g}_seed{seed}.h5"
+    if is_done(out):
+        return None
+    arguments = ["--alpha", repr(alpha), "--seed", str(seed), "--out", str(out), *options.extra]
+    log = out.with_suffix(".log")
+    with log.open("w") as errors:
+        done = subprocess.run(
+            [sys.executable, MAKE_PACKING, *arguments],
+            check=False,
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            env=os.environ | _ONE_THREAD,
+        )
+    if done.returncode == 0 or is_done(out):
+        return None
+    last = log.read_text().strip().replace("\r", "\n").splitlines()
+    return f"{out.name}: {last[-1] if last else f'exit code {done.returncode}'}"
+
+
+def main(options: argparse.Namespace) -> int:
+    """Run all samples; return the exit code."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    samples = [(a, s) for s in range(1, options.samples + 1) for a in options.alpha]
+    failures = []
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        runs = [pool.submit(make, alpha, seed, options) for alpha, seed in samples]
+        for run in tqdm(concurrent.futures.as_completed(runs), total=len(runs), unit="packing"):
+            if complaint := run.result():
+                failures.append(complaint)
+                tqdm.write(complaint, file=sys.stderr)
+    done = len(samples) - len(failures)
+    print(json.dumps({"out": str(options.out), "made": done, "failed": failures}))
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(parse()))
+    except (ValueError, OSError) as error:
+        sys.exit(f"sweep.py: {error}")
