@@ -126,7 +126,7 @@ nb::dict derivatives_in(const PackingArrays &arrays, const typename Model::Law &
     write_vec(pairs.at(touching[c]).r, separation.row(c));
     write_vec(contact.force, force.row(c));
     for (int b = 0; b < contact.n_bonds; ++b) {
-      stiffness.row(c)[b] = static_cast<double>(contact.bond[b].stiffness);
+      stiffness.row(c)[b] = static_cast<double>(contact.bond[b].own_stiffness);
       distance.row(c)[b] = static_cast<double>(contact.bond[b].distance);
       on_side.row(c)[2 * b] = contact.bond[b].on_side_i;
       on_side.row(c)[2 * b + 1] = contact.bond[b].on_side_j;

@@ -22,7 +22,8 @@ template <int D, class S = double> struct Bond {
   S distance;            // the r of the overlap 1 - r/d
   S reach;               // the d of it
   S energy;              // this bond's share of the contact's energy
-  S stiffness;           // its second derivative with respect to the distance
+  S stiffness;           // of the energy along the bond, at most: its second derivative by distance
+  S own_stiffness;       // what of it comes from this bond's overlap alone
   bool on_side_i;        // the foot lies strictly inside the flat part of i
   bool on_side_j;
 };

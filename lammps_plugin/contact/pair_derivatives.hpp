@@ -20,9 +20,9 @@ template <class Model, int D, class S> struct PosedPair {
 };
 
 /// A contact with the second derivatives of its energy, in two parts: the sum over bonds of
-/// stiffness * gradient (x) gradient, and `curvature`, all that comes from the forces themselves
-/// (Marschall & Teitel 2018, Eqs. 38-40: H and -S). Kept apart since the second is smaller by the
-/// overlap and would drown in their sum.
+/// own_stiffness * gradient (x) gradient, and `curvature`, all that comes from the forces
+/// themselves (Marschall & Teitel 2018, Eqs. 38-40: H and -S). Kept apart since the second is
+/// smaller by the overlap and would drown in their sum.
 template <int D, class S> struct ContactDerivatives {
   static constexpr int N = PAIR_VARIABLES<D>;
   Contact<D, S> contact;

@@ -233,11 +233,11 @@ template <int D, class S> class SpherocylinderContact {
   SpherocylinderLaw law;
 
   /// How a bond enters the energy: `law` times the harmonic law of its own overlap, with
-  /// `energy` and `slope` (by the overlap) that do not come from that law.
+  /// `energy`, `slope` (by the overlap) and at most `bend` of it that do not come from that law.
   struct Share {
-    S law, energy, slope;
+    S law, energy, slope, bend;
   };
-  static Share whole() { return {1.0, 0.0, 0.0}; }
+  static Share whole() { return {1.0, 0.0, 0.0, 0.0}; }
 
   bool touches(const S &distance_sq) const { return distance_sq < S(reach) * reach; }
 
@@ -334,9 +334,10 @@ template <int D, class S> class SpherocylinderContact {
 
     Contact<D, S> contact = empty(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
-    add_bond(contact, closest, distance, {1.0 - by_mean, 0.0, slope});
+    add_bond(contact, closest, distance, {1.0 - by_mean, 0.0, slope, 0.5 * by_mean});
     const S second = b > 0.0 ? weights.second * depth.two_bonds : S(0.0);
-    add_bond(contact, ends.farther(), far_distance, {second, by_mean * law_of.energy(mean), slope});
+    add_bond(contact, ends.farther(), far_distance,
+             {second, by_mean * law_of.energy(mean), slope, 0.5 * by_mean});
 
     const S per_second = depth.two_bonds * E_b, per_mean = deep * excess;
     const S per_spread =
@@ -359,8 +360,9 @@ template <int D, class S> class SpherocylinderContact {
   {
     const S overlap = overlap_at(distance);
     const Vec<D, S> normal = (1.0 / sqrt(feet.distance_sq)) * feet.delta;
-    // In dual numbers the law's own slope is left out here: `stiffness` stands for it, so that what
-    // the derivatives of force and torque hold is the small rest, not its sum with a large number.
+    // In dual numbers the law's own slope is left out here: `own_stiffness` stands for it, so that
+    // what the derivatives of force and torque hold is the small rest, not its sum with a large
+    // number.
     const S slope = share.law * law.harmonic.energy_gradient(constant(overlap)) + share.slope;
     const Vec<D, S> force = (slope * inverse_reach) * normal;
     const S energy = share.law * law.harmonic.energy(overlap) + share.energy;
@@ -373,8 +375,9 @@ template <int D, class S> class SpherocylinderContact {
     bond.distance = distance;
     bond.reach = reach;
     bond.energy = energy;
-    bond.stiffness =
-        share.law * law.harmonic.energy_hessian(overlap) * inverse_reach * inverse_reach;
+    const S bend = law.harmonic.energy_hessian(overlap) * inverse_reach * inverse_reach;
+    bond.stiffness = (share.law + share.bend) * bend;
+    bond.own_stiffness = share.law * bend;
     bond.on_side_i = abs(feet.s) < pair.A_i;
     bond.on_side_j = abs(feet.t) < pair.A_j;
     contact.energy += energy;

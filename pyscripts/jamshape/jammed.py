@@ -99,8 +99,17 @@ class Files:
 
     def __init__(self, out: Path) -> None:
         self.run = out.with_name(out.name + ".run.h5")
-        self.restart = out.with_name(out.name + ".run.restart")
         self.search = out.with_name(out.name + ".search.h5")
+
+    def restart(self, step: int) -> Path:
+        """LAMMPS restart file of the compression at that step."""
+        return self.run.with_suffix(f".restart{step}")
+
+    def forget_restarts(self, but: int | None = None) -> None:
+        """Remove all restart files, or all but one."""
+        for path in self.run.parent.glob(self.run.with_suffix(".restart*").name):
+            if but is None or path != self.restart(but):
+                path.unlink()
 
 
 def is_done(out: Path) -> bool:
@@ -161,16 +170,17 @@ def _compress(sample: Sample, files: Files) -> Iterator[Progress]:
         for row in approach(run, sample.approach):
             rows.append(row)
             if len(rows) == _ROWS_PER_RESTART:
-                session.commands(f"write_restart {files.restart}")
+                session.commands(f"write_restart {files.restart(row.step)}")
                 _write_rows(writer, rows)
                 rate = {"rate": run.settings.kappa, "dt": run.settings.dt}
                 writer.set_attributes({"restart_step": row.step, "restart_time": row.time, **rate})
+                files.forget_restarts(but=row.step)
             found = row.observables
             yield Progress("compression", found["phi"], found["u"], found["fmax"])
         _write_rows(writer, rows)
         writer.append(run.packing())
     writer.set_attributes({"finished": True})
-    files.restart.unlink(missing_ok=True)
+    files.forget_restarts()
 
 
 def _write_rows(writer: RunWriter, rows: list[Row]) -> None:
@@ -190,14 +200,13 @@ def _begun(session: Session, sample: Sample, files: Files) -> tuple[CompressionR
 def _resumed(
     session: Session, sample: Sample, files: Files
 ) -> tuple[CompressionRun, RunWriter] | None:
-    if not (files.run.exists() and files.restart.exists()):
+    if not files.run.exists():
         return None
     stored = read_attributes(files.run)
-    if not _same(stored, sample) or stored["restart_step"] < 0:
+    restart = files.restart(stored["restart_step"])
+    if not (_same(stored, sample) and restart.exists()):
         return None
-    run = resume_approach(session, files.restart, stored)
-    if session.step != stored["restart_step"]:  # killed between the two writes
-        return None
+    run = resume_approach(session, restart, stored)
     writer = RunWriter.open(files.run)
     writer.truncate(session.step)
     return run, writer

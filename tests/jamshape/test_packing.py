@@ -179,3 +179,61 @@ def test_phi_is_the_sum_of_the_measures_over_the_box(dimension, measure):
 def test_shape_style_is_guessed_from_the_diameters():
     assert guess_shape_style([[1, 1, 1], [3, 1, 1]]) == "spherocylinder"
     assert guess_shape_style([[1, 1, 1], [1, 3, 3]]) == "superellipsoid"
+
+
+def with_rests(dimension):
+    """A packing whose poses are known to more digits than doubles hold."""
+    packing = nasty_packing(dimension).with_(position=nasty_packing(dimension).position.clip(-9, 9))
+    finer = [x + np.longdouble(1) / 3 * np.spacing(np.longdouble(1) * 1e-3) for x in packing.poses()]
+    finer = [x + np.spacing(np.abs(x).astype(float)) / np.longdouble(7) for x in finer]
+    return packing.with_poses(*finer)
+
+
+RESTS = ("position_rest", "orientation_rest", "edges_rest")
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_poses_are_kept_to_all_digits_as_doubles_and_rests(dimension):
+    packing = with_rests(dimension)
+    assert all(getattr(packing, name).any() for name in RESTS)
+    position, orientation, edges = packing.poses()
+    np.testing.assert_array_equal(position.astype(float), packing.position)
+    again = packing.with_poses(position, orientation, edges)
+    for one, other in zip(again.poses(), (position, orientation, edges), strict=True):
+        assert one.dtype == np.longdouble
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("changed", "dropped"),
+    [("position", "position_rest"), ("orientation", "orientation_rest"), ("box", "edges_rest")],
+)
+def test_new_poses_are_exact_doubles_and_other_rests_stay(changed, dropped):
+    packing = with_rests(2)
+    new = packing.with_(**{changed: getattr(packing, changed)})
+    assert not getattr(new, dropped).any()
+    for name in {*RESTS} - {dropped}:
+        np.testing.assert_array_equal(getattr(new, name), getattr(packing, name))
+    stepped = packing.with_(step=7)
+    for name in RESTS:
+        np.testing.assert_array_equal(getattr(stepped, name), getattr(packing, name))
+
+
+def test_rests_follow_their_particles():
+    packing = with_rests(3)
+    order, ordered = packing.id.argsort(), packing.sorted_by_id()
+    for one, other in zip(ordered.poses()[:2], packing.poses()[:2], strict=True):
+        np.testing.assert_array_equal(one, other[order])
+    np.testing.assert_array_equal(ordered.poses()[2], packing.poses()[2])
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"position_rest": np.ones((6, 3))}, r"position_rest has shape \(6, 3\), expected \(6, 2"),
+        ({"edges_rest": np.full(2, np.nan)}, "edges_rest holds NaN or infinity"),
+    ],
+)
+def test_packing_refuses_rests(changes, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        nasty_packing(2, **changes)

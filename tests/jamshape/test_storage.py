@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from test_packing import assert_identical, nasty_packing
+from test_packing import assert_identical, nasty_packing, with_rests
 
 from jamshape.storage import (
     FileFormatError,
@@ -397,3 +397,89 @@ def test_group_in_the_place_of_a_dataset(path):
         file.create_group("particles/all/id")
     with pytest.raises(FileFormatError, match="/particles/all/id is a group, expected a dataset"):
         read_packing(path)
+
+
+REST_ELEMENTS = ("position_rest", "orientation_rest", "box/edges_rest")
+
+
+def assert_same_poses(found, expected):
+    for one, other in zip(found.poses(), expected.poses(), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_rests_come_back_to_the_last_bit(path, dimension):
+    packing = with_rests(dimension)
+    write_packing(path, packing)
+    found = read_packing(path)
+    assert_identical(found, packing)
+    assert_same_poses(found, packing)
+    for name in ("position_rest", "orientation_rest", "edges_rest"):
+        assert getattr(found, name).tobytes() == getattr(packing, name).tobytes()
+        assert getattr(found, name).any()
+
+
+def test_packings_of_doubles_have_no_rests_in_their_files(path):
+    write_packing(path, nasty_packing(2))
+    with h5py.File(path) as file:
+        assert not any(name in file["particles/all"] for name in REST_ELEMENTS)
+    write_packing(path, with_rests(2))
+    with h5py.File(path) as file:
+        assert all(name in file["particles/all"] for name in REST_ELEMENTS)
+
+
+def test_frames_with_rests_are_appended_and_truncated(path):
+    frames = [with_rests(2).with_(step=step) for step in (0, 10, 20)]
+    frames[1] = frames[1].with_(position=frames[1].position)  # without one of them
+    writer = RunWriter.create(path, frames[0])
+    for packing in frames[1:]:
+        writer.append(packing)
+    for index, packing in enumerate(frames):
+        assert_same_poses(read_packing(path, index), packing)
+    RunWriter.open(path).truncate(10)
+    assert count_frames(path) == 2
+    assert_same_poses(read_packing(path), frames[1])
+    RunWriter.open(path).append(frames[2])
+    assert_same_poses(read_packing(path), frames[2])
+
+
+def test_rests_that_come_with_a_later_frame_are_not_lost(path):
+    first = with_rests(2)
+    writer = RunWriter.create(path, first.with_(step=0, position=first.position,
+                              orientation=first.orientation, box=first.box))
+    later = first.with_(step=10)
+    writer.append(later)
+    assert_same_poses(read_packing(path), later)
+
+
+def test_a_series_is_as_many_rows_one_by_one(path, tmp_path):
+    steps, times = np.array([5, 7, 20]), np.array([5, 7, 20]) / 3
+    columns = {"p": np.array([1 / 3, np.nan, -0.0]), "u": np.array([1e-300, 2, 3])}
+    together, single = (RunWriter.create(p, frame(0)) for p in (path, tmp_path / "single.h5"))
+    together.append_series(steps[:2], times[:2], {k: v[:2] for k, v in columns.items()})
+    together.append_series(steps[2:], times[2:], {k: v[2:] for k, v in columns.items()})
+    together.append_series([], [], {"p": []})
+    for row, (step, time) in enumerate(zip(steps, times, strict=True)):
+        single.append_observables(step, time, {k: v[row] for k, v in columns.items()})
+    for name in columns:
+        one, other = read_series(together.path, name), read_series(single.path, name)
+        for x, y in zip(one, other, strict=True):
+            assert (x.dtype, x.tobytes()) == (y.dtype, y.tobytes())
+
+
+@pytest.mark.parametrize(
+    ("steps", "times", "p", "sentence"),
+    [
+        ([21, 22], [1, 2], [1], r"rows of a series differ in length, expected \(2,\)"),
+        ([21, 22], [1], [1, 2], r"rows of a series differ in length, expected \(2,\)"),
+        ([22, 21], [1, 2], [1, 2], "the steps of a series do not ascend"),
+        ([21, 21], [1, 2], [1, 2], "the steps of a series do not ascend"),
+        ([20, 21], [1, 2], [1, 2], "p is stored up to step 20, expected a step after it, found 20"),
+    ],
+)
+def test_series_is_refused_and_changes_nothing(path, steps, times, p, sentence):
+    writer = run_of_three(path)
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match=sentence):
+        writer.append_series(steps, times, {"p": p})
+    assert path.read_bytes() == before
