@@ -7,8 +7,16 @@ from test_minimise import squeezed
 from jamshape.approach import Approach
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
 from jamshape.initial import InsertionError
-from jamshape.jammed import Files, Sample, is_compressed, is_done, make, measure, summary
-from jamshape.jammed import write_minimum
+from jamshape.jammed import (
+    Files,
+    Sample,
+    is_compressed,
+    is_done,
+    make,
+    measure,
+    summary,
+    write_minimum,
+)
 from jamshape.landscape import Landscape, State
 from jamshape.minimise import residual_of
 from jamshape.storage import (
@@ -22,7 +30,7 @@ from jamshape.target import Target, find
 
 U0 = 1e-12
 SAMPLE = Sample(n=16, alpha=1.0, phi_start=0.5, target=Target(U0))
-FAST = Approach(kappa=1e-4, p_end=1e-3)
+FAST = Approach(kappa=1e-5, p_end=3e-4)
 
 
 @cache
@@ -45,7 +53,7 @@ def compressed(out, packing=None):
     p = 0.3 * np.clip(phi - 0.85, 0, None)
     kappa = np.where(np.arange(60) < 50, 1e-6, -1e-6)
     writer.append_series(np.arange(60), np.arange(60.0), {"phi": phi, "p": p, "kappa": kappa})
-    writer.set_attributes({"finished": True})
+    writer.set_attributes(SAMPLE.attributes() | {"finished": True})
 
 
 def assert_same_result(out, expected):
@@ -129,12 +137,11 @@ def test_a_compression_that_is_there_is_taken_and_searched_from(whole):
     identity = {"n": 16, "alpha": 1.0, "seed": 1, "phi_start": 0.5, "u0": U0, "size_ratio": 1.4}
     assert {name: stored[name] for name in identity} == identity
     assert stored["phi_J_compression"] == pytest.approx(0.85, abs=1e-3)
-    assert found["phi_J_opening"] is None if "phi_J_opening" in found else True
     assert stored["evaluations"] > 10
     assert stored["wall_seconds"] > 0
 
 
-@pytest.mark.parametrize("after", [1, 2, 5])
+@pytest.mark.parametrize("after", [1, 4])
 def test_a_search_that_was_killed_goes_on_to_the_same_bits(whole, tmp_path, after):
     out = tmp_path / "packing.h5"
     compressed(out)
@@ -156,7 +163,7 @@ def test_a_search_that_was_killed_goes_on_to_the_same_bits(whole, tmp_path, afte
 def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_path):
     # Its first state is all doubles, those after it are not.
     packing, state = squeezed(16, 1, 0.86)
-    apart = state.strained(0.02).packing(packing)
+    apart = state.strained(0.006).packing(packing)
     apart = apart.with_(position=apart.position, orientation=apart.orientation, box=apart.box)
     assert not len(find_contacts(apart, 1.0, 2).pairs)
     unbroken, out = tmp_path / "unbroken.h5", tmp_path / "packing.h5"
@@ -170,7 +177,7 @@ def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_pat
     assert_same_result(out, unbroken)
 
 
-def test_the_search_of_another_sample_is_not_gone_on_with(tmp_path):
+def test_the_search_of_another_target_is_not_gone_on_with(tmp_path):
     out = tmp_path / "packing.h5"
     compressed(out)
     going = make(SAMPLE, out)
@@ -182,11 +189,10 @@ def test_the_search_of_another_sample_is_not_gone_on_with(tmp_path):
     assert read_attributes(out)["u"] == pytest.approx(1e-8, rel=1e-7, abs=0)
 
 
+@pytest.mark.lammps
 def test_a_compression_of_another_sample_is_not_taken(tmp_path):
     out = tmp_path / "packing.h5"
     compressed(out)
-    writer = RunWriter.open(Files(out).run)
-    writer.set_attributes(SAMPLE.attributes())
     other = Sample(n=24, alpha=0.0, phi_start=0.5, seed=9, target=Target(U0), approach=FAST)
     going = make(other, out)
     try:
@@ -210,25 +216,26 @@ def test_a_run_without_its_end_is_not_compressed(tmp_path):
 
 @pytest.mark.lammps
 def test_a_compression_that_was_killed_goes_on_to_a_result(tmp_path):
-    sample = Sample(n=16, alpha=0.0, phi_start=0.6, target=Target(1e-9), approach=FAST)
-    unbroken, out = tmp_path / "unbroken.h5", tmp_path / "packing.h5"
-    all_rows = [at for at in make(sample, unbroken) if at.stage == "compression"]
-    assert len(all_rows) > 70
+    sample = Sample(n=16, alpha=0.0, phi_start=0.5, target=Target(1e-6), approach=FAST)
+    unbroken, out = make(sample, tmp_path / "unbroken.h5"), tmp_path / "packing.h5"
+    rows = [next(unbroken) for _ in range(150)]
+    unbroken.close()
     going = make(sample, out)
     for _ in range(60):  # past the first restart file, which is written after 50 rows
         next(going)
     going.close()
-    assert Files(out).restart.exists()
+    assert list(tmp_path.glob("packing*restart*"))
     assert not is_compressed(Files(out).run)
-    rows = [at for at in make(sample, out) if at.stage == "compression"]
-    assert len(rows) == pytest.approx(len(all_rows) - 50, abs=2)
-    assert rows[0].phi == pytest.approx(all_rows[50].phi, rel=1e-9)
+    progress = list(make(sample, out))
+    assert {at.stage for at in progress} == {"compression", "search"}
+    for found, expected in zip(progress[:100], rows[50:], strict=True):
+        assert found.phi == pytest.approx(expected.phi, rel=1e-12)
+        assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-6, abs=1e-20)
     phi = read_observables(Files(out).run)["phi"]
-    np.testing.assert_allclose(
-        phi, read_observables(Files(unbroken).run)["phi"][: len(phi)], rtol=1e-9
-    )
+    np.testing.assert_allclose(phi[:150], [at.phi for at in rows], rtol=1e-12)
+    assert is_compressed(Files(out).run)
     assert summary(out)["reached"]
-    assert not Files(out).restart.exists()
+    assert not list(tmp_path.glob("packing*restart*"))
 
 
 @pytest.mark.lammps

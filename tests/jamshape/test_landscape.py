@@ -68,9 +68,7 @@ def test_discs_have_no_rotation_and_rods_one_or_three():
     discs = landscape.particles.half_length == 0
     spread = landscape.components(np.ones(landscape.size))
     np.testing.assert_array_equal(spread[:, 2] == 0, discs)
-    np.testing.assert_array_equal(
-        landscape.particle_of_coordinate(), np.nonzero(spread)[0]
-    )
+    np.testing.assert_array_equal(landscape.particle_of_coordinate(), np.nonzero(spread)[0])
 
 
 @pytest.mark.parametrize("sides", [1, 2])
@@ -201,9 +199,7 @@ def test_rests_survive_the_way_through_a_packing(packing):
     rng = np.random.default_rng(7)
     state = State.of(packing)
     shift = np.longdouble(1e-18) * rng.normal(size=packing.position.shape)
-    turn = np.longdouble(1e-18) * rng.normal(
-        size=(packing.n, 1 if packing.dimension == 2 else 3)
-    )
+    turn = np.longdouble(1e-18) * rng.normal(size=(packing.n, 1 if packing.dimension == 2 else 3))
     state = state.strained(1e-17).displaced(shift, turn)
     again = State.of(state.packing(packing))
     for name in ("position", "orientation", "edges"):

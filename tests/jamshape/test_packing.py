@@ -184,7 +184,9 @@ def test_shape_style_is_guessed_from_the_diameters():
 def with_rests(dimension):
     """A packing whose poses are known to more digits than doubles hold."""
     packing = nasty_packing(dimension).with_(position=nasty_packing(dimension).position.clip(-9, 9))
-    finer = [x + np.longdouble(1) / 3 * np.spacing(np.longdouble(1) * 1e-3) for x in packing.poses()]
+    finer = [
+        x + np.longdouble(1) / 3 * np.spacing(np.longdouble(1) * 1e-3) for x in packing.poses()
+    ]
     finer = [x + np.spacing(np.abs(x).astype(float)) / np.longdouble(7) for x in finer]
     return packing.with_poses(*finer)
 

@@ -445,8 +445,10 @@ def test_frames_with_rests_are_appended_and_truncated(path):
 
 def test_rests_that_come_with_a_later_frame_are_not_lost(path):
     first = with_rests(2)
-    writer = RunWriter.create(path, first.with_(step=0, position=first.position,
-                              orientation=first.orientation, box=first.box))
+    writer = RunWriter.create(
+        path,
+        first.with_(step=0, position=first.position, orientation=first.orientation, box=first.box),
+    )
     later = first.with_(step=10)
     writer.append(later)
     assert_same_poses(read_packing(path), later)

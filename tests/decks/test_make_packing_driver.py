@@ -1,0 +1,108 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jamshape.contacts import find_contacts
+from jamshape.landscape import Landscape, State
+from jamshape.minimise import residual_of
+from jamshape.storage import read_attributes, read_observables, read_packing, read_report
+
+pytestmark = pytest.mark.lammps
+
+DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_packing.py"
+SMALL = ("--n", "16", "--alpha", "1", "--kappa", "1e-5", "--phi-start", "0.6", "--u0", "1e-9")
+
+
+def run(*options):
+    command = [sys.executable, str(DRIVER), *map(str, options)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    out = tmp_path_factory.mktemp("make_packing") / "new" / "packing.h5"  # makes the folder
+    finished = run(*SMALL, "--out", out)
+    assert finished.returncode in {0, 1}, finished.stderr
+    return out, finished
+
+
+def test_help_names_every_option():
+    found = run("--help")
+    assert found.returncode == 0
+    for name in ("--alpha", "--n ", "--size-ratio", "--seed", "--u0", "--out", "--again"):
+        assert name in found.stdout
+
+
+def test_a_run_ends_with_one_json_line_and_says_whether_it_got_there(made):
+    out, finished = made
+    (line,) = finished.stdout.splitlines()
+    report = json.loads(line, parse_constant=pytest.fail)  # no NaN
+    assert report["out"] == str(out)
+    assert (report["n"], report["alpha"], report["seed"]) == (16, 1.0, 1)
+    assert report["reached"] is (finished.returncode == 0)
+    assert report["reached"] is (report["outcome"] in {"converged", "sliding"})
+    assert report["u"] == pytest.approx(1e-9, rel=1e-7, abs=0)
+    assert report["phi"] > report["phi_J"]
+
+
+def test_the_file_is_a_packing_at_that_energy(made):
+    out, finished = made
+    report = json.loads(finished.stdout)
+    packing = read_packing(out)
+    landscape, state = Landscape(packing), State.of(packing)
+    evaluation = landscape.evaluate(state)
+    assert evaluation.energy / state.volume == pytest.approx(1e-9, rel=1e-7, abs=0)
+    assert packing.phi == pytest.approx(report["phi"], rel=1e-14)
+    stored = read_attributes(out)
+    assert residual_of(landscape, evaluation).largest <= 2 * max(stored["residual"], 1e-8)
+    if report["outcome"] == "converged":
+        assert stored["residual"] <= 1e-8
+    assert stored["kappa"] == 1e-5
+    assert len(find_contacts(packing, 1.0, 2).pairs) == stored["n_contacts"]
+    assert len(read_report(out).step) > 5
+
+
+def test_the_compression_is_beside_it_and_nothing_else(made):
+    out, _ = made
+    run_file = out.with_name("packing.h5.run.h5")
+    assert sorted(path.name for path in out.parent.iterdir()) == [out.name, run_file.name]
+    assert read_attributes(run_file)["finished"]
+    observables = read_observables(run_file)
+    closing = observables["kappa"] > 0
+    assert observables["phi"][closing].max() > 0.7
+    assert np.all(np.diff(observables["phi"][closing]) > 0)
+    assert np.all(np.diff(observables["phi"][~closing]) < 0)
+
+
+def test_a_finished_file_is_left_alone(made):
+    out, finished = made
+    before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.parent.iterdir()}
+    again = run(*SMALL, "--out", out)
+    assert (again.returncode, again.stdout) == (finished.returncode, finished.stdout)
+    after = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.parent.iterdir()}
+    assert after == before
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--u0", "-1"), "u0 is -1.0, expected a positive number"),
+        (("--n", "0"), "n is 0, expected at least one particle"),
+        (("--alpha", "-1"), "alpha is -1.0"),
+        (("--size-ratio", "0.5"), "size_ratio is 0.5"),
+        (("--kappa", "1"), "kappa is 1.0, expected at most"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path):
+    failed = run(*SMALL, *options, "--out", tmp_path / "none.h5")
+    assert failed.returncode == 1
+    last = failed.stderr.strip().replace("\r", "\n").splitlines()[-1]  # below a bar of progress
+    assert last.startswith("make_packing.py: ")
+    assert words in last
+    assert "Traceback" not in failed.stderr
+    assert not failed.stdout
+    assert not list(tmp_path.iterdir())
