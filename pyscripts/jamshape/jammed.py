@@ -46,6 +46,8 @@ _SUMMARY = (
     *("n_rattlers", "evaluations", "wall_seconds"),
 )
 
+_NOT_STORED = {"approach", "target", "mixture"}
+
 _REACHED = (Outcome.CONVERGED, Outcome.SLIDING)
 
 
@@ -61,6 +63,8 @@ class Sample:
         Packing fraction of the random start.
     approach, target
         How to compress, and what to look for.
+    mixture
+        Other particles than these.
     """
 
     n: int = 256
@@ -70,15 +74,16 @@ class Sample:
     phi_start: float = 0.4
     approach: Approach = field(default_factory=Approach)
     target: Target = field(default_factory=Target)
+    mixture: Mixture | None = None
 
     def start(self) -> Packing:
         """Make the random start; errors as `initial.random_packing`."""
-        mixture = Mixture.bidisperse(self.alpha, self.size_ratio)
+        mixture = self.mixture or Mixture.bidisperse(self.alpha, self.size_ratio)
         return random_packing(self.n, self.phi_start, self.seed, mixture)
 
     def attributes(self) -> dict[str, Any]:
         """Return what identifies it, to be stored."""
-        found = {k: v for k, v in vars(self).items() if k not in {"approach", "target"}}
+        found = {k: v for k, v in vars(self).items() if k not in _NOT_STORED}
         found |= {f"approach_{k}": v for k, v in vars(self.approach).items()}
         found |= {k: v for k, v in vars(self.target).items() if k != "step"}
         return found | {"kappa": self.approach.kappa, "step": self.target.step}

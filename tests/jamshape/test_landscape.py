@@ -267,5 +267,5 @@ def test_strain_scales_box_and_positions_and_leaves_the_rotations(packing):
 
 def test_crossing_spines_are_named_by_their_ids():
     crossing = make([[5, 5], [5.1, 5.1], [9, 9]], [0, np.pi / 2, 0], id=np.array([7, 3, 5]))
-    with pytest.raises(CrossingError, match="the spines of particles [73] and [73] cross"):
+    with pytest.raises(CrossingError, match=r"the spines of particles [73] and [73] cross"):
         Landscape(crossing).evaluate(State.of(crossing))

@@ -170,7 +170,7 @@ def test_unknown_method_is_refused_in_a_sentence():
 @pytest.mark.parametrize("method", METHODS)
 def test_crossing_spines_are_refused(method):
     crossing = make([[5, 5], [5.1, 5.1], [9, 9]], [0, np.pi / 2, 0])
-    with pytest.raises(CrossingError, match="spines of particles [12] and [12] cross"):
+    with pytest.raises(CrossingError, match=r"spines of particles [12] and [12] cross"):
         minimise(Landscape(crossing), State.of(crossing), method)
 
 

@@ -7,7 +7,7 @@ import pytest
 from test_minimise import squeezed
 
 from jamshape.contacts import coordination, find_contacts
-from jamshape.landscape import Landscape, State
+from jamshape.landscape import Landscape
 from jamshape.minimise import History, Outcome, minimise, residual_of
 from jamshape.target import Search, Target, TargetError, direct, find, halving
 
@@ -72,7 +72,7 @@ def test_discs_are_isostatic_at_jamming(name, u0):
     landscape, _ = start_of(name)
     counts = coordination_of(landscape, found(name, u0))
     N = landscape.particles.n - counts.n_rattlers
-    assert N > landscape.particles.n / 2
+    assert landscape.particles.n / 2 < N
     assert counts.n_bonds == counts.n_contacts == 2 * N - 1
     assert counts.z == pytest.approx(2 * (2 * N - 1) / N)
 
@@ -98,7 +98,7 @@ def test_halving_comes_back_to_the_packing_of_the_direct_search(name):
     landscape, _ = start_of(name)
     expected, target = found(name, 1e-9), Target(1e-9)
     search = Search(expected.state.strained(1.03e-7), step=1e-8)
-    for search in halving(landscape, search, target):
+    for _ in halving(landscape, search, target):
         pass
     assert search.minimum.energy_density == pytest.approx(1e-9, rel=1e-7, abs=0)
     assert search.minimum.residual.largest <= 1e-8
@@ -143,13 +143,12 @@ def test_resumed_from_any_point_it_gives_the_same_bits(name):
     landscape, state = start_of(name)
     target = Target(1e-12)
     halfway = [Search(state, target.step)]
-    for search in direct(landscape, copied(halfway[0]), target):
-        halfway.append(copied(search))
+    halfway += [copied(s) for s in direct(landscape, copied(halfway[0]), target)]
     whole = halfway.pop().minimum
     assert len(halfway) > 4
     for point in (halfway[0], halfway[len(halfway) // 2], halfway[-1]):
         search = copied(point)
-        for search in direct(Landscape(landscape.particles), search, target):
+        for _ in direct(Landscape(landscape.particles), search, target):
             pass
         for part in ("position", "orientation", "edges"):
             np.testing.assert_array_equal(

@@ -1,0 +1,191 @@
+"""Residual force against run time of every minimiser, and of both energy targets, on the same states.
+
+    python analysis/minimiser_error.py --n 256 --seconds 60 --out runs/minimisers
+
+For every state a packing at u0 = 1e-15 is made first (kept in the folder, and taken from there the next
+time). All minimisers then start from it, each particle displaced at random by 1e-6 of its radius, which
+is many overlaps; the two energy targets start from it compressed by a strain of 1e-6. A curve is the best residual so
+far; the table gives the seconds to residuals of 1e-4, 1e-6 and 1e-8, or what was reached.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from tqdm import tqdm
+
+from jamshape.approach import Approach
+from jamshape.initial import Mixture
+from jamshape.jammed import Sample, is_done, make
+from jamshape.landscape import Landscape, State
+from jamshape.minimise import History, Stop, minimise
+from jamshape.packing import Packing
+from jamshape.storage import read_packing
+from jamshape.target import Search, Target, TargetError, direct, halving
+
+MINIMISERS = ("auto", "newton", "lbfgs", "lammps", "paper")
+LEVELS = (1e-4, 1e-6, 1e-8)
+DISPLACEMENT = 1e-6
+STRAIN = 1e-6
+
+Row = dict[str, Any]
+
+
+def parse() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--n", type=int, default=256, help="particles (256)")
+    parser.add_argument("--seconds", type=float, default=60.0, help="for each curve (60)")
+    parser.add_argument("--kappa", type=float, default=4e-6, help="slowest compression rate (4e-6)")
+    parser.add_argument(
+        "--states",
+        nargs="+",
+        default=["0.01", "1", "4", "20", "mixture"],
+        help="aspect ratios, or 'mixture' (0.01 1 4 20 mixture)",
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder")
+    return parser.parse_args()
+
+
+def mixture(n: int) -> Mixture:
+    """Discs and rods up to alpha = 8, in two sizes."""
+    radius = np.where(np.arange(n) % 2, 0.5, 0.7)
+    alpha = np.array([0, 0.3, 1, 2, 4, 8])[np.arange(n) // 2 % 6]
+    return Mixture.from_arrays(alpha * radius, radius, 1 + (np.arange(n) + 1) % 2)
+
+
+def state_of(name: str, options: argparse.Namespace) -> Packing:
+    """Make the packing at u0, or read it."""
+    path: Path = options.out / f"state_{name}.h5"
+    rods = name != "mixture" and float(name) > 10
+    sample = Sample(
+        n=options.n,
+        alpha=8.0 if name == "mixture" else float(name),
+        phi_start=0.2 if rods else 0.35,
+        approach=Approach(kappa=options.kappa),
+        target=Target(tolerance=1e-7),
+        mixture=mixture(options.n) if name == "mixture" else None,
+    )
+    if not is_done(path):
+        for _ in tqdm(make(sample, path), desc=f"state {name}", unit="row", mininterval=5):
+            pass
+    return read_packing(path)
+
+
+def curve(history: History) -> Row:
+    """Summarise a history: best residual so far against time, thinned, and seconds to each level."""
+    seconds, best = np.array(history.wall_seconds), np.minimum.accumulate(history.residual)
+    reached = {f"{level:g}": seconds[best <= level] for level in LEVELS}
+    keep = np.flatnonzero(np.diff(best, prepend=np.inf) < 0)
+    return {
+        "seconds": seconds[keep].tolist(),
+        "residual": best[keep].tolist(),
+        "to": {k: float(v[0]) if len(v) else None for k, v in reached.items()},
+        "reached": float(best[-1]),
+    }
+
+
+def run_minimiser(method: str, packing: Packing, seconds: float) -> Row:
+    """Minimise from the displaced state."""
+    landscape = Landscape(packing)
+    rng = np.random.default_rng(1)
+    step = DISPLACEMENT * float(packing.radius.min()) * rng.normal(size=landscape.size)
+    start = landscape.displaced(State.of(packing), step)
+    found = minimise(landscape, start, method, Stop(seconds=seconds))
+    return {"outcome": found.outcome.value, **curve(found.history)}
+
+
+def run_target(search: Callable[..., Any], packing: Packing, seconds: float) -> Row:
+    """Find u0 from the compressed state."""
+    landscape, target = Landscape(packing), Target(tolerance=1e-7, method="auto")
+    step = 1e-6 if search is halving else target.step
+    state = Search(State.of(packing).strained(-STRAIN), step)
+    began, errors = time.perf_counter(), []
+    try:
+        for _ in search(landscape, state, target):
+            u = state.history.energy_density[-1]
+            errors.append((time.perf_counter() - began, abs(u / target.u0 - 1)))
+            if errors[-1][0] > seconds:
+                break
+    except TargetError as error:
+        return {"outcome": str(error), "seconds": time.perf_counter() - began}
+    off = errors[-1][1] if errors else None
+    done = state.minimum is not None
+    return {"outcome": "found" if done else "out of time", "seconds": errors[-1][0], "off": off}
+
+
+def study(options: argparse.Namespace) -> dict[str, Row]:
+    """Run everything; results of each state are kept in the folder as they come."""
+    results: dict[str, Row] = {}
+    for name in options.states:
+        path = options.out / f"result_{name}.json"
+        if not path.exists():
+            packing = state_of(name, options)
+            rows = {m: run_minimiser(m, packing, options.seconds) for m in MINIMISERS}
+            targets = {
+                f.__name__: run_target(f, packing, options.seconds) for f in (direct, halving)
+            }
+            path.write_text(json.dumps({"minimisers": rows, "targets": targets}))
+        results[name] = json.loads(path.read_text())
+    return results
+
+
+def draw(results: dict[str, Row], path: Path) -> None:
+    """One panel a state, one curve a minimiser."""
+    figure, axes = plt.subplots(1, len(results), figsize=(3 * len(results), 3), squeeze=False)
+    for axis, (name, result) in zip(axes[0], results.items(), strict=True):
+        for method, row in result["minimisers"].items():
+            axis.loglog(row["seconds"], row["residual"], label=method)
+        label = name if name == "mixture" else rf"$\alpha = {name}$"
+        axis.set(xlabel=f"seconds, {label}", ylim=(1e-11, None))
+    axes[0][0].set_ylabel("largest net force / mean bond force")
+    axes[0][0].legend(fontsize="small")
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+
+
+def table(results: dict[str, Row]) -> str:
+    """Seconds to each level, as Markdown."""
+    heads = [f"to {level:g}" for level in LEVELS]
+    lines = [
+        f"| state | method | {' | '.join(heads)} | reached |",
+        "| --- " * (3 + len(heads)) + "|",
+    ]
+    for name, result in results.items():
+        for method, row in result["minimisers"].items():
+            times = [f"{t:.3g} s" if t is not None else "-" for t in row["to"].values()]
+            lines.append(f"| {name} | {method} | {' | '.join(times)} | {row['reached']:.1e} |")
+        for method, row in result["targets"].items():
+            lines.append(
+                f"| {name} | target: {method} | {row['seconds']:.3g} s | {row['outcome']} |"
+            )
+    return "\n".join(lines)
+
+
+def main(options: argparse.Namespace) -> None:
+    """Study, draw, print."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    results = study(options)
+    draw(results, options.out / "minimisers.png")
+    print(table(results))
+    print(json.dumps({"out": str(options.out / "minimisers.png"), "n": options.n}))
+
+
+if __name__ == "__main__":
+    try:
+        main(parse())
+    except (ValueError, OSError, RuntimeError) as error:
+        sys.exit(f"minimiser_error.py: {error}")
