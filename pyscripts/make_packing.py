@@ -17,7 +17,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from jamshape.approach import Approach
-from jamshape.jammed import Sample, is_done, make, summary
+from jamshape.jammed import Sample, is_done, make, require_same, summary
 from jamshape.target import Target
 
 
@@ -68,6 +68,8 @@ def main(options: argparse.Namespace) -> int:
                     f"{at.stage} phi {at.phi:.6f} u {at.energy_density:.2e} res {at.residual:.1e}"
                 )
                 bar.set_postfix_str(text, refresh=False)
+    else:
+        require_same(options.out, sample)
     found = summary(options.out)
     print(json.dumps(found))
     return 0 if found["reached"] else 1

@@ -47,8 +47,11 @@ def parse() -> argparse.Namespace:
 def make(alpha: float, seed: int, options: argparse.Namespace) -> str | None:
     """Make one sample; return its complaint if it fails."""
     out = options.out / f"alpha{alpha:g}_seed{seed}.h5"
-    if is_done(out):
-        return None
+    try:
+        if is_done(out):
+            return None
+    except (ValueError, OSError) as error:
+        return f"{out.name}: {error}"
     arguments = ["--alpha", repr(alpha), "--seed", str(seed), "--out", str(out), *options.extra]
     log = out.with_suffix(".log")
     with log.open("w") as errors:

@@ -83,10 +83,14 @@ class Sample:
 
     def attributes(self) -> dict[str, Any]:
         """Return what identifies it, to be stored."""
+        found = {k: v for k, v in vars(self.target).items() if k != "step"}
+        return self.compression() | found | {"step": self.target.step}
+
+    def compression(self) -> dict[str, Any]:
+        """Return what identifies its compression, whatever the target."""
         found = {k: v for k, v in vars(self).items() if k not in _NOT_STORED}
         found |= {f"approach_{k}": v for k, v in vars(self.approach).items()}
-        found |= {k: v for k, v in vars(self.target).items() if k != "step"}
-        return found | {"kappa": self.approach.kappa, "step": self.target.step}
+        return found | {"kappa": self.approach.kappa, "mixture": self.mixture is not None}
 
 
 @dataclass(frozen=True)
@@ -144,7 +148,7 @@ def make(sample: Sample, out: Path) -> Iterator[Progress]:
         As `initial.random_packing`.
     """
     began, files = time.perf_counter(), Files(out)
-    if not is_compressed(files.run):
+    if not _holds_compression(files.run, sample):
         yield from _compress(sample, files)
     start = read_packing(files.run)
     landscape = Landscape(start)
@@ -163,9 +167,35 @@ def make(sample: Sample, out: Path) -> Iterator[Progress]:
     files.search.unlink(missing_ok=True)
 
 
+def require_same(out: Path, sample: Sample) -> None:
+    """Refuse a finished packing that is another one than asked for.
+
+    Raises
+    ------
+    ValueError
+    """
+    stored = read_attributes(out)
+    for name, value in sample.attributes().items():
+        if stored.get(name) != value:
+            msg = (
+                f"{out} holds a packing with {name} = {stored.get(name)}, expected {value};"
+                " write to another file, or make it again"
+            )
+            raise ValueError(msg)
+
+
 def is_compressed(run: Path) -> bool:
     """Whether the file holds a compression that reached its end."""
     return run.exists() and bool(read_attributes(run).get("finished"))
+
+
+def _holds_compression(run: Path, sample: Sample) -> bool:
+    """Whether the file holds the compression of this sample, to its end."""
+    if not (is_compressed(run) and _same(read_attributes(run), sample.compression())):
+        return False
+    if sample.mixture is None:
+        return True
+    return np.array_equal(read_packing(run).diameters, sample.start().diameters)
 
 
 def _compress(sample: Sample, files: Files) -> Iterator[Progress]:
@@ -208,8 +238,8 @@ def _resumed(
     if not files.run.exists():
         return None
     stored = read_attributes(files.run)
-    restart = files.restart(stored["restart_step"])
-    if not (_same(stored, sample) and restart.exists()):
+    restart = files.restart(stored.get("restart_step", -1))
+    if not (_same(stored, sample.compression()) and restart.exists()):
         return None
     run = resume_approach(session, restart, stored)
     writer = RunWriter.open(files.run)
@@ -217,8 +247,8 @@ def _resumed(
     return run, writer
 
 
-def _same(stored: Mapping[str, Any], sample: Sample) -> bool:
-    return all(stored.get(name) == value for name, value in sample.attributes().items())
+def _same(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:
+    return all(stored.get(name) == value for name, value in expected.items())
 
 
 def _onset(run: Path) -> dict[str, float]:
@@ -257,7 +287,7 @@ def _stored_search(path: Path, sample: Sample) -> Search | None:
     if not path.exists():
         return None
     stored = read_attributes(path)
-    if not _same(stored, sample):
+    if not _same(stored, sample.attributes()):
         return None
     opening = int(stored["opening"])
     return Search(

@@ -481,8 +481,7 @@ def _create_particles(group: h5py.Group, packing: Packing) -> None:
     group.attrs["shape_style"] = packing.shape_style
     for name in ("species", "id", "diameters"):
         group[name] = getattr(packing, name)
-    rests = any(getattr(packing, name).any() for name in _RESTS)
-    for name, value in _frame_values(packing, rests=rests).items():
+    for name, value in _frame_values(packing, rests=_has_rests(packing)).items():
         element = group.create_group(name)
         _create_rows(element, "value", value)
         if name == "position":
@@ -491,6 +490,19 @@ def _create_particles(group: h5py.Group, packing: Packing) -> None:
             element["step"], element["time"] = group["position/step"], group["position/time"]
     group["box"].attrs["dimension"] = packing.dimension
     group["box"].attrs["boundary"] = np.array([b"periodic"] * packing.dimension)
+
+
+def _has_rests(packing: Packing) -> bool:
+    return any(getattr(packing, name).any() for name in _RESTS)
+
+
+def _create_rests(group: h5py.Group, packing: Packing, n: int) -> None:
+    """Create the elements of rests, zero in the n frames that are there."""
+    for name, path in _RESTS.items():
+        element = group.create_group(path)
+        _create_rows(element, "value", getattr(packing, name))
+        element["value"].resize(n, axis=0)
+        element["step"], element["time"] = group["position/step"], group["position/time"]
 
 
 def _create_clock(group: h5py.Group) -> None:
@@ -514,6 +526,8 @@ def _create_rows(group: h5py.Group, name: str, row: NDArray[Any]) -> None:
 def _append_frame(group: h5py.Group, packing: Packing) -> None:
     position = group["position"]
     n = len(position["step"])
+    if _has_rests(packing) and "position_rest" not in group:
+        _create_rests(group, packing, n)
     for name, value in _frame_values(packing, rests="position_rest" in group).items():
         _put(group[name]["value"], n, value)
     _put(position["time"], n, packing.time)
