@@ -87,15 +87,15 @@ def draw_particle(axes: Axes) -> None:
     axes.set_axis_off()
 
 
-def draw(curves: dict[float, Curve], n: int, out: Path) -> None:
-    """Draw P(phi) of each alpha, with a band of one standard error."""
+def draw(curves: dict[str, Curve], n: int, out: Path) -> None:
+    """Draw P(phi) of each, by its name, with a band of one standard error."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(6, 4.3), dpi=200, layout="constrained")
     axes = figure.subplots()
-    for k, (alpha, found) in enumerate(curves.items()):
+    for k, (name, found) in enumerate(curves.items()):
         color = COLORS[k % len(COLORS)]
-        label = rf"$\alpha={alpha:g}$ ({found.samples} sample{'s' * (found.samples > 1)})"
+        label = f"{name} ({found.samples} sample{'s' * (found.samples > 1)})"
         axes.stairs(found.density, found.edges, color=color, lw=1.1, label=label, baseline=None)
         low, high = found.density - found.error, found.density + found.error
         axes.stairs(
@@ -142,7 +142,7 @@ def main() -> None:
         for alpha in choose_alphas(sweep, options.alpha, PAPER_ALPHAS, most=5)
     }
     n = next(iter(sweep.values()))[0].attributes["n"]
-    draw(curves, n, options.out)
+    draw({rf"$\alpha={alpha:g}$": found for alpha, found in curves.items()}, n, options.out)
     rows = [
         {"alpha": alpha, "samples": found.samples, "contacts": found.n_contacts}
         | {"peak": found.density.max(), "on_flat": found.on_flat.report()}

@@ -168,14 +168,19 @@ def make(sample: Sample, out: Path) -> Iterator[Progress]:
 
 
 def require_same(out: Path, sample: Sample) -> None:
-    """Refuse a finished packing that is another one than asked for.
+    """Refuse a finished packing that is another one than asked for; errors as below."""
+    require_attributes(out, sample.attributes())
+
+
+def require_attributes(out: Path, expected: Mapping[str, Any]) -> None:
+    """Refuse a file with other attributes than expected.
 
     Raises
     ------
     ValueError
     """
     stored = read_attributes(out)
-    for name, value in sample.attributes().items():
+    for name, value in expected.items():
         if stored.get(name) != value:
             msg = (
                 f"{out} holds a packing with {name} = {stored.get(name)}, expected {value};"

@@ -1,0 +1,180 @@
+"""The check of the singular limit, as its users run it, on few discs."""
+
+import json
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jamshape.initial import Mixture, random_packing
+from jamshape.jammed import write_minimum
+from jamshape.landscape import Landscape, State
+from jamshape.minimise import Stop, minimise
+from jamshape.storage import read_attributes, read_packing, write_packing
+from jamshape.target import Target, find
+
+SCRIPT = Path(__file__).parents[2] / "analysis" / "singular_limit.py"
+N, U0 = 16, 1e-14
+
+
+def run(*arguments):
+    command = [sys.executable, "-W", "error", SCRIPT, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def report(*arguments):
+    done = run(*arguments)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1], parse_constant=pytest.fail)  # no NaN
+
+
+@pytest.fixture
+def problem(monkeypatch, capsys):
+    """Run the script here, which saves the time of starting it; return its one sentence."""
+
+    def sentence(*arguments):
+        monkeypatch.setattr(sys, "argv", [str(SCRIPT), *map(str, arguments)])
+        monkeypatch.syspath_prepend(SCRIPT.parent)
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(SCRIPT), run_name="__main__")
+        said = ended.value.code
+        assert isinstance(said, str)  # printed by Python, which then ends with exit code 1
+        assert "\n" not in said
+        assert said.startswith("singular_limit.py: ")
+        assert not capsys.readouterr().out
+        return said
+
+    return sentence
+
+
+def write_jammed(path, alpha, seed):
+    """A packing as make_packing.py writes it, without its compression in LAMMPS."""
+    packing = random_packing(N, 0.4, seed, Mixture.bidisperse(alpha))
+    landscape, state = Landscape(packing), State.of(packing)
+    rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
+    while state.packing(packing).phi < 0.8:
+        state = minimise(landscape, state.strained(-0.01), "lbfgs", rough).state
+    minimum = find(landscape, state, Target(U0))
+    known = {"alpha": float(alpha), "n": N, "size_ratio": 1.4, "seed": seed, "u0": U0}
+    write_minimum(path, landscape, minimum, known)
+    return path
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sweep")
+    for seed in (1, 2):
+        write_jammed(folder / f"alpha0_seed{seed}.h5", 0, seed)
+    write_jammed(folder / "alpha0.01_seed1.h5", 0.01, 1)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def made(sweep, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out") / "new"
+    return out, report(sweep, "--out", out)
+
+
+def test_help():
+    done = run("--help")
+    assert done.returncode == 0
+    assert "Marschall & Teitel" in done.stdout
+    for name in ("SWEEP", "--alpha", "--seed", "--out"):
+        assert name in done.stdout
+
+
+def test_an_error_ends_the_process_without_traceback(tmp_path):
+    done = run("--alpha", 0, "--out", tmp_path / "out")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+
+
+def test_discs_become_jammed_rods_of_the_same_radii(sweep, made):
+    out, _ = made
+    packings = sorted(out.glob("*.h5"))
+    assert [p.name for p in packings] == [f"alpha0.01_from_alpha0_seed{k}.h5" for k in (1, 2)]
+    for seed, path in enumerate(packings, 1):
+        discs, rods = read_packing(sweep / f"alpha0_seed{seed}.h5"), read_packing(path)
+        np.testing.assert_array_equal(rods.radius, discs.radius)
+        np.testing.assert_allclose(rods.aspect_ratio, 0.01, rtol=1e-12)
+        assert abs(rods.phi - discs.phi) < 0.03
+        evaluation = Landscape(rods).evaluate(State.of(rods))
+        assert evaluation.energy / rods.box.volume == pytest.approx(U0, rel=1e-7, abs=0)
+        stored = read_attributes(path)
+        assert stored["outcome"] in {"converged", "sliding"}
+        assert (stored["n"], stored["seed"], stored["alpha"]) == (N, seed, 0.01)
+        second_harmonic = np.exp(2j * rods.orientation).mean()
+        assert abs(second_harmonic) < 3 / np.sqrt(N)  # directions are random
+
+
+def test_spines_find_the_contacts(made):
+    """Nearly all particles touch with their flat sides, 0.63 % of the perimeter."""
+    out, found = made
+    for name, samples in (("from_discs", 2), ("compressed", 1)):
+        row = found[name]
+        assert row["samples"] == samples
+        assert row["flat_of_backbone"]["value"] > 0.7
+        assert row["angles_on_flat"]["value"] > 0.1
+        assert row["peak"] > 3
+        assert 4 < row["z"]["value"] < 6
+        assert row["overlap_over_limit"]["value"] < 0.1
+    assert 0 < found["kolmogorov_distance"] < 0.4
+    assert found["paper"]["flat"] == 0.963
+    assert found["failed"] == []
+    assert found["out"] == str(out / "singular_limit.png")
+    assert (out / "singular_limit.png").stat().st_size > 10_000
+
+
+def test_packings_that_are_there_are_taken(sweep, made):
+    out, found = made
+    before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.glob("*.h5")}
+    assert report(sweep, "--out", out) == found
+    after = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.glob("*.h5")}
+    assert after == before
+    one = report(sweep / "alpha0_seed1.h5", "--out", out)
+    assert "compressed" not in one
+    assert one["from_discs"]["samples"] == 1
+
+
+def test_packings_of_other_directions_or_discs_are_not_taken(problem, sweep, made, tmp_path):
+    out, _ = made
+    before = {path: path.read_bytes() for path in out.iterdir()}
+    assert "with spine_seed = 1, expected 2" in problem(sweep, "--seed", 2, "--out", out)
+    other = write_jammed(tmp_path / "alpha0_seed1.h5", 0, 5)
+    assert "with seed = 1, expected 5" in problem(other, "--out", out)
+    assert {path: path.read_bytes() for path in out.iterdir()} == before
+
+
+@pytest.mark.lammps
+def test_discs_are_made_where_none_are_given(problem, tmp_path):
+    small = ("--n", 12, "--samples", 1, "--kappa", 1e-5, "--u0", 1e-12, "--out", tmp_path)
+    found = report(*small)
+    assert found["from_discs"]["samples"] == 1
+    discs = read_packing(tmp_path / "discs" / "alpha0_seed1.h5")
+    assert not discs.half_length.any()
+    assert "with approach_kappa = 1e-05, expected" in problem(*small, "--kappa", 2e-5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--alpha", 0), "alpha is 0.0, expected A / R above 0"),
+        (("--alpha", "nan"), "alpha is nan, expected A / R above 0"),
+        (("--seed", -1), "seed is -1, expected an integer from 0"),
+        (("--samples", 0), "samples is 0, expected at least 1"),
+        (("none",), "No such file"),
+    ],
+)
+def test_user_errors_are_one_sentence(problem, tmp_path, arguments, words):
+    assert words in problem(*arguments, "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_rods_that_are_called_discs_are_refused(problem, tmp_path):
+    path = tmp_path / "rods.h5"
+    known = {"alpha": 0.0, "n": 4, "size_ratio": 1.4, "seed": 1, "u0": U0}
+    known |= {"outcome": "converged", "phi": 0.3}
+    write_packing(path, random_packing(4, 0.3, 1, Mixture.bidisperse(1.0)), known)
+    assert "half lengths up to 0.7, expected discs" in problem(path, "--out", tmp_path / "out")
