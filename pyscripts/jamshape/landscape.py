@@ -22,6 +22,8 @@ from jamshape.packing import Box, FloatArray, IntArray, LongArray, Packing
 # Pairs whose surfaces are closer than this fraction of the smallest radius are looked at.
 _SKIN = 0.1
 
+_TURN = 2 * np.arccos(np.longdouble(-1))
+
 
 class CrossingError(ValueError):
     """Spines of two particles cross: their contact has no energy."""
@@ -75,7 +77,9 @@ class State:
     def displaced(self, shift: FloatArray, turn: FloatArray) -> State:
         """Add (N, D) displacements and (N, 1) or (N, 3) rotation vectors."""
         if self.dimension == 2:
+            # Whole turns would cost digits: a nearly round particle may make thousands of them.
             orientation = self.orientation + turn
+            orientation = orientation - _TURN * np.rint(orientation / _TURN)
         else:
             orientation = _turned(self.orientation, np.asarray(turn, np.longdouble))
         return replace(self, position=self.position + shift, orientation=orientation)

@@ -44,11 +44,12 @@ _LARGEST_FACTOR = 4.0
 # Below this fraction of u0 the energy is falling to nothing: the box was opened too far.
 _FALLEN = 1e-4
 
-# Steps grow again after so many that left the state unjammed.
+# Steps grow again after so many that left the state unjammed, and at once while they are finer than
+# the strain from jamming to u0; a search whose steps fall below this fraction of that strain has failed.
 _GROW_AFTER = 4
+_SMALLEST_STEP = 1e-3
 
 _PATIENCE = 1500
-_SMALLEST_STEP = 1e-12
 
 
 class TargetError(RuntimeError):
@@ -94,6 +95,10 @@ class Target:
     def is_met(self, u: float) -> bool:
         """Whether an energy density is u0."""
         return abs(u - self.u0) <= self.accuracy * self.u0
+
+    def strain_above_jamming(self, landscape: Landscape) -> float:
+        """Estimate the strain of the box between jamming and u0."""
+        return float(landscape.particles.radius.max()) * math.sqrt(self.u0 / landscape.k_e)
 
 
 @dataclass(eq=False)
@@ -147,22 +152,24 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
     TargetError
         If steps become too small.
     """
+    fine = target.strain_above_jamming(landscape)
     while search.minimum is None:
         landscape.forget_pairs()  # what follows depends on `search` alone
         stop = Stop(tolerance=_GOOD, lowest=_FALLEN * target.u0)
         found = minimise(landscape, search.state, "auto", stop, search.history)
         if found.outcome is Outcome.CONVERGED:
-            found = _lead_to(landscape, found, target)
+            jammed, found = found, _lead_to(landscape, found, target)
             if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):
                 search.minimum, search.state = found, found.state
                 yield search
                 return
-            search.step, search.loose_in_a_row = search.step / 4, 0
+            if found.outcome is not Outcome.UNJAMMED or found.state.volume > jammed.state.volume:
+                search.step, search.loose_in_a_row = search.step / 4, 0
         if found.outcome is Outcome.UNJAMMED:
             search.loose, search.loose_in_a_row = found.state, search.loose_in_a_row + 1
             if search.opening:
                 search.step /= 4
-            elif search.loose_in_a_row % _GROW_AFTER == 0:
+            elif search.step < fine or search.loose_in_a_row % _GROW_AFTER == 0:
                 search.step = min(2 * search.step, target.step)
             search.opening = False
             search.state = found.state.strained(-search.step)
@@ -174,7 +181,7 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
                 search.step *= 2
             search.opening = True
             search.state = found.state.strained(search.step)
-        if search.step < _SMALLEST_STEP:
+        if search.step < _SMALLEST_STEP * fine:
             u = found.energy_density
             msg = (
                 f"the search ended between an unjammed state and one of u = {u:.3g} that has a"

@@ -247,6 +247,17 @@ def test_a_rotation_moves_a_tip_by_its_coordinate():
     assert turned.orientation[0] == pytest.approx(0.3 + 0.05 / 2.5, abs=1e-15)
 
 
+def test_whole_turns_cost_no_digits():
+    # Minimisers turn particles that are nearly round by thousands of turns.
+    packing = make([[5, 5]], 0.3, half_length=0.5)
+    landscape, start = Landscape(packing), State.of(packing)
+    there = landscape.displaced(start, np.array([0.0, 0.0, 0.5 * 2 * np.pi * 5000]))
+    assert np.abs(there.orientation) <= np.pi
+    finest = np.array([0.0, 0.0, 0.5 * 1e-18])
+    moved = landscape.displaced(there, finest).orientation - there.orientation
+    assert float(moved[0, 0]) == pytest.approx(1e-18, rel=0.1)
+
+
 def test_rotation_vectors_turn_in_space_coordinates():
     packing = pressed_named("rods in space")
     state = State.of(packing)

@@ -189,6 +189,20 @@ def test_result_is_a_minimum_at_fixed_box_already():
     assert again.energy_density == pytest.approx(minimum.energy_density, rel=1e-9)
 
 
+def test_steps_finer_than_the_strain_above_jamming_grow_at_once():
+    landscape, _ = start_of("16 discs")
+    target = Target(1e-9)
+    fine = target.strain_above_jamming(landscape)
+    assert 0.1 < fine / math.sqrt(1e-9) < 10
+    below = found("16 discs", 1e-9).state.strained(20 * fine)
+    search = Search(below, fine / 100)
+    steps = [s.step for s in direct(landscape, search, target)]
+    growing = steps[: steps.index(max(steps))]
+    assert max(steps) > fine
+    assert len(growing) < 20
+    assert search.minimum is not None
+
+
 @pytest.mark.parametrize("name", ["u0", "accuracy", "tolerance", "step"])
 @pytest.mark.parametrize("value", [0, -1e-9, math.nan, math.inf])
 def test_target_refuses(name, value):
