@@ -2,8 +2,9 @@
 
     python analysis/fig_phi_j.py SWEEP [MORE.h5 ...] --out phi_j.png
 
-phi_J is known in two ways: of each packing, led from its energy density u0 to zero, and of the
-compression before it, where there is one, led from its pressure to zero as in the paper. The last
+phi_J is known in three ways: of each packing, led from its energy density u0 to zero; and of the run
+at finite rate before it, where there is one, led from its pressure to zero as in the paper, once as the box
+closes and once as it opens again. Those two tell what the rate does: they rise as kappa falls. The last
 line of standard output is one JSON object with the averages over samples.
 """
 
@@ -37,7 +38,7 @@ PAPER = {
     1.0: Mean(0.8875, math.nan, 0),
     4.0: Mean(0.866, math.nan, 0),
 }
-NAMES = ("phi_J", "phi_J_compression")
+NAMES = ("phi_J", "phi_J_compression", "phi_J_opening")
 
 Averages = dict[str, dict[float, Mean]]
 
@@ -64,6 +65,7 @@ def draw(known: Averages, samples: str, out: Path) -> None:
     styles: tuple[dict[str, Any], ...] = (
         {"fmt": "o-", "color": BLUE, "label": f"$\\phi_J$ from $u_0$ to 0 ({samples})"},
         {"fmt": "s", "color": RED, "mfc": "none", "label": r"$\phi_J$ from $p$ to 0, compression"},
+        {"fmt": "^", "color": RED, "mfc": "none", "label": r"$\phi_J$ from $p$ to 0, opening again"},
     )
     for name, style in zip(NAMES, styles, strict=True):
         found = {alpha: m for alpha, m in known[name].items() if m.samples}

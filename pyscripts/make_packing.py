@@ -62,7 +62,7 @@ def main(options: argparse.Namespace) -> int:
     sample = sample_of(options)
     if options.again or not is_done(options.out):
         options.out.parent.mkdir(parents=True, exist_ok=True)
-        with tqdm(make(sample, options.out), unit="row", mininterval=1) as bar:
+        with tqdm(make(sample, options.out, again=options.again), unit="row", mininterval=1) as bar:
             for at in bar:
                 text = (
                     f"{at.stage} phi {at.phi:.6f} u {at.energy_density:.2e} res {at.residual:.1e}"

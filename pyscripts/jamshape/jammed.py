@@ -48,6 +48,8 @@ _SUMMARY = (
 
 _NOT_STORED = {"approach", "target", "mixture"}
 
+_SHAPE_STYLE = "spherocylinder"
+
 _REACHED = (Outcome.CONVERGED, Outcome.SLIDING)
 
 
@@ -122,11 +124,25 @@ class Files:
 
 
 def is_done(out: Path) -> bool:
-    """Whether the file holds a finished packing."""
-    return out.exists() and "outcome" in read_attributes(out)
+    """Whether the file is there, with a finished packing.
+
+    Raises
+    ------
+    ValueError
+        If it is there with anything else.
+    """
+    if not out.exists():
+        return False
+    if "outcome" not in read_attributes(out):
+        msg = (
+            f"{out} holds no finished packing, expected one of make_packing.py;"
+            " write to another file, or remove this one"
+        )
+        raise ValueError(msg)
+    return True
 
 
-def make(sample: Sample, out: Path) -> Iterator[Progress]:
+def make(sample: Sample, out: Path, *, again: bool = False) -> Iterator[Progress]:
     """Make a packing and write it to `out`, going on with what an earlier call has left.
 
     Parameters
@@ -134,6 +150,8 @@ def make(sample: Sample, out: Path) -> Iterator[Progress]:
     sample : Sample
     out : Path
         Replaced when the packing is found.
+    again : bool
+        Replace the compression of another sample too.
 
     Yields
     ------
@@ -145,9 +163,11 @@ def make(sample: Sample, out: Path) -> Iterator[Progress]:
     TargetError
         As `target.direct`.
     ValueError
-        As `initial.random_packing`.
+        As `initial.random_packing`, or if another sample was being made there.
     """
     began, files = time.perf_counter(), Files(out)
+    if files.run.exists() and not again:
+        _require_compression(files.run, sample)
     if not _holds_compression(files.run, sample):
         yield from _compress(sample, files)
     start = read_packing(files.run)
@@ -170,9 +190,10 @@ def make(sample: Sample, out: Path) -> Iterator[Progress]:
 def require_same(out: Path, sample: Sample) -> None:
     """Refuse a finished packing that is another one than asked for; errors as below."""
     require_attributes(out, sample.attributes())
+    _require_particles(out, sample)
 
 
-def require_attributes(out: Path, expected: Mapping[str, Any]) -> None:
+def require_attributes(out: Path, expected: Mapping[str, Any], what: str = "a packing") -> None:
     """Refuse a file with other attributes than expected.
 
     Raises
@@ -183,10 +204,28 @@ def require_attributes(out: Path, expected: Mapping[str, Any]) -> None:
     for name, value in expected.items():
         if stored.get(name) != value:
             msg = (
-                f"{out} holds a packing with {name} = {stored.get(name)}, expected {value};"
+                f"{out} holds {what} with {name} = {stored.get(name)}, expected {value};"
                 " write to another file, or make it again"
             )
             raise ValueError(msg)
+
+
+def _require_compression(run: Path, sample: Sample) -> None:
+    """Refuse the compression of another sample."""
+    require_attributes(run, sample.compression(), "the compression of a packing")
+    _require_particles(run, sample)
+
+
+def _require_particles(path: Path, sample: Sample) -> None:
+    """Refuse a file that is damaged or holds other particles than the sample's."""
+    packing = read_packing(path)
+    found = f"{path} holds {packing.n} particles of shape {packing.shape_style!r}"
+    if packing.shape_style != _SHAPE_STYLE or packing.n != sample.n:
+        msg = f"{found}, expected {sample.n} of {_SHAPE_STYLE!r}; write to another file"
+        raise ValueError(msg)
+    if sample.mixture and not np.array_equal(packing.diameters, sample.start().diameters):
+        msg = f"{found}, expected those of another mixture; write to another file"
+        raise ValueError(msg)
 
 
 def is_compressed(run: Path) -> bool:
@@ -196,11 +235,13 @@ def is_compressed(run: Path) -> bool:
 
 def _holds_compression(run: Path, sample: Sample) -> bool:
     """Whether the file holds the compression of this sample, to its end."""
-    if not (is_compressed(run) and _same(read_attributes(run), sample.compression())):
+    if not is_compressed(run):
         return False
-    if sample.mixture is None:
-        return True
-    return np.array_equal(read_packing(run).diameters, sample.start().diameters)
+    try:
+        _require_compression(run, sample)
+    except ValueError:  # to be made again
+        return False
+    return True
 
 
 def _compress(sample: Sample, files: Files) -> Iterator[Progress]:
