@@ -151,7 +151,7 @@ def make(sample: Sample, out: Path, *, again: bool = False) -> Iterator[Progress
     out : Path
         Replaced when the packing is found.
     again : bool
-        Replace the compression of another sample too.
+        Replace the compression of another sample, or a damaged one, too.
 
     Yields
     ------
@@ -166,9 +166,14 @@ def make(sample: Sample, out: Path, *, again: bool = False) -> Iterator[Progress
         As `initial.random_packing`, or if another sample was being made there.
     """
     began, files = time.perf_counter(), Files(out)
-    if files.run.exists() and not again:
-        _require_compression(files.run, sample)
-    if not _holds_compression(files.run, sample):
+    if files.run.exists():
+        try:
+            _require_compression(files.run, sample)
+        except ValueError:
+            if not again:
+                raise
+            files.run.unlink()
+    if not is_compressed(files.run):
         yield from _compress(sample, files)
     start = read_packing(files.run)
     landscape = Landscape(start)
@@ -233,20 +238,9 @@ def is_compressed(run: Path) -> bool:
     return run.exists() and bool(read_attributes(run).get("finished"))
 
 
-def _holds_compression(run: Path, sample: Sample) -> bool:
-    """Whether the file holds the compression of this sample, to its end."""
-    if not is_compressed(run):
-        return False
-    try:
-        _require_compression(run, sample)
-    except ValueError:  # to be made again
-        return False
-    return True
-
-
 def _compress(sample: Sample, files: Files) -> Iterator[Progress]:
     with Session() as session:
-        run, writer = _resumed(session, sample, files) or _begun(session, sample, files)
+        run, writer = _resumed(session, files) or _begun(session, sample, files)
         rows: list[Row] = []
         for row in approach(run, sample.approach):
             rows.append(row)
@@ -278,14 +272,12 @@ def _begun(session: Session, sample: Sample, files: Files) -> tuple[CompressionR
     return run, RunWriter.create(files.run, run.packing(), attributes)
 
 
-def _resumed(
-    session: Session, sample: Sample, files: Files
-) -> tuple[CompressionRun, RunWriter] | None:
+def _resumed(session: Session, files: Files) -> tuple[CompressionRun, RunWriter] | None:
     if not files.run.exists():
         return None
     stored = read_attributes(files.run)
     restart = files.restart(stored.get("restart_step", -1))
-    if not (_same(stored, sample.compression()) and restart.exists()):
+    if not restart.exists():
         return None
     run = resume_approach(session, restart, stored)
     writer = RunWriter.open(files.run)

@@ -443,7 +443,7 @@ def _packing(file: h5py.File, frame: int) -> Packing:
     try:
         return Packing(box=Box(lo=lo, edges=edges), **fields)
     except ValueError as error:
-        msg = f"{file.filename}: {error}"
+        msg = f"{file.filename}: {error}; write it again"
         raise FileFormatError(msg) from error
 
 

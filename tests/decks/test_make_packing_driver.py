@@ -1,8 +1,10 @@
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -87,22 +89,73 @@ def test_a_finished_file_is_left_alone(made):
     assert after == before
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--u0", "-1"), "u0 is -1.0, expected a positive number"),
-        (("--n", "0"), "n is 0, expected at least one particle"),
-        (("--alpha", "-1"), "alpha is -1.0"),
-        (("--size-ratio", "0.5"), "size_ratio is 0.5"),
-        (("--kappa", "1"), "kappa is 1.0, expected at most"),
-    ],
-)
-def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path):
-    failed = run(*SMALL, *options, "--out", tmp_path / "none.h5")
+def assert_one_sentence(failed, words):
     assert failed.returncode == 1
     last = failed.stderr.strip().replace("\r", "\n").splitlines()[-1]  # below a bar of progress
     assert last.startswith("make_packing.py: ")
     assert words in last
     assert "Traceback" not in failed.stderr
     assert not failed.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--u0", "-1"), "u0 is -1.0, expected a positive number"),
+        (("--u0", "0"), "u0 is 0.0, expected a positive number"),
+        (("--u0", "nan"), "u0 is nan, expected a positive number"),
+        (("--n", "0"), "n is 0, expected at least one particle"),
+        (("--n", "-5"), "n is -5, expected at least one particle"),
+        (("--alpha", "-1"), "alpha is -1.0"),
+        (("--alpha", "nan"), "alpha is nan"),
+        (("--size-ratio", "-1.4"), "size_ratio is -1.4, expected big over small, at least 1"),
+        (("--size-ratio", "inf"), "of the mixture holds inf, expected finite lengths"),
+        (("--kappa", "1"), "kappa is 1.0, expected at most"),
+        (("--phi-start", "nan"), "phi is nan, expected a packing fraction between 0 and 1"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path):
+    assert_one_sentence(run(*SMALL, *options, "--out", tmp_path / "none.h5"), words)
     assert not list(tmp_path.iterdir())
+
+
+def cut(path):
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+
+
+def rename_shape(path):
+    with h5py.File(path, "r+") as file:
+        file["particles/all"].attrs["shape_style"] = "superellipsoid"
+
+
+def lose_a_position(path):
+    with h5py.File(path, "r+") as file:
+        file["particles/all/position/value"][0, 3, 1] = np.nan
+
+
+def forget_the_outcome(path):
+    with h5py.File(path, "r+") as file:
+        del file["parameters"].attrs["outcome"]
+
+
+@pytest.mark.parametrize(
+    ("damage", "options", "words"),
+    [
+        (cut, (), "is truncated or damaged, expected a complete HDF5 file; write it again"),
+        (rename_shape, (), "of shape 'superellipsoid', expected 16 of 'spherocylinder'"),
+        (lose_a_position, (), "position holds NaN or infinity, expected finite numbers"),
+        (forget_the_outcome, (), "holds no finished packing, expected one of make_packing.py"),
+        (lambda _: None, ("--seed", "2"), "with seed = 1, expected 2; write to another file"),
+        (lambda _: None, ("--u0", "1e-8"), "with u0 = 1e-09, expected 1e-08; write to another"),
+        (Path.unlink, ("--alpha", "4"), "holds the compression of a packing with alpha = 1.0"),
+    ],
+)
+def test_a_file_that_is_not_the_packing_is_told_and_kept(made, tmp_path, damage, options, words):
+    out = tmp_path / made[0].name
+    for path in made[0].parent.iterdir():
+        shutil.copy(path, tmp_path)
+    damage(out)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert_one_sentence(run(*SMALL, *options, "--out", out), words)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -173,6 +173,10 @@ def test_box_too_short_for_the_longest(alpha, dimension):
             r"radius of the mixture holds 0\.0, expected finite lengths above 0",
         ),
         (
+            {"mixture": Mixture.from_arrays([1.0, 1.0], [1.0, -1.0])},
+            r"radius of the mixture holds -1\.0, expected finite lengths above 0",
+        ),
+        (
             {"mixture": Mixture.from_arrays([1.0], [1.0])},
             r"half_length of the mixture has shape \(1,\), expected \(2,\)",
         ),

@@ -1,12 +1,14 @@
+from dataclasses import replace
 from functools import cache
 
+import h5py
 import numpy as np
 import pytest
 from test_minimise import squeezed
 
 from jamshape.approach import Approach
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
-from jamshape.initial import InsertionError
+from jamshape.initial import InsertionError, Mixture
 from jamshape.jammed import (
     Files,
     Sample,
@@ -14,6 +16,7 @@ from jamshape.jammed import (
     is_done,
     make,
     measure,
+    require_same,
     summary,
     write_minimum,
 )
@@ -189,19 +192,139 @@ def test_the_search_of_another_target_is_not_gone_on_with(tmp_path):
     assert read_attributes(out)["u"] == pytest.approx(1e-8, rel=1e-7, abs=0)
 
 
-@pytest.mark.lammps
-def test_a_compression_of_another_sample_is_not_taken(tmp_path):
+OTHERS = {
+    "alpha = 1.0, expected 0.5": {"alpha": 0.5},
+    "n = 16, expected 24": {"n": 24},
+    "seed = 1, expected 9": {"seed": 9},
+    "approach_kappa = 1e-07, expected 1e-05": {"approach": FAST},
+    "mixture = False, expected True": {"mixture": Mixture.monodisperse(1.0)},
+}
+
+
+def refused(sample, out):
+    """Say why a sample is not made, after a look at the files, which must stay as they are."""
+    before = {path: path.read_bytes() for path in out.parent.iterdir()}
+    with pytest.raises(ValueError) as error:
+        next(make(sample, out))
+    assert {path: path.read_bytes() for path in out.parent.iterdir()} == before
+    sentence = str(error.value)
+    assert "\n" not in sentence
+    assert sentence.startswith(str(out))
+    return sentence
+
+
+@pytest.mark.parametrize("words", OTHERS)
+def test_the_compression_of_another_sample_is_neither_taken_nor_replaced(tmp_path, words):
     out = tmp_path / "packing.h5"
     compressed(out)
-    other = Sample(n=24, alpha=0.0, phi_start=0.5, seed=9, target=Target(U0), approach=FAST)
-    going = make(other, out)
-    try:
-        first = next(going)
-    except ValueError:
-        return  # a refusal would do as well
-    finally:
+    sentence = refused(replace(SAMPLE, **OTHERS[words]), out)
+    assert "run.h5 holds the compression of a packing with " in sentence
+    assert words in sentence
+    assert sentence.endswith("; write to another file, or make it again")
+
+
+def test_the_compression_of_another_mixture_is_refused(tmp_path):
+    sample = replace(SAMPLE, mixture=Mixture.monodisperse(1.0))
+    out = tmp_path / "packing.h5"
+    compressed(out)
+    RunWriter.open(Files(out).run).set_attributes(sample.attributes())
+    assert "expected those of another mixture" in refused(sample, out)
+
+
+@pytest.mark.lammps
+def test_the_compression_of_another_sample_is_replaced_where_that_is_asked_for(tmp_path):
+    out = tmp_path / "packing.h5"
+    for damaged in (False, True):
+        compressed(out)
+        if damaged:
+            cut(Files(out).run)
+        going = make(replace(SAMPLE, alpha=0.0, approach=FAST), out, again=True)
+        assert next(going).stage == "compression"
         going.close()
-    assert first.stage == "compression"
+        assert read_attributes(Files(out).run)["alpha"] == 0
+
+
+def cut(path):
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+
+
+def edited(name, value):
+    def edit(path):
+        with h5py.File(path, "r+") as file:
+            file["particles/all"][name][...] = value
+
+    return edit
+
+
+def renamed_shape(path):
+    with h5py.File(path, "r+") as file:
+        file["particles/all"].attrs["shape_style"] = "superellipsoid"
+
+
+def emptied(path):
+    with h5py.File(path, "r+") as file:
+        for name in ("position", "orientation", "image"):
+            del file["particles/all"][name]["value"]
+            file["particles/all"][name]["value"] = np.zeros((2, 0, 2))
+
+
+DAMAGE = {
+    "is truncated or damaged, expected a complete HDF5 file; write it again": cut,
+    "is not an HDF5 file, expected one written by jamshape": lambda path: path.write_text("none"),
+    "position holds NaN or infinity, expected finite numbers": edited("position/value", np.nan),
+    "diameters hold -1.0, expected positive lengths": edited("diameters", -1.0),
+    "packing has no particles, expected at least one": emptied,
+}
+
+
+@pytest.mark.parametrize("words", DAMAGE)
+@pytest.mark.parametrize("stage", ["run", "search"])
+def test_damaged_files_are_refused_and_kept(tmp_path, words, stage):
+    out = tmp_path / "packing.h5"
+    compressed(out)
+    if stage == "search":
+        going = make(SAMPLE, out)
+        next(going)
+        going.close()
+    path = getattr(Files(out), stage)
+    DAMAGE[words](path)
+    sentence = refused(SAMPLE, out)
+    assert sentence.startswith(f"{path}: ")
+    assert words in sentence
+
+
+def test_the_compression_of_another_shape_is_refused(tmp_path):
+    out = tmp_path / "packing.h5"
+    compressed(out)
+    renamed_shape(Files(out).run)
+    words = "holds 16 particles of shape 'superellipsoid', expected 16 of 'spherocylinder'"
+    assert words in refused(SAMPLE, out)
+
+
+def test_a_finished_packing_of_another_sample_or_shape_is_refused(tmp_path):
+    out = tmp_path / "packing.h5"
+    landscape, found = minimum()
+    write_minimum(out, landscape, found, SAMPLE.attributes())
+    require_same(out, SAMPLE)
+    for words, changes in OTHERS.items():
+        with pytest.raises(ValueError, match=f"holds a packing with {words}; write to another"):
+            require_same(out, replace(SAMPLE, **changes))
+    with pytest.raises(ValueError, match="with u0 = 1e-12, expected 1e-10; write to another file"):
+        require_same(out, replace(SAMPLE, target=Target(1e-10)))
+    renamed_shape(out)
+    with pytest.raises(ValueError, match="of shape 'superellipsoid', expected 16 of 'sphero"):
+        require_same(out, SAMPLE)
+
+
+def test_a_file_that_is_no_finished_packing_is_neither_done_nor_replaced(tmp_path):
+    out = tmp_path / "run.h5"
+    RunWriter.create(out, start(), {"kappa": 1e-6})
+    sentence = (
+        r"run\.h5 holds no finished packing, expected one of make_packing\.py; write to anoth"
+    )
+    with pytest.raises(ValueError, match=sentence):
+        is_done(out)
 
 
 def test_a_run_without_its_end_is_not_compressed(tmp_path):

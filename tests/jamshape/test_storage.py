@@ -377,6 +377,14 @@ def replace(file, name, value):
         ("position/value", 1.0, r"/particles/all/position/value has shape \(\), expected 1 rows"),
         ("position/step", 10, r"/particles/all/position/step has shape \(\), expected one step"),
         ("box/edges/value", -np.ones((1, 2)), r"box edges are \[-1.0, -1.0\], expected positive"),
+        ("position/value", np.full((1, 6, 2), np.nan), "position holds NaN .*; write it again$"),
+        ("position/value", np.zeros((1, 0, 2)), "packing has no particles, expected at least one"),
+        ("orientation/value", np.full((1, 6), np.nan), "orientation holds NaN or infinity"),
+        (
+            "diameters",
+            -np.ones((6, 3)),
+            r"diameters hold -1\.0, expected positive lengths; write it",
+        ),
         ("id", np.ones(6), "id has dtype float64, expected integers"),
         ("id", np.ones(6, int), "an id is there more than once"),
     ],
@@ -388,6 +396,16 @@ def test_wrong_content(path, name, value, sentence):
     with pytest.raises(FileFormatError, match=sentence) as error:
         read_packing(path)
     assert str(error.value).count(str(path)) == 1
+
+
+@pytest.mark.parametrize("name", ["position_rest", "orientation_rest", "box/edges_rest"])
+def test_rest_that_is_not_a_number(path, name):
+    write_packing(path, with_rests(2))
+    with h5py.File(path, "r+") as file:
+        file["particles/all"][name]["value"][...] = np.nan
+    sentence = rf"packing\.h5: {name.split('/')[-1]} holds NaN or infinity, expected finite numbers"
+    with pytest.raises(FileFormatError, match=sentence):
+        read_packing(path)
 
 
 def test_group_in_the_place_of_a_dataset(path):
