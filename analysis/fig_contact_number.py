@@ -115,7 +115,8 @@ def draw(
     error_bars(logarithmic, above_discs(PAPER), None, **PAPER_STYLE)
     linear.axhline(ISOSTATIC, color="0.5", ls="--", lw=1, zorder=0)
     note: dict[str, Any] = {"fontsize": 8, "color": "0.3", "va": "bottom"}
-    linear.text(0.02, ISOSTATIC, "isostatic", **note, transform=linear.get_yaxis_transform())
+    note |= {"ha": "right", "transform": linear.get_yaxis_transform()}
+    linear.text(0.98, ISOSTATIC, "isostatic", **note)
     linear.set_ylim(top=max(ISOSTATIC + 0.25, linear.get_ylim()[1]))
     linear.set_ylabel("contacts per particle at jamming")
     label_alpha_axis(linear, discs)

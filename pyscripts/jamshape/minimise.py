@@ -29,9 +29,11 @@ _WIDEST_TURN = 0.2
 # `auto` changes from L-BFGS to Newton below this residual, or where L-BFGS no longer gains.
 _NEWTON_BELOW = 1e-2
 
-# A method no longer gains if its best residual did not fall by this factor in so many evaluations.
+# A method no longer gains if residual times energy did not fall by this factor in so many evaluations;
+# what L-BFGS needs to unjam a packing grows with it.
 _GAIN = 0.7
 _PATIENCE = {"lbfgs": 1000, "newton": 2000}
+_PATIENCE_PER_PARTICLE = 4
 
 # L-BFGS begins anew when it gives up; not more often than this within so few evaluations.
 _STUCK, _SOON = 3, 30
@@ -354,8 +356,8 @@ class _LeaveError(Exception):
 
 def _lbfgs(descent: Descent, below: float = 0.0) -> Outcome:
     """SciPy's L-BFGS, in doubles, on displacements from the present state."""
-    descent.be_patient(_PATIENCE["lbfgs"])
     particles = descent.landscape.particles
+    descent.be_patient(max(_PATIENCE["lbfgs"], _PATIENCE_PER_PARTICLE * particles.n))
     # Its first step is of unit length in its own coordinates.
     unit = 0.01 * float(particles.radius.min()) * math.sqrt(particles.n)
     stuck = 0

@@ -223,10 +223,18 @@ class _Best:
         self.age += 1
         if not met or descent.residual > _SLIDING:
             return
-        if self.minimum is None or descent.residual < _GAIN * self.minimum.residual.largest:
-            sliding = directions.stiff <= descent.stop.tolerance
-            self.minimum = descent.minimum(Outcome.SLIDING if sliding else Outcome.STALLED)
-            self.age = 0
+        sliding = directions.stiff <= descent.stop.tolerance
+        outcome = Outcome.SLIDING if sliding else Outcome.STALLED
+        known = self.minimum.residual.largest if self.minimum else math.inf
+        if descent.residual < _GAIN * known:
+            self.minimum, self.age = descent.minimum(outcome), 0
+        elif sliding and self.stalled and descent.residual < known / _GAIN:
+            self.minimum = descent.minimum(outcome)
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the best one has more left than what slides."""
+        return self.minimum is not None and self.minimum.outcome is Outcome.STALLED
 
 
 @dataclass(frozen=True, eq=False)
