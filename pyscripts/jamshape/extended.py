@@ -1,0 +1,95 @@
+"""Products of matrices in extended precision: long doubles for sparse ones, slices for dense ones.
+
+NumPy multiplies long doubles one by one. Sparse factors with few entries a row need no more; dense
+ones are cut into slices of so few bits that BLAS multiplies them without rounding (Ozaki, Ogita, Oishi
+and Rump, Numer. Algorithms 59, 95 (2012)).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jamshape.packing import FloatArray, IntArray, LongArray
+
+EPS = float(np.finfo(np.longdouble).eps)
+
+# Columns of a dense factor that are taken at once, to bound memory.
+_COLUMNS = 128
+
+# Bits of a product that are wanted: those of a long double.
+_BITS = 64
+
+
+class SparseRows:
+    """A sparse matrix of doubles that multiplies dense ones in long double.
+
+    Parameters
+    ----------
+    matrix : (m, n) scipy.sparse matrix
+    """
+
+    def __init__(self, matrix: Any) -> None:
+        matrix = matrix.tocsr()
+        counts = np.diff(matrix.indptr)
+        self.shape = matrix.shape
+        row = np.repeat(np.arange(matrix.shape[0]), counts)
+        slot = np.arange(matrix.nnz) - matrix.indptr[row]
+        width = int(counts.max(initial=0))
+        self._column: IntArray = np.zeros((width, matrix.shape[0]), np.int64)
+        self._value: FloatArray = np.zeros((width, matrix.shape[0]))
+        self._column[slot, row], self._value[slot, row] = matrix.indices, matrix.data
+
+    def __matmul__(self, dense: NDArray[Any]) -> LongArray:
+        """(m, k) product with an (n, k) matrix, or (m,) with an (n,) vector."""
+        if dense.ndim == 1:
+            return np.asarray((self @ dense[:, None])[:, 0])
+        result = np.zeros((self.shape[0], dense.shape[1]), np.longdouble)
+        for first in range(0, dense.shape[1], _COLUMNS):
+            columns = np.asarray(dense[:, first : first + _COLUMNS], np.longdouble)
+            part = result[:, first : first + _COLUMNS]
+            for column, value in zip(self._column, self._value, strict=True):
+                part += value[:, None] * columns[column]
+        return result
+
+
+def dense_product(a: NDArray[Any], b: NDArray[Any]) -> LongArray:
+    """Multiply dense matrices to the precision of long doubles.
+
+    Parameters
+    ----------
+    a : (m, n) array of float64 or longdouble
+    b : (n, k) array of float64 or longdouble
+
+    Returns
+    -------
+    (m, k) array of longdouble
+        Off by about n 2^-64 times the largest magnitudes in the row of a and the column of b.
+    """
+    n = a.shape[1]
+    bits = (53 - math.ceil(math.log2(max(n, 2)))) // 2
+    left, right = _slices(a, bits), [s.T for s in _slices(b.T, bits)]
+    result = np.zeros((a.shape[0], b.shape[1]), np.longdouble)
+    last = math.ceil(_BITS / bits) - 1
+    for k in range(last, -1, -1):  # small terms first
+        for i, x in enumerate(left):
+            if 0 <= k - i < len(right):
+                result += x @ right[k - i]
+    return result
+
+
+def _slices(matrix: NDArray[Any], bits: int) -> list[FloatArray]:
+    """Cut (m, n) into doubles of so many bits relative to the largest of each row; their sum is it."""
+    rest = np.array(matrix, np.longdouble)
+    largest = np.abs(rest).max(axis=1, initial=0, keepdims=True).astype(np.float64)
+    exponent = np.frexp(largest)[1]
+    slices = []
+    for k in range(math.ceil(_BITS / bits)):
+        unit = np.ldexp(np.longdouble(1.0), exponent - (k + 1) * bits)
+        piece = np.rint(rest / unit) * unit
+        slices.append(piece.astype(np.float64))
+        rest -= piece
+    return slices

@@ -1,0 +1,83 @@
+"""Small packings at an energy, made once a session; a synthetic matrix; exact eigenvalues."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import mpmath
+import numpy as np
+import scipy.sparse
+from test_minimise import squeezed
+
+from jamshape.hessian import dynamical_matrix
+from jamshape.landscape import Landscape
+from jamshape.minimise import Residual
+from jamshape.target import Target, find
+
+# n, alpha, packing fraction just below jamming, seed
+SMALL = {
+    "discs": (16, 0, 0.77, 1),
+    "rods of alpha 0.01": (16, 0.01, 0.77, 1),
+    "rods of alpha 1": (16, 1, 0.86, 1),
+    "rods of alpha 4": (16, 4, 0.8, 1),
+}
+
+DIGITS = 60
+
+
+@cache
+def jammed(name, u0=1e-15):
+    """Landscape and minimum."""
+    packing, state = squeezed(*SMALL[name])
+    landscape = Landscape(packing)
+    return landscape, find(landscape, state, Target(u0))
+
+
+@cache
+def matrix_of(name, u0=1e-15):
+    landscape, minimum = jammed(name, u0)
+    return dynamical_matrix(landscape, minimum.state)
+
+
+def synthetic(n=48, m=40, size=1e-8, n_sliding=2, seed=0):
+    """M = C^T C - S with null modes of C, some of which S moves in second order only."""
+    rng = np.random.default_rng(seed)
+    C = rng.normal(size=(m, n)) / np.sqrt(n)
+    null = np.linalg.svd(C)[2][m:].T
+    S = size * rng.normal(size=(n, n))
+    S = S + S.T
+    P, Q = null @ null.T, null[:, :n_sliding] @ null[:, :n_sliding].T
+    S = S - P @ S @ Q - Q @ S @ P + Q @ S @ Q
+    return as_matrix(C, 0.5 * (S + S.T))
+
+
+def as_matrix(C, S, translations=None):
+    """What the modes need of a dynamical matrix."""
+    n = C.shape[1]
+    C, S = map(scipy.sparse.csr_matrix, (C, S))
+    return SimpleNamespace(
+        compatibility=C,
+        prestress=S,
+        prestress_sizes=abs(S),
+        stiffness=C.T @ C,
+        matrix=C.T @ C - S,
+        translations=np.zeros((n, 0)) if translations is None else translations,
+        residual=Residual(0.0, 0.0),
+        size=n,
+        n_bonds=C.shape[0],
+    )
+
+
+def exact_eigenvalues(matrix, digits=DIGITS):
+    """Ascending, of the matrix as it is stored, in arbitrary precision."""
+    with mpmath.workdps(digits):
+        C = mpmath.matrix(matrix.compatibility.toarray().tolist())
+        S = mpmath.matrix(matrix.prestress.toarray().tolist())
+        values = mpmath.eigsy(C.T * C - S, eigvals_only=True)
+        return sorted(values)
+
+
+def errors(found, exact, digits=DIGITS):
+    """Of ascending eigenvalues (k,), in double but without cancellation."""
+    with mpmath.workdps(digits):
+        pairs = zip(found.tolist(), exact, strict=True)
+        return np.array([float(abs(mpmath.mpf(a) - b)) for a, b in pairs])
