@@ -3,7 +3,7 @@
     python analysis/minimiser_error.py --n 256 --seconds 60 --out runs/minimisers
 
 For every state a packing at u0 = 1e-15 is made first (kept in the folder, and taken from there the next
-time). All minimisers then start from it, each particle displaced at random by 1e-6 of its radius, which
+time); nearly round rods start from jammed discs, given spines of random directions. All minimisers then start from it, each particle displaced at random by 1e-6 of its radius, which
 is many overlaps; the two energy targets start from it compressed by a strain of 1e-6. A curve is the best residual so
 far; the table gives the seconds to residuals of 1e-4, 1e-6 and 1e-8, or what was reached.
 """
@@ -23,21 +23,23 @@ import matplotlib as mpl
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from singular_limit import with_spines
 from tqdm import tqdm
 
 from jamshape.approach import Approach
 from jamshape.initial import Mixture
-from jamshape.jammed import Sample, is_done, make
+from jamshape.jammed import Sample, is_done, make, write_minimum
 from jamshape.landscape import Landscape, State
 from jamshape.minimise import History, Stop, minimise
 from jamshape.packing import Packing
 from jamshape.storage import read_packing
-from jamshape.target import Search, Target, TargetError, direct, halving
+from jamshape.target import Search, Target, TargetError, direct, find, halving
 
 MINIMISERS = ("auto", "newton", "lbfgs", "lammps", "paper")
 LEVELS = (1e-4, 1e-6, 1e-8)
 DISPLACEMENT = 1e-6
 STRAIN = 1e-6
+NEARLY_ROUND = 0.1
 
 Row = dict[str, Any]
 
@@ -70,6 +72,8 @@ def mixture(n: int) -> Mixture:
 def state_of(name: str, options: argparse.Namespace) -> Packing:
     """Make the packing at u0, or read it."""
     path: Path = options.out / f"state_{name}.h5"
+    if name != "mixture" and 0 < float(name) < NEARLY_ROUND:
+        return from_discs(state_of("0", options), float(name), path)
     rods = name != "mixture" and float(name) > 10
     sample = Sample(
         n=options.n,
@@ -82,6 +86,15 @@ def state_of(name: str, options: argparse.Namespace) -> Packing:
     if not is_done(path):
         for _ in tqdm(make(sample, path), desc=f"state {name}", unit="row", mininterval=5):
             pass
+    return read_packing(path)
+
+
+def from_discs(discs: Packing, alpha: float, path: Path) -> Packing:
+    """Make the packing of nearly round rods, or read it."""
+    if not is_done(path):
+        rods, start = with_spines(discs, alpha, seed=1)
+        landscape = Landscape(rods)
+        write_minimum(path, landscape, find(landscape, start, Target(tolerance=1e-7)), {})
     return read_packing(path)
 
 

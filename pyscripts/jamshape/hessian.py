@@ -104,6 +104,17 @@ class Bonds(NamedTuple):
     """(m, v) of its length by the pair's variables: r_i - r_j, rotations of i and of j [radian]."""
 
 
+class Strains(NamedTuple):
+    """What affine strains do to a packing, k of them, with all second derivatives of the energy."""
+
+    stretched: FloatArray
+    """(m, k) change of the bonds' lengths, times the roots of their stiffness."""
+    pushed: FloatArray
+    """(n, k) change of the forces by the prestress alone: -S between strain and coordinates."""
+    affine: FloatArray
+    """(k,) second derivative of the energy by the prestress alone."""
+
+
 @dataclass(frozen=True, eq=False)
 class DynamicalMatrix:
     """M = C^T C - S of n coordinates and m bonds (Marschall & Teitel 2018, Eqs. 38-40).
@@ -120,6 +131,8 @@ class DynamicalMatrix:
         Sums of the magnitudes of what was added to each entry of S.
     coordinates : Coordinates
     bonds : Bonds
+    curvature : (C, v, v) array of float64
+        Second derivatives of the contacts' energies, without the bonds' stiffness: S contact by contact.
     contacts : dict
         `Landscape.derivatives` of the contacts between particles that are no rattlers.
     gradient : (n,) array of float64, [energy / length]
@@ -136,6 +149,7 @@ class DynamicalMatrix:
     prestress_sizes: Any
     coordinates: Coordinates
     bonds: Bonds
+    curvature: FloatArray
     contacts: dict[str, NDArray[Any]]
     gradient: FloatArray
     residual: Residual
@@ -186,6 +200,18 @@ class DynamicalMatrix:
         columns[np.flatnonzero(moves), (D * own + self.coordinates.kind)[moves]] = 1.0
         unit: FloatArray = columns / np.sqrt(columns.sum(axis=0))
         return unit
+
+
+    def strained(self, strains: FloatArray) -> Strains:
+        """Take in (k, D, D) strains e, r_i - r_j -> (1 + e) (r_i - r_j), at fixed orientations."""
+        D = self.coordinates.dimension
+        moved = np.einsum("kab,cb->cka", strains, self.contacts["separation"])
+        rows = np.sqrt(self.bonds.stiffness)[:, None] * self.bonds.gradient[:, :D]
+        stretched = np.einsum("ma,mka->mk", rows, moved[self.bonds.contact])
+        bent = np.einsum("cva,cka->ckv", self.curvature[:, :, :D], moved)
+        scatter = _Scatter(self.contacts["particles"], self.coordinates)
+        pushed = np.column_stack([scatter.vector(bent[:, k]) for k in range(len(strains))])
+        return Strains(stretched, pushed, np.einsum("cka,cka->k", bent[:, :, :D], moved))
 
 
 def dynamical_matrix(
@@ -317,11 +343,11 @@ def _gradient(landscape: Landscape, gradient: FloatArray, coordinates: Coordinat
     return np.asarray(coordinates.embedding.T @ components.ravel())
 
 
-_Parts = tuple[Any, Any, Any, Bonds, dict[str, NDArray[Any]]]
+_Parts = tuple[Any, Any, Any, Bonds, FloatArray, dict[str, NDArray[Any]]]
 
 
 def _parts(landscape: Landscape, state: State, coordinates: Coordinates) -> _Parts:
-    """C, S, the sizes of S, the bonds and the contacts."""
+    """C, S, the sizes of S, the bonds, the curvatures and the contacts."""
     every = landscape.derivatives(state, extended=True)
     is_held = np.zeros(coordinates.n_all, bool)
     is_held[coordinates.backbone] = True
@@ -331,7 +357,7 @@ def _parts(landscape: Landscape, state: State, coordinates: Coordinates) -> _Par
     scatter = _Scatter(contacts["particles"], coordinates)
     compatibility = scatter.rows(np.sqrt(bonds.stiffness)[:, None] * bonds.gradient, bonds.contact)
     prestress, sizes = scatter.blocks(-curvature)
-    return compatibility, prestress, sizes, bonds, contacts
+    return compatibility, prestress, sizes, bonds, curvature, contacts
 
 
 def _bonds(contacts: dict[str, NDArray[Any]], lengths: FloatArray) -> tuple[Bonds, FloatArray]:
@@ -396,6 +422,12 @@ class _Scatter:
         shape = (len(rows), self._embedding.shape[0])
         flat = (entries.ravel(), (row.ravel(), place.ravel()))
         return _tidy(scipy.sparse.csr_matrix(flat, shape=shape) @ self._embedding)
+
+    def vector(self, vectors: FloatArray) -> FloatArray:
+        """(n,) sum of (C, v) vectors."""
+        full = np.zeros(self._embedding.shape[0])
+        np.add.at(full, self._place, vectors[:, self._variable] * self._sign)
+        return np.asarray(self._embedding.T @ full)
 
     def blocks(self, blocks: FloatArray) -> tuple[Any, Any]:
         """(n, n) CSR matrix of (C, v, v) blocks, and that of the magnitudes."""

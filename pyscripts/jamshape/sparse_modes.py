@@ -53,26 +53,36 @@ class ShiftedInverse:
     ----------
     matrix : DynamicalMatrix
     shift : float, [energy / length^2]
-        No eigenvalue; that of translations is 0.
+        No eigenvalue, but for that of translations, 0: there, one particle of each cluster is held.
     """
 
     def __init__(self, matrix: DynamicalMatrix, shift: float) -> None:
         self.matrix, self.shift = matrix, shift
         C, S = matrix.compatibility, matrix.prestress
         self.scale = max(typical_prestress(matrix), abs(shift))
-        one = scipy.sparse.identity
+        held = shift * np.ones(matrix.size)
+        if shift == 0.0:
+            first = np.abs(matrix.translations).argmax(axis=0)
+            held[first] = -self.scale
+        one = scipy.sparse.identity(matrix.n_bonds)
         blocks = [
-            [-(S + shift * one(matrix.size)) / self.scale, C.T],
-            [C, -self.scale * one(matrix.n_bonds)],
+            [-(S + scipy.sparse.diags(held)) / self.scale, C.T],
+            [C, -self.scale * one],
         ]
         self._factors = splu(scipy.sparse.bmat(blocks, format="csc"))
 
     def solve(self, b: FloatArray) -> Solution:
-        """Solve for (n, k) or (n,) right-hand sides."""
-        n, m = self.matrix.size, self.matrix.n_bonds
-        right = np.concatenate([b / self.scale, np.zeros((m, *b.shape[1:]))])
-        both = self._factors.solve(right)
-        return Solution(both[:n], both[n:])
+        """Solve for (n, k) or (n,) right-hand sides, which push no cluster as a whole if shift is 0."""
+        return self._solved(b / self.scale, np.zeros((self.matrix.n_bonds, *b.shape[1:])))
+
+    def solve_both(self, b: FloatArray, c: FloatArray) -> Solution:
+        """Solve -(S + shift) v + C^T y = b, C v - y = c for (n, k) and (m, k) right-hand sides."""
+        found = self._solved(b / self.scale, c)
+        return Solution(found.v, self.scale * found.y)
+
+    def _solved(self, b: FloatArray, c: FloatArray) -> Solution:
+        both = self._factors.solve(np.concatenate([b, c]))
+        return Solution(both[: self.matrix.size], both[self.matrix.size :])
 
 
 def typical_prestress(matrix: DynamicalMatrix) -> float:
