@@ -201,7 +201,6 @@ class DynamicalMatrix:
         unit: FloatArray = columns / np.sqrt(columns.sum(axis=0))
         return unit
 
-
     def strained(self, strains: FloatArray) -> Strains:
         """Take in (k, D, D) strains e, r_i - r_j -> (1 + e) (r_i - r_j), at fixed orientations."""
         D = self.coordinates.dimension

@@ -402,11 +402,11 @@ class _Objective:
 
 def _paper(descent: Descent) -> Outcome:
     """Polak-Ribiere with the line search of Marschall & Teitel 2018, Appendix A, as printed."""
-    restarted = False
-    epsilon = 1e-4
+    restarted, epsilon = False, 1e-4
+    direction = -descent.evaluation.gradient
     while not (outcome := descent.outcome()):
         gradient = descent.evaluation.gradient
-        if restarted or not len(descent.history.residual) > 1:
+        if restarted:
             direction = -gradient
         moved = _line_search_of_paper(descent, direction / np.linalg.norm(direction), epsilon)
         if moved < 1e-16:

@@ -210,11 +210,12 @@ def test_history_is_complete_and_ascending(jammed, method):
     assert history.residual[0] == residual_of(landscape, landscape.evaluate(start)).largest
 
 
-def test_history_goes_on_where_it_is_given():
+@pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])
+def test_history_goes_on_where_it_is_given(method):
     landscape, start = shaken(*JAMMED["24 discs"])
-    first = minimise(landscape, start, "newton", Stop(evaluations=3))
+    first = minimise(landscape, start, method, Stop(evaluations=3))
     rows = len(first.history.residual)
-    second = minimise(landscape, first.state, "newton", history=first.history)
+    second = minimise(landscape, first.state, method, Stop(evaluations=300), first.history)
     assert second.history is first.history
     assert len(second.history.residual) > rows
     assert np.all(np.diff(second.history.evaluations) >= 0)
