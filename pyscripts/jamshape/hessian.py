@@ -219,6 +219,7 @@ def dynamical_matrix(
     *,
     rotation: str | FloatArray = "half_length",
     backbone: NDArray[np.bool_] | None = None,
+    least_force: float = 0.0,
     force: bool = False,
 ) -> DynamicalMatrix:
     """Assemble the dynamical matrix of a minimum of the energy.
@@ -233,6 +234,10 @@ def dynamical_matrix(
         of modes that rotate depend on this choice; their number, signs and zeros do not.
     backbone : (N,) array of bool, optional
         Particles to take, with the contacts between them; those that are no rattlers if left out.
+    least_force : float
+        Leave out contacts whose force is below this fraction of the mean force of a bond: rods that slid
+        along flat sides up to others touch them with forces of second order in the overlap, which
+        minimisers in doubles do not see.
     force : bool
         Also where the state is no minimum.
 
@@ -267,7 +272,8 @@ def dynamical_matrix(
         )
         raise NotAtMinimumError(msg)
     coordinates = _coordinates(landscape, state, taken, _lengths(landscape, rotation))
-    parts = _parts(landscape, state, coordinates)
+    weakest = least_force * evaluation.bond_force
+    parts = _parts(landscape, state, coordinates, weakest)
     gradient = _gradient(landscape, evaluation.gradient, coordinates)
     return DynamicalMatrix(
         *parts[:3], coordinates, *parts[3:], gradient, residual, evaluation.bond_force, state.volume
@@ -345,12 +351,15 @@ def _gradient(landscape: Landscape, gradient: FloatArray, coordinates: Coordinat
 _Parts = tuple[Any, Any, Any, Bonds, FloatArray, dict[str, NDArray[Any]]]
 
 
-def _parts(landscape: Landscape, state: State, coordinates: Coordinates) -> _Parts:
+def _parts(
+    landscape: Landscape, state: State, coordinates: Coordinates, weakest: float = 0.0
+) -> _Parts:
     """C, S, the sizes of S, the bonds, the curvatures and the contacts."""
     every = landscape.derivatives(state, extended=True)
     is_held = np.zeros(coordinates.n_all, bool)
     is_held[coordinates.backbone] = True
     held = is_held[every["particles"]].all(axis=1)
+    held &= every["bond_force"].sum(axis=1) >= weakest
     contacts = {name: values[held] for name, values in every.items()}
     bonds, curvature = _bonds(contacts, landscape.rotation_length)
     scatter = _Scatter(contacts["particles"], coordinates)
