@@ -17,7 +17,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from jamshape.landscape import Landscape, State
+from jamshape.landscape import Evaluation, Landscape, State
 from jamshape.minimise import Residual, residual_of
 from jamshape.packing import FloatArray, IntArray, Packing
 
@@ -142,6 +142,8 @@ class DynamicalMatrix:
     bond_force : float, [energy / length]
         Mean magnitude of the force of a bond.
     volume : float, [length^D]
+    n_left_out : int
+        Contacts between these particles that are weaker than was asked for.
     """
 
     compatibility: Any
@@ -155,6 +157,7 @@ class DynamicalMatrix:
     residual: Residual
     bond_force: float
     volume: float
+    n_left_out: int = 0
 
     @property
     def size(self) -> int:
@@ -274,21 +277,24 @@ def dynamical_matrix(
     coordinates = _coordinates(landscape, state, taken, _lengths(landscape, rotation))
     weakest = least_force * evaluation.bond_force
     parts = _parts(landscape, state, coordinates, weakest)
-    gradient = _gradient(landscape, evaluation.gradient, coordinates)
-    return DynamicalMatrix(
-        *parts[:3], coordinates, *parts[3:], gradient, residual, evaluation.bond_force, state.volume
-    )
+    return _matrix(landscape, state, evaluation, parts | {"residual": residual})
 
 
 def matrix_at(landscape: Landscape, state: State, like: DynamicalMatrix) -> DynamicalMatrix:
     """Assemble the matrix of a state nearby, in the coordinates of another one; never refuses."""
     evaluation = landscape.evaluate(state)
-    coordinates = like.coordinates
-    parts = _parts(landscape, state, coordinates)
-    gradient = _gradient(landscape, evaluation.gradient, coordinates)
-    residual = residual_of(landscape, evaluation)
+    parts = _parts(landscape, state, like.coordinates)
+    return _matrix(
+        landscape, state, evaluation, parts | {"residual": residual_of(landscape, evaluation)}
+    )
+
+
+def _matrix(
+    landscape: Landscape, state: State, evaluation: Evaluation, parts: dict[str, Any]
+) -> DynamicalMatrix:
+    gradient = _gradient(landscape, evaluation.gradient, parts["coordinates"])
     return DynamicalMatrix(
-        *parts[:3], coordinates, *parts[3:], gradient, residual, evaluation.bond_force, state.volume
+        **parts, gradient=gradient, bond_force=evaluation.bond_force, volume=state.volume
     )
 
 
@@ -348,24 +354,31 @@ def _gradient(landscape: Landscape, gradient: FloatArray, coordinates: Coordinat
     return np.asarray(coordinates.embedding.T @ components.ravel())
 
 
-_Parts = tuple[Any, Any, Any, Bonds, FloatArray, dict[str, NDArray[Any]]]
-
-
 def _parts(
     landscape: Landscape, state: State, coordinates: Coordinates, weakest: float = 0.0
-) -> _Parts:
-    """C, S, the sizes of S, the bonds, the curvatures and the contacts."""
+) -> dict[str, Any]:
+    """Make those fields of a DynamicalMatrix that come from the contacts, and the coordinates."""
     every = landscape.derivatives(state, extended=True)
     is_held = np.zeros(coordinates.n_all, bool)
     is_held[coordinates.backbone] = True
     held = is_held[every["particles"]].all(axis=1)
-    held &= every["bond_force"].sum(axis=1) >= weakest
-    contacts = {name: values[held] for name, values in every.items()}
+    strong = every["bond_force"].sum(axis=1) >= weakest
+    contacts = {name: values[held & strong] for name, values in every.items()}
     bonds, curvature = _bonds(contacts, landscape.rotation_length)
     scatter = _Scatter(contacts["particles"], coordinates)
-    compatibility = scatter.rows(np.sqrt(bonds.stiffness)[:, None] * bonds.gradient, bonds.contact)
     prestress, sizes = scatter.blocks(-curvature)
-    return compatibility, prestress, sizes, bonds, curvature, contacts
+    return {
+        "compatibility": scatter.rows(
+            np.sqrt(bonds.stiffness)[:, None] * bonds.gradient, bonds.contact
+        ),
+        "prestress": prestress,
+        "prestress_sizes": sizes,
+        "coordinates": coordinates,
+        "bonds": bonds,
+        "curvature": curvature,
+        "contacts": contacts,
+        "n_left_out": int((held & ~strong).sum()),
+    }
 
 
 def _bonds(contacts: dict[str, NDArray[Any]], lengths: FloatArray) -> tuple[Bonds, FloatArray]:
