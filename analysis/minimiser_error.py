@@ -49,7 +49,7 @@ TARGETS = {
     "halving": (halving, "auto"),
     "as published": (halving, "paper"),
 }
-LONGER = 10.0
+LONGER = 20.0
 
 Row = dict[str, Any]
 
