@@ -27,7 +27,7 @@ LARGEST_RESIDUAL = 1e-4
 # Rank-one parts of a contact's curvature this stiff, over the stiffest bond and over what the forces
 # alone can bring about, are bonds: where two bonds become one, it is no longer a bond's own.
 _STIFF = 0.1
-_BEYOND_FORCES = 100.0
+_BEYOND_FORCES = 4.0
 
 
 class NotAtMinimumError(ValueError):
