@@ -21,7 +21,7 @@ from jamshape.packing import FloatArray, IntArray, Packing
 # least so many amplitudes, and the quartic force exceeds the other one by this factor at its end.
 _DEVIATION = 0.03
 _FEWEST = 6
-_BEYOND = 2.0
+_BEYOND = 10.0
 
 # Differences of energies are taken where they exceed the rounding of the energy by this factor, and
 # called right where so many in a row agree with the integral of the force to this fraction.

@@ -1,0 +1,79 @@
+"""Lead packings to other energies: for Figs. 14, 18 and 20 of Marschall & Teitel, PRE 97, 012905.
+
+    python analysis/energy_ladder.py PACKING.h5 [MORE.h5 ...] --u0 1e-18 1e-15 1e-12 1e-9 --out LADDER
+
+Every packing is led from its own energy up and down to each u0 and written to LADDER. Started again
+after a kill it goes on: files that are there are not made again. The last line of standard output is
+one JSON object; the exit code is 0 only if every file is there and each is in equilibrium.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from pathlib import Path
+from typing import Any
+
+from sweep_files import REACHED
+from tqdm import tqdm
+
+from jamshape.ladder import Rung, climb
+from jamshape.storage import read_attributes
+from jamshape.target import Target
+
+SUMMARY = ("u0", "alpha", "seed", "outcome", "phi", "phi_J", "residual", "z", "contacts_shared")
+
+
+def parse() -> Namespace:
+    """Read the command line."""
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("packings", type=Path, nargs="+", metavar="PACKING", help="H5MD files")
+    parser.add_argument(
+        "--u0", type=float, nargs="+", required=True, help="energy densities U/L^2, in any order"
+    )
+    accuracy, tolerance = Target().accuracy, Target().tolerance
+    parser.add_argument(
+        "--accuracy", type=float, default=accuracy, help=f"of |u - u0|/u0 ({accuracy:g})"
+    )
+    largest = f"largest net force and torque over the mean bond force ({tolerance:g})"
+    parser.add_argument("--tolerance", type=float, default=tolerance, help=largest)
+    parser.add_argument("--out", type=Path, required=True, help="folder")
+    return parser.parse_args()
+
+
+def row(rung: Rung) -> dict[str, Any]:
+    """Summarise one rung."""
+    if rung.failure:
+        return {"out": str(rung.path), "u0": rung.u0, "failure": rung.failure}
+    stored = read_attributes(rung.path)
+    found = {name: stored[name] for name in SUMMARY if name in stored}
+    return {"out": str(rung.path), "made": rung.made, **found}
+
+
+def main(options: Namespace) -> int:
+    """Climb all ladders; return the exit code."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    target = Target(options.u0[0], options.accuracy, options.tolerance)
+    rows = []
+    total = len(options.packings) * len(set(options.u0))
+    with tqdm(total=total, unit="packing") as bar:
+        for source in options.packings:
+            for rung in climb(source, options.u0, options.out, target):
+                rows.append(row(rung))
+                bar.set_postfix_str(rung.path.name, refresh=False)
+                bar.update()
+                if rung.failure:
+                    tqdm.write(f"{rung.path.name}: {rung.failure}", file=sys.stderr)
+    failed = sum("failure" in found for found in rows)
+    reached = sum(found.get("outcome") in REACHED for found in rows)
+    made = sum(found.get("made", False) for found in rows)
+    print(json.dumps({"made": made, "reached": reached, "failed": failed, "ladder": rows}))
+    return 0 if reached == len(rows) else 1
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(parse()))
+    except (ValueError, OSError) as error:
+        sys.exit(f"energy_ladder.py: {error}")
