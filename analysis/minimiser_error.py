@@ -146,12 +146,12 @@ def run_target(name: str, packing: Packing, seconds: float) -> Row:
                 break
     except TargetError as error:
         outcome = str(error)
-    return {
-        "outcome": outcome,
-        "seconds": time.perf_counter() - began,
-        "off": abs(state.history.energy_density[-1] / target.u0 - 1),
-        "residual": state.history.residual[-1],
-    }
+    seconds = time.perf_counter() - began
+    u, residual = state.history.energy_density[-1], state.history.residual[-1]
+    if state.minimum is not None:  # the best one, not the last one
+        u, residual = state.minimum.energy_density, state.minimum.residual.largest
+    off = abs(u / target.u0 - 1)
+    return {"outcome": outcome, "seconds": seconds, "off": off, "residual": residual}
 
 
 def study(options: argparse.Namespace) -> dict[str, Row]:
