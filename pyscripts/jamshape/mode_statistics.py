@@ -103,7 +103,10 @@ class Counts(NamedTuple):
 
 
 class Redundancy(NamedTuple):
-    """A set of bonds that could carry stress by itself, beside that of the packing."""
+    """A set of bonds that could carry stress by itself, beside that of the packing.
+
+    Such as a ring of rods with flat contacts; or a single second bond that has all but faded.
+    """
 
     n_states: int
     bonds: IntArray
@@ -281,17 +284,10 @@ def redundancies(matrix: DynamicalMatrix) -> list[Redundancy]:
     These are states of self stress, null vectors of C^T, orthogonal to the forces that balance in the
     packing. Needs the singular vectors of C: as long as a whole spectrum.
     """
-    C = matrix.compatibility.toarray()
-    left, sigma, _ = scipy.linalg.svd(C)
-    rank = rank_of(sigma, matrix.residual.largest)
-    null = left[:, rank:]
-    values = np.zeros(null.shape[1])
-    values[: len(sigma) - rank] = sigma[rank:]
-    own = _self_stress(matrix)
+    left, sigma, _ = scipy.linalg.svd(matrix.compatibility.toarray())
+    null, own = left[:, rank_of(sigma, matrix.residual.largest) :], _self_stress(matrix)
     further, share = np.linalg.svd(null - np.outer(own, own @ null), full_matrices=False)[:2]
-    further = further[:, share > 0.5]
-    weight = (further**2).sum(axis=1)
-    return _grouped(matrix, weight, values[1:] if len(values) > 1 else values)
+    return _grouped(matrix, further[:, share > 0.5])
 
 
 def _self_stress(matrix: DynamicalMatrix) -> FloatArray:
@@ -302,9 +298,9 @@ def _self_stress(matrix: DynamicalMatrix) -> FloatArray:
     return np.asarray(own / max(float(np.linalg.norm(own)), 1e-300))
 
 
-def _grouped(matrix: DynamicalMatrix, weight: FloatArray, values: FloatArray) -> list[Redundancy]:
-    """Group bonds by shared particles."""
-    involved = np.flatnonzero(weight > _SHARE)
+def _grouped(matrix: DynamicalMatrix, states: FloatArray) -> list[Redundancy]:
+    """Group the bonds of states of self stress (m, q), orthonormal, by shared particles."""
+    involved = np.flatnonzero((states**2).sum(axis=1) > _SHARE)
     if not len(involved):
         return []
     particles = matrix.bonds.particles[involved]
@@ -312,12 +308,17 @@ def _grouped(matrix: DynamicalMatrix, weight: FloatArray, values: FloatArray) ->
     graph[np.arange(len(involved))[:, None], particles] = True
     shared = graph.astype(np.int64) @ graph.T > 0
     n_groups, group = connected_components(shared, directed=False)
-    return [
-        Redundancy(
-            n_states=round(float(weight[involved[group == g]].sum())),
-            bonds=involved[group == g],
-            particles=np.unique(particles[group == g]),
-            largest_singular_value=float(values.max(initial=0.0)),
-        )
-        for g in range(n_groups)
-    ]
+    return [_redundancy(matrix, states, involved[group == g]) for g in range(n_groups)]
+
+
+def _redundancy(matrix: DynamicalMatrix, states: FloatArray, bonds: IntArray) -> Redundancy:
+    """Describe those of some states of self stress (m, q) that are on some of the bonds."""
+    _, share, mix = np.linalg.svd(states[bonds], full_matrices=False)
+    own = states @ mix[share > 0.5].T
+    pushes = matrix.compatibility.T @ own
+    return Redundancy(
+        n_states=own.shape[1],
+        bonds=bonds,
+        particles=np.unique(matrix.bonds.particles[bonds]),
+        largest_singular_value=float(np.linalg.norm(pushes, 2)) if own.shape[1] else 0.0,
+    )
