@@ -1,0 +1,321 @@
+"""The figures of modes and the ladder of energies, as their users run them.
+
+On tables made up with known numbers, and on one small packing.
+"""
+
+import json
+import runpy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from jamshape.hessian import Coordinates, dynamical_matrix
+from jamshape.initial import Mixture, random_packing
+from jamshape.jammed import write_minimum
+from jamshape.landscape import Landscape, State
+from jamshape.minimise import Stop, minimise
+from jamshape.mode_table import ModeTable, tabulate, write_modes
+from jamshape.modes import spectrum
+from jamshape.storage import read_attributes, read_packing, write_packing
+from jamshape.target import Target, find
+
+ANALYSIS = Path(__file__).parents[2] / "analysis"
+OF_MODES = ("density_of_states", "participation", "mode_components", "band_frequency")
+OF_PACKING = ("modes", "energy_along_modes")
+SCRIPTS = (*OF_MODES, *OF_PACKING, "jamming_distance")
+
+N = 40
+BANDS = {"low": 3, "middle": 5, "high": 110}
+U0 = 1e-15
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Run a script in this process, which saves the time of starting it; return how it ended."""
+
+    def run_here(script, *arguments):
+        path = ANALYSIS / script
+        monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
+        monkeypatch.syspath_prepend(ANALYSIS)
+        try:
+            runpy.run_path(str(path), run_name="__main__")
+        except SystemExit as ended:
+            return ended.code
+        return 0
+
+    return run_here
+
+
+@pytest.fixture
+def report(here, capsys):
+    """Run a figure and read its last line; look at whether anything is drawn."""
+
+    def reported(figure, *arguments):
+        assert here(f"fig_{figure}.py", *arguments) == 0
+        last = json.loads(capsys.readouterr().out.splitlines()[-1], parse_constant=pytest.fail)
+        look_at(last["out"])
+        return last
+
+    return reported
+
+
+@pytest.fixture
+def problem(here):
+    """Run a figure that must end with one sentence."""
+
+    def sentence(figure, *arguments):
+        said = here(f"fig_{figure}.py", *arguments)
+        assert isinstance(said, str)
+        assert "\n" not in said
+        assert said.startswith(f"fig_{figure}.py: ")
+        return said
+
+    return sentence
+
+
+def look_at(path):
+    from matplotlib.image import imread  # noqa: PLC0415 - the other helpers need none
+
+    pixels = imread(path)
+    assert min(pixels.shape[:2]) > 500
+    assert max(pixels.shape[:2]) < 3000
+    assert pixels[..., :3].std() > 0.02
+
+
+def sizes_at(u):
+    """sqrt(|lambda|) of low and middle modes: of the exponents 1/2 and 1/4 of the paper."""
+    low = 1e-8 * np.array([1, 2, 3]) * (u / U0) ** 0.5
+    middle = 1e-4 * np.linspace(1, 2, 5) * (u / U0) ** 0.25
+    return low, middle
+
+
+def made_up(alpha, u, seed, *, n=N):
+    """A table of modes; the first two of the low band are unstable."""
+    rng = np.random.default_rng(seed)
+    low, middle = sizes_at(u)
+    high = np.sqrt(rng.uniform(1e-4, 4, BANDS["high"]))
+    values = np.concatenate([[0.0, 0.0], low**2 * [-1, -1, 1], middle**2, high**2])
+    band = np.repeat([-1, 0, 1, 2], [2, *BANDS.values()])
+    k = len(values)
+    shares = rng.dirichlet([1, 1, 1], k).T
+    columns = {
+        "eigenvalues": values,
+        "omega": np.sign(values) * np.sqrt(np.abs(values)),
+        "sign": np.sign(values).astype(np.int64),
+        "solver_error": 1e-3 * np.abs(values),
+        "entry_error": 0.0 * values,
+        "state_error": np.where(band == 0, 2e-16, 0.0),
+        "is_translation": band == -1,
+        "participation": np.where(band == 2, 0.7, 1 / n),
+        **dict(zip(("parallel", "perpendicular", "rotation"), shares, strict=True)),
+        "of_round": 0.0 * values,
+        "band": band,
+    }
+    particle, kind = np.repeat(np.arange(n), 3), np.tile(np.arange(3), n)
+    coordinates = Coordinates(particle, kind, np.tile(np.eye(3), (n, 1)), n, 2)
+    order = np.argsort(values)
+    columns = {name: values[order] for name, values in columns.items()}
+    numbers = {"n_backbone": n, "n_modes": k, "z": 5.8}
+    packing = {"alpha": alpha, "u0": u, "seed": seed, "n": n, "size_ratio": 1.4}
+    attributes = numbers | {f"packing_{name}": value for name, value in packing.items()}
+    return ModeTable(columns, np.empty((3 * n, 0)), coordinates, np.empty(0), attributes)
+
+
+def write(folder, alpha, u, seed, **changes):
+    path = folder / f"alpha{alpha:g}_u{u:g}_seed{seed}.h5"
+    write_modes(path, made_up(alpha, u, seed, **changes), {}, vectors=False)
+    return path
+
+
+@pytest.fixture(scope="module")
+def modes(tmp_path_factory):
+    """Modes of two alphas, two samples and four energies; a packing among them is left out."""
+    folder = tmp_path_factory.mktemp("modes")
+    for alpha in (0.01, 4.0):
+        for u in (1e-18, 1e-15, 1e-14, 1e-12):
+            for seed in (1, 2):
+                write(folder, alpha, u, seed)
+    write_packing(folder / "packing.h5", random_packing(8, 0.3, 1, Mixture.bidisperse(1)))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def jammed(tmp_path_factory):
+    """A small packing and its modes, as files."""
+    packing = random_packing(14, 0.4, 1, Mixture.bidisperse(1))
+    landscape, state = Landscape(packing), State.of(packing)
+    while state.packing(packing).phi < 0.84:
+        state = state.strained(-0.01)
+        rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
+        state = minimise(landscape, state, "lbfgs", rough).state
+    minimum = find(landscape, state, Target(1e-12))
+    folder = tmp_path_factory.mktemp("jammed")
+    attributes = {"alpha": 1.0, "n": packing.n, "seed": 1, "size_ratio": 1.4, "u0": 1e-12}
+    write_minimum(folder / "packing.h5", landscape, minimum, attributes)
+    matrix = dynamical_matrix(landscape, minimum.state)
+    table = tabulate(landscape, minimum.state, matrix, spectrum(matrix))
+    write_modes(folder / "modes.h5", table, {}, vectors=True)
+    write_modes(folder / "bare.h5", table, {}, vectors=False)
+    return folder, table
+
+
+@pytest.mark.parametrize("figure", SCRIPTS)
+def test_help(here, capsys, figure):
+    assert here(f"fig_{figure}.py", "--help") == 0
+    help_text = capsys.readouterr().out
+    assert "of Marschall & Teitel, PRE 97, 012905" in help_text
+    assert "--out" in help_text
+
+
+def test_density_of_states(report, modes, tmp_path):
+    out = tmp_path / "a.png"
+    rows = report("density_of_states", modes, "--u0", U0, "--out", out)["bands"]
+    assert [row["alpha"] for row in rows] == [0.01, 4.0]
+    for row in rows:
+        assert row["samples"] == 2
+        for band, count in BANDS.items():
+            assert_allclose(row[band]["fraction"]["value"], count / (3 * N))
+        assert row["low"]["unstable"] == [2, 2]
+        assert row["unsure"] == 0
+    assert rows[1]["low"]["paper"] == 0.0638
+    rows = report("density_of_states", modes, "--alpha", 4, "--out", out)["bands"]
+    assert [row["u0"] for row in rows] == [1e-18, 1e-15, 1e-14, 1e-12]
+    assert [row["low"]["paper"] for row in rows] == [None, 0.0638, None, None]
+
+
+def test_density_is_normalised(modes, monkeypatch):
+    monkeypatch.syspath_prepend(ANALYSIS)
+    script = runpy.run_path(str(ANALYSIS / "fig_density_of_states.py"))
+    tables = script["read_tables"]([modes])
+    samples = tables[(4.0, U0)]
+    edges = script["bin_edges"](samples)
+    both = [script["densities"](samples, edges, below=below) for below in (False, True)]
+    # Translations have no frequency.
+    assert_allclose((sum(both) * np.diff(edges)).sum(axis=1), (3 * N - 2) / (3 * N))
+
+
+def test_participation(report, modes, tmp_path):
+    rows = report("participation", modes, "--out", tmp_path / "a.png")["participation"]
+    for row in rows:
+        assert_allclose(row["high"]["value"], 0.7)
+        assert_allclose(row["low"]["value"], 1 / N)
+
+
+def test_components(report, modes, tmp_path):
+    arguments = (modes, "--alpha", 4, "--u0", U0, 1e-12, "--out", tmp_path / "a.png")
+    for row in report("mode_components", *arguments)["components"]:
+        for band in BANDS:
+            assert_allclose(sum(part["value"] for part in row[band].values()), 1)
+
+
+def test_band_frequencies_and_exponents(report, modes, tmp_path):
+    rows = report("band_frequency", modes, "--out", tmp_path / "a.png")["bands"]
+    assert len(rows) == 4
+    for row in rows:
+        expected = {"low": 0.5, "middle": 0.25}[row["band"]]
+        assert_allclose(row["exponent"]["value"], expected, rtol=1e-9)
+        low, middle = sizes_at(1e-14)
+        mean = {"low": low, "middle": middle}[row["band"]].mean()
+        assert_allclose(row["omega"]["1e-14"]["value"], mean)
+        if row["band"] == "low":
+            assert_allclose(row["omega_positive"]["1e-14"], low[2])
+            assert_allclose(row["omega_negative"]["1e-14"], low[:2].mean())
+        else:
+            assert row["omega_negative"] == {}
+
+
+def test_jamming_distance(report, problem, tmp_path):
+    packing = random_packing(8, 0.3, 1, Mixture.bidisperse(4))
+    for seed, phi_J in ((1, 0.86), (2, 0.87)):
+        for u in (1e-17, 1e-15, 1e-13):
+            attributes = {"alpha": 4.0, "seed": seed, "u0": u, "outcome": "converged"}
+            attributes |= {"phi": phi_J + 2.9 * u**0.5, "phi_J": phi_J}
+            write_packing(tmp_path / f"{seed}_{u:g}.h5", packing, attributes)
+    out = tmp_path / "a.png"
+    (row,) = report("jamming_distance", tmp_path, "--out", out)["jamming_distance"]
+    assert_allclose(row["exponent"]["value"], 0.5, rtol=1e-6)
+    assert_allclose(row["distance"]["1e-15"]["value"], 2.9e-15**0.5, rtol=0.8)
+    assert row["paper"]["1e-15"] == 9.1e-8
+    one = tmp_path / "1_1e-17.h5"
+    assert "no sample at two energies" in problem("jamming_distance", one, "--out", out)
+
+
+def test_modes_of_a_packing(report, problem, jammed, tmp_path):
+    folder, table = jammed
+    packing, out = folder / "packing.h5", tmp_path / "a.png"
+    rows = report("modes", packing, "--modes", folder / "modes.h5", "--out", out)["modes"]
+    assert rows
+    for row in rows:
+        assert row["eigenvalue"] == table["eigenvalues"][row["mode"]]
+        assert row["parallel"] + row["perpendicular"] + row["rotation"] == pytest.approx(1)
+    last = len(table["omega"]) - 1
+    # Found here, to rounding.
+    arguments = (packing, "--mode", last, "--omega", 1.0, "--zoom", "--out", out)
+    stiff, near = report("modes", *arguments)["modes"]
+    assert_allclose(stiff["eigenvalue"], table["eigenvalues"][last], rtol=1e-9)
+    assert abs(np.log(near["omega"])) <= np.abs(np.log(np.abs(table["omega"][-5:]))).min() + 1e-12
+    bare = folder / "bare.h5"
+    assert "holds no vectors" in problem("modes", packing, "--modes", bare, "--out", out)
+    assert "no mode 999" in problem("modes", packing, "--mode", 999, "--out", out)
+
+
+def test_energy_along_modes(report, problem, jammed, tmp_path):
+    folder, table = jammed
+    packing, out = folder / "packing.h5", tmp_path / "a.png"
+    last = len(table["omega"]) - 1
+    arguments = ("--modes", folder / "modes.h5", "--mode", last, "--from", 1e-9, "--to", 1e-2)
+    (row,) = report("energy_along_modes", packing, *arguments, "--out", out)["modes"]
+    assert row["eigenvalue"] == table["eigenvalues"][last]
+    assert abs(row["slope_at_0"]) < 1e-12
+    assert row["crossover"] is None
+    wrong = problem("energy_along_modes", packing, "--from", 1, "--to", 0.1, "--out", out)
+    assert "expected 0 < from < to" in wrong
+
+
+def test_ladder_is_climbed_once(here, jammed, capsys, tmp_path):
+    folder, _ = jammed
+    energies = (1e-13, 1e-12, 1e-11)
+    arguments = (folder / "packing.h5", "--u0", *energies, "--out", tmp_path)
+    for made in (3, 0):
+        assert here("energy_ladder.py", *arguments) == 0
+        found = json.loads(capsys.readouterr().out.splitlines()[-1])
+        assert (found["made"], found["reached"], found["failed"]) == (made, 3, 0)
+    rungs = {row["u0"]: row for row in found["ladder"]}
+    distance = {}
+    for u in energies:
+        path = Path(rungs[u]["out"])
+        stored = read_attributes(path)
+        assert_allclose([stored["u"], stored["u0"]], u, rtol=1e-7)
+        assert stored["residual"] < 1e-6
+        assert stored["seed"] == 1
+        assert read_packing(path).phi == pytest.approx(stored["phi"])
+        distance[u] = stored["phi"] - rungs[1e-13]["phi_J"]
+    assert_allclose(distance[1e-11] / distance[1e-13], 10, rtol=1e-3)
+
+
+def test_ladders_of_other_packings_are_refused(here, jammed, tmp_path):
+    folder, _ = jammed
+    packing = folder / "packing.h5"
+    other = read_attributes(packing) | {"seed": 7, "u0": 1e-13}
+    write_packing(tmp_path / "packing_u1e-13.h5", read_packing(packing), other)
+    said = here("energy_ladder.py", packing, "--u0", 1e-13, "--out", tmp_path)
+    assert "seed = 7, expected 1" in said
+    said = here("energy_ladder.py", tmp_path / "none.h5", "--u0", 1e-13, "--out", tmp_path)
+    assert "does not exist" in said
+
+
+@pytest.mark.parametrize("figure", OF_MODES)
+def test_user_errors_are_one_sentence(problem, modes, tmp_path, figure):
+    out = tmp_path / "out.png"
+    assert "none.h5" in problem(figure, tmp_path / "none.h5", "--out", out)
+    (tmp_path / "empty").mkdir()
+    assert "no modes, expected files" in problem(figure, tmp_path / "empty", "--out", out)
+    assert "no modes have alpha = 7" in problem(figure, modes, "--alpha", 7, "--out", out)
+    packing = modes / "packing.h5"
+    assert "packing.h5: is no complete file of modes" in problem(figure, packing, "--out", out)
+    more = write(tmp_path, 4.0, U0, 3, n=N + 1)
+    assert "expected one ensemble" in problem(figure, modes, more, "--out", out)
+    assert not out.exists()
