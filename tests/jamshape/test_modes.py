@@ -191,6 +191,27 @@ def test_state_error_covers_the_way_to_the_minimum():
     assert (estimate[real] <= 1.1 * change[real] + found.bound[real] + best.bound[real]).all()
 
 
+@pytest.mark.parametrize("name", SMALL)
+def test_entry_error_covers_rounding_of_the_entries(name):
+    matrix, eps = matrix_of(name), np.finfo(float).eps
+    found = spectrum(matrix, "refined")
+    rng = np.random.default_rng(8)
+    largest = np.zeros(matrix.size)
+    for _ in range(5):
+        C, S = matrix.compatibility.copy(), matrix.prestress.tocoo()
+        C.data *= 1 + 2 * eps * rng.uniform(-1, 1, C.nnz)
+        factor = 1 + 2 * eps * rng.uniform(-1, 1, (matrix.size, matrix.size))
+        factor = np.triu(factor) + np.triu(factor, 1).T
+        S = S.toarray() * factor
+        other = spectrum(as_matrix(C.toarray(), S, matrix.translations), "refined")
+        real = ~found.is_translation
+        change = np.abs(other.eigenvalues[~other.is_translation] - found.eigenvalues[real])
+        solver = found.solver_error[real] + other.solver_error[~other.is_translation]
+        assert (change <= found.entry_error[real] + solver).all()
+        largest[real] = np.maximum(largest[real], change)
+    assert (largest[real] > 1e-3 * found.entry_error[real]).mean() > 0.8  # and is not far above it
+
+
 def test_unknown_methods_are_refused():
     with pytest.raises(ValueError, match="the method is 'exact', expected one of projected"):
         spectrum(matrix_of("discs"), "exact")
