@@ -3,8 +3,8 @@
     python pyscripts/sweep.py --alpha 0 0.01 1 4 --samples 6 --n 256 --out sweep/
 
 Each sample is one run of make_packing.py in a process of its own, one a core. Started again after a kill it
-goes on: packings that are there are not made again, those under way go on from their own files. A sample
-that fails is listed, the others go on. The last line of standard output is one JSON object; the exit code
+goes on: packings that are there are not made again, those under way go on from their own files, and those of
+other parameters are refused. A sample that fails is listed, the others go on. The last line of standard output is one JSON object; the exit code
 is 0 only if all samples are there. For clusters see pyscripts/sweep.smk.
 """
 
@@ -19,8 +19,6 @@ import sys
 from pathlib import Path
 
 from tqdm import tqdm
-
-from jamshape.jammed import is_done
 
 MAKE_PACKING = Path(__file__).with_name("make_packing.py")
 
@@ -47,22 +45,17 @@ def parse() -> argparse.Namespace:
 def make(alpha: float, seed: int, options: argparse.Namespace) -> str | None:
     """Make one sample; return its complaint if it fails."""
     out = options.out / f"alpha{alpha:g}_seed{seed}.h5"
-    try:
-        if is_done(out):
-            return None
-    except (ValueError, OSError) as error:
-        return f"{out.name}: {error}"
     arguments = ["--alpha", repr(alpha), "--seed", str(seed), "--out", str(out), *options.extra]
     log = out.with_suffix(".log")
-    with log.open("w") as errors:
+    with log.open("a") as errors:
         done = subprocess.run(
             [sys.executable, MAKE_PACKING, *arguments],
             check=False,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
             stderr=errors,
             env=os.environ | _ONE_THREAD,
         )
-    if done.returncode == 0 or is_done(out):
+    if done.stdout.strip():  # a finished packing, which says itself whether it is in equilibrium
         return None
     last = log.read_text().strip().replace("\r", "\n").splitlines()
     return f"{out.name}: {last[-1] if last else f'exit code {done.returncode}'}"

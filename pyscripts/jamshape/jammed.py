@@ -33,7 +33,7 @@ from jamshape.storage import (
     read_packing,
     write_packing,
 )
-from jamshape.target import Search, Target, direct
+from jamshape.target import Search, Target, direct, require_reachable
 
 # Rows of the convergence history that are kept in a packing's file.
 _REPORT_ROWS = 2000
@@ -163,7 +163,7 @@ def make(sample: Sample, out: Path, *, again: bool = False) -> Iterator[Progress
     TargetError
         As `target.direct`.
     ValueError
-        As `initial.random_packing`, or if another sample was being made there.
+        As `initial.random_packing` and `target.direct`, or if another sample was being made there.
     """
     began, files = time.perf_counter(), Files(out)
     if files.run.exists():
@@ -174,6 +174,7 @@ def make(sample: Sample, out: Path, *, again: bool = False) -> Iterator[Progress
                 raise
             files.run.unlink()
     if not is_compressed(files.run):
+        require_reachable(Landscape(sample.start()), sample.target)
         yield from _compress(sample, files)
     start = read_packing(files.run)
     landscape = Landscape(start)

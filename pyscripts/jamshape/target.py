@@ -49,6 +49,11 @@ _FALLEN = 1e-4
 _GROW_AFTER = 4
 _SMALLEST_STEP = 1e-3
 
+# Overlaps that can be balanced in long doubles to a residual of 1e-5, and those of soft particles
+# that still are particles.
+_LEAST_OVERLAP = 1e-13
+_LARGEST_OVERLAP = 0.05
+
 _PATIENCE = 1500
 
 
@@ -151,8 +156,11 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
     ------
     TargetError
         If steps become too small.
+    ValueError
+        If u0 is out of reach: overlaps below the rounding of coordinates, or no longer small.
     """
     fine = target.strain_above_jamming(landscape)
+    require_reachable(landscape, target)
     while search.minimum is None:
         landscape.forget_pairs()  # what follows depends on `search` alone
         stop = Stop(tolerance=_GOOD, lowest=_FALLEN * target.u0)
@@ -163,7 +171,8 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
                 search.minimum, search.state = found, found.state
                 yield search
                 return
-            if found.outcome is not Outcome.UNJAMMED or found.state.volume > jammed.state.volume:
+            lost = found.outcome is not Outcome.UNJAMMED or found.state.volume > jammed.state.volume
+            if lost and search.loose is not None:
                 search.step, search.loose_in_a_row = search.step / 4, 0
         if found.outcome is Outcome.UNJAMMED:
             search.loose, search.loose_in_a_row = found.state, search.loose_in_a_row + 1
@@ -190,6 +199,22 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
             )
             raise TargetError(msg)
         yield search
+
+
+def require_reachable(landscape: Landscape, target: Target) -> None:
+    """Refuse a u0 whose overlaps drown in rounding, or are as large as particles.
+
+    Raises
+    ------
+    ValueError
+    """
+    overlap = target.strain_above_jamming(landscape)  # of the same size
+    if not _LEAST_OVERLAP <= overlap <= _LARGEST_OVERLAP:
+        msg = (
+            f"u0 is {target.u0:g}, whose overlaps are about {overlap:.1g} of a particle, expected from"
+            f" {_LEAST_OVERLAP:g} (rounding) to {_LARGEST_OVERLAP:g}; take another u0"
+        )
+        raise ValueError(msg)
 
 
 def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Minimum:

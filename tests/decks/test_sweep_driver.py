@@ -21,7 +21,7 @@ def run(out, *options):
 
 
 def times(folder):
-    return {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    return {path.name: path.stat().st_mtime_ns for path in folder.glob("*.h5")}
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +64,16 @@ def test_a_second_call_makes_nothing_anew(swept):
     before = times(out)
     done, report = run(out, "--alpha", "0", "1", "--samples", "2")
     assert (done.returncode, report["made"], report["failed"]) == (0, 4, [])
+    assert times(out) == before
+
+
+def test_packings_of_other_parameters_are_refused_and_kept(swept):
+    out, *_ = swept
+    before = times(out)
+    done, report = run(out, "--alpha", "0", "--samples", "1", "--size-ratio", "1.5")
+    assert (done.returncode, report["made"]) == (1, 0)
+    (complaint,) = report["failed"]
+    assert "size_ratio = 1.4, expected 1.5" in complaint
     assert times(out) == before
 
 

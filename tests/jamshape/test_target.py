@@ -210,6 +210,23 @@ def test_target_refuses(name, value):
         Target(**{name: value})
 
 
+@pytest.mark.parametrize("u0", [1e-30, 1e-300, 0.1, 1.0])
+def test_energies_out_of_reach_are_refused_before_anything_is_done(u0):
+    landscape, state = start_of("16 discs")
+    with pytest.raises(ValueError, match=rf"^u0 is {u0:g}, whose overlaps are .*take another u0$"):
+        find(landscape, state, Target(u0))
+    assert landscape.evaluations == 0
+
+
+def test_a_start_far_above_jamming_is_opened_until_it_unjams():
+    packing, state = squeezed(24, 0.01, 0.80)
+    landscape = Landscape(packing)
+    above = find(landscape, state, Target(1e-12)).state.strained(-6e-3)
+    minimum = find(landscape, above, Target(1e-15))
+    assert minimum.energy_density == pytest.approx(1e-15, rel=1e-7, abs=0)
+    assert minimum.residual.largest <= 1e-8
+
+
 def test_target_is_met_within_its_accuracy():
     target = Target(1e-12, accuracy=1e-3)
     assert [target.is_met(1e-12 * x) for x in (1, 1.0009, 0.9991)] == [True] * 3
