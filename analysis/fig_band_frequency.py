@@ -5,8 +5,8 @@
 MODES are files of analysis/modes.py, or folders of them, of packings at several energies (energy_ladder.py).
 Bands below the high one: low, of second order in the prestress, modes that slide; middle, of first order. Means of
 sqrt|lambda| over the modes of a sample, then over samples with standard errors; where modes have negative
-eigenvalues these and the others are also shown apart. Power laws of u are fitted to each sample; the last line of
-standard output is one JSON object with the means of their exponents, with standard errors.
+eigenvalues these and the others are also shown apart. Power laws of u are fitted to each sample where there is
+a gap below the high band; the last line of standard output is one JSON object with the means of their exponents.
 """
 
 from __future__ import annotations
@@ -32,6 +32,12 @@ PAPER_EXPONENTS = {"low": 0.5, "middle": 0.25}
 STYLES = {"low": ("s", RED), "middle": ("o", BLUE)}
 FEWEST = 3  # energies of a fit
 
+# Numbers of modes that are the same but for this fraction.
+SAME = 0.1
+
+# Bands have merged with the high one if their eigenvalues are not apart by this factor.
+GAP = 2.0
+
 Curve = dict[float, Mean]
 
 
@@ -53,6 +59,22 @@ def mean_size(table: ModeTable, band: str, sign: int = 0) -> float:
     return float(values.mean()) if len(values) else math.nan
 
 
+def is_apart(table: ModeTable, band: str) -> bool:
+    """Whether there is a gap between a band and the high one."""
+    size = sizes(table) ** 2
+    own, high = (size[table.in_band(name)] for name in (band, "high"))
+    return bool(high.min(initial=math.inf) > GAP * own.max(initial=0.0))
+
+
+def apart(tables: Tables, alpha: float, band: str) -> Tables:
+    """Leave out energies where the band of some sample has merged with the high one."""
+    return {
+        key: samples
+        for key, samples in tables.items()
+        if key.alpha == alpha and all(is_apart(t, band) for t in samples)
+    }
+
+
 def curve(tables: Tables, alpha: float, band: str, sign: int = 0) -> Curve:
     """Average over samples at each energy; energies without modes of the band are left out."""
     found = {
@@ -63,20 +85,25 @@ def curve(tables: Tables, alpha: float, band: str, sign: int = 0) -> Curve:
     return {u: m for u, m in found.items() if m.samples}
 
 
-def fit(tables: Tables, alpha: float, band: str, largest: float) -> Fit | None:
-    """Fit a power law to every sample, or None if there are too few energies."""
-    by_seed: dict[float, list[tuple[float, float]]] = {}
-    for key, samples in tables.items():
-        if key.alpha == alpha and key.u0 <= largest * (1 + 1e-9):
-            for table in samples:
-                point = (key.u0, mean_size(table, band))
-                by_seed.setdefault(number(table, "seed"), []).append(point)
+def fit(tables: Tables, alpha: float, band: str, *, same: bool = False) -> Fit | None:
+    """Fit a power law to every sample, where the band is one, or None if there are too few energies.
+
+    With `same` only where it has the number of modes that it has most often, or nearly so: bonds that
+    only graze open as u falls, which lets more rods slide.
+    """
+    by_seed: dict[float, list[tuple[float, float, int]]] = {}
+    for key, samples in apart(tables, alpha, band).items():
+        for table in samples:
+            point = (key.u0, mean_size(table, band), len(table.in_band(band)))
+            by_seed.setdefault(number(table, "seed"), []).append(point)
     lines = []
     for points in by_seed.values():
-        u, omega = np.log(np.array(points)).T
+        u, omega, count = np.array(points).T
         known = np.isfinite(omega)
+        if same and known.any():
+            known &= np.abs(count - np.median(count[known])) <= SAME * count
         if known.sum() >= FEWEST:
-            lines.append(np.polyfit(u[known], omega[known], 1))
+            lines.append(np.polyfit(np.log(u[known]), np.log(omega[known]), 1))
     if not lines:
         return None
     slopes, offsets = np.array(lines).T
@@ -103,7 +130,14 @@ def draw(tables: Tables, fits: dict[tuple[float, str], Fit | None], out: Path) -
     for axes, alpha in zip(panels, alphas, strict=True):
         samples = [len(s) for key, s in tables.items() if key.alpha == alpha]
         for band, (marker, color) in STYLES.items():
-            points = curve(tables, alpha, band)
+            every = curve(tables, alpha, band)
+            if not every:
+                continue
+            points = curve(apart(tables, alpha, band), alpha, band)
+            merged = {u: m for u, m in every.items() if u not in points}
+            if merged:
+                text = f"{band} and high band merge"
+                draw_points(axes, merged, fmt="x", color=color, ms=5, label=text)
             if not points:
                 continue
             law = fits[alpha, band]
@@ -115,14 +149,13 @@ def draw(tables: Tables, fits: dict[tuple[float, str], Fit | None], out: Path) -
                 u = np.geomspace(min(points) / 2, max(points) * 2, 2)
                 axes.plot(u, law.factor * u**x.value, "-", color=color, lw=1, zorder=1)
             draw_points(axes, points, fmt=marker, color=color, mfc="none", ms=5, label=text)
-            apart = {sign: curve(tables, alpha, band, sign) for sign in (1, -1)}
-            if apart[-1]:
+            signs = {sign: curve(tables, alpha, band, sign) for sign in (1, -1)}
+            if signs[-1]:
                 names = {1: ("2", r"only $\lambda>0$"), -1: ("1", r"only $\lambda<0$")}
                 for sign, (symbol, what) in names.items():
-                    if apart[sign]:
-                        u = np.array(list(apart[sign])) * 1.15**sign
-                        values = [m.value for m in apart[sign].values()]
-                        axes.plot(u, values, symbol, color="0.35", ms=6, label=what, zorder=1)
+                    values = [m.value for m in signs[sign].values()]
+                    place = np.array(list(signs[sign])) * 1.2**sign
+                    axes.plot(place, values, symbol, color="0.35", ms=6, label=what, zorder=1)
         many = f"{min(samples)}" if len(set(samples)) == 1 else f"{min(samples)} to {max(samples)}"
         title = rf"$\alpha={alpha:g}$, {many} samples"
         axes.set(xscale="log", yscale="log", xlabel=r"energy density  $u=U/L^2\;[k_e/(2R_s)^2]$")
@@ -135,14 +168,14 @@ def draw(tables: Tables, fits: dict[tuple[float, str], Fit | None], out: Path) -
 def guides(panels: Any) -> None:
     """Draw the exponents of the paper below the points."""
     low, high = panels[0].get_ylim()
-    panels[0].set_ylim(low / 30, high * 30)
+    panels[0].set_ylim(low / 100, high * 100)
     for axes in panels:
         left, right = axes.get_xlim()
-        u = np.geomspace(left * (right / left) ** 0.55, left * (right / left) ** 0.85, 2)
-        for exponent, text, above in ((0.25, "1/4", 3.0), (0.5, "1/2", 1.0)):
-            y = low / 15 * above * (u / u[0]) ** exponent
+        u = np.geomspace(left * (right / left) ** 0.45, left * (right / left) ** 0.85, 2)
+        for exponent, text in ((0.25, "1/4"), (0.5, "1/2")):
+            y = low / 50 * (u / u[0]) ** exponent
             axes.plot(u, y, "k-", lw=1.2)
-            axes.text(u[1] * 1.3, y[1], text, fontsize=8, va="center")
+            axes.text(u[1] * 1.4, y[1], text, fontsize=8, va="center")
         axes.set_xlim(left, right)
 
 
@@ -151,7 +184,6 @@ def main() -> None:
     parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument("modes", type=Path, nargs="+", metavar="MODES", help="folder or files")
     parser.add_argument("--alpha", type=float, nargs="+", default=[], help="only these (all)")
-    parser.add_argument("--largest", type=float, default=math.inf, help="energy of the fits (all)")
     parser.add_argument(
         "--out", type=Path, default=Path("band_frequency.png"), help="(%(default)s)"
     )
@@ -163,7 +195,7 @@ def main() -> None:
     if not with_bands:
         msg = "no packing has modes below the high band, expected rods"
         raise ValueError(msg)
-    fits = {(a, b): fit(tables, a, b, options.largest) for a in with_bands for b in STYLES}
+    fits = {(a, b): fit(tables, a, b) for a in with_bands for b in STYLES}
     draw(tables, fits, options.out)
     rows = [row(tables, alpha, band, law) for (alpha, band), law in fits.items()]
     print(json.dumps({"out": str(options.out), "bands": rows}))
@@ -173,7 +205,12 @@ def row(tables: Tables, alpha: float, band: str, law: Fit | None) -> dict[str, A
     """Report one band of one alpha."""
     found: dict[str, Any] = {"alpha": alpha, "band": band}
     found["exponent"] = law.exponent.report() if law else None
+    same = fit(tables, alpha, band, same=True)
+    found["exponent_at_same_number"] = same.exponent.report() if same else None
     found["paper_exponent"] = PAPER_EXPONENTS[band]
+    found["merged"] = [
+        key.u0 for key in tables if key.alpha == alpha and key not in apart(tables, alpha, band)
+    ]
     found["omega"] = {f"{u:g}": m.report() for u, m in curve(tables, alpha, band).items()}
     for name, sign in (("positive", 1), ("negative", -1)):
         means = curve(tables, alpha, band, sign)

@@ -73,7 +73,7 @@ def draw(curves: Curves, table: ModeTable, title: str, out: Path) -> None:
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(7.2, 6.2), dpi=200, layout="constrained")
+    figure = Figure(figsize=(8.4, 6.0), dpi=200, layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2.3, 1])
     shades = colormaps["viridis"](np.linspace(0.92, 0.0, len(curves)))
     for color, (mode, (along, crossover)) in zip(shades, curves.items(), strict=True):
@@ -100,7 +100,14 @@ def draw(curves: Curves, table: ModeTable, title: str, out: Path) -> None:
         top.plot([], [], "o", color="w", mec="k", mew=0.6, ms=6, label=r"crossover $\delta^*$")
     if any((along.mean_energy < 0).any() for along, _ in curves.values()):
         top.plot([], [], "--", color="k", lw=1.3, label=r"$-\Delta U$, where $\Delta U<0$")
-    top.legend(title=title, title_fontsize=8, fontsize=8, frameon=False, loc="upper left")
+    figure.legend(
+        *top.get_legend_handles_labels(),
+        title=title,
+        title_fontsize=8,
+        fontsize=8,
+        frameon=False,
+        loc="outside right upper",
+    )
     figure.savefig(out)
 
 
