@@ -126,12 +126,8 @@ def draw(packing: Packing, table: ModeTable, modes: list[int], out: Path, *, zoo
         axes.set_title(f"({chr(97 + k)})  {mode_text(table, mode)}", fontsize=9, loc="left")
     for axes in panels[len(modes) :]:
         axes.set_axis_off()
-    bar = figure.colorbar(bodies, ax=list(panels), aspect=30, shrink=0.75, pad=0.01)
-    bar.set_ticks([-1, -0.5, 0, 0.5, 1])
-    bar.ax.tick_params(labelsize=8)
-    bar.set_label(r"rotation  $A\,\delta\theta\,/$ largest motion", fontsize=8)
-    bar.ax.text(0.5, 1.02, "counter-\nclockwise", **_note(bar.ax, "bottom"))
-    bar.ax.text(0.5, -0.02, "clockwise", **_note(bar.ax, "top"))
+    if table.coordinates.is_rotation.any():
+        add_color_bar(figure.colorbar(bodies, ax=list(panels), aspect=30, shrink=0.75, pad=0.01))
     arrow = {"arrowstyle": "-|>", "lw": 1.2, "color": "k", "shrinkA": 0, "shrinkB": 0}
     last = panels[columns * n_rows - 1]
     last.annotate(
@@ -140,6 +136,15 @@ def draw(packing: Packing, table: ModeTable, modes: list[int], out: Path, *, zoo
     label = {"ha": "right", "va": "center", "fontsize": 8, "transform": last.transAxes}
     last.text(1.0 - LONGEST - 0.02, -0.035, "displacement: largest motion", **label)
     figure.savefig(out)
+
+
+def add_color_bar(bar: Any) -> None:
+    """Say what the colours are."""
+    bar.set_ticks([-1, -0.5, 0, 0.5, 1])
+    bar.ax.tick_params(labelsize=8)
+    bar.set_label(r"rotation  $A\,\delta\theta\,/$ largest motion", fontsize=8)
+    bar.ax.text(0.5, 1.02, "counter-\nclockwise", **_note(bar.ax, "bottom"))
+    bar.ax.text(0.5, -0.02, "clockwise", **_note(bar.ax, "top"))
 
 
 def _note(axes: Axes, va: str) -> dict[str, Any]:

@@ -134,11 +134,13 @@ def key_of(table: ModeTable) -> Key:
 
 
 def samples_text(tables: Tables) -> str:
-    """Name N and the number of samples, for a legend."""
+    """Name N, the number of samples and what all curves share, for a legend."""
     counts = sorted({len(samples) for samples in tables.values()})
     n = int(number(next(iter(tables.values()))[0], "n"))
     many = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    return rf"$N={n}$, {many} sample{'s' * (counts[-1] > 1)}" + " each" * (len(tables) > 1)
+    text = rf"$N={n}$, {many} sample{'s' * (counts[-1] > 1)}" + " each" * (len(tables) > 1)
+    alphas = {key.alpha for key in tables}
+    return text if len(tables) == 1 or len(alphas) > 1 else rf"$\alpha={alphas.pop():g}$, {text}"
 
 
 def stable(table: ModeTable) -> NDArray[np.bool_]:
@@ -318,9 +320,10 @@ def draw_errors(axes: Axes, tables: Tables, colors: Sequence[str]) -> None:
     style: dict[str, Any] = {"transform": axes.get_xaxis_transform()}
     for k, (size, error, bound, color) in enumerate(rows):
         height = low + (high - low) * (k + 0.5) / max(len(rows), 12)
+        faint = 0.35 if len(rows) < 100 else 0.15
         for width, shade, lw in ((error, color, 0.9), (bound, "k", 1.6)):
             ends = np.sqrt(np.maximum([size - width, size + width], 1e-300))
-            opacity = 1.0 if shade == "k" else 0.35
+            opacity = 1.0 if shade == "k" else faint
             axes.plot(ends, [height] * 2, "-", color=shade, lw=lw, alpha=opacity, **style)
         axes.plot(np.sqrt(size), height, "|", color=color, ms=3, mew=1, **style)
     note: dict[str, Any] = {"fontsize": 7, "color": "0.3", "ha": "center", "va": "bottom"}
