@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from jamshape.hessian import Coordinates
 from jamshape.landscape import CrossingError, Landscape, State
-from jamshape.packing import FloatArray, IntArray, Packing
+from jamshape.packing import FloatArray, Packing
 
 # A fit of the crossover is the longest that leaves no more than this, relative, of the force; it has at
 # least so many amplitudes, and the quartic force exceeds the other one by this factor at its end.
@@ -122,59 +122,67 @@ def fit_crossover(along: EnergyAlong) -> Crossover | None:
     x, y = along.delta[seen], along.mean_slope[seen] / along.delta[seen]
     if len(x) < _FEWEST:
         return None
-    fits = _Fits(x**2 / x[-1] ** 2, y)
-    begin, end = np.triu_indices(len(x), _FEWEST - 1)
-    a, b, deviation = fits.between(begin, end)
-    u = fits.u
-    good = (a > 0) & (b > 0) & (deviation < _DEVIATION)
-    good &= (u[end] > _BEYOND * a / b) & (2 * u[begin] < a / b)
-    if not good.any():
+    u = x**2 / x[-1] ** 2
+    best = max((_longest(u, y, first) for first in range(len(x) - _FEWEST + 1)), key=_span)
+    if not best.n_points:
         return None
-    best = int(np.argmax(np.where(good, np.log(x[end] / x[begin]), -np.inf)))
-    first, last = begin[best], end[best]
-    stiffness, quartic = a[best], b[best] / (4 * x[-1] ** 2)
-    delta = np.sqrt(stiffness / (2 * quartic))
-    relative = 0.5 * fits.relative_error(first, last, (a[best], b[best]))
+    part = slice(best.first, best.first + best.n_points)
+    quartic = best.b / (4 * x[-1] ** 2)
+    delta = np.sqrt(best.a / (2 * quartic))
     return Crossover(
         delta=float(delta),
-        delta_error=float(delta * relative),
-        stiffness=float(stiffness),
+        delta_error=float(0.5 * delta * _relative_error(u[part], y[part], best)),
+        stiffness=best.a,
         quartic=float(quartic),
-        begin=float(x[first]),
-        end=float(x[last]),
-        deviation=float(deviation[best]),
+        begin=float(x[part][0]),
+        end=float(x[part][-1]),
+        deviation=best.deviation,
     )
 
 
-class _Fits:
-    """Least squares of y = a + b u, relative to y, between any two of the points."""
+class _Fit(NamedTuple):
+    """Least squares of y = a + b u, relative to y, to some points in a row."""
 
-    def __init__(self, u: FloatArray, y: FloatArray) -> None:
-        self.u, self.y = u, y
-        columns = np.column_stack([np.ones_like(y), u, u**2, y, u * y]) / (y**2)[:, None]
-        self._sums = np.concatenate([np.zeros((1, 5)), np.cumsum(columns, axis=0)])
+    a: float
+    b: float
+    deviation: float
+    first: int
+    n_points: int
+    """0 if no fit is good."""
+    span: float
+    """Ratio of the last u to the first."""
 
-    def between(self, begin: IntArray, end: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return a, b and the relative deviation of all the fits."""
-        s, su, suu, sy, suy = (self._sums[end + 1] - self._sums[begin]).T
+
+def _span(fit: _Fit) -> float:
+    return fit.span
+
+
+def _longest(u: FloatArray, y: FloatArray, first: int) -> _Fit:
+    """Find the longest good fit that begins at a point."""
+    u, y = u[first:], y[first:]
+    columns = np.column_stack([np.ones_like(y), u, u**2, y, u * y]) / (y**2)[:, None]
+    s, su, suu, sy, suy = np.cumsum(columns, axis=0).T
+    count = np.arange(1, len(u) + 1)
+    with np.errstate(all="ignore"):  # where there are too few points, or all y are alike
         determinant = s * suu - su**2
-        count = end - begin + 1
-        with np.errstate(all="ignore"):
-            a = (suu * sy - su * suy) / determinant
-            b = (s * suy - su * sy) / determinant
-            square = np.maximum(count - a * sy - b * suy, 0.0) / (count - 2)
-        fitted = np.isfinite(a) & (b != 0)
-        return np.where(fitted, a, 0.0), np.where(fitted, b, 1.0), np.sqrt(square)
+        a = (suu * sy - su * suy) / determinant
+        b = (s * suy - su * sy) / determinant
+        square = np.maximum(count - a * sy - b * suy, 0.0) / (count - 2)
+        good = (a > 0) & (b > 0) & (count >= _FEWEST) & (square < _DEVIATION**2)
+        good &= (u > _BEYOND * a / b) & (2 * u[0] < a / b)
+    if not good.any():
+        return _Fit(0.0, 0.0, np.inf, first, 0, 0.0)
+    last = int(np.flatnonzero(good)[-1])
+    deviation = float(np.sqrt(square[last]))
+    return _Fit(float(a[last]), float(b[last]), deviation, first, last + 1, float(u[last] / u[0]))
 
-    def relative_error(self, first: int, last: int, ab: tuple[float, float]) -> float:
-        """Return the standard error of ln(a / b) of one fit."""
-        part = slice(first, last + 1)
-        design = np.column_stack([np.ones_like(self.u[part]), self.u[part]]) / self.y[part, None]
-        left = 1 - design @ np.array(ab)
-        variance = float(left @ left) / (len(left) - 2)
-        covariance = variance * np.linalg.inv(design.T @ design)
-        gradient = np.array([1 / ab[0], -1 / ab[1]])
-        return float(np.sqrt(gradient @ covariance @ gradient))
+
+def _relative_error(u: FloatArray, y: FloatArray, fit: _Fit) -> float:
+    """Return the standard error of ln(a / b)."""
+    design = np.column_stack([np.ones_like(u), u]) / y[:, None]
+    covariance = fit.deviation**2 * np.linalg.inv(design.T @ design)
+    gradient = np.array([1 / fit.a, -1 / fit.b])
+    return float(np.sqrt(gradient @ covariance @ gradient))
 
 
 class AlongModes:

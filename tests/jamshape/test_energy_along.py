@@ -153,3 +153,14 @@ def test_no_crossover_where_none_is():
     delta = np.geomspace(1e-10, 1, 121)
     for slope in (delta, -delta, -delta + 4 * delta**3, delta + delta**2, np.full(121, np.nan)):
         assert fit_crossover(made_up(delta, slope)) is None
+
+
+def test_crossover_after_a_weak_bond_has_closed():
+    """The range of the fit begins behind a step of the stiffness over many orders."""
+    delta = np.geomspace(1e-10, 1, 121)
+    a, c = 2e-6, 5e-1
+    slope = np.where(delta > 1e-7, a * delta + 4 * c * delta**3, -1e-16 * delta)
+    found = fit_crossover(made_up(delta, slope))
+    assert_allclose([found.stiffness, found.quartic], [a, c], rtol=1e-6)
+    assert_allclose(found.delta, np.sqrt(a / (2 * c)), rtol=1e-6)
+    assert 1e-7 < found.begin < 2e-7
