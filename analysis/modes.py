@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.hessian import dynamical_matrix
+from jamshape.hessian import Scope, dynamical_matrix
 from jamshape.landscape import Landscape, State
 from jamshape.mode_statistics import density_of_states, mean_in_bins, redundancies
 from jamshape.mode_table import BANDS, ModeTable, tabulate, write_modes
@@ -135,10 +135,8 @@ def main(options: argparse.Namespace) -> None:
     """Read, assemble, solve, write, report."""
     packing = read_packing(options.packing)
     landscape, state = Landscape(packing), State.of(packing)
-    matrix = dynamical_matrix(
-        landscape, state,
-        rotation=options.rotation, least_force=options.least_force, force=options.force,
-    )  # fmt: skip
+    scope = Scope(options.rotation, options.least_force, force=options.force)
+    matrix = dynamical_matrix(landscape, state, scope)
     found: Spectrum
     if options.method != "sparse" and not options.lowest:
         found = spectrum(matrix, options.method)

@@ -216,14 +216,34 @@ class DynamicalMatrix:
         return Strains(stretched, pushed, np.einsum("cka,cka->k", bent[:, :, :D], moved))
 
 
+@dataclass(frozen=True, eq=False)
+class Scope:
+    """What to take of a packing, and what a rotation counts for.
+
+    Parameters
+    ----------
+    rotation : str or (N,) array of float64, [length]
+        What a radian counts for: ``half_length`` (A theta, Marschall & Teitel 2018, Eq. 23), ``radius``
+        (R theta) or lengths. What no contact can turn, discs, has no rotation in any case. Eigenvalues
+        of modes that rotate depend on this choice; their number, signs and zeros do not.
+    least_force : float
+        Leave out contacts whose force is below this fraction of the mean force of a bond: rods that slid
+        along flat sides up to others touch them with forces of second order in the overlap, which
+        minimisers in doubles do not see.
+    backbone : (N,) array of bool, optional
+        Particles to take, with the contacts between them; those that are no rattlers if left out.
+    force : bool
+        Also where the state is no minimum.
+    """
+
+    rotation: str | FloatArray = "half_length"
+    least_force: float = 0.0
+    backbone: NDArray[np.bool_] | None = None
+    force: bool = False
+
+
 def dynamical_matrix(
-    landscape: Landscape,
-    state: State,
-    *,
-    rotation: str | FloatArray = "half_length",
-    backbone: NDArray[np.bool_] | None = None,
-    least_force: float = 0.0,
-    force: bool = False,
+    landscape: Landscape, state: State, scope: Scope | None = None
 ) -> DynamicalMatrix:
     """Assemble the dynamical matrix of a minimum of the energy.
 
@@ -231,18 +251,7 @@ def dynamical_matrix(
     ----------
     landscape : Landscape
     state : State
-    rotation : str or (N,) array of float64, [length]
-        What a radian counts for: ``half_length`` (A theta, Marschall & Teitel 2018, Eq. 23), ``radius``
-        (R theta) or lengths. What no contact can turn, discs, has no rotation in any case. Eigenvalues
-        of modes that rotate depend on this choice; their number, signs and zeros do not.
-    backbone : (N,) array of bool, optional
-        Particles to take, with the contacts between them; those that are no rattlers if left out.
-    least_force : float
-        Leave out contacts whose force is below this fraction of the mean force of a bond: rods that slid
-        along flat sides up to others touch them with forces of second order in the overlap, which
-        minimisers in doubles do not see.
-    force : bool
-        Also where the state is no minimum.
+    scope : Scope, optional
 
     Returns
     -------
@@ -253,12 +262,17 @@ def dynamical_matrix(
     NotAtMinimumError
         If the residual is above `LARGEST_RESIDUAL`, unless forced.
     ValueError
-        If all particles are rattlers, or `rotation` is neither.
+        If all particles are rattlers, or the scope's rotation is neither.
     CrossingError
         If two spines cross.
     """
+    scope = scope or Scope()
     evaluation = landscape.evaluate(state)
-    taken = ~landscape.curvature(state).rattlers if backbone is None else np.asarray(backbone)
+    taken = (
+        ~landscape.curvature(state).rattlers
+        if scope.backbone is None
+        else np.asarray(scope.backbone)
+    )
     if not taken.any():
         msg = (
             f"all {len(taken)} particles are rattlers, so that there is no mode to find,"
@@ -267,15 +281,15 @@ def dynamical_matrix(
         raise ValueError(msg)
     held = np.where(taken[landscape.particle_of_coordinate()], evaluation.gradient, 0.0)
     residual = residual_of(landscape, evaluation._replace(gradient=held))
-    if residual.largest > LARGEST_RESIDUAL and not force:
+    if residual.largest > LARGEST_RESIDUAL and not scope.force:
         msg = (
             f"the state is not at a minimum: its largest net force is {residual.largest:.2g} of the"
             f" mean bond force, expected at most {LARGEST_RESIDUAL:g}; minimise it first,"
             " or force it (--force)"
         )
         raise NotAtMinimumError(msg)
-    coordinates = _coordinates(landscape, state, taken, _lengths(landscape, rotation))
-    weakest = least_force * evaluation.bond_force
+    coordinates = _coordinates(landscape, state, taken, _lengths(landscape, scope.rotation))
+    weakest = scope.least_force * evaluation.bond_force
     parts = _parts(landscape, state, coordinates, weakest)
     return _matrix(landscape, state, evaluation, parts | {"residual": residual})
 

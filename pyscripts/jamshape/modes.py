@@ -167,7 +167,8 @@ def state_error(
     values = found.eigenvalues.copy()
     values[~stiff] = at.quotients.value - relaxed.sum(axis=0)
     values[stiff] = there.quotients(found.vectors[:, stiff]).value
-    return np.asarray(np.abs(values - found.eigenvalues) / part)
+    change = np.abs(values - found.eigenvalues) / part
+    return np.where(found.is_translation, 0.0, change)
 
 
 def _plain(matrix: DynamicalMatrix) -> Found:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jamshape.approach import Approach
-from jamshape.hessian import dynamical_matrix
+from jamshape.hessian import Scope, dynamical_matrix
 from jamshape.jammed import Sample, make
 from jamshape.landscape import Landscape, State
 from jamshape.mode_statistics import bands, components, count, participation, redundancies
@@ -36,8 +36,9 @@ def packings(tmp_path_factory):
     return found
 
 
-def analysed(packing, **options):
-    matrix = dynamical_matrix(Landscape(packing), State.of(packing), **options)
+def analysed(packing, least_force=0.0):
+    scope = Scope(least_force=least_force)
+    matrix = dynamical_matrix(Landscape(packing), State.of(packing), scope)
     return matrix, spectrum(matrix)
 
 
