@@ -246,7 +246,7 @@ def _compress(sample: Sample, files: Files) -> Iterator[Progress]:
         for row in approach(run, sample.approach):
             rows.append(row)
             if len(rows) == _ROWS_PER_RESTART:
-                session.commands(f"write_restart {files.restart(row.step)}")
+                run.write_restart(files.restart(row.step))
                 _write_rows(writer, rows)
                 rate = {"rate": run.settings.kappa, "dt": run.settings.dt}
                 writer.set_attributes({"restart_step": row.step, "restart_time": row.time, **rate})

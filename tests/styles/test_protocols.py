@@ -1,0 +1,35 @@
+import numpy as np
+import pytest
+
+from jamshape.initial import Mixture, random_packing
+from jamshape.protocols import Compression, CompressionRun
+from jamshape.session import Session
+
+pytestmark = pytest.mark.lammps
+
+ROWS, STEPS, ROWS_PER_RESTART = 400, 10, 5
+
+
+def compressed(path=None):
+    """Compress fast, so that particles leave the box, writing restart files."""
+    start = random_packing(64, 0.35, 1, Mixture.bidisperse(4.0))
+    rows = []
+    with Session() as session:
+        run = CompressionRun(session, Compression(1e-4, phi_end=1e3, dt=0.25), start)
+        for row in range(1, ROWS + 1):
+            run.advance(row * STEPS)
+            if path and row % ROWS_PER_RESTART == 0:
+                run.write_restart(path)
+            rows.append(run.sample().observables)
+        return run.packing(), rows
+
+
+def test_writing_restart_files_does_not_change_a_run(tmp_path):
+    plain, rows = compressed()
+    written, others = compressed(tmp_path / "now.restart")
+    apart = np.abs(plain.position - written.position)
+    apart = np.minimum(apart, plain.box.edges - apart)  # one may have crossed the border earlier
+    assert apart.max() < 1e-9 * plain.box.edges.min()
+    for name in ("p", "u"):
+        one, other = (np.array([row[name] for row in found]) for found in (rows, others))
+        np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-15)
