@@ -34,6 +34,7 @@ FEWEST = 3  # energies of a fit
 
 # Numbers of modes that are the same but for this fraction.
 SAME = 0.1
+NOTEWORTHY = 0.003  # difference of exponents
 
 # Bands have merged with the high one if their eigenvalues are not apart by this factor.
 GAP = 2.0
@@ -144,8 +145,10 @@ def draw(tables: Tables, fits: dict[tuple[float, str], Fit | None], out: Path) -
             text = f"{band} band"
             if law:
                 x = law.exponent
-                off = "" if math.isnan(x.error) else rf"\pm {x.error:.3f}"
-                text += rf", $\bar\omega\sim u^{{{x.value:.3f}{off}}}$"
+                text += rf": $\bar\omega\sim u^{{{with_error(x)}}}$"
+                same = fit(tables, alpha, band, same=True)
+                if same and abs(same.exponent.value - x.value) > NOTEWORTHY:
+                    text += f"\n(${with_error(same.exponent)}$ for the same number of modes)"
                 u = np.geomspace(min(points) / 2, max(points) * 2, 2)
                 axes.plot(u, law.factor * u**x.value, "-", color=color, lw=1, zorder=1)
             draw_points(axes, points, fmt=marker, color=color, mfc="none", ms=5, label=text)
@@ -163,6 +166,12 @@ def draw(tables: Tables, fits: dict[tuple[float, str], Fit | None], out: Path) -
     guides(panels)
     panels[0].set_ylabel(r"mean frequency  $\bar\omega\;[\sqrt{k_e}/2R_s]$")
     figure.savefig(out)
+
+
+def with_error(value: Mean) -> str:
+    """Write a number with its error in TeX."""
+    off = "" if math.isnan(value.error) else rf"\pm {value.error:.3f}"
+    return f"{value.value:.3f}{off}"
 
 
 def guides(panels: Any) -> None:
