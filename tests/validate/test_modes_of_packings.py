@@ -61,7 +61,7 @@ def test_bounds_leave_the_digits_of_every_mode(packings, alpha):
         _, found = analysed(packings[alpha, seed])
         real = ~found.is_translation & (np.abs(found.eigenvalues) > 1e-21)
         assert (found.bound < 1e-4 * np.abs(found.eigenvalues))[real].all()
-        assert (found.bound < 1e-21)[~real].all()
+        assert (found.bound < 1e-18)[~real].all()
 
 
 @pytest.mark.parametrize("alpha", PAPER)
