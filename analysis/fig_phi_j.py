@@ -65,7 +65,12 @@ def draw(known: Averages, samples: str, out: Path) -> None:
     styles: tuple[dict[str, Any], ...] = (
         {"fmt": "o-", "color": BLUE, "label": f"$\\phi_J$ from $u_0$ to 0 ({samples})"},
         {"fmt": "s", "color": RED, "mfc": "none", "label": r"$\phi_J$ from $p$ to 0, compression"},
-        {"fmt": "^", "color": RED, "mfc": "none", "label": r"$\phi_J$ from $p$ to 0, opening again"},
+        {
+            "fmt": "^",
+            "color": RED,
+            "mfc": "none",
+            "label": r"$\phi_J$ from $p$ to 0, opening again",
+        },
     )
     for name, style in zip(NAMES, styles, strict=True):
         found = {alpha: m for alpha, m in known[name].items() if m.samples}
