@@ -17,7 +17,7 @@ from jamshape.mode_table import BANDS, read_modes
 from jamshape.storage import FileFormatError, write_packing
 from jamshape.target import Target, find
 
-SCRIPT = Path(__file__).parents[2] / "analysis" / "modes.py"
+ANALYSIS = Path(__file__).parents[2] / "analysis"
 
 
 @cache
@@ -31,8 +31,8 @@ def jammed():
     return find(landscape, state, Target(1e-12)).state.packing(packing)
 
 
-def run(*arguments):
-    command = [sys.executable, "-W", "error", SCRIPT, *map(str, arguments)]
+def run(*arguments, script="modes.py"):
+    command = [sys.executable, "-W", "error", ANALYSIS / script, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
@@ -148,3 +148,17 @@ def test_files_that_are_not_of_modes_are_refused(packing, tmp_path):
         pass
     with pytest.raises(FileFormatError, match="is no complete file of modes"):
         read_modes(tmp_path / "empty.h5")
+
+
+def test_errors_of_all_methods_against_run_time(packing, tmp_path):
+    out = tmp_path / "errors.png"
+    done = run(packing, "--tiles", 2, "--out", out, script="spectrum_error.py")
+    assert (done.returncode, done.stderr) == (0, "")
+    report = json.loads(done.stdout.splitlines()[-1], parse_constant=pytest.fail)
+    (row,) = report["packings"]
+    largest = {m: row["methods"][m]["bands"]["high"]["largest"] for m in row["methods"]}
+    assert largest["projected"] < 1e-13
+    assert largest["projected"] < largest["first_order"]
+    assert report["tiles"][0]["n"] == 64
+    assert report["tiles"][0]["relative_bound"] < 1e-6
+    assert out.read_bytes().startswith(b"\x89PNG")
