@@ -24,7 +24,6 @@ from mode_files import (
     add_sides,
     bin_edges,
     draw_errors,
-    draw_legend,
     read_tables,
     samples_text,
     selected,
@@ -93,8 +92,8 @@ def draw(tables: Tables, out: Path) -> None:
     for axes in row.each():
         axes.set_yscale("log")
         axes.set_ylim(bottom=least / 8)
-    every = [table for samples in tables.values() for table in samples]
-    draw_legend(row.stable, every, title=samples_text(tables))
+    text: dict[str, Any] = {"title": samples_text(tables), "title_fontsize": 8, "fontsize": 8}
+    row.stable.legend(loc="upper right", frameon=False, **text)
     first = row.unstable or row.stable
     first.set_ylabel(r"density of states  $D(\omega)$")
     figure.savefig(out)

@@ -52,10 +52,10 @@ def draw(tables: Tables, out: Path) -> None:
         axes.set_ylim(0.6 * single, 5.0)
         for level in (EVEN, single):
             axes.axhline(level, color="0.5", ls=":", lw=1, zorder=0)
-    note: dict[str, Any] = {"fontsize": 8, "color": "0.3", "ha": "left"}
+    note: dict[str, Any] = {"fontsize": 8, "color": "0.3", "ha": "right"}
     note["transform"] = row.stable.get_yaxis_transform()
-    row.stable.text(0.02, EVEN * 1.08, "spread evenly", va="bottom", **note)
-    row.stable.text(0.02, single / 1.08, "one coordinate", va="top", **note)
+    row.stable.text(0.98, EVEN * 1.08, "spread evenly", va="bottom", **note)
+    row.stable.text(0.98, single / 1.08, "one coordinate", va="top", **note)
     first = row.unstable or row.stable
     first.set_ylabel(r"participation ratio  $P(\omega)$")
     every = [table for samples in tables.values() for table in samples]

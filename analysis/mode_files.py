@@ -38,7 +38,7 @@ _LEAST_WIDTH = 0.16
 _ERRORS = (0.02, 0.42)
 
 # Least width of a gap for a legend, over that of the axes.
-_ROOM = 0.35
+_ROOM = 0.25
 
 
 class Key(NamedTuple):
