@@ -162,7 +162,7 @@ def draw(tables: Tables, fits: dict[tuple[float, str], Fit | None], out: Path) -
         many = f"{min(samples)}" if len(set(samples)) == 1 else f"{min(samples)} to {max(samples)}"
         title = rf"$\alpha={alpha:g}$, {many} samples"
         axes.set(xscale="log", yscale="log", xlabel=r"energy density  $u=U/L^2\;[k_e/(2R_s)^2]$")
-        axes.legend(title=title, title_fontsize=8, fontsize=7, frameon=False, loc="best")
+        axes.legend(title=title, title_fontsize=8, fontsize=7, frameon=False, loc="upper left")
     guides(panels)
     panels[0].set_ylabel(r"mean frequency  $\bar\omega\;[\sqrt{k_e}/2R_s]$")
     figure.savefig(out)
@@ -170,14 +170,16 @@ def draw(tables: Tables, fits: dict[tuple[float, str], Fit | None], out: Path) -
 
 def with_error(value: Mean) -> str:
     """Write a number with its error in TeX."""
-    off = "" if math.isnan(value.error) else rf"\pm {value.error:.3f}"
-    return f"{value.value:.3f}{off}"
+    if math.isnan(value.error):
+        return f"{value.value:.3f}"
+    digits = min(max(3, -math.floor(math.log10(max(value.error, 1e-9)))), 5)
+    return rf"{value.value:.{digits}f}\pm {value.error:.{digits}f}"
 
 
 def guides(panels: Any) -> None:
     """Draw the exponents of the paper below the points."""
     low, high = panels[0].get_ylim()
-    panels[0].set_ylim(low / 100, high * 100)
+    panels[0].set_ylim(low / 100, high * (100 * high / low) ** 0.55)  # room for legends
     for axes in panels:
         left, right = axes.get_xlim()
         u = np.geomspace(left * (right / left) ** 0.45, left * (right / left) ** 0.85, 2)
