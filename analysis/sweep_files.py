@@ -41,8 +41,8 @@ PAPER_STYLE |= {"label": "paper, $N=1024$"}
 ENSEMBLE = ("n", "size_ratio", "u0")
 REACHED = ("converged", "sliding")  # outcomes with mechanical equilibrium; others stalled
 
-# Ends of the names of files that lie beside a packing until it is done, or for good.
-UNFINISHED = (".run.h5", ".search.h5")
+# Ends of the names of files that may lie beside a packing and are none.
+OTHERS = (".run.h5", ".search.h5", ".modes.h5")
 
 # On a logarithmic axis of alpha, discs stand this factor left of the smallest other alpha.
 DISCS_LEFT_BY = 4.0
@@ -131,7 +131,7 @@ def _samples(path: Path) -> list[Sample]:
             raise ValueError(msg)
         return [sample]
     # Runs and searches that lead to a packing may still be written, and are then locked.
-    files = [file for file in sorted(path.glob("*.h5")) if not file.name.endswith(UNFINISHED)]
+    files = [file for file in sorted(path.glob("*.h5")) if not file.name.endswith(OTHERS)]
     samples = [Sample(file, read_attributes(file)) for file in files]
     return [sample for sample in samples if "outcome" in sample.attributes]
 
