@@ -60,12 +60,27 @@ def assert_is_a_minimum(landscape, found):
         assert landscape.evaluate(near).energy > found.evaluation.energy
 
 
+def assert_sits_on_a_kink(landscape, found):
+    """The forces turn round within a step far below what any smooth energy could do in."""
+    gradient = landscape.evaluate(found.state).gradient
+    scale = np.linalg.norm(gradient)
+    beyond = landscape.displaced(found.state, -1e-10 * gradient / scale)
+    assert np.linalg.norm(landscape.evaluate(beyond).gradient - gradient) > 0.5 * scale
+
+
 @pytest.mark.parametrize("method", ["newton", "auto"])
 def test_newton_and_auto_find_minima(jammed, method):
     landscape, start = jammed
     before = landscape.evaluate(start)
     assert residual_of(landscape, before).largest > 0.1
     found = minimise(landscape, start, method)
+    if found.outcome is Outcome.STALLED:
+        # Where rods overlap by less than the length over which the second bond fades in, some
+        # minima of long rods are kinks (spherocylinder.hpp). Which minimum the squeezing leads to
+        # is for the rounding of the machine to say.
+        assert (landscape.particles.half_length > 2 * landscape.particles.radius).any()
+        assert_sits_on_a_kink(landscape, found)
+        return
     assert found.outcome is Outcome.CONVERGED
     assert found.residual.largest <= 1e-8
     assert found.evaluation.energy < before.energy
