@@ -4,6 +4,8 @@ N = 256 instead of 1024, two samples each. The paper's minimiser works in double
 the overlap, up to which rods slid along flat sides, are left out where its fractions are compared.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from jamshape.landscape import Landscape, State
 from jamshape.mode_statistics import bands, components, count, participation, redundancies
 from jamshape.modes import spectrum
 from jamshape.storage import read_packing
+from jamshape.target import Target
 
 pytestmark = [pytest.mark.lammps, pytest.mark.validate]
 
@@ -99,3 +102,23 @@ def test_low_band_at_alpha_4_is_single_rods_that_slide(packings):
         assert kinds.parallel.min() > 0.9
         spread = participation(matrix.coordinates, found.vectors[:, low.modes])
         assert np.median(spread) < 3 / matrix.n_particles
+
+
+@pytest.mark.parametrize(
+    ("alpha", "u0"), [(1e-6, 1e-15), (50.0, 1e-15), (0.01, 1e-18), (4.0, 1e-18)]
+)
+def test_modes_of_extremes(alpha, u0, tmp_path):
+    sample = Sample(n=32, alpha=alpha, seed=1, phi_start=0.4 if alpha < 10 else 0.15)
+    sample = replace(sample, approach=Approach(kappa=1e-5), target=Target(u0=u0))
+    for _ in make(sample, tmp_path / "packing.h5"):
+        pass
+    matrix, found = analysed(read_packing(tmp_path / "packing.h5"))
+    counts = count(matrix, found)
+    further = sum(r.n_states for r in redundancies(matrix))
+    print(f"alpha {alpha}, u0 {u0}: {counts}, {further} more states of self stress")
+    assert counts.rank == counts.n_bonds - 1 - further
+    assert counts.n_modes == counts.rank + counts.n_floppy + counts.n_translations
+    assert np.isfinite(found.eigenvalues).all()
+    sure = ~found.is_translation & (found.sign != 0)
+    assert sure.sum() >= counts.rank
+    assert (found.bound < 1e-3 * np.abs(found.eigenvalues))[sure].mean() > 0.95
