@@ -201,7 +201,7 @@ class AlongModes:
 
     def __init__(self, packing: Packing, coordinates: Coordinates, k_e: float = 1.0) -> None:
         self.coordinates = coordinates
-        rows = ["position", "orientation", "diameters", "species", "id", "image"]
+        rows = ["position", "orientation", "diameters", "exponent", "species", "id", "image"]
         rows += ["position_rest", "orientation_rest"]
         backbone = coordinates.backbone
         self.particles = packing.with_(**{row: getattr(packing, row)[backbone] for row in rows})

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 
 from jamshape.landscape import Evaluation, Landscape, State
 from jamshape.minimise import Residual, residual_of
-from jamshape.packing import FloatArray, IntArray, Packing
+from jamshape.packing import FloatArray, IntArray
 
 # A state with a larger residual is no minimum, and has no modes.
 LARGEST_RESIDUAL = 1e-4
@@ -223,8 +223,8 @@ class Scope:
     Parameters
     ----------
     rotation : str or (N,) array of float64, [length]
-        What a radian counts for: ``half_length`` (A theta, Marschall & Teitel 2018, Eq. 23), ``radius``
-        (R theta) or lengths. What no contact can turn, discs, has no rotation in any case. Eigenvalues
+        What a radian counts for: ``half_length`` (A theta, Marschall & Teitel 2018, Eq. 23; a theta of
+        superellipsoids), ``radius`` (R theta, or the shortest semi-axis) or lengths. What no contact can turn, discs, has no rotation in any case. Eigenvalues
         of modes that rotate depend on this choice; their number, signs and zeros do not.
     least_force : float
         Leave out contacts whose force is below this fraction of the mean force of a bond: rods that slid
@@ -316,7 +316,7 @@ def _lengths(landscape: Landscape, rotation: str | FloatArray) -> FloatArray:
     """(N,) lengths that a radian counts for; 0 where nothing turns."""
     own = landscape.rotation_length
     if isinstance(rotation, str):
-        known = {"half_length": own, "radius": landscape.particles.radius}
+        known = {"half_length": own, "radius": landscape.inner_radius}
         if rotation not in known:
             msg = f"rotation is {rotation!r}, expected one of {', '.join(known)}, or lengths"
             raise ValueError(msg)
@@ -335,7 +335,7 @@ def _coordinates(
 ) -> Coordinates:
     """List displacements and rotations of the particles that are held, particle by particle."""
     D = state.dimension
-    axes = _rotation_axes(landscape.particles, state)
+    axes = landscape.shape.turning_axes(state.packing(landscape.particles))
     n, n_turns, T = axes.shape
     direction = np.zeros((n, D + n_turns, D + T))
     direction[:, :D, :D] = np.eye(D)
@@ -344,20 +344,6 @@ def _coordinates(
     used = held[:, None] & (direction != 0).any(axis=2)
     particle, kind = np.nonzero(used)
     return Coordinates(particle, kind, direction[used], n, D)
-
-
-def _rotation_axes(particles: Packing, state: State) -> FloatArray:
-    """(N, rotations, T) unit vectors to turn about; a rod in space spins freely about its own axis."""
-    n = particles.n
-    if state.dimension == 2:
-        return np.ones((n, 1, 1))
-    if particles.shape_style != "spherocylinder":
-        return np.tile(np.eye(3), (n, 1, 1))
-    axis = state.packing(particles).axes
-    least = np.eye(3)[np.abs(axis).argmin(axis=1)]
-    first = np.cross(axis, least)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([first, np.cross(axis, first)], axis=1)
 
 
 def _gradient(landscape: Landscape, gradient: FloatArray, coordinates: Coordinates) -> FloatArray:

@@ -1,8 +1,9 @@
 """The energy landscape of a packing: energy, forces and Hessian as functions of its coordinates.
 
 Coordinates are displacements and rotations of a `State`, in one vector. Angles enter it as lengths, A theta for
-spherocylinders (Marschall & Teitel 2018, Eq. 23), so that all its components are alike; what no
-contact can turn, discs, has no rotation in it. Needs no LAMMPS.
+spherocylinders (Marschall & Teitel 2018, Eq. 23), a times the three angles for superellipsoids (Yuan et
+al. 2019), so that all its components are alike; what no contact can turn, discs and spheres, has no
+rotation in it. Needs no LAMMPS.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
 from jamshape import _contact
-from jamshape.contacts import NearPairs, bodies, each_once, near_pairs, shifted
-from jamshape.packing import Box, FloatArray, IntArray, LongArray, Packing
+from jamshape.packing import FloatArray, IntArray, LongArray, Packing
+from jamshape.shapes import PairArrays, Shape, shape_of
 
 # Pairs whose surfaces are closer than this fraction of the smallest radius are looked at.
 _SKIN = 0.1
@@ -116,19 +117,17 @@ class Curvature(NamedTuple):
     """(N,) particles that no contacts hold in place."""
 
 
-_Arrays = tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray]
-
-
 class Landscape:
     """Elastic energy of the particles of a packing, with all periodic images.
 
     Parameters
     ----------
     packing : Packing
-        Spherocylinders; only their shapes are taken.
+        Only the shapes of its particles are taken.
     k_e : float, [energy]
+        The epsilon of superellipsoids.
     sides : {1, 2}
-        Bonds of a side-to-side contact; minima exist for 2 only.
+        Bonds of a side-to-side contact of spherocylinders; minima exist for 2 only.
 
     Notes
     -----
@@ -137,13 +136,19 @@ class Landscape:
 
     def __init__(self, packing: Packing, k_e: float = 1.0, sides: int = 2) -> None:
         self.particles, self.k_e, self.sides = packing, k_e, sides
+        self.shape = shape_of(packing, k_e, sides)
         self.evaluations = 0
         self._pairs: _Pairs | None = None
 
-    @cached_property
+    @property
     def rotation_length(self) -> FloatArray:
-        """(N,) lengths that a radian counts for: A; 0 where nothing can turn."""
-        return self.particles.half_length
+        """(N,) lengths that a radian counts for: A, or a; 0 where nothing can turn."""
+        return self.shape.rotation_length
+
+    @property
+    def inner_radius(self) -> FloatArray:
+        """(N,) smallest lengths of the particles: R, or the shortest semi-axis."""
+        return self.shape.inner_radius
 
     @cached_property
     def _free(self) -> NDArray[np.bool_]:
@@ -197,14 +202,12 @@ class Landscape:
         """
         self.evaluations += 1
         pairs = self._pairs_at(state)
-        found = _contact.spherocylinder_sums(
-            *self._arrays(state, pairs), self.k_e, self.sides, extended
-        )
+        found = self.shape.sums(self._arrays(state, pairs), extended=extended)
         if found["crossing"] >= 0:
             first, second = self.particles.id[pairs.particles[found["crossing"]]]
             msg = (
-                f"the spines of particles {first} and {second} cross, expected overlaps smaller than"
-                " the particles; start from a state without crossings"
+                f"the {self.shape.core} of particles {first} and {second} cross, expected overlaps smaller"
+                " than the particles; start from a state without crossings"
             )
             raise CrossingError(msg)
         slope = -np.column_stack([found["force"], found["torque"] / self._length_or_1[:, None]])
@@ -226,14 +229,12 @@ class Landscape:
         return self._assembled(found, bonds + found["curvature"])
 
     def derivatives(self, state: State, *, extended: bool = False) -> dict[str, NDArray[Any]]:
-        """Give second derivatives contact by contact, as `_contact.spherocylinder_derivatives`.
+        """Give second derivatives contact by contact, as `Shape.derivatives`.
 
         Its rows `pair` are those of `particles`, an array (C, 2) that is added here.
         """
         pairs = self._pairs_at(state)
-        found = _contact.spherocylinder_derivatives(
-            *self._arrays(state, pairs), self.k_e, self.sides, extended
-        )
+        found = self.shape.derivatives(self._arrays(state, pairs), extended=extended)
         found["particles"] = pairs.particles[found["pair"]]
         found["shift"] = pairs.shift[found["pair"]]
         return found
@@ -286,12 +287,12 @@ class Landscape:
         flat = found["on_side"].any(axis=1) | (found["n_bonds"] == 2)[:, None]
         return _contact.find_rattlers(n, D, found["particles"], normals, flat)
 
-    def _arrays(self, state: State, pairs: _Pairs) -> _Arrays:
-        return (self.particles.diameters, *state.split, pairs.particles, pairs.shift)
+    def _arrays(self, state: State, pairs: _Pairs) -> PairArrays:
+        return PairArrays(*state.split, pairs.particles, pairs.shift)
 
     def _pairs_at(self, state: State) -> _Pairs:
-        if self._pairs is None or self._pairs.outrun_by(state, self.rotation_length):
-            self._pairs = _Pairs.near(self.particles, state)
+        if self._pairs is None or self._pairs.outrun_by(state, self.shape.turning_radius):
+            self._pairs = _Pairs.near(self.shape, state.packing(self.particles), state)
         return self._pairs
 
 
@@ -306,19 +307,14 @@ class _Pairs:
     reach: float
 
     @classmethod
-    def near(cls, particles: Packing, state: State) -> _Pairs:
-        skin = _SKIN * float(particles.radius.min())
-        rows = bodies(state.packing(particles))
-        box = Box(particles.box.lo, state.edges.astype(np.float64))
-        wide = rows.copy()
-        wide[:, -1] += 0.5 * skin
-        near = each_once(near_pairs(wide, wide, box))
-        near = near.take(_gaps(rows, near, box) < skin)
-        reach = 2 * float((rows[:, -2] + rows[:, -1]).max()) + skin
+    def near(cls, shape: Shape, packing: Packing, state: State) -> _Pairs:
+        skin = _SKIN * float(shape.inner_radius.min())
+        near = shape.near(packing, skin)
+        reach = 2 * float(shape.outer_radius.max()) + skin
         pairs = np.column_stack([near.first, near.second])
         return cls(pairs, near.shift, state, skin, reach)
 
-    def outrun_by(self, now: State, rotation_length: FloatArray) -> bool:
+    def outrun_by(self, now: State, turning_radius: FloatArray) -> bool:
         """Whether two surfaces may have come closer by `skin`."""
         position, orientation, edges = (part[0] for part in now.split)
         position_then, orientation_then, edges_then = (part[0] for part in self.then.split)
@@ -328,14 +324,7 @@ class _Pairs:
         turned = np.sqrt(((orientation - orientation_then) ** 2).sum(axis=1))
         if now.dimension == 3:
             turned *= 2.3  # the chord of the quaternions is half of the angle, or a little less
-        return bool(2 * (moved + rotation_length * turned).max(initial=0.0) >= left)
-
-
-def _gaps(rows: FloatArray, near: NearPairs, box: Box) -> FloatArray:
-    """Distances of surfaces."""
-    i, j = rows[near.first], shifted(rows[near.second], near.shift, box)
-    gaps: FloatArray = _contact.spine_distances(i, j) - i[:, -1] - j[:, -1]
-    return gaps
+        return bool(2 * (moved + turning_radius * turned).max(initial=0.0) >= left)
 
 
 def _split(values: LongArray) -> FloatArray:

@@ -141,7 +141,7 @@ def residual_of(landscape: Landscape, evaluation: Evaluation) -> Residual:
 def rounding_floor(evaluation: Evaluation, landscape: Landscape, *, extended: bool = True) -> float:
     """Residual that rounding of the coordinates alone leaves: about eps / overlap."""
     eps = float(np.finfo(np.longdouble if extended else np.float64).eps)
-    size = float(landscape.particles.radius.max())
+    size = float(landscape.inner_radius.max())
     return 8 * eps * landscape.k_e / (size * max(evaluation.bond_force, 1e-300))
 
 
@@ -282,7 +282,7 @@ def _newton(descent: Descent) -> Outcome:
 def limited(landscape: Landscape, step: FloatArray) -> FloatArray:
     """Shorten a step that moves or turns a particle too far."""
     shift, turn = landscape.motion(step)
-    longest = _LONGEST_STEP * float(landscape.particles.radius.min())
+    longest = _LONGEST_STEP * float(landscape.inner_radius.min())
     excess = max(
         np.sqrt((shift**2).sum(axis=1)).max() / longest, np.abs(turn).max() / _WIDEST_TURN, 1.0
     )
@@ -359,7 +359,7 @@ def _lbfgs(descent: Descent, below: float = 0.0) -> Outcome:
     particles = descent.landscape.particles
     descent.be_patient(max(_PATIENCE["lbfgs"], _PATIENCE_PER_PARTICLE * particles.n))
     # Its first step is of unit length in its own coordinates.
-    unit = 0.01 * float(particles.radius.min()) * math.sqrt(particles.n)
+    unit = 0.01 * float(descent.landscape.inner_radius.min()) * math.sqrt(particles.n)
     stuck = 0
     while not (outcome := descent.outcome()) and descent.residual > below and stuck < _STUCK:
         evaluations = descent.evaluations

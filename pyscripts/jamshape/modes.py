@@ -156,7 +156,7 @@ def state_error(
     slope = found.vectors[:, sure].T @ matrix.gradient
     newton = -(found.vectors[:, sure] @ (slope / found.eigenvalues[sure]))
     farthest = float(np.abs(newton).max(initial=0.0))
-    part = min(1.0, _SHORT * float(landscape.particles.radius.min()) / max(farthest, 1e-300))
+    part = min(1.0, _SHORT * float(landscape.inner_radius.min()) / max(farthest, 1e-300))
     shift, turn = matrix.coordinates.motion(part * newton)
     there = Products(matrix_at(landscape, state.displaced(shift, turn), matrix))
 

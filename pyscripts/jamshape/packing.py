@@ -92,6 +92,8 @@ class Packing:
         Periodic image counts; zeros when left out.
     shape_style : str
         One of `SHAPE_STYLES`.
+    exponent : (N,) array of float64, optional
+        p of superellipsoids |x/a|^2p + |y/b|^2p + |z/c|^2p = 1; ones when left out.
     step : int
     time : float, [time]
     position_rest, orientation_rest, edges_rest : arrays as above, of float64, optional
@@ -101,8 +103,8 @@ class Packing:
     Raises
     ------
     ValueError
-        If shapes disagree, a number is not finite, a diameter is not positive, an ID is there
-        twice, or the diameters are not those of the shape style.
+        If shapes disagree, a number is not finite, a diameter is not positive, an exponent is not
+        above 1/2, an ID is there twice, or the diameters are not those of the shape style.
     """
 
     position: FloatArray
@@ -113,6 +115,7 @@ class Packing:
     box: Box
     image: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
     shape_style: str = "spherocylinder"
+    exponent: FloatArray = field(default_factory=lambda: np.empty(0))
     step: int = 0
     time: float = 0.0
     position_rest: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
@@ -126,6 +129,8 @@ class Packing:
             raise ValueError(msg)
         if np.size(self.image) == 0:
             object.__setattr__(self, "image", np.zeros((n, dimension), dtype=np.int64))
+        if np.size(self.exponent) == 0:
+            object.__setattr__(self, "exponent", np.ones(n))
         vector = (n, dimension)
         rotation = (n,) if dimension == 2 else (n, 4)
         rests = {"position_rest": vector, "orientation_rest": rotation, "edges_rest": (dimension,)}
@@ -133,6 +138,7 @@ class Packing:
             if np.size(getattr(self, name)) == 0:
                 object.__setattr__(self, name, np.zeros(shape))
         floats = {"position": vector, "orientation": rotation, "diameters": (n, 3), **rests}
+        floats["exponent"] = (n,)
         for name, shape in floats.items():
             object.__setattr__(self, name, _floats(name, getattr(self, name), shape))
         for name, shape in (("species", (n,)), ("id", (n,)), ("image", vector)):
@@ -185,22 +191,50 @@ class Packing:
         unit: FloatArray = x_axis / (self.orientation**2).sum(axis=1, keepdims=True)
         return unit
 
-    @property
-    def phi(self) -> float:
-        """Packing fraction: sum of areas (volumes) over that of the box.
+    def body_axes(self, k: int) -> FloatArray:
+        """(N, D) unit vectors along the body's axis k."""
+        if self.dimension == 2:
+            cosine, sine = np.cos(self.orientation), np.sin(self.orientation)
+            return np.column_stack([cosine, sine] if k == 0 else [-sine, cosine])
+        unit = np.zeros(3)
+        unit[k] = 1.0
+        w, v = self.orientation[:, :1], self.orientation[:, 1:]
+        turned = unit + 2 * np.cross(v, np.cross(v, unit) + w * unit)
+        found: FloatArray = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+        return found
 
-        Raises
-        ------
-        ValueError
-            If the shape style is not ``spherocylinder``.
+    @property
+    def symmetry_axis(self) -> IntArray:
+        """(N,) body axis about which superellipsoids are spheroids (0, 1, 2); -1 for others.
+
+        Those with p = 1 and two equal axes; other exponents have corners or edges about every axis.
         """
-        if self.shape_style != "spherocylinder":
-            msg = f"shape style is {self.shape_style!r}, phi is defined for 'spherocylinder' only"
-            raise ValueError(msg)
+        a, b, c = self.diameters.T
+        equal = np.stack([b == c, c == a, a == b])
+        return np.where(equal.any(axis=0) & (self.exponent == 1), equal.argmax(axis=0), -1)
+
+    @property
+    def is_round(self) -> NDArray[np.bool_]:
+        """(N,) whether the particle is a disc or a sphere, which no contact can turn."""
+        used = self.diameters[:, : self.dimension]
+        equal = (used == used[:, :1]).all(axis=1)
+        return np.asarray(equal & (self.exponent == 1))
+
+    @property
+    def measures(self) -> FloatArray:
+        """(N,) areas (volumes) of the particles, [length^D]."""
         # Imported here so that reading and writing files needs no compiled module.
         contact = importlib.import_module("jamshape._contact")
-        measure, _ = contact.spherocylinder_drag(self.half_length, self.radius, self.dimension)
-        return float(np.sum(measure)) / self.box.volume
+        if self.shape_style == "spherocylinder":
+            found, _ = contact.spherocylinder_drag(self.half_length, self.radius, self.dimension)
+        else:
+            found, _ = contact.superellipsoid_drag(self.diameters, self.exponent, self.dimension)
+        return np.asarray(found)
+
+    @property
+    def phi(self) -> float:
+        """Packing fraction: sum of areas (volumes) over that of the box."""
+        return float(np.sum(self.measures)) / self.box.volume
 
     def poses(self) -> tuple[LongArray, LongArray, LongArray]:
         """Position, orientation and box edges to all digits that are known, as longdouble."""
@@ -231,7 +265,7 @@ class Packing:
     def sorted_by_id(self) -> Packing:
         """Return the same packing with its particles in the order of their IDs."""
         order = np.argsort(self.id)
-        names = ["position", "orientation", "diameters", "species", "id", "image"]
+        names = ["position", "orientation", "diameters", "exponent", "species", "id", "image"]
         names += ["position_rest", "orientation_rest"]
         return self.with_(**{name: getattr(self, name)[order] for name in names})
 
@@ -325,6 +359,9 @@ def _check_labels(packing: Packing) -> None:
 def _check_shapes(packing: Packing) -> None:
     if not (packing.diameters > 0).all():
         msg = f"diameters hold {packing.diameters.min()}, expected positive lengths"
+        raise ValueError(msg)
+    if not (packing.exponent > 0.5).all():
+        msg = f"exponents hold {packing.exponent.min()}, expected p > 0.5, for which bodies are convex"
         raise ValueError(msg)
     if packing.shape_style == "spherocylinder":
         wrong = ~_are_spherocylinders(packing.diameters)

@@ -13,6 +13,7 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
                         doubles, in files of states that are known to more digits (not in H5MD)
         species, id     (N,)
         diameters       (N, 3), the shape columns of LAMMPS (not in H5MD)
+        exponent        (N,), of superellipsoids (not in H5MD)
     /observables/NAME   {step, time, value (T', ...)}, each sampled when its caller likes
     /parameters         +every attribute that the caller gives, results too
     /report             step, wall_seconds, error (T'',): the convergence history
@@ -345,7 +346,7 @@ class RunWriter:
         return _h5py().File(self.path, "r+")
 
     def _check_same_particles(self, packing: Packing) -> None:
-        for name in ("dimension", "shape_style", "id", "species", "diameters"):
+        for name in ("dimension", "shape_style", "id", "species", "diameters", "exponent"):
             if not np.array_equal(getattr(packing, name), getattr(self._first, name)):
                 msg = (
                     f"{self.path}: {name} differs from the first frame,"
@@ -433,6 +434,8 @@ def _packing(file: h5py.File, frame: int) -> Packing:
         return _dataset(file, f"particles/all/{name}")[()]
 
     fields = {name: fixed(name) for name in ("diameters", "species", "id")}
+    if "particles/all/exponent" in file:
+        fields["exponent"] = fixed("exponent")
     fields |= {name: row(f"{name}/value") for name in ("position", "orientation", "image")}
     for name, element in _RESTS.items():
         if f"particles/all/{element}" in file:
@@ -481,6 +484,8 @@ def _create_particles(group: h5py.Group, packing: Packing) -> None:
     group.attrs["shape_style"] = packing.shape_style
     for name in ("species", "id", "diameters"):
         group[name] = getattr(packing, name)
+    if packing.shape_style == "superellipsoid":
+        group["exponent"] = packing.exponent
     for name, value in _frame_values(packing, rests=_has_rests(packing)).items():
         element = group.create_group(name)
         _create_rows(element, "value", value)

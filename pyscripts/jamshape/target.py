@@ -103,7 +103,7 @@ class Target:
 
     def strain_above_jamming(self, landscape: Landscape) -> float:
         """Estimate the strain of the box between jamming and u0."""
-        return float(landscape.particles.radius.max()) * math.sqrt(self.u0 / landscape.k_e)
+        return float(landscape.inner_radius.max()) * math.sqrt(self.u0 / landscape.k_e)
 
 
 @dataclass(eq=False)

@@ -157,11 +157,6 @@ def test_packing_refuses_quaternions_that_are_not_unit():
         nasty_packing(3, orientation=np.tile([2.0, 0, 0, 0], (6, 1)))
 
 
-def test_phi_belongs_to_spherocylinders():
-    with pytest.raises(ValueError, match="'superellipsoid', phi is defined for 'spherocylinder'"):
-        _ = nasty_packing(3, shape_style="superellipsoid").phi
-
-
 @pytest.mark.parametrize(
     ("dimension", "measure"),
     [(2, 4 * 2 * 0.5 + np.pi * 0.5**2), (3, np.pi * 0.5**2 * 4 + 4 / 3 * np.pi * 0.5**3)],
