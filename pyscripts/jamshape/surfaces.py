@@ -14,6 +14,10 @@ from jamshape.superellipsoid_shape import checked
 _STILL = 1e-12
 _MOST_STEPS = 200
 
+# Below this exponent 2p normals turn within so little of the surface that triangles there would be
+# slivers; those of this exponent are taken.
+_SHARP = 1.3
+
 # Stands for the logarithm of 0.
 _NOTHING = -600.0
 
@@ -34,7 +38,7 @@ def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
 
     Seen from the centre of a body in which position and normal count the same, |x|^2p + ... = 1 with
     x + n instead of x, the vertices are those of a sphere's mesh; so flat sides, edges and tips all get
-    their share, at p from 0.55 to 10. The mesh has the symmetry of the body: edges of a box lie on
+    their share, at p from 0.5 to 20. The mesh has the symmetry of the body: edges of a box lie on
     edges of triangles, and so do those of an octahedron.
 
     Parameters
@@ -60,7 +64,7 @@ def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
         raise ValueError(msg)
     directions, triangles = _sphere(level)
     q = 2 * float(exponent)
-    log_u = _shares(np.abs(directions), q)
+    log_u = _shares(np.abs(directions), max(q, _SHARP))
     sign = np.sign(directions)
     normal = sign * np.exp((1 - 1 / q) * log_u) / axes
     return SurfaceMesh(
