@@ -137,7 +137,8 @@ def draw(shapes: list[Shape], out: Path, dpi: int) -> list[dict[str, Any]]:
     columns = min(COLUMNS, len(shapes))
     rows = -(-len(shapes) // columns)
     size = (INCHES * columns, 0.93 * INCHES * rows)
-    figure = Figure(figsize=size, dpi=dpi, layout="constrained")
+    figure = Figure(figsize=size, dpi=dpi)
+    figure.set_layout_engine("constrained", h_pad=0.08, w_pad=0.04)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     report = [measure(shape) for shape in shapes]
     for k, (axes, shape, known) in enumerate(zip(panels, shapes, report, strict=False)):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.packing import UNIT_QUATERNION_TOLERANCE, FloatArray, IntArray
+from jamshape.superellipsoid_shape import director_axis
 
 # So many cosines are held at a time, 16 MB.
 _BLOCK = 2_000_000
@@ -62,6 +63,35 @@ def body_axes(quaternions: ArrayLike) -> FloatArray:
     return np.stack([np.stack(axis, axis=-1) for axis in (x, y, z)], axis=-2)
 
 
+def directors(axes: ArrayLike, semi_axes: ArrayLike) -> FloatArray:
+    """Choose the axis of each particle that tells its direction, for the nematic order.
+
+    Parameters
+    ----------
+    axes : (N, 3, 3) array_like
+        From `body_axes`.
+    semi_axes : (3,) or (N, 3) array_like, [length]
+        Of all particles or of each; `jamshape.superellipsoid_shape.director_axis` says which axis.
+
+    Returns
+    -------
+    (N, 3) array of float64
+        Unit vectors.
+
+    Raises
+    ------
+    ValueError
+        If axes are no such unit vectors, or semi-axes are not positive or of another number.
+    """
+    u = _units("axes", axes, 3)
+    which = director_axis(semi_axes)
+    if which.shape not in {(), (len(u),)}:
+        found = f"semi-axes have shape {np.shape(semi_axes)}"
+        msg = f"{found}, expected (3,) or ({len(u)}, 3) for {len(u)} particles"
+        raise ValueError(msg)
+    return u[np.arange(len(u)), which]
+
+
 def nematic_order(directors: ArrayLike) -> Order:
     r"""S_2, the largest eigenvalue of :math:`\frac32 \langle s s^T \rangle - \frac12`.
 
@@ -71,8 +101,7 @@ def nematic_order(directors: ArrayLike) -> Order:
     Parameters
     ----------
     directors : (N, 3) array_like
-        Unit vectors s along the axes of `jamshape.superellipsoid_shape.director_axis`; their signs
-        do not matter.
+        Unit vectors s, such as `directors` finds; their signs do not matter.
 
     Returns
     -------

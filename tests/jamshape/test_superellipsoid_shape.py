@@ -10,7 +10,7 @@ from jamshape.superellipsoid_shape import (
     volume,
 )
 
-SHAPES = [(1, 1, 1), (0.3, 1, 1), (1, 1, 3), (1, 1.25, 1.5625), (0.7, 1, 2)]
+SHAPES = [(1, 1, 1), (0.3, 1, 1), (0.7, 1, 2)]
 EXTREMES = [(0.1, 1, 1), (1, 1, 10), (0.1, 1, 10)]
 
 
@@ -20,16 +20,18 @@ def directions(theta, phi):
     return np.abs(np.stack(x, axis=-1))
 
 
-def area_over_directions(axes, p, n=300):
-    """Integrate over directions from the centre, by Gauss-Legendre rules crowded at the planes."""
+def area_over_directions(axes, p, n):
+    """Integrate over directions from the centre of the body before it is stretched to its axes.
+
+    By Gauss-Legendre rules crowded at the planes of symmetry.
+    """
     x, w = np.polynomial.legendre.leggauss(n)
     s = (x + 1) / 2
     angle, weight = np.pi / 2 * s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3), 140 * (s - s**2) ** 3
     unit = directions(angle, angle)
-    reach = ((unit / axes) ** (2 * p)).sum(axis=-1) ** (-0.5 / p)
-    slope = (reach[..., None] * unit / axes) ** (2 * p - 1) / axes
-    leaning = (slope * unit).sum(axis=-1) / np.linalg.norm(slope, axis=-1)
-    density = reach**2 * np.sin(angle)[:, None] / leaning
+    reach = (unit ** (2 * p)).sum(axis=-1) ** (-0.5 / p)
+    slope = np.linalg.norm((reach[..., None] * unit) ** (2 * p - 1) / axes, axis=-1)
+    density = np.prod(axes) * reach**3 * slope * np.sin(angle)[:, None]
     return 8 * (np.pi / 4) ** 2 * np.einsum("i,j,ij", w * weight, w * weight, density)
 
 
@@ -58,25 +60,23 @@ def test_volumes_in_closed_form():
     assert volume(axes, 1e6) == pytest.approx(8 * 1.5, rel=1e-5)
 
 
-@pytest.mark.parametrize("p", [0.75, 0.85, 1.0, 1.25, 1.5, 2.0, 3.0])
-@pytest.mark.parametrize("axes", SHAPES)
+@pytest.mark.parametrize("p", [0.5, 0.55, 0.75, 0.85, 1.0, 1.25, 1.5, 2.0, 4.0, 10.0])
+@pytest.mark.parametrize("axes", SHAPES + EXTREMES)
 def test_area_is_that_of_another_quadrature(axes, p, measured):
     area, error = surface_area(axes, p)
-    error_seen = abs(area / area_over_directions(np.array(axes), p) - 1)
-    measured(relative=error_seen)
-    assert error_seen < 1e-11
+    relative = abs(area / area_over_directions(axes, p, n=400 if p > 4 else 200) - 1)
+    measured(relative=relative)
+    assert relative < (1e-10 if p > 2 else 1e-12)
     assert error < 1e-12 * area
 
 
-@pytest.mark.parametrize("p", [0.55, 0.75, 2.0, 10.0])
-@pytest.mark.parametrize("axes", EXTREMES)
-def test_area_of_extreme_shapes_is_the_limit_of_triangles(axes, p, measured):
-    area, error = surface_area(axes, p)
-    off = [area_of_triangles(np.array(axes), p, n) / area - 1 for n in (200, 800)]
+@pytest.mark.parametrize("p", [0.75, 2.0])
+def test_area_is_the_limit_of_triangles(p, measured):
+    axes = np.array(EXTREMES[-1])
+    off = [area_of_triangles(axes, p, n) / surface_area(axes, p).area - 1 for n in (100, 400)]
     measured(coarse=off[0], fine=off[1])
-    assert abs(off[1]) < 1e-3
-    assert abs(off[1]) < 0.5 * abs(off[0])
-    assert error < 1e-12 * area
+    assert abs(off[1]) < 2e-5
+    assert abs(off[1]) < 0.2 * abs(off[0])
 
 
 def test_area_of_ellipsoids_is_continuous_in_p(measured):
@@ -141,23 +141,12 @@ def test_asphericity_is_0_for_spheres_and_grows_to_1():
     assert asphericity((1, 1e6, 1e6), 1) > 0.999
 
 
-def test_spheroids_bound_the_shapes_of_the_paper():
-    # Fig. 12: at one beta no other shape is rounder, up to superballs of p = 2 and A about 0.04.
-    beta = np.array([0.3, 0.6, 1.5, 3.0])
-    spheroids = np.where(
-        beta < 1,
-        asphericity(axes_from(np.minimum(beta, 1), np.ones(4)), 1),
-        asphericity(axes_from(np.ones(4), np.maximum(beta, 1)), 1),
-    )
-    others = asphericity(axes_from(np.minimum(beta, 0.8), np.maximum(beta, 1.25)), 1)
-    assert (reduced_aspect_ratio(axes_from(0.8, 1.25)) == pytest.approx(1)) and (others > 0).all()
-    for p in (0.75, 0.85, 1.5, 2.0):
-        axes = np.where(
-            (beta < 1)[:, None],
-            axes_from(np.minimum(beta, 1), np.ones(4)),
-            axes_from(np.ones(4), np.maximum(beta, 1)),
-        )
-        assert (asphericity(axes, p) > 0.9 * spheroids).all()
+@pytest.mark.parametrize("beta", [0.3, 0.6, 1.5, 3.0])
+def test_spheroids_are_the_roundest_ellipsoids_of_their_beta(beta):  # Fig. 12
+    w1 = np.linspace(0.2, min(beta, 1.0), 30)
+    found = asphericity(axes_from(w1, beta / w1), 1)
+    assert found[-1] == asphericity(axes_from(min(beta, 1), max(beta, 1)), 1)
+    assert (np.diff(found) < 0).all()
 
 
 def test_axes_have_the_papers_ratios_in_units_of_a():
