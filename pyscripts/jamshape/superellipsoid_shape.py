@@ -1,0 +1,249 @@
+"""How big, how round and how long superellipsoids are.
+
+Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019), Sec. 2.1. The surface of a superellipsoid with
+semi-axes a, b, c is |x/a|^2p + |y/b|^2p + |z/c|^2p = 1: p = 1 is an ellipsoid, p < 1 is like an octahedron
+(p = 1/2 is one) and p > 1 like a box. Shapes are (..., 3) semi-axes along the body's x, y, z, in any
+order, and an exponent p, a number or (...). What is printed as a, b, c in the paper is their sorted order,
+a <= b <= c.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import elliprg, gamma
+
+from jamshape.packing import FloatArray, IntArray
+
+OCTAHEDRON = 0.5  # the least p of a convex body
+
+# Quadrature ends when halving its step changes the area by less than this fraction.
+_CONVERGED = 1e-13
+_STEPS = (1 / 4, 1 / 8, 1 / 16, 1 / 32)
+
+# The integrand is left out where its weight has fallen to exp of minus this.
+_TAIL = 40.0
+
+# A reduced aspect ratio this close to 1 is that of a self-dual shape but for rounding.
+_SELF_DUAL = 1e-9
+
+
+class SurfaceArea(NamedTuple):
+    """Areas of surfaces and bounds on their errors."""
+
+    area: FloatArray
+    """(...), [length^2]"""
+    error: FloatArray
+    """(...), [length^2]: by how much the last halving of the step changed it."""
+
+
+def checked(semi_axes: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Check shapes of convex superellipsoids, and give each its own exponent.
+
+    Parameters
+    ----------
+    semi_axes : (..., 3) array_like, [length]
+    p : (...) array_like
+
+    Returns
+    -------
+    semi_axes : (..., 3) array of float64
+    p : (...) array of float64
+
+    Raises
+    ------
+    ValueError
+        If a semi-axis is not a positive length, an exponent is below 1/2, or the numbers of
+        shapes and exponents disagree.
+    """
+    axes, exponent = np.asarray(semi_axes, np.float64), np.asarray(p, np.float64)
+    if axes.ndim < 1 or axes.shape[-1] != 3:
+        msg = f"semi-axes have shape {axes.shape}, expected (..., 3)"
+        raise ValueError(msg)
+    if not (np.isfinite(axes) & (axes > 0)).all():
+        msg = f"semi-axes hold {axes[~(np.isfinite(axes) & (axes > 0))][0]}, expected lengths > 0"
+        raise ValueError(msg)
+    convex = np.isfinite(exponent) & (exponent >= OCTAHEDRON)
+    if not convex.all():
+        found = f"exponent p is {exponent[~convex][0] if exponent.ndim else exponent}"
+        msg = f"{found}, expected at least 1/2: below that the body is not convex"
+        raise ValueError(msg)
+    try:
+        shape = np.broadcast_shapes(axes.shape[:-1], exponent.shape)
+    except ValueError:
+        found = f"{axes.shape[:-1]} shapes have {exponent.shape} exponents p"
+        msg = f"{found}, expected one for all or one for each"
+        raise ValueError(msg) from None
+    return np.broadcast_to(axes, (*shape, 3)), np.broadcast_to(exponent, shape)
+
+
+def axes_from(w1: ArrayLike, w2: ArrayLike) -> FloatArray:
+    """Semi-axes (a, b, c) in units of a, of aspect ratios w1 = a/b and w2 = c/b.
+
+    Yuan et al. 2019, Sec. 2.1, where lengths are in units of a. Spheroids have one aspect ratio w there:
+    oblate, b = c, w = a/c < 1: (w1, w2) = (w, 1); prolate, a = b, w = c/a > 1: (w1, w2) = (1, w).
+
+    Parameters
+    ----------
+    w1 : (...) array_like
+        In (0, 1].
+    w2 : (...) array_like
+        At least 1.
+
+    Returns
+    -------
+    (..., 3) array of float64
+        Ascending: (1, 1 / w1, w2 / w1).
+
+    Raises
+    ------
+    ValueError
+        If a ratio is out of its range.
+    """
+    short, long = np.broadcast_arrays(np.asarray(w1, np.float64), np.asarray(w2, np.float64))
+    if not ((short > 0) & (short <= 1) & (long >= 1) & np.isfinite(long)).all():
+        msg = f"aspect ratios are w1 = {short} and w2 = {long}, expected 0 < w1 <= 1 <= w2"
+        raise ValueError(msg)
+    return np.stack([np.ones_like(short), 1 / short, long / short], axis=-1)
+
+
+def volume(semi_axes: ArrayLike, p: ArrayLike) -> FloatArray:
+    """Volume, 8 a b c Gamma(1 + 1/2p)^3 / Gamma(1 + 3/2p).
+
+    Parameters and errors are those of `checked`.
+
+    Returns
+    -------
+    (...) array of float64, [length^3]
+    """
+    axes, exponent = checked(semi_axes, p)
+    of_unit = 8 * gamma(1 + 0.5 / exponent) ** 3 / gamma(1 + 1.5 / exponent)
+    return np.asarray(of_unit * axes.prod(axis=-1))
+
+
+def surface_area(semi_axes: ArrayLike, p: ArrayLike) -> SurfaceArea:
+    r"""Area of the surface.
+
+    With u, v, w = |x/a|^2p, |y/b|^2p, |z/c|^2p on the surface, u + v + w = 1, equal volumes of the
+    cones to the centre have the weight :math:`(u v w)^{1/2p - 1}`, and the cone over dA is one third of
+    dA times the distance of the tangent plane from the centre:
+
+    .. math:: A = 3 V \left\langle \sqrt{u^m / a^2 + v^m / b^2 + w^m / c^2} \right\rangle,
+        \quad m = 2 - 1/p.
+
+    With u = 1/(1 + e^y), v/w = e^z the average over y and z has a bounded integrand that is smooth and
+    dies out exponentially, for all p; and double exponentially in :math:`\sinh^{-1}`, where equal steps
+    are taken. For p = 1, :math:`A = 4 \pi R_G(a^2 b^2, b^2 c^2, c^2 a^2)` (Carlson).
+
+    Parameters and errors are those of `checked`.
+
+    Returns
+    -------
+    SurfaceArea
+        The relative error is below 1e-13 for p from 0.5 to 20 and axis ratios up to 100.
+    """
+    axes, exponent = checked(semi_axes, p)
+    shapes = np.concatenate([np.sort(axes, axis=-1), exponent[..., None]], axis=-1)
+    different, which = np.unique(shapes.reshape(-1, 4), axis=0, return_inverse=True)
+    found = np.array([_area_of(row[:3], float(row[3])) for row in different]).reshape(-1, 2)
+    area, error = np.moveaxis(found[which.ravel()].reshape(*exponent.shape, 2), -1, 0)
+    return SurfaceArea(area, error)
+
+
+def asphericity(semi_axes: ArrayLike, p: ArrayLike) -> FloatArray:
+    """Asphericity, 1 - (4 pi)^(1/3) (3 V)^(2/3) / A: 0 for a sphere, 1 for a needle or a sheet.
+
+    Yuan et al. 2019, Eq. 2. (Their text has 1 for spheres, and the right-hand sides of their Eqs. 8
+    and 9, of oblate and prolate ellipsoids, are 1 minus this.)
+
+    Parameters and errors are those of `checked`.
+
+    Returns
+    -------
+    (...) array of float64
+    """
+    of_sphere = np.cbrt(4 * np.pi * (3 * volume(semi_axes, p)) ** 2)
+    # Rounding may leave a sphere just below 0.
+    return np.maximum(0.0, 1 - of_sphere / surface_area(semi_axes, p).area)
+
+
+def reduced_aspect_ratio(semi_axes: ArrayLike) -> FloatArray:
+    """Reduced aspect ratio beta = a c / b^2 of the sorted semi-axes.
+
+    Yuan et al. 2019, Sec. 2.1: below 1 for flat, above 1 for long shapes, 1 for self-dual ones.
+
+    Parameters
+    ----------
+    semi_axes : (..., 3) array_like, [length]
+
+    Returns
+    -------
+    (...) array of float64
+
+    Raises
+    ------
+    ValueError
+        If a semi-axis is not a positive length.
+    """
+    axes, _ = checked(semi_axes, 1.0)
+    a, b, c = np.moveaxis(np.sort(axes, axis=-1), -1, 0)
+    return np.asarray((a / b) * (c / b))
+
+
+def director_axis(semi_axes: ArrayLike) -> IntArray:
+    """Which axis of the body tells its direction: the shortest if it is flat, the longest if it is long.
+
+    Yuan et al. 2019, Sec. 2.4, of the nematic order S_2. They do not say which one it is for self-dual
+    shapes, beta = 1: here the shortest, and the first one if all are equal.
+
+    Parameters and errors are those of `reduced_aspect_ratio`.
+
+    Returns
+    -------
+    (...) array of int64
+        0, 1 or 2 for the body's x, y or z.
+    """
+    axes, _ = checked(semi_axes, 1.0)
+    is_long = reduced_aspect_ratio(axes) > 1 + _SELF_DUAL
+    return np.asarray(np.where(is_long, axes.argmax(axis=-1), axes.argmin(axis=-1)), np.int64)
+
+
+def _area_of(axes: FloatArray, p: float) -> tuple[float, float]:
+    """Area of one shape and its error."""
+    size = float(np.cbrt(axes.prod()))
+    unit = axes / size
+    if p == 1:
+        a, b, c = unit**2
+        area = 4 * np.pi * float(elliprg(a * b, b * c, c * a))
+        return size**2 * area, size**2 * area * _CONVERGED
+    scale = 3 * float(volume(unit, p)) * size**2
+    mean, change = _mean_slope(unit, p, _STEPS[0]), np.inf
+    for step in _STEPS[1:]:
+        before, mean = mean, _mean_slope(unit, p, step)
+        change = abs(mean - before)
+        if change < _CONVERGED * mean:
+            break
+    return scale * mean, scale * max(change, _CONVERGED * mean)
+
+
+def _mean_slope(axes: FloatArray, p: float, step: float) -> float:
+    """Average of the root in `surface_area`, by the trapezoidal rule.
+
+    Both coordinates are (pi/2) sinh(xi). Everything is kept as logarithms: at p = 10 coordinates go
+    up to 800. The weights' own sum takes the place of their integral, a product of beta functions.
+    """
+    reach = np.arcsinh(_TAIL * 2 * p / (np.pi / 2))
+    n = int(np.ceil(reach / step))
+    xi = step * np.arange(-n, n + 1)
+    y, stretch = np.pi / 2 * np.sinh(xi), np.cosh(xi)
+    log_less, log_more = -np.logaddexp(0, -y), -np.logaddexp(0, y)  # of s and of 1 - s
+    power, m = 0.5 / p, 2 - 1 / p
+    outer = stretch * np.exp(power * log_more + 2 * power * log_less)
+    inner = stretch * np.exp(power * (log_more + log_less))
+    # The one that stands alone is the longest: its corner of the surface is the sharpest.
+    b, c, a = axes
+    pair = np.exp(m * log_less) / b**2 + np.exp(m * log_more) / c**2
+    slope = np.sqrt(np.exp(m * log_more)[:, None] / a**2 + np.exp(m * log_less)[:, None] * pair)
+    return float(outer @ slope @ inner / (outer.sum() * inner.sum()))
