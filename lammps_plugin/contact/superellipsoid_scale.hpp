@@ -524,8 +524,9 @@ template <int D, class T> class TangencySearch {
     const Tangency<D, T> &at = found.at;
     const T below = dot(r, at.normal) / widths(at.normal);
     const T above = reach_of(at.point_i);
-    found.gap = std::max({above - at.scale, at.scale - below, T(0)}) / at.scale;
-    if (!(found.gap >= T(0))) found.gap = std::numeric_limits<T>::infinity();
+    const T gap = std::max(above - at.scale, at.scale - below) / at.scale;
+    const bool is_bound = std::isfinite(above) && std::isfinite(below) && std::isfinite(at.scale);
+    found.gap = is_bound ? std::max(gap, T(0)) : std::numeric_limits<T>::infinity();
   }
 
  private:
@@ -566,17 +567,23 @@ template <int D, class T> class TangencySearch {
     return found;
   }
 
+  /// The first attempt that ends in a short step and within bounds; else, where both bodies are so
+  /// flat that steps stay long, the one of the closest bounds.
   void follow(FoundTangency<D, T> &found) const
   {
     const Tangency<D, T> start = found.at;
+    certify(found);
+    FoundTangency<D, T> best = found;
     for (const double ratio : RATIOS) {
       found.at = start;
-      if (to_own_exponents(found, ratio)) {
-        certify(found);
-        if (found.gap <= GAP) return;
-      }
+      const bool is_converged = to_own_exponents(found, ratio);
+      certify(found);
+      if (is_converged && found.gap <= GAP) return;
+      if (found.gap < best.gap) best = found;
       found.is_fallback = true;
     }
+    found.at = best.at;
+    found.gap = best.gap;
   }
 
   /// In stages of this ratio, or at once for ratio 1.
@@ -594,16 +601,17 @@ template <int D, class T> class TangencySearch {
         ratio == 1.0 ? 1.0 : std::ceil(std::log(double(std::max(e_i, e_j))) / std::log(ratio));
     const int last = std::max(1, static_cast<int>(stages));
     Vec<Equations::M, T> z{};
+    bool is_converged = false;
     for (int stage = 1; stage <= last; ++stage) {
       const T share = T(stage) / last;
       const Equations equations(detail::TangencyProblem<D, T>{
           i, j, r, stage < last ? between(e_i, share) : e_i,
           stage < last ? between(e_j, share) : e_j});
       if (stage == 1) z = equations.start(found.at);
-      if (!newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations)) return false;
+      is_converged = newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations);
       if (stage == last) found.at = equations.tangency(z);
     }
-    return true;
+    return is_converged;
   }
 
   /// Whole powers cost no logarithm.
