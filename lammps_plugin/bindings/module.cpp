@@ -2,6 +2,7 @@
 
 namespace jamshape {
 void export_spherocylinder(nanobind::module_ &m);
+void export_superellipsoid(nanobind::module_ &m);
 void export_rattlers(nanobind::module_ &m);
 }  // namespace jamshape
 
@@ -9,5 +10,6 @@ NB_MODULE(_contact, m)
 {
   m.doc() = "Contact geometry and energies: arrays in, arrays out, over lammps_plugin/contact/.";
   jamshape::export_spherocylinder(m);
+  jamshape::export_superellipsoid(m);
   jamshape::export_rattlers(m);
 }

@@ -20,6 +20,7 @@ struct PackingArrays {
   const Array2<double> &edges;        // (2, D)
   const Array2<std::int64_t> &pairs;  // (M, 2)
   const Array2<std::int64_t> &shift;  // (M, D)
+  const Array1<double> *exponent = nullptr;  // (N,), of shapes that have one
 
   int dimension() const { return static_cast<int>(edges.shape(1)); }
   std::size_t n() const { return diameters.shape(0); }
@@ -34,6 +35,7 @@ struct PackingArrays {
     require(orientation.shape(0) == 2 && orientation.shape(1) == n() &&
                 orientation.shape(2) == (D == 2 ? 1 : 4),
             "orientation has no shape (2, N, 1) in 2D or (2, N, 4) in 3D.");
+    require(exponent == nullptr || exponent->shape(0) == n(), "exponent has no shape (N,).");
     require(pairs.shape(1) == 2 && shift.shape(1) == D && shift.shape(0) == pairs.shape(0),
             "pairs and shift have no shapes (M, 2) and (M, D).");
     const std::int64_t *const first = pairs.data(), *const last = first + pairs.size();
@@ -63,7 +65,8 @@ struct PackingArrays {
     std::vector<typename Model::Shape> result;
     result.reserve(n());
     for (std::size_t i = 0; i < n(); ++i) {
-      const auto shape = Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i));
+      const double p = exponent == nullptr ? 1.0 : exponent->data()[i];
+      const auto shape = Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), p);
       require(shape.has_value(),
               "particle " + std::to_string(i) + " is no such shape: " + Model::SHAPE_RULE + ".");
       result.push_back(*shape);
@@ -92,6 +95,7 @@ nb::dict sums_in(const PackingArrays &arrays, const typename Model::Law &law)
   result["virial"] = virial.release();
   result["bond_force"] = static_cast<double>(sums.bond_force);
   result["n_bonds"] = sums.n_bonds;
+  result["error"] = sums.error;
   result["crossing"] =
       sums.crossing == PairSums<D, S>::NONE ? -1 : static_cast<std::int64_t>(sums.crossing);
   return result;

@@ -34,6 +34,7 @@ template <int D, class S = double> struct Contact {
   ContactStatus status;
   ContactKind kind;
   int n_bonds;
+  double error;  // relative, of the overlap's distance where that comes from an iteration; else 0
   Bond<D, S> bond[2];
   S energy;
   Vec<D, S> force;

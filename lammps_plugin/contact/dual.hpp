@@ -73,6 +73,11 @@ template <int N, class S = double> struct Dual {
     return a.chain(root, 1 / (2 * root));
   }
   friend Dual log(const Dual &a) { return a.chain(std::log(a.value), 1 / a.value); }
+  /// Of a base that is not negative, to a constant power that is at least 1.
+  friend Dual pow(const Dual &a, const S &exponent)
+  {
+    return a.chain(std::pow(a.value, exponent), exponent * std::pow(a.value, exponent - 1));
+  }
   friend Dual abs(const Dual &a) { return a.value < 0 ? -a : a; }
   friend Dual copysign(const Dual &a, const Dual &b)
   {

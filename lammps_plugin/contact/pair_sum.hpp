@@ -5,6 +5,7 @@
 #include "contact/rotation.hpp"
 #include "contact/vec.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -98,6 +99,7 @@ template <int D, class S> struct PairSums {
   Vec<D * D, S> virial{};  // sum of r (x) force on i
   S bond_force = 0.0;      // sum of the magnitudes
   std::size_t n_bonds = 0;
+  double error = 0.0;                // the largest of a contact
   std::size_t crossing = NONE;  // the first pair that cannot be computed
 
   static constexpr std::size_t NONE = static_cast<std::size_t>(-1);
@@ -127,6 +129,7 @@ PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_part
     }
     for (int b = 0; b < contact.n_bonds; ++b) sums.bond_force += norm(contact.bond[b].force);
     sums.n_bonds += contact.n_bonds;
+    sums.error = std::max(sums.error, contact.error);
   }
   return sums;
 }

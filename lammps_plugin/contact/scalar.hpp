@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <utility>
 
 namespace jamshape {
 
@@ -8,11 +9,15 @@ namespace jamshape {
 using std::abs;
 using std::copysign;
 using std::log;
+using std::pow;
 using std::sqrt;
 
 /// The plain number in a scalar: of a dual number its value.
 inline double value_of(double x) { return x; }
 inline long double value_of(long double x) { return x; }
+
+/// The type of the plain number in a scalar S; only to be named where value_of(S) is declared.
+template <class S> using ValueOf = decltype(value_of(std::declval<S>()));
 
 /// A scalar as a constant: of a dual number what it is without its derivatives.
 inline double constant(double x) { return x; }

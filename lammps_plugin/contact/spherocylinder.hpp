@@ -253,6 +253,7 @@ template <int D, class S> class SpherocylinderContact {
     contact.status = status;
     contact.kind = ContactKind::TIP_TO_TIP;
     contact.n_bonds = 0;
+    contact.error = 0.0;
     contact.energy = 0.0;
     contact.force = {};
     contact.torque_i = contact.torque_j = {};
@@ -407,7 +408,8 @@ struct SpherocylinderModel {
 
   static Law law(Options sides, double k_e) { return {{k_e}, sides}; }
 
-  static std::optional<Shape> shape_from(const Vec<3> &semi_axes)
+  /// Other shapes have an exponent.
+  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)
   {
     return spherocylinder_from(semi_axes);
   }
@@ -441,12 +443,18 @@ struct SpherocylinderModel {
     return norm_sq(pair.r) < bounding * bounding && spine_distance_sq(pair) < reach * reach;
   }
 
+  /// Where a particle was when the pairs were last chosen.
+  template <int D> struct Pose {
+    Vec<D> centre, axis;
+  };
+  template <int D> static Pose<D> pose(const Body<D> &body) { return {body.centre, body.axis}; }
+
   /// Upper bound of the squared distance that any point of the spine moved: |dx + s du| over |s| <=
   /// A, by (a + b)^2 <= 2 a^2 + 2 b^2.
   template <int D>
-  static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Vec<D> &axis)
+  static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
   {
-    const double turned = now.half_length * now.half_length * norm_sq(now.axis - axis);
+    const double turned = now.half_length * now.half_length * norm_sq(now.axis - then.axis);
     return turned == 0.0 ? norm_sq(shift) : 2.0 * (norm_sq(shift) + turned);
   }
 };

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 namespace jamshape {
@@ -48,7 +49,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   SubstrateDrag drag(const Vec<3> &semi_axes) const override
   {
-    const auto shape = *Model::shape_from(semi_axes);
+    const auto shape = *shape_from(semi_axes);
     return domain->dimension == 2 ? Model::template drag<2>(shape) : Model::template drag<3>(shape);
   }
 
@@ -63,29 +64,31 @@ template <class Model> class PairContactOf : public PairContact {
 
   bool is_valid_shape(const Vec<3> &semi_axes) const override
   {
-    return Model::shape_from(semi_axes).has_value();
+    return shape_from(semi_axes).has_value();
   }
   std::string shape_rule() const override { return Model::SHAPE_RULE; }
   bool turns(const Vec<3> &semi_axes) const override
   {
-    return Model::turns(*Model::shape_from(semi_axes));
+    return Model::turns(*shape_from(semi_axes));
   }
 
  private:
   // A small margin keeps the list short, a large one keeps it longer; flat optimum near one half.
   static constexpr double MARGIN_OVER_SKIN = 0.15;
+  static constexpr double EXPONENT = 1.0;  // until a style reads one per type
 
   template <int D> using Body = typename Model::template Body<D>;
+  template <int D> using Pose = typename Model::template Pose<D>;
+
+  static std::optional<typename Model::Shape> shape_from(const Vec<3> &semi_axes)
+  {
+    return Model::shape_from(semi_axes, EXPONENT);
+  }
 
   typename Model::Law law_of(int i, int j) const
   {
     return Model::law(options, k_e[atom->type[i]][atom->type[j]]);
   }
-
-  /// Where a particle was when the pairs were last chosen.
-  template <int D> struct Pose {
-    Vec<D> centre, axis;
-  };
 
   template <int D> struct Bodies {
     std::vector<Body<D>> now;
@@ -200,7 +203,7 @@ template <class Model> class PairContactOf : public PairContact {
     std::vector<Body<D>> &bodies = all<D>().now;
     resize_closely(bodies, semi_axes.size());
     for (std::size_t i = 0; i < semi_axes.size(); ++i) {
-      bodies[i] = Model::template body<D>(*Model::shape_from(semi_axes[i]));
+      bodies[i] = Model::template body<D>(*shape_from(semi_axes[i]));
     }
   }
 
@@ -234,7 +237,7 @@ template <class Model> class PairContactOf : public PairContact {
     }
     resize_closely(bodies.then, bodies.now.size());
     for (std::size_t i = 0; i < bodies.now.size(); ++i) {
-      bodies.then[i] = {bodies.now[i].centre, bodies.now[i].axis};
+      bodies.then[i] = Model::template pose<D>(bodies.now[i]);
     }
     for (int k = 0; k < D; ++k) bodies.box_then[k] = domain->prd[k];
   }
@@ -261,7 +264,7 @@ template <class Model> class PairContactOf : public PairContact {
             bodies.now[i].centre[k] - centre[k] - scale[k] * (bodies.then[i].centre[k] - centre[k]);
       }
       most_sq = std::max(most_sq,
-                         Model::template motion_sq<D>(shift, bodies.now[i], bodies.then[i].axis));
+                         Model::template motion_sq<D>(shift, bodies.now[i], bodies.then[i]));
     }
     return 4.0 * most_sq >= left * left;
   }

@@ -1,0 +1,265 @@
+#pragma once
+
+#include "contact/contact.hpp"
+#include "contact/harmonic.hpp"
+#include "contact/superellipsoid_scale.hpp"
+#include "contact/superellipsoid_shape.hpp"
+#include "contact/vec.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace jamshape {
+
+/// U = epsilon/2 (1 - eta^2)^2 for eta < 1 (Yuan et al. 2019, Eq. 2), eta the scale at which the two
+/// bodies, scaled about their centres, touch (Perram & Wertheim 1985): the harmonic law of the
+/// overlap 1 - eta^2.
+struct SuperellipsoidLaw {
+  double epsilon;
+};
+
+/// Centres closer than this times the sum of the bounding radii are one point: no normal exists.
+inline constexpr double COINCIDENT_CENTRES = 1e-14;
+
+/// Contact of two superellipsoids in 2D or 3D. With x = eta^2, n the common normal where the scaled
+/// bodies touch, grad_r x = 2 x n / (r.n): the printed force (Yuan et al. 2019, Eq. 3) lacks one eta.
+/// Torques are by the envelope theorem those of this force at the point of tangency of the **scaled**
+/// bodies. The one bond has
+///     normal, levers    the gradient of x over |grad_r x|, that of a length
+///     reach             1 / |grad_r x|, so that the stiffness is epsilon / reach^2 as of other laws
+///     distance          reach x: 1 - distance / reach is the overlap. For two spheres of contact
+///                       distance d it is r / 2, and reach = d / 2 where they touch.
+template <int D, class S> class SuperellipsoidContact {
+ public:
+  using T = ValueOf<S>;
+  using Body = SuperellipsoidBody<D, S>;
+
+  SuperellipsoidContact(const Body &body_i, const Body &body_j, const SuperellipsoidLaw &of) :
+      i(body_i), j(body_j), r(body_i.centre - body_j.centre), law{of.epsilon}
+  {
+  }
+
+  /// Begins at a normal and leaves there the one it found, also where the bodies are apart.
+  Contact<D, S> evaluate_from(Vec<D, T> &last) { return evaluate_with(&last); }
+
+  Contact<D, S> evaluate() const { return evaluate_with(nullptr); }
+
+ private:
+  const Body &i, &j;
+  Vec<D, S> r;
+  Harmonic law;
+
+  static constexpr bool IS_PLAIN = std::is_same_v<S, T>;
+
+  Contact<D, S> evaluate_with(Vec<D, T> *last) const
+  {
+    const double reach = i.bounding_radius + j.bounding_radius;
+    const T distance_sq = value_of(norm_sq(r));
+    if (!(distance_sq < T(reach) * reach)) return empty(ContactStatus::APART);
+    if (distance_sq <= COINCIDENT_CENTRES * reach * COINCIDENT_CENTRES * reach) {
+      return empty(ContactStatus::CROSSING);
+    }
+    if (is_round(i) && is_round(j)) return touching(spheres(), T(0));  // bounded by themselves
+    const FoundTangency<D, T> found = find_tangency(last);
+    if (last != nullptr) *last = found.at.normal;
+    if (found.is_apart || !(found.at.scale < 1)) return empty(ContactStatus::APART);
+    return touching(in_scalar(found.at), found.gap);
+  }
+
+  static bool is_round(const Body &body)
+  {
+    if (body.p != 1.0) return false;
+    for (int k = 1; k < D; ++k) {
+      if (body.semi_axes[k] != body.semi_axes[0]) return false;
+    }
+    return true;
+  }
+
+  Tangency<D, S> spheres() const
+  {
+    const double radius_i = i.semi_axes[0], radius_j = j.semi_axes[0], d = radius_i + radius_j;
+    return {norm(r) / d, r, S(radius_i / d) * r, S(radius_j / d) * r};
+  }
+
+  FoundTangency<D, T> find_tangency(const Vec<D, T> *last) const
+  {
+    if constexpr (IS_PLAIN) {
+      return tangency_of(i, j, TangencyWish<D, T>{r, true, last});
+    } else {
+      const SuperellipsoidBody<D, T> plain_i = plain<T>(i), plain_j = plain<T>(j);
+      return tangency_of(plain_i, plain_j, TangencyWish<D, T>{plain<T>(r), true, last});
+    }
+  }
+
+  Tangency<D, S> in_scalar(const Tangency<D, T> &found) const
+  {
+    if constexpr (IS_PLAIN) {
+      return found;
+    } else {
+      return TangencyIn<D, S>(i, j, r).from(found);
+    }
+  }
+
+  static Contact<D, S> empty(ContactStatus status)
+  {
+    Contact<D, S> contact;
+    contact.status = status;
+    contact.kind = ContactKind::TIP_TO_TIP;
+    contact.n_bonds = 0;
+    contact.error = 0.0;
+    contact.energy = 0.0;
+    contact.force = {};
+    contact.torque_i = contact.torque_j = {};
+    return contact;
+  }
+
+  /// In dual numbers the law's own slope is a constant: `own_stiffness` stands for what it leaves
+  /// out (see ContactDerivatives).
+  Contact<D, S> touching(const Tangency<D, S> &at, const T &gap) const
+  {
+    const S x = at.scale * at.scale, overlap = (T(1) - at.scale) * (T(1) + at.scale);
+    const Vec<D, S> gradient = (T(2) * x / dot(r, at.normal)) * at.normal;
+    const S steepness = norm(gradient), reach = T(1) / steepness;
+    const Vec<D, S> arm_i = -at.point_i, arm_j = at.point_j;
+
+    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
+    contact.n_bonds = 1;
+    contact.error = static_cast<double>(gap);
+    contact.energy = law.energy(overlap);
+    contact.force = law.energy_gradient(constant(overlap)) * gradient;
+    contact.torque_i = cross(arm_i, contact.force);
+    contact.torque_j = -cross(arm_j, contact.force);
+    Bond<D, S> &bond = contact.bond[0];
+    bond.normal = reach * gradient;
+    bond.force = contact.force;
+    bond.arm_i = arm_i;
+    bond.lever_i = cross(arm_i, bond.normal);
+    bond.lever_j = -cross(arm_j, bond.normal);
+    bond.distance = reach * x;
+    bond.reach = reach;
+    bond.energy = contact.energy;
+    bond.stiffness = bond.own_stiffness = law.energy_hessian(overlap) * steepness * steepness;
+    bond.on_side_i = bond.on_side_j = false;
+    return contact;
+  }
+};
+
+template <int D, class S>
+Contact<D, S> contact_of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
+                         const SuperellipsoidLaw &law)
+{
+  return SuperellipsoidContact<D, S>(i, j, law).evaluate();
+}
+
+/// The same, begun at the normal that this pair had a moment before (any vector at first), which is
+/// replaced by the present one: a step or two instead of ten.
+template <int D, class S>
+Contact<D, S> contact_of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
+                         const SuperellipsoidLaw &law, Vec<D, ValueOf<S>> &last_normal)
+{
+  return SuperellipsoidContact<D, S>(i, j, law).evaluate_from(last_normal);
+}
+
+/// What a pair style, its neighbour list and the drag need to know of the shape (see
+/// SpherocylinderModel).
+struct SuperellipsoidModel {
+  using Shape = Superellipsoid;
+  using Law = SuperellipsoidLaw;
+  struct Options {};
+  template <int D, class S = double> using Body = SuperellipsoidBody<D, S>;
+
+  static constexpr const char *SHAPE_RULE =
+      "a superellipsoid has positive diameters (2a, 2b, 2c) and an exponent p above 0.5";
+
+  static Law law(const Options &, double epsilon) { return {epsilon}; }
+
+  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double exponent)
+  {
+    return superellipsoid_from(semi_axes, exponent);
+  }
+
+  static bool turns(const Shape &shape) { return !shape.is_round(); }
+
+  template <int D> static SubstrateDrag drag(const Shape &shape)
+  {
+    return substrate_drag<D>(shape);
+  }
+
+  template <int D, class S = double> static Body<D, S> body(const Shape &shape)
+  {
+    Body<D, S> body{};
+    for (int k = 0; k < D; ++k) {
+      body.axis[k][k] = 1.0;
+      body.semi_axes[k] = shape.semi_axes[k];
+    }
+    body.p = shape.p;
+    body.bounding_radius = shape.bounding_radius<D>();
+    return body;
+  }
+
+  template <int D, class S> static void turn_to(Body<D, S> &body, const QuaternionOf<S> &q)
+  {
+    if constexpr (D == 2) {
+      body.axis[0] = long_axis<2, S>(q);
+      body.axis[1] = {{-body.axis[0][1], body.axis[0][0]}};
+    } else {
+      for (int k = 0; k < D; ++k) body.axis[k] = body_axis(q, k);
+    }
+  }
+
+  /// Whether the surfaces of i and j may be closer than `margin`: false where the gap between two
+  /// parallel planes says no. Tried are the planes across the line of centres, those of the bodies'
+  /// axes and nearly that of two ellipsoids.
+  template <int D> static bool closer_than(double margin, const Body<D> &i, const Body<D> &j)
+  {
+    const Vec<D> r = i.centre - j.centre;
+    const double distance_sq = norm_sq(r), bounding = i.bounding_radius + j.bounding_radius + margin;
+    if (distance_sq >= bounding * bounding) return false;
+    if (distance_sq == 0.0) return true;
+    using Norm = PowerNorm<D, double>;
+    const auto h_i = Norm::support(i), h_j = Norm::support(j);
+    const auto divides = [&](const Vec<D> &n) {
+      return std::abs(dot(r, n)) >= h_i.value(n) + h_j.value(n) + margin * norm(n);
+    };
+    if (divides(r)) return false;
+    for (int k = 0; k < D; ++k) {
+      if (divides(i.axis[k]) || divides(j.axis[k])) return false;
+    }
+    return !divides(detail::ByNormalOfEllipsoids<D, double>(i, j, r).start());
+  }
+
+  template <int D> struct Pose {
+    Vec<D> centre;
+    Vec<D> axis[D];
+  };
+  template <int D> static Pose<D> pose(const Body<D> &body)
+  {
+    Pose<D> pose{body.centre, {}};
+    for (int k = 0; k < D; ++k) pose.axis[k] = body.axis[k];
+    return pose;
+  }
+
+  /// Upper bound of the squared distance that any point of the body moved, |dx + sum x_k du_k| over
+  /// |x_k| <= a_k, by (a + b)^2 <= 2 a^2 + 2 b^2.
+  template <int D>
+  static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
+  {
+    double turned = 0.0;
+    for (int k = 0; k < D; ++k) turned += now.semi_axes[k] * norm(now.axis[k] - then.axis[k]);
+    return turned == 0.0 ? norm_sq(shift) : 2.0 * (norm_sq(shift) + turned * turned);
+  }
+};
+
+/// Whether two bodies share more than a point, with the least work that decides it: for Monte Carlo
+/// of hard particles.
+template <int D> bool are_overlapping(const SuperellipsoidBody<D> &i, const SuperellipsoidBody<D> &j)
+{
+  const Vec<D> r = i.centre - j.centre;
+  const double distance_sq = norm_sq(r), bounding = i.bounding_radius + j.bounding_radius;
+  if (distance_sq >= bounding * bounding) return false;
+  if (distance_sq <= COINCIDENT_CENTRES * bounding * COINCIDENT_CENTRES * bounding) return true;
+  return TangencySearch<D, double>(i, j, {r, true, nullptr}).is_overlap();
+}
+
+}  // namespace jamshape

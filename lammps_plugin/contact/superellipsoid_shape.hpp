@@ -1,0 +1,221 @@
+#pragma once
+
+#include "contact/contact.hpp"
+#include "contact/dual.hpp"
+#include "contact/rotation.hpp"
+#include "contact/vec.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace jamshape {
+
+/// The surface |x/a|^2p + |y/b|^2p + |z/c|^2p = 1 (Yuan et al. 2019, Eq. 1); in 2D the first two
+/// axes alone. p = 1 is an ellipsoid, p > 1 tends to a box, p < 1 to an octahedron.
+struct Superellipsoid {
+  Vec<3> semi_axes;
+  double p;
+
+  bool is_round() const
+  {
+    return p == 1.0 && semi_axes[0] == semi_axes[1] && semi_axes[0] == semi_axes[2];
+  }
+
+  /// Largest distance of a point of the surface from the centre: by Hoelder's inequality for p > 1,
+  /// the longest semi-axis otherwise.
+  template <int D> double bounding_radius() const
+  {
+    double longest = 0.0, sum = 0.0;
+    for (int k = 0; k < D; ++k) longest = std::max(longest, semi_axes[k]);
+    if (p <= 1.0) return longest;
+    for (int k = 0; k < D; ++k) sum += std::pow(semi_axes[k] / longest, 2.0 * p / (p - 1.0));
+    return longest * std::pow(sum, (p - 1.0) / (2.0 * p));
+  }
+};
+
+/// Nothing unless the semi-axes are lengths and the particle is strictly convex.
+inline std::optional<Superellipsoid> superellipsoid_from(const Vec<3> &semi_axes, double p)
+{
+  for (int k = 0; k < 3; ++k) {
+    if (!(semi_axes[k] > 0.0) || !std::isfinite(semi_axes[k])) return std::nullopt;
+  }
+  if (!(p > 0.5) || !std::isfinite(p)) return std::nullopt;
+  return Superellipsoid{semi_axes, p};
+}
+
+/// Volume (area in 2D) and moments, Dirichlet's integral: with m = 1/2p the volume is prod 2 a_k
+/// G(1 + m)^D / G(1 + D m) and the mean of x_k^2 is a_k^2 G(3 m) G(1 + D m) / (G(m) G(1 + (D + 2)
+/// m)).
+template <int D> SubstrateDrag substrate_drag(const Superellipsoid &shape)
+{
+  const double m = 0.5 / shape.p, all = std::lgamma(1.0 + D * m);
+  double volume = std::exp(D * std::lgamma(1.0 + m) - all);
+  for (int k = 0; k < D; ++k) volume *= 2.0 * shape.semi_axes[k];
+  const double ratio = std::exp(std::lgamma(3.0 * m) - std::lgamma(m) + all -
+                                std::lgamma(1.0 + (D + 2) * m));
+  Vec<3> mean_sq{};
+  for (int k = 0; k < D; ++k) mean_sq[k] = ratio * shape.semi_axes[k] * shape.semi_axes[k];
+  const double about_z = mean_sq[0] + mean_sq[1];
+  if (D == 2) return {volume, {{0.0, 0.0, about_z}}};
+  return {volume, {{mean_sq[1] + mean_sq[2], mean_sq[0] + mean_sq[2], about_z}}};
+}
+
+/// Shape and pose of one particle, as the pair loops read it.
+template <int D, class S = double> struct SuperellipsoidBody {
+  Vec<D, S> centre;
+  Vec<D, S> axis[D];
+  Vec<D> semi_axes;
+  double p;
+  double bounding_radius;
+};
+
+/// x^e of x >= 0. Small integer powers, all that the usual shapes need, are products.
+template <class T> class Exponent {
+ public:
+  explicit Exponent(T exponent) :
+      e(exponent), whole(exponent == std::floor(exponent) && exponent <= T(32) ? static_cast<int>(exponent) : -1)
+  {
+  }
+
+  T value() const { return e; }
+
+  template <class S> S operator()(const S &x) const
+  {
+    if (whole < 0) return pow(x, e);
+    S power = 1.0, square = x;
+    for (int left = whole; left > 0; left >>= 1) {
+      if (left & 1) power *= square;
+      if (left > 1) square *= square;
+    }
+    return power;
+  }
+
+ private:
+  T e;
+  int whole;
+};
+
+/// A norm at a vector: its value N, its gradient and its second derivatives.
+template <int D, class S> struct NormAt {
+  S value;
+  Vec<D, S> gradient;
+};
+template <int D, class T> struct CurvedNormAt {
+  T value;
+  Vec<D, T> gradient;
+  T hessian[D][D];
+};
+
+/// N(v) = (sum |s_k v_k|^(e+1))^(1/(e+1)), v_k along the body's axes. Both norms of a superellipsoid
+/// are of this form, each the other's dual:
+///     the gauge g of a point, 1 on the surface:     s_k = 1 / a_k, e = 2p - 1
+///     the support function h of a direction:        s_k = a_k,     e = 1 / (2p - 1)
+/// The gradient of g at a point is a normal there; the gradient of h the point where that is normal.
+template <int D, class S> class PowerNorm {
+ public:
+  using T = ValueOf<S>;
+
+  static PowerNorm gauge(const SuperellipsoidBody<D, S> &body, T exponent)
+  {
+    Vec<D, T> scale;
+    for (int k = 0; k < D; ++k) scale[k] = 1 / T(body.semi_axes[k]);
+    return PowerNorm(body, scale, exponent);
+  }
+  static PowerNorm gauge(const SuperellipsoidBody<D, S> &body)
+  {
+    return gauge(body, 2 * T(body.p) - 1);
+  }
+
+  static PowerNorm support(const SuperellipsoidBody<D, S> &body, T exponent)
+  {
+    Vec<D, T> scale;
+    for (int k = 0; k < D; ++k) scale[k] = body.semi_axes[k];
+    return PowerNorm(body, scale, exponent);
+  }
+  static PowerNorm support(const SuperellipsoidBody<D, S> &body)
+  {
+    return support(body, 1 / (2 * T(body.p) - 1));
+  }
+
+  S value(const Vec<D, S> &v) const { return at(v).value; }
+
+  NormAt<D, S> at(const Vec<D, S> &v) const
+  {
+    const Components c = components(v);
+    NormAt<D, S> norm{c.norm, {}};
+    for (int k = 0; k < D; ++k) norm.gradient += c.gradient[k] * body->axis[k];
+    return norm;
+  }
+
+  /// For plain numbers only.
+  CurvedNormAt<D, T> curved_at(const Vec<D, T> &v) const
+  {
+    const Components c = components(v);
+    CurvedNormAt<D, T> norm{c.norm, {}, {}};
+    for (int k = 0; k < D; ++k) norm.gradient += c.gradient[k] * body->axis[k];
+    const T bend = e.value() / c.norm;
+    for (int row = 0; row < D; ++row) {
+      for (int col = 0; col <= row; ++col) {
+        T sum = -norm.gradient[row] * norm.gradient[col];
+        for (int k = 0; k < D; ++k) sum += c.bend[k] * body->axis[k][row] * body->axis[k][col];
+        norm.hessian[row][col] = norm.hessian[col][row] = bend * sum;
+      }
+    }
+    return norm;
+  }
+
+ private:
+  const SuperellipsoidBody<D, S> *body;
+  Vec<D, T> scale;
+  Exponent<T> e;
+
+  PowerNorm(const SuperellipsoidBody<D, S> &of, const Vec<D, T> &scales, T exponent) :
+      body(&of), scale(scales), e(exponent)
+  {
+  }
+
+  struct Components {
+    S norm;
+    S gradient[D];
+    T bend[D];  // s_k^2 (|s_k v_k| / N)^(e-1)
+  };
+
+  Components components(const Vec<D, S> &v) const
+  {
+    S t[D];
+    int largest = 0;
+    for (int k = 0; k < D; ++k) {
+      t[k] = scale[k] * dot(body->axis[k], v);
+      if (abs(t[k]) > abs(t[largest])) largest = k;
+    }
+    const S most = abs(t[largest]), inverse = T(1) / most;
+    Components c;
+    S sum = T(0), power[D];
+    for (int k = 0; k < D; ++k) {  // nothing over- or underflows: the largest ratio is 1
+      const S ratio = abs(t[k]) * inverse;
+      power[k] = e(ratio);
+      sum += ratio * power[k];
+    }
+    const S grown = root(sum);
+    c.norm = most * grown;
+    const S shrink = grown / sum;  // (most / N)^e
+    for (int k = 0; k < D; ++k) {
+      const S w = power[k] * shrink;
+      c.gradient[k] = copysign(scale[k] * w, t[k]);
+      const T ratio = value_of(abs(t[k])) / value_of(c.norm);
+      c.bend[k] = e.value() == 1 ? scale[k] * scale[k]
+                                 : (ratio > 0 ? scale[k] * scale[k] * value_of(w) / ratio : T(0));
+    }
+    return c;
+  }
+
+  S root(const S &sum) const
+  {
+    if (e.value() == 1) return sqrt(sum);
+    if (e.value() == 3) return sqrt(sqrt(sum));
+    return pow(sum, 1 / (e.value() + 1));
+  }
+};
+
+}  // namespace jamshape
