@@ -201,6 +201,20 @@ nb::dict superellipsoid_derivatives(const Array2<double> &diameters,
       extended);
 }
 
+nb::object superellipsoid_bounding_radius(const Array2<double> &diameters,
+                                          const Array1<double> &exponent, int dimension)
+{
+  const std::size_t n_particles = diameters.shape(0);
+  require(diameters.shape(1) == 3 && exponent.shape(0) == n_particles,
+          "diameters and exponent have no shapes (N, 3) and (N,).");
+  NewArray<double> radius({n_particles});
+  for (std::size_t n = 0; n < n_particles; ++n) {
+    const Superellipsoid shape{0.5 * read_vec<3>(diameters.data() + 3 * n), exponent.data()[n]};
+    radius[n] = dimension == 2 ? shape.bounding_radius<2>() : shape.bounding_radius<3>();
+  }
+  return radius.release();
+}
+
 nb::tuple superellipsoid_drag(const Array2<double> &diameters, const Array1<double> &exponent,
                               int dimension)
 {
@@ -253,6 +267,8 @@ void export_superellipsoid(nb::module_ &m)
   m.def("superellipsoid_derivatives", &superellipsoid_derivatives, "diameters"_a, "exponent"_a,
         "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "epsilon"_a, "extended"_a,
         "As spherocylinder_derivatives, with an exponent p per particle (N,).");
+  m.def("superellipsoid_bounding_radius", &superellipsoid_bounding_radius, "diameters"_a,
+        "exponent"_a, "dimension"_a, "Largest distance of the surface from the centre (N,).");
   m.def("superellipsoid_drag", &superellipsoid_drag, "diameters"_a, "exponent"_a, "dimension"_a,
         "Volume (area in 2D) (N,) and moments per body axis (N, 3), in units of length squared.");
 }

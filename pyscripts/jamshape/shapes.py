@@ -105,7 +105,9 @@ class Superellipsoids:
         self._packing, self._epsilon = packing, k_e
         self.core = "centres"
         axes = packing.diameters[:, : packing.dimension] / 2
-        self.outer_radius = _outer_radius(axes, packing.exponent)
+        self.outer_radius = _contact.superellipsoid_bounding_radius(
+            packing.diameters, packing.exponent, packing.dimension
+        )
         self.inner_radius = axes.min(axis=1)
         is_round = packing.is_round
         self.rotation_length = np.where(is_round, 0.0, packing.diameters[:, 0] / 2)
@@ -168,19 +170,6 @@ def shape_of(packing: Packing, k_e: float, sides: int) -> Shape:
     if packing.shape_style == "spherocylinder":
         return Spherocylinders(packing, k_e, sides)
     return Superellipsoids(packing, k_e)
-
-
-def _outer_radius(axes: FloatArray, exponent: FloatArray) -> FloatArray:
-    """(N,) largest distance of the surface from the centre, of (N, D) semi-axes.
-
-    For p <= 1 the longest semi-axis; beyond, |x|^2 has its maximum inside the faces of the box: with
-    w = sum (x/a)^2p = 1, it is (sum a^(2p/(p-1)))^((p-1)/2p) by Hoelder's inequality.
-    """
-    longest = axes.max(axis=1)
-    p = np.maximum(exponent, 1 + 1e-9)
-    power = np.minimum(2 * p / (p - 1), 1e4)
-    total = ((axes / longest[:, None]) ** power[:, None]).sum(axis=1) ** (1 / power)
-    return np.asarray(np.where(exponent <= 1, longest, longest * total))
 
 
 def _across(axis: FloatArray) -> FloatArray:

@@ -1,0 +1,191 @@
+#pragma once
+
+#include "contact/rotation.hpp"
+#include "contact/vec.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+namespace jamshape {
+
+/// How far the moves of a Monte Carlo simulation go at most: each coordinate, and the angle.
+struct Moves {
+  double shift, turn;
+};
+
+/// What became of the moves of a sweep.
+struct Tally {
+  std::size_t tried = 0, accepted = 0;
+
+  Tally &operator+=(const Tally &other)
+  {
+    tried += other.tried;
+    accepted += other.accepted;
+    return *this;
+  }
+};
+
+/// Monte Carlo of hard particles in a periodic box that is at least twice as wide as they are: every
+/// move that leads to no overlap is accepted. `Model` as for pair styles, with `are_overlapping`
+/// for its bodies.
+template <class Model, int D> class HardParticles {
+ public:
+  using Body = typename Model::template Body<D>;
+
+  HardParticles(std::vector<Body> bodies_at, std::vector<Quaternion> at, const Vec<D> &box_edges,
+                std::uint64_t seed) :
+      bodies(std::move(bodies_at)), orientation(std::move(at)), edges(box_edges), random(seed)
+  {
+    for (const Body &body : bodies) reach = std::max(reach, 2.0 * body.bounding_radius);
+    std::size_t n_cells = 1;
+    for (int k = 0; k < D; ++k) {
+      count[k] = std::max<std::size_t>(1, static_cast<std::size_t>(edges[k] / reach));
+      n_cells *= count[k];
+    }
+    members.resize(n_cells);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      wrap(bodies[i].centre);
+      members[cell_at(bodies[i].centre)].push_back(i);
+    }
+  }
+
+  bool has_room() const
+  {
+    for (int k = 0; k < D; ++k) {
+      if (edges[k] < 2.0 * reach) return false;
+    }
+    return true;
+  }
+
+  /// Whether any two overlap.
+  bool any_overlap() const
+  {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (overlaps(i, bodies[i])) return true;
+    }
+    return false;
+  }
+
+  /// As many moves as there are particles, each of one taken at random.
+  Tally sweep(const Moves &moves)
+  {
+    Tally tally;
+    std::uniform_int_distribution<std::size_t> any(0, bodies.size() - 1);
+    for (std::size_t n = 0; n < bodies.size(); ++n) {
+      ++tally.tried;
+      tally.accepted += move(any(random), moves);
+    }
+    return tally;
+  }
+
+  const Body &body(std::size_t i) const { return bodies[i]; }
+  const Quaternion &pose(std::size_t i) const { return orientation[i]; }
+
+ private:
+  std::vector<Body> bodies;
+  std::vector<Quaternion> orientation;
+  Vec<D> edges;
+  std::mt19937_64 random;
+  double reach = 0.0;
+  std::array<std::size_t, D> count;
+  std::vector<std::vector<std::size_t>> members;
+
+  /// Uniform in [-1, 1).
+  double around_zero() { return 2.0 * std::generate_canonical<double, 53>(random) - 1.0; }
+
+  bool move(std::size_t i, const Moves &moves)
+  {
+    Body trial = bodies[i];
+    for (int k = 0; k < D; ++k) trial.centre[k] += moves.shift * around_zero();
+    wrap(trial.centre);
+    // A rotation vector uniform in a ball, so that a move and its reverse are equally likely.
+    Torque<D> turn;
+    do {
+      for (int k = 0; k < ROTATIONS<D>; ++k) turn[k] = around_zero();
+    } while (norm_sq(turn) > 1.0);
+    const Quaternion q = turned(orientation[i], moves.turn * turn);
+    Model::template turn_to<D>(trial, q);
+    if (overlaps(i, trial)) return false;
+    change_cell(i, cell_at(bodies[i].centre), cell_at(trial.centre));
+    bodies[i] = trial;
+    orientation[i] = q;
+    return true;
+  }
+
+  void change_cell(std::size_t i, std::size_t from, std::size_t to)
+  {
+    if (from == to) return;
+    std::vector<std::size_t> &old = members[from];
+    *std::find(old.begin(), old.end(), i) = old.back();
+    old.pop_back();
+    members[to].push_back(i);
+  }
+
+  /// Whether `trial`, a place for particle i, overlaps any other.
+  bool overlaps(std::size_t i, const Body &trial) const
+  {
+    const std::array<std::size_t, D> centre = cell_of(trial.centre);
+    std::array<std::size_t, D> cell;
+    return overlaps_in(0, cell, centre, i, trial);
+  }
+
+  /// The cells around `centre`, each once, one dimension after another.
+  bool overlaps_in(int k, std::array<std::size_t, D> &cell, const std::array<std::size_t, D> &centre,
+                   std::size_t i, const Body &trial) const
+  {
+    if (k == D) return overlaps_members(members[flat(cell)], i, trial);
+    const std::size_t n = std::min<std::size_t>(3, count[k]);
+    for (std::size_t step = 0; step < n; ++step) {
+      cell[k] = (centre[k] + count[k] + step - (n == 3 ? 1 : 0)) % count[k];
+      if (overlaps_in(k + 1, cell, centre, i, trial)) return true;
+    }
+    return false;
+  }
+
+  bool overlaps_members(const std::vector<std::size_t> &others, std::size_t i,
+                        const Body &trial) const
+  {
+    for (const std::size_t j : others) {
+      if (j == i) continue;
+      Vec<D> r = trial.centre - bodies[j].centre;
+      for (int k = 0; k < D; ++k) r[k] -= edges[k] * std::nearbyint(r[k] / edges[k]);
+      const double bounding = trial.bounding_radius + bodies[j].bounding_radius;
+      if (norm_sq(r) >= bounding * bounding) continue;
+      Body near = bodies[j];
+      near.centre = trial.centre - r;
+      if (are_overlapping(trial, near)) return true;
+    }
+    return false;
+  }
+
+  void wrap(Vec<D> &x) const
+  {
+    for (int k = 0; k < D; ++k) x[k] -= edges[k] * std::floor(x[k] / edges[k]);
+  }
+
+  std::array<std::size_t, D> cell_of(const Vec<D> &x) const
+  {
+    std::array<std::size_t, D> cell;
+    for (int k = 0; k < D; ++k) {
+      const auto along = static_cast<std::size_t>(count[k] * (x[k] / edges[k]));
+      cell[k] = std::min(along, count[k] - 1);
+    }
+    return cell;
+  }
+
+  std::size_t flat(const std::array<std::size_t, D> &cell) const
+  {
+    std::size_t index = 0;
+    for (int k = 0; k < D; ++k) index = index * count[k] + cell[k];
+    return index;
+  }
+
+  std::size_t cell_at(const Vec<D> &x) const { return flat(cell_of(x)); }
+};
+
+}  // namespace jamshape
