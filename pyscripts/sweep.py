@@ -1,6 +1,7 @@
-"""Make many packings on all cores, several samples of every aspect ratio.
+"""Make many packings on all cores, several samples of every shape.
 
     python pyscripts/sweep.py --alpha 0 0.01 1 4 --samples 6 --n 256 --out sweep/
+    python pyscripts/sweep.py --superellipsoid 1 0.6 1 --superellipsoid 1.5 1 1 --samples 5 --n 400 --out sweep3d/
 
 Each sample is one run of make_packing.py in a process of its own, one a core. Started again after a kill it
 goes on: packings that are there are not made again, those under way go on from their own files, and those of
@@ -17,6 +18,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 from tqdm import tqdm
 
@@ -33,7 +35,17 @@ def parse() -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="Other options (--n, --u0, --kappa ...) are those of make_packing.py.",
     )
-    parser.add_argument("--alpha", type=float, nargs="+", required=True, help="aspect ratios A/R")
+    shapes = parser.add_mutually_exclusive_group(required=True)
+    shapes.add_argument("--alpha", type=float, nargs="+", default=[], help="aspect ratios A/R")
+    shapes.add_argument(
+        "--superellipsoid",
+        type=float,
+        nargs=3,
+        action="append",
+        default=[],
+        metavar=("P", "W1", "W2"),
+        help="exponent, a/b and c/b; may be given several times",
+    )
     parser.add_argument("--samples", type=int, default=6, help="seeds 1 to this (6)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes (all cores)")
     parser.add_argument("--out", type=Path, required=True, help="folder")
@@ -42,10 +54,26 @@ def parse() -> argparse.Namespace:
     return options
 
 
-def make(alpha: float, seed: int, options: argparse.Namespace) -> str | None:
+class Particle(NamedTuple):
+    """A shape: how its files are called, and the options of make_packing.py that tell it."""
+
+    name: str
+    arguments: list[str]
+
+
+def particles(options: argparse.Namespace) -> list[Particle]:
+    """List the shapes that are asked for."""
+    rods = [Particle(f"alpha{a:g}", ["--alpha", repr(a)]) for a in options.alpha]
+    for p, w1, w2 in options.superellipsoid:
+        told = ["--shape", "superellipsoid", "--p", repr(p), "--w1", repr(w1), "--w2", repr(w2)]
+        rods.append(Particle(f"p{p:g}_w{w1:g}_{w2:g}", told))
+    return rods
+
+
+def make(particle: Particle, seed: int, options: argparse.Namespace) -> str | None:
     """Make one sample; return its complaint if it fails."""
-    out = options.out / f"alpha{alpha:g}_seed{seed}.h5"
-    arguments = ["--alpha", repr(alpha), "--seed", str(seed), "--out", str(out), *options.extra]
+    out = options.out / f"{particle.name}_seed{seed}.h5"
+    arguments = [*particle.arguments, "--seed", str(seed), "--out", str(out), *options.extra]
     log = out.with_suffix(".log")
     with log.open("a") as errors:
         done = subprocess.run(
@@ -64,10 +92,10 @@ def make(alpha: float, seed: int, options: argparse.Namespace) -> str | None:
 def main(options: argparse.Namespace) -> int:
     """Run all samples; return the exit code."""
     options.out.mkdir(parents=True, exist_ok=True)
-    samples = [(a, s) for s in range(1, options.samples + 1) for a in options.alpha]
+    samples = [(p, s) for s in range(1, options.samples + 1) for p in particles(options)]
     failures = []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        runs = [pool.submit(make, alpha, seed, options) for alpha, seed in samples]
+        runs = [pool.submit(make, particle, seed, options) for particle, seed in samples]
         for run in tqdm(concurrent.futures.as_completed(runs), total=len(runs), unit="packing"):
             if complaint := run.result():
                 failures.append(complaint)

@@ -1,4 +1,4 @@
-"""Contacts, forces and rattlers of a packing of spherocylinders, without LAMMPS.
+"""Contacts, forces and rattlers of a packing, without LAMMPS.
 
 The geometry and the energies are those of `lammps_plugin/contact/`; here they are only summed.
 """
@@ -19,6 +19,7 @@ from jamshape.packing import Box, FloatArray, IntArray, Packing
 BoolArray = NDArray[np.bool_]
 
 _TOUCHING, _CROSSING = 1, 2  # ContactStatus of contact/contact.hpp
+_CORE = {"spherocylinder": "spines", "superellipsoid": "centres"}  # what must not cross
 
 # Bounding spheres are larger by this fraction, so that rounding never drops a contact.
 _BOUNDING_MARGIN = 1e-9
@@ -47,7 +48,7 @@ class Bonds:
     point : (B, D) array of float64, [length]
         Where the surfaces interpenetrate, next to the position of i as the packing gives it.
     distance, reach : (B,) array of float64, [length]
-        r and d = R_i + R_j of the overlap 1 - r/d.
+        r and d = R_i + R_j of the overlap 1 - r/d; of superellipsoids that is 1 - eta^2.
     energy : (B,) array of float64, [energy]
     on_side : (B, 2) array of bool
         Whether the point lies on the flat part of i, of j.
@@ -170,13 +171,31 @@ def bodies(packing: Packing) -> FloatArray:
     return np.column_stack([packing.position, packing.axes, packing.half_length, packing.radius])
 
 
+def superellipsoid_bodies(packing: Packing) -> FloatArray:
+    """Pack shapes and poses of superellipsoids into the rows that `jamshape._contact` takes.
+
+    Returns
+    -------
+    (N, 6) array in 2D, (N, 11) in 3D, of float64
+        Centre, angle or quaternion, D semi-axes, exponent.
+    """
+    axes = packing.diameters[:, : packing.dimension] / 2
+    return np.column_stack([packing.position, packing.orientation, axes, packing.exponent])
+
+
+def spheres(position: FloatArray, radius: FloatArray) -> FloatArray:
+    """(N, D + 2) rows for `near_pairs` that are spheres (discs) of these radii."""
+    return np.column_stack([position, np.zeros(len(radius)), radius])
+
+
 def near_pairs(first: FloatArray, second: FloatArray, box: Box) -> NearPairs:
     """Find all pairs whose bounding spheres overlap, with all periodic images.
 
     Parameters
     ----------
-    first, second : (M, 6) or (M, 8) array of float64
-        Rows of `bodies`, anywhere, in the box or not.
+    first, second : (M, ...) array of float64
+        Rows of `bodies` or `spheres`, anywhere, in the box or not: the centre first, and last two lengths
+        whose sum is the radius of the bounding sphere.
     box : Box
         Of any size; a pair is there several times when it is shorter than the bodies.
 
@@ -218,7 +237,7 @@ def each_once(near: NearPairs) -> NearPairs:
 
 
 def shifted(rows: FloatArray, shift: IntArray, box: Box) -> FloatArray:
-    """Move rows (M, 6) or (M, 8) of `bodies` by (M, D) box edges."""
+    """Move rows (M, ...), whose first D columns are positions, by (M, D) box edges."""
     D = box.dimension
     return np.column_stack([rows[:, :D] + shift * box.edges, rows[:, D:]])
 
@@ -229,10 +248,11 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
     Parameters
     ----------
     packing : Packing
-        Spherocylinders; positions need not lie in the box.
+        Positions need not lie in the box.
     k_e : float, [energy]
+        The epsilon of superellipsoids.
     sides : {1, 2}
-        Bonds of a side-to-side contact: one in the dynamics, two for minima and modes.
+        Bonds of a side-to-side contact of spherocylinders: one in the dynamics, two for minima and modes.
 
     Returns
     -------
@@ -241,12 +261,18 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
     Raises
     ------
     ValueError
-        If two spines cross, or an argument is out of its range.
+        If two spines or centres cross, or an argument is out of its range.
     """
-    rows = bodies(packing)
-    near = each_once(near_pairs(rows, rows, packing.box))
+    are_rods = packing.shape_style == "spherocylinder"
+    rows = bodies(packing) if are_rods else superellipsoid_bodies(packing)
+    bounds = rows if are_rods else spheres(packing.position, outer_radius(packing))
+    near = each_once(near_pairs(bounds, bounds, packing.box))
     i, j = rows[near.first], shifted(rows[near.second], near.shift, packing.box)
-    found = _contact.spherocylinder_contacts(i, j, k_e, sides)
+    if are_rods:
+        found = _contact.spherocylinder_contacts(i, j, k_e, sides)
+        found["bond_reach"] = np.repeat((i[:, -1] + j[:, -1])[:, None], 2, axis=1)
+    else:
+        found = _with_slots(_contact.superellipsoid_contacts(i, j, k_e))
     _refuse_crossing(packing, near, found["status"])
 
     touching = found["status"] == _TOUCHING
@@ -263,7 +289,7 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
         force=found["force"],
         torque_i=_rotation(found["torque_i"]),
         torque_j=_rotation(found["torque_j"]),
-        bonds=_bonds(found, i, j),
+        bonds=_bonds(found, i),
     )
 
 
@@ -356,7 +382,7 @@ def _refuse_crossing(packing: Packing, near: NearPairs, status: NDArray[np.int32
     if len(crossing):
         first, second = packing.id[near.first[crossing[0]]], packing.id[near.second[crossing[0]]]
         msg = (
-            f"the spines of particles {first} and {second} cross (1 of {len(crossing)} such"
+            f"the {_CORE[packing.shape_style]} of particles {first} and {second} cross (1 of {len(crossing)} such"
             " pairs), expected overlaps smaller than the particles; take a packing without crossings"
         )
         raise ValueError(msg)
@@ -367,8 +393,29 @@ def _rotation(torque: FloatArray) -> FloatArray:
     return torque[:, 0] if torque.shape[1] == 1 else torque
 
 
-def _bonds(found: dict[str, NDArray[Any]], i: FloatArray, j: FloatArray) -> Bonds:
-    contact, slot = np.nonzero(np.arange(2) < found["n_bonds"][:, None])
+def outer_radius(packing: Packing) -> FloatArray:
+    """(N,) radii of the spheres around the particles, [length]."""
+    if packing.shape_style == "spherocylinder":
+        return packing.half_length + packing.radius
+    radius: FloatArray = _contact.superellipsoid_bounding_radius(
+        packing.diameters, packing.exponent, packing.dimension
+    )
+    return radius
+
+
+def _with_slots(found: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Give contacts of one bond the arrays (M, slots, ...) of those that may have more."""
+    one = {n: v[:, None] if n.startswith("bond_") else v for n, v in found.items()}
+    nowhere = np.zeros((len(found["status"]), 1), bool)
+    one |= {"bond_on_side_i": nowhere, "bond_on_side_j": nowhere}
+    one |= {"bond_force": found["force"][:, None], "bond_energy": found["energy"][:, None]}
+    n_bonds = (found["status"] == _TOUCHING).astype(np.int64)
+    return one | {"n_bonds": n_bonds, "kind": np.zeros_like(n_bonds)}
+
+
+def _bonds(found: dict[str, NDArray[Any]], i: FloatArray) -> Bonds:
+    slots = found["bond_distance"].shape[1]
+    contact, slot = np.nonzero(np.arange(slots) < found["n_bonds"][:, None])
 
     def column(name: str) -> NDArray[Any]:
         return found[f"bond_{name}"][contact, slot]
@@ -379,7 +426,7 @@ def _bonds(found: dict[str, NDArray[Any]], i: FloatArray, j: FloatArray) -> Bond
         force=column("force"),
         point=i[contact, : found["force"].shape[1]] + column("arm_i"),
         distance=column("distance"),
-        reach=(i[:, -1] + j[:, -1])[contact],
+        reach=column("reach"),
         energy=column("energy"),
         on_side=np.column_stack([column("on_side_i"), column("on_side_j")]),
     )

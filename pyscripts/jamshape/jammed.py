@@ -345,7 +345,7 @@ def write_minimum(
     packing = minimum.state.packing(landscape.particles)
     measured, observables = measure(landscape, minimum)
     write_packing(path, packing, dict(attributes) | measured, observables)
-    steps, seconds, errors = _thinned(minimum.history)
+    steps, seconds, errors = thinned(minimum.history)
     RunWriter.open(path).append_report(steps, seconds, errors)
 
 
@@ -366,7 +366,7 @@ def measure(
     attributes: dict[str, float | str] = {
         "outcome": minimum.outcome.value,
         "phi": packing.phi,
-        "phi_J": _onset_by_energy(packing.phi, u, pressure),
+        "phi_J": energy_onset(packing.phi, u, pressure),
         "u": u,
         "p": pressure,
         "residual_force": float(largest[0]),
@@ -385,7 +385,7 @@ def measure(
     return attributes, observables
 
 
-def _onset_by_energy(phi: float, u: float, pressure: float) -> float:
+def energy_onset(phi: float, u: float, pressure: float) -> float:
     """Phi where sqrt(u), linear in phi, vanishes: du/dphi = p / phi - u / phi at fixed particles.
 
     u = U / V and dU/dV = -p; with V = const / phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
@@ -393,7 +393,8 @@ def _onset_by_energy(phi: float, u: float, pressure: float) -> float:
     return phi - 2 * phi * u / (pressure + u) if u > 0 else math.nan
 
 
-def _thinned(history: History) -> tuple[list[int], list[float], list[float]]:
+def thinned(history: History) -> tuple[list[int], list[float], list[float]]:
+    """Pick rows of a history for a report: evaluations, seconds, residuals."""
     rows = np.unique(np.linspace(0, len(history.residual) - 1, _REPORT_ROWS).astype(int))
     picked = zip(
         *((history.evaluations[r], history.wall_seconds[r], history.residual[r]) for r in rows),

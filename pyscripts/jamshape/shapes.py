@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jamshape import _contact
-from jamshape.contacts import NearPairs, bodies, each_once, near_pairs, shifted
+from jamshape.contacts import (
+    NearPairs,
+    bodies,
+    each_once,
+    near_pairs,
+    outer_radius,
+    shifted,
+    spheres,
+    superellipsoid_bodies,
+)
 from jamshape.packing import FloatArray, IntArray, Packing
 
 
@@ -65,7 +74,7 @@ class Spherocylinders:
         self.core = "spines"
         self.rotation_length = self.turning_radius = packing.half_length
         self.inner_radius = packing.radius
-        self.outer_radius = packing.half_length + packing.radius
+        self.outer_radius = outer_radius(packing)
 
     def near(self, packing: Packing, margin: float) -> NearPairs:
         """As `Shape.near`."""
@@ -105,9 +114,7 @@ class Superellipsoids:
         self._packing, self._epsilon = packing, k_e
         self.core = "centres"
         axes = packing.diameters[:, : packing.dimension] / 2
-        self.outer_radius = _contact.superellipsoid_bounding_radius(
-            packing.diameters, packing.exponent, packing.dimension
-        )
+        self.outer_radius = outer_radius(packing)
         self.inner_radius = axes.min(axis=1)
         is_round = packing.is_round
         self.rotation_length = np.where(is_round, 0.0, packing.diameters[:, 0] / 2)
@@ -115,10 +122,8 @@ class Superellipsoids:
 
     def near(self, packing: Packing, margin: float) -> NearPairs:
         """As `Shape.near`."""
-        spheres = np.column_stack([
-            packing.position, np.zeros(packing.n), self.outer_radius + 0.5 * margin,
-        ])  # fmt: skip
-        found = each_once(near_pairs(spheres, spheres, packing.box))
+        wide = spheres(packing.position, self.outer_radius + 0.5 * margin)
+        found = each_once(near_pairs(wide, wide, packing.box))
         rows = superellipsoid_bodies(packing)
         i, j = rows[found.first], shifted(rows[found.second], found.shift, packing.box)
         return found.take(_contact.superellipsoid_near(i, j, margin))
@@ -149,20 +154,6 @@ class Superellipsoids:
             axes[own, :2] = _across(packing.body_axes(k)[own])
             axes[own, 2] = 0.0
         return axes
-
-
-def superellipsoid_bodies(packing: Packing) -> FloatArray:
-    """Pack shapes and poses of superellipsoids into the rows that `jamshape._contact` takes.
-
-    Returns
-    -------
-    (N, 6) array in 2D, (N, 11) in 3D, of float64
-        Centre, angle or quaternion, D semi-axes, exponent.
-    """
-    D = packing.dimension
-    return np.column_stack([
-        packing.position, packing.orientation, packing.diameters[:, :D] / 2, packing.exponent,
-    ])  # fmt: skip
 
 
 def shape_of(packing: Packing, k_e: float, sides: int) -> Shape:

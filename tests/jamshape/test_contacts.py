@@ -350,5 +350,3 @@ def test_refuses():
         find_contacts(apart, 1.0, 3)
     with pytest.raises(ValueError, match="k_e is -1"):
         find_contacts(apart, -1.0)
-    with pytest.raises(ValueError, match="shape style is 'superellipsoid', expected 'sphero"):
-        find_contacts(apart.with_(shape_style="superellipsoid"))
