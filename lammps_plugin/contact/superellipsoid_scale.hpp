@@ -28,8 +28,8 @@ template <int D, class T> struct FoundTangency {
   bool is_apart;  // decided by a separating plane; the tangency was not sought then
 };
 
-/// What is asked of a pair: r = x_i - x_j, whether "apart" is answer enough where a plane divides the
-/// bodies, and a normal to begin with (or null).
+/// What is asked of a pair: r = x_i - x_j, whether "apart" is answer enough where a plane divides
+/// the bodies, and a normal to begin with (or null).
 template <int D, class T> struct TangencyWish {
   Vec<D, T> r;
   bool may_stop_apart;
@@ -125,8 +125,8 @@ template <int D, class S> struct TangencyProblem {
 };
 
 /// Both bodies by their support functions, p <= 1, where these are smooth. With F = h_i + h_j the
-/// scale at which two bodies touch is the largest r.n / F(n); the n with F(n) = r.n / F(n) minimises
-/// the convex F^2 / 2 - r.n, that is F grad F = r, and eta = F there.
+/// scale at which two bodies touch is the largest r.n / F(n); the n with F(n) = r.n / F(n)
+/// minimises the convex F^2 / 2 - r.n, that is F grad F = r, and eta = F there.
 template <int D, class S> class ByNormal {
  public:
   static constexpr int M = D;
@@ -204,9 +204,9 @@ template <int D, class T> class ByNormalOfEllipsoids {
     at.residual = F * slope - r;
     for (int a = 0; a < D; ++a) {
       for (int b = 0; b <= a; ++b) {
-        at.jacobian.row[a][b] =
-            slope[a] * slope[b] + over_i * (A_i.row[a][b] - i.point[a] * i.point[b]) +
-            over_j * (A_j.row[a][b] - j.point[a] * j.point[b]);
+        at.jacobian.row[a][b] = slope[a] * slope[b] +
+                                over_i * (A_i.row[a][b] - i.point[a] * i.point[b]) +
+                                over_j * (A_j.row[a][b] - j.point[a] * j.point[b]);
       }
     }
     return at;
@@ -450,8 +450,8 @@ template <class T> T smooth_exponent(double p)
 }  // namespace detail
 
 /// Finds the tangency of two bodies in plain numbers T. From the ellipsoids of the same axes, where
-/// Newton's method takes four steps, it follows the solution as the exponents grow, in stages of one
-/// to a few Newton steps each. Where a stage fails it starts again with finer ones. Method and
+/// Newton's method takes four steps, it follows the solution as the exponents grow, in stages of
+/// one to a few Newton steps each. Where a stage fails it starts again with finer ones. Method and
 /// measurements: analysis/contact_error.py.
 template <int D, class T> class TangencySearch {
  public:
@@ -541,8 +541,8 @@ template <int D, class T> class TangencySearch {
     const bool i_by_normal = detail::is_by_normal(i.p), j_by_normal = detail::is_by_normal(j.p);
     const T g_i = i_by_normal ? at.scale : Norm::gauge(i).value(at.point_i);
     const T above = std::max(g_i, Norm::gauge(j).value(r - at.point_i));
-    const T below = j_by_normal ? at.scale
-                                : dot(r, at.normal) / (T(1) + Norm::support(j).value(at.normal));
+    const T below =
+        j_by_normal ? at.scale : dot(r, at.normal) / (T(1) + Norm::support(j).value(at.normal));
     const T gap = std::max(above - at.scale, at.scale - below) / at.scale;
     const bool is_bound = std::isfinite(above) && std::isfinite(below) && at.scale > T(0);
     found.gap = is_bound ? std::max(gap, T(0)) : std::numeric_limits<T>::infinity();
@@ -637,9 +637,9 @@ template <int D, class T> class TangencySearch {
     bool is_converged = false;
     for (int stage = 1; stage <= last; ++stage) {
       const T share = T(stage) / last;
-      const Equations equations(detail::TangencyProblem<D, T>{
-          i, j, r, stage < last ? between(e_i, share) : e_i,
-          stage < last ? between(e_j, share) : e_j});
+      const Equations equations(
+          detail::TangencyProblem<D, T>{i, j, r, stage < last ? between(e_i, share) : e_i,
+                                        stage < last ? between(e_j, share) : e_j});
       if (stage == 1) z = equations.start(found.at);
       is_converged = newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations);
       if (stage == last) found.at = equations.tangency(z);
@@ -699,8 +699,8 @@ FoundTangency<D, long double> tangency_of(const SuperellipsoidBody<D, long doubl
                                           const TangencyWish<D, long double> &wish)
 {
   const SuperellipsoidBody<D, double> short_i = plain<double>(i), short_j = plain<double>(j);
-  const auto begun = tangency_of(
-      short_i, short_j, TangencyWish<D, double>{plain<double>(wish.r), false, nullptr});
+  const auto begun =
+      tangency_of(short_i, short_j, TangencyWish<D, double>{plain<double>(wish.r), false, nullptr});
   FoundTangency<D, long double> found{plain<long double>(begun.at), begun.gap, begun.iterations,
                                       begun.is_fallback, false};
   const TangencySearch<D, long double> search(i, j, wish);

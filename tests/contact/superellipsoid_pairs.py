@@ -69,7 +69,7 @@ class Bodies:
         return self.replaced(centre=centre)
 
 
-def random_bodies(rng, n, dimension, p, axis_range=np.sqrt(10.0)):
+def random_bodies(rng, n, dimension, p, axis_range=10.0**0.5):
     """Semi-axes within a factor axis_range**2 of each other, any orientation."""
     spread = np.log(axis_range)
     turn = rng.normal(size=(n, 4))
@@ -80,7 +80,7 @@ def random_bodies(rng, n, dimension, p, axis_range=np.sqrt(10.0)):
     return Bodies(rng.normal(size=(n, dimension)), turn, axes, np.broadcast_to(p, n).astype(float))
 
 
-def random_pairs(rng, n, dimension, p_i, p_j=None, size_range=np.sqrt(10.0)):
+def random_pairs(rng, n, dimension, p_i, p_j=None, size_range=10.0**0.5):
     i = random_bodies(rng, n, dimension, p_i)
     j = random_bodies(rng, n, dimension, p_i if p_j is None else p_j)
     size = np.exp(rng.uniform(-np.log(size_range), np.log(size_range), (n, 1)))

@@ -99,7 +99,9 @@ def test_double_and_extended_agree(dimension, measured):
     """The whole error of doubles: what they round, amplified by how sharp the bodies are."""
     rng = np.random.default_rng(4)
     i, j = pairs_of(5, dimension, *rng.choice(EXPONENTS, (2, PAIRS)))
-    short, long = (_contact.superellipsoid_derivatives(*packed(i, j), 1.0, e) for e in (False, True))
+    short, long = (
+        _contact.superellipsoid_derivatives(*packed(i, j), 1.0, e) for e in (False, True)
+    )
     for name, tolerance in (("energy", 1e-12), ("force", 1e-10), ("curvature", 1e-7)):
         size = np.abs(long[name]).reshape(PAIRS, -1).max(1)
         error = np.abs(short[name] - long[name]).reshape(PAIRS, -1).max(1) / size

@@ -96,7 +96,7 @@ def check_against_oracle(i, j, measured, tolerance):
 @pytest.mark.parametrize("p", EXPONENTS)
 def test_scale_is_that_of_independent_optimisers(p, dimension, measured):
     rng = np.random.default_rng(round(1000 * p) + dimension)
-    i, j = random_pairs(rng, 15, dimension, p)
+    i, j = random_pairs(rng, 20, dimension, p)
     check_against_oracle(i, j, measured, 1e-7 if p in (0.55, 10.0) else 1e-10)
 
 

@@ -12,7 +12,9 @@ from jamshape import _contact
 
 def integral(function):
     """Over [-1, 1], even; the root at 1 is taken out by x = 1 - u^4."""
-    value, error = quad(lambda u: 8.0 * u**3 * function(1.0 - u**4), 0.0, 1.0, epsabs=0, epsrel=1e-12)
+    value, error = quad(
+        lambda u: 8.0 * u**3 * function(1.0 - u**4), 0.0, 1.0, epsabs=0, epsrel=1e-12
+    )
     assert error < 1e-9 * value
     return value
 
