@@ -51,7 +51,7 @@ template <int D, class S> class SuperellipsoidContact {
   Vec<D, S> r;
   Harmonic law;
 
-  static constexpr bool IS_PLAIN = std::is_same_v<S, T>;
+  static constexpr bool IS_PLAIN = sizeof(S) == sizeof(T);  // no derivatives beside the value
 
   Contact<D, S> evaluate_with(Vec<D, T> *last) const
   {

@@ -507,17 +507,16 @@ template <int D, class T> class TangencySearch {
   /// them.
   bool is_overlap() const
   {
-    if (separates(r)) return false;
     FoundTangency<D, T> found{};
     const detail::ByNormalOfEllipsoids<D, T> ellipsoids(i, j, r);
     Vec<D, T> n = ellipsoids.start();
-    for (const T tolerance : {T(1), ROUGH}) {
-      newton(ellipsoids, n, tolerance, found.iterations);
-      const Vec<D, T> point = ellipsoids.tangency(n).point_i;
-      if (reach_of(point) < 1) return true;
-      if (separates(n)) return false;
-    }
-    return find().at.scale < 1;
+    newton(ellipsoids, n, ROUGH, found.iterations);
+    found.at = ellipsoids.tangency(n);
+    if (reach_of(found.at.point_i) < 1) return true;
+    if (separates(n)) return false;
+    if (are_ellipsoids()) return of_ellipsoids(ellipsoids, n).at.scale < 1;
+    follow(found);
+    return found.at.scale < 1;
   }
 
   /// From a tangency near the one sought, found before or in fewer digits; false if it leads
