@@ -52,8 +52,8 @@ template <int D> SubstrateDrag substrate_drag(const Superellipsoid &shape)
   const double m = 0.5 / shape.p, all = std::lgamma(1.0 + D * m);
   double volume = std::exp(D * std::lgamma(1.0 + m) - all);
   for (int k = 0; k < D; ++k) volume *= 2.0 * shape.semi_axes[k];
-  const double ratio = std::exp(std::lgamma(3.0 * m) - std::lgamma(m) + all -
-                                std::lgamma(1.0 + (D + 2) * m));
+  const double ratio =
+      std::exp(std::lgamma(3.0 * m) - std::lgamma(m) + all - std::lgamma(1.0 + (D + 2) * m));
   Vec<3> mean_sq{};
   for (int k = 0; k < D; ++k) mean_sq[k] = ratio * shape.semi_axes[k] * shape.semi_axes[k];
   const double about_z = mean_sq[0] + mean_sq[1];
@@ -74,7 +74,8 @@ template <int D, class S = double> struct SuperellipsoidBody {
 template <class T> class Exponent {
  public:
   explicit Exponent(T exponent) :
-      e(exponent), whole(exponent == std::floor(exponent) && exponent <= T(32) ? static_cast<int>(exponent) : -1)
+      e(exponent),
+      whole(exponent == std::floor(exponent) && exponent <= T(32) ? static_cast<int>(exponent) : -1)
   {
   }
 
@@ -107,11 +108,12 @@ template <int D, class T> struct CurvedNormAt {
   T hessian[D][D];
 };
 
-/// N(v) = (sum |s_k v_k|^(e+1))^(1/(e+1)), v_k along the body's axes. Both norms of a superellipsoid
-/// are of this form, each the other's dual:
+/// N(v) = (sum |s_k v_k|^(e+1))^(1/(e+1)), v_k along the body's axes. Both norms of a
+/// superellipsoid are of this form, each the other's dual:
 ///     the gauge g of a point, 1 on the surface:     s_k = 1 / a_k, e = 2p - 1
 ///     the support function h of a direction:        s_k = a_k,     e = 1 / (2p - 1)
-/// The gradient of g at a point is a normal there; the gradient of h the point where that is normal.
+/// The gradient of g at a point is a normal there; the gradient of h the point where that is
+/// normal.
 template <int D, class S> class PowerNorm {
  public:
   using T = ValueOf<S>;
@@ -142,7 +144,7 @@ template <int D, class S> class PowerNorm {
 
   NormAt<D, S> at(const Vec<D, S> &v) const
   {
-    const Components c = components(v);
+    const Components c = components<false>(v);
     NormAt<D, S> norm{c.norm, {}};
     for (int k = 0; k < D; ++k) norm.gradient += c.gradient[k] * body->axis[k];
     return norm;
@@ -151,7 +153,7 @@ template <int D, class S> class PowerNorm {
   /// For plain numbers only.
   CurvedNormAt<D, T> curved_at(const Vec<D, T> &v) const
   {
-    const Components c = components(v);
+    const Components c = components<true>(v);
     CurvedNormAt<D, T> norm{c.norm, {}, {}};
     for (int k = 0; k < D; ++k) norm.gradient += c.gradient[k] * body->axis[k];
     const T bend = e.value() / c.norm;
@@ -168,20 +170,21 @@ template <int D, class S> class PowerNorm {
  private:
   const SuperellipsoidBody<D, S> *body;
   Vec<D, T> scale;
-  Exponent<T> e;
+  Exponent<T> e, e_minus_one;
 
   PowerNorm(const SuperellipsoidBody<D, S> &of, const Vec<D, T> &scales, T exponent) :
-      body(&of), scale(scales), e(exponent)
+      body(&of), scale(scales), e(exponent), e_minus_one(exponent - 1)
   {
   }
 
   struct Components {
     S norm;
     S gradient[D];
-    T bend[D];  // s_k^2 (|s_k v_k| / N)^(e-1)
+    T bend[D];  // s_k^2 (|s_k v_k| / N)^(e-1), where CURVED
   };
 
-  Components components(const Vec<D, S> &v) const
+  /// Second derivatives are for plain numbers and e >= 1, where the norm is smooth.
+  template <bool CURVED> Components components(const Vec<D, S> &v) const
   {
     S t[D];
     int largest = 0;
@@ -192,20 +195,24 @@ template <int D, class S> class PowerNorm {
     const S most = abs(t[largest]), inverse = T(1) / most;
     Components c;
     S sum = T(0), power[D];
+    T lower_power[D]{};
     for (int k = 0; k < D; ++k) {  // nothing over- or underflows: the largest ratio is 1
       const S ratio = abs(t[k]) * inverse;
-      power[k] = e(ratio);
+      if constexpr (CURVED) {
+        lower_power[k] = e_minus_one(ratio);
+        power[k] = ratio * lower_power[k];
+      } else {
+        power[k] = e(ratio);
+      }
       sum += ratio * power[k];
     }
     const S grown = root(sum);
     c.norm = most * grown;
     const S shrink = grown / sum;  // (most / N)^e
+    const T shrink_lower = value_of(shrink) * value_of(grown);
     for (int k = 0; k < D; ++k) {
-      const S w = power[k] * shrink;
-      c.gradient[k] = copysign(scale[k] * w, t[k]);
-      const T ratio = value_of(abs(t[k])) / value_of(c.norm);
-      c.bend[k] = e.value() == 1 ? scale[k] * scale[k]
-                                 : (ratio > 0 ? scale[k] * scale[k] * value_of(w) / ratio : T(0));
+      c.gradient[k] = copysign(scale[k] * power[k] * shrink, t[k]);
+      c.bend[k] = scale[k] * scale[k] * lower_power[k] * shrink_lower;
     }
     return c;
   }
