@@ -2,6 +2,7 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
+from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 from test_contacts import make, pressed, scaled
 
 from jamshape.contacts import find_contacts, find_rattlers, forces
@@ -28,6 +29,9 @@ PRESSED = {
     "spheres and rods in space": partial(
         pressed, n=16, dimension=3, mixture=half_of_them_discs(16), phi=0.15
     ),
+    "ellipsoids": ellipsoids,
+    "octahedra and boxes": octahedra_and_boxes,
+    "superellipses": superellipses,
 }
 
 
@@ -62,8 +66,9 @@ def slope_by_strain(state, value):
 
 def test_discs_have_no_rotation_and_rods_one_or_three():
     sizes = {name: Landscape(pressed_named(name)).size for name in PRESSED}
-    expected = (24 * 2, 24 * 3, 24 * 3, 24 * 2 + 12, 16 * 6, 16 * 3 + 8 * 3)
-    assert tuple(sizes.values()) == expected
+    rods = (24 * 2, 24 * 3, 24 * 3, 24 * 2 + 12, 16 * 6, 16 * 3 + 8 * 3)
+    superellipsoids = (11 * 6 + 3, 12 * 6, 14 * 3 + 2 * 2)  # a sphere, discs
+    assert tuple(sizes.values()) == rods + superellipsoids
     landscape = Landscape(pressed_named("discs and rods"))
     discs = landscape.particles.half_length == 0
     spread = landscape.components(np.ones(landscape.size))
@@ -83,7 +88,8 @@ def test_energy_and_forces_are_those_of_the_contacts(packing, sides):
     assert found.strain_gradient == pytest.approx(
         -packing.dimension * packing.box.volume * expected.pressure, rel=1e-12
     )
-    A, turns = packing.half_length, packing.half_length > 0
+    A = Landscape(packing).rotation_length
+    turns = A > 0
     components = Landscape(packing).components(found.gradient)
     D = packing.dimension
     assert_close(-components[:, :D], expected.force, 1e-12)
@@ -148,7 +154,7 @@ def test_curvature_knows_the_rattlers(packing):
 def test_pairs_are_looked_for_anew_after_moves_and_strains(packing):
     landscape, state = Landscape(packing), State.of(packing)
     rng = np.random.default_rng(5)
-    radius = packing.radius.min()
+    radius = landscape.inner_radius.min()
     n_compared = n_with_new_bonds = 0
     bonds = landscape.evaluate(state).n_bonds
     for size in (1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0):
@@ -178,7 +184,7 @@ def test_pairs_are_found_while_the_state_creeps(packing):
     # Many steps, each far smaller than what the list of pairs allows.
     landscape, state = Landscape(packing), State.of(packing)
     step = np.random.default_rng(6).normal(size=landscape.size)
-    step *= 0.01 * packing.radius.min() / np.abs(step).max()
+    step *= 0.01 * landscape.inner_radius.min() / np.abs(step).max()
     for _ in range(30):
         state = landscape.displaced(state.strained(1e-3), step)
         found, expected = landscape.evaluate(state), Landscape(packing).evaluate(state)
