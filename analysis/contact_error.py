@@ -96,11 +96,9 @@ def measure(rng: np.random.Generator, p: float | None, axis_ratio: float, n: int
 
 def table(rows: list[dict[str, Any]]) -> str:
     """Write the rows as Markdown."""
-    lines = [
-        "| p | w | largest gap | uncertain | fallbacks, of | iterations, most | warm | "
-        "us contact | us warm | us apart | us overlap |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
+    head = "| p | w | largest gap | uncertain | fallbacks, of | iterations, most | warm | "
+    head += "us contact | us warm | us apart | us overlap |"
+    lines = [head, "|" + 11 * " --- |"]
     lines += [
         f"| {r['p'] or 'any'} | {r['axis_ratio']:g} | {r['largest_gap']:.1e} | {r['uncertain']} | "
         f"{r['fallbacks']}, {r['pairs']} | {r['iterations']:.1f}, {r['iterations_most']} | "

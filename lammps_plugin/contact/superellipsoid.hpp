@@ -22,6 +22,10 @@ struct SuperellipsoidLaw {
 /// Centres closer than this times the sum of the bounding radii are one point: no normal exists.
 inline constexpr double COINCIDENT_CENTRES = 1e-14;
 
+/// A scale with a larger relative error bar is no contact that could be computed: it is reported as
+/// such (CROSSING), not dropped. None has been seen.
+inline constexpr double USELESS = 1e-6;
+
 /// Contact of two superellipsoids in 2D or 3D. With x = eta^2, n the common normal where the scaled
 /// bodies touch, grad_r x = 2 x n / (r.n): the printed force (Yuan et al. 2019, Eq. 3) lacks one
 /// eta. Torques are by the envelope theorem those of this force at the point of tangency of the
@@ -64,7 +68,9 @@ template <int D, class S> class SuperellipsoidContact {
     if (is_round(i) && is_round(j)) return touching(spheres(), T(0));  // bounded by themselves
     const FoundTangency<D, T> found = find_tangency(last);
     if (last != nullptr) *last = found.at.normal;
-    if (found.is_apart || !(found.at.scale < 1)) return empty(ContactStatus::APART);
+    if (found.is_apart) return empty(ContactStatus::APART);
+    if (!(found.gap < T(USELESS))) return empty(ContactStatus::CROSSING);
+    if (!(found.at.scale < 1)) return empty(ContactStatus::APART);
     return touching(in_scalar(found.at), found.gap);
   }
 

@@ -514,7 +514,9 @@ template <int D, class T> class TangencySearch {
     found.at = ellipsoids.tangency(n);
     if (reach_of(found.at.point_i) < 1) return true;
     if (separates(n)) return false;
-    if (are_ellipsoids()) return of_ellipsoids(ellipsoids, n).at.scale < 1;
+    if (are_ellipsoids()) {
+      return of_ellipsoids(ellipsoids, ellipsoids.scaled(n)).at.scale < 1;
+    }
     follow(found);
     return found.at.scale < 1;
   }
@@ -562,7 +564,7 @@ template <int D, class T> class TangencySearch {
                                     Vec<D, T> n) const
   {
     FoundTangency<D, T> found{};
-    // At this length of n a plane between the bodies has r.n >= 1.
+    // n has the length that `scaled` gives, where r.n is the square of r.n / F.
     if (may_stop_apart && dot(r, n) >= T(1)) return apart(found, n);
     newton(ellipsoids, n, TOLERANCE, found.iterations);
     found.at = ellipsoids.tangency(n);
