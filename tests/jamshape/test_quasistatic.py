@@ -38,7 +38,7 @@ def test_the_end_is_the_first_jammed_packing_close_to_the_tolerance(ended):
 
 def test_steps_are_halved_from_the_densest_unjammed_state(ended):
     *_, protocol, rows = ended
-    phi, step, loose = np.array(rows).T
+    _, step, loose = np.array(rows).T
     assert step[0] == protocol.step
     assert set(np.log2(protocol.step / step)) <= set(range(40))
     assert (np.diff(step) <= 0).all()
