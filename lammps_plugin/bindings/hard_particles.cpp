@@ -39,8 +39,9 @@ struct HardArrays {
   }
 };
 
-template <int D> nb::dict sweeps(const HardArrays &arrays, const Moves &moves, std::size_t n_sweeps,
-                                 std::uint64_t seed)
+template <int D>
+nb::dict sweeps(const HardArrays &arrays, const Moves &moves, std::size_t n_sweeps,
+                std::uint64_t seed)
 {
   using Model = SuperellipsoidModel;
   std::vector<Model::Body<D>> bodies;
@@ -48,7 +49,8 @@ template <int D> nb::dict sweeps(const HardArrays &arrays, const Moves &moves, s
   for (std::size_t i = 0; i < arrays.n(); ++i) {
     const auto shape = Model::shape_from(0.5 * read_vec<3>(arrays.diameters.data() + 3 * i),
                                          arrays.exponent.data()[i]);
-    require(shape.has_value(), std::string("a particle is no such shape: ") + Model::SHAPE_RULE + ".");
+    require(shape.has_value(),
+            std::string("a particle is no such shape: ") + Model::SHAPE_RULE + ".");
     at.push_back(arrays.orientation_of<D>(i));
     bodies.push_back(Model::body<D>(*shape));
     Model::turn_to<D>(bodies.back(), at.back());
@@ -96,12 +98,14 @@ nb::dict superellipsoid_sweeps(const Array2<double> &diameters, const Array1<dou
 void export_hard_particles(nb::module_ &m)
 {
   using namespace nb::literals;
-  m.def("superellipsoid_sweeps", &superellipsoid_sweeps, "diameters"_a, "exponent"_a, "position"_a,
-        "orientation"_a, "edges"_a, "shift"_a, "turn"_a, "n_sweeps"_a, "seed"_a,
-        "Monte Carlo sweeps of N hard superellipsoids in a periodic box: diameters (N, 3), exponent\n"
-        "(N,), position (N, D), orientation (N, 1) angles or (N, 4) quaternions, edges (D,); moves of\n"
-        "at most `shift` along each axis and `turn` radians. Returns a dict: position (in the box\n"
-        "[0, edges)), orientation, and how many moves were tried and accepted.");
+  m.def(
+      "superellipsoid_sweeps", &superellipsoid_sweeps, "diameters"_a, "exponent"_a, "position"_a,
+      "orientation"_a, "edges"_a, "shift"_a, "turn"_a, "n_sweeps"_a, "seed"_a,
+      "Monte Carlo sweeps of N hard superellipsoids in a periodic box: diameters (N, 3), exponent\n"
+      "(N,), position (N, D), orientation (N, 1) angles or (N, 4) quaternions, edges (D,); moves "
+      "of\n"
+      "at most `shift` along each axis and `turn` radians. Returns a dict: position (in the box\n"
+      "[0, edges)), orientation, and how many moves were tried and accepted.");
 }
 
 }  // namespace jamshape

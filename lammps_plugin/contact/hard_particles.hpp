@@ -30,9 +30,9 @@ struct Tally {
   }
 };
 
-/// Monte Carlo of hard particles in a periodic box that is at least twice as wide as they are: every
-/// move that leads to no overlap is accepted. `Model` as for pair styles, with `are_overlapping`
-/// for its bodies.
+/// Monte Carlo of hard particles in a periodic box that is at least twice as wide as they are:
+/// every move that leads to no overlap is accepted. `Model` as for pair styles, with
+/// `are_overlapping` for its bodies.
 template <class Model, int D> class HardParticles {
  public:
   using Body = typename Model::template Body<D>;
@@ -135,8 +135,8 @@ template <class Model, int D> class HardParticles {
   }
 
   /// The cells around `centre`, each once, one dimension after another.
-  bool overlaps_in(int k, std::array<std::size_t, D> &cell, const std::array<std::size_t, D> &centre,
-                   std::size_t i, const Body &trial) const
+  bool overlaps_in(int k, std::array<std::size_t, D> &cell,
+                   const std::array<std::size_t, D> &centre, std::size_t i, const Body &trial) const
   {
     if (k == D) return overlaps_members(members[flat(cell)], i, trial);
     const std::size_t n = std::min<std::size_t>(3, count[k]);

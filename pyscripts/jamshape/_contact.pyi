@@ -87,3 +87,17 @@ def superellipsoid_derivatives(
 def superellipsoid_drag(
     diameters: NDArray[np.float64], exponent: NDArray[np.float64], dimension: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def superellipsoid_bounding_radius(
+    diameters: NDArray[np.float64], exponent: NDArray[np.float64], dimension: int
+) -> NDArray[np.float64]: ...
+def superellipsoid_sweeps(
+    diameters: NDArray[np.float64],
+    exponent: NDArray[np.float64],
+    position: NDArray[np.float64],
+    orientation: NDArray[np.float64],
+    edges: NDArray[np.float64],
+    shift: float,
+    turn: float,
+    n_sweeps: int,
+    seed: int,
+) -> dict[str, Any]: ...
