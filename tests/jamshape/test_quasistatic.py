@@ -9,7 +9,7 @@ from jamshape.quasistatic import Compression, Quasistatic, compress
 
 def begun(n=16, phi=0.5, protocol=None):
     packing = scattered(np.tile([1.0, 1.0, 1.5], (n, 1)), np.ones(n), phi)
-    landscape, protocol = Landscape(packing), protocol or Quasistatic(step=5e-3)
+    landscape, protocol = Landscape(packing), protocol or Quasistatic(step=5e-3, energy=1e-8)
     return landscape, Compression.of(landscape, State.of(packing), protocol), protocol
 
 
