@@ -1,8 +1,9 @@
 """Residual force against run time of every minimiser, and of both energy targets, on the same states.
 
     python analysis/minimiser_error.py --n 256 --seconds 60 --out runs/minimisers
+    python analysis/minimiser_error.py --states runs/sweep3d/p1_w0.6_1_seed1.h5 --out runs/minimisers3d
 
-For every state a packing at u0 = 1e-15 is made first (kept in the folder, and taken from there the next
+States may also be packings of make_packing.py, superellipsoids as well (of which LAMMPS's minimiser is left out). For every other state a packing at u0 = 1e-15 is made first (kept in the folder, and taken from there the next
 time); nearly round rods start from jammed discs, given spines of random directions. All minimisers then start from it, each particle displaced at random by 1e-6 of its radius, which
 is many overlaps; the two energy targets start from it compressed by a strain of 1e-6. A curve is the best residual so
 far; the table gives the seconds to residuals of 1e-4, 1e-6 and 1e-8, or what was reached, and how many times
@@ -67,7 +68,7 @@ def parse() -> argparse.Namespace:
         "--states",
         nargs="+",
         default=["0.01", "1", "4", "20", "mixture"],
-        help="aspect ratios, or 'mixture' (0.01 1 4 20 mixture)",
+        help="aspect ratios, 'mixture', or packings, *.h5 (0.01 1 4 20 mixture)",
     )
     parser.add_argument("--out", type=Path, required=True, help="folder")
     return parser.parse_args()
@@ -82,6 +83,8 @@ def mixture(n: int) -> Mixture:
 
 def state_of(name: str, options: argparse.Namespace) -> Packing:
     """Make the packing at u0, or read it."""
+    if name.endswith(".h5"):
+        return read_packing(name)
     path: Path = options.out / f"state_{name}.h5"
     if name != "mixture" and 0 < float(name) < NEARLY_ROUND:
         return from_discs(state_of("0", options), float(name), path)
@@ -126,7 +129,7 @@ def run_minimiser(method: str, packing: Packing, seconds: float) -> Row:
     """Minimise from the displaced state."""
     landscape = Landscape(packing)
     rng = np.random.default_rng(1)
-    step = DISPLACEMENT * float(packing.radius.min()) * rng.normal(size=landscape.size)
+    step = DISPLACEMENT * float(landscape.inner_radius.min()) * rng.normal(size=landscape.size)
     start = landscape.displaced(State.of(packing), step)
     found = minimise(landscape, start, method, Stop(seconds=seconds))
     return {"outcome": found.outcome.value, **curve(found.history)}
@@ -135,22 +138,24 @@ def run_minimiser(method: str, packing: Packing, seconds: float) -> Row:
 def run_target(name: str, packing: Packing, seconds: float) -> Row:
     """Find u0 from the compressed state."""
     search, method, tolerance = TARGETS[name]
-    landscape, target = Landscape(packing), Target(tolerance=tolerance, method=method)
+    landscape, state = Landscape(packing), State.of(packing)
+    u0 = landscape.evaluate(state).energy / state.volume
+    target = Target(u0=float(f"{u0:.3g}"), tolerance=tolerance, method=method)
     step = 1e-6 if search is halving else target.step
-    state = Search(State.of(packing).strained(-STRAIN), step)
+    run = Search(state.strained(-STRAIN), step)
     began, outcome = time.perf_counter(), "out of time"
     try:
-        for _ in search(landscape, state, target):
-            if state.minimum is not None:
+        for _ in search(landscape, run, target):
+            if run.minimum is not None:
                 outcome = "found"
             elif time.perf_counter() - began > seconds:
                 break
     except TargetError as error:
         outcome = str(error)
     seconds = time.perf_counter() - began
-    u, residual = state.history.energy_density[-1], state.history.residual[-1]
-    if state.minimum is not None:  # the best one, not the last one
-        u, residual = state.minimum.energy_density, state.minimum.residual.largest
+    u, residual = run.history.energy_density[-1], run.history.residual[-1]
+    if run.minimum is not None:  # the best one, not the last one
+        u, residual = run.minimum.energy_density, run.minimum.residual.largest
     off = abs(u / target.u0 - 1)
     return {"outcome": outcome, "seconds": seconds, "off": off, "residual": residual}
 
@@ -159,12 +164,14 @@ def study(options: argparse.Namespace) -> dict[str, Row]:
     """Run everything; results of each state are kept in the folder as they come."""
     results: dict[str, Row] = {}
     for name in options.states:
-        path = options.out / f"result_{name}.json"
+        path = options.out / f"result_{Path(name).stem if name.endswith('.h5') else name}.json"
         found: Row = {"minimisers": {}, "targets": {}}
         if path.exists():
             found = json.loads(path.read_text())
+        rods = state_of(name, options).shape_style == "spherocylinder"
+        minimisers = [m for m in MINIMISERS if rods or m != "lammps"]
         runs: list[tuple[str, str, Callable[..., Row], float]] = [
-            *(("minimisers", m, run_minimiser, options.seconds) for m in MINIMISERS),
+            *(("minimisers", m, run_minimiser, options.seconds) for m in minimisers),
             *(("targets", t, run_target, LONGER * options.seconds) for t in TARGETS),
         ]
         for group, method, run, seconds in runs:
@@ -181,7 +188,8 @@ def draw(results: dict[str, Row], path: Path) -> None:
     for axis, (name, result) in zip(axes[0], results.items(), strict=True):
         for method, row in result["minimisers"].items():
             axis.loglog(row["seconds"], row["residual"], label=method)
-        label = name if name == "mixture" else rf"$\alpha = {name}$"
+        number = name.replace(".", "", 1).isdecimal()
+        label = rf"$\alpha = {name}$" if number else Path(name).stem
         axis.set(xlabel=f"seconds, {label}", ylim=(1e-11, None))
     axes[0][0].set_ylabel("largest net force / mean bond force")
     axes[0][0].legend(fontsize="small")

@@ -1,0 +1,202 @@
+"""Error against run time of every part of jamshape, in one page.
+
+    python analysis/error_report.py --out runs/error_report
+    python analysis/error_report.py --full --out runs/error_report_full
+
+Runs the work-precision study of each part, or takes what is there of an earlier call, and writes report.md: the
+command of each study, how long it took, its tables and its picture, the machine and the versions. The short
+run, by default, takes minutes, the full one hours. A run that was killed leaves the page of what was done and
+goes on when started again. --only names studies, --again repeats them. The last line of standard output is one
+JSON object; the exit code is 0 only if no study failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import json
+import os
+import platform
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tqdm import tqdm
+
+ROOT = Path(__file__).resolve().parents[1]
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+PACKAGES = ("jamshape", "numpy", "scipy", "h5py", "matplotlib")
+
+
+class Study(NamedTuple):
+    """Command lines, first those that prepare; they run in the study's folder."""
+
+    title: str
+    short: list[str]
+    full: list[str]
+    pictures: list[str]
+
+
+def rods(n: int, alpha: float = 1.0) -> str:
+    """Command line that makes a packing of rods."""
+    return f"pyscripts/make_packing.py --alpha {alpha:g} --n {n} --kappa 1e-6 --out rods_{n}.h5"
+
+
+def spheroids(n: int) -> str:
+    """Command line that makes a packing of oblate spheroids."""
+    shape = "--shape superellipsoid --w1 0.6"
+    return f"pyscripts/make_packing.py {shape} --n {n} --u0 1e-12 --out spheroids_{n}.h5"
+
+
+STUDIES = {
+    "heun": Study(
+        "Heun's method: the time step",
+        ["analysis/heun_error.py --n 64 --out ."],
+        ["analysis/heun_error.py --out ."],
+        ["heun_error.png"],
+    ),
+    "minimisers": Study(
+        "Minimisers and energy targets, rods",
+        ["analysis/minimiser_error.py --n 48 --seconds 2 --states 1 4 --out ."],
+        ["analysis/minimiser_error.py --n 256 --seconds 10 --out ."],
+        ["minimisers.png"],
+    ),
+    "minimisers3d": Study(
+        "Minimisers and energy targets, spheroids",
+        [
+            spheroids(40),
+            "analysis/minimiser_error.py --seconds 2 --states spheroids_40.h5 --out .",
+        ],
+        [
+            spheroids(400),
+            "analysis/minimiser_error.py --seconds 60 --states spheroids_400.h5 --out .",
+        ],
+        ["minimisers.png"],
+    ),
+    "contact": Study(
+        "Contacts of superellipsoids",
+        ["analysis/contact_error.py --pairs 1000 --out ."],
+        ["analysis/contact_error.py --out ."],
+        ["contact_error.png"],
+    ),
+    "spectra": Study(
+        "Spectra of dynamical matrices",
+        [
+            rods(32),
+            rods(64),
+            "analysis/spectrum_error.py rods_32.h5 rods_64.h5 --tiles 2 4 --out spectrum_error.png",
+        ],
+        [
+            *(rods(n, 4) for n in (64, 256, 1024)),
+            "analysis/spectrum_error.py rods_64.h5 rods_256.h5 rods_1024.h5 --tiles 2 6 13 --out spectrum_error.png",
+        ],
+        ["spectrum_error.png"],
+    ),
+}
+
+
+def parse() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--out", type=Path, default=Path("runs/error_report"), help="folder")
+    parser.add_argument("--full", action="store_true", help="the real studies, for hours")
+    parser.add_argument("--only", nargs="+", choices=STUDIES, default=list(STUDIES))
+    parser.add_argument("--again", action="store_true", help="repeat what is there")
+    return parser.parse_args()
+
+
+def run(name: str, options: argparse.Namespace) -> dict[str, Any]:
+    """Run a study unless its result is there; return its record."""
+    folder: Path = options.out / name
+    folder.mkdir(parents=True, exist_ok=True)
+    record = folder / "record.json"
+    if record.exists() and not options.again:
+        found: dict[str, Any] = json.loads(record.read_text())
+        if found["full"] == options.full and not found["failed"]:
+            return found
+    began, printed, failed = time.perf_counter(), "", ""
+    commands = STUDIES[name].full if options.full else STUDIES[name].short
+    for command in commands:
+        printed, failed = printed_by(command, folder)
+        if failed:
+            break
+    found = {
+        "full": options.full,
+        "commands": [f".venv/bin/python {command}" for command in commands],
+        "seconds": time.perf_counter() - began,
+        "printed": "\n".join(printed.strip().splitlines()[:-1]),  # all but the JSON line
+        "failed": failed,
+    }
+    record.write_text(json.dumps(found, indent=1))
+    return found
+
+
+def printed_by(command: str, folder: Path) -> tuple[str, str]:
+    """Run a script in a folder: what it printed, and its complaint if it printed nothing.
+
+    Packings say by their exit code whether forces balance; studies of them need not stop there.
+    """
+    path, *arguments = command.split()
+    done = subprocess.run(
+        [sys.executable, str(ROOT / path), *arguments],
+        check=False,
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env=os.environ | ONE_THREAD,
+    )
+    if done.returncode == 0 or done.stdout.strip():
+        return done.stdout, ""
+    said = done.stderr.strip().replace("\r", "\n").splitlines() or ["it said nothing"]
+    return "", f"{command}: {said[-1]}"
+
+
+def page(records: dict[str, dict[str, Any]]) -> str:
+    """Write what was done as Markdown."""
+    versions = ", ".join(f"{p} {importlib.metadata.version(p)}" for p in PACKAGES)
+    lines = [
+        "# Error against run time",
+        "",
+        f"{platform.platform()}, {os.cpu_count()} cores, Python {platform.python_version()}; {versions}.",
+        "",
+    ]
+    for name, found in records.items():
+        lines += [f"## {STUDIES[name].title}", ""]
+        lines += [f"    {command}" for command in found["commands"]]
+        lines += ["", f"{found['seconds']:.0f} s; run in the folder `{name}`.", ""]
+        if found["failed"]:
+            lines += [f"**Failed:** {found['failed']}", ""]
+            continue
+        lines += [
+            f"![{STUDIES[name].title}]({name}/{picture})" for picture in STUDIES[name].pictures
+        ]
+        table = found["printed"].lstrip().startswith("|")
+        lines += ["", found["printed"] if table else f"```\n{found['printed']}\n```", ""]
+    return "\n".join(lines)
+
+
+def main(options: argparse.Namespace) -> int:
+    """Run the studies one after another; return the exit code."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    records: dict[str, dict[str, Any]] = {}
+    for name in tqdm(options.only, unit="study"):
+        records[name] = run(name, options)
+        (options.out / "report.md").write_text(page(records))
+    failed = {name: found["failed"] for name, found in records.items() if found["failed"]}
+    seconds = sum(found["seconds"] for found in records.values())
+    report = str(options.out / "report.md")
+    print(
+        json.dumps({"out": report, "studies": list(records), "failed": failed, "seconds": seconds})
+    )
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(parse()))
+    except (ValueError, OSError) as error:
+        sys.exit(f"error_report.py: {error}")
