@@ -97,6 +97,9 @@ def main() -> None:
     parser.add_argument("--dpi", type=int, default=200, help="dots per inch (200)")
     options = parser.parse_args()
     packing = read_any(options.file, options.frame)
+    if packing.shape_style != "spherocylinder":
+        msg = f"{options.file}: holds {packing.shape_style!r}, expected 'spherocylinder'"
+        raise ValueError(msg)
     if packing.dimension != 2:
         msg = f"{options.file}: is three-dimensional, expected two dimensions; OVITO draws 3D dumps"
         raise ValueError(msg)
