@@ -81,7 +81,7 @@ void OverdampedFlow::measure_particles()
   const std::vector<Vec<3>> semi_axes = pair->particle_view().semi_axes(atom->nlocal);
   mobility.resize(semi_axes.size());
   for (std::size_t i = 0; i < semi_axes.size(); ++i) {
-    const SubstrateDrag of_particle = pair->drag(semi_axes[i]);
+    const SubstrateDrag of_particle = pair->drag(semi_axes[i], atom->type[i]);
     const double shift = 1.0 / (drag * of_particle.measure);
     mobility[i].shift = shift;
     for (int k = 0; k < 3; ++k) {
@@ -89,7 +89,7 @@ void OverdampedFlow::measure_particles()
       mobility[i].turn[k] = moment > 0.0 ? shift / moment : 0.0;
     }
     mobility[i].step_limit =
-        LARGEST_STEP * std::min({semi_axes[i][0], semi_axes[i][1], semi_axes[i][2]});
+        LARGEST_STEP * *std::min_element(semi_axes[i].c, semi_axes[i].c + dimension);
   }
 }
 
@@ -101,6 +101,7 @@ Rate OverdampedFlow::mobility_times(int i, const Vec<3> &force, const Vec<3> &to
 {
   const Mobility &m = mobility[i];
   if (dimension == 2) return {m.shift * force, {{0.0, 0.0, m.turn[2] * torque[2]}}};
+  if (!pair->particles_turn()) return {m.shift * force, {}};  // nobody reads orientations then
   Vec<3> turn{};
   const Quaternion q = pair->particle_view().orientation(i);
   for (int b = 0; b < 3; ++b) {

@@ -15,6 +15,8 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace jamshape {
@@ -47,42 +49,57 @@ template <class Model> class PairContactOf : public PairContact {
     domain->dimension == 2 ? visit_bonds<2>(visit) : visit_bonds<3>(visit);
   }
 
-  SubstrateDrag drag(const Vec<3> &semi_axes) const override
+  SubstrateDrag drag(const Vec<3> &semi_axes, int type) const override
   {
-    const auto shape = *shape_from(semi_axes);
+    const auto shape = *shape_from(semi_axes, type);
     return domain->dimension == 2 ? Model::template drag<2>(shape) : Model::template drag<3>(shape);
   }
 
   double memory_usage() override
   {
     return PairContact::memory_usage() + in_2d.memory_usage() + in_3d.memory_usage() +
-           static_cast<double>((first.capacity() + partner.capacity()) * sizeof(int));
+           static_cast<double>((first.capacity() + partner.capacity()) * sizeof(int) +
+                               last_normal.capacity() * sizeof(float));
   }
 
  protected:
   typename Model::Options options{};
 
-  bool is_valid_shape(const Vec<3> &semi_axes) const override
+  bool is_valid_shape(const Vec<3> &semi_axes, int type) const override
   {
-    return shape_from(semi_axes).has_value();
+    return shape_from(semi_axes, type).has_value();
   }
   std::string shape_rule() const override { return Model::SHAPE_RULE; }
-  bool turns(const Vec<3> &semi_axes) const override
+  bool turns(const Vec<3> &semi_axes, int type) const override
   {
-    return Model::turns(*shape_from(semi_axes));
+    return Model::turns(*shape_from(semi_axes, type));
+  }
+  double bounding_radius(const Vec<3> &semi_axes, int type) const override
+  {
+    const auto shape = *shape_from(semi_axes, type);
+    return domain->dimension == 2 ? shape.template bounding_radius<2>()
+                                  : shape.template bounding_radius<3>();
   }
 
  private:
   // A small margin keeps the list short, a large one keeps it longer; flat optimum near one half.
   static constexpr double MARGIN_OVER_SKIN = 0.15;
-  static constexpr double EXPONENT = 1.0;  // until a style reads one per type
 
   template <int D> using Body = typename Model::template Body<D>;
   template <int D> using Pose = typename Model::template Pose<D>;
 
-  static std::optional<typename Model::Shape> shape_from(const Vec<3> &semi_axes)
+  /// Whether a contact is found sooner from the normal that the pair had a moment before.
+  template <int D, class = void> struct StartsFromNormal : std::false_type {};
+  template <int D>
+  struct StartsFromNormal<
+      D, std::void_t<decltype(contact_of(
+             std::declval<const Body<D> &>(), std::declval<const Body<D> &>(),
+             std::declval<const typename Model::Law &>(), std::declval<Vec<D> &>()))>> :
+      std::true_type {};
+
+  std::optional<typename Model::Shape> shape_from(const Vec<3> &semi_axes, int type) const
   {
-    return Model::shape_from(semi_axes, EXPONENT);
+    return Model::shape_from(semi_axes, exponent(type));
   }
 
   typename Model::Law law_of(int i, int j) const
@@ -106,6 +123,7 @@ template <class Model> class PairContactOf : public PairContact {
   Bodies<3> in_3d;
   double margin = 0.0;
   std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
+  std::vector<float> last_normal;   // D a close pair, for shapes that start from it; zeros at first
 
   template <int D> Bodies<D> &all()
   {
@@ -140,7 +158,7 @@ template <class Model> class PairContactOf : public PairContact {
       Torque<D> torque_i{};
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
-        const Contact<D> contact = contact_of(body, bodies[j], law_of(i, j));
+        const Contact<D> contact = contact_of_pair<D>(k, body, bodies[j], law_of(i, j));
         if (contact.status == ContactStatus::APART) continue;
         if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
         force_i += contact.force;
@@ -153,6 +171,23 @@ template <class Model> class PairContactOf : public PairContact {
       }
       add_to<D>(f[i], force_i);
       if constexpr (TURNS) add_torque<D>(torque[i], torque_i);
+    }
+  }
+
+  /// Contact of the k-th close pair. Where it starts from is worth time only, so floats do.
+  template <int D>
+  Contact<D> contact_of_pair(int k, const Body<D> &i, const Body<D> &j,
+                             const typename Model::Law &law)
+  {
+    if constexpr (StartsFromNormal<D>::value) {
+      float *const last = &last_normal[static_cast<std::size_t>(D) * k];
+      Vec<D> normal;
+      for (int a = 0; a < D; ++a) normal[a] = last[a];
+      const Contact<D> contact = contact_of(i, j, law, normal);
+      for (int a = 0; a < D; ++a) last[a] = static_cast<float>(normal[a]);
+      return contact;
+    } else {
+      return contact_of(i, j, law);
     }
   }
 
@@ -203,7 +238,7 @@ template <class Model> class PairContactOf : public PairContact {
     std::vector<Body<D>> &bodies = all<D>().now;
     resize_closely(bodies, semi_axes.size());
     for (std::size_t i = 0; i < semi_axes.size(); ++i) {
-      bodies[i] = Model::template body<D>(*shape_from(semi_axes[i]));
+      bodies[i] = Model::template body<D>(*shape_from(semi_axes[i], atom->type[i]));
     }
   }
 
@@ -234,6 +269,10 @@ template <class Model> class PairContactOf : public PairContact {
           partner.push_back(j);
       }
       first.push_back(static_cast<int>(partner.size()));
+    }
+    if constexpr (StartsFromNormal<D>::value) {
+      last_normal.clear();
+      resize_closely(last_normal, D * partner.size());
     }
     resize_closely(bodies.then, bodies.now.size());
     for (std::size_t i = 0; i < bodies.now.size(); ++i) {
@@ -278,7 +317,7 @@ template <class Model> class PairContactOf : public PairContact {
       const int i = list->ilist[n];
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
-        const Contact<D> contact = contact_of(bodies[i], bodies[j], law_of(i, j));
+        const Contact<D> contact = contact_of_pair<D>(k, bodies[i], bodies[j], law_of(i, j));
         if (contact.status != ContactStatus::TOUCHING) continue;
         const Vec<D> r = bodies[i].centre - bodies[j].centre;
         for (int b = 0; b < contact.n_bonds; ++b) {
