@@ -14,12 +14,12 @@ namespace jamshape {
 
 /// Arguments of the functions over all pairs of a packing, as they come from Python.
 struct PackingArrays {
-  const Array2<double> &diameters;    // (N, 3)
-  const Array3<double> &position;     // (2, N, D)
-  const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
-  const Array2<double> &edges;        // (2, D)
-  const Array2<std::int64_t> &pairs;  // (M, 2)
-  const Array2<std::int64_t> &shift;  // (M, D)
+  const Array2<double> &diameters;           // (N, 3)
+  const Array3<double> &position;            // (2, N, D)
+  const Array3<double> &orientation;         // (2, N, 1) or (2, N, 4)
+  const Array2<double> &edges;               // (2, D)
+  const Array2<std::int64_t> &pairs;         // (M, 2)
+  const Array2<std::int64_t> &shift;         // (M, D)
   const Array1<double> *exponent = nullptr;  // (N,), of shapes that have one
 
   int dimension() const { return static_cast<int>(edges.shape(1)); }

@@ -189,8 +189,8 @@ nb::dict superellipsoid_sums(const Array2<double> &diameters, const Array1<doubl
       extended);
 }
 
-nb::dict superellipsoid_derivatives(const Array2<double> &diameters,
-                                    const Array1<double> &exponent, const Array3<double> &position,
+nb::dict superellipsoid_derivatives(const Array2<double> &diameters, const Array1<double> &exponent,
+                                    const Array3<double> &position,
                                     const Array3<double> &orientation, const Array2<double> &edges,
                                     const Array2<std::int64_t> &pairs,
                                     const Array2<std::int64_t> &shift, double epsilon,
@@ -211,10 +211,10 @@ nb::tuple superellipsoid_drag(const Array2<double> &diameters, const Array1<doub
           "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
   NewArray<double> measure({n_particles}), moment({n_particles, 3});
   for (std::size_t n = 0; n < n_particles; ++n) {
-    const auto shape = SuperellipsoidModel::shape_from(
-        0.5 * read_vec<3>(diameters.data() + 3 * n), exponent.data()[n]);
-    require(shape.has_value(), "particle " + std::to_string(n) + " is no such shape: " +
-                                   SuperellipsoidModel::SHAPE_RULE + ".");
+    const auto shape = SuperellipsoidModel::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * n),
+                                                       exponent.data()[n]);
+    require(shape.has_value(), "particle " + std::to_string(n) +
+                                   " is no such shape: " + SuperellipsoidModel::SHAPE_RULE + ".");
     const SubstrateDrag drag = dimension == 2 ? SuperellipsoidModel::drag<2>(*shape)
                                               : SuperellipsoidModel::drag<3>(*shape);
     measure[n] = drag.measure;
@@ -228,19 +228,20 @@ nb::tuple superellipsoid_drag(const Array2<double> &diameters, const Array1<doub
 void export_superellipsoid(nb::module_ &m)
 {
   using namespace nb::literals;
-  m.def("superellipsoid_contacts", &superellipsoid_contacts, "bodies_i"_a, "bodies_j"_a,
-        "epsilon"_a,
-        "Contacts of M pairs. Bodies are (M, 6) in 2D: centre, angle, two semi-axes, p; (M, 11) in\n"
-        "3D: centre, quaternion w i j k, three semi-axes, p. Returns a dict of arrays: status (0\n"
-        "apart, 1 touching, 2 concentric), error (relative, of the scale), energy, force (on i),\n"
-        "torque_i, torque_j, bond_normal (into i), bond_arm_i, bond_distance, bond_reach (1 -\n"
-        "distance/reach is 1 - eta^2), bond_stiffness.");
-  m.def("superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
-        "normals"_a.none() = nb::none(),
-        "The scale at which both bodies of M pairs touch, whether above 1 or below, begun at\n"
-        "`normals` (M, D) where given. Returns a dict: eta, gap (relative bound of its error),\n"
-        "iterations, fallback (the first attempt failed), normal (into i, unit), point_i (from the\n"
-        "centre of i to the tangency of the scaled bodies).");
+  m.def(
+      "superellipsoid_contacts", &superellipsoid_contacts, "bodies_i"_a, "bodies_j"_a, "epsilon"_a,
+      "Contacts of M pairs. Bodies are (M, 6) in 2D: centre, angle, two semi-axes, p; (M, 11) in\n"
+      "3D: centre, quaternion w i j k, three semi-axes, p. Returns a dict of arrays: status (0\n"
+      "apart, 1 touching, 2 concentric), error (relative, of the scale), energy, force (on i),\n"
+      "torque_i, torque_j, bond_normal (into i), bond_arm_i, bond_distance, bond_reach (1 -\n"
+      "distance/reach is 1 - eta^2), bond_stiffness.");
+  m.def(
+      "superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
+      "normals"_a.none() = nb::none(),
+      "The scale at which both bodies of M pairs touch, whether above 1 or below, begun at\n"
+      "`normals` (M, D) where given. Returns a dict: eta, gap (relative bound of its error),\n"
+      "iterations, fallback (the first attempt failed), normal (into i, unit), point_i (from the\n"
+      "centre of i to the tangency of the scaled bodies).");
   m.def("superellipsoid_near", &superellipsoid_near, "bodies_i"_a, "bodies_j"_a, "margin"_a,
         "Whether surfaces may be closer than `margin` (M,): false only where they are not.");
   m.def("superellipsoid_overlap", &superellipsoid_overlap, "bodies_i"_a, "bodies_j"_a,

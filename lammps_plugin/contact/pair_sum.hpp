@@ -99,7 +99,7 @@ template <int D, class S> struct PairSums {
   Vec<D * D, S> virial{};  // sum of r (x) force on i
   S bond_force = 0.0;      // sum of the magnitudes
   std::size_t n_bonds = 0;
-  double error = 0.0;                // the largest of a contact
+  double error = 0.0;           // the largest of a contact
   std::size_t crossing = NONE;  // the first pair that cannot be computed
 
   static constexpr std::size_t NONE = static_cast<std::size_t>(-1);

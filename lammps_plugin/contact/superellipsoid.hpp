@@ -12,8 +12,8 @@
 
 namespace jamshape {
 
-/// U = epsilon/2 (1 - eta^2)^2 for eta < 1 (Yuan et al. 2019, Eq. 2), eta the scale at which the two
-/// bodies, scaled about their centres, touch (Perram & Wertheim 1985): the harmonic law of the
+/// U = epsilon/2 (1 - eta^2)^2 for eta < 1 (Yuan et al. 2019, Eq. 2), eta the scale at which the
+/// two bodies, scaled about their centres, touch (Perram & Wertheim 1985): the harmonic law of the
 /// overlap 1 - eta^2.
 struct SuperellipsoidLaw {
   double epsilon;
@@ -23,12 +23,13 @@ struct SuperellipsoidLaw {
 inline constexpr double COINCIDENT_CENTRES = 1e-14;
 
 /// Contact of two superellipsoids in 2D or 3D. With x = eta^2, n the common normal where the scaled
-/// bodies touch, grad_r x = 2 x n / (r.n): the printed force (Yuan et al. 2019, Eq. 3) lacks one eta.
-/// Torques are by the envelope theorem those of this force at the point of tangency of the **scaled**
-/// bodies. The one bond has
+/// bodies touch, grad_r x = 2 x n / (r.n): the printed force (Yuan et al. 2019, Eq. 3) lacks one
+/// eta. Torques are by the envelope theorem those of this force at the point of tangency of the
+/// **scaled** bodies. The one bond has
 ///     normal, levers    the gradient of x over |grad_r x|, that of a length
-///     reach             1 / |grad_r x|, so that the stiffness is epsilon / reach^2 as of other laws
-///     distance          reach x: 1 - distance / reach is the overlap. For two spheres of contact
+///     reach             1 / |grad_r x|, so that the stiffness is epsilon / reach^2 as of other
+///     laws distance          reach x: 1 - distance / reach is the overlap. For two spheres of
+///     contact
 ///                       distance d it is r / 2, and reach = d / 2 where they touch.
 template <int D, class S> class SuperellipsoidContact {
  public:
@@ -214,7 +215,8 @@ struct SuperellipsoidModel {
   template <int D> static bool closer_than(double margin, const Body<D> &i, const Body<D> &j)
   {
     const Vec<D> r = i.centre - j.centre;
-    const double distance_sq = norm_sq(r), bounding = i.bounding_radius + j.bounding_radius + margin;
+    const double distance_sq = norm_sq(r),
+                 bounding = i.bounding_radius + j.bounding_radius + margin;
     if (distance_sq >= bounding * bounding) return false;
     if (distance_sq == 0.0) return true;
     using Norm = PowerNorm<D, double>;
@@ -253,7 +255,8 @@ struct SuperellipsoidModel {
 
 /// Whether two bodies share more than a point, with the least work that decides it: for Monte Carlo
 /// of hard particles.
-template <int D> bool are_overlapping(const SuperellipsoidBody<D> &i, const SuperellipsoidBody<D> &j)
+template <int D>
+bool are_overlapping(const SuperellipsoidBody<D> &i, const SuperellipsoidBody<D> &j)
 {
   const Vec<D> r = i.centre - j.centre;
   const double distance_sq = norm_sq(r), bounding = i.bounding_radius + j.bounding_radius;

@@ -28,8 +28,8 @@ template <int D, class T> struct FoundTangency {
   bool is_apart;  // decided by a separating plane; the tangency was not sought then
 };
 
-/// What is asked of a pair: r = x_i - x_j, whether "apart" is answer enough where a plane divides the
-/// bodies, and a normal to begin with (or null).
+/// What is asked of a pair: r = x_i - x_j, whether "apart" is answer enough where a plane divides
+/// the bodies, and a normal to begin with (or null).
 template <int D, class T> struct TangencyWish {
   Vec<D, T> r;
   bool may_stop_apart;
@@ -87,6 +87,19 @@ template <int M, class T> Vec<M, T> solved_symmetric(Matrix<M, T> a, Vec<M, T> b
   return b;
 }
 
+/// In 3D by cofactors: one division instead of three in a row.
+template <class T> Vec<3, T> solved_symmetric(const Matrix<3, T> &a, const Vec<3, T> &b)
+{
+  const T xx = a.row[0][0], yx = a.row[1][0], yy = a.row[1][1];
+  const T zx = a.row[2][0], zy = a.row[2][1], zz = a.row[2][2];
+  const T c_xx = yy * zz - zy * zy, c_xy = zx * zy - yx * zz, c_xz = yx * zy - zx * yy;
+  const T c_yy = xx * zz - zx * zx, c_yz = zx * yx - xx * zy, c_zz = xx * yy - yx * yx;
+  const T inverse = 1 / (xx * c_xx + yx * c_xy + zx * c_xz);
+  return {{inverse * (c_xx * b[0] + c_xy * b[1] + c_xz * b[2]),
+           inverse * (c_xy * b[0] + c_yy * b[1] + c_yz * b[2]),
+           inverse * (c_xz * b[0] + c_yz * b[1] + c_zz * b[2])}};
+}
+
 /// Two bodies that are both flat where they touch (face on face, tip on tip) leave a matrix
 /// singular; this much of its largest element on its diagonal keeps the step finite.
 inline constexpr double FLAT = 1e-15;
@@ -112,8 +125,8 @@ template <int D, class S> struct TangencyProblem {
 };
 
 /// Both bodies by their support functions, p <= 1, where these are smooth. With F = h_i + h_j the
-/// scale at which two bodies touch is the largest r.n / F(n); the n with F(n) = r.n / F(n) minimises
-/// the convex F^2 / 2 - r.n, that is F grad F = r, and eta = F there.
+/// scale at which two bodies touch is the largest r.n / F(n); the n with F(n) = r.n / F(n)
+/// minimises the convex F^2 / 2 - r.n, that is F grad F = r, and eta = F there.
 template <int D, class S> class ByNormal {
  public:
   static constexpr int M = D;
@@ -191,9 +204,9 @@ template <int D, class T> class ByNormalOfEllipsoids {
     at.residual = F * slope - r;
     for (int a = 0; a < D; ++a) {
       for (int b = 0; b <= a; ++b) {
-        at.jacobian.row[a][b] =
-            slope[a] * slope[b] + over_i * (A_i.row[a][b] - i.point[a] * i.point[b]) +
-            over_j * (A_j.row[a][b] - j.point[a] * j.point[b]);
+        at.jacobian.row[a][b] = slope[a] * slope[b] +
+                                over_i * (A_i.row[a][b] - i.point[a] * i.point[b]) +
+                                over_j * (A_j.row[a][b] - j.point[a] * j.point[b]);
       }
     }
     return at;
@@ -437,8 +450,8 @@ template <class T> T smooth_exponent(double p)
 }  // namespace detail
 
 /// Finds the tangency of two bodies in plain numbers T. From the ellipsoids of the same axes, where
-/// Newton's method takes four steps, it follows the solution as the exponents grow, in stages of one
-/// to a few Newton steps each. Where a stage fails it starts again with finer ones. Method and
+/// Newton's method takes four steps, it follows the solution as the exponents grow, in stages of
+/// one to a few Newton steps each. Where a stage fails it starts again with finer ones. Method and
 /// measurements: analysis/contact_error.py.
 template <int D, class T> class TangencySearch {
  public:
@@ -458,16 +471,11 @@ template <int D, class T> class TangencySearch {
   FoundTangency<D, T> find() const
   {
     FoundTangency<D, T> found{};
-    if (may_stop_apart && separates(r)) return apart(found, r);
     const detail::ByNormalOfEllipsoids<D, T> ellipsoids(i, j, r);
-    const bool are_ellipsoids = i.p == 1.0 && j.p == 1.0;
     Vec<D, T> n = ellipsoids.start();
-    newton(ellipsoids, n, are_ellipsoids ? TOLERANCE : ROUGH, found.iterations);
+    if (are_ellipsoids()) return of_ellipsoids(ellipsoids, n);
+    newton(ellipsoids, n, ROUGH, found.iterations);
     found.at = ellipsoids.tangency(n);
-    if (are_ellipsoids) {
-      certify(found);
-      return found;
-    }
     if (may_stop_apart && separates(n)) return apart(found, n);
     follow(found);
     return ordered(found);
@@ -479,6 +487,11 @@ template <int D, class T> class TangencySearch {
     using Norm = PowerNorm<D, T>;
     FoundTangency<D, T> found{};
     if (!(dot(r, n) > T(0))) return find();
+    if (are_ellipsoids()) {
+      const detail::ByNormalOfEllipsoids<D, T> ellipsoids(i, j, r);
+      found = of_ellipsoids(ellipsoids, ellipsoids.scaled(n));
+      return found.gap <= GAP ? found : find();
+    }
     if (may_stop_apart && separates(n)) return apart(found, n);
     const auto h_i = Norm::support(i).at(n), h_j = Norm::support(j).at(n);
     const T scale = dot(r, n) / (h_i.value + h_j.value);
@@ -518,14 +531,20 @@ template <int D, class T> class TangencySearch {
     return is_improved && found.gap <= GAP;
   }
 
-  /// Bounds of the scale from a plane and a point: |scale - eta| / scale is below `gap`.
+  /// Bounds of the scale, |scale - eta| / scale < gap: the plane with normal n gives the lower
+  /// one, r.n / (h_i + h_j), a point y the upper, max(g_i(y), g_j(r - y)). The equations have met
+  /// one half of each by how the tangency follows from their unknowns.
   void certify(FoundTangency<D, T> &found) const
   {
+    using Norm = PowerNorm<D, T>;
     const Tangency<D, T> &at = found.at;
-    const T below = dot(r, at.normal) / widths(at.normal);
-    const T above = reach_of(at.point_i);
+    const bool i_by_normal = detail::is_by_normal(i.p), j_by_normal = detail::is_by_normal(j.p);
+    const T g_i = i_by_normal ? at.scale : Norm::gauge(i).value(at.point_i);
+    const T above = std::max(g_i, Norm::gauge(j).value(r - at.point_i));
+    const T below =
+        j_by_normal ? at.scale : dot(r, at.normal) / (T(1) + Norm::support(j).value(at.normal));
     const T gap = std::max(above - at.scale, at.scale - below) / at.scale;
-    const bool is_bound = std::isfinite(above) && std::isfinite(below) && std::isfinite(at.scale);
+    const bool is_bound = std::isfinite(above) && std::isfinite(below) && at.scale > T(0);
     found.gap = is_bound ? std::max(gap, T(0)) : std::numeric_limits<T>::infinity();
   }
 
@@ -537,6 +556,20 @@ template <int D, class T> class TangencySearch {
   static constexpr T TOLERANCE = sizeof(T) > 8 ? T(1e-11) : T(1e-9);
   static constexpr T ROUGH = T(1e-2);
   static constexpr double RATIOS[] = {3.0, 1.5, 1.15, 1.04};  // of exponents, stage to stage
+
+  bool are_ellipsoids() const { return i.p == 1.0 && j.p == 1.0; }
+
+  FoundTangency<D, T> of_ellipsoids(const detail::ByNormalOfEllipsoids<D, T> &ellipsoids,
+                                    Vec<D, T> n) const
+  {
+    FoundTangency<D, T> found{};
+    // At this length of n a plane between the bodies has r.n >= 1.
+    if (may_stop_apart && dot(r, n) >= T(1)) return apart(found, n);
+    newton(ellipsoids, n, TOLERANCE, found.iterations);
+    found.at = ellipsoids.tangency(n);
+    certify(found);
+    return found;
+  }
 
   T widths(const Vec<D, T> &n) const
   {
@@ -572,8 +605,8 @@ template <int D, class T> class TangencySearch {
   void follow(FoundTangency<D, T> &found) const
   {
     const Tangency<D, T> start = found.at;
-    certify(found);
     FoundTangency<D, T> best = found;
+    best.gap = std::numeric_limits<T>::infinity();
     for (const double ratio : RATIOS) {
       found.at = start;
       const bool is_converged = to_own_exponents(found, ratio);
@@ -597,16 +630,16 @@ template <int D, class T> class TangencySearch {
   template <class Equations> bool in_stages(FoundTangency<D, T> &found, double ratio) const
   {
     const T e_i = detail::smooth_exponent<T>(i.p), e_j = detail::smooth_exponent<T>(j.p);
-    const double stages =
-        ratio == 1.0 ? 1.0 : std::ceil(std::log(double(std::max(e_i, e_j))) / std::log(ratio));
-    const int last = std::max(1, static_cast<int>(stages));
+    int last = 1;
+    const T most = ratio > 1.0 ? std::max(e_i, e_j) * T(1 - 1e-9) : T(1);
+    for (T reached = T(ratio); reached < most; reached *= T(ratio)) ++last;
     Vec<Equations::M, T> z{};
     bool is_converged = false;
     for (int stage = 1; stage <= last; ++stage) {
       const T share = T(stage) / last;
-      const Equations equations(detail::TangencyProblem<D, T>{
-          i, j, r, stage < last ? between(e_i, share) : e_i,
-          stage < last ? between(e_j, share) : e_j});
+      const Equations equations(
+          detail::TangencyProblem<D, T>{i, j, r, stage < last ? between(e_i, share) : e_i,
+                                        stage < last ? between(e_j, share) : e_j});
       if (stage == 1) z = equations.start(found.at);
       is_converged = newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations);
       if (stage == last) found.at = equations.tangency(z);
@@ -666,8 +699,8 @@ FoundTangency<D, long double> tangency_of(const SuperellipsoidBody<D, long doubl
                                           const TangencyWish<D, long double> &wish)
 {
   const SuperellipsoidBody<D, double> short_i = plain<double>(i), short_j = plain<double>(j);
-  const auto begun = tangency_of(
-      short_i, short_j, TangencyWish<D, double>{plain<double>(wish.r), false, nullptr});
+  const auto begun =
+      tangency_of(short_i, short_j, TangencyWish<D, double>{plain<double>(wish.r), false, nullptr});
   FoundTangency<D, long double> found{plain<long double>(begun.at), begun.gap, begun.iterations,
                                       begun.is_fallback, false};
   const TangencySearch<D, long double> search(i, j, wish);

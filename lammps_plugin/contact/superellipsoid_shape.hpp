@@ -52,8 +52,8 @@ template <int D> SubstrateDrag substrate_drag(const Superellipsoid &shape)
   const double m = 0.5 / shape.p, all = std::lgamma(1.0 + D * m);
   double volume = std::exp(D * std::lgamma(1.0 + m) - all);
   for (int k = 0; k < D; ++k) volume *= 2.0 * shape.semi_axes[k];
-  const double ratio = std::exp(std::lgamma(3.0 * m) - std::lgamma(m) + all -
-                                std::lgamma(1.0 + (D + 2) * m));
+  const double ratio =
+      std::exp(std::lgamma(3.0 * m) - std::lgamma(m) + all - std::lgamma(1.0 + (D + 2) * m));
   Vec<3> mean_sq{};
   for (int k = 0; k < D; ++k) mean_sq[k] = ratio * shape.semi_axes[k] * shape.semi_axes[k];
   const double about_z = mean_sq[0] + mean_sq[1];
@@ -74,7 +74,8 @@ template <int D, class S = double> struct SuperellipsoidBody {
 template <class T> class Exponent {
  public:
   explicit Exponent(T exponent) :
-      e(exponent), whole(exponent == std::floor(exponent) && exponent <= T(32) ? static_cast<int>(exponent) : -1)
+      e(exponent),
+      whole(exponent == std::floor(exponent) && exponent <= T(32) ? static_cast<int>(exponent) : -1)
   {
   }
 
@@ -107,11 +108,12 @@ template <int D, class T> struct CurvedNormAt {
   T hessian[D][D];
 };
 
-/// N(v) = (sum |s_k v_k|^(e+1))^(1/(e+1)), v_k along the body's axes. Both norms of a superellipsoid
-/// are of this form, each the other's dual:
+/// N(v) = (sum |s_k v_k|^(e+1))^(1/(e+1)), v_k along the body's axes. Both norms of a
+/// superellipsoid are of this form, each the other's dual:
 ///     the gauge g of a point, 1 on the surface:     s_k = 1 / a_k, e = 2p - 1
 ///     the support function h of a direction:        s_k = a_k,     e = 1 / (2p - 1)
-/// The gradient of g at a point is a normal there; the gradient of h the point where that is normal.
+/// The gradient of g at a point is a normal there; the gradient of h the point where that is
+/// normal.
 template <int D, class S> class PowerNorm {
  public:
   using T = ValueOf<S>;

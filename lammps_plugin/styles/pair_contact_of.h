@@ -302,8 +302,8 @@ template <class Model> class PairContactOf : public PairContact {
         shift[k] =
             bodies.now[i].centre[k] - centre[k] - scale[k] * (bodies.then[i].centre[k] - centre[k]);
       }
-      most_sq = std::max(most_sq,
-                         Model::template motion_sq<D>(shift, bodies.now[i], bodies.then[i]));
+      most_sq =
+          std::max(most_sq, Model::template motion_sq<D>(shift, bodies.now[i], bodies.then[i]));
     }
     return 4.0 * most_sq >= left * left;
   }

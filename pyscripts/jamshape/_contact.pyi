@@ -1,6 +1,8 @@
 """Contact geometry and energies: arrays in, arrays out, over lammps_plugin/contact/.
 
-Bodies are C-contiguous rows (M, 6) in 2D, (M, 8) in 3D: centre, unit axis, half_length, radius.
+Bodies are C-contiguous rows: of spherocylinders (M, 6) in 2D, (M, 8) in 3D: centre, unit axis,
+half_length, radius; of superellipsoids (M, 6) in 2D, (M, 11) in 3D: centre, angle or quaternion
+w i j k, semi-axes, exponent p.
 """
 
 from typing import Any
@@ -46,3 +48,42 @@ def spherocylinder_derivatives(
     sides: int,
     extended: bool,
 ) -> dict[str, NDArray[Any]]: ...
+def superellipsoid_contacts(
+    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64], epsilon: float
+) -> dict[str, NDArray[Any]]: ...
+def superellipsoid_scales(
+    bodies_i: NDArray[np.float64],
+    bodies_j: NDArray[np.float64],
+    normals: NDArray[np.float64] | None = None,
+) -> dict[str, NDArray[Any]]: ...
+def superellipsoid_near(
+    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64], margin: float
+) -> NDArray[np.bool_]: ...
+def superellipsoid_overlap(
+    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64]
+) -> NDArray[np.bool_]: ...
+def superellipsoid_sums(
+    diameters: NDArray[np.float64],
+    exponent: NDArray[np.float64],
+    position: NDArray[np.float64],
+    orientation: NDArray[np.float64],
+    edges: NDArray[np.float64],
+    pairs: NDArray[np.int64],
+    shift: NDArray[np.int64],
+    epsilon: float,
+    extended: bool,
+) -> dict[str, Any]: ...
+def superellipsoid_derivatives(
+    diameters: NDArray[np.float64],
+    exponent: NDArray[np.float64],
+    position: NDArray[np.float64],
+    orientation: NDArray[np.float64],
+    edges: NDArray[np.float64],
+    pairs: NDArray[np.int64],
+    shift: NDArray[np.int64],
+    epsilon: float,
+    extended: bool,
+) -> dict[str, NDArray[Any]]: ...
+def superellipsoid_drag(
+    diameters: NDArray[np.float64], exponent: NDArray[np.float64], dimension: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
