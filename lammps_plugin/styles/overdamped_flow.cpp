@@ -111,6 +111,22 @@ Rate OverdampedFlow::mobility_times(int i, const Vec<3> &force, const Vec<3> &to
   return {m.shift * force, turn};
 }
 
+Rate OverdampedFlow::resistance_times(int i, const Rate &rate) const
+{
+  const Mobility &m = mobility[i];
+  const auto per = [](double value, double of) { return of > 0.0 ? value / of : 0.0; };
+  const Vec<3> force = (1.0 / m.shift) * rate.shift;
+  if (dimension == 2) return {force, {{0.0, 0.0, per(rate.turn[2], m.turn[2])}}};
+  if (!pair->particles_turn()) return {force, {}};
+  Vec<3> torque{};
+  const Quaternion q = pair->particle_view().orientation(i);
+  for (int b = 0; b < 3; ++b) {
+    const Vec<3> axis = body_axis(q, b);
+    torque += per(dot(axis, rate.turn), m.turn[b]) * axis;
+  }
+  return {force, torque};
+}
+
 Rate OverdampedFlow::present_rate(int i) const
 {
   return mobility_times(i, vec3(atom->f[i]), vec3(atom->torque[i]));
@@ -158,9 +174,11 @@ void OverdampedFlow::begin_step()
   }
 }
 
-void OverdampedFlow::store_rate(int i, const Rate &rate)
+void OverdampedFlow::store_rate(int i, const Rate &rate) { pack(rate, values[i] + dimension); }
+
+/// Without the components that are zero in the plane.
+void OverdampedFlow::pack(const Rate &rate, double *to) const
 {
-  double *to = values[i] + dimension;
   to = std::copy_n(rate.shift.c, dimension, to);
   if (dimension == 2) {
     *to = rate.turn[2];
@@ -373,7 +391,7 @@ double OverdampedFlow::largest_rate()
   const int nlocal = atom->nlocal;
   const std::size_t size = static_cast<std::size_t>(n_rates) * nlocal;
   pair->particle_view().read_orientations(nlocal);
-  std::vector<double> saved(size), now(size), before(size, 0.0);
+  std::vector<double> saved(size), before(size, 0.0);
   for (int i = 0; i < nlocal; ++i) {
     pack_force(i, &saved[n_rates * i]);
     double start[6];
@@ -382,7 +400,8 @@ double OverdampedFlow::largest_rate()
   }
 
   // Lanczos' method in the metric of the drag, in which mobility times stiffness is symmetric. Each
-  // direction is the rate of a force, `now`; what is left of the next one is in the force arrays.
+  // direction is the rate of a force; that of the one `before` is kept, and what is left of the next
+  // one is in the force arrays.
   std::vector<double> diagonal, off_diagonal;
   for (int step = 0; step < LANCZOS_STEPS; ++step) {
     double mine = 0.0;
@@ -395,12 +414,10 @@ double OverdampedFlow::largest_rate()
       if (!(length > EXHAUSTED * diagonal[0])) break;
       off_diagonal.push_back(length);
     }
-    now.swap(before);
     for (int i = 0; i < nlocal; ++i) {
+      if (step > 0) pack(resistance_times(i, stored_rate(i)), &before[n_rates * i]);
       const Rate rate = present_rate(i);
       store_rate(i, {(1.0 / length) * rate.shift, (1.0 / length) * rate.turn});
-      pack_force(i, &now[n_rates * i]);
-      for (int k = 0; k < n_rates; ++k) now[n_rates * i + k] /= length;
     }
     apply_stiffness();
     mine = 0.0;
@@ -410,10 +427,11 @@ double OverdampedFlow::largest_rate()
     }
     diagonal.push_back(sum(mine));
     for (int i = 0; i < nlocal; ++i) {
-      double left[6];
+      double left[6], now[6];
       pack_force(i, left);
+      pack(resistance_times(i, stored_rate(i)), now);
       for (int k = 0; k < n_rates; ++k) {
-        left[k] -= diagonal.back() * now[n_rates * i + k];
+        left[k] -= diagonal.back() * now[k];
         if (step > 0) left[k] -= length * before[n_rates * i + k];
       }
       unpack_force(i, left);

@@ -106,10 +106,13 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   };
   std::vector<Mobility> mobility;
 
+  /// Force and torque (in the places of a rate) that move a particle at a rate.
+  Rate resistance_times(int i, const Rate &rate) const;
   Rate mobility_times(int i, const Vec<3> &force, const Vec<3> &torque) const;
   Rate present_rate(int i) const;
   Rate stored_rate(int i) const;
   void store_rate(int i, const Rate &rate);
+  void pack(const Rate &rate, double *to) const;
   Vec<3> read_coordinates(int i) const;
   Quaternion orientation_at_start(int i) const;
   void require_small(int i, double moved) const;
