@@ -54,8 +54,12 @@ STYLES = {
         "pair_style superellipsoid/harmonic\npair_coeff * * 1 {p}",
         "fix flow all overdamped/affine drag 1 compress 1e-6\ntimestep 0.1\n",
     ),
-    "gayberne": Style("pair_style gayberne 1 1 1 {reach}\npair_coeff * * 1 2 1 1 1 1 1 1", NOTHING_MOVES),
-    "resquared": Style("pair_style resquared {reach}\npair_coeff * * 1 1 1 1 1 1 1 1", NOTHING_MOVES),
+    "gayberne": Style(
+        "pair_style gayberne 1 1 1 {reach}\npair_coeff * * 1 2 1 1 1 1 1 1", NOTHING_MOVES
+    ),
+    "resquared": Style(
+        "pair_style resquared {reach}\npair_coeff * * 1 1 1 1 1 1 1 1", NOTHING_MOVES
+    ),
 }
 
 

@@ -54,8 +54,8 @@ template <class Model, int D> class StoredBodies {
   std::vector<Body> now;
 };
 
-/// The same for large bodies: each kind of shape is kept once, and a body put together where it is
-/// asked for, from LAMMPS's positions and the gathered orientations (which must be those of own and
+/// The same for large bodies: each kind of shape (semi-axes and p) is kept once, and a body put
+/// together where it is asked for, from LAMMPS's positions and the gathered orientations (which must be those of own and
 /// ghost particles then).
 template <class Model, int D> class AssembledBodies {
  public:
@@ -79,6 +79,7 @@ template <class Model, int D> class AssembledBodies {
     resize_closely(kind, n);
     kinds.clear();
     number_of.clear();
+    orientations = nullptr;
   }
   void set_shape(std::size_t i, const Shape &shape)
   {
@@ -130,7 +131,8 @@ template <class Model, int D> class AssembledBodies {
 inline constexpr std::size_t LARGEST_STORED_BODY = 64;
 
 template <class Model, int D>
-using BodiesOf = std::conditional_t<(sizeof(typename Model::template Body<D>) <= LARGEST_STORED_BODY),
-                                    StoredBodies<Model, D>, AssembledBodies<Model, D>>;
+using BodiesOf =
+    std::conditional_t<(sizeof(typename Model::template Body<D>) <= LARGEST_STORED_BODY),
+                       StoredBodies<Model, D>, AssembledBodies<Model, D>>;
 
 }  // namespace jamshape

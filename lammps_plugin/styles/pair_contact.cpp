@@ -180,8 +180,7 @@ void PairContact::stop_at_crossing(int i, int j)
 {
   error->one(FLERR,
              "pair_style " + style_name() + " found atoms " + std::to_string(atom->tag[i]) +
-                 " and " + std::to_string(atom->tag[j]) +
-                 " with " + without_force() +
+                 " and " + std::to_string(atom->tag[j]) + " with " + without_force() +
                  ", where no contact force exists: start from a state without overlap, or use a "
                  "smaller timestep.");
 }

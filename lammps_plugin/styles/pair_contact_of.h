@@ -95,8 +95,8 @@ template <class Model> class PairContactOf : public PairContact {
   struct StartsFromNormal<
       D, std::void_t<decltype(contact_of(
              std::declval<const Body<D> &>(), std::declval<const Body<D> &>(),
-             std::declval<const typename Model::Law &>(), std::declval<Vec<D> &>()))>> :
-      std::true_type {};
+             std::declval<const typename Model::Law &>(), std::declval<Vec<D> &>()))>>
+      : std::true_type {};
 
   std::optional<typename Model::Shape> shape_from(const Vec<3> &semi_axes, int type) const
   {
@@ -266,11 +266,11 @@ template <class Model> class PairContactOf : public PairContact {
       const int *const neighbours = list->firstneigh[i];
       for (int k = 0; k < list->numneigh[i]; ++k) {
         const int j = neighbours[k] & NEIGHMASK;
-        if (Model::template closer_than<D>(margin, body, bodies.now[j]))
-          partner.push_back(j);
+        if (Model::template closer_than<D>(margin, body, bodies.now[j])) partner.push_back(j);
       }
       first.push_back(static_cast<int>(partner.size()));
     }
+    if (partner.capacity() > partner.size() + partner.size() / 4) partner.shrink_to_fit();
     if constexpr (StartsFromNormal<D>::value) {
       last_normal.clear();
       resize_closely(last_normal, D * partner.size());

@@ -27,8 +27,8 @@ double PairSuperellipsoidHarmonic::exponent(int type) const
   return exponent_of.empty() ? ELLIPSOID : exponent_of[type];
 }
 
-/// The longest axis of long particles and the shortest of flat ones (Yuan et al. 2019, Sec. 2.4); the
-/// first where they are equal, as in cubes.
+/// The longest axis of long particles and the shortest of flat ones (Yuan et al. 2019, Sec. 2.4);
+/// the first where they are equal, as in cubes.
 std::optional<int> PairSuperellipsoidHarmonic::director(const Vec<3> &semi_axes, int type) const
 {
   const double *const begin = semi_axes.c, *const end = begin + domain->dimension;
@@ -50,8 +50,9 @@ void PairSuperellipsoidHarmonic::settings(int narg, char **arg)
   if (narg == 0) return;
   std::string found;
   for (int k = 0; k < narg; ++k) found += std::string(" ") + arg[k];
-  error->all(FLERR, "pair_style superellipsoid/harmonic found '" + found +
-                        "', expected no arguments: give exponents with 'pair_coeff I I epsilon p'.");
+  error->all(FLERR,
+             "pair_style superellipsoid/harmonic found '" + found +
+                 "', expected no arguments: give exponents with 'pair_coeff I I epsilon p'.");
 }
 
 void PairSuperellipsoidHarmonic::coeff(int narg, char **arg)

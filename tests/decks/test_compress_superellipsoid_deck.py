@@ -23,11 +23,12 @@ SETTINGS = {"n": 24, "p": 1.5, "kappa": 4e-4, "w1": 0.8, "w2": 1.2, "phi_end": 0
 COLUMNS = ["step", "phi", "p", "u", "z", "S_2", "C_4", "fmax", "tmax", "dt_max"]
 
 
-def run_deck(out, ranks=1, **settings):
-    variables = [word for name, value in {**SETTINGS, **settings, "out": out}.items()
+def run_deck(out, ranks=1, deck="compress", **settings):
+    settings = {**SETTINGS, **settings} if deck == "compress" else settings
+    variables = [word for name, value in {**settings, "out": out}.items()
                  for word in ("-var", name, value)]  # fmt: skip
     done = subprocess.run(
-        command_line("-in", "inputs/compress_superellipsoid.in", *variables, ranks=ranks),
+        command_line("-in", f"inputs/{deck}_superellipsoid.in", *variables, ranks=ranks),
         cwd=REPOSITORY, env=environment(), text=True, stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, timeout=120, check=False,
     )  # fmt: skip
@@ -130,3 +131,20 @@ def test_run_goes_on_from_a_restart_file(whole, tmp_path):
     assert last.step == expected.step
     apart = nearest_image(last.position - expected.position, expected.box)
     assert np.abs(apart).max() < 1e-10 * expected.box.edges.max()
+
+
+@pytest.mark.parametrize("source", ["restart", "data"])
+def test_minimising_its_end_balances_forces(source, whole, tmp_path):
+    start = {"restart": {"restart": whole / "final.restart"},
+             "data": {"data": whole / "final.data", "p": SETTINGS["p"]}}  # fmt: skip
+    run_deck(tmp_path, deck="minimize", maxiter=3000, **start[source])
+    lines = [line.split() for line in (tmp_path / "log.lammps").read_text().splitlines()]
+    begin = lines.index(["Step", "v_phi", "v_u", "v_pressure", "v_z", "v_fmax", "v_tmax"]) + 1
+    rows = np.array([line for line in lines[begin:] if len(line) == 7 and line[0].isdigit()], float)
+    phi, u, fmax, tmax = rows[:, [1, 2, 5, 6]].T
+    np.testing.assert_allclose(phi, thermo_rows(whole)["phi"][-1], rtol=1e-7)
+    assert u[-1] < u[0]
+    assert max(fmax[-1], tmax[-1]) < 1e-3
+    end = read_data(tmp_path / "final.data").with_(shape_style="superellipsoid")
+    end = end.with_(exponent=np.full(end.n, SETTINGS["p"]))
+    np.testing.assert_allclose(u[-1], sums(end, 1.0)["energy"] / end.box.volume, rtol=1e-6)

@@ -84,7 +84,9 @@ def tiny_box(dimension=3):
 
 def pair_commands(packing, epsilon=EPSILON):
     lines = [f"pair_coeff * * {epsilon}"]
-    lines += [f"pair_coeff {k} {k} {epsilon} {p:.17g}" for k, p in enumerate(exponents_of(packing), 1)]
+    lines += [
+        f"pair_coeff {k} {k} {epsilon} {p:.17g}" for k, p in enumerate(exponents_of(packing), 1)
+    ]
     return "pair_style superellipsoid/harmonic\n" + "\n".join(lines)
 
 
