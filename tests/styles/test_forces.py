@@ -208,6 +208,7 @@ def test_discs_alone_take_the_same_path_to_rounding(dimension, tmp_path, measure
         position=np.vstack([discs.position, rod_at]),
         orientation=np.concatenate([discs.orientation, zero]),
         diameters=np.vstack([discs.diameters, rod]),
+        exponent=np.append(discs.exponent, 1.0),
         species=np.append(discs.species, 1),
         id=np.append(discs.id, discs.id.max() + 1),
         image=np.vstack([discs.image, np.zeros(dimension, int)]),
