@@ -55,8 +55,8 @@ template <class Model, int D> class StoredBodies {
 };
 
 /// The same for large bodies: each kind of shape (semi-axes and p) is kept once, and a body put
-/// together where it is asked for, from LAMMPS's positions and the gathered orientations (which must be those of own and
-/// ghost particles then).
+/// together where it is asked for, from LAMMPS's positions and the gathered orientations (which
+/// must be those of own and ghost particles then).
 template <class Model, int D> class AssembledBodies {
  public:
   using Body = typename Model::template Body<D>;
