@@ -19,7 +19,7 @@ struct Spherocylinder {
   double half_length;
   double radius;
 
-  double bounding_radius() const { return half_length + radius; }
+  template <int D> double bounding_radius() const { return half_length + radius; }
 };
 
 /// From the semi-axes that LAMMPS stores, (A + R, R, R); nothing when they are of another shape.

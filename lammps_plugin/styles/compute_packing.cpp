@@ -14,13 +14,17 @@
 #include <cmath>
 #include <cstddef>
 #include <mpi.h>
+#include <optional>
 #include <unordered_map>
 
 namespace jamshape {
 
 namespace {
 
-enum Value { PHI, U, P, Z, S_2, S_4, F_MAX, F_RMS, Z_SINGLE, RATTLERS, BONDS, OVERLAP, T_MAX };
+enum Value { PHI, U, P, Z, S_2, S_4, F_MAX, F_RMS, Z_SINGLE, RATTLERS, BONDS, OVERLAP, T_MAX, C_4 };
+
+/// Directions that the cubatic order tries are the axes of at most so many particles.
+constexpr LAMMPS_NS::bigint MOST_TRIED = 512;
 
 /// A contact as ranks exchange it; bytes over MPI, all ranks being the same program.
 struct SharedContact {
@@ -42,14 +46,14 @@ SharedContact shared(const LocalBond &bond, const LAMMPS_NS::tagint *tag)
           side_to_side || bond.on_side_j};
 }
 
-std::vector<SharedContact> gather(const std::vector<SharedContact> &mine, MPI_Comm world)
+template <class T> std::vector<T> gather(const std::vector<T> &mine, MPI_Comm world)
 {
-  int n_ranks, bytes = static_cast<int>(mine.size() * sizeof(SharedContact));
+  int n_ranks, bytes = static_cast<int>(mine.size() * sizeof(T));
   MPI_Comm_size(world, &n_ranks);
   std::vector<int> counts(n_ranks), offsets(n_ranks + 1, 0);
   MPI_Allgather(&bytes, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
   for (int r = 0; r < n_ranks; ++r) offsets[r + 1] = offsets[r] + counts[r];
-  std::vector<SharedContact> all(offsets[n_ranks] / sizeof(SharedContact));
+  std::vector<T> all(offsets[n_ranks] / sizeof(T));
   MPI_Allgatherv(mine.data(), bytes, MPI_BYTE, all.data(), counts.data(), offsets.data(), MPI_BYTE,
                  world);
   return all;
@@ -108,6 +112,7 @@ void ComputePacking::compute_vector()
   }
   compute_density_and_stress();
   compute_order();
+  compute_cubatic_order();
   compute_contacts();
 }
 
@@ -119,8 +124,9 @@ void ComputePacking::compute_density_and_stress()
     volume *= domain->prd[k];
     trace += pair->virial[k];
   }
-  for (const Vec<3> &semi_axes : pair->particle_view().semi_axes(atom->nlocal)) {
-    measure += pair->drag(semi_axes).measure;
+  const std::vector<Vec<3>> semi_axes = pair->particle_view().semi_axes(atom->nlocal);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    measure += pair->drag(semi_axes[i], atom->type[i]).measure;
   }
   vector[PHI] = sum(measure) / volume;
   vector[U] = sum(pair->eng_vdwl) / volume;
@@ -134,7 +140,8 @@ void ComputePacking::compute_order()
   view.read_orientations(atom->nlocal);
   std::vector<Vec<3>> axes;  // of particles that have a direction
   for (int i = 0; i < atom->nlocal; ++i) {
-    if (semi_axes[i][0] != semi_axes[i][1]) axes.push_back(body_axis(view.orientation(i), 0));
+    const std::optional<int> along = pair->director(semi_axes[i], atom->type[i]);
+    if (along) axes.push_back(body_axis(view.orientation(i), *along));
   }
   const double n = sum(static_cast<double>(axes.size()));
   vector[S_2] = vector[S_4] = 0.0;
@@ -172,6 +179,34 @@ void ComputePacking::compute_order()
     tetratic += 0.125 * (c_sq * (35.0 * c_sq - 30.0) + 3.0);
   }
   vector[S_4] = sum(tetratic) / n;
+}
+
+/// The largest mean of P_4(t.u_i) over directions t, u_i being the axis of i nearest to t.
+void ComputePacking::compute_cubatic_order()
+{
+  vector[C_4] = 0.0;
+  if (domain->dimension == 2 || !pair->has_three_axes()) return;
+  ParticleView &view = pair->particle_view();
+  view.read_orientations(atom->nlocal);
+  std::vector<Vec<3>> axes, mine;
+  const LAMMPS_NS::bigint stride = 1 + (atom->natoms - 1) / MOST_TRIED;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    for (int k = 0; k < 3; ++k) axes.push_back(body_axis(view.orientation(i), k));
+    if (atom->tag[i] % stride == 0) mine.insert(mine.end(), axes.end() - 3, axes.end());
+  }
+  const std::vector<Vec<3>> tried = gather(mine, world);
+  std::vector<double> sums(tried.size(), 0.0), all(tried.size());
+  for (std::size_t t = 0; t < tried.size(); ++t) {
+    for (std::size_t n = 0; n < axes.size(); n += 3) {
+      double c_sq = 0.0;
+      for (int k = 0; k < 3; ++k) c_sq = std::max(c_sq, std::pow(dot(tried[t], axes[n + k]), 2));
+      sums[t] += 0.125 * (c_sq * (35.0 * c_sq - 30.0) + 3.0);
+    }
+  }
+  MPI_Allreduce(sums.data(), all.data(), static_cast<int>(all.size()), MPI_DOUBLE, MPI_SUM, world);
+  for (const double each : all) {
+    vector[C_4] = std::max(vector[C_4], each / static_cast<double>(atom->natoms));
+  }
 }
 
 void ComputePacking::compute_contacts()
@@ -230,7 +265,7 @@ void ComputePacking::compute_residuals(double mean_bond_force)
     const double force_sq = f[0] * f[0] + f[1] * f[1] + f[2] * f[2];
     sum_sq += force_sq;
     largest_sq = std::max(largest_sq, force_sq);
-    const Vec<3> moment = pair->drag(semi_axes[i]).moment;
+    const Vec<3> moment = pair->drag(semi_axes[i], atom->type[i]).moment;
     const double gyration = std::sqrt(std::max({moment[0], moment[1], moment[2]}));
     largest_torque =
         std::max(largest_torque, std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) / gyration);

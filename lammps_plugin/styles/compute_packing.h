@@ -23,6 +23,8 @@ namespace jamshape {
 ///   11 bonds     the number of all bonds, a side-to-side contact counted as two
 ///   12 overlap   largest overlap 1 - r/d
 ///   13 tmax      largest net torque over mean bond force times the particle's radius of gyration
+///   14 C_4       cubatic order (Yuan et al. 2019, Eq. 7) of superellipsoids in 3D, 0 for others;
+///                directions tried are the axes of all particles, or of about 512 of many
 class ComputePacking : public LAMMPS_NS::Compute {
  public:
   ComputePacking(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);
@@ -32,13 +34,14 @@ class ComputePacking : public LAMMPS_NS::Compute {
   void compute_vector() override;
 
  private:
-  static constexpr int N_VALUES = 13;
+  static constexpr int N_VALUES = 14;
   PairContact *pair;
 
   double sum(double mine) const;
   double largest(double mine) const;
   void compute_density_and_stress();
   void compute_order();
+  void compute_cubatic_order();
   void compute_contacts();
   void compute_residuals(double mean_bond_force);
 };

@@ -17,7 +17,9 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <mpi.h>
+#include <tuple>
 
 namespace jamshape {
 
@@ -79,18 +81,29 @@ void OverdampedFlow::begin_run()
 void OverdampedFlow::measure_particles()
 {
   const std::vector<Vec<3>> semi_axes = pair->particle_view().semi_axes(atom->nlocal);
-  mobility.resize(semi_axes.size());
+  std::map<std::tuple<int, double, double, double>, std::size_t> number_of;
+  mobilities.clear();
+  resize_closely(kind, semi_axes.size());
   for (std::size_t i = 0; i < semi_axes.size(); ++i) {
-    const SubstrateDrag of_particle = pair->drag(semi_axes[i]);
-    const double shift = 1.0 / (drag * of_particle.measure);
-    mobility[i].shift = shift;
-    for (int k = 0; k < 3; ++k) {
-      const double moment = of_particle.moment[k];
-      mobility[i].turn[k] = moment > 0.0 ? shift / moment : 0.0;
-    }
-    mobility[i].step_limit =
-        LARGEST_STEP * std::min({semi_axes[i][0], semi_axes[i][1], semi_axes[i][2]});
+    const Vec<3> &axes = semi_axes[i];
+    const auto found = number_of.emplace(std::make_tuple(atom->type[i], axes[0], axes[1], axes[2]),
+                                         mobilities.size());
+    if (found.second) mobilities.push_back(mobility_of(axes, atom->type[i]));
+    kind[i] = static_cast<int>(found.first->second);
   }
+}
+
+OverdampedFlow::Mobility OverdampedFlow::mobility_of(const Vec<3> &semi_axes, int type) const
+{
+  const SubstrateDrag of_particle = pair->drag(semi_axes, type);
+  Mobility m;
+  m.shift = 1.0 / (drag * of_particle.measure);
+  for (int k = 0; k < 3; ++k) {
+    const double moment = of_particle.moment[k];
+    m.turn[k] = moment > 0.0 ? m.shift / moment : 0.0;
+  }
+  m.step_limit = LARGEST_STEP * *std::min_element(semi_axes.c, semi_axes.c + dimension);
+  return m;
 }
 
 /* ----------------------------------------------------------------------
@@ -99,8 +112,9 @@ void OverdampedFlow::measure_particles()
 
 Rate OverdampedFlow::mobility_times(int i, const Vec<3> &force, const Vec<3> &torque) const
 {
-  const Mobility &m = mobility[i];
+  const Mobility &m = mobilities[kind[i]];
   if (dimension == 2) return {m.shift * force, {{0.0, 0.0, m.turn[2] * torque[2]}}};
+  if (!pair->particles_turn()) return {m.shift * force, {}};  // nobody reads orientations then
   Vec<3> turn{};
   const Quaternion q = pair->particle_view().orientation(i);
   for (int b = 0; b < 3; ++b) {
@@ -108,6 +122,22 @@ Rate OverdampedFlow::mobility_times(int i, const Vec<3> &force, const Vec<3> &to
     turn += (m.turn[b] * dot(axis, torque)) * axis;
   }
   return {m.shift * force, turn};
+}
+
+Rate OverdampedFlow::resistance_times(int i, const Rate &rate) const
+{
+  const Mobility &m = mobilities[kind[i]];
+  const auto per = [](double value, double of) { return of > 0.0 ? value / of : 0.0; };
+  const Vec<3> force = (1.0 / m.shift) * rate.shift;
+  if (dimension == 2) return {force, {{0.0, 0.0, per(rate.turn[2], m.turn[2])}}};
+  if (!pair->particles_turn()) return {force, {}};
+  Vec<3> torque{};
+  const Quaternion q = pair->particle_view().orientation(i);
+  for (int b = 0; b < 3; ++b) {
+    const Vec<3> axis = body_axis(q, b);
+    torque += per(dot(axis, rate.turn), m.turn[b]) * axis;
+  }
+  return {force, torque};
 }
 
 Rate OverdampedFlow::present_rate(int i) const
@@ -157,9 +187,11 @@ void OverdampedFlow::begin_step()
   }
 }
 
-void OverdampedFlow::store_rate(int i, const Rate &rate)
+void OverdampedFlow::store_rate(int i, const Rate &rate) { pack(rate, values[i] + dimension); }
+
+/// Without the components that are zero in the plane.
+void OverdampedFlow::pack(const Rate &rate, double *to) const
 {
-  double *to = values[i] + dimension;
   to = std::copy_n(rate.shift.c, dimension, to);
   if (dimension == 2) {
     *to = rate.turn[2];
@@ -178,7 +210,7 @@ void OverdampedFlow::store_rates(const Stage &stage)
 
 void OverdampedFlow::require_small(int i, double moved) const
 {
-  if (moved <= mobility[i].step_limit) return;  // false for NaN
+  if (moved <= mobilities[kind[i]].step_limit) return;  // false for NaN
   error->one(FLERR, "fix overdamped/affine found that one step moves atom " +
                         std::to_string(atom->tag[i]) + " by " + std::to_string(moved) +
                         ", expected at most half its radius: use a smaller timestep.");
@@ -224,12 +256,14 @@ void OverdampedFlow::move(const Move &m, bool is_last)
 void OverdampedFlow::move_by(const Move &m) { move(m, false); }
 void OverdampedFlow::finish_step(const Move &m) { move(m, true); }
 
-void OverdampedFlow::clear_forces()
+/// Of all atoms from the first one on.
+void OverdampedFlow::clear_forces(int first)
 {
-  const std::size_t n = atom->nlocal + (force->newton ? atom->nghost : 0);
-  if (n == 0) return;
-  std::memset(&atom->f[0][0], 0, 3 * n * sizeof(double));
-  std::memset(&atom->torque[0][0], 0, 3 * n * sizeof(double));
+  const int end = atom->nlocal + (force->newton ? atom->nghost : 0);
+  if (first >= end) return;
+  const std::size_t n = end - first;
+  std::memset(&atom->f[first][0], 0, 3 * n * sizeof(double));
+  std::memset(&atom->torque[first][0], 0, 3 * n * sizeof(double));
 }
 
 /// As LAMMPS's own step: atoms change ranks, ghosts and lists are made anew.
@@ -257,7 +291,7 @@ void OverdampedFlow::evaluate_forces()
   } else {
     comm->forward_comm();
   }
-  clear_forces();
+  clear_forces(0);
   const int no_energy = 0, no_virial = 0;
   if (modify->n_pre_force) modify->pre_force(no_virial);
   force->pair->compute(no_energy, no_virial);
@@ -329,11 +363,11 @@ void OverdampedFlow::unpack_direction(int n, int first, const double *buf)
   }
 }
 
-/// Sums stiffness times the direction over all bonds into the force arrays.
+/// Adds stiffness times the direction, over all bonds, to the force arrays of own atoms.
 void OverdampedFlow::apply_stiffness()
 {
   comm->forward_comm_fix(fix, n_rates);
-  clear_forces();
+  clear_forces(atom->nlocal);
   const auto add = [&](int i, const Vec<3> &force_on, const Vec<3> &torque_on) {
     for (int k = 0; k < 3; ++k) {
       atom->f[i][k] += force_on[k];
@@ -367,12 +401,28 @@ void OverdampedFlow::unpack_force(int i, const double *from)
   std::copy_n(from + dimension, n_rates - dimension, atom->torque[i] + (dimension == 2 ? 2 : 0));
 }
 
+/// The force and torque that belong to a rate, times a factor: as those of i, or added to them.
+void OverdampedFlow::set_force(int i, double factor, const Rate &rate)
+{
+  for (double *const of : {atom->f[i], atom->torque[i]}) std::fill_n(of, 3, 0.0);
+  add_force(i, factor, rate);
+}
+
+void OverdampedFlow::add_force(int i, double factor, const Rate &rate)
+{
+  const Rate load = resistance_times(i, rate);
+  for (int k = 0; k < 3; ++k) {
+    atom->f[i][k] += factor * load.shift[k];
+    atom->torque[i][k] += factor * load.turn[k];
+  }
+}
+
 double OverdampedFlow::largest_rate()
 {
   const int nlocal = atom->nlocal;
   const std::size_t size = static_cast<std::size_t>(n_rates) * nlocal;
   pair->particle_view().read_orientations(nlocal);
-  std::vector<double> saved(size), now(size), before(size, 0.0);
+  std::vector<double> saved(size);
   for (int i = 0; i < nlocal; ++i) {
     pack_force(i, &saved[n_rates * i]);
     double start[6];
@@ -381,7 +431,7 @@ double OverdampedFlow::largest_rate()
   }
 
   // Lanczos' method in the metric of the drag, in which mobility times stiffness is symmetric. Each
-  // direction is the rate of a force, `now`; what is left of the next one is in the force arrays.
+  // direction is the rate of a force; what is left of the next one is in the force arrays.
   std::vector<double> diagonal, off_diagonal;
   for (int step = 0; step < LANCZOS_STEPS; ++step) {
     double mine = 0.0;
@@ -394,12 +444,10 @@ double OverdampedFlow::largest_rate()
       if (!(length > EXHAUSTED * diagonal[0])) break;
       off_diagonal.push_back(length);
     }
-    now.swap(before);
     for (int i = 0; i < nlocal; ++i) {
-      const Rate rate = present_rate(i);
+      const Rate before = stored_rate(i), rate = present_rate(i);
       store_rate(i, {(1.0 / length) * rate.shift, (1.0 / length) * rate.turn});
-      pack_force(i, &now[n_rates * i]);
-      for (int k = 0; k < n_rates; ++k) now[n_rates * i + k] /= length;
+      set_force(i, step == 0 ? 0.0 : -length, before);
     }
     apply_stiffness();
     mine = 0.0;
@@ -409,13 +457,7 @@ double OverdampedFlow::largest_rate()
     }
     diagonal.push_back(sum(mine));
     for (int i = 0; i < nlocal; ++i) {
-      double left[6];
-      pack_force(i, left);
-      for (int k = 0; k < n_rates; ++k) {
-        left[k] -= diagonal.back() * now[n_rates * i + k];
-        if (step > 0) left[k] -= length * before[n_rates * i + k];
-      }
-      unpack_force(i, left);
+      add_force(i, -diagonal.back(), stored_rate(i));
     }
   }
   for (int i = 0; i < nlocal; ++i) unpack_force(i, &saved[n_rates * i]);
@@ -473,7 +515,8 @@ int OverdampedFlow::unpack(int i, const double *buf)
 double OverdampedFlow::memory_usage() const
 {
   return static_cast<double>(atom->nmax * width() * sizeof(double) +
-                             mobility.capacity() * sizeof(Mobility));
+                             mobilities.capacity() * sizeof(Mobility) +
+                             kind.capacity() * sizeof(int));
 }
 
 }  // namespace jamshape

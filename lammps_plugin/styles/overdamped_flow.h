@@ -104,18 +104,25 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
     Vec<3> turn;        // per body axis
     double step_limit;  // no particle may move farther in one step than this
   };
-  std::vector<Mobility> mobility;
+  std::vector<Mobility> mobilities;  // of each kind of particle
+  std::vector<int> kind;             // of own atoms
 
+  Mobility mobility_of(const Vec<3> &semi_axes, int type) const;
+  /// Force and torque (in the places of a rate) that move a particle at a rate.
+  Rate resistance_times(int i, const Rate &rate) const;
   Rate mobility_times(int i, const Vec<3> &force, const Vec<3> &torque) const;
   Rate present_rate(int i) const;
   Rate stored_rate(int i) const;
   void store_rate(int i, const Rate &rate);
+  void pack(const Rate &rate, double *to) const;
   Vec<3> read_coordinates(int i) const;
   Quaternion orientation_at_start(int i) const;
   void require_small(int i, double moved) const;
   double place(int i, const Move &move, bool is_last);
   void move(const Move &move, bool is_last);
-  void clear_forces();
+  void clear_forces(int first);
+  void set_force(int i, double factor, const Rate &rate);
+  void add_force(int i, double factor, const Rate &rate);
   double sum(double mine) const;
   void pack_force(int i, double *to) const;
   void unpack_force(int i, const double *from);

@@ -48,10 +48,7 @@ void PairContact::allocate()
 
 void PairContact::coeff(int narg, char **arg)
 {
-  if (narg != 3) {
-    error->all(FLERR, "pair_coeff of " + style_name() + " found " + std::to_string(narg) +
-                          " arguments, expected 'I J k_e'.");
-  }
+  require_arguments(narg == 3, narg);
   if (!allocated) allocate();
   int ilo, ihi, jlo, jhi;
   LAMMPS_NS::utils::bounds(FLERR, std::string(arg[0]), 1, atom->ntypes, ilo, ihi, error);
@@ -59,7 +56,7 @@ void PairContact::coeff(int narg, char **arg)
   const double stiffness = LAMMPS_NS::utils::numeric(FLERR, arg[2], false, lmp);
   if (!(stiffness > 0.0) || !std::isfinite(stiffness)) {
     error->all(FLERR,
-               "pair_coeff of " + style_name() + " found k_e = " + arg[2] +
+               "pair_coeff of " + style_name() + " found " + energy_name() + " = " + arg[2] +
                    ", expected a positive energy: give the contacts a stiffness such as 1.0.");
   }
   for (int i = ilo; i <= ihi; ++i) {
@@ -70,6 +67,13 @@ void PairContact::coeff(int narg, char **arg)
   }
 }
 
+void PairContact::require_arguments(bool is_right, int narg) const
+{
+  if (is_right) return;
+  error->all(FLERR, "pair_coeff of " + style_name() + " found " + std::to_string(narg) +
+                        " arguments, expected " + coeff_rule() + ".");
+}
+
 /// The largest particle of each type, and whether any particle can turn. Sizes are per particle, so
 /// cutoffs follow from the particles themselves, never from an input that could be too short.
 void PairContact::measure_particles()
@@ -78,19 +82,19 @@ void PairContact::measure_particles()
   std::vector<double> mine(atom->ntypes + 1, 0.0);
   int turning = 0;
   for (int i = 0; i < atom->nlocal; ++i) {
-    if (!is_valid_shape(semi_axes[i])) {
+    const int type = atom->type[i];
+    if (!is_valid_shape(semi_axes[i], type)) {
       const Vec<3> diameters = 2.0 * semi_axes[i];
       error->one(FLERR, style_name() + " found atom " + std::to_string(atom->tag[i]) +
                             " with diameters " + std::to_string(diameters[0]) + " " +
                             std::to_string(diameters[1]) + " " + std::to_string(diameters[2]) +
                             ", expected that " + shape_rule() + ": correct its shape.");
     }
-    double &largest = mine[atom->type[i]];
-    largest = std::max({largest, semi_axes[i][0], semi_axes[i][1], semi_axes[i][2]});
-    turning |= turns(semi_axes[i]);
+    mine[type] = std::max(mine[type], bounding_radius(semi_axes[i], type));
+    turning |= turns(semi_axes[i], type);
   }
-  bounding_radius.resize(mine.size());
-  MPI_Allreduce(mine.data(), bounding_radius.data(), static_cast<int>(mine.size()), MPI_DOUBLE,
+  largest_radius.resize(mine.size());
+  MPI_Allreduce(mine.data(), largest_radius.data(), static_cast<int>(mine.size()), MPI_DOUBLE,
                 MPI_MAX, world);
   int anywhere;
   MPI_Allreduce(&turning, &anywhere, 1, MPI_INT, MPI_MAX, world);
@@ -130,7 +134,7 @@ double PairContact::init_one(int i, int j)
     k_e[i][j] = std::sqrt(k_e[i][i] * k_e[j][j]);
   }
   k_e[j][i] = k_e[i][j];
-  return bounding_radius[i] + bounding_radius[j];
+  return largest_radius[i] + largest_radius[j];
 }
 
 void PairContact::setup()
@@ -149,8 +153,8 @@ void PairContact::setup()
 void PairContact::require_same_bounds(const std::vector<Vec<3>> &semi_axes) const
 {
   for (std::size_t i = 0; i < semi_axes.size(); ++i) {
-    const double largest = std::max({semi_axes[i][0], semi_axes[i][1], semi_axes[i][2]});
-    if (largest > bounding_radius[atom->type[i]]) {
+    const int type = atom->type[i];
+    if (bounding_radius(semi_axes[i], type) > largest_radius[type]) {
       error->one(FLERR,
                  "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
                      " larger than at the start of the run, so the ghost cutoff is too short: "
@@ -176,9 +180,9 @@ void PairContact::stop_at_crossing(int i, int j)
 {
   error->one(FLERR,
              "pair_style " + style_name() + " found atoms " + std::to_string(atom->tag[i]) +
-                 " and " + std::to_string(atom->tag[j]) +
-                 " with crossing spines or coinciding centres, where no contact force exists: "
-                 "start from a state without overlap, or use a smaller timestep.");
+                 " and " + std::to_string(atom->tag[j]) + " with " + without_force() +
+                 ", where no contact force exists: start from a state without overlap, or use a "
+                 "smaller timestep.");
 }
 
 bool PairContact::is_mine(int i, int j) const
@@ -260,7 +264,7 @@ void PairContact::min_xf_pointers(int, double **x, double **f)
   const std::vector<Vec<3>> semi_axes = particles.semi_axes(atom->nlocal);
   gyration.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const Vec<3> moment = drag(semi_axes[i]).moment;
+    const Vec<3> moment = drag(semi_axes[i], atom->type[i]).moment;
     gyration[i] = std::sqrt(std::max({moment[0], moment[1], moment[2]}));
   }
   *x = x_extra.data();

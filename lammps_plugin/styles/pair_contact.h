@@ -7,6 +7,7 @@
 #include "particle_view.h"
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,9 +43,14 @@ class PairContact : public LAMMPS_NS::Pair {
   void min_xf_get(int ignore) override;
   void min_x_set(int ignore) override;
 
-  /// Drag coefficients of a particle, and whether a contact can turn any particle of this scene.
-  virtual SubstrateDrag drag(const Vec<3> &semi_axes) const = 0;
+  /// Drag coefficients of a particle of a type, and whether a contact can turn any of this scene.
+  virtual SubstrateDrag drag(const Vec<3> &semi_axes, int type) const = 0;
   bool particles_turn() const { return any_turns; }
+
+  /// The body axis (0, 1, 2) that tells a particle's direction; nothing for those that have none.
+  virtual std::optional<int> director(const Vec<3> &semi_axes, int type) const = 0;
+  /// Whether all three axes of the bodies count, as for the cubatic order.
+  virtual bool has_three_axes() const { return false; }
 
   /// Shows every bond of this rank's pairs, at the current positions, to `visit`.
   virtual void for_each_bond(const std::function<void(const LocalBond &)> &visit) = 0;
@@ -58,11 +64,20 @@ class PairContact : public LAMMPS_NS::Pair {
   double **k_e;
   bool any_turns;
 
-  /// Names the style in messages; checks one shape and says what it should be.
+  /// Names the style, its energy and what has no contact force, in messages.
   virtual std::string style_name() const = 0;
-  virtual bool is_valid_shape(const Vec<3> &semi_axes) const = 0;
+  virtual std::string energy_name() const { return "k_e"; }
+  virtual std::string coeff_rule() const { return "'I J k_e'"; }
+  virtual std::string without_force() const { return "crossing spines or coinciding centres"; }
+
+  /// Checks one shape and says what it should be. Some shapes have an exponent, by type.
+  virtual double exponent(int /*type*/) const { return 1.0; }
+  virtual bool is_valid_shape(const Vec<3> &semi_axes, int type) const = 0;
   virtual std::string shape_rule() const = 0;
-  virtual bool turns(const Vec<3> &semi_axes) const = 0;
+  virtual bool turns(const Vec<3> &semi_axes, int type) const = 0;
+  virtual double bounding_radius(const Vec<3> &semi_axes, int type) const = 0;
+
+  void require_arguments(bool is_right, int narg) const;
 
   [[noreturn]] void stop_at_crossing(int i, int j);
   void require_same_bounds(const std::vector<Vec<3>> &semi_axes) const;
@@ -72,7 +87,7 @@ class PairContact : public LAMMPS_NS::Pair {
   bool is_mine(int i, int j) const;
 
  private:
-  std::vector<double> bounding_radius;   // per type: the largest of its particles
+  std::vector<double> largest_radius;    // per type: bounding radius of the largest particle
   std::vector<double> x_extra, f_extra;  // rotations as lengths, for the minimiser
   std::vector<double> gyration;          // length per radian of each own particle
 

@@ -5,6 +5,8 @@
 #include "contact/vec.hpp"
 
 #include "atom.h"
+#include "bodies.h"
+#include "comm.h"
 #include "domain.h"
 #include "force.h"
 #include "neigh_list.h"
@@ -15,6 +17,8 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace jamshape {
@@ -47,42 +51,56 @@ template <class Model> class PairContactOf : public PairContact {
     domain->dimension == 2 ? visit_bonds<2>(visit) : visit_bonds<3>(visit);
   }
 
-  SubstrateDrag drag(const Vec<3> &semi_axes) const override
+  SubstrateDrag drag(const Vec<3> &semi_axes, int type) const override
   {
-    const auto shape = *shape_from(semi_axes);
+    const auto shape = *shape_from(semi_axes, type);
     return domain->dimension == 2 ? Model::template drag<2>(shape) : Model::template drag<3>(shape);
   }
 
   double memory_usage() override
   {
     return PairContact::memory_usage() + in_2d.memory_usage() + in_3d.memory_usage() +
-           static_cast<double>((first.capacity() + partner.capacity()) * sizeof(int));
+           static_cast<double>((first.capacity() + partner.capacity()) * sizeof(int) +
+                               last_normal.capacity() * sizeof(float));
   }
 
  protected:
   typename Model::Options options{};
 
-  bool is_valid_shape(const Vec<3> &semi_axes) const override
+  bool is_valid_shape(const Vec<3> &semi_axes, int type) const override
   {
-    return shape_from(semi_axes).has_value();
+    return shape_from(semi_axes, type).has_value();
   }
   std::string shape_rule() const override { return Model::SHAPE_RULE; }
-  bool turns(const Vec<3> &semi_axes) const override
+  bool turns(const Vec<3> &semi_axes, int type) const override
   {
-    return Model::turns(*shape_from(semi_axes));
+    return Model::turns(*shape_from(semi_axes, type));
+  }
+  double bounding_radius(const Vec<3> &semi_axes, int type) const override
+  {
+    const auto shape = *shape_from(semi_axes, type);
+    return domain->dimension == 2 ? shape.template bounding_radius<2>()
+                                  : shape.template bounding_radius<3>();
   }
 
  private:
   // A small margin keeps the list short, a large one keeps it longer; flat optimum near one half.
   static constexpr double MARGIN_OVER_SKIN = 0.15;
-  static constexpr double EXPONENT = 1.0;  // until a style reads one per type
 
   template <int D> using Body = typename Model::template Body<D>;
-  template <int D> using Pose = typename Model::template Pose<D>;
 
-  static std::optional<typename Model::Shape> shape_from(const Vec<3> &semi_axes)
+  /// Whether a contact is found sooner from the normal that the pair had a moment before.
+  template <int D, class = void> struct StartsFromNormal : std::false_type {};
+  template <int D>
+  struct StartsFromNormal<
+      D, std::void_t<decltype(contact_of(
+             std::declval<const Body<D> &>(), std::declval<const Body<D> &>(),
+             std::declval<const typename Model::Law &>(), std::declval<Vec<D> &>()))>>
+      : std::true_type {};
+
+  std::optional<typename Model::Shape> shape_from(const Vec<3> &semi_axes, int type) const
   {
-    return Model::shape_from(semi_axes, EXPONENT);
+    return Model::shape_from(semi_axes, exponent(type));
   }
 
   typename Model::Law law_of(int i, int j) const
@@ -91,14 +109,15 @@ template <class Model> class PairContactOf : public PairContact {
   }
 
   template <int D> struct Bodies {
-    std::vector<Body<D>> now;
-    std::vector<Pose<D>> then;
+    using Pose = typename BodiesOf<Model, D>::Pose;
+
+    BodiesOf<Model, D> now;
+    std::vector<Pose> then;  // when pairs were last chosen
     Vec<D> box_then;
 
     double memory_usage() const
     {
-      return static_cast<double>(now.capacity() * sizeof(Body<D>) +
-                                 then.capacity() * sizeof(Pose<D>));
+      return now.memory_usage() + static_cast<double>(then.capacity() * sizeof(Pose));
     }
   };
 
@@ -106,6 +125,7 @@ template <class Model> class PairContactOf : public PairContact {
   Bodies<3> in_3d;
   double margin = 0.0;
   std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
+  std::vector<float> last_normal;   // D a close pair, for shapes that start from it; zeros at first
 
   template <int D> Bodies<D> &all()
   {
@@ -130,7 +150,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   template <int D, bool TURNS, bool TALLY> void evaluate()
   {
-    const std::vector<Body<D>> &bodies = all<D>().now;
+    const BodiesOf<Model, D> &bodies = all<D>().now;
     const int nlocal = atom->nlocal, newton = force->newton_pair;
     double **const f = atom->f, **const torque = atom->torque;
     for (int n = 0; n < list->inum; ++n) {
@@ -140,7 +160,8 @@ template <class Model> class PairContactOf : public PairContact {
       Torque<D> torque_i{};
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
-        const Contact<D> contact = contact_of(body, bodies[j], law_of(i, j));
+        const Body<D> &other = bodies[j];
+        const Contact<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
         if (contact.status == ContactStatus::APART) continue;
         if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
         force_i += contact.force;
@@ -149,10 +170,27 @@ template <class Model> class PairContactOf : public PairContact {
           add_to<D>(f[j], -contact.force);
           if constexpr (TURNS) add_torque<D>(torque[j], contact.torque_j);
         }
-        if constexpr (TALLY) tally<D>(i, j, contact, body.centre - bodies[j].centre);
+        if constexpr (TALLY) tally<D>(i, j, contact, body.centre - other.centre);
       }
       add_to<D>(f[i], force_i);
       if constexpr (TURNS) add_torque<D>(torque[i], torque_i);
+    }
+  }
+
+  /// Contact of the k-th close pair. Where it starts from is worth time only, so floats do.
+  template <int D>
+  Contact<D> contact_of_pair(int k, const Body<D> &i, const Body<D> &j,
+                             const typename Model::Law &law)
+  {
+    if constexpr (StartsFromNormal<D>::value) {
+      float *const last = &last_normal[static_cast<std::size_t>(D) * k];
+      Vec<D> normal;
+      for (int a = 0; a < D; ++a) normal[a] = last[a];
+      const Contact<D> contact = contact_of(i, j, law, normal);
+      for (int a = 0; a < D; ++a) last[a] = static_cast<float>(normal[a]);
+      return contact;
+    } else {
+      return contact_of(i, j, law);
     }
   }
 
@@ -200,23 +238,20 @@ template <class Model> class PairContactOf : public PairContact {
   {
     const std::vector<Vec<3>> semi_axes = particles.semi_axes(n_all());
     require_same_bounds(semi_axes);
-    std::vector<Body<D>> &bodies = all<D>().now;
-    resize_closely(bodies, semi_axes.size());
+    BodiesOf<Model, D> &bodies = all<D>().now;
+    bodies.begin_shapes(semi_axes.size());
     for (std::size_t i = 0; i < semi_axes.size(); ++i) {
-      bodies[i] = Model::template body<D>(*shape_from(semi_axes[i]));
+      bodies.set_shape(i, *shape_from(semi_axes[i], atom->type[i]));
     }
   }
 
   template <int D> void read_poses()
   {
-    std::vector<Body<D>> &bodies = all<D>().now;
-    const int n = n_all();
-    for (int i = 0; i < n; ++i) {
-      for (int k = 0; k < D; ++k) bodies[i].centre[k] = atom->x[i][k];
-    }
+    BodiesOf<Model, D> &bodies = all<D>().now;
+    bodies.read_centres(atom->x);
     if (!any_turns) return;
-    particles.read_orientations(n);
-    for (int i = 0; i < n; ++i) Model::template turn_to<D>(bodies[i], particles.orientation(i));
+    particles.read_orientations(n_all());
+    bodies.read_orientations(particles);
   }
 
   template <int D> void choose_pairs()
@@ -227,18 +262,22 @@ template <class Model> class PairContactOf : public PairContact {
     partner.clear();
     for (int n = 0; n < list->inum; ++n) {
       const int i = list->ilist[n];
+      const Body<D> &body = bodies.now[i];
       const int *const neighbours = list->firstneigh[i];
       for (int k = 0; k < list->numneigh[i]; ++k) {
         const int j = neighbours[k] & NEIGHMASK;
-        if (Model::template closer_than<D>(margin, bodies.now[i], bodies.now[j]))
-          partner.push_back(j);
+        if (Model::template closer_than<D>(margin, body, bodies.now[j])) partner.push_back(j);
       }
       first.push_back(static_cast<int>(partner.size()));
     }
-    resize_closely(bodies.then, bodies.now.size());
-    for (std::size_t i = 0; i < bodies.now.size(); ++i) {
-      bodies.then[i] = Model::template pose<D>(bodies.now[i]);
+    if (partner.capacity() > partner.size() + partner.size() / 4) partner.shrink_to_fit();
+    if constexpr (StartsFromNormal<D>::value) {
+      last_normal.clear();
+      resize_closely(last_normal, D * partner.size());
     }
+    // A ghost of this rank's own particle moves with it.
+    resize_closely(bodies.then, comm->nprocs == 1 ? atom->nlocal : bodies.now.size());
+    for (std::size_t i = 0; i < bodies.then.size(); ++i) bodies.then[i] = bodies.now.pose(i);
     for (int k = 0; k < D; ++k) bodies.box_then[k] = domain->prd[k];
   }
 
@@ -257,14 +296,14 @@ template <class Model> class PairContactOf : public PairContact {
     const double left = margin - strain * (cutforce + margin);
     if (left <= 0.0) return true;
     double most_sq = 0.0;
-    for (std::size_t i = 0; i < bodies.now.size(); ++i) {
+    for (std::size_t i = 0; i < bodies.then.size(); ++i) {
+      const Body<D> &now = bodies.now[i];
+      const auto &then = bodies.now.pose_of(i, bodies.then[i]);
       Vec<D> shift;
       for (int k = 0; k < D; ++k) {
-        shift[k] =
-            bodies.now[i].centre[k] - centre[k] - scale[k] * (bodies.then[i].centre[k] - centre[k]);
+        shift[k] = now.centre[k] - centre[k] - scale[k] * (then.centre[k] - centre[k]);
       }
-      most_sq =
-          std::max(most_sq, Model::template motion_sq<D>(shift, bodies.now[i], bodies.then[i]));
+      most_sq = std::max(most_sq, Model::template motion_sq<D>(shift, now, then));
     }
     return 4.0 * most_sq >= left * left;
   }
@@ -273,14 +312,17 @@ template <class Model> class PairContactOf : public PairContact {
 
   template <int D> void visit_bonds(const std::function<void(const LocalBond &)> &visit)
   {
-    const std::vector<Body<D>> &bodies = all<D>().now;
+    read_poses<D>();  // others gather orientations in the same place
+    const BodiesOf<Model, D> &bodies = all<D>().now;
     for (int n = 0; n < list->inum; ++n) {
       const int i = list->ilist[n];
+      const Body<D> body = bodies[i];
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
-        const Contact<D> contact = contact_of(bodies[i], bodies[j], law_of(i, j));
+        const Body<D> &other = bodies[j];
+        const Contact<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
         if (contact.status != ContactStatus::TOUCHING) continue;
-        const Vec<D> r = bodies[i].centre - bodies[j].centre;
+        const Vec<D> r = body.centre - other.centre;
         for (int b = 0; b < contact.n_bonds; ++b) {
           const Bond<D> &bond = contact.bond[b];
           visit({i, j, contact.kind, b == 0, in_space<D>(bond.normal), in_space<D>(bond.force),

@@ -9,6 +9,11 @@
 
 namespace jamshape {
 
+std::optional<int> PairSpherocylinderHarmonic::director(const Vec<3> &semi_axes, int) const
+{
+  return semi_axes[0] != semi_axes[1] ? std::optional<int>(0) : std::nullopt;
+}
+
 void PairSpherocylinderHarmonic::settings(int narg, char **arg)
 {
   const std::string keyword = narg == 2 ? arg[0] : "", value = narg == 2 ? arg[1] : "";

@@ -4,12 +4,17 @@
 
 #include "pair_contact_of.h"
 
+#include <optional>
+#include <string>
+
 namespace jamshape {
 
 /// pair_style spherocylinder/harmonic sides one|two; pair_coeff I J k_e
 class PairSpherocylinderHarmonic : public PairContactOf<SpherocylinderModel> {
  public:
   using PairContactOf::PairContactOf;
+
+  std::optional<int> director(const Vec<3> &semi_axes, int type) const override;
 
   void settings(int narg, char **arg) override;
   void write_restart(FILE *fp) override;

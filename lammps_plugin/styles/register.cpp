@@ -8,6 +8,7 @@
 #include "force.h"
 #include "modify.h"
 #include "pair_spherocylinder_harmonic.h"
+#include "pair_superellipsoid_harmonic.h"
 
 #include <string>
 
@@ -29,6 +30,7 @@ void add_styles(LAMMPS *lmp)
 {
   using namespace jamshape;
   (*lmp->force->pair_map)["spherocylinder/harmonic"] = pair<PairSpherocylinderHarmonic>;
+  (*lmp->force->pair_map)["superellipsoid/harmonic"] = pair<PairSuperellipsoidHarmonic>;
   (*lmp->modify->fix_map)["overdamped/affine"] = fix<FixOverdampedAffine>;
   (*lmp->modify->compute_map)["contact/local"] = compute<ComputeContactLocal>;
   (*lmp->modify->compute_map)["packing"] = compute<ComputePacking>;

@@ -174,8 +174,8 @@ class State:
         return ExactPacking(**vars(self.packing), quaternion=self.quaternion)
 
 
-def state_from(table, lo, hi, step=0):
-    """State of a table with the columns POSE and FORCE."""
+def state_from(table, lo, hi, step=0, exponents=None):
+    """State of a table with the columns POSE and FORCE; of superellipsoids with exponents by type."""
     table = table[np.argsort(table[:, 0])]
     D = 2 if (lo[2], hi[2]) == (-0.5, 0.5) else 3
     lo, hi = np.array(lo[:D]), np.array(hi[:D])
@@ -184,28 +184,34 @@ def state_from(table, lo, hi, step=0):
         for zero in (table[:, 4], quaternion[:, 1:3], force[:, 2], torque[:, :2]):
             assert not zero.any(), "2D: z and rotations out of the plane are exactly zero"
         torque = torque[:, 2]
+    species = table[:, 1].astype(int)
+    style = {}
+    if exponents is not None:
+        exponent = np.asarray(exponents, float)[species - 1]
+        style = {"shape_style": "superellipsoid", "exponent": exponent}
     packing = Packing(
         position=table[:, 2 : 2 + D],
         orientation=angle_from_quaternion(quaternion) if D == 2 else quaternion,
         diameters=table[:, 12:15],
-        species=table[:, 1].astype(int),
+        species=species,
         id=table[:, 0].astype(int),
         image=table[:, 5 : 5 + D].astype(int),
         box=Box(lo=lo, edges=hi - lo),
         step=step,
+        **style,
     )
     return State(packing, quaternion, force[:, :D], torque)
 
 
-def state_of(session):
+def state_of(session, exponents=None):
     """State and forces of the last run."""
     per_atom, array = 1, 2
     table = session.lmp.numpy.extract_compute("state", per_atom, array)
     lo, hi = session.lmp.extract_box()[:2]
-    return state_from(table.copy(), lo, hi, session.step)
+    return state_from(table.copy(), lo, hi, session.step, exponents)
 
 
-def states_from_dump(path):
+def states_from_dump(path, exponents=None):
     """States of the frames that `dump` made LAMMPS write."""
     states = []
     for text in Path(path).read_text().split("ITEM: TIMESTEP\n")[1:]:
@@ -213,7 +219,8 @@ def states_from_dump(path):
         step, n = int(lines[0]), int(lines[2])
         bounds = np.array([line.split() for line in lines[4:7]], dtype=float)
         table = np.array([line.split() for line in lines[8 : 8 + n]], dtype=float)
-        states.append(state_from(table, tuple(bounds[:, 0]), tuple(bounds[:, 1]), step))
+        lo, hi = map(tuple, bounds.T)
+        states.append(state_from(table, lo, hi, step, exponents))
     return states
 
 
@@ -247,6 +254,47 @@ def difference_from_bindings(state, sides="one", k_e=1.0):
             (state.torque, expected.torque, torques),
         )
     )
+
+
+def gradient_by_differences(session, state, step):
+    """Central differences of the energy by every position and every rotation, through `run 0`."""
+    D, n = state.packing.dimension, state.packing.n
+    x = session.lmp.numpy.extract_atom("x")
+
+    def energy_after(command=""):
+        session.commands(f"{command}\nrun 0 post no")
+        return session.lmp.get_thermo("pe")
+
+    by_position = np.zeros((n, D))
+    for row, k in np.ndindex(n, D):
+        atom = session.lmp.numpy.extract_atom("id")[:n].tolist().index(state.packing.id[row])
+        at = x[atom, k]
+        x[atom, k] = ahead = at + step
+        rise = energy_after()
+        x[atom, k] = behind = at - step
+        rise -= energy_after()
+        x[atom, k] = at
+        by_position[row, k] = rise / (ahead - behind)
+
+    axes = np.eye(3)[2:] if D == 2 else np.eye(3)
+    by_rotation = np.zeros((n, len(axes)))
+    for row, k in np.ndindex(*by_rotation.shape):
+        q, rise = state.quaternion[row], 0.0
+        lever = state.packing.diameters[row, 0] / 2
+        for sign in (1, -1):
+            turn = quaternion_product(rotation_by(sign * step / lever * axes[k]), q)
+            rise += sign * energy_after(set_quaternion(state.packing.id[row], turn))
+        energy_after(set_quaternion(state.packing.id[row], q))
+        by_rotation[row, k] = rise * lever / (2 * step)
+    return by_position, by_rotation if D == 3 else by_rotation[:, 0]
+
+
+def set_quaternion(tag, q):
+    """LAMMPS takes an axis and an angle in degrees."""
+    length = np.linalg.norm(q[1:])
+    axis = q[1:] / length if length else np.array([0.0, 0.0, 1.0])
+    degrees = np.degrees(2 * np.arctan2(length, q[0]))
+    return f"set atom {tag} quat {' '.join(f'{c:.17g}' for c in axis)} {degrees:.17g}"
 
 
 def nearest_image(separation, box):

@@ -244,6 +244,7 @@ def expected_vector(state, sides):
         "bonds": side_bonds,
         "overlap": (1 - network.bonds.distance / network.bonds.reach).max(),
         "tmax": (torque / np.sqrt(moment.max(axis=1))).max() / bond_force,
+        "C_4": 0.0,
     }
 
 
@@ -275,7 +276,7 @@ def test_packing_vector(dimension, alpha, sides, tmp_path, measured):
         run 0""",
         tmp_path, ranks=2,
     )  # fmt: skip
-    row = out.split("c_packing[13]")[1].strip().split("\n")[0].split()
+    row = out.split("c_packing[14]")[1].strip().split("\n")[0].split()
     assert_same_vector(np.array(row[1:], float), expected)
 
 

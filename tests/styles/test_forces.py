@@ -19,17 +19,17 @@ from lammps_scenes import (
     dump,
     fix_vector,
     global_vector,
+    gradient_by_differences,
     kicked,
     load_plugin,
     loaded,
     moved,
     on_grid,
     pose_differences,
-    quaternion_product,
     rods,
     rods_3d,
-    rotation_by,
     run_lmp_well,
+    set_quaternion,
     state_of,
     states_from_dump,
     tiny_box,
@@ -208,6 +208,7 @@ def test_discs_alone_take_the_same_path_to_rounding(dimension, tmp_path, measure
         position=np.vstack([discs.position, rod_at]),
         orientation=np.concatenate([discs.orientation, zero]),
         diameters=np.vstack([discs.diameters, rod]),
+        exponent=np.append(discs.exponent, 1.0),
         species=np.append(discs.species, 1),
         id=np.append(discs.id, discs.id.max() + 1),
         image=np.vstack([discs.image, np.zeros(dimension, int)]),
@@ -229,47 +230,6 @@ def test_discs_alone_take_the_same_path_to_rounding(dimension, tmp_path, measure
 
 
 # --- the gradient of the energy ------------------------------------------------------------------
-
-
-def gradient_by_differences(session, state, step):
-    """Central differences of the energy by every position and every rotation, through `run 0`."""
-    D, n = state.packing.dimension, state.packing.n
-    x = session.lmp.numpy.extract_atom("x")
-
-    def energy_after(command=""):
-        session.commands(f"{command}\nrun 0 post no")
-        return session.lmp.get_thermo("pe")
-
-    by_position = np.zeros((n, D))
-    for row, k in np.ndindex(n, D):
-        atom = session.lmp.numpy.extract_atom("id")[:n].tolist().index(state.packing.id[row])
-        at = x[atom, k]
-        x[atom, k] = ahead = at + step
-        rise = energy_after()
-        x[atom, k] = behind = at - step
-        rise -= energy_after()
-        x[atom, k] = at
-        by_position[row, k] = rise / (ahead - behind)
-
-    axes = np.eye(3)[2:] if D == 2 else np.eye(3)
-    by_rotation = np.zeros((n, len(axes)))
-    for row, k in np.ndindex(*by_rotation.shape):
-        q, rise = state.quaternion[row], 0.0
-        lever = state.packing.diameters[row, 0] / 2
-        for sign in (1, -1):
-            turn = quaternion_product(rotation_by(sign * step / lever * axes[k]), q)
-            rise += sign * energy_after(set_quaternion(state.packing.id[row], turn))
-        energy_after(set_quaternion(state.packing.id[row], q))
-        by_rotation[row, k] = rise * lever / (2 * step)
-    return by_position, by_rotation if D == 3 else by_rotation[:, 0]
-
-
-def set_quaternion(tag, q):
-    """LAMMPS takes an axis and an angle in degrees."""
-    length = np.linalg.norm(q[1:])
-    axis = q[1:] / length if length else np.array([0.0, 0.0, 1.0])
-    degrees = np.degrees(2 * np.arctan2(length, q[0]))
-    return f"set atom {tag} quat {' '.join(f'{c:.17g}' for c in axis)} {degrees:.17g}"
 
 
 @pytest.mark.parametrize("sides", SIDES)

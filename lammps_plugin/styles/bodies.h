@@ -1,0 +1,138 @@
+#pragma once
+
+#include "contact/rotation.hpp"
+#include "contact/vec.hpp"
+
+#include "particle_view.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <tuple>
+#include <type_traits>
+#include <vector>
+
+namespace jamshape {
+
+/// Own and ghost particles as bodies of a model, all kept: for bodies of a few numbers, whose
+/// contacts take so little time that putting bodies together would show.
+template <class Model, int D> class StoredBodies {
+ public:
+  using Body = typename Model::template Body<D>;
+  using Shape = typename Model::Shape;
+
+  std::size_t size() const { return now.size(); }
+  const Body &operator[](std::size_t i) const { return now[i]; }
+
+  void begin_shapes(std::size_t n) { resize_closely(now, n); }
+  void set_shape(std::size_t i, const Shape &shape) { now[i] = Model::template body<D>(shape); }
+
+  void read_centres(const double *const *x)
+  {
+    for (std::size_t i = 0; i < now.size(); ++i) std::copy_n(x[i], D, now[i].centre.c);
+  }
+  void read_orientations(const ParticleView &view)
+  {
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      Model::template turn_to<D>(now[i], view.orientation(static_cast<int>(i)));
+    }
+  }
+
+  /// Poses kept for later.
+  struct Pose {
+    typename Model::template Pose<D> of_model;
+  };
+  Pose pose(std::size_t i) const { return {Model::template pose<D>(now[i])}; }
+  const typename Model::template Pose<D> &pose_of(std::size_t, const Pose &pose) const
+  {
+    return pose.of_model;
+  }
+
+  double memory_usage() const { return static_cast<double>(now.capacity() * sizeof(Body)); }
+
+ private:
+  std::vector<Body> now;
+};
+
+/// The same for large bodies: each kind of shape (semi-axes and p) is kept once, and a body put
+/// together where it is asked for, from LAMMPS's positions and the gathered orientations (which
+/// must be those of own and ghost particles then).
+template <class Model, int D> class AssembledBodies {
+ public:
+  using Body = typename Model::template Body<D>;
+  using Shape = typename Model::Shape;
+
+  std::size_t size() const { return kind.size(); }
+
+  Body operator[](std::size_t i) const
+  {
+    Body body = kinds[kind[i]];
+    std::copy_n(centres[i], D, body.centre.c);
+    if (orientations) {
+      Model::template turn_to<D>(body, orientations->orientation(static_cast<int>(i)));
+    }
+    return body;
+  }
+
+  void begin_shapes(std::size_t n)
+  {
+    resize_closely(kind, n);
+    kinds.clear();
+    number_of.clear();
+    orientations = nullptr;
+  }
+  void set_shape(std::size_t i, const Shape &shape)
+  {
+    const Vec<3> &a = shape.semi_axes;
+    const auto found = number_of.emplace(std::make_tuple(a[0], a[1], a[2], shape.p), kinds.size());
+    if (found.second) kinds.push_back(Model::template body<D>(shape));
+    kind[i] = static_cast<int>(found.first->second);
+  }
+
+  void read_centres(const double *const *x) { centres = x; }
+  void read_orientations(const ParticleView &view) { orientations = &view; }
+
+  struct Pose {
+    Vec<D> centre;
+    Quaternion orientation;
+  };
+  Pose pose(std::size_t i) const
+  {
+    Pose pose{{}, {1.0, 0.0, 0.0, 0.0}};
+    std::copy_n(centres[i], D, pose.centre.c);
+    if (orientations) pose.orientation = orientations->orientation(static_cast<int>(i));
+    return pose;
+  }
+  typename Model::template Pose<D> pose_of(std::size_t i, const Pose &pose) const
+  {
+    Body body = kinds[kind[i]];
+    body.centre = pose.centre;
+    Model::template turn_to<D>(body, pose.orientation);
+    return Model::template pose<D>(body);
+  }
+
+  double memory_usage() const
+  {
+    return static_cast<double>(kind.capacity() * sizeof(int) +
+                               kinds.size() * (sizeof(Body) + PER_ENTRY));
+  }
+
+ private:
+  static constexpr std::size_t PER_ENTRY = 96;  // of the map, about
+
+  std::vector<int> kind;
+  std::vector<Body> kinds;
+  std::map<std::tuple<double, double, double, double>, std::size_t> number_of;
+  const double *const *centres = nullptr;
+  const ParticleView *orientations = nullptr;
+};
+
+/// Bodies larger than this are put together when needed.
+inline constexpr std::size_t LARGEST_STORED_BODY = 64;
+
+template <class Model, int D>
+using BodiesOf =
+    std::conditional_t<(sizeof(typename Model::template Body<D>) <= LARGEST_STORED_BODY),
+                       StoredBodies<Model, D>, AssembledBodies<Model, D>>;
+
+}  // namespace jamshape
