@@ -29,12 +29,10 @@ inline constexpr double USELESS = 1e-6;
 /// Contact of two superellipsoids in 2D or 3D. With x = eta^2, n the common normal where the scaled
 /// bodies touch, grad_r x = 2 x n / (r.n): the printed force (Yuan et al. 2019, Eq. 3) lacks one
 /// eta. Torques are by the envelope theorem those of this force at the point of tangency of the
-/// **scaled** bodies. The one bond has
-///     normal, levers    the gradient of x over |grad_r x|, that of a length
-///     reach             1 / |grad_r x|, so that the stiffness is epsilon / reach^2 as of other
-///     laws distance          reach x: 1 - distance / reach is the overlap. For two spheres of
-///     contact
-///                       distance d it is r / 2, and reach = d / 2 where they touch.
+/// **scaled** bodies. The one bond has as normal and levers the gradient of x over |grad_r x|, that
+/// of a length; as reach 1 / |grad_r x|, so that the stiffness is epsilon / reach^2 as of other
+/// laws; as distance reach times x, so that 1 - distance / reach is the overlap. For two spheres of
+/// contact distance d the distance is r / 2, and reach d / 2 where they touch.
 template <int D, class S> class SuperellipsoidContact {
  public:
   using T = ValueOf<S>;
