@@ -159,7 +159,9 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
-    cases = sorted({(r["n"], r["alpha"], r["kappa"]) for r in rows}, key=lambda c: (c[1], c[0], -c[2]))
+    cases = sorted(
+        {(r["n"], r["alpha"], r["kappa"]) for r in rows}, key=lambda c: (c[1], c[0], -c[2])
+    )
     columns = min(len(cases), 4)
     lines = -(-len(cases) // columns)
     figure, axes = plt.subplots(lines, columns, figsize=(3.2 * columns, 3 * lines), squeeze=False,
@@ -176,7 +178,9 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
             axis.loglog(cost, [r["median"] for r in of], "o-", color=colour, label=method)
             if method != "heun":
                 axis.loglog(cost, [r["largest"] for r in of], "s--", color=colour, mfc="none")
-        axis.set_title(rf"$N$ = {case[0]}, $\alpha$ = {case[1]:g}, $\kappa$ = {case[2]:g}", fontsize=9)
+        axis.set_title(
+            rf"$N$ = {case[0]}, $\alpha$ = {case[1]:g}, $\kappa$ = {case[2]:g}", fontsize=9
+        )
         axis.grid(visible=True, alpha=0.3)
     for axis in axes[:, 0]:
         axis.set_ylabel("relative error of p")

@@ -154,8 +154,7 @@ std::unique_ptr<Integrator> make_rkc2(AffineBox &box, const IntegratorOptions &o
   return std::make_unique<Rkc2>(box, tolerance_of(options), stages);
 }
 
-const std::map<std::string,
-               std::unique_ptr<Integrator> (*)(AffineBox &, const IntegratorOptions &)>
+const std::map<std::string, std::unique_ptr<Integrator> (*)(AffineBox &, const IntegratorOptions &)>
     INTEGRATORS = {
         {"heun", make_heun},
         {"heun/adaptive", make_heun_euler},

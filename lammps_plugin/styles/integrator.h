@@ -10,9 +10,9 @@ namespace jamshape {
 
 /// How a step of LAMMPS was divided, for output. All zero with a method that does not divide it.
 struct StepReport {
-  double shortest;   // substep of the last step of LAMMPS [time]
-  double error;      // largest of its local errors, over the typical overlap
-  double stages;     // most force evaluations of one of its substeps
+  double shortest;  // substep of the last step of LAMMPS [time]
+  double error;     // largest of its local errors, over the typical overlap
+  double stages;    // most force evaluations of one of its substeps
 };
 
 /// What a method that chooses its own steps carries from one step of LAMMPS to the next; a restart

@@ -96,11 +96,12 @@ void OverdampedFlow::measure_particles()
       const double moment = of_particle.moment[k];
       mobility[i].turn[k] = moment > 0.0 ? shift / moment : 0.0;
     }
-    const auto [shortest, longest] = std::minmax({semi_axes[i][0], semi_axes[i][1], semi_axes[i][2]});
+    const auto [shortest, longest] =
+        std::minmax({semi_axes[i][0], semi_axes[i][1], semi_axes[i][2]});
     mobility[i].step_limit = LARGEST_STEP * shortest;
     mobility[i].longest = longest;
-    mobility[i].gyration = std::sqrt(
-        std::max({of_particle.moment[0], of_particle.moment[1], of_particle.moment[2]}));
+    mobility[i].gyration =
+        std::sqrt(std::max({of_particle.moment[0], of_particle.moment[1], of_particle.moment[2]}));
   }
 }
 
@@ -251,8 +252,7 @@ double OverdampedFlow::place(int i, const Move &m, bool is_last)
   require_small(i, moved, m.to);
   double difference = 0.0;
   if (!can_retry && m.present != 0.0) {
-    difference =
-        m.present * norm(present_rate(i).shift - m.to * stored_rate(i).shift);
+    difference = m.present * norm(present_rate(i).shift - m.to * stored_rate(i).shift);
   }
   if (n_registers > 0 && !is_last) {
     double *const last = values[i] + dimension + n_rates + n_turns;
@@ -267,8 +267,8 @@ double OverdampedFlow::place(int i, const Move &m, bool is_last)
   }
   if (!pair->particles_turn()) return difference;
   const Quaternion q = orientation_at_start(i);
-  pair->particle_view().set_orientation(
-      i, dimension == 2 ? turned(q, Vec<1>{{moved.turn[2]}}) : turned(q, moved.turn));
+  pair->particle_view().set_orientation(i, dimension == 2 ? turned(q, Vec<1>{{moved.turn[2]}})
+                                                          : turned(q, moved.turn));
   return difference;
 }
 

@@ -139,7 +139,7 @@ void StepControl::accept(OverdampedFlow &flow, const Span &span, double error, b
   error = std::max(error, SMALLEST_ERROR);
   const double order = order_of_error();
   double growth = SAFETY * std::pow(error, -OF_ERROR / order) *
-      std::pow(now.error_before, OF_ERROR_BEFORE / order);
+                  std::pow(now.error_before, OF_ERROR_BEFORE / order);
   growth = std::clamp(growth, SMALLEST_GROWTH, was_rejected ? 1.0 : LARGEST_GROWTH);
   const bool was_clipped = span.h < now.h;  // by the end of the step of LAMMPS
   if (was_clipped && growth >= 1.0) {
