@@ -32,7 +32,9 @@ def parse() -> argparse.Namespace:
         ("--kappa", 1e-4, "compression rate"),
         ("--phi-start", 0.4, "packing fraction of the random start"),
         ("--phi-end", 0.9, "packing fraction to reach"),
-        ("--dt", 0.05, "time step"),
+        ("--integrator", "heun", "heun, heun/adaptive or rkc2"),
+        ("--dt", 0.05, "time step of heun"),
+        ("--tolerance", 1e-4, "of the others: local error over the typical overlap"),
         ("--sides", 1, "bonds of a side-to-side contact, 1 or 2"),
         ("--size-ratio", 1.4, "R_b/R_s"),
         ("--seed", 1, "of the random start"),
@@ -49,7 +51,10 @@ def parse() -> argparse.Namespace:
 
 def fresh(options: argparse.Namespace) -> tuple[Compression, Packing, Recording]:
     """Make settings and initial state, before LAMMPS is started."""
-    settings = Compression(options.kappa, options.phi_end, options.dt, options.sides)
+    names = ("kappa", "phi_end", "dt", "sides", "integrator", "tolerance")
+    settings = Compression(**{name: getattr(options, name) for name in names})
+    if settings.chooses_steps:
+        settings = settings.in_steps(options.phi_start, options.rows)
     mixture = Mixture.bidisperse(options.alpha, options.size_ratio)
     start = random_packing(options.n, options.phi_start, options.seed, mixture)
     options.out.parent.mkdir(parents=True, exist_ok=True)

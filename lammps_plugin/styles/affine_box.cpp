@@ -63,6 +63,11 @@ double AffineBox::strain(bigint step) const { return now.strain_base + now.rate 
 
 double AffineBox::scale(bigint step) const { return std::exp(-strain(step)); }
 
+double AffineBox::scale(bigint step, double time_after) const
+{
+  return std::exp(-(now.strain_base + now.rate * (time(step) + time_after)));
+}
+
 void AffineBox::edges(double scale, double *lo, double *hi) const
 {
   for (int k = 0; k < 3; ++k) {
@@ -73,9 +78,9 @@ void AffineBox::edges(double scale, double *lo, double *hi) const
   }
 }
 
-void AffineBox::set_box(bigint step)
+void AffineBox::set_box(double scale)
 {
-  edges(scale(step), domain->boxlo, domain->boxhi);
+  edges(scale, domain->boxlo, domain->boxhi);
   domain->set_global_box();
   domain->set_local_box();
 }

@@ -34,10 +34,11 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   /// Time since the rate or the time step last changed.
   double time(LAMMPS_NS::bigint step) const;
   double strain(LAMMPS_NS::bigint step) const;
-  /// L(step) / L(strain 0).
+  /// L / L(strain 0), at a step and at a time after it.
   double scale(LAMMPS_NS::bigint step) const;
-  /// Gives LAMMPS the box of that step.
-  void set_box(LAMMPS_NS::bigint step);
+  double scale(LAMMPS_NS::bigint step, double time_after) const;
+  /// Gives LAMMPS the box of that scale.
+  void set_box(double scale);
 
   /// A position from its coordinates in the box of strain 0 (relative to the fixed point,
   /// unwrapped), and back. `image` holds LAMMPS's periodic image counts.

@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
 #include <string>
 
 namespace jamshape {
@@ -25,6 +26,17 @@ constexpr double NEAR_LIMIT = 0.9;
 /// The limit is estimated anew at the latest after this strain, in which contacts may form.
 constexpr double STRAIN_BETWEEN_CHECKS = 0.005;
 
+/// A step of LAMMPS may shrink the box by this strain: output between has to see something.
+constexpr double LARGEST_STRAIN = 1.0;
+
+constexpr int N_OF_SUBSTEPS = 8;
+
+/// What is global in a restart file.
+struct Saved {
+  AffineBox::State box;
+  StepState steps;
+};
+
 }  // namespace
 
 FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
@@ -35,7 +47,8 @@ FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char 
     error->all(FLERR, "fix overdamped/affine found " + found_and_expected);
   };
   const std::string syntax =
-      "'drag k_d compress kappa [integrator NAME] [reference center|corner] [check N]'.";
+      "'drag k_d compress kappa [integrator NAME] [tolerance T] [stages MAX] "
+      "[reference center|corner] [check N]'.";
   if (igroup != 0) fail("a group other than all, expected 'all': the whole box moves.");
   if (narg < 7 || narg % 2 == 0 || std::strcmp(arg[3], "drag") || std::strcmp(arg[5], "compress")) {
     fail("a wrong list of arguments, expected " + syntax);
@@ -49,11 +62,16 @@ FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char 
     fail(std::string("compress ") + arg[6] + ", expected a finite rate.");
   }
   std::string method = "heun";
+  IntegratorOptions of_method;
   AffineBox::Reference reference = AffineBox::Reference::CENTER;
   for (int k = 7; k < narg; k += 2) {
     const std::string keyword = arg[k], value = arg[k + 1];
     if (keyword == "integrator") {
       method = value;
+    } else if (keyword == "tolerance") {
+      of_method.tolerance = LAMMPS_NS::utils::numeric(FLERR, arg[k + 1], false, lmp);
+    } else if (keyword == "stages") {
+      of_method.stages = LAMMPS_NS::utils::inumeric(FLERR, arg[k + 1], false, lmp);
     } else if (keyword == "reference" && (value == "center" || value == "corner")) {
       reference = value == "center" ? AffineBox::Reference::CENTER : AffineBox::Reference::CORNER;
     } else if (keyword == "check") {
@@ -64,11 +82,16 @@ FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char 
     }
   }
   box = std::make_unique<AffineBox>(lmp, kappa, reference);
-  flow = std::make_unique<OverdampedFlow>(lmp, k_d, *box, this);
-  integrator = make_integrator(method, *box);
+  try {
+    integrator = make_integrator(method, *box, of_method);
+  } catch (const std::invalid_argument &problem) {
+    fail(problem.what());
+  }
   if (!integrator) {
     fail("integrator " + method + ", expected one of: " + integrator_names() + ".");
   }
+  flow = std::make_unique<OverdampedFlow>(lmp, k_d, *box, this, integrator->n_registers());
+  if (integrator->state()) flow->allow_retries();
 
   time_integrate = 1;
   time_depend = 1;
@@ -79,7 +102,7 @@ FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char 
   maxexchange = flow->width();
   comm_forward = flow->width();
   vector_flag = 1;
-  size_vector = 8;
+  size_vector = 8 + N_OF_SUBSTEPS;
   global_freq = 1;
   extvector = 0;
 
@@ -131,8 +154,22 @@ void FixOverdampedAffine::init()
 void FixOverdampedAffine::setup_post_neighbor()
 {
   box->begin_run();
-  flow->begin_run();
+  const bool is_known = flow->begin_run();
+  if (StepState *const state = integrator->state()) {
+    if (!is_known) state->h = 0.0;
+    require_timestep();
+  }
   running = true;
+}
+
+void FixOverdampedAffine::require_timestep() const
+{
+  const double strain = std::abs(box->state().rate) * update->dt;
+  if (update->dt >= 0.0 && strain <= LARGEST_STRAIN) return;
+  const std::string dt = std::to_string(update->dt);
+  error->all(FLERR, "fix overdamped/affine found timestep " + dt + ", a strain of " +
+                        std::to_string(strain) +
+                        ", expected a step from 0 to a strain of 1: the integrator divides it.");
 }
 
 void FixOverdampedAffine::post_neighbor()
@@ -145,28 +182,32 @@ void FixOverdampedAffine::setup(int)
   if (update->whichflag != 1) return;
   next_check = update->ntimestep;
   check_stability(update->ntimestep);
-}
-
-OverdampedFlow::Stage FixOverdampedAffine::stage_at(bigint step) const
-{
-  return {step, box->scale(step)};
+  integrator->begin_run(*flow);
 }
 
 void FixOverdampedAffine::initial_integrate(int)
 {
   const bigint to = update->ntimestep, from = to - 1;
   if (from >= next_check) check_stability(from);
-  integrator->step(*flow, stage_at(from), stage_at(to), update->dt);
+  flow->count_evaluation();  // LAMMPS's own, at the end of the last step
+  integrator->step(*flow, to, update->dt);
 }
 
 double FixOverdampedAffine::largest_stable_dt() const
 {
-  return largest_rate > 0.0 ? integrator->stability_interval() / largest_rate : INFINITY;
+  const double rate = present_rate();
+  return rate > 0.0 ? integrator->stability_interval() / rate : INFINITY;
+}
+
+double FixOverdampedAffine::present_rate() const
+{
+  const StepState *const state = integrator->state();
+  return state ? state->rate : largest_rate;
 }
 
 void FixOverdampedAffine::check_stability(bigint step)
 {
-  if (check_every == 0 || update->dt == 0.0) return;
+  if (check_every == 0 || update->dt == 0.0 || integrator->state()) return;
   if (step < next_check) return;
   const double strain_a_step = std::abs(box->state().rate) * update->dt;
   const double until_strained = std::ceil(STRAIN_BETWEEN_CHECKS / strain_a_step);
@@ -202,7 +243,7 @@ double FixOverdampedAffine::compute_vector(int n)
     case 1:
       return box->strain(step);
     case 2:
-      return largest_rate;
+      return present_rate();
     case 3:
       return largest_stable_dt();
     case 4:
@@ -211,9 +252,27 @@ double FixOverdampedAffine::compute_vector(int n)
       return static_cast<double>(flow->n_evaluations());
     case 6:
       return static_cast<double>(flow->n_rebuilds());
-    default:
+    case 7:
       return flow->stage_difference();
+    default:
+      return of_substeps(n - 8);
   }
+}
+
+double FixOverdampedAffine::of_substeps(int n) const
+{
+  const StepState *const state = integrator->state();
+  if (!state) return 0.0;
+  const StepReport report = integrator->report();
+  const double values[N_OF_SUBSTEPS] = {static_cast<double>(state->accepted),
+                                        static_cast<double>(state->rejected),
+                                        static_cast<double>(state->forced),
+                                        state->h,
+                                        report.shortest,
+                                        report.error,
+                                        report.stages,
+                                        state->touching.overlap};
+  return values[n];
 }
 
 double FixOverdampedAffine::memory_usage() { return flow->memory_usage(); }
@@ -225,17 +284,19 @@ double FixOverdampedAffine::memory_usage() { return flow->memory_usage(); }
 void FixOverdampedAffine::write_restart(FILE *fp)
 {
   if (comm->me != 0) return;
-  const AffineBox::State state = box->state();
-  const int size = sizeof(state);
+  const StepState *const of_steps = integrator->state();
+  const Saved saved{box->state(), of_steps ? *of_steps : StepState{}};
+  const int size = sizeof(saved);
   fwrite(&size, sizeof(int), 1, fp);
-  fwrite(&state, size, 1, fp);
+  fwrite(&saved, size, 1, fp);
 }
 
 void FixOverdampedAffine::restart(char *buf)
 {
-  AffineBox::State state;
-  std::memcpy(&state, buf, sizeof(state));
-  box->restore(state);
+  Saved saved;
+  std::memcpy(&saved, buf, sizeof(saved));
+  box->restore(saved.box);
+  if (StepState *const of_steps = integrator->state()) *of_steps = saved.steps;
 }
 
 void FixOverdampedAffine::grow_arrays(int nmax) { flow->grow(nmax); }

@@ -10,12 +10,14 @@
 namespace jamshape {
 
 /// fix ID all overdamped/affine drag k_d compress kappa
-///     [integrator NAME] [reference center|corner] [check N]
+///     [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]
 ///
 /// Overdamped motion on a substrate that shrinks affinely with the box (Marschall & Teitel 2018,
 /// Eqs. 6-14). Global vector: time since strain 0, strain, largest relaxation rate, largest stable
 /// time step, dissipated power, force evaluations, list rebuilds inside steps, largest difference
-/// of the stages of the last step.
+/// of the stages of the last step; of integrators that choose their steps: accepted, rejected and
+/// forced substeps, the next one's length, and of the last step of LAMMPS the shortest substep,
+/// largest local error and most stages; the mean overlap length that errors are measured by.
 class FixOverdampedAffine : public LAMMPS_NS::Fix {
  public:
   FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);
@@ -53,8 +55,10 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   double largest_rate;
   bool warned, running;
 
-  OverdampedFlow::Stage stage_at(LAMMPS_NS::bigint step) const;
+  void require_timestep() const;
+  double present_rate() const;
   double largest_stable_dt() const;
+  double of_substeps(int n) const;
   void check_stability(LAMMPS_NS::bigint step);
 };
 

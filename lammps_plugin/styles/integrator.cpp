@@ -1,10 +1,18 @@
 #include "integrator.h"
 
+#include "runge_kutta_chebyshev.h"
+#include "step_control.h"
+
+#include <cmath>
 #include <map>
+#include <stdexcept>
 
 namespace jamshape {
 
 namespace {
+
+constexpr double DEFAULT_TOLERANCE = 1e-4;
+constexpr int DEFAULT_STAGES = 200, MOST_STAGES = 1000;
 
 /// Two stages, second order (Marschall & Teitel 2018, Sec. II): Euler to the end of the step, then
 /// the mean of the rates at both ends.
@@ -12,15 +20,15 @@ class Heun : public Integrator {
  public:
   explicit Heun(AffineBox &affine_box) : box(affine_box) {}
 
-  void step(OverdampedFlow &flow, const OverdampedFlow::Stage &from,
-            const OverdampedFlow::Stage &to, double dt) override
+  void step(OverdampedFlow &flow, LAMMPS_NS::bigint step, double dt) override
   {
-    flow.begin_step();
+    const double from = box.scale(step - 1), to = box.scale(step);
+    flow.hold_start();
     flow.store_rates(from);
-    box.set_box(to.step);
-    flow.move_by({dt, 1.0, 0.0, from, to});
+    box.set_box(to);
+    flow.move_by({dt, 0.0, from, to});
     flow.evaluate_forces();
-    flow.finish_step({dt, 0.5, 0.5, to, to});
+    flow.finish_step({0.5 * dt, 0.5 * dt, to, to});
   }
 
   double stability_interval() const override { return 2.0; }
@@ -29,21 +37,137 @@ class Heun : public Integrator {
   AffineBox &box;
 };
 
-template <class T> std::unique_ptr<Integrator> make(AffineBox &box)
+/// The same with its difference from Euler's method as the error: of Euler's step, so that Heun's
+/// is far smaller.
+class HeunEuler : public StepControl {
+ public:
+  using StepControl::StepControl;
+
+  double stability_interval() const override { return 2.0; }
+
+ private:
+  static constexpr double STAGES = 2.0;
+
+  double order_of_error() const override { return 2.0; }
+  double stages(double) const override { return STAGES; }
+
+  double attempt(OverdampedFlow &flow, const Span &span) override
+  {
+    box.set_box(span.to());
+    if (!flow.move_by({span.h, 0.0, span.from(), span.to()})) return INFINITY;
+    flow.evaluate_forces();
+    return flow.rms_of({-0.5 * span.h, 0.5 * span.h, span.to(), span.to()});
+  }
+
+  void finish(OverdampedFlow &flow, const Span &span) override
+  {
+    flow.finish_step({0.5 * span.h, 0.5 * span.h, span.to(), span.to()});
+  }
+
+  bool has_forces_at_end() const override { return false; }
+};
+
+/// Second-order Runge-Kutta-Chebyshev: s stages are stable to about 0.65 s^2 over the largest
+/// relaxation rate (Sommeijer, Shampine & Verwer, J. Comput. Appl. Math. 88, 315 (1998)).
+class Rkc2 : public StepControl {
+ public:
+  Rkc2(AffineBox &affine_box, double tolerance, int most_stages) :
+      StepControl(affine_box, tolerance), most(most_stages)
+  {
+  }
+
+  double stability_interval() const override { return RungeKuttaChebyshev::interval(most); }
+  int n_registers() const override { return 2; }
+
+ private:
+  const int most;
+
+  double order_of_error() const override { return 3.0; }
+  double stages(double z) const override { return RungeKuttaChebyshev::stages(z, most); }
+
+  double attempt(OverdampedFlow &flow, const Span &span) override
+  {
+    const RungeKuttaChebyshev method(static_cast<int>(stages(span.z)));
+    const double h = span.h;
+    double scale = span.from();
+    for (int j = 1; j <= method.s; ++j) {
+      const RungeKuttaChebyshev::Stage &stage = method.stage[j];
+      const double before = scale;
+      scale = j == method.s ? span.to() : span.scale(stage.c * h);
+      box.set_box(scale);
+      const bool fits = flow.move_by({h * stage.of_start, h * stage.of_last_rate, before, scale,
+                                      stage.of_last, stage.of_one_before});
+      if (!fits) return INFINITY;
+      flow.evaluate_forces();
+    }
+    return flow.rms_of({0.4 * h, 0.4 * h, span.to(), span.to(), -0.8, 0.0});
+  }
+
+  void finish(OverdampedFlow &flow, const Span &span) override
+  {
+    flow.finish_step({0.0, 0.0, span.to(), span.to(), 1.0, 0.0});
+  }
+
+  bool has_forces_at_end() const override { return true; }
+};
+
+/* ---------------------------------------------------------------------- */
+
+double tolerance_of(const IntegratorOptions &options)
 {
-  return std::make_unique<T>(box);
+  const double tolerance = options.tolerance.value_or(DEFAULT_TOLERANCE);
+  if (!(tolerance >= 1e-12 && tolerance <= 0.1)) {
+    throw std::invalid_argument("tolerance " + std::to_string(tolerance) +
+                                ", expected a number from 1e-12 to 0.1.");
+  }
+  return tolerance;
 }
 
-const std::map<std::string, std::unique_ptr<Integrator> (*)(AffineBox &)> INTEGRATORS = {
-    {"heun", make<Heun>},
+void refuse_stages(const IntegratorOptions &options)
+{
+  if (options.stages) throw std::invalid_argument("stages, which belong to integrator rkc2.");
+}
+
+std::unique_ptr<Integrator> make_heun(AffineBox &box, const IntegratorOptions &options)
+{
+  refuse_stages(options);
+  if (options.tolerance) {
+    throw std::invalid_argument(
+        "a tolerance, which belongs to integrators that choose their steps, not to heun.");
+  }
+  return std::make_unique<Heun>(box);
+}
+
+std::unique_ptr<Integrator> make_heun_euler(AffineBox &box, const IntegratorOptions &options)
+{
+  refuse_stages(options);
+  return std::make_unique<HeunEuler>(box, tolerance_of(options));
+}
+
+std::unique_ptr<Integrator> make_rkc2(AffineBox &box, const IntegratorOptions &options)
+{
+  const int stages = options.stages.value_or(DEFAULT_STAGES);
+  if (stages < 2 || stages > MOST_STAGES) {
+    throw std::invalid_argument("stages " + std::to_string(stages) + ", expected from 2 to " +
+                                std::to_string(MOST_STAGES) + ".");
+  }
+  return std::make_unique<Rkc2>(box, tolerance_of(options), stages);
+}
+
+const std::map<std::string, std::unique_ptr<Integrator> (*)(AffineBox &, const IntegratorOptions &)>
+    INTEGRATORS = {
+        {"heun", make_heun},
+        {"heun/adaptive", make_heun_euler},
+        {"rkc2", make_rkc2},
 };
 
 }  // namespace
 
-std::unique_ptr<Integrator> make_integrator(const std::string &name, AffineBox &box)
+std::unique_ptr<Integrator> make_integrator(const std::string &name, AffineBox &box,
+                                            const IntegratorOptions &options)
 {
   const auto found = INTEGRATORS.find(name);
-  return found == INTEGRATORS.end() ? nullptr : found->second(box);
+  return found == INTEGRATORS.end() ? nullptr : found->second(box, options);
 }
 
 std::string integrator_names()

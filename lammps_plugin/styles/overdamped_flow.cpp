@@ -33,10 +33,13 @@ Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
 /// contacts would be passed through.
 constexpr double LARGEST_STEP = 0.5;
 
+/// And this part of that where a shorter step may be tried instead.
+constexpr double LARGEST_TRIAL = 0.5;
+
 /// Coordinates that agree with the atom's position to this fraction of the box are its own.
 constexpr double SAME_POSITION = 1e-13;
 
-constexpr int LANCZOS_STEPS = 30;
+constexpr int LANCZOS_STEPS = 30, LANCZOS_STEPS_AT_LEAST = 6;
 
 /// A direction shorter than this against the first is rounding: all eigenvalues have been found.
 constexpr double EXHAUSTED = 1e-12;
@@ -44,10 +47,11 @@ constexpr double EXHAUSTED = 1e-12;
 }  // namespace
 
 OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineBox &affine_box,
-                               LAMMPS_NS::Fix *owner) :
+                               LAMMPS_NS::Fix *owner, int registers) :
     Pointers(lmp), drag(k_d), box(affine_box), dimension(domain->dimension),
-    n_rates(dimension == 2 ? 3 : 6), n_turns(dimension == 2 ? 2 : 4), pair(nullptr),
-    values(nullptr), largest_difference(0.0), evaluations(0), rebuilds(0), fix(owner)
+    n_rates(dimension == 2 ? 3 : 6), n_turns(dimension == 2 ? 2 : 4), n_registers(registers),
+    pair(nullptr), values(nullptr), can_retry(false), farthest(0.0), largest_difference(0.0),
+    evaluations(0), rebuilds(0), fix(owner)
 {
 }
 
@@ -57,7 +61,7 @@ OverdampedFlow::~OverdampedFlow() { memory->destroy(values); }
    set-up
 ------------------------------------------------------------------------- */
 
-void OverdampedFlow::begin_run()
+bool OverdampedFlow::begin_run()
 {
   pair = dynamic_cast<PairContact *>(force->pair);
   if (!pair) {
@@ -68,14 +72,18 @@ void OverdampedFlow::begin_run()
   }
   measure_particles();
   const double scale = box.scale(update->ntimestep);
+  double moved = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) {
     const Vec<3> expected = box.position(read_coordinates(i), atom->image[i], scale);
     bool same = true;
     for (int k = 0; k < dimension; ++k) {
       same = same && std::abs(expected[k] - atom->x[i][k]) <= SAME_POSITION * domain->prd[k];
     }
-    if (!same) set(i);
+    if (same) continue;
+    set(i);
+    moved = 1.0;
   }
+  return sum(moved) == 0.0;
 }
 
 void OverdampedFlow::measure_particles()
@@ -103,6 +111,9 @@ OverdampedFlow::Mobility OverdampedFlow::mobility_of(const Vec<3> &semi_axes, in
     m.turn[k] = moment > 0.0 ? m.shift / moment : 0.0;
   }
   m.step_limit = LARGEST_STEP * *std::min_element(semi_axes.c, semi_axes.c + dimension);
+  m.longest = *std::max_element(semi_axes.c, semi_axes.c + dimension);
+  const Vec<3> &moment = of_particle.moment;
+  m.gyration = std::sqrt(*std::max_element(moment.c, moment.c + 3));
   return m;
 }
 
@@ -145,11 +156,30 @@ Rate OverdampedFlow::present_rate(int i) const
   return mobility_times(i, vec3(atom->f[i]), vec3(atom->torque[i]));
 }
 
-Rate OverdampedFlow::stored_rate(int i) const
+namespace {
+
+Rate read_rate(const double *from, int dimension)
 {
-  const double *from = values[i] + dimension;
   if (dimension == 2) return {{{from[0], from[1], 0.0}}, {{0.0, 0.0, from[2]}}};
   return {vec3(from), vec3(from + 3)};
+}
+
+void add(Rate &to, double weight, const Rate &rate)
+{
+  to.shift += weight * rate.shift;
+  to.turn += weight * rate.turn;
+}
+
+}  // namespace
+
+Rate OverdampedFlow::stored_rate(int i) const
+{
+  return read_rate(values[i] + dimension, dimension);
+}
+
+Rate OverdampedFlow::register_of(int i, int which) const
+{
+  return read_rate(values[i] + dimension + n_rates + n_turns + which * n_rates, dimension);
 }
 
 Vec<3> OverdampedFlow::read_coordinates(int i) const
@@ -168,11 +198,11 @@ Quaternion OverdampedFlow::orientation_at_start(int i) const
    stages
 ------------------------------------------------------------------------- */
 
-void OverdampedFlow::begin_step()
+void OverdampedFlow::hold_start()
 {
-  ++evaluations;  // LAMMPS's own, at the end of the last step
-  if (!pair->particles_turn()) return;
-  pair->particle_view().read_orientations(atom->nlocal);
+  const bool turn = pair->particles_turn();
+  if (turn || dimension == 3) pair->particle_view().read_orientations(atom->nlocal);
+  if (!turn) return;
   for (int i = 0; i < atom->nlocal; ++i) {
     const Quaternion q = pair->particle_view().orientation(i);
     double *to = values[i] + dimension + n_rates;
@@ -187,10 +217,8 @@ void OverdampedFlow::begin_step()
   }
 }
 
-void OverdampedFlow::store_rate(int i, const Rate &rate) { pack(rate, values[i] + dimension); }
-
 /// Without the components that are zero in the plane.
-void OverdampedFlow::pack(const Rate &rate, double *to) const
+void OverdampedFlow::write_rate(double *to, const Rate &rate) const
 {
   to = std::copy_n(rate.shift.c, dimension, to);
   if (dimension == 2) {
@@ -200,45 +228,77 @@ void OverdampedFlow::pack(const Rate &rate, double *to) const
   }
 }
 
-void OverdampedFlow::store_rates(const Stage &stage)
+void OverdampedFlow::store_rate(int i, const Rate &rate)
+{
+  write_rate(values[i] + dimension, rate);
+}
+
+void OverdampedFlow::store_rates(double scale)
 {
   for (int i = 0; i < atom->nlocal; ++i) {
     const Rate rate = present_rate(i);
-    store_rate(i, {(1.0 / stage.scale) * rate.shift, rate.turn});
+    store_rate(i, {(1.0 / scale) * rate.shift, rate.turn});
   }
 }
 
-void OverdampedFlow::require_small(int i, double moved) const
+/// Displacement in coordinates of the box of strain 0 and rotation vector.
+Rate OverdampedFlow::sum_of(int i, const Move &m) const
 {
-  if (moved <= mobilities[kind[i]].step_limit) return;  // false for NaN
+  const Rate stored = stored_rate(i);
+  Rate sum{m.stored * stored.shift, m.stored * stored.turn};
+  if (m.present != 0.0) {
+    Rate present = present_rate(i);
+    if (n_registers > 0 && dimension == 3) {
+      // The rate of a rotation vector is not the angular velocity, to first order in the vector.
+      present.turn += -0.5 * cross(register_of(i, 0).turn, present.turn);
+    }
+    sum.shift += (m.present / m.from) * present.shift;
+    sum.turn += m.present * present.turn;
+  }
+  if (m.last != 0.0) add(sum, m.last, register_of(i, 0));
+  if (m.before != 0.0) add(sum, m.before, register_of(i, 1));
+  return sum;
+}
+
+void OverdampedFlow::require_small(int i, const Rate &moved, double scale)
+{
+  const double limit = mobilities[kind[i]].step_limit, distance = scale * norm(moved.shift);
+  if (can_retry) {
+    const double ratio =
+        (distance + mobilities[kind[i]].longest * norm(moved.turn)) / (LARGEST_TRIAL * limit);
+    farthest = ratio <= farthest ? farthest : ratio;  // NaN too
+    return;
+  }
+  if (distance <= limit) return;  // false for NaN
   error->one(FLERR, "fix overdamped/affine found that one step moves atom " +
-                        std::to_string(atom->tag[i]) + " by " + std::to_string(moved) +
+                        std::to_string(atom->tag[i]) + " by " + std::to_string(distance) +
                         ", expected at most half its radius: use a smaller timestep.");
 }
 
 /// Returns the distance from where the stored rates alone lead.
 double OverdampedFlow::place(int i, const Move &m, bool is_last)
 {
-  const Rate stored = stored_rate(i);
-  Vec<3> shift = (m.h * m.a) * stored.shift, turn = (m.h * m.a) * stored.turn;
+  const Rate moved = sum_of(i, m);
+  require_small(i, moved, m.to);
   double difference = 0.0;
-  if (m.b != 0.0) {
-    const Rate present = present_rate(i);
-    difference = m.h * m.b * norm(present.shift - m.target.scale * stored.shift);
-    shift += (m.h * m.b / m.present.scale) * present.shift;
-    turn += (m.h * m.b) * present.turn;
+  if (!can_retry && m.present != 0.0) {
+    difference = m.present * norm(present_rate(i).shift - m.to * stored_rate(i).shift);
   }
-  require_small(i, m.target.scale * norm(shift));
-  const Vec<3> coordinates = read_coordinates(i) + shift;
-  const Vec<3> x = box.position(coordinates, atom->image[i], m.target.scale);
+  if (n_registers > 0 && !is_last) {
+    double *const last = values[i] + dimension + n_rates + n_turns;
+    std::copy_n(last, n_rates, last + n_rates);
+    write_rate(last, moved);
+  }
+  const Vec<3> coordinates = read_coordinates(i) + moved.shift;
+  const Vec<3> x = box.position(coordinates, atom->image[i], m.to);
   for (int k = 0; k < dimension; ++k) {
     atom->x[i][k] = x[k];
     if (is_last) values[i][k] = coordinates[k];
   }
   if (!pair->particles_turn()) return difference;
   const Quaternion q = orientation_at_start(i);
-  pair->particle_view().set_orientation(i, dimension == 2 ? turned(q, Vec<1>{{turn[2]}})
-                                                          : turned(q, turn));
+  pair->particle_view().set_orientation(i, dimension == 2 ? turned(q, Vec<1>{{moved.turn[2]}})
+                                                          : turned(q, moved.turn));
   return difference;
 }
 
@@ -246,15 +306,40 @@ void OverdampedFlow::move(const Move &m, bool is_last)
 {
   ParticleView &view = pair->particle_view();
   if (pair->particles_turn()) view.read_orientations(atom->nlocal);
-  largest_difference = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    largest_difference = std::max(largest_difference, place(i, m, is_last));
-  }
+  double largest = 0.0;
+  farthest = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) largest = std::max(largest, place(i, m, is_last));
+  if (!can_retry) largest_difference = largest;
   if (pair->particles_turn()) view.write_orientations(atom->nlocal);
 }
 
-void OverdampedFlow::move_by(const Move &m) { move(m, false); }
+bool OverdampedFlow::move_by(const Move &m)
+{
+  move(m, false);
+  if (!can_retry) return true;
+  const double too_far = farthest <= 1.0 ? 0.0 : 1.0;
+  return sum(too_far) == 0.0;
+}
+
 void OverdampedFlow::finish_step(const Move &m) { move(m, true); }
+
+double OverdampedFlow::rms_of(const Move &m)
+{
+  double mine[2] = {0.0, 0.0}, all[2], largest_sq = 0.0;
+  if (dimension == 3) pair->particle_view().read_orientations(atom->nlocal);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const Rate stored = stored_rate(i);
+    if (norm(stored.shift) == 0.0 && norm(vec3(atom->f[i])) == 0.0) continue;
+    const Rate found = sum_of(i, m);
+    const Vec<3> shift = m.to * found.shift, turn = mobilities[kind[i]].gyration * found.turn;
+    mine[0] += dot(shift, shift) + dot(turn, turn);
+    mine[1] += 1.0;
+    largest_sq = std::max(largest_sq, dot(shift, shift));
+  }
+  largest_difference = std::sqrt(largest_sq);
+  MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, world);
+  return all[1] > 0.0 ? std::sqrt(all[0] / all[1]) : 0.0;
+}
 
 /// Of all atoms from the first one on.
 void OverdampedFlow::clear_forces(int first)
@@ -286,6 +371,7 @@ void OverdampedFlow::rebuild_lists()
 
 void OverdampedFlow::evaluate_forces()
 {
+  ++neighbor->ago;  // 0 tells the pair style that the list is new
   if (neighbor->check_distance()) {
     rebuild_lists();
   } else {
@@ -366,6 +452,7 @@ void OverdampedFlow::unpack_direction(int n, int first, const double *buf)
 /// Adds stiffness times the direction, over all bonds, to the force arrays of own atoms.
 void OverdampedFlow::apply_stiffness()
 {
+  ++evaluations;
   comm->forward_comm_fix(fix, n_rates);
   clear_forces(atom->nlocal);
   const auto add = [&](int i, const Vec<3> &force_on, const Vec<3> &torque_on) {
@@ -417,7 +504,7 @@ void OverdampedFlow::add_force(int i, double factor, const Rate &rate)
   }
 }
 
-double OverdampedFlow::largest_rate()
+double OverdampedFlow::largest_rate(double tolerance)
 {
   const int nlocal = atom->nlocal;
   const std::size_t size = static_cast<std::size_t>(n_rates) * nlocal;
@@ -433,6 +520,7 @@ double OverdampedFlow::largest_rate()
   // Lanczos' method in the metric of the drag, in which mobility times stiffness is symmetric. Each
   // direction is the rate of a force; what is left of the next one is in the force arrays.
   std::vector<double> diagonal, off_diagonal;
+  double found = 0.0;
   for (int step = 0; step < LANCZOS_STEPS; ++step) {
     double mine = 0.0;
     for (int i = 0; i < nlocal; ++i) {
@@ -456,12 +544,44 @@ double OverdampedFlow::largest_rate()
       mine += dot(rate.shift, vec3(atom->f[i])) + dot(rate.turn, vec3(atom->torque[i]));
     }
     diagonal.push_back(sum(mine));
+    if (tolerance > 0.0) {
+      const double better = largest_eigenvalue(diagonal, off_diagonal);
+      if (step >= LANCZOS_STEPS_AT_LEAST && better <= (1.0 + tolerance) * found) break;
+      found = better;
+    }
     for (int i = 0; i < nlocal; ++i) {
       add_force(i, -diagonal.back(), stored_rate(i));
     }
   }
   for (int i = 0; i < nlocal; ++i) unpack_force(i, &saved[n_rates * i]);
   return largest_eigenvalue(diagonal, off_diagonal);
+}
+
+OverdampedFlow::Touching OverdampedFlow::touching()
+{
+  ++evaluations;
+  double mine[4] = {0.0, 0.0, 0.0, 0.0}, all[4];
+  pair->for_each_bond([&](const LocalBond &b) {
+    // Without newton both ranks see the bond.
+    const double share = force->newton_pair || b.j < atom->nlocal ? 1.0 : 0.5;
+    mine[0] += share;
+    mine[1] += share * std::max(b.reach - b.distance, 0.0);
+    mine[2] += share * b.reach;
+    mine[3] += share * 2.0 * b.stiffness * mobilities[kind[b.i]].shift;
+  });
+  MPI_Allreduce(mine, all, 4, MPI_DOUBLE, MPI_SUM, world);
+  if (!(all[0] > 0.0)) return {0.0, 0.0, 0.0, 0.0};
+  return {all[0], all[1] / all[0], all[2] / all[0], all[3] / all[0]};
+}
+
+double OverdampedFlow::largest_edge() const
+{
+  return *std::max_element(domain->prd, domain->prd + dimension);
+}
+
+void OverdampedFlow::stop(const std::string &found) const
+{
+  error->all(FLERR, "fix overdamped/affine " + found);
 }
 
 double OverdampedFlow::dissipated_power() const

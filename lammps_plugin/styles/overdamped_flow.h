@@ -6,6 +6,7 @@
 #include "affine_box.h"
 #include "fix.h"
 
+#include <string>
 #include <vector>
 
 namespace jamshape {
@@ -23,38 +24,49 @@ struct Rate {
 class OverdampedFlow : protected LAMMPS_NS::Pointers {
  public:
   OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineBox &affine_box,
-                 LAMMPS_NS::Fix *owner);
+                 LAMMPS_NS::Fix *owner, int n_registers);
   ~OverdampedFlow() override;
 
   /* set-up */
 
-  void begin_run();
+  /// False when particles are not where the last run left them.
+  bool begin_run();
   /// Drag coefficients of own atoms; after every exchange of atoms.
   void measure_particles();
 
-  /* stages of a step, for integrators: between `begin_step` and the last `move_to`, coordinates at
-     the start of the step and rates stored with `store_rates` stay with their atoms on whatever
-     rank */
+  /* stages of a step, for integrators: from `hold_start` to `finish_step`, coordinates at the start
+     of the step, rates stored with `store_rates` and registers stay with their atoms on whatever
+     rank. Scales are those of the box, L / L(strain 0) */
 
-  struct Stage {
-    LAMMPS_NS::bigint step;  // whose box the coordinates live in
-    double scale;
-  };
-  void begin_step();
-  /// Stores the rates of the present forces, which belong to the box of `stage`.
-  void store_rates(const Stage &stage);
-  /// Moves every particle from its coordinates at the start of the step by
-  /// h * (a * stored rate + b * rate of the present forces in the box `present`), into the box
-  /// `target`.
+  /// The present state is where every move starts, until the step is finished.
+  void hold_start();
+  /// Stores the rates of the present forces, which belong to the box of this scale.
+  void store_rates(double scale);
+  /// Moves every particle from its coordinates at the start of the step, into the box `to`, by
+  ///
+  ///     stored * (stored rate) + present * (rate of the present forces in the box `from`)
+  ///       + last * (displacement of the last move) + before * (of the one before it)
+  ///
+  /// The last two need registers.
   struct Move {
-    double h, a, b;
-    Stage present, target;
+    double stored, present;
+    double from, to;
+    double last = 0.0, before = 0.0;
   };
-  void move_by(const Move &move);
+  /// Without registers, stops the run at a move of more than half a radius; `allow_retries` makes
+  /// it return false on all ranks, at a quarter of it, turns included: nothing can be passed
+  /// through then, and another move may follow.
+  bool move_by(const Move &move);
+  void allow_retries() { can_retry = true; }
   /// As move_by, and makes it the state.
   void finish_step(const Move &move);
+  /// The same sum as a length: rms over all particles that a force moves, turns times the radius of
+  /// gyration.
+  double rms_of(const Move &sum);
   /// Forces at the present positions, neighbour lists kept valid. Counts as one evaluation.
   void evaluate_forces();
+  /// LAMMPS's own.
+  void count_evaluation() { ++evaluations; }
 
   /* numbers about the flow */
 
@@ -62,12 +74,25 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /// derivative of the energy without the prestress), by Lanczos' method, from below. Kinks of the
   /// energy, where differences of forces blow up, do not enter. The prestress is smaller by the
   /// overlap, but for long nearly parallel rods in 3D, whose true rate may be twice this one.
-  double largest_rate();
+  /// Ends when an iteration adds less than this fraction. Needs the place of the stored rates.
+  double largest_rate(double tolerance = 0.0);
+  /// Means over all bonds.
+  struct Touching {
+    double bonds;    // how many
+    double overlap;  // [length]
+    double reach;    // distance of first touch [length]
+    double rate;     // with which a single contact of two particles like the first relaxes [1/time]
+  };
+  Touching touching();
+  double largest_edge() const;
+  /// Ends the run, on all ranks, with a sentence about the fix.
+  [[noreturn]] void stop(const std::string &found) const;
   /// Power that the drag takes: sum F^2/(k_d A) + tau^2/(k_d A I), over all ranks.
   double dissipated_power() const;
   /// Largest distance between the end of the last step and where the stored rates alone had led: of
   /// the order of the local error of Euler's method, a bound of Heun's.
   double stage_difference() const;
+  /// Passes over all contacts: forces, and what estimates need.
   LAMMPS_NS::bigint n_evaluations() const { return evaluations; }
   LAMMPS_NS::bigint n_rebuilds() const { return rebuilds; }
 
@@ -80,7 +105,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   int unpack(int i, const double *buf);
   int n_coordinates() const { return dimension; }
   double *coordinates(int i) { return values[i]; }
-  int width() const { return dimension + n_rates + n_turns; }
+  int width() const { return dimension + n_rates + n_turns + n_registers * n_rates; }
   double memory_usage() const;
 
   /* the direction of the Lanczos iteration, sent to ghosts */
@@ -91,10 +116,13 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
  private:
   const double drag;
   const AffineBox &box;
-  const int dimension, n_rates, n_turns;
+  const int dimension, n_rates, n_turns, n_registers;
   PairContact *pair;
-  double *
-      *values;  // per atom: coordinates, rates of the stored stage, orientation at the step's start
+  // Per atom: coordinates, rates of the stored stage, orientation at the step's start, registers
+  // (displacements of the last move and of the one before).
+  double **values;
+  bool can_retry;
+  double farthest;  // of the last move, over what is allowed
   double largest_difference;
   LAMMPS_NS::bigint evaluations, rebuilds;
   LAMMPS_NS::Fix *fix;
@@ -103,6 +131,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
     double shift;
     Vec<3> turn;        // per body axis
     double step_limit;  // no particle may move farther in one step than this
+    double longest;     // semi-axis: what a turn moves at most
+    double gyration;    // length that a radian stands for
   };
   std::vector<Mobility> mobilities;  // of each kind of particle
   std::vector<int> kind;             // of own atoms
@@ -113,11 +143,13 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   Rate mobility_times(int i, const Vec<3> &force, const Vec<3> &torque) const;
   Rate present_rate(int i) const;
   Rate stored_rate(int i) const;
+  Rate register_of(int i, int which) const;
   void store_rate(int i, const Rate &rate);
-  void pack(const Rate &rate, double *to) const;
+  void write_rate(double *to, const Rate &rate) const;
+  Rate sum_of(int i, const Move &move) const;
+  void require_small(int i, const Rate &moved, double scale);
   Vec<3> read_coordinates(int i) const;
   Quaternion orientation_at_start(int i) const;
-  void require_small(int i, double moved) const;
   double place(int i, const Move &move, bool is_last);
   void move(const Move &move, bool is_last);
   void clear_forces(int first);

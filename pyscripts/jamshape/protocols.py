@@ -24,6 +24,8 @@ _PACKING = {
     "z_single": 8, "rattlers": 9, "bonds": 10, "overlap": 11, "tmax": 12,
 }  # fmt: skip
 _FLOW = {"strain": 1, "lambda_max": 2, "dt_max": 3, "evaluations": 5, "step_error": 7}
+_SUBSTEPS = {"substeps": 8, "rejected": 9, "forced": 10, "substep": 11, "substep_shortest": 12,
+             "local_error": 13, "stages": 14, "overlap_length": 15}  # fmt: skip
 
 _LONGEST_RUN = 1_000_000_000  # steps in one `run` command, which counts in 32 bits
 
@@ -39,18 +41,20 @@ class Compression:
     phi_end
         Packing fraction to reach.
     dt
-        Time step, [time].
+        Time step, [time]; an integrator that chooses its own steps divides it as it needs.
     sides
         Bonds of a side-to-side contact, 1 or 2.
     k_e, k_d
         Stiffness [energy] and drag [energy time / length^(D + 2)].
     integrator
-        A name that `fix overdamped/affine` knows.
+        A name that `fix overdamped/affine` knows; all but ``heun`` choose their own steps.
+    tolerance
+        Of those: local error over the typical overlap.
 
     Raises
     ------
     ValueError
-        If a rate, step, stiffness or drag is not positive, or `sides` neither 1 nor 2.
+        If a rate, step, stiffness, drag or tolerance is not positive, or `sides` neither 1 nor 2.
     """
 
     kappa: float = 1e-4
@@ -60,12 +64,13 @@ class Compression:
     k_e: float = 1.0
     k_d: float = 1.0
     integrator: str = "heun"
+    tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.kappa) and self.kappa != 0):
             msg = f"kappa is {self.kappa}, expected a rate other than zero."
             raise ValueError(msg)
-        for name in ("phi_end", "dt", "k_e", "k_d"):
+        for name in ("phi_end", "dt", "k_e", "k_d", "tolerance"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 msg = f"{name} is {value}, expected a positive number."
@@ -73,6 +78,16 @@ class Compression:
         if self.sides not in (1, 2):
             msg = f"sides is {self.sides}, expected 1 or 2."
             raise ValueError(msg)
+
+    @property
+    def chooses_steps(self) -> bool:
+        """Whether the integrator divides the time step as accuracy asks."""
+        return self.integrator != "heun"
+
+    def in_steps(self, phi: float, steps: int) -> Compression:
+        """Return the same with a time step of which so many lead from `phi` to the end."""
+        strain = math.log(self.phi_end / phi) / 2
+        return dataclasses.replace(self, dt=strain / (self.kappa * steps))
 
     def steps(self, phi: float) -> int:
         """Count the time steps from packing fraction `phi` to `phi_end`."""
@@ -152,6 +167,7 @@ class CompressionRun:
         return (
             f"fix flow all overdamped/affine drag {s.k_d!r} compress {s.kappa!r}"
             f" integrator {s.integrator}"
+            f"{f' tolerance {s.tolerance!r}' if s.chooses_steps else ''}"
         )
 
     def change(self, kappa: float | None = None, dt: float | None = None) -> None:
@@ -200,7 +216,8 @@ class CompressionRun:
         lmp = self.session.lmp
         values = lmp.extract_compute("packing", 0, 1)
         found = {name: float(values[column]) for name, column in _PACKING.items()}
-        found |= {name: float(lmp.extract_fix("flow", 0, 1, k)) for name, k in _FLOW.items()}
+        flow = _FLOW | _SUBSTEPS if self.settings.chooses_steps else _FLOW
+        found |= {name: float(lmp.extract_fix("flow", 0, 1, k)) for name, k in flow.items()}
         return found
 
     def packing(self) -> Packing:
@@ -265,7 +282,8 @@ def begin(session: Session, settings: Compression, start: Packing, to: Recording
 def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
     """Go on with a compression that was killed, from its last restart file, as it was set."""
     stored = read_attributes(path)
-    settings = Compression(**{f.name: stored[f.name] for f in dataclasses.fields(Compression)})
+    names = {f.name for f in dataclasses.fields(Compression)} & set(stored)
+    settings = Compression(**{name: stored[name] for name in names})
     to = Recording(path, int(stored["rows"]), int(stored["frames"]))
     run = CompressionRun(session, settings, to.newest_restart())
     RunWriter.open(path).truncate(session.step)
@@ -278,6 +296,7 @@ def record(run: CompressionRun, to: Recording) -> Iterator[Sample]:
     whole = run.settings.steps(float(read_attributes(to.path)["phi_start"]))
     every = max(1, whole // to.rows)
     per_frame = every * max(1, to.rows // to.frames)
+    name_of_error = "local_error" if run.settings.chooses_steps else "step_error"
     run.keep_restarts(per_frame, to.restart_prefix)
 
     def keep(sample: Sample) -> Sample:
@@ -285,7 +304,7 @@ def record(run: CompressionRun, to: Recording) -> Iterator[Sample]:
             writer.append(run.packing(), sample.observables)
         else:
             writer.append_observables(sample.step, sample.time, sample.observables)
-        error = sample.observables["step_error"]
+        error = sample.observables[name_of_error]
         writer.append_report(sample.step, sample.wall_seconds, error)
         return sample
 

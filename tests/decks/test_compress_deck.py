@@ -54,7 +54,21 @@ def thermo_rows(out):
     table = np.array([rows[step] for step in sorted(rows)])
     return dict(
         zip(
-            ["step", "phi", "p", "u", "z", "S_2", "S_4", "fmax", "frms", "dt_max"],
+            [
+                "step",
+                "phi",
+                "p",
+                "u",
+                "z",
+                "S_2",
+                "S_4",
+                "fmax",
+                "frms",
+                "dt_max",
+                "evaluations",
+                "substep",
+                "error",
+            ],
             table.T,
             strict=True,
         )

@@ -95,13 +95,16 @@ def test_pair_coeff_has_three_arguments(sentence_of):
     )
 
 
-SYNTAX = "'drag k_d compress kappa [integrator NAME] [reference center|corner] [check N]'."
+SYNTAX = (
+    "'drag k_d compress kappa [integrator NAME] [tolerance T] [stages MAX] "
+    "[reference center|corner] [check N]'."
+)
 
 
 @pytest.mark.parametrize(
     ("command", "sentence"),
     [
-        (f"{FIX} integrator leapfrog", r"integrator leapfrog, expected one of: (\w+, )*heun.*"),
+        (f"{FIX} integrator leapfrog", r"integrator leapfrog, expected one of: heun, .*"),
         (f"{FIX} reference middle", f"'reference middle', expected {re.escape(SYNTAX)}"),
         (f"{FIX} speed 3", f"'speed 3', expected {re.escape(SYNTAX)}"),
         (f"{FIX} integrator", f"a wrong list of arguments, expected {re.escape(SYNTAX)}"),
@@ -109,6 +112,17 @@ SYNTAX = "'drag k_d compress kappa [integrator NAME] [reference center|corner] [
         (
             "fix drive all overdamped/affine compress 1.0 drag 1.0",
             f"a wrong list of arguments, expected {re.escape(SYNTAX)}",
+        ),
+        (
+            f"{FIX} tolerance 1e-3",
+            "a tolerance, which belongs to integrators that choose their steps, not to heun.",
+        ),
+        (f"{FIX} integrator rkc2 tolerance 0.5", r"tolerance 0\.50*, expected a number .* 0\.1\."),
+        (f"{FIX} integrator rkc2 tolerance -1e-3", "tolerance -0.001.*, expected a number .*"),
+        (f"{FIX} integrator rkc2 stages 1", r"stages 1, expected from 2 to 1000\."),
+        (
+            f"{FIX} integrator heun/adaptive stages 9",
+            r"stages, which belong to integrator rkc2\.",
         ),
         (f"{FIX} check -1", "check -1, expected a number of steps, or 0 for never."),
         (
@@ -119,6 +133,14 @@ SYNTAX = "'drag k_d compress kappa [integrator NAME] [reference center|corner] [
 )
 def test_wrong_fix_commands(command, sentence, sentence_of):
     assert re.fullmatch(f"fix overdamped/affine found {sentence}", sentence_of(command))
+
+
+@pytest.mark.parametrize(("dt", "strain"), [("-0.5", "0.000500"), ("2000.0", "2.000000")])
+def test_steps_that_cannot_be_divided(dt, strain, sentence_of):
+    assert sentence_of(f"{FIX} integrator rkc2\ntimestep {dt}\nrun 1") == (
+        f"fix overdamped/affine found timestep {float(dt):.6f}, a strain of {strain}, expected a "
+        "step from 0 to a strain of 1: the integrator divides it."
+    )
 
 
 def test_fix_needs_a_pair_style_of_ours(sentence_of):
