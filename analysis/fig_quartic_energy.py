@@ -46,7 +46,7 @@ class Followed(NamedTuple):
 
     @property
     def pressure(self) -> float:
-        """[energy / length^3]"""
+        """Of the packing, [energy / length^3]."""
         return self.sample.number("pressure")
 
     @property

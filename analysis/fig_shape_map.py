@@ -60,7 +60,8 @@ def draw_bands(axes: Axes, A: Averages, phi: Averages) -> None:
         axes.errorbar([k.beta for k in inside], [phi[k].value for k in inside], error, **style)
     axes.set_ylabel(r"packing fraction $\phi_J$")
     _beta_axis(axes.xaxis)
-    axes.legend(fontsize=8)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=8)
 
 
 def _beta_axis(axis: Any) -> None:

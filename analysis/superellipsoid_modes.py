@@ -22,7 +22,7 @@ from jamshape.storage import FileFormatError
 # What tells a packing from others.
 _IDENTITY = ("phi", "u", "seed")
 
-AMPLITUDES: FloatArray = np.geomspace(1e-6, 0.3, 50)  # in units of a
+AMPLITUDES: FloatArray = np.geomspace(1e-5, 0.3, 37)  # in units of a
 
 
 class QuarticCount(NamedTuple):
