@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import ConvexHull
+from shading import lit, mean_normals, view
 
 from jamshape.packing import FloatArray
 from jamshape.superellipsoid_shape import (
@@ -58,19 +59,10 @@ COLORS = [
 ]
 COLUMNS, INCHES = 3, 2.6
 REACH = 2.15  # half width of what is shown, in radii of the sphere of the same volume
-AMBIENT, DIFFUSE, SHINE, GLOSS = 0.42, 0.62, 0.4, 28
 LEVEL = 4
 
 
-def view(height: float, turn: float) -> FloatArray:
-    """Point to the eye, to its right and up, from degrees above and around z: unit vectors."""
-    a, b = np.radians([height, turn])
-    eye = np.array([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
-    right = np.array([-np.sin(b), np.cos(b), 0])
-    return np.array([eye, right, np.cross(eye, right)])
-
-
-EYE = view(28, -55)
+VIEW = view(28, -55)
 
 
 def body(shape: Shape) -> SurfaceMesh:
@@ -81,32 +73,17 @@ def body(shape: Shape) -> SurfaceMesh:
     return surface_mesh(axes[::-1], p, LEVEL)
 
 
-def lit(color: FloatArray, normals: FloatArray) -> FloatArray:
-    """Color (T, 3) faces with these normals by a light at the left above the eye (Blinn 1977)."""
-    eye, right, up = EYE
-    light = eye + 0.9 * up - 0.8 * right
-    light /= np.linalg.norm(light)
-    half = (light + eye) / np.linalg.norm(light + eye)
-    diffuse = np.clip(normals @ light, 0, None)
-    shine = np.clip(normals @ half, 0, None) ** GLOSS
-    shaded = (AMBIENT + DIFFUSE * diffuse)[:, None] * color + SHINE * shine[:, None]
-    return np.asarray(np.clip(shaded, 0, 1))
-
-
 def draw_body(axes: Axes, mesh: SurfaceMesh, color: FloatArray) -> None:
     """Draw one body as it looks from afar: convex, so that what faces the eye is seen."""
     from matplotlib.collections import PolyCollection  # noqa: PLC0415 - not needed for --help
 
-    triangles = mesh.triangles
-    normals = mesh.normals[triangles].mean(axis=1)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    eye, right, up = EYE
-    seen = normals @ eye > -0.1
-    flat = mesh.vertices @ np.array([right, up]).T
-    faces = lit(color, normals[seen])
+    normals = mean_normals(mesh)
+    seen = normals @ VIEW.eye > -0.1
+    flat = VIEW.flat(mesh.vertices)
+    faces = lit(color, normals[seen], VIEW)
     # Smoothed, neighbours would leave a line between them; the outline hides their steps.
     axes.add_collection(
-        PolyCollection(list(flat[triangles[seen]]), facecolors=faces, lw=0, antialiaseds=False)
+        PolyCollection(list(flat[mesh.triangles[seen]]), facecolors=faces, lw=0, antialiaseds=False)
     )
     outline = flat[ConvexHull(flat).vertices]
     axes.fill(*outline.T, fill=False, ec=0.35 * color, lw=0.9, joinstyle="round")

@@ -42,7 +42,7 @@ ENSEMBLE = ("n", "size_ratio", "u0")
 REACHED = ("converged", "sliding")  # outcomes with mechanical equilibrium; others stalled
 
 # Ends of the names of files that may lie beside a packing and are none.
-OTHERS = (".run.h5", ".search.h5", ".modes.h5")
+OTHERS = (".run.h5", ".search.h5", ".path.h5", ".modes.h5")
 
 # On a logarithmic axis of alpha, discs stand this factor left of the smallest other alpha.
 DISCS_LEFT_BY = 4.0
@@ -100,16 +100,7 @@ def read_sweep(paths: Iterable[Path], *, with_stalled: bool = False) -> Sweep:
     OSError
         If one cannot be read.
     """
-    paths = list(paths)
-    samples = [sample for path in paths for sample in _samples(path)]
-    kept = [s for s in samples if with_stalled or s.reached]
-    if not kept:
-        places, n = ", ".join(map(str, paths)), len(samples)
-        stalled = f" in equilibrium, of {n} that ended otherwise" if samples else ""
-        msg = (
-            f"{places}: no finished packing{stalled}, expected files of sweep.py or make_packing.py"
-        )
-        raise ValueError(msg)
+    kept = finished(list(paths), with_stalled=with_stalled)
     for name in ENSEMBLE:
         values = sorted({sample.number(name) for sample in kept})
         if len(values) > 1:
@@ -120,6 +111,20 @@ def read_sweep(paths: Iterable[Path], *, with_stalled: bool = False) -> Sweep:
     for sample in sorted(kept, key=lambda s: (s.number("alpha"), s.number("seed"))):
         sweep.setdefault(sample.number("alpha"), []).append(sample)
     return sweep
+
+
+def finished(paths: list[Path], *, with_stalled: bool) -> list[Sample]:
+    """Find the finished packings in folders and files, at least one; arguments as `read_sweep`."""
+    samples = [sample for path in paths for sample in _samples(path)]
+    kept = [s for s in samples if with_stalled or s.reached]
+    if not kept:
+        places, n = ", ".join(map(str, paths)), len(samples)
+        stalled = f" in equilibrium, of {n} that ended otherwise" if samples else ""
+        msg = (
+            f"{places}: no finished packing{stalled}, expected files of sweep.py or make_packing.py"
+        )
+        raise ValueError(msg)
+    return kept
 
 
 def _samples(path: Path) -> list[Sample]:

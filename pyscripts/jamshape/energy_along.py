@@ -1,5 +1,7 @@
 """Energy of a packing along one of its modes: Marschall & Teitel 2018, Figs. 13 and 17.
 
+Also of superellipsoids: Yuan et al. 2019, Fig. 10.
+
 What a soft mode costs at small amplitudes is far below the rounding of the energy. Here it is the integral of
 the force along the mode, in which the rounding of bonds cancels as far as the mode leaves their lengths as
 they are: it resolves eigenvalues of 1e-16 at amplitudes of 1e-11.
@@ -22,6 +24,11 @@ from jamshape.packing import FloatArray, Packing
 _DEVIATION = 0.03
 _FEWEST = 6
 _BEYOND = 10.0
+
+# Where the energy is a crossover's factor above its quadratic start, a quartic term is as large as that; bonds that
+# open have taken it below the start when so little of it is left.
+_TWICE = 2.0
+_BELOW = 0.99
 
 # Differences of energies are taken where they exceed the rounding of the energy by this factor, and
 # called right where so many in a row agree with the integral of the force to this fraction.
@@ -140,6 +147,34 @@ def fit_crossover(along: EnergyAlong) -> Crossover | None:
     )
 
 
+def quartic_crossover(along: EnergyAlong) -> float:
+    """Find delta* from which on a mode is quartic (Yuan et al. 2019, Sec. 3.2), whatever follows there.
+
+    The smallest amplitude where the energy is twice what it would be with the stiffness of the start; of an
+    unstable mode, where it is what it was at 0. Superellipsoids press harder on some neighbours and lose others
+    as they turn, at about delta*, so that `fit_crossover` finds few ranges with one quartic term. Along what
+    bonds constrain to first order some of these open, and the energy falls below its start before it rises.
+
+    Returns
+    -------
+    float, [length]
+        NaN if the energy falls below its quadratic start by a percent first, or is never twice as large.
+    """
+    start = along.mean_slope[0] / along.delta[0]
+    ratio = along.mean_energy / (0.5 * start * along.delta**2)
+    if start < 0:  # from 1 down to 0
+        ratio = _TWICE - ratio
+    ratio = ratio[np.isfinite(ratio)]
+    off = np.flatnonzero((ratio < _BELOW) | (ratio > _TWICE))
+    if not len(off) or ratio[off[0]] < _BELOW:
+        return float("nan")
+    k = int(off[0])
+    if start < 0:
+        ratio = np.where(ratio < 2 * _TWICE, ratio, 2 * _TWICE)
+    around = slice(max(k - 1, 0), k + 1)
+    return float(np.exp(np.interp(_TWICE, ratio[around], np.log(along.delta[around]))))
+
+
 class _Fit(NamedTuple):
     """Least squares of y = a + b u, relative to y, to some points in a row."""
 
@@ -193,7 +228,7 @@ class AlongModes:
     Parameters
     ----------
     packing : Packing
-        Spherocylinders at a minimum.
+        At a minimum.
     coordinates : Coordinates
         Those of the modes.
     k_e : float, [energy]

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jamshape import superellipsoid_jammed
 from jamshape.contacts import find_contacts, find_rattlers
 from jamshape.jammed import is_done, require_attributes, write_minimum
 from jamshape.landscape import Landscape, State
@@ -24,7 +25,7 @@ from jamshape.storage import read_attributes, read_packing
 from jamshape.target import Search, Target, TargetError, direct
 
 # What must agree in the packing and in a rung that is there already.
-_IDENTITY = ("alpha", "n", "seed", "size_ratio")
+_IDENTITY = ("alpha", "n", "seed", "size_ratio", "p", "w1", "w2", "protocol", "n_sweeps")
 
 # A box that was opened has been opened too far below this fraction of u0; how long to look.
 _FALLEN = 1e-2
@@ -50,7 +51,7 @@ def climb(
     Parameters
     ----------
     source : Path
-        A finished packing of `jammed.make`.
+        A finished packing of `jammed.make` or `superellipsoid_jammed.make`.
     energies : iterable of float
         Energy densities u0, in any order, [energy / length^D].
     folder : Path
@@ -76,8 +77,9 @@ def climb(
         raise ValueError(msg)
     stored = read_attributes(source)
     targets = sorted({replace(target or Target(), u0=u0) for u0 in energies}, key=lambda t: t.u0)
-    up = [t for t in targets if t.u0 >= stored["u0"]]
-    down = [t for t in reversed(targets) if t.u0 < stored["u0"]]
+    own = stored.get("u0", stored["u"])
+    up = [t for t in targets if t.u0 >= own]
+    down = [t for t in reversed(targets) if t.u0 < own]
     for part in (up, down):
         last = source
         for goal in part:
@@ -114,7 +116,9 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
         "evaluations": landscape.evaluations,
         "wall_seconds": time.perf_counter() - began,
     }
-    write_minimum(out, landscape, search.minimum, attributes)
+    are_rods = start.shape_style == "spherocylinder"
+    write = write_minimum if are_rods else superellipsoid_jammed.write_minimum
+    write(out, landscape, search.minimum, attributes)
     return Rung(out, goal.u0, made=True, failure="")
 
 

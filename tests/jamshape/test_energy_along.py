@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from small_packings import jammed, matrix_of
+from superellipsoid_packings import octahedra_and_boxes
 
-from jamshape.energy_along import AlongModes, EnergyAlong, fit_crossover
-from jamshape.hessian import Coordinates
+from jamshape.energy_along import AlongModes, EnergyAlong, fit_crossover, quartic_crossover
+from jamshape.hessian import Coordinates, dynamical_matrix
 from jamshape.landscape import Landscape, State
+from jamshape.minimise import Stop, minimise
 from jamshape.modes import spectrum
 from jamshape.packing import Box, Packing
 
@@ -164,3 +166,42 @@ def test_crossover_after_a_weak_bond_has_closed():
     assert_allclose([found.stiffness, found.quartic], [a, c], rtol=1e-6)
     assert_allclose(found.delta, np.sqrt(a / (2 * c)), rtol=1e-6)
     assert 1e-7 < found.begin < 2e-7
+
+
+def energy_of(delta, energy, slope):
+    both = np.stack([energy, energy])
+    nothing = np.zeros_like(both)
+    return EnergyAlong(delta, np.stack([slope, slope]), both, nothing, nothing, nothing, 0.0, 10)
+
+
+@pytest.mark.parametrize("a", [3e-9, -3e-9])
+def test_quartic_crossover_is_where_both_terms_are_equal(a):
+    delta, c = np.geomspace(1e-7, 1, 100), 2e-3
+    energy, slope = a * delta**2 / 2 + c * delta**4, a * delta + 4 * c * delta**3
+    energy[delta > 0.05] *= 7.0  # other contacts push back
+    found = quartic_crossover(energy_of(delta, energy, slope))
+    assert_allclose(found, np.sqrt(abs(a) / (2 * c)), rtol=0.02)
+
+
+def test_what_opens_bonds_or_stays_quadratic_has_no_quartic_crossover():
+    delta = np.geomspace(1e-7, 1, 100)
+    energy, slope = 0.5 * delta**2, delta
+    assert np.isnan(quartic_crossover(energy_of(delta, energy, slope)))
+    opened = np.where(delta > 1e-4, 0.9, 1.0) * energy + 1e3 * delta**4
+    assert np.isnan(quartic_crossover(energy_of(delta, opened, slope)))
+
+
+def test_force_along_modes_of_superellipsoids_is_their_eigenvalue():
+    """Rotations in space, of all three axes."""
+    packing = octahedra_and_boxes()
+    landscape = Landscape(packing)
+    squeezed = State.of(packing).strained(-0.06)
+    minimum = minimise(landscape, squeezed, "auto", Stop(tolerance=1e-12))
+    matrix = dynamical_matrix(landscape, minimum.state)
+    found = spectrum(matrix)
+    modes = AlongModes(minimum.state.packing(packing), matrix.coordinates)
+    real = np.flatnonzero(~found.is_translation)
+    for k in (real[0], real[len(real) // 2], real[-1]):
+        along = modes.energy(found.vectors[:, k], [1e-8, 1e-7])
+        assert_allclose(along.mean_slope[1] / 1e-7, found.eigenvalues[k], rtol=1e-4, atol=1e-9)
+        assert_allclose(along.mean_energy[1], 0.5 * found.eigenvalues[k] * 1e-14, rtol=1e-3)
