@@ -32,6 +32,9 @@ _LARGEST_GROWTH, _LEAST_GROWTH, _SAFETY = 3.0, 0.2, 0.85
 # After a stage without a solution.
 _RETREAT = 0.25
 
+# Steps that do not grow after one that was rejected.
+_HELD = 2
+
 # Factors of a step serve another one whose size differs by less than this factor.
 _SAME_STEP = 1.5
 
@@ -168,6 +171,8 @@ class Flow:
     factorisations: int = 0
     wall_seconds: float = 0.0
     explicit_left: int = 0
+    held: int = 0
+    """Steps that are not to grow any more."""
     _factors: Factorisation | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
 
@@ -302,6 +307,7 @@ class _Run:
             attempt = self._tried(dt, explicit, here)
             if attempt is None:
                 flow.rejected += 1
+                flow.held = _HELD
                 flow.dt = _RETREAT * dt
                 flow.forget()
                 if flow.dt < self._stable:
@@ -316,6 +322,9 @@ class _Run:
                 break
             flow.rejected += 1
             flow.dt = dt * min(growth, 0.9)
+        if flow.held > 0:
+            flow.held -= 1
+            growth = min(growth, 1.0)
         if explicit:
             flow.explicit += 1
             flow.explicit_left = max(flow.explicit_left - 1, 0)
@@ -357,7 +366,8 @@ class _Run:
         overlap = self._unit(evaluation)
         bonds = max(evaluation.n_bonds, self.landscape.particles.n)
         energy = bonds * self.landscape.k_e * (overlap / self.size) ** 2
-        return Units(energy, math.sqrt(overlap * self.size))
+        force = self.landscape.k_e * overlap / self.size**2
+        return Units(force, energy, math.sqrt(overlap * self.size))
 
     def _is_extended(self, state: State, unit: float = math.inf) -> bool:
         rounding = float(np.finfo(np.float64).eps) * self.size
@@ -401,7 +411,7 @@ class _Run:
             velocities.append((found.x - centre) / own)
         error = sum((dt * e * v for e, v in zip(method.error, velocities)), np.zeros(landscape.size))
         force = drag * error
-        size = self._units(evaluation).of(landscape, found.factors.solve(force), force)
+        size = self._units(evaluation).of(landscape, found.factors.solve(force), force, drag)
         return _Attempt(found.x, velocities, size, evaluation)
 
     def _predicted(

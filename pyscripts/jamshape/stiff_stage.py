@@ -27,12 +27,16 @@ from jamshape.packing import FloatArray
 
 # A stage is given up after so many directions, and factorises anew after so many that did not bring
 # it to its end.
-_DIRECTIONS = 60
-_PER_FACTORISATION = (4, 12, 24)
+_DIRECTIONS = 24
+_PER_FACTORISATION = (3, 3, 3, 6, 24)
 
 # Evaluations along one direction; the force along it is to fall to this fraction.
 _TRIES = 12
 _FALL = 0.5
+
+# A guess with a force above this multiple of the typical one has gone through a collision; to find the
+# solution from there takes longer than to come closer to the collision first.
+_COLLISION = 30.0
 
 # Pairs of differences that are kept.
 _MEMORY = 30
@@ -99,7 +103,7 @@ class Solution(NamedTuple):
 
     x: FloatArray
     evaluation: Evaluation
-    factors: Factorisation
+    factors: Factorisation | None
     factorisations: int
     directions: int
     solved: bool
@@ -138,14 +142,18 @@ class Units(NamedTuple):
     overlaps in second order: over the square root of overlap times size.
     """
 
+    force: float
+    """Of a typical bond."""
     energy: float
     """Twice the typical energy of the packing."""
     length: float
     """sqrt(overlap size), [length]."""
 
-    def of(self, landscape: Landscape, shift: FloatArray, force: FloatArray) -> float:
-        """Size of an (n,) displacement and the (n,) force that makes it."""
-        hard = math.sqrt(max(float(shift @ force), 0.0) / self.energy)
+    def of(
+        self, landscape: Landscape, shift: FloatArray, force: FloatArray, drag: FloatArray
+    ) -> float:
+        """Size of an (n,) displacement, the (n,) force that makes it and the drag over the time."""
+        hard = math.sqrt(max(float(shift @ (force - drag * shift)), 0.0) / self.energy)
         return max(hard, rms(landscape, shift) / self.length)
 
 
@@ -176,12 +184,14 @@ def solve(
     secants, made = _Secants(), 0
     x = guess
     evaluation, gradient = stage.evaluate(x)
+    if np.abs(gradient).max(initial=0.0) > _COLLISION * units.force:
+        return Solution(x, evaluation, factors, 0, 0, False)
     if factors is None:
         factors, made = stage.factorise(x), 1
     since = 0
     for directions in range(_DIRECTIONS):
         step = -secants.solve(factors, gradient)
-        if units.of(stage.landscape, step, -gradient) <= accuracy:
+        if units.of(stage.landscape, step, -gradient, stage.drag) <= accuracy:
             return Solution(x + step, evaluation, factors, made, directions, True)
         if since >= _PER_FACTORISATION[min(made, len(_PER_FACTORISATION) - 1)]:
             factors, made, since = stage.factorise(x), made + 1, 0
