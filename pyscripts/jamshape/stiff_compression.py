@@ -108,7 +108,7 @@ class Protocol:
     tolerance: float = 1e-3
     k_d: float = 1.0
     largest_strain: float = 1e-3
-    method: str = "sdirk2"
+    method: str = "tr-bdf2"
 
     def __post_init__(self) -> None:
         for name in ("phi_end", "p_end", "tolerance", "k_d", "largest_strain"):
