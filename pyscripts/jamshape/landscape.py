@@ -182,6 +182,15 @@ class Landscape:
         full[self._free] = vector
         return full
 
+    def coordinates(self, components: FloatArray) -> FloatArray:
+        """Gather an (n,) vector from (N, D + rotations), as `components` spreads it."""
+        return components[self._free]
+
+    @property
+    def components_per_particle(self) -> int:
+        """D + rotations."""
+        return self._free.shape[1]
+
     def particle_of_coordinate(self) -> IntArray:
         """(n,) the particle that each coordinate belongs to."""
         return np.nonzero(self._free)[0]

@@ -307,7 +307,7 @@ def search_along(descent: Descent, step: FloatArray, tries: int = 25) -> LineSea
     """
     landscape = descent.landscape
     slope = float(descent.evaluation.gradient @ step)
-    bracket = _Bracket(slope)
+    bracket = Bracket(slope)
     factor = 1.0
     for n in range(1, 2 * tries):
         state = landscape.displaced(descent.state, factor * step)
@@ -327,7 +327,7 @@ def search_along(descent: Descent, step: FloatArray, tries: int = 25) -> LineSea
 _CORNER = 0.1
 
 
-class _Bracket:
+class Bracket:
     """Bracket of the zero of the slope along a line, from 0 where it is negative."""
 
     def __init__(self, slope: float) -> None:
