@@ -65,6 +65,7 @@ class PairContact : public LAMMPS_NS::Pair {
   virtual bool turns(const Vec<3> &semi_axes) const = 0;
 
   [[noreturn]] void stop_at_crossing(int i, int j);
+  [[noreturn]] void stop_at_unconverged(int i, int j);
   void require_same_bounds(const std::vector<Vec<3>> &semi_axes) const;
   void require_in_plane(int n) const;
 
