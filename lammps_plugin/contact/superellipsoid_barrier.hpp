@@ -12,9 +12,9 @@ namespace jamshape {
 
 namespace detail {
 
-/// The slow and certain way to a tangency, for any two exponents: the least t with a point y in both
-/// bodies scaled by t. With q = 2p and x_k the components of y over the semi-axes, g(y) <= t where
-/// there are u_k with
+/// The slow and certain way to a tangency, for any two exponents: the least t with a point y in
+/// both bodies scaled by t. With q = 2p and x_k the components of y over the semi-axes, g(y) <= t
+/// where there are u_k with
 ///     |x_k| <= u_k^(1/q) t^(1 - 1/q),    sum u_k <= t,
 /// all of them convex cones with self-concordant barriers B (Chares 2009 for the power cone).
 /// Newton's method on t / mu + B with steps cut to 1 / (1 + decrement) then converges from every

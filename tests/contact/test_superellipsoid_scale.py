@@ -20,6 +20,9 @@ from superellipsoid_pairs import (
 )
 
 from jamshape import _contact
+from jamshape.contacts import find_contacts
+from jamshape.landscape import Landscape, State
+from jamshape.packing import Box, Packing
 
 ROUNDING = 1e-13
 
@@ -396,6 +399,39 @@ def test_concentric_bodies_have_no_normal(dimension):
     with pytest.raises(ValueError, match="pair 0 have the same centre"):
         scales(i, j)
     assert np.all(_contact.superellipsoid_overlap(i.rows, j.rows))
+
+
+def test_what_does_not_converge_is_no_crossing():
+    """Beside p = 1/2, where faces are flat to rounding, some bounds stay 4e-6 apart."""
+    rng = np.random.default_rng(0)
+    i, j = random_pairs(rng, 300, 3, 0.5 + 1e-9)
+    axes = np.tile([0.1, 1.0, 10.0], (300, 1))
+    i = i.replaced(semi_axes=axes, centre=j.centre + 0.3 * rng.normal(size=(300, 3)))
+    j = j.replaced(semi_axes=axes)
+    found = contacts(i, j)
+    lost = np.flatnonzero(found["status"] == 3)
+    assert len(lost) > 0
+    assert np.all(scales(i, j)["gap"][lost] >= 1e-6)
+    assert not np.any(found["force"][lost])
+    assert not np.any(found["status"] == 2)
+
+    worst = np.argmax(np.minimum(scales(i, j)["gap"], scales(j, i)["gap"]))  # in either order
+    i, j = one(i, worst), one(j, worst)
+    packing = Packing(
+        position=np.vstack([i.centre, j.centre]) - j.centre,
+        orientation=np.vstack([i.turn, j.turn]),
+        diameters=2.0 * axes[:2],
+        species=np.ones(2, int),
+        id=np.array([7, 3]),
+        box=Box(np.full(3, -50.0), np.full(3, 100.0)),
+        shape_style="superellipsoid",
+        exponent=np.full(2, 0.5 + 1e-9),
+    )
+    sentence = "contact of particles (7 and 3|3 and 7) did not converge"
+    with pytest.raises(ValueError, match=sentence):
+        find_contacts(packing)
+    with pytest.raises(ValueError, match=sentence):
+        Landscape(packing).evaluate(State.of(packing), extended=False)
 
 
 @pytest.mark.parametrize("factor", [1e-9, 1e9])
