@@ -96,8 +96,11 @@ nb::dict sums_in(const PackingArrays &arrays, const typename Model::Law &law)
   result["bond_force"] = static_cast<double>(sums.bond_force);
   result["n_bonds"] = sums.n_bonds;
   result["error"] = sums.error;
-  result["crossing"] =
-      sums.crossing == PairSums<D, S>::NONE ? -1 : static_cast<std::int64_t>(sums.crossing);
+  const auto pair_or_none = [](std::size_t pair) {
+    return pair == PairSums<D, S>::NONE ? -1 : static_cast<std::int64_t>(pair);
+  };
+  result["crossing"] = pair_or_none(sums.crossing);
+  result["unconverged"] = pair_or_none(sums.unconverged);
   return result;
 }
 

@@ -174,7 +174,7 @@ void export_spherocylinder(nb::module_ &m)
         "angles or (2, N, 4) quaternions and edges (2, D) as a double and its small rest; pairs\n"
         "(M, 2), shift (M, D) box edges to add to the second; extended: in long double. Returns a\n"
         "dict: energy, force (N, D), torque (N, 1 or 3), virial (D, D), bond_force (sum of\n"
-        "magnitudes), n_bonds, crossing (a pair that cannot be computed, or -1).");
+        "magnitudes), n_bonds, crossing and unconverged (a pair of this status, or -1).");
   m.def("spherocylinder_derivatives", &spherocylinder_derivatives, "diameters"_a, "position"_a,
         "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "k_e"_a, "sides"_a, "extended"_a,
         "Second derivatives of the C touching pairs, arguments as in spherocylinder_sums. The\n"

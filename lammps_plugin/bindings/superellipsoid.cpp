@@ -246,9 +246,9 @@ void export_superellipsoid(nb::module_ &m)
       "superellipsoid_contacts", &superellipsoid_contacts, "bodies_i"_a, "bodies_j"_a, "epsilon"_a,
       "Contacts of M pairs. Bodies are (M, 6) in 2D: centre, angle, two semi-axes, p; (M, 11) in\n"
       "3D: centre, quaternion w i j k, three semi-axes, p. Returns a dict of arrays: status (0\n"
-      "apart, 1 touching, 2 concentric), error (relative, of the scale), energy, force (on i),\n"
-      "torque_i, torque_j, bond_normal (into i), bond_arm_i, bond_distance, bond_reach (1 -\n"
-      "distance/reach is 1 - eta^2), bond_stiffness.");
+      "apart, 1 touching, 2 concentric, 3 unconverged), error (relative, of the scale), energy,\n"
+      "force (on i), torque_i, torque_j, bond_normal (into i), bond_arm_i, bond_distance,\n"
+      "bond_reach (1 - distance/reach is 1 - eta^2), bond_stiffness.");
   m.def(
       "superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
       "normals"_a.none() = nb::none(),

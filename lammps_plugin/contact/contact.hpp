@@ -4,9 +4,10 @@
 
 namespace jamshape {
 
-/// What a pair of particles is to each other. CROSSING is no contact that could be computed: spines
-/// (or centres) lie on each other, and no normal exists.
-enum class ContactStatus { APART, TOUCHING, CROSSING };
+/// What a pair of particles is to each other. Two have no contact: CROSSING, where spines (or
+/// centres) lie on each other and no normal exists, and UNCONVERGED, where an iteration ended
+/// without usable bounds.
+enum class ContactStatus { APART, TOUCHING, CROSSING, UNCONVERGED };
 
 /// Classes of contact (Marschall & Teitel 2018, Fig. 1). The numbers are the column `kind` of
 /// `compute contact/local` and of the Python bindings.

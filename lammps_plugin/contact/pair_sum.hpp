@@ -99,8 +99,9 @@ template <int D, class S> struct PairSums {
   Vec<D * D, S> virial{};  // sum of r (x) force on i
   S bond_force = 0.0;      // sum of the magnitudes
   std::size_t n_bonds = 0;
-  double error = 0.0;           // the largest of a contact
-  std::size_t crossing = NONE;  // the first pair that cannot be computed
+  double error = 0.0;              // the largest of a contact
+  std::size_t crossing = NONE;     // the first pair of this status
+  std::size_t unconverged = NONE;  // likewise
 
   static constexpr std::size_t NONE = static_cast<std::size_t>(-1);
 };
@@ -115,8 +116,10 @@ PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_part
     const PosedPair<Model, D, S> pair = pairs.at(p);
     const Contact<D, S> contact = contact_at(pair);
     if (contact.status == ContactStatus::APART) continue;
-    if (contact.status == ContactStatus::CROSSING) {
-      if (sums.crossing == PairSums<D, S>::NONE) sums.crossing = p;
+    if (contact.status != ContactStatus::TOUCHING) {
+      const bool is_crossing = contact.status == ContactStatus::CROSSING;
+      std::size_t &first = is_crossing ? sums.crossing : sums.unconverged;
+      if (first == PairSums<D, S>::NONE) first = p;
       continue;
     }
     sums.energy += contact.energy;

@@ -23,7 +23,7 @@ struct SuperellipsoidLaw {
 inline constexpr double COINCIDENT_CENTRES = 1e-14;
 
 /// A scale with a larger relative error bar is no contact that could be computed: it is reported as
-/// such (CROSSING), not dropped. None has been seen.
+/// such (UNCONVERGED), not dropped. None has been seen.
 inline constexpr double USELESS = 1e-6;
 
 /// Contact of two superellipsoids in 2D or 3D. With x = eta^2, n the common normal where the scaled
@@ -67,7 +67,7 @@ template <int D, class S> class SuperellipsoidContact {
     const FoundTangency<D, T> found = find_tangency(last);
     if (last != nullptr) *last = found.at.normal;
     if (found.is_apart) return empty(ContactStatus::APART);
-    if (!(found.gap < T(USELESS))) return empty(ContactStatus::CROSSING);
+    if (!(found.gap < T(USELESS))) return empty(ContactStatus::UNCONVERGED);
     if (!(found.at.scale < 1)) return empty(ContactStatus::APART);
     return touching(in_scalar(found.at), found.gap);
   }

@@ -185,6 +185,13 @@ void PairContact::stop_at_crossing(int i, int j)
                  "smaller timestep.");
 }
 
+void PairContact::stop_at_unconverged(int i, int j)
+{
+  error->one(FLERR, "pair_style " + style_name() + " found no converged contact of atoms " +
+                        std::to_string(atom->tag[i]) + " and " + std::to_string(atom->tag[j]) +
+                        ": use semi-axes within a factor 100 and exponents from 0.55 to 10.");
+}
+
 bool PairContact::is_mine(int i, int j) const
 {
   if (force->newton_pair || j < atom->nlocal) return true;

@@ -80,6 +80,7 @@ class PairContact : public LAMMPS_NS::Pair {
   void require_arguments(bool is_right, int narg) const;
 
   [[noreturn]] void stop_at_crossing(int i, int j);
+  [[noreturn]] void stop_at_unconverged(int i, int j);
   void require_same_bounds(const std::vector<Vec<3>> &semi_axes) const;
   void require_in_plane(int n) const;
 

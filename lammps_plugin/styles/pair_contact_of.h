@@ -164,6 +164,7 @@ template <class Model> class PairContactOf : public PairContact {
         const Contact<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
         if (contact.status == ContactStatus::APART) continue;
         if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
+        if (contact.status == ContactStatus::UNCONVERGED) stop_at_unconverged(i, j);
         force_i += contact.force;
         if constexpr (TURNS) torque_i += contact.torque_i;
         if (newton || j < nlocal) {

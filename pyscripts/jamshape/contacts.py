@@ -18,7 +18,7 @@ from jamshape.packing import Box, FloatArray, IntArray, Packing
 
 BoolArray = NDArray[np.bool_]
 
-_TOUCHING, _CROSSING = 1, 2  # ContactStatus of contact/contact.hpp
+_TOUCHING, _CROSSING, _UNCONVERGED = 1, 2, 3  # ContactStatus of contact/contact.hpp
 _CORE = {"spherocylinder": "spines", "superellipsoid": "centres"}  # what must not cross
 
 # Bounding spheres are larger by this fraction, so that rounding never drops a contact.
@@ -261,7 +261,8 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
     Raises
     ------
     ValueError
-        If two spines or centres cross, or an argument is out of its range.
+        If two spines or centres cross, a contact did not converge, or an argument is out of its
+        range.
     """
     are_rods = packing.shape_style == "spherocylinder"
     rows = bodies(packing) if are_rods else superellipsoid_bodies(packing)
@@ -274,6 +275,7 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
     else:
         found = _with_slots(_contact.superellipsoid_contacts(i, j, k_e))
     _refuse_crossing(packing, near, found["status"])
+    _refuse_unconverged(packing, near, found["status"])
 
     touching = found["status"] == _TOUCHING
     i, j, near = i[touching], j[touching], near.take(touching)
@@ -386,6 +388,21 @@ def _refuse_crossing(packing: Packing, near: NearPairs, status: NDArray[np.int32
             " pairs), expected overlaps smaller than the particles; take a packing without crossings"
         )
         raise ValueError(msg)
+
+
+def _refuse_unconverged(packing: Packing, near: NearPairs, status: NDArray[np.int32]) -> None:
+    failed = np.flatnonzero(status == _UNCONVERGED)
+    if len(failed):
+        first, second = packing.id[near.first[failed[0]]], packing.id[near.second[failed[0]]]
+        raise ValueError(unconverged_sentence(first, second))
+
+
+def unconverged_sentence(first: int, second: int) -> str:
+    """Say what happened to two particles whose contact is ContactStatus::UNCONVERGED."""
+    return (
+        f"the contact of particles {first} and {second} did not converge; use semi-axes within a factor"
+        " 100 and exponents from 0.55 to 10"
+    )
 
 
 def _rotation(torque: FloatArray) -> FloatArray:

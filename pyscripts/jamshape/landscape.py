@@ -17,6 +17,7 @@ import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
 from jamshape import _contact
+from jamshape.contacts import unconverged_sentence
 from jamshape.packing import FloatArray, IntArray, LongArray, Packing
 from jamshape.shapes import PairArrays, Shape, shape_of
 
@@ -208,6 +209,8 @@ class Landscape:
         ------
         CrossingError
             If two spines cross.
+        ValueError
+            If a contact did not converge.
         """
         self.evaluations += 1
         pairs = self._pairs_at(state)
@@ -219,6 +222,9 @@ class Landscape:
                 " than the particles; start from a state without crossings"
             )
             raise CrossingError(msg)
+        if found["unconverged"] >= 0:
+            first, second = self.particles.id[pairs.particles[found["unconverged"]]]
+            raise ValueError(unconverged_sentence(first, second))
         slope = -np.column_stack([found["force"], found["torque"] / self._length_or_1[:, None]])
         n_bonds = found["n_bonds"]
         return Evaluation(

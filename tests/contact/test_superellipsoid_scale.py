@@ -20,6 +20,9 @@ from superellipsoid_pairs import (
 )
 
 from jamshape import _contact
+from jamshape.contacts import find_contacts
+from jamshape.landscape import Landscape, State
+from jamshape.packing import Box, Packing
 
 ROUNDING = 1e-13
 
@@ -150,6 +153,91 @@ def test_no_random_pair_is_left_without_bounds(measured):
         fallbacks += found["fallback"].sum()
     measured(uncertain=uncertain, fallbacks=fallbacks)
     assert uncertain <= 1
+
+
+CORNERS = np.array(
+    [(0.5, 0.5, 5.0), (0.1, 1.0, 1.0), (1.0, 1.0, 10.0), (0.1, 1.0, 10.0), (0.1, 0.1, 1.0)]
+)
+
+
+def corner_pairs(rng, n, dimension, p_i, p_j):
+    """Needles, plates and both at once, far apart to nearly concentric."""
+    i, j = (random_bodies(rng, n, dimension, p) for p in (p_i, p_j))
+    kinds = rng.integers(len(CORNERS), size=(2, n))
+    kinds[1] = np.where(rng.random(n) < 0.5, kinds[0], kinds[1])
+    axes = [rng.permuted(CORNERS[kind], axis=1)[:, :dimension] for kind in kinds]
+    i, j = i.replaced(semi_axes=axes[0]), j.replaced(semi_axes=axes[1])
+    r = rng.normal(size=(n, dimension))
+    sizes = axes[0].max(1) + axes[1].max(1)
+    distance = sizes * np.exp(rng.uniform(np.log(0.05), np.log(3.0), n))
+    any_length = rng.random(n) < 0.5
+    r *= np.where(any_length, 1.0, distance / np.linalg.norm(r, axis=1))[:, None]
+    return i.replaced(centre=j.centre + r), j
+
+
+def check_bounds(i, j, measured, tolerance):
+    """Rounding of points 100 times as far as a surface is near limits the bounds to 1e-13."""
+    found = scales(i, j)
+    r, n = i.centre - j.centre, found["normal"]
+    below = (r * n).sum(1) / sum(support(in_body(n, b), b.semi_axes, b.p) for b in (i, j))
+    y = -found["point_i"]
+    above = np.maximum(
+        gauge(in_body(y, i), i.semi_axes, i.p), gauge(in_body(r - y, j), j.semi_axes, j.p)
+    )
+    gap = np.maximum(found["gap"], (above - below) / found["eta"])
+    measured(
+        gap=gap.max(), above_1e_13=int(np.sum(~(gap < 1e-13))), fallbacks=found["fallback"].sum(),
+        iterations=found["iterations"].max(),
+    )  # fmt: skip
+    assert np.all(gap < tolerance)
+
+
+# Centre of i, quaternions, semi-axes and p of pairs that no stages by exponent lead to.
+LOST = [
+    ((0.588, -0.427, -1.199), (-0.184, -0.111, -0.967, -0.135), (0.1, 1.0, 10.0), 2.0,
+     (0.339, 0.429, 0.459, -0.7), (0.1, 1.0, 10.0), 2.0),
+    ((-0.971, -0.42, 0.603), (0.316, 0.581, 0.601, -0.449), (0.1, 1.0, 10.0), 10.0,
+     (-0.383, 0.331, 0.649, -0.568), (0.1, 1.0, 10.0), 10.0),
+    ((0.336, 0.53, 1.828), (-0.361, 0.634, -0.6, 0.328), (0.1, 1.0, 10.0), 5.0,
+     (-0.984, 0.125, -0.128, -0.011), (0.1, 1.0, 10.0), 5.0),
+    ((0.425, -0.711, 0.938), (-0.087, -0.75, 0.403, 0.517), (0.5, 0.5, 5.0), 0.55,
+     (-0.521, 0.341, 0.55, -0.556), (0.5, 0.5, 5.0), 0.55),
+    ((-1.214, -0.62, -0.396), (0.391, -0.468, -0.753, 0.247), (0.5, 0.5, 5.0), 2.0,
+     (0.314, -0.876, -0.354, -0.094), (0.1, 1.0, 10.0), 0.55),
+    ((0.429, 0.88, 0.367), (0.571, -0.282, 0.108, -0.763), (0.1, 1.0, 10.0), 0.6,
+     (0.4, -0.821, 0.401, 0.076), (0.1, 1.0, 1.0), 10.0),
+    ((-0.447, -1.332, -0.185), (0.122, -0.828, -0.548, 0.01), (0.1, 1.0, 10.0), 1.0,
+     (-0.195, -0.796, 0.301, 0.488), (0.1, 1.0, 1.0), 5.0),
+    ((0.558, -0.503, 1.568), (0.644, 0.386, 0.023, 0.66), (0.5, 0.5, 5.0), 10.0,
+     (-0.579, 0.673, 0.228, 0.4), (0.1, 1.0, 10.0), 1.0),
+]  # fmt: skip
+
+
+def test_pairs_that_were_lost(measured):
+    centre, turn_i, axes_i, p_i, turn_j, axes_j, p_j = (
+        np.array(c) for c in zip(*LOST, strict=True)
+    )
+    turn_i, turn_j = (q / np.linalg.norm(q, axis=1)[:, None] for q in (turn_i, turn_j))
+    i, j = Bodies(centre, turn_i, axes_i, p_i), Bodies(0.0 * centre, turn_j, axes_j, p_j)
+    check_bounds(i, j, measured, 1e-13)
+    assert np.all(contacts(at_scale(i, j, 0.9), j)["status"] == 1)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("p", EXPONENTS)
+def test_bounds_meet_in_the_corner_of_the_range(p, dimension, measured):
+    rng = np.random.default_rng(15)
+    p_j = np.where(rng.random(4000) < 0.5, p, rng.choice(EXPONENTS, 4000))
+    check_bounds(*corner_pairs(rng, 4000, dimension, p, p_j), measured, 1e-12)
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("p", EXPONENTS)
+def test_bounds_of_many_pairs_in_the_corner(p, dimension, measured):
+    rng = np.random.default_rng(16)
+    p_j = np.where(rng.random(70000) < 0.5, p, rng.choice(EXPONENTS, 70000))
+    check_bounds(*corner_pairs(rng, 70000, dimension, p, p_j), measured, 1e-10)
 
 
 def perram_wertheim(i, j):
@@ -311,6 +399,39 @@ def test_concentric_bodies_have_no_normal(dimension):
     with pytest.raises(ValueError, match="pair 0 have the same centre"):
         scales(i, j)
     assert np.all(_contact.superellipsoid_overlap(i.rows, j.rows))
+
+
+def test_what_does_not_converge_is_no_crossing():
+    """Beside p = 1/2, where faces are flat to rounding, some bounds stay 4e-6 apart."""
+    rng = np.random.default_rng(0)
+    i, j = random_pairs(rng, 300, 3, 0.5 + 1e-9)
+    axes = np.tile([0.1, 1.0, 10.0], (300, 1))
+    i = i.replaced(semi_axes=axes, centre=j.centre + 0.3 * rng.normal(size=(300, 3)))
+    j = j.replaced(semi_axes=axes)
+    found = contacts(i, j)
+    lost = np.flatnonzero(found["status"] == 3)
+    assert len(lost) > 0
+    assert np.all(scales(i, j)["gap"][lost] >= 1e-6)
+    assert not np.any(found["force"][lost])
+    assert not np.any(found["status"] == 2)
+
+    worst = np.argmax(np.minimum(scales(i, j)["gap"], scales(j, i)["gap"]))  # in either order
+    i, j = one(i, worst), one(j, worst)
+    packing = Packing(
+        position=np.vstack([i.centre, j.centre]) - j.centre,
+        orientation=np.vstack([i.turn, j.turn]),
+        diameters=2.0 * axes[:2],
+        species=np.ones(2, int),
+        id=np.array([7, 3]),
+        box=Box(np.full(3, -50.0), np.full(3, 100.0)),
+        shape_style="superellipsoid",
+        exponent=np.full(2, 0.5 + 1e-9),
+    )
+    sentence = "contact of particles (7 and 3|3 and 7) did not converge"
+    with pytest.raises(ValueError, match=sentence):
+        find_contacts(packing)
+    with pytest.raises(ValueError, match=sentence):
+        Landscape(packing).evaluate(State.of(packing), extended=False)
 
 
 @pytest.mark.parametrize("factor", [1e-9, 1e9])
