@@ -48,7 +48,7 @@ def draw_phi(groups: Groups, axes: Axes) -> None:
     points(axes, averages(groups, "asphericity"), averages(groups, "phi_J"))
     axes.set_xlim(left=min(-0.005, axes.get_xlim()[0]))
     axes.set(xlabel=r"asphericity $\mathcal{A}$", ylabel=r"packing fraction $\phi_J$")
-    family_legend(axes, groups, samples_text(groups), loc="best")
+    family_legend(axes, groups, samples_text(groups), loc="outside right center")
 
 
 def draw_z(groups: Groups, panels: list[Axes]) -> None:
@@ -88,7 +88,7 @@ def draw(groups: Groups, quantity: str, out: Path) -> None:
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     if quantity == "phi_J":
-        figure = Figure(figsize=(6, 4.4), dpi=200, layout="constrained")
+        figure = Figure(figsize=(7.4, 4.4), dpi=200, layout="constrained")
         draw_phi(groups, figure.subplots())
     else:
         figure = Figure(figsize=(9, 4.2), dpi=200, layout="constrained")

@@ -58,7 +58,7 @@ def draw(groups: Groups, known: Curvatures, out: Path) -> None:
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(10, 4.2), dpi=200, layout="constrained")
+    figure = Figure(figsize=(11.5, 4.2), dpi=200, layout="constrained")
     left, right = figure.subplots(1, 2)
     z = averages(groups, "z")
     shades = colormaps["turbo"](np.linspace(0.05, 0.95, len(known)))
@@ -81,8 +81,8 @@ def draw(groups: Groups, known: Curvatures, out: Path) -> None:
     left.set(xscale="log", yscale="log", ylabel="$P(K_G)$")
     left.set_xlabel(r"$K_G=\bar K_G\,(abc)^{2/3}$ at contacts")
     if left.get_legend_handles_labels()[0]:
-        text: dict[str, Any] = {"title_fontsize": 8, "fontsize": 7, "loc": "lower left"}
-        left.legend(title="$(p, w_1, w_2)$, " + samples_text(groups), **text)
+        text: dict[str, Any] = {"title_fontsize": 8, "fontsize": 8, "loc": "outside right center"}
+        figure.legend(title=f"$(p, w_1, w_2)$\n{samples_text(groups)}", **text)
     right.set(yscale="log", xlabel="contacts per particle $z_J$")
     right.set_ylabel("median and quartiles of $K_G$")
     right.axhline(1, color="0.8", lw=0.8, ls=":", zorder=0)

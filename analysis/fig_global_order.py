@@ -21,6 +21,7 @@ from superellipsoid_files import (
     OF_PAPER,
     Groups,
     averages,
+    beta_axis,
     exactly,
     family_legend,
     mark,
@@ -49,7 +50,7 @@ def draw(groups: Groups, at_random: dict[str, float], out: Path) -> None:
     """Draw S_2 against C_4 and beta."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    figure = Figure(figsize=(9, 4.2), dpi=200, layout="constrained")
+    figure = Figure(figsize=(10.5, 4.2), dpi=200, layout="constrained")
     both, flat = figure.subplots(1, 2, sharey=True)
     S2, C4, n = averages(groups, "S2"), averages(groups, "C4"), _n(groups)
     for kind, samples in groups.items():
@@ -67,8 +68,8 @@ def draw(groups: Groups, at_random: dict[str, float], out: Path) -> None:
     both.axvline(1 / math.sqrt(n), **OF_PAPER)
     both.set(xlabel="cubatic order $C_4$", ylabel="nematic order $S_2$")
     flat.axvline(1, color="0.8", lw=0.8, ls=":", zorder=0)
-    flat.set_xlabel(r"reduced aspect ratio $\beta=ac/b^2$")
-    family_legend(flat, groups, samples_text(groups), loc="best")
+    beta_axis(flat.xaxis)
+    family_legend(flat, groups, samples_text(groups), loc="outside right center")
     both.legend(fontsize=8, loc="best")
     figure.savefig(out)
 

@@ -66,7 +66,7 @@ def draw(
     """Draw both kinds of order."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    figure = Figure(figsize=(9, 4.2), dpi=200, layout="constrained")
+    figure = Figure(figsize=(10.5, 4.2), dpi=200, layout="constrained")
     panels = figure.subplots(1, 2)
     for axes, name in zip(panels, GLOBAL, strict=True):
         known = averages(groups, name)
@@ -76,7 +76,7 @@ def draw(
         axes.plot(x, low, "+", color=BLACK, ms=6, alpha=0.6, label="local, random directions")
         points(axes, local[name], known)
         axes.set(xlabel=LOCAL_ORDER[name], ylabel=GLOBAL[name])
-    family_legend(panels[0], groups, samples_text(groups), loc="best")
+    family_legend(panels[0], groups, samples_text(groups), loc="outside right center")
     figure.savefig(out)
 
 

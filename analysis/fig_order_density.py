@@ -44,7 +44,7 @@ def draw(groups: Groups, out: Path) -> None:
     """Draw order and contacts against phi_J."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    figure = Figure(figsize=(11, 4), dpi=200, layout="constrained")
+    figure = Figure(figsize=(12, 4), dpi=200, layout="constrained")
     panels = figure.subplots(1, len(PANELS))
     first = only(groups, lambda kind: kind.protocol == 1)
     second = only(groups, lambda kind: kind.protocol == 2)
@@ -57,7 +57,7 @@ def draw(groups: Groups, out: Path) -> None:
         axes.set(xlabel=r"packing fraction $\phi_J$", ylabel=text)
     for axes in panels[:2]:
         axes.set_ylim(0, max(0.5, axes.get_ylim()[1]))
-    family_legend(panels[0], groups, samples_text(groups), loc="upper left")
+    family_legend(panels[0], groups, samples_text(groups), loc="outside right center")
     figure.savefig(out)
 
 

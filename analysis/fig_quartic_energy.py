@@ -83,10 +83,10 @@ def draw_energies(axes: Axes, found: Followed, n: int) -> None:
     for color, energy in zip(shades, found.quartic.values(), strict=False):
         size = energy.mean_energy / n
         axes.plot(energy.delta, np.where(size > 0, size, np.nan), "-", color=color, lw=1.3)
-        delta = quartic_crossover(energy)
-        if np.isfinite(delta):
-            at = np.interp(np.log(delta), np.log(energy.delta), size)
-            axes.plot(delta, at, "o", color=color, ms=5, mec="k", mew=0.6, zorder=3)
+        end = quartic_crossover(energy)
+        if np.isfinite(end):
+            at = np.interp(np.log(end), np.log(energy.delta), size)
+            axes.plot(end, at, "o", color=color, ms=5, mec="k", mew=0.6, zorder=3)
     for energy in found.others.values():
         axes.plot(energy.delta, energy.mean_energy / n, "--", color="#D55E00", lw=1.1)
     axes.set(xscale="log", yscale="log", xlabel=r"amplitude $\delta\;/\;a$")
@@ -157,7 +157,7 @@ def row(found: Followed) -> dict[str, Any]:
         | {"crossover": plain(quartic_crossover(e)), "first_change": plain(e.first_change)}
         for k, e in (found.quartic | found.others).items()
     ]
-    known = {"packing": str(found.sample.path), "pressure": found.pressure}
+    known: dict[str, Any] = {"packing": str(found.sample.path), "pressure": found.pressure}
     return known | found.name[0].report() | {"seed": found.name[1], "modes": modes}
 
 

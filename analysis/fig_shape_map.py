@@ -21,6 +21,7 @@ from superellipsoid_files import (
     Averages,
     Groups,
     averages,
+    beta_axis,
     exactly,
     only,
     parser_of,
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 BANDS = (0.05, 0.1, 0.15, 0.2, 0.25)
 HALF = 0.025
 ENOUGH = 10  # shapes for contours
-TICKS = (0.3, 0.5, 1, 2, 3)
+LEAST_ROUND = 0.05  # radius of the inner over the outer circle of a triangle at the rim
 
 
 def draw_bands(axes: Axes, A: Averages, phi: Averages) -> None:
@@ -59,21 +60,15 @@ def draw_bands(axes: Axes, A: Averages, phi: Averages) -> None:
         style |= {"color": color, "label": text}
         axes.errorbar([k.beta for k in inside], [phi[k].value for k in inside], error, **style)
     axes.set_ylabel(r"packing fraction $\phi_J$")
-    _beta_axis(axes.xaxis)
+    beta_axis(axes.xaxis)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)
 
 
-def _beta_axis(axis: Any) -> None:
-    axis.set_label_text(r"reduced aspect ratio $\beta$")
-    set_scale = getattr(axis.axes, f"set_{axis.axis_name}scale")
-    set_scale("log")
-    axis.set_ticks(TICKS, labels=[f"{tick:g}" for tick in TICKS])
-    axis.set_ticks([], minor=True)
-
-
 def draw_map(figure: Any, axes: Axes, A: Averages, phi: Averages) -> bool:
     """Draw phi_J as color; return whether there are contours."""
+    from matplotlib.tri import TriAnalyzer, Triangulation  # noqa: PLC0415
+
     x = np.array([A[k].value for k in A])
     y = np.array([k.beta for k in A])
     z = np.array([phi[k].value for k in A])
@@ -81,13 +76,16 @@ def draw_map(figure: Any, axes: Axes, A: Averages, phi: Averages) -> bool:
     contours = len(x) >= ENOUGH and spread
     if contours:
         levels = np.arange(np.floor(z.min() * 100) / 100, z.max() + 0.01, 0.01)
-        axes.tricontourf(x, y, z, levels, cmap="viridis", alpha=0.6)
-        axes.tricontour(x, y, z, levels, colors="0.4", linewidths=0.5)
+        mesh = Triangulation(x / np.ptp(x), np.log(y) / np.ptp(np.log(y)))
+        flat = TriAnalyzer(mesh).get_flat_tri_mask(LEAST_ROUND)
+        mesh = Triangulation(x, y, mesh.triangles, flat)
+        axes.tricontourf(mesh, z, levels, cmap="viridis", alpha=0.6)
+        axes.tricontour(mesh, z, levels, colors="0.4", linewidths=0.5)
     dots = axes.scatter(x, y, c=z, cmap="viridis", s=60, edgecolors="k", linewidths=0.6, zorder=3)
     figure.colorbar(dots, ax=axes, label=r"$\phi_J$")
     axes.axhline(1, **OF_PAPER)
     axes.set_xlabel(r"asphericity $\mathcal{A}$")
-    _beta_axis(axes.yaxis)
+    beta_axis(axes.yaxis)
     return bool(contours)
 
 

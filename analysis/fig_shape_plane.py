@@ -17,6 +17,7 @@ import numpy as np
 from superellipsoid_files import (
     Groups,
     averages,
+    beta_axis,
     exactly,
     family_legend,
     parser_of,
@@ -37,7 +38,7 @@ def draw(groups: Groups, out: Path) -> None:
     """Draw shapes and the curves that bound them."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    figure = Figure(figsize=(6, 4.6), dpi=200, layout="constrained")
+    figure = Figure(figsize=(7, 4.6), dpi=200, layout="constrained")
     axes = figure.subplots()
     long = np.geomspace(1, LARGEST, 40)
     flat, tall = axes_from(1 / long, np.ones_like(long)), axes_from(np.ones_like(long), long)
@@ -52,12 +53,9 @@ def draw(groups: Groups, out: Path) -> None:
     points(axes, averages(groups, "asphericity"), exactly(groups, lambda kind: kind.beta))
     axes.axhline(1, color="0.8", lw=0.8, ls=":", zorder=0)
     largest = max(0.36, 1.05 * max(m.value for m in averages(groups, "asphericity").values()))
-    axes.set(yscale="log", xlim=(-0.01, largest))
-    axes.set_yticks((0.2, 0.3, 0.5, 1, 2, 3, 5), ["0.2", "0.3", "0.5", "1", "2", "3", "5"])
-    axes.set_yticks([], minor=True)
-    axes.set(xlabel=r"asphericity $\mathcal{A}$", ylabel=r"reduced aspect ratio $\beta$")
-    place = {"loc": "center left", "bbox_to_anchor": (1, 0.5)}
-    family_legend(axes, groups, samples_text(groups), **place)
+    axes.set(xlim=(-0.01, largest), xlabel=r"asphericity $\mathcal{A}$")
+    beta_axis(axes.yaxis)
+    family_legend(axes, groups, samples_text(groups), loc="outside right center")
     figure.savefig(out)
 
 

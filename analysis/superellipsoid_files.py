@@ -23,8 +23,10 @@ from jamshape.storage import read_packing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 PHI_SPHERES, Z_SPHERES = 0.64, 6.0  # the paper's
+BETA_TICKS = (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10)
 PEAK = (0.05, 0.70, 0.74)  # asphericity at the peak of phi_J, and where phi_J lies there
 LOCAL_ORDER = {"S2": r"local nematic order $S_2^\mathrm{loc}$"}
 LOCAL_ORDER["C4"] = r"local cubatic order $C_4^\mathrm{loc}$"
@@ -178,8 +180,8 @@ def exactly(groups: Groups, value: Callable[[Kind], float]) -> Averages:
     return {kind: Mean(value(kind), math.nan, len(samples)) for kind, samples in groups.items()}
 
 
-def family_legend(axes: Axes, groups: Iterable[Kind], title: str, **place: Any) -> None:
-    """Explain the marks that were drawn."""
+def family_legend(axes: Axes, groups: Iterable[Kind], title: str, loc: str = "best") -> None:
+    """Explain the marks that were drawn; "outside ..." is beside all axes of the figure."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - not needed for --help and for errors
 
     handles: dict[str, Line2D] = {}
@@ -188,7 +190,18 @@ def family_legend(axes: Axes, groups: Iterable[Kind], title: str, **place: Any) 
         handles.setdefault(text, Line2D([], [], ls="none", ms=6, label=text, **mark(kind)))
     known, _ = axes.get_legend_handles_labels()
     every = [*handles.values(), *known]
-    axes.legend(handles=every, title=title, title_fontsize=8, fontsize=8, **place)
+    where: Any = axes.figure if loc.startswith("outside") else axes
+    where.legend(handles=every, title=title, title_fontsize=8, fontsize=8, loc=loc)
+
+
+def beta_axis(axis: Axis) -> None:
+    """Make an axis that of beta: logarithmic, with ticks that can be read."""
+    axis.set_label_text(r"reduced aspect ratio $\beta=ac/b^2$")
+    getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
+    low, high = axis.get_view_interval()
+    ticks = [tick for tick in BETA_TICKS if low / 1.01 < tick < 1.01 * high]
+    axis.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+    axis.set_ticks([], minor=True)
 
 
 def rows(groups: Groups, columns: dict[str, Averages]) -> list[dict[str, Any]]:
