@@ -21,6 +21,7 @@ struct StepState {
   double h;             // substep to try next [time]; 0 before the first
   double error_before;  // of the last substep, over what is allowed
   double rate;          // estimate of the largest relaxation rate
+  double margin;        // of that, for stability
   OverdampedFlow::Touching touching;
   LAMMPS_NS::bigint rate_cost, rate_age, touching_age;  // in force evaluations
   LAMMPS_NS::bigint accepted, rejected, forced;         // substeps so far

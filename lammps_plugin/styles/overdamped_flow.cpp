@@ -50,7 +50,7 @@ OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineB
                                LAMMPS_NS::Fix *owner, int registers) :
     Pointers(lmp), drag(k_d), box(affine_box), dimension(domain->dimension),
     n_rates(dimension == 2 ? 3 : 6), n_turns(dimension == 2 ? 2 : 4), n_registers(registers),
-    pair(nullptr), values(nullptr), can_retry(false), farthest(0.0), largest_difference(0.0),
+    pair(nullptr), values(nullptr), can_retry(false), farthest(0.0), seen(0.0), largest_difference(0.0),
     evaluations(0), rebuilds(0), fix(owner)
 {
 }
@@ -323,21 +323,33 @@ bool OverdampedFlow::move_by(const Move &m)
 
 void OverdampedFlow::finish_step(const Move &m) { move(m, true); }
 
+double OverdampedFlow::length_of(int i, const Rate &of, double scale) const
+{
+  const Vec<3> shift = scale * of.shift, turn = mobilities[kind[i]].gyration * of.turn;
+  return std::sqrt(dot(shift, shift) + dot(turn, turn));
+}
+
 double OverdampedFlow::rms_of(const Move &m)
 {
-  double mine[2] = {0.0, 0.0}, all[2], largest_sq = 0.0;
+  double mine[4] = {0.0, 0.0, 0.0, 0.0}, all[4];
+  largest_difference = 0.0;
   if (dimension == 3) pair->particle_view().read_orientations(atom->nlocal);
   for (int i = 0; i < atom->nlocal; ++i) {
     const Rate stored = stored_rate(i);
     if (norm(stored.shift) == 0.0 && norm(vec3(atom->f[i])) == 0.0) continue;
-    const Rate found = sum_of(i, m);
-    const Vec<3> shift = m.to * found.shift, turn = mobilities[kind[i]].gyration * found.turn;
-    mine[0] += dot(shift, shift) + dot(turn, turn);
+    const double length = length_of(i, sum_of(i, m), m.to);
+    largest_difference = std::max(largest_difference, length);
+    mine[0] += length * length;
     mine[1] += 1.0;
-    largest_sq = std::max(largest_sq, dot(shift, shift));
+    if (n_registers == 0) continue;
+    Rate change = present_rate(i);
+    change.shift = (1.0 / m.from) * change.shift;
+    add(change, -1.0, stored);
+    mine[2] += length * length_of(i, change, m.to);
+    mine[3] += length * length_of(i, register_of(i, 0), m.to);
   }
-  largest_difference = std::sqrt(largest_sq);
-  MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, world);
+  MPI_Allreduce(mine, all, 4, MPI_DOUBLE, MPI_SUM, world);
+  seen = all[3] > 0.0 ? all[2] / all[3] : 0.0;
   return all[1] > 0.0 ? std::sqrt(all[0] / all[1]) : 0.0;
 }
 

@@ -63,6 +63,10 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /// The same sum as a length: rms over all particles that a force moves, turns times the radius of
   /// gyration.
   double rms_of(const Move &sum);
+  /// With registers, from the last `rms_of`: by how much the rates changed over the last move, over
+  /// that move, where the sum was large. Of the order of the largest relaxation rate when the step
+  /// is unstable, whatever makes it so; below it in smooth motion.
+  double rate_seen() const { return seen; }
   /// Forces at the present positions, neighbour lists kept valid. Counts as one evaluation.
   void evaluate_forces();
   /// LAMMPS's own.
@@ -123,6 +127,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   double **values;
   bool can_retry;
   double farthest;  // of the last move, over what is allowed
+  double seen;
   double largest_difference;
   LAMMPS_NS::bigint evaluations, rebuilds;
   LAMMPS_NS::Fix *fix;
@@ -147,6 +152,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   void store_rate(int i, const Rate &rate);
   void write_rate(double *to, const Rate &rate) const;
   Rate sum_of(int i, const Move &move) const;
+  double length_of(int i, const Rate &of, double scale) const;
   void require_small(int i, const Rate &moved, double scale);
   Vec<3> read_coordinates(int i) const;
   Quaternion orientation_at_start(int i) const;

@@ -14,12 +14,16 @@ namespace {
 
 // Step size controller: proportional and integral (Hairer & Wanner, Solving Ordinary Differential
 // Equations II, Sec. IV.2), with limits of the change from one substep to the next.
-constexpr double SAFETY = 0.85, OF_ERROR = 0.7, OF_ERROR_BEFORE = 0.4;
+constexpr double TARGET = 0.5, OF_ERROR = 0.7, OF_ERROR_BEFORE = 0.4;
 constexpr double LARGEST_GROWTH = 5.0, SMALLEST_GROWTH = 0.2, SMALLEST_CUT = 0.1, LARGEST_CUT = 0.6;
 constexpr double SMALLEST_ERROR = 1e-8;
 
 /// The rate is estimated from below, and contacts that close may raise it before it is made anew.
 constexpr double MARGIN_OF_RATE = 1.15, ERROR_OF_RATE = 0.02;
+
+/// Nor has it the prestress and the bends of the energy, which may be stiffer than the bonds: the
+/// margin follows what the forces show in the substeps, up to this, and forgets it slowly.
+constexpr double LARGEST_MARGIN = 12.0, MEMORY_OF_MARGIN = 0.98;
 
 /// Estimates are made anew when this many times as much has been spent on forces: 5 % of the cost.
 constexpr bigint REFRESH = 20;
@@ -27,10 +31,6 @@ constexpr bigint REJECTIONS_TO_REFRESH = 4;  // and after so many substeps that 
 
 /// Longest substep as a strain of the box.
 constexpr double LARGEST_STRAIN = 1e-3;
-
-/// Smallest substep, times the square root of the tolerance over the fastest rate. Smooth motion
-/// meets the tolerance long before; what is left are jumps of the force (`sides one`).
-constexpr double SMALLEST_STEP = 0.1;
 
 /// Below this part of the smallest substep even a particle in free flight went too far.
 constexpr double NO_PROGRESS = 1e-9;
@@ -79,6 +79,7 @@ void StepControl::refresh(OverdampedFlow &flow)
   }
   if (begins) {
     now.error_before = 1.0;
+    now.margin = MARGIN_OF_RATE;
     now.h = now.rate > 0.0 ? std::sqrt(tolerance) / now.rate : box.state().dt;
   }
   now.touching_age += flow.n_evaluations() - before;
@@ -88,7 +89,7 @@ void StepControl::refresh(OverdampedFlow &flow)
 StepControl::Span StepControl::choose(const Span &left) const
 {
   Span span = left;
-  const double speed = std::abs(box.state().rate), rate = MARGIN_OF_RATE * now.rate;
+  const double speed = std::abs(box.state().rate), rate = now.margin * now.rate;
   double h = now.h;
   if (rate > 0.0) h = std::min(h, stability_interval() / rate);
   if (speed > 0.0) h = std::min(h, LARGEST_STRAIN / speed);
@@ -110,6 +111,7 @@ double StepControl::substep(OverdampedFlow &flow, const Span &left)
       now.touching = flow.touching();  // contacts that closed in this substep
       now.touching_age = 0;
     }
+    widen_margin(flow.rate_seen());
     const double error = length / allowed_error(flow, span);
     const bool is_forced = !(error <= 1.0) && std::isfinite(error) && span.h <= smallest_step();
     if (error <= 1.0 || is_forced) {
@@ -121,11 +123,19 @@ double StepControl::substep(OverdampedFlow &flow, const Span &left)
       return span.h;
     }
     ++now.rejected;
-    const double cut = SAFETY * std::pow(error, -1.0 / order_of_error());
+    const double cut = std::pow(error / TARGET, -1.0 / order_of_error());
     now.h = span.h * std::clamp(std::isfinite(error) ? cut : 0.0, SMALLEST_CUT, LARGEST_CUT);
+    if (std::isfinite(error)) now.h = std::max(now.h, smallest_step());
     now.rate_age += REFRESH * now.rate_cost / REJECTIONS_TO_REFRESH;
     require_progress(flow, now.h);
   }
+}
+
+void StepControl::widen_margin(double rate_seen)
+{
+  const double seen = now.rate > 0.0 ? MARGIN_OF_RATE * rate_seen / now.rate : 0.0;
+  const double remembered = MARGIN_OF_RATE + MEMORY_OF_MARGIN * (now.margin - MARGIN_OF_RATE);
+  now.margin = std::max(remembered, std::min(seen, LARGEST_MARGIN));
 }
 
 void StepControl::accept(OverdampedFlow &flow, const Span &span, double error, bool was_rejected)
@@ -138,8 +148,8 @@ void StepControl::accept(OverdampedFlow &flow, const Span &span, double error, b
 
   error = std::max(error, SMALLEST_ERROR);
   const double order = order_of_error();
-  double growth = SAFETY * std::pow(error, -OF_ERROR / order) *
-                  std::pow(now.error_before, OF_ERROR_BEFORE / order);
+  double growth = std::pow(error / TARGET, -OF_ERROR / order) *
+                  std::pow(now.error_before / TARGET, OF_ERROR_BEFORE / order);
   growth = std::clamp(growth, SMALLEST_GROWTH, was_rejected ? 1.0 : LARGEST_GROWTH);
   const bool was_clipped = span.h < now.h;  // by the end of the step of LAMMPS
   if (was_clipped && growth >= 1.0) {
@@ -147,6 +157,7 @@ void StepControl::accept(OverdampedFlow &flow, const Span &span, double error, b
   } else {
     now.h = growth * span.h;
     now.error_before = std::min(error, 1.0);
+    if (span.h >= smallest_step()) now.h = std::max(now.h, smallest_step());
   }
 }
 
@@ -160,10 +171,13 @@ double StepControl::allowed_error(const OverdampedFlow &flow, const Span &span) 
   return tolerance * std::max(t.overlap, pushed) + (1.0 + span.z) * rounding;
 }
 
+/// Smooth motion meets the tolerance with longer steps, even where the fastest mode is as large as
+/// the overlaps. What is left are jumps of the force (`sides one`), which make particles chatter,
+/// the less the smaller the step, and never end.
 double StepControl::smallest_step() const
 {
   const double rate = std::max(now.rate, now.touching.rate);
-  return rate > 0.0 ? SMALLEST_STEP * std::sqrt(tolerance) / rate : 0.0;
+  return rate > 0.0 ? std::pow(tolerance, 1.0 / order_of_error()) / rate : 0.0;
 }
 
 void StepControl::require_progress(const OverdampedFlow &flow, double h) const

@@ -54,6 +54,7 @@ class StepControl : public Integrator {
   double allowed_error(const OverdampedFlow &flow, const Span &span) const;
   double smallest_step() const;
   void refresh(OverdampedFlow &flow);
+  void widen_margin(double rate_seen);
   void accept(OverdampedFlow &flow, const Span &span, double error, bool was_rejected);
   void require_progress(const OverdampedFlow &flow, double h) const;
 };

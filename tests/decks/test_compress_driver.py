@@ -46,6 +46,24 @@ def test_a_run_reaches_its_end_and_reports_it(whole):
     assert read_attributes(out)["finished"]
 
 
+def test_integrators_that_choose_their_steps_take_rows_as_steps(tmp_path):
+    out, tolerance = tmp_path / "rkc2.h5", 1e-3
+    options = ("--sides", "2", "--integrator", "rkc2", "--tolerance", str(tolerance))
+    finished = run(out, *options)
+    assert finished.returncode == 0, finished.stderr
+    observables, history = read_observables(out), read_report(out)
+    assert len(observables["p"]) == 61
+    assert observables["phi"][-1] == pytest.approx(0.86, rel=1e-12)
+    assert (observables["local_error"] <= tolerance).all()
+    np.testing.assert_array_equal(history.error, observables["local_error"][1:])
+    assert np.all(np.diff(observables["substeps"]) >= 1)
+    assert (observables["substep_shortest"] > 0).sum() >= 60
+    assert observables["forced"][-1] == 0
+    assert observables["evaluations"][-1] < 2 * read_attributes(out)["dt"] * 60 / 0.05
+    again = run(out, *options, "--resume")
+    assert again.returncode == 0
+
+
 def test_a_killed_run_goes_on_as_if_nothing_had_happened(whole, tmp_path):
     out = tmp_path / "killed.h5"
     with subprocess.Popen(
