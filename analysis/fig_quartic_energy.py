@@ -152,10 +152,15 @@ def exponent(every: list[Followed], name: Name) -> float | None:
 
 def row(found: Followed) -> dict[str, Any]:
     """Describe one packing."""
-    modes = [
-        {"mode": k, "eigenvalue": found.eigenvalues[k], "quartic": k in found.quartic}
-        | {"crossover": plain(quartic_crossover(e)), "first_change": plain(e.first_change)}
-        for k, e in (found.quartic | found.others).items()
+    modes: list[dict[str, Any]] = [
+        {
+            "mode": k,
+            "eigenvalue": found.eigenvalues[k],
+            "quartic": k in found.quartic,
+            "crossover": plain(quartic_crossover(energy)),
+            "first_change": plain(energy.first_change),
+        }
+        for k, energy in (found.quartic | found.others).items()
     ]
     known: dict[str, Any] = {"packing": str(found.sample.path), "pressure": found.pressure}
     return known | found.name[0].report() | {"seed": found.name[1], "modes": modes}

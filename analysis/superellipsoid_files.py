@@ -23,7 +23,6 @@ from jamshape.storage import read_packing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
 
 PHI_SPHERES, Z_SPHERES = 0.64, 6.0  # the paper's
 BETA_TICKS = (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10)
@@ -194,8 +193,8 @@ def family_legend(axes: Axes, groups: Iterable[Kind], title: str, loc: str = "be
     where.legend(handles=every, title=title, title_fontsize=8, fontsize=8, loc=loc)
 
 
-def beta_axis(axis: Axis) -> None:
-    """Make an axis that of beta: logarithmic, with ticks that can be read."""
+def beta_axis(axis: Any) -> None:
+    """Make an x or y axis of matplotlib that of beta: logarithmic, with ticks that can be read."""
     axis.set_label_text(r"reduced aspect ratio $\beta=ac/b^2$")
     getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
     low, high = axis.get_view_interval()
