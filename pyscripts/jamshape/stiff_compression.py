@@ -406,9 +406,7 @@ class _Run:
                 return None
             evaluation = found.evaluation
             velocities.append((found.x - centre) / own)
-        error = sum(
-            (dt * e * v for e, v in zip(method.error, velocities)), np.zeros(landscape.size)
-        )
+        error = self._combined(method.error, velocities, dt)
         force = drag * error
         assert found.factors is not None
         size = self._units(evaluation).of(landscape, found.factors.solve(force), force, drag)
