@@ -190,7 +190,7 @@ class Landscape:
     @property
     def components_per_particle(self) -> int:
         """D + rotations."""
-        return self._free.shape[1]
+        return int(self._free.shape[1])
 
     def particle_of_coordinate(self) -> IntArray:
         """(n,) the particle that each coordinate belongs to."""

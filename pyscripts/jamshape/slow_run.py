@@ -28,7 +28,18 @@ STEPS_PER_FRAME = 100
 # The fast compression that makes a start.
 _PHI_RANDOM, _KAPPA_FAST, _DT_FAST = 0.4, 1e-4, 0.2
 
-_ROW = ("phi", "p", "u", "strain", "dt", "error", "evaluations", "factorisations", "rejected", "explicit")
+_ROW = (
+    "phi",
+    "p",
+    "u",
+    "strain",
+    "dt",
+    "error",
+    "evaluations",
+    "factorisations",
+    "rejected",
+    "explicit",
+)
 
 _COUNTS = ("dt", "time", "strain", "steps", "rejected", "explicit", "evaluations", "factorisations",
            "wall_seconds", "explicit_left", "held")  # fmt: skip
@@ -91,7 +102,7 @@ def _keep(writer: RunWriter, rows: list[Step], flow: Flow, like: Packing) -> Non
     seconds, errors = [row.wall_seconds for row in rows], [row.error for row in rows]
     writer.append_report(steps, seconds, errors)
     motion = {"velocity": flow.velocity, "acceleration": flow.acceleration}
-    writer.append(_as_frame(flow, like), {k: v for k, v in motion.items() if v is not None})
+    writer.append(_as_frame(flow, like), motion)
     writer.set_attributes(_counts(flow))
     rows.clear()
 

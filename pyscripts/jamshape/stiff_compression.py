@@ -68,9 +68,7 @@ METHODS = {
     # Alexander 1977, SIAM J. Numer. Anal. 14, 1006; beside it a method of first order.
     "sdirk2": Method(((_G,), (1 - _G, _G)), (0.5 - _G, _G - 0.5), 2),
     # Hosea & Shampine 1996, Appl. Numer. Math. 20, 21; beside it a method of third order.
-    "tr-bdf2": Method(
-        ((0.0,), (_G, _G), (_W, _W, _G)), ((4 * _W - 1) / 3, -1 / 3, 2 * _G / 3), 3
-    ),
+    "tr-bdf2": Method(((0.0,), (_G, _G), (_W, _W, _G)), ((4 * _W - 1) / 3, -1 / 3, 2 * _G / 3), 3),
 }
 
 _HEUN_EULER = Method(((0.0,), (1.0, 0.0), (0.5, 0.5, 0.0)), (-0.5, 0.5, 0.0), 2)
@@ -152,15 +150,16 @@ class Flow:
     dt : float, [time]
         Size of the next step; 0 to choose one.
     velocity : (n,) array, [length / time]
-        Of the non-affine motion, at the end of the last step, in the coordinates of the landscape.
+        Of the non-affine motion, at the end of the last step, in the coordinates of the landscape;
+        empty to find it.
     acceleration : (n,) array, [length / time^2]
         Its change over the last step; both only predict, unless the method has an explicit stage.
     """
 
     state: State
     dt: float = 0.0
-    velocity: FloatArray | None = None
-    acceleration: FloatArray | None = None
+    velocity: FloatArray = field(default_factory=lambda: np.empty(0))
+    acceleration: FloatArray = field(default_factory=lambda: np.empty(0))
     time: float = 0.0
     strain: float = 0.0
     """Of the box since the start, -ln L / L_0."""
@@ -293,8 +292,8 @@ class _Run:
         """Take a step; give the evaluation at its end, its error and size."""
         flow = self.flow
         self.kappa, phi_end = self.protocol.leg(self.phi)
-        here = self.landscape.evaluate(flow.state, extended=self._is_extended(flow.state))
-        if flow.velocity is None:
+        here = self.landscape.evaluate(flow.state, extended=False)
+        if not flow.velocity.size:
             self._begin(here)
         longest = 0.5 * math.log(phi_end / self.phi) / self.kappa
         while True:
@@ -369,7 +368,7 @@ class _Run:
         force = self.landscape.k_e * overlap / self.size**2
         return Units(force, energy, math.sqrt(overlap * self.size))
 
-    def _is_extended(self, state: State, unit: float = math.inf) -> bool:
+    def _is_extended(self, unit: float) -> bool:
         rounding = float(np.finfo(np.float64).eps) * self.size
         return rounding > _ROUNDING * _STAGE_ACCURACY * self.protocol.tolerance * unit
 
@@ -387,20 +386,18 @@ class _Run:
         accuracy = _STAGE_ACCURACY * self.protocol.tolerance
         if not 1 / _SAME_STEP < dt / max(flow._dt_of_factors, 1e-300) < _SAME_STEP:
             flow.forget()
-        assert flow.velocity is not None and flow.acceleration is not None
-        times, velocities = method.times, []
+        times = method.times
+        velocities: list[FloatArray] = []
         evaluation = here
         for k, row in enumerate(method.weights):
             own = row[k] * dt
-            centre = sum((dt * a * v for a, v in zip(row, velocities)), np.zeros(landscape.size))
+            centre = self._combined(row, velocities, dt)
             if own == 0.0:
                 velocities.append(flow.velocity)
                 continue
             strain = math.expm1(-self.kappa * times[k] * dt)
             drag = self.drag * stretch_of(landscape, strain) ** 2 / own
-            stage = Stage(
-                landscape, flow.state, strain, drag, centre, self._is_extended(flow.state, unit)
-            )
+            stage = Stage(landscape, flow.state, strain, drag, centre, self._is_extended(unit))
             guess = centre + own * self._predicted(times[k] * dt, velocities, times, dt)
             found = solve(stage, guess, flow._factors, units, accuracy)
             flow.factorisations += found.factorisations
@@ -409,10 +406,20 @@ class _Run:
                 return None
             evaluation = found.evaluation
             velocities.append((found.x - centre) / own)
-        error = sum((dt * e * v for e, v in zip(method.error, velocities)), np.zeros(landscape.size))
+        error = self._combined(method.error, velocities, dt)
         force = drag * error
+        assert found.factors is not None
         size = self._units(evaluation).of(landscape, found.factors.solve(force), force, drag)
         return _Attempt(found.x, velocities, size, evaluation)
+
+    def _combined(
+        self, weights: tuple[float, ...], velocities: list[FloatArray], dt: float
+    ) -> FloatArray:
+        """Displacement by the velocities that there are so far."""
+        total = np.zeros(self.landscape.size)
+        for weight, velocity in zip(weights, velocities, strict=False):
+            total += dt * weight * velocity
+        return total
 
     def _predicted(
         self, after: float, velocities: list[FloatArray], times: list[float], dt: float
@@ -427,10 +434,10 @@ class _Run:
 
     def _explicit(self, dt: float, here: Evaluation) -> _Attempt:
         flow, landscape = self.flow, self.landscape
-        extended = self._is_extended(flow.state, self._unit(here))
-        velocities, x, evaluation = [-here.gradient / self.drag], np.zeros(landscape.size), here
+        extended = self._is_extended(self._unit(here))
+        velocities, evaluation = [-here.gradient / self.drag], here
         for after, row in zip(_HEUN_EULER.times[1:], _HEUN_EULER.weights[1:], strict=True):
-            x = sum((dt * a * v for a, v in zip(row, velocities)), np.zeros(landscape.size))
+            x = self._combined(row, velocities, dt)
             strain = math.expm1(-self.kappa * after * dt)
             state = landscape.displaced(flow.state, x).strained(strain)
             evaluation = landscape.evaluate(state, extended=extended)

@@ -229,7 +229,7 @@ def _search(
 
 def rms(landscape: Landscape, vector: FloatArray) -> float:
     """Root mean square over particles of an (n,) vector of coordinates."""
-    return float(np.linalg.norm(vector)) / landscape.particles.n**0.5
+    return float(np.linalg.norm(vector)) / math.sqrt(landscape.particles.n)
 
 
 def stretch_of(landscape: Landscape, strain: float) -> FloatArray:
