@@ -17,8 +17,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from jamshape.protocols import summary
-from jamshape.slow_run import begin, is_finished, make_start, record
+from jamshape.slow_run import begin, is_finished, make_start, record, summary
 from jamshape.stiff_compression import METHODS, Protocol
 from jamshape.storage import read_attributes, read_packing
 
@@ -72,9 +71,6 @@ if __name__ == "__main__":
     try:
         if not is_finished(arguments.out):
             run(arguments)
-        found = summary(arguments.out)
-        stored = read_attributes(arguments.out)
-        cost = ("steps", "evaluations", "factorisations", "wall_seconds")
-        print(json.dumps(found | {name: stored[f"flow_{name}"] for name in cost}))
+        print(json.dumps(summary(arguments.out)))
     except (ValueError, OSError, RuntimeError) as error:
         sys.exit(f"slow_compress.py: {error}")

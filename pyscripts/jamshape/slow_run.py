@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from jamshape.initial import Mixture, random_packing
+from jamshape.jamming import fit_onset
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
 from jamshape.protocols import Compression, CompressionRun
@@ -68,6 +69,20 @@ def begin(
 def is_finished(path: Path) -> bool:
     """Whether the file holds a run that reached its end."""
     return path.exists() and bool(read_attributes(path).get("finished"))
+
+
+def summary(path: Path) -> dict[str, object]:
+    """Summarise a run: its end, its cost and, where the pressure rises, the onset of jamming."""
+    observables, stored = read_observables(path), read_attributes(path)
+    found: dict[str, object] = {"out": str(path)}
+    found |= {name: float(observables[name][-1]) for name in ("phi", "p", "u")}
+    cost = ("steps", "rejected", "explicit", "evaluations", "factorisations", "wall_seconds")
+    found |= {name: float(stored[f"flow_{name}"]) for name in cost}
+    try:
+        fit = fit_onset(observables["phi"], observables["p"])
+    except ValueError:  # the run ends below jamming
+        return found | {"phi_J": None}
+    return found | {"phi_J": fit.phi_J, "phi_J_error": fit.phi_J_error}
 
 
 def record(path: Path) -> Iterator[Step]:
