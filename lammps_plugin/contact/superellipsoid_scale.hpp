@@ -200,6 +200,7 @@ template <int D, class T> class TangencySearch {
     }
     detail::ConeBarrier<D, T> barrier(i, j, r);
     for (const double mu : BARRIERS) {
+      if (sizeof(T) > 8 && best.gap <= T(TangencySearch<D, double>::GAP)) break;  // no closer then
       barrier.follow(T(mu), found.iterations);
       found.at = barrier.tangency();
       bound(found);
