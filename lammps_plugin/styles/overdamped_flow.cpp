@@ -48,8 +48,8 @@ OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineB
                                LAMMPS_NS::Fix *owner, int registers) :
     Pointers(lmp), drag(k_d), box(affine_box), dimension(domain->dimension),
     n_rates(dimension == 2 ? 3 : 6), n_turns(dimension == 2 ? 2 : 4), n_registers(registers),
-    pair(nullptr), values(nullptr), can_retry(false), farthest(0.0), seen(0.0), largest_difference(0.0),
-    evaluations(0), rebuilds(0), fix(owner)
+    pair(nullptr), values(nullptr), can_retry(false), farthest(0.0), seen(0.0),
+    largest_difference(0.0), evaluations(0), rebuilds(0), fix(owner)
 {
 }
 

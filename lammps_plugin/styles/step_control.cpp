@@ -174,9 +174,9 @@ double StepControl::allowed_error(const OverdampedFlow &flow, const Span &span) 
   return tolerance * std::max(t.overlap, pushed) + (1.0 + span.z) * rounding;
 }
 
-/// Smooth motion and contacts that close meet the tolerance with longer steps, even where the fastest
-/// mode is as large as the overlaps. What is left are jumps of the force (`sides one`), which make particles chatter,
-/// the less the smaller the step, and never end.
+/// Smooth motion and contacts that close meet the tolerance with longer steps, even where the
+/// fastest mode is as large as the overlaps. What is left are jumps of the force (`sides one`),
+/// which make particles chatter, the less the smaller the step, and never end.
 double StepControl::smallest_step() const
 {
   const double rate = std::max(now.rate, now.touching.rate);
