@@ -32,6 +32,9 @@ constexpr bigint REJECTIONS_TO_REFRESH = 4;  // and after so many substeps that 
 /// Longest substep as a strain of the box.
 constexpr double LARGEST_STRAIN = 1e-3;
 
+/// Smallest substep, times the square root of the tolerance over the fastest rate.
+constexpr double SMALLEST_STEP = 0.5;
+
 /// Below this part of the smallest substep even a particle in free flight went too far.
 constexpr double NO_PROGRESS = 1e-9;
 
@@ -157,8 +160,8 @@ void StepControl::accept(OverdampedFlow &flow, const Span &span, double error, b
   } else {
     now.h = growth * span.h;
     now.error_before = std::min(error, 1.0);
-    if (span.h >= smallest_step()) now.h = std::max(now.h, smallest_step());
   }
+  now.h = std::max(now.h, smallest_step());
 }
 
 /// In length. Overlaps are measured by what the box's own motion pushes a single contact to, where
@@ -171,13 +174,13 @@ double StepControl::allowed_error(const OverdampedFlow &flow, const Span &span) 
   return tolerance * std::max(t.overlap, pushed) + (1.0 + span.z) * rounding;
 }
 
-/// Smooth motion meets the tolerance with longer steps, even where the fastest mode is as large as
-/// the overlaps. What is left are jumps of the force (`sides one`), which make particles chatter,
-/// the less the smaller the step, and never end.
+/// Smooth motion and contacts that close meet the tolerance with longer steps, even where the
+/// fastest mode is as large as the overlaps. What is left are jumps of the force (`sides one`),
+/// which make particles chatter, the less the smaller the step, and never end.
 double StepControl::smallest_step() const
 {
   const double rate = std::max(now.rate, now.touching.rate);
-  return rate > 0.0 ? std::pow(tolerance, 1.0 / order_of_error()) / rate : 0.0;
+  return rate > 0.0 ? SMALLEST_STEP * std::sqrt(tolerance) / rate : 0.0;
 }
 
 void StepControl::require_progress(const OverdampedFlow &flow, double h) const

@@ -135,7 +135,7 @@ def test_wrong_fix_commands(command, sentence, sentence_of):
     assert re.fullmatch(f"fix overdamped/affine found {sentence}", sentence_of(command))
 
 
-@pytest.mark.parametrize(("dt", "strain"), [("-0.5", "0.000500"), ("2000.0", "2.000000")])
+@pytest.mark.parametrize(("dt", "strain"), [("-0.5", "-0.000500"), ("2000.0", "2.000000")])
 def test_steps_that_cannot_be_divided(dt, strain, sentence_of):
     assert sentence_of(f"{FIX} integrator rkc2\ntimestep {dt}\nrun 1") == (
         f"fix overdamped/affine found timestep {float(dt):.6f}, a strain of {strain}, expected a "
