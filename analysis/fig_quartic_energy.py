@@ -141,13 +141,16 @@ def _geometric(values: list[float]) -> float:
     return float(np.exp(np.nanmean(np.log(values))))
 
 
-def exponent(every: list[Followed], name: Name) -> float | None:
-    """Fit delta* of one packing to a power of the pressure, if there are several pressures."""
+def exponents(every: list[Followed], name: Name) -> dict[str, float | None]:
+    """Fit delta* of one packing to a power of the pressure: of all pressures, and of the lowest two."""
     rungs = [f for f in every if f.name == name and np.isfinite(f.crossovers).any()]
+    rungs.sort(key=lambda f: f.pressure)
     x = np.log([f.pressure for f in rungs])
-    if len(x) < 2 or np.ptp(x) == 0:
-        return None
-    return float(np.polyfit(x, np.log([_geometric(f.crossovers) for f in rungs]), 1)[0])
+    y = np.log([_geometric(f.crossovers) for f in rungs])
+    if len(x) < 2 or x[0] == x[1]:
+        return {"exponent": None, "exponent_of_lowest": None}
+    slopes = [float(np.polyfit(x[:n], y[:n], 1)[0]) for n in (len(x), 2)]
+    return dict(zip(("exponent", "exponent_of_lowest"), slopes, strict=True))
 
 
 def row(found: Followed) -> dict[str, Any]:
@@ -177,8 +180,7 @@ def main(options: Namespace) -> None:
     draw(every, options.out)
     names = dict.fromkeys(found.name for found in every)
     slopes = [
-        kind.report() | {"seed": seed, "exponent": exponent(every, (kind, seed))}
-        for kind, seed in names
+        kind.report() | {"seed": seed} | exponents(every, (kind, seed)) for kind, seed in names
     ]
     rows = [row(found) for found in every]
     print(json.dumps({"out": str(options.out), "packings": rows, "delta_of_pressure": slopes}))

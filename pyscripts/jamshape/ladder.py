@@ -25,7 +25,8 @@ from jamshape.storage import read_attributes, read_packing
 from jamshape.target import Search, Target, TargetError, direct
 
 # What must agree in the packing and in a rung that is there already.
-_IDENTITY = ("alpha", "n", "seed", "size_ratio", "p", "w1", "w2", "protocol", "n_sweeps")
+_IDENTITY = ("alpha", "n", "seed", "size_ratio")
+_IDENTITY_3D = ("p", "w1", "w2", "n", "seed", "protocol", "n_sweeps")  # p of rods is the pressure
 
 # A box that was opened has been opened too far below this fraction of u0; how long to look.
 _FALLEN = 1e-2
@@ -97,7 +98,8 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
     """Make one rung from the one before, unless it is there."""
     out = rung_path(source, goal.u0, folder)
     if is_done(out):
-        identity = {name: stored[name] for name in _IDENTITY if name in stored}
+        names = _IDENTITY_3D if "w1" in stored else _IDENTITY
+        identity = {name: stored[name] for name in names if name in stored}
         require_attributes(out, identity | {"u0": goal.u0})
         return Rung(out, goal.u0, made=False, failure="")
     began, start = time.perf_counter(), read_packing(last)

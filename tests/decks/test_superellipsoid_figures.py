@@ -262,7 +262,7 @@ def test_crossovers_fall_as_the_root_of_the_pressure(here, report, capsys, sweep
     assert len(quartic) == 4
     assert all(mode["crossover"] > 0 for mode in quartic)
     (slope,) = found["delta_of_pressure"]
-    assert slope["exponent"] == pytest.approx(0.5, abs=0.15)
+    assert slope["exponent"] == slope["exponent_of_lowest"] == pytest.approx(0.5, abs=0.05)
 
 
 def test_pictures(report, problem, sweep, tmp_path):
