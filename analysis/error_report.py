@@ -31,7 +31,7 @@ PACKAGES = ("jamshape", "numpy", "scipy", "h5py", "matplotlib")
 
 
 class Study(NamedTuple):
-    """Command lines, first those that prepare; they run in the study's folder."""
+    """Command lines, first those that prepare; they run in the study's folder. Pictures are patterns there."""
 
     title: str
     short: list[str]
@@ -56,6 +56,21 @@ STUDIES = {
         ["analysis/heun_error.py --n 64 --out ."],
         ["analysis/heun_error.py --out ."],
         ["heun_error.png"],
+    ),
+    "integrators": Study(
+        "Integrators of the fix",
+        ["analysis/integrator_error.py --quick --out ."],
+        ["analysis/integrator_error.py --out ."],
+        ["integrator_error.png"],
+    ),
+    "implicit": Study(
+        "The implicit integrator of slow compressions",
+        ["analysis/stiff_error.py --quick --out ."],
+        [
+            "analysis/stiff_error.py --n 256 --alpha 4 --out .",
+            "analysis/stiff_error.py --n 256 --alpha 0.01 --phi-from 0.83 --phi-to 0.86 --out .",
+        ],
+        ["stiff_error_*.png"],
     ),
     "minimisers": Study(
         "Minimisers and energy targets, rods",
@@ -155,7 +170,7 @@ def printed_by(command: str, folder: Path) -> tuple[str, str]:
     return "", f"{command}: {said[-1]}"
 
 
-def page(records: dict[str, dict[str, Any]]) -> str:
+def page(records: dict[str, dict[str, Any]], out: Path) -> str:
     """Write what was done as Markdown."""
     versions = ", ".join(f"{p} {importlib.metadata.version(p)}" for p in PACKAGES)
     lines = [
@@ -171,9 +186,10 @@ def page(records: dict[str, dict[str, Any]]) -> str:
         if found["failed"]:
             lines += [f"**Failed:** {found['failed']}", ""]
             continue
-        lines += [
-            f"![{STUDIES[name].title}]({name}/{picture})" for picture in STUDIES[name].pictures
+        drawn = [
+            p for pattern in STUDIES[name].pictures for p in sorted((out / name).glob(pattern))
         ]
+        lines += [f"![{STUDIES[name].title}]({picture.relative_to(out)})" for picture in drawn]
         table = found["printed"].lstrip().startswith("|")
         lines += ["", found["printed"] if table else f"```\n{found['printed']}\n```", ""]
     return "\n".join(lines)
@@ -185,7 +201,7 @@ def main(options: argparse.Namespace) -> int:
     records: dict[str, dict[str, Any]] = {}
     for name in tqdm(options.only, unit="study"):
         records[name] = run(name, options)
-        (options.out / "report.md").write_text(page(records))
+        (options.out / "report.md").write_text(page(records, options.out))
     failed = {name: found["failed"] for name, found in records.items() if found["failed"]}
     seconds = sum(found["seconds"] for found in records.values())
     report = str(options.out / "report.md")
