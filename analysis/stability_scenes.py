@@ -130,10 +130,11 @@ def shorter_first(alpha: FloatArray, dimension: int, phi: float, overlap: float)
 
 
 @cache
-def all_aspect_ratios(dimension: int) -> Packing:
-    """Alpha from 1e-6 to 100 in the same box; the longest rods are longer than it."""
-    alpha = np.append(np.geomspace(1e-6, 100.0, 9), np.tile([0.0, 1e-6, 0.01, 1.0], 4))
-    return shorter_first(alpha, dimension, 0.3 if dimension == 2 else 0.02, 0.1)
+def all_aspect_ratios(dimension: int, largest: float = 100.0) -> Packing:
+    """Alpha from 1e-6 to the largest in the same box; the longest rods are longer than it."""
+    alpha = np.append(np.geomspace(1e-6, largest, 9), np.tile([0.0, 1e-6, 0.01, 1.0], 4))
+    phi = 0.3 if dimension == 2 else 0.5 / largest
+    return shorter_first(alpha, dimension, phi, 0.1)
 
 
 @cache

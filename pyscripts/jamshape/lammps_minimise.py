@@ -46,9 +46,8 @@ def _set_up(session: Session, landscape: Landscape, state: State, factor: float)
     session.commands(f"""
         pair_style spherocylinder/harmonic sides {("one", "two")[landscape.sides - 1]}
         pair_coeff * * {landscape.k_e * factor!r}
-        neighbor 0.3 bin
-        neigh_modify every 1 delay 0 check yes one 10000 page 1000000
+        {session.neighbours()}
         min_style cg
-        min_modify dmax 0.1
+        min_modify dmax {0.1 * packing.diameters.min()!r}
         thermo_modify lost error
     """)

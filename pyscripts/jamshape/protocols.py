@@ -137,8 +137,7 @@ class CompressionRun:
         self.session.commands(f"""
             pair_style spherocylinder/harmonic sides {("one", "two")[s.sides - 1]}
             pair_coeff * * {s.k_e!r}
-            neighbor 0.3 bin
-            neigh_modify every 1 delay 0 check yes one 10000 page 1000000
+            {self.session.neighbours()}
             {self._fix()}
             timestep {s.dt!r}
             compute packing all packing

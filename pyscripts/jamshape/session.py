@@ -23,6 +23,10 @@ _ATOMS = "units lj\natom_style ellipsoid\natom_modify map array"
 _POSES = """compute orient all property/atom quatw quati quatj quatk
             compute shape all property/atom shapex shapey shapez"""
 
+# Of the smallest diameter.
+_SKIN = 0.3
+_WIDEST_BIN = 50.0
+
 PLUGIN_NAME = "jamshape_plugin.so"
 
 
@@ -150,6 +154,17 @@ class Session:
             box=Box(np.array(lo[:d]), np.array(hi[:d]) - np.array(lo[:d])),
             step=self.step,
             time=time,
+        )
+
+    def neighbours(self) -> str:
+        """Input that sets the neighbour list up in the unit of length of the particles."""
+        diameters = self.packing().diameters
+        # Bins of a plane, which is one unit thick, may not be a hundred times wider than that.
+        style = "bin" if diameters.max() < _WIDEST_BIN else "nsq"
+        skin = _SKIN * float(diameters.min())
+        return (
+            f"neighbor {skin!r} {style}\n"
+            "neigh_modify every 1 delay 0 check yes one 10000 page 1000000"
         )
 
     @property
