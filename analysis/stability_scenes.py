@@ -237,6 +237,21 @@ def scattered_superellipsoids(
     return in_doubles(pressed(found.state.packing(packing), overlap))
 
 
+@cache
+def jammed_spheroids() -> Packing:
+    """Twelve prolate spheroids in space, squeezed until they stay jammed."""
+    packing = scattered_superellipsoids((1.0,), (1.5,), 3, 0.01)
+    landscape, state = Landscape(packing), State.of(packing)
+    for _ in range(200):
+        state = state.strained(-0.01)
+        rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
+        found = minimise(landscape, state, "lbfgs", rough)
+        state = found.state
+        if found.evaluation.energy > 1e-4 * packing.n:
+            break
+    return in_doubles(state.packing(packing))
+
+
 # --- the oracle ----------------------------------------------------------------------------------
 
 

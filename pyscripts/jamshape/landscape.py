@@ -151,6 +151,11 @@ class Landscape:
         return self.shape.inner_radius
 
     @cached_property
+    def length(self) -> float:
+        """The unit of length: twice the smallest of `inner_radius`."""
+        return 2 * float(self.inner_radius.min())
+
+    @cached_property
     def _free(self) -> NDArray[np.bool_]:
         """(N, D + rotations) which components are coordinates."""
         D = self.particles.dimension

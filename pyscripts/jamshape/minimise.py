@@ -38,6 +38,9 @@ _PATIENCE_PER_PARTICLE = 4
 # L-BFGS begins anew when it gives up; not more often than this within so few evaluations.
 _STUCK, _SOON = 3, 30
 
+# In units of k_e and `Landscape.length`.
+_LOWEST = 1e-24
+
 # Newton and L-BFGS take turns so many times before `auto` calls it a stall.
 _ROUNDS = 3
 
@@ -81,7 +84,8 @@ class Stop:
     tolerance
         Converged when the residual is below.
     lowest
-        Unjammed when the energy density is below, [energy / length^D].
+        Unjammed when the energy density is below, [energy / length^D]; when left out 1e-24 in units of
+        k_e and `Landscape.length`.
     evaluations
         Exhausted after so many evaluations of all forces.
     seconds
@@ -89,7 +93,7 @@ class Stop:
     """
 
     tolerance: float = 1e-8
-    lowest: float = 1e-24
+    lowest: float | None = None
     evaluations: int = 200_000
     seconds: float = np.inf
 
@@ -152,6 +156,9 @@ class Descent:
         self, landscape: Landscape, start: State, stop: Stop, history: History | None = None
     ) -> None:
         self.landscape, self.stop = landscape, stop
+        self._lowest = stop.lowest
+        if self._lowest is None:
+            self._lowest = _LOWEST * landscape.k_e / landscape.length**start.dimension
         self.history = history or History()
         self.state = start
         self._first_evaluation, self._began = landscape.evaluations, time.perf_counter()
@@ -198,7 +205,7 @@ class Descent:
 
     def outcome(self) -> Outcome | None:
         """Say whether it ends here, and how."""
-        if self.evaluation.energy <= self.stop.lowest * self.state.volume:
+        if self.evaluation.energy <= self._lowest * self.state.volume:
             return Outcome.UNJAMMED
         if self.residual <= self.stop.tolerance:
             return Outcome.CONVERGED
@@ -269,7 +276,7 @@ def _auto(descent: Descent) -> Outcome:
 
 def _newton(descent: Descent) -> Outcome:
     descent.be_patient(_PATIENCE["newton"])
-    regularised = Regularised()
+    regularised = Regularised.of(descent.landscape)
     while not (outcome := descent.outcome()):
         curvature = descent.landscape.curvature(descent.state)
         step = -regularised.factorise(curvature.hessian).solve(descent.evaluation.gradient)

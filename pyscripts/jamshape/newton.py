@@ -9,11 +9,15 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.linalg import splu
 
+from jamshape.landscape import Landscape
 from jamshape.packing import FloatArray
 
 # The smallest shift, relative to the largest diagonal element: rounding in the factorisation is
 # just below it, and so is what it does to modes that are stiff at all.
 LEAST_SHIFT = 1e-13
+
+# The first one, in units of k_e and `Landscape.length`.
+_FIRST_SHIFT = 1e-6
 
 _GROWTH = 10.0
 _DECAY = 3.0
@@ -50,7 +54,12 @@ class Factorisation:
 class Regularised:
     """Keeps the shift that makes a Hessian positive definite, from one step to the next."""
 
-    shift: float = 1e-6
+    shift: float = _FIRST_SHIFT
+
+    @classmethod
+    def of(cls, landscape: Landscape) -> Regularised:
+        """Begin with the same shift in all units."""
+        return cls(_FIRST_SHIFT * landscape.k_e / landscape.length**2)
 
     def factorise(self, matrix: Any) -> Factorisation:
         """Factorise with the least shift, by powers of ten, that leaves no negative pivot."""

@@ -103,7 +103,8 @@ class Target:
 
     def strain_above_jamming(self, landscape: Landscape) -> float:
         """Estimate the strain of the box between jamming and u0."""
-        return float(landscape.inner_radius.max()) * math.sqrt(self.u0 / landscape.k_e)
+        size = float(landscape.inner_radius.max()) ** landscape.particles.dimension
+        return math.sqrt(self.u0 * size / landscape.k_e)
 
 
 @dataclass(eq=False)
@@ -222,7 +223,7 @@ def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Minimum:
     stop = Stop(tolerance=target.tolerance, lowest=_FALLEN * target.u0)
     descent = Descent(landscape, start.state, stop, start.history)
     descent.be_patient(_PATIENCE)
-    regularised, best = Regularised(), _Best()
+    regularised, best = Regularised.of(landscape), _Best()
     while True:
         met = target.is_met(descent.evaluation.energy / descent.state.volume)
         outcome = descent.outcome()
