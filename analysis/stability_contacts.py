@@ -122,9 +122,7 @@ def random_rods(
         low, high = np.where(apart, low, x), np.where(apart, x, high)
     r = np.asarray(at(low).r, float)
     x_j = np.zeros((n, D))
-    pairs = Rods(
-        np.column_stack([r, u_i, A[0], R[0]]), np.column_stack([x_j, u_j, A[1], R[1]]), D
-    )
+    pairs = Rods(np.column_stack([r, u_i, A[0], R[0]]), np.column_stack([x_j, u_j, A[1], R[1]]), D)
     keep = np.sqrt((closest(pairs.spines)[2] ** 2).sum(axis=1)) < pairs.spines.d
     keep &= ~crossing(pairs.spines) if D == 2 else True
     return Rods(pairs.i[keep], pairs.j[keep], D)
@@ -534,7 +532,9 @@ def super_cases() -> list[Case]:
         found.append(Case(SUPER, f"unit of length {length:g}", what, 1e-10, run))
     for energy in (1e-6, 1e6):
         run = partial(super_in_other_units, 1.0, energy)
-        found.append(Case(SUPER, f"epsilon {energy:g}", "change of forces over epsilon", 1e-15, run))
+        found.append(
+            Case(SUPER, f"epsilon {energy:g}", "change of forces over epsilon", 1e-15, run)
+        )
     for distance in (0.0, 1e-300, 1e-15, 1e-8):
         run = partial(concentric, distance)
         name = f"centres {distance:g} apart"
@@ -561,7 +561,9 @@ RODS: dict[str, Callable[[], Packing]] = {
 SUPERS: dict[str, Callable[[], Packing]] = {
     "p 0.55 to 10 in one box": partial(scattered_superellipsoids, EXPONENTS, (1.0,)),
     "w 0.1 to 10 in one box": partial(scattered_superellipsoids, (1.0, 1.5), (0.1, 1.0, 10.0)),
-    "2D, p 0.55 to 10, w to 10": partial(scattered_superellipsoids, (0.55, 1.0, 10.0), (10.0, 1.0), 2),
+    "2D, p 0.55 to 10, w to 10": partial(
+        scattered_superellipsoids, (0.55, 1.0, 10.0), (10.0, 1.0), 2
+    ),
     "overlaps of a third": partial(scattered_superellipsoids, (0.75, 2.0), (1.0, 3.0), 3, 1 / 3),
 }
 

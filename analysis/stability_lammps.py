@@ -181,9 +181,7 @@ def force_error(
     other = sum_forces(at.packing, network)
     arm = np.maximum(at.packing.half_length, at.packing.radius)[:, None]
     torque = other.torque.reshape(at.packing.n, -1)
-    worst = max(
-        np.abs(at.force - other.force).max(), np.abs((at.torque - torque) / arm).max()
-    )
+    worst = max(np.abs(at.force - other.force).max(), np.abs((at.torque - torque) / arm).max())
     return float(worst * at.packing.diameters[:, 1].min() / k_e)
 
 
@@ -193,9 +191,7 @@ def orders_of_k_e(sides: str) -> float:
     types = 1 + np.arange(packing.n) % 2
     packing = packing.with_(species=types)
     values = {(1, 1): 1e-6, (2, 2): 1e6, (1, 2): 1.0}
-    text = set_up(sides) + "".join(
-        f"\npair_coeff {i} {j} {k!r}" for (i, j), k in values.items()
-    )
+    text = set_up(sides) + "".join(f"\npair_coeff {i} {j} {k!r}" for (i, j), k in values.items())
     with loaded(packing, text) as session:
         session.commands("run 0")
         at = frame(session)
@@ -207,7 +203,9 @@ def orders_of_k_e(sides: str) -> float:
         np.add.at(expected, network.pairs[:, which], sign * k[:, None] * network.force)
         np.add.at(sizes, network.pairs[:, which], k)
     for row in range(packing.n):
-        worst = max(worst, float(np.abs(at.force[row] - expected[row]).max() / max(sizes[row], 1e-300)))
+        worst = max(
+            worst, float(np.abs(at.force[row] - expected[row]).max() / max(sizes[row], 1e-300))
+        )
     return worst
 
 
@@ -295,7 +293,9 @@ def pair_cases() -> list[Case]:
             run_there = partial(sentence, packing, set_up(sides) + "\nrun 0")
             found.append(Case(PAIR, f"{name}, sides {sides}", "sentence", _CROSSING, run_there))
     # A skin far above the box asks for images beyond counting.
-    large = partial(lambda: sentence(scaled(jammed(1.0), 1e6), set_up("one", skin=29.0) + "\nrun 0"))
+    large = partial(
+        lambda: sentence(scaled(jammed(1.0), 1e6), set_up("one", skin=29.0) + "\nrun 0")
+    )
     words = "Cannot use neighbor bins - box size << cutoff"
     label = "unit of length 1e6 in a plane of thickness 1, in bins"
     found.append(Case(PAIR, label, "sentence", words, large))
@@ -384,7 +384,7 @@ def lone_particle(kappa: float, dt: float, steps: int) -> float:
 
 
 def rates_changed(scene: Callable[[], Packing], factor: float) -> float:
-    """kappa changed by this factor from a step to the next and back: strain, box, forces."""
+    """Kappa changed by this factor from a step to the next and back: strain, box, forces."""
     kappas = [1e-3, 1e-3 / factor, 1e-3, -1e-3 / factor, 1e-3]
     with loaded(scene(), set_up("two") + "\n" + fix(1.0, kappas[0], 0.02)) as session:
         session.commands("run 0")
@@ -513,11 +513,26 @@ def fix_cases() -> list[Case]:
         run = partial(restarted_in_an_event, sides)
         label = f"restart within a plastic event, sides {sides}"
         found.append(Case(FIX, label, "distance from the run without", 1e-12, run))
-    for fraction, steps in ((1e-12, 1000), (1e-6, 1000), (1e-3, 1000), (0.1, 50), (0.5, 20), (0.89, 50)):
+    for fraction, steps in (
+        (1e-12, 1000),
+        (1e-6, 1000),
+        (1e-3, 1000),
+        (0.1, 50),
+        (0.5, 20),
+        (0.89, 50),
+    ):
         run = partial(relaxation_error, fraction, steps)
         label = f"dt {fraction:g} of the limit"
         found.append(Case(FIX, label, "distance from Heun's closed form, over rounding", 1.0, run))
-    found.append(Case(FIX, "half the step", "ratio of errors over that of second order, less 1", 0.1, partial(half_steps, "one")))
+    found.append(
+        Case(
+            FIX,
+            "half the step",
+            "ratio of errors over that of second order, less 1",
+            0.1,
+            partial(half_steps, "one"),
+        )
+    )
     for factor in (1.05, 10.0, 1e6):
         text = f"{set_up()}\n{fix(1.0, 0.0, factor * 2 / _RATE)}\nrun 10"
         label = f"dt {factor:g} of the limit"
@@ -537,12 +552,17 @@ def fix_cases() -> list[Case]:
         words = r"smaller timestep|use a timestep|smaller rate|compress"
         run_there = partial(sentence, two_discs(0.1), text)
         found.append(Case(FIX, f"kappa {kappa:g}", "sentence", words, run_there))
-    for name, scene in {"jammed": partial(jammed, 1.0), "alpha 1e-6 to 100": partial(all_aspect_ratios, 2)}.items():
+    for name, scene in {
+        "jammed": partial(jammed, 1.0),
+        "alpha 1e-6 to 100": partial(all_aspect_ratios, 2),
+    }.items():
         for factor in (1e6, 1e-1):
             run = partial(rates_changed, scene, factor)
             label = f"rates changed by {factor:g}, {name}"
             found.append(Case(FIX, label, "box and forces", 1e-12, run))
-    found.append(Case(FIX, "dt changed by 1e6", "box and forces", 1e-12, partial(steps_changed, 1e6)))
+    found.append(
+        Case(FIX, "dt changed by 1e6", "box and forces", 1e-12, partial(steps_changed, 1e6))
+    )
     scenes: dict[str, Callable[[], Packing]] = {
         "alpha 1e-6 to 100 in one box": partial(all_aspect_ratios, 2),
         "longer than the box": longer_than_the_box,
@@ -559,11 +579,17 @@ def fix_cases() -> list[Case]:
             what = "forces after 100 steps, in overlaps"
             limit = 1e-12 if "100" in name or "longer" in name else 2e-13
             found.append(Case(FIX, f"{name}, sides {sides}", what, limit, run))
-    found.append(Case(FIX, "compressed to overlaps of a third", "forces, in overlaps", 1e-14, compressed_deep))
+    found.append(
+        Case(
+            FIX, "compressed to overlaps of a third", "forces, in overlaps", 1e-14, compressed_deep
+        )
+    )
     cross = f"{set_up()}\n{fix(1.0, 5e-2, 0.02, 'check 0')}\nrun 100000"
     run_there = partial(lambda text: sentence(jammed(1.0), text), cross)
     what = "sentence"
-    found.append(Case(FIX, "compressed until spines cross", what, f"{_CROSSING}|{_TOO_FAR}", run_there))
+    found.append(
+        Case(FIX, "compressed until spines cross", what, f"{_CROSSING}|{_TOO_FAR}", run_there)
+    )
     return found
 
 
@@ -587,9 +613,7 @@ def compression_in_units(length: float, k_e: float) -> float:
         t0 = unit**4 / energy  # k_d = 1 in all
         packing = scaled(jammed(0.0, 16, 0.8), unit)
         with Session() as session:
-            settings = Compression(
-                kappa=1e-3 / t0, phi_end=0.9, dt=0.1 * t0, k_e=energy
-            )
+            settings = Compression(kappa=1e-3 / t0, phi_end=0.9, dt=0.1 * t0, k_e=energy)
             run = CompressionRun(session, settings, packing)
             run.advance(run.last_step)
             at = run.measure()

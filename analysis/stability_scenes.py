@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.contacts import find_contacts
 from jamshape.initial import Mixture, random_packing
-from jamshape.landscape import CrossingError, Landscape, State
+from jamshape.landscape import Landscape, State
 from jamshape.minimise import Stop, minimise
 from jamshape.packing import Box, FloatArray, LongArray, Packing
 
@@ -124,9 +124,7 @@ def shorter_first(alpha: FloatArray, dimension: int, phi: float, overlap: float)
     n = len(alpha)
     radius = np.where(np.arange(n) % 2, 0.5, 0.7)
     mixture = Mixture.from_arrays(alpha * radius, radius)
-    return in_doubles(
-        pressed(random_packing(n, phi, 1, mixture, dimension=dimension), overlap)
-    )
+    return in_doubles(pressed(random_packing(n, phi, 1, mixture, dimension=dimension), overlap))
 
 
 @cache

@@ -1,0 +1,88 @@
+"""The cases of analysis/stability_report.py, one test each, and the report itself."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "analysis"))
+
+import stability_report
+from stability_cases import Case, all_cases
+
+pytestmark = pytest.mark.lammps
+
+# What is known to fail, with the reason.
+KNOWN = {}
+
+
+def marked(case):
+    marks = [pytest.mark.validate] if case.heavy else []
+    if case.label in KNOWN:
+        marks.append(pytest.mark.xfail(reason=KNOWN[case.label], strict=True))
+    return pytest.param(case, id=case.label, marks=marks)
+
+
+@pytest.mark.parametrize("case", [marked(case) for case in all_cases()])
+def test_extreme_case(case, measured):
+    verdict = case.judge()
+    if not isinstance(verdict.measured, str):
+        measured(error=verdict.measured)
+    assert verdict.holds, f"{case.measure}: {verdict.measured}, expected {case.expected}"
+
+
+def refuse():
+    msg = "found 3, expected 2"
+    raise ValueError(msg)
+
+
+def test_verdicts():
+    def of(expected, run):
+        return Case("part", "name", "error", expected, run).judge()
+
+    assert of(1.0, lambda: 0.5).holds
+    assert not of(1.0, lambda: 2.0).holds
+    assert not of(1.0, lambda: float("nan")).holds
+    assert not of(1.0, refuse).holds
+    assert of("found 3", refuse).holds
+    assert not of("found 4", refuse).holds
+    assert not of("found 3", lambda: 0.0).holds
+
+
+def options(out, **changes):
+    told = {"out": out, "only": "wn images: contacts", "quick": False, "again": False} | changes
+    return argparse.Namespace(**told)
+
+
+def test_report_goes_on_and_says_what_fails(tmp_path, capsys):
+    assert stability_report.main(options(tmp_path)) == 0
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert last["failed"] == []
+    assert last["cases"] >= 2
+    page = (tmp_path / "report.md").read_text()
+    assert "| own images: contacts |" in page
+    assert "| holds |" in page
+    path = tmp_path / "verdicts.json"
+    records = json.loads(path.read_text())
+    for record in records.values():
+        record["seconds"] = 77.0
+    first = next(iter(records))
+    records[first] |= {"measured": 5.0, "holds": False}
+    path.write_text(json.dumps(records))
+    assert stability_report.main(options(tmp_path)) == 0
+    again = json.loads(path.read_text())
+    assert again[first]["seconds"] < 77.0  # repeated, having failed
+    assert sum(record["seconds"] == 77.0 for record in again.values()) == len(again) - 1
+
+
+def test_a_process_that_ends_is_a_verdict(tmp_path):
+    found = list(stability_report.verdicts(["no such case"], tmp_path / "log"))
+    assert not found[0].holds
+    assert "KeyError" in found[0].measured
+
+
+def test_nothing_of_that_name(tmp_path):
+    with pytest.raises(ValueError, match="no case is called 'unheard of'"):
+        stability_report.main(options(tmp_path, only="unheard of"))
