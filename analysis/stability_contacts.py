@@ -66,8 +66,8 @@ class Rods(NamedTuple):
     @property
     def spines(self) -> Spines:
         """The same numbers as long doubles."""
-        i, j, D = (np.asarray(x, np.longdouble) for x in (*self[:2], self.D))
-        D = int(self.D)
+        i, j = np.asarray(self.i, np.longdouble), np.asarray(self.j, np.longdouble)
+        D = self.D
         r = i[:, :D] - j[:, :D]
         A, R = slice(2 * D, 2 * D + 1), slice(2 * D + 1, None)
         axes = i[:, D : 2 * D], j[:, D : 2 * D]
@@ -94,8 +94,8 @@ def random_rods(
 ) -> Rods:
     """Pairs that overlap by so much, in all directions; alpha and R log-uniform between bounds."""
     rng = np.random.default_rng(1)
-    R = np.exp(rng.uniform(*np.log(size), (2, n)))
-    A = R * np.exp(rng.uniform(*np.log(alpha), (2, n)))
+    R = np.exp(rng.uniform(np.log(size[0]), np.log(size[1]), (2, n)))
+    A = R * np.exp(rng.uniform(np.log(alpha[0]), np.log(alpha[1]), (2, n)))
     u_i, u_j = _units(rng, n, D), _units(rng, n, D)
     if angle is not None:
         across = u_j - (u_j * u_i).sum(axis=1, keepdims=True) * u_i
@@ -110,9 +110,8 @@ def random_rods(
 
     def at(x: LongArray) -> Spines:
         r = np.asarray(offset + x[:, None] * line, np.longdouble)
-        return Spines(
-            r, *(np.asarray(y, np.longdouble) for y in (u_i, u_j, *A)), np.longdouble(1) * R.sum(0)
-        )
+        long = [np.asarray(y, np.longdouble) for y in (u_i, u_j, A[0], A[1], R.sum(0))]
+        return Spines(r, long[0], long[1], long[2], long[3], long[4])
 
     low, high = np.zeros(n, np.longdouble), np.longdouble(1) * (A.sum(0) + 1.1 * R.sum(0))
     for _ in range(80):
@@ -153,7 +152,7 @@ def _turn(u: LongArray, force: LongArray) -> LongArray:
 
 
 def one_bond(s: Spines) -> Bond:
-    """The contact with one bond, from the definition."""
+    """Give the contact with one bond, from the definition."""
     f, t, delta = closest(s)
     middle_f, middle_t, overlapping = middle(s)
     flat = (sine(s) < 1e-8) & overlapping
@@ -216,7 +215,7 @@ def rods_in_other_units(D: int, sides: int, length: float, energy: float) -> flo
 
 
 def rods_exchanged(D: int, sides: int, angle: float | None) -> float:
-    """The force on i is minus that on j when both change places."""
+    """Compare the force on i with minus that on j when both change places."""
     pairs = random_rods(D, 0.01, angle=angle)
     found, other = pairs.contacts(sides), Rods(pairs.j, pairs.i, D).contacts(sides)
     size = np.abs(found["force"]).max()
@@ -311,9 +310,9 @@ def rod_cases() -> list[Case]:
                 run = partial(rods_in_other_units, D, sides, 1.0, energy)
                 name = f"{D}D, sides {word}, k_e {energy:.3g}"
                 found.append(Case(ROD, name, "change of forces over k_e, in overlaps", limit, run))
-            for angle in (None, 1e-6, 1e-12):
-                name = f"{D}D, sides {word}, i and j exchanged, angle {angle or 'any'}"
-                run = partial(rods_exchanged, D, sides, angle)
+            for tilt in (None, 1e-6, 1e-12):
+                name = f"{D}D, sides {word}, i and j exchanged, angle {tilt or 'any'}"
+                run = partial(rods_exchanged, D, sides, tilt)
                 found.append(Case(ROD, name, "change of forces, in overlaps", 1e-14, run))
             run = partial(upside_down, D, sides, 1e-12)
             name = f"{D}D, sides {word}, upside down"
@@ -379,8 +378,9 @@ def bounds(i: Bodies, j: Bodies, normal: FloatArray, point: FloatArray) -> tuple
     widths, gauges = [], []
     for body, at in ((i, y), (j, r - y)):
         p = np.asarray(body.p, np.longdouble)
-        widths.append(_norm(np.abs(body.inside(n)) * body.axes, 2 * p / (2 * p - 1)))
-        gauges.append(_norm(np.abs(body.inside(at)) / body.axes, 2 * p))
+        axes = np.asarray(body.axes, np.longdouble)
+        widths.append(_norm(np.abs(body.inside(n)) * axes, 2 * p / (2 * p - 1)))
+        gauges.append(_norm(np.abs(body.inside(at)) / axes, 2 * p))
     return (r * n).sum(axis=1) / (widths[0] + widths[1]), np.maximum(*gauges)
 
 
@@ -395,7 +395,7 @@ def random_super(
         turn = rng.uniform(-3, 3, (n, 1)) if D == 2 else quaternion
         if D == 3:
             turn = turn / np.linalg.norm(turn, axis=1, keepdims=True)
-        axes = np.exp(rng.uniform(*np.log(w), (n, D)))
+        axes = np.exp(rng.uniform(np.log(w[0]), np.log(w[1]), (n, D)))
         axes[:, 0] = 1.0
         largest = np.exp(rng.uniform(0, np.log(size), n)) if size > 1 else np.ones(n)
         order = np.broadcast_to(np.asarray(p, float), n)
@@ -581,12 +581,12 @@ SUPERS["own images, w 10"] = needles
 
 @cache
 def expected_of(scene: Callable[[], Packing]) -> Found:
-    """What the oracle says of a scene."""
+    """Ask what the oracle says of a scene."""
     return oracle(scene())
 
 
 def against_oracle(scene: Callable[[], Packing]) -> float:
-    """Forces of one-bond contacts in long double, relative to the largest; contacts counted."""
+    """Compare forces of one-bond contacts in long double, relative to the largest; contacts counted."""
     packing = scene()
     landscape, expected = Landscape(packing, sides=1), expected_of(scene)
     found = landscape.evaluate(State.of(packing))
@@ -647,7 +647,7 @@ def doubles_error(scene: Callable[[], Packing], sides: int = 2) -> float:
 
 
 def moved_error(scene: Callable[[], Packing]) -> float:
-    """Moved, wrapped and in another order: forces relative to the largest."""
+    """Move, wrap and reorder: change of forces relative to the largest."""
     packing = scene()
     landscape, state = Landscape(packing), State.of(packing)
     expected = landscape.components(landscape.evaluate(state).gradient)
@@ -664,7 +664,7 @@ def moved_error(scene: Callable[[], Packing]) -> float:
 
 
 def units_error(scene: Callable[[], Packing], length: float, energy: float) -> float:
-    """The same packing in other units: forces relative to the largest."""
+    """Give the same packing in other units: forces relative to the largest."""
     packing = scene()
     small, large = Landscape(packing), Landscape(scaled(packing, length), energy)
     a = small.evaluate(State.of(packing))
@@ -695,7 +695,7 @@ def second_derivatives(scene: Callable[[], Packing], h: float) -> float:
 
 
 def barely_touching(overlap: float) -> float:
-    """A long double resolves what a double drops: relative error of one force in a box of 1000."""
+    """Resolve in long double what a double drops: relative error of one force in a box of 1000."""
     state_edges = np.full(2, np.longdouble(1000))
     packing = rods([[-400.3, 0.0], [-399.3, 0.0]], [0.0, 0.0], 0.0, 0.5, [1000.0, 1000.0])
     x = np.array([[-400.3, 0.1], [0.0, 0.1]], np.longdouble)
@@ -716,7 +716,7 @@ def _concentric(packing: Packing) -> str:
 
 
 def packing_cases() -> list[Case]:
-    """Sums over packings."""
+    """List sums over packings."""
     found = []
     lost, unit = "contacts too few or too many", "forces against long double over all images"
     for name, scene in RODS.items():

@@ -81,7 +81,7 @@ def verdicts(labels: list[str], log: Path) -> Iterator[Verdict]:
 
 
 def shown(value: float | str) -> str:
-    """A number or a sentence, for a cell of a table."""
+    """Show a number or a sentence, for a cell of a table."""
     text = value if isinstance(value, str) else f"{value:.2g}"
     return text.replace("|", "\\|").replace("\n", " ")
 
@@ -110,8 +110,9 @@ def page(records: dict[str, dict[str, Any]]) -> str:
     lines = [
         "# Stability battery",
         "",
-        f"{len(labels)} cases, {len(failed)} of which fail, in {seconds:.0f} s; {platform.platform()},"
-        f" Python {platform.python_version()}.",
+        f"{len(labels)} cases, {len(failed)} of which fail, in {seconds:.0f} s.",
+        "",
+        f"{platform.platform()}, Python {platform.python_version()}.",
         "",
     ]
     if failed:

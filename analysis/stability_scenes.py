@@ -200,7 +200,7 @@ def deep(dimension: int, alpha: float = 1.0, n: int = 16) -> Packing:
 
 @cache
 def jammed(alpha: float, n: int = 16, phi: float = 0.9, seed: int = 1) -> Packing:
-    """A random packing of the plane, squeezed to phi and roughly minimised on the way."""
+    """Make a random packing of the plane, squeezed to phi and roughly minimised on the way."""
     packing = random_packing(n, 0.4, seed, Mixture.bidisperse(alpha))
     landscape, state = Landscape(packing), State.of(packing)
     while (now := state.packing(packing).phi) < phi * (1 - 1e-12):
@@ -286,7 +286,7 @@ def _cross(a: LongArray, b: LongArray) -> LongArray:
 
 
 def _across(s: Spines) -> LongArray:
-    """The part of u_i across u_j, through their difference: nearly parallel axes keep its digits."""
+    """Give the part of u_i across u_j, through their difference: nearly parallel axes keep its digits."""
     sign = np.where(_dot(s.u_i, s.u_j) < 0, -1, 1)[:, None]
     turn = s.u_i - sign * s.u_j
     return np.asarray(turn - _dot(turn, s.u_j)[:, None] * s.u_j)

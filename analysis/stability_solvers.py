@@ -96,7 +96,7 @@ def faint_in_units(length: float, k_e: float) -> float:
 
 
 def unjams(length: float, k_e: float, method: str) -> float:
-    """Evaluations to part a few overlapping discs, in other units; infinite if not unjammed."""
+    """Count evaluations to part a few overlapping discs, in other units; infinite if not unjammed."""
     packing = scaled(
         rods([[0.0, 0.0], [0.9, 0.0], [0.4, 0.7]], 0.0, 0.0, 0.5, [20.0, 20.0]), length
     )
@@ -106,7 +106,7 @@ def unjams(length: float, k_e: float, method: str) -> float:
 
 
 def nothing_touches(method: str) -> float:
-    """Evaluations of a packing without contacts; infinite if that is not called unjammed."""
+    """Count evaluations of a packing without contacts; infinite if that is not called unjammed."""
     packing = rods([[0.0, 0.0], [5.0, 0.0]], 0.0, 1.0, 0.5, [20.0, 20.0])
     landscape = Landscape(packing)
     found = minimise(landscape, State.of(packing), method)
@@ -187,7 +187,7 @@ def _start(name: str) -> Packing:
 def led(
     name: str, u0: float, length: float = 1.0, k_e: float = 1.0, tolerance: float = 1e-8
 ) -> tuple[Landscape, Minimum]:
-    """A small packing at an energy density of u0 in units of the length 1 and k_e 1."""
+    """Lead a small packing to an energy density of u0 in units of the length 1 and k_e 1."""
     packing = scaled(_start(name), length)
     landscape = Landscape(packing, k_e)
     target = Target(u0 * k_e / length**packing.dimension, tolerance=tolerance)
@@ -210,7 +210,7 @@ def out_of_reach(u0: float) -> str:
 
 
 def target_cases() -> list[Case]:
-    """The direct search."""
+    """List what the direct search must stand."""
     found, what = [], "error of u where forces balance"
     for name in _JAMMED:
         for u0 in (1e-4, 1e-8, 1e-15, 1e-18):
@@ -233,7 +233,7 @@ def target_cases() -> list[Case]:
 
 
 def _exact_inertia(matrix: DynamicalMatrix, shift: Fraction) -> int:
-    """Number of eigenvalues below a shift, exactly: signs of pivots in rational arithmetic."""
+    """Count eigenvalues below a shift, exactly: signs of pivots in rational arithmetic."""
     C = [[Fraction(x) for x in row] for row in matrix.compatibility.toarray().tolist()]
     S = [[Fraction(x) for x in row] for row in matrix.prestress.toarray().tolist()]
     n = len(S)
@@ -299,7 +299,7 @@ def spectrum_in_units(name: str, length: float, k_e: float) -> float:
 
 
 def _of_state(found: Spectrum) -> FloatArray:
-    """What rounding of coordinates in long double does to the prestress, and so to low modes."""
+    """Allow for what rounding of coordinates in long double does to the prestress and to low modes."""
     return np.asarray(1e-16 + 1e-13 * np.abs(found.eigenvalues))
 
 
@@ -315,7 +315,7 @@ def finite_spectrum(scene: Callable[[], Packing]) -> float | str:
 
 
 def at_a_minimum(scene: Callable[[], Packing]) -> Callable[[], Packing]:
-    """The minimum next to a scene."""
+    """Find the minimum next to a scene."""
 
     def run() -> Packing:
         packing = scene()

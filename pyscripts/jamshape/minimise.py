@@ -156,9 +156,8 @@ class Descent:
         self, landscape: Landscape, start: State, stop: Stop, history: History | None = None
     ) -> None:
         self.landscape, self.stop = landscape, stop
-        self._lowest = stop.lowest
-        if self._lowest is None:
-            self._lowest = _LOWEST * landscape.k_e / landscape.length**start.dimension
+        unit = landscape.k_e / landscape.length**start.dimension
+        self._lowest = _LOWEST * unit if stop.lowest is None else stop.lowest
         self.history = history or History()
         self.state = start
         self._first_evaluation, self._began = landscape.evaluations, time.perf_counter()
