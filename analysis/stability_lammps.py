@@ -459,23 +459,25 @@ def extreme_run(scene: Callable[[], Packing], sides: str, kappa: float = 1e-4) -
 
 def restarted_in_an_event(sides: str) -> float:
     """Restart where the energy of a driven packing falls fastest, against going on without."""
-    steps, kappa, dt = 200, 1e-3, 0.05
+    steps, kappa, dt = 1000, 3e-5, 0.2
     text = set_up(sides) + "\n" + fix(1.0, kappa, dt)
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "event.restart"
-        with loaded(jammed(4.0, 16, 0.9), text) as session:
-            session.commands("run 100")
+        with loaded(jammed(4.0, 24, 0.8), text) as session:
+            session.commands("run 8000")
             energies = []
             for _ in range(40):
-                session.commands("run 20 pre no post no")
+                session.commands("run 100 pre no post no")
                 energies.append(measured(session, 2))
         falls = np.diff(energies)
         if falls.min() >= 0:
             return np.inf
-        event = 100 + 20 * (1 + int(falls.argmin())) + 10  # in the middle of the fastest fall
-        with loaded(jammed(4.0, 16, 0.9), text) as session:
-            session.commands(f"run {event}\nwrite_restart {path}\nrun {steps}")
+        event = 8000 + 100 * (1 + int(falls.argmin())) + 50  # in the middle of the fastest fall
+        with loaded(jammed(4.0, 24, 0.8), text) as session:
+            session.commands(f"run {event}\nwrite_restart {path}")
+        with loaded(jammed(4.0, 24, 0.8), text) as session:
+            session.commands(f"run {event + steps}")
             whole = frame(session)
         with Session() as session:
             session.load_restart(path)
