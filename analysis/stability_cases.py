@@ -60,13 +60,14 @@ class Case:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", RuntimeWarning)
-                measured = self.run()
+                found = self.run()
+                measured = found if isinstance(found, str) else float(found)
         except (ValueError, RuntimeError, RuntimeWarning) as error:
             measured = f"{error}" or type(error).__name__
         if isinstance(self.expected, str):
             holds = isinstance(measured, str) and bool(re.search(self.expected, measured))
         else:
-            holds = not isinstance(measured, str) and measured <= self.expected
+            holds = not isinstance(measured, str) and bool(measured <= self.expected)
         return Verdict(measured, holds, time.perf_counter() - began)
 
 

@@ -459,23 +459,25 @@ def extreme_run(scene: Callable[[], Packing], sides: str, kappa: float = 1e-4) -
 
 def restarted_in_an_event(sides: str) -> float:
     """Restart where the energy of a driven packing falls fastest, against going on without."""
-    steps, kappa, dt = 200, 1e-3, 0.05
+    steps, kappa, dt = 1000, 3e-5, 0.2
     text = set_up(sides) + "\n" + fix(1.0, kappa, dt)
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "event.restart"
-        with loaded(jammed(4.0, 16, 0.9), text) as session:
-            session.commands("run 100")
+        with loaded(jammed(4.0, 24, 0.8), text) as session:
+            session.commands("run 8000")
             energies = []
             for _ in range(40):
-                session.commands("run 20 pre no post no")
+                session.commands("run 100 pre no post no")
                 energies.append(measured(session, 2))
         falls = np.diff(energies)
         if falls.min() >= 0:
             return np.inf
-        event = 100 + 20 * (1 + int(falls.argmin())) + 10  # in the middle of the fastest fall
-        with loaded(jammed(4.0, 16, 0.9), text) as session:
-            session.commands(f"run {event}\nwrite_restart {path}\nrun {steps}")
+        event = 8000 + 100 * (1 + int(falls.argmin())) + 50  # in the middle of the fastest fall
+        with loaded(jammed(4.0, 24, 0.8), text) as session:
+            session.commands(f"run {event}\nwrite_restart {path}")
+        with loaded(jammed(4.0, 24, 0.8), text) as session:
+            session.commands(f"run {event + steps}")
             whole = frame(session)
         with Session() as session:
             session.load_restart(path)
@@ -605,9 +607,10 @@ def fix_cases() -> list[Case]:
 # --- minimize and the library --------------------------------------------------------------------
 
 
-def minimised(scene: Callable[[], Packing], style: str, sides: str = "two") -> float:
-    """Energy after 50 iterations over that before: never above 1, never NaN."""
-    with loaded(scene(), set_up(sides) + f"\nmin_style {style}\nmin_modify dmax 0.1") as session:
+def minimised(scene: Callable[[], Packing], style: str, line: str = "quadratic") -> float:
+    """Energy after 50 iterations over that before."""
+    style_of_search = f"min_style {style}\nmin_modify dmax 0.1 line {line}"
+    with loaded(scene(), set_up("two") + f"\n{style_of_search}") as session:
         session.commands("run 0")
         before = measured(session, 2)
         session.commands("minimize 0 1e-300 50 500\nrun 0")
@@ -643,8 +646,12 @@ def library_cases() -> list[Case]:
     }
     for name, scene in scenes.items():
         for style in ("cg", "sd"):
-            run = partial(minimised, scene, style)
-            found.append(Case(MINIMIZE, f"{name}, {style}", "energy over that before", 1.0, run))
+            for line in ("quadratic", "backtrack"):
+                run = partial(minimised, scene, style, line)
+                # The deep one has been minimised before; all others must gain.
+                limit = 1.0 if "third" in name else 0.99
+                label = f"{name}, {style}, line {line}"
+                found.append(Case(MINIMIZE, label, "energy over that before", limit, run))
     for length, k_e in ((1e-3, 1.0), (1e3, 1.0), (1.0, 1e-6), (1.0, 1e6)):
         run = partial(compression_in_units, length, k_e)
         label = f"length {length:g}, k_e {k_e:g}"

@@ -143,6 +143,7 @@ def main(options: argparse.Namespace) -> int:
     for label, verdict in zip(todo, tqdm(found, total=len(todo), unit="case"), strict=True):
         records[label] = verdict._asdict()
         path.write_text(json.dumps(records, indent=1))
+        report.write_text(page({x: records[x] for x in asked if x in records}))
     report.write_text(page({label: records[label] for label in asked}))
     failed = [label for label in asked if not records[label]["holds"]]
     seconds = sum(records[label]["seconds"] for label in asked)

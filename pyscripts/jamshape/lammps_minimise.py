@@ -48,6 +48,6 @@ def _set_up(session: Session, landscape: Landscape, state: State, factor: float)
         pair_coeff * * {landscape.k_e * factor!r}
         {session.neighbours()}
         min_style cg
-        min_modify dmax {0.1 * packing.diameters.min()!r}
+        min_modify dmax {0.1 * float(packing.diameters.min())!r}
         thermo_modify lost error
     """)
