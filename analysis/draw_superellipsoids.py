@@ -22,8 +22,8 @@ from shading import draw_packing, save_smooth, view
 from superellipsoid_files import LOCAL_ORDER, local_order
 from sweep_files import GREEN, RED, YELLOW, plain
 
-from jamshape.order3d import body_axes, directors
-from jamshape.packing import FloatArray, Packing
+from jamshape.order3d import directors
+from jamshape.packing import FloatArray, Packing, body_axes
 from jamshape.storage import read_attributes, read_packing
 from jamshape.superellipsoid_jammed import order
 

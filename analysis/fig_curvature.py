@@ -30,8 +30,7 @@ from superellipsoid_files import (
 from sweep_files import Sample, plain
 
 from jamshape.contacts import find_contacts
-from jamshape.order3d import body_axes
-from jamshape.packing import FloatArray
+from jamshape.packing import FloatArray, body_axes
 from jamshape.superellipsoid_curvature import contact_curvatures
 
 PER_DECADE = 6

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 import sys
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +21,10 @@ from mode_files import (
     Key,
     Tables,
     add_sides,
+    asked,
     bin_edges,
     draw_errors,
-    read_tables,
     samples_text,
-    selected,
     sizes,
     stable,
     unstable,
@@ -124,15 +122,8 @@ def report(key: Key, samples: list[ModeTable]) -> dict[str, Any]:
 
 def main() -> None:
     """Read, count, draw, report."""
-    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument("modes", type=Path, nargs="+", metavar="MODES", help="folder or files")
-    parser.add_argument("--alpha", type=float, nargs="+", default=[], help="only these (all)")
-    parser.add_argument("--u0", type=float, nargs="+", default=[], help="only these (all)")
-    parser.add_argument(
-        "--out", type=Path, default=Path("density_of_states.png"), help="(%(default)s)"
-    )
-    options = parser.parse_args()
-    tables = selected(read_tables(options.modes), options.alpha, options.u0)
+    options = asked(__doc__, "density_of_states.png")
+    tables = options.tables
     draw(tables, options.out)
     rows = [report(key, samples) for key, samples in tables.items()]
     print(json.dumps({"out": str(options.out), "bands": rows}))

@@ -33,7 +33,8 @@ from superellipsoid_files import (
 )
 from sweep_files import BLACK, mean
 
-from jamshape.order3d import body_axes, cubatic_order, nematic_order
+from jamshape.order3d import cubatic_order, nematic_order
+from jamshape.packing import body_axes
 
 DRAWS = 200
 

@@ -31,7 +31,8 @@ from superellipsoid_files import (
 from sweep_files import BLACK, Mean, mean
 
 from jamshape.contacts import find_contacts
-from jamshape.order3d import body_axes, local_cubatic_order, local_nematic_order
+from jamshape.order3d import local_cubatic_order, local_nematic_order
+from jamshape.packing import body_axes
 
 GLOBAL = {"S2": "nematic order $S_2$", "C4": "cubatic order $C_4$"}
 

@@ -117,7 +117,7 @@ def draw(packing: Packing, table: ModeTable, modes: list[int], out: Path, *, zoo
     columns = min(len(modes), 3)
     n_rows = -(-len(modes) // columns)
     size = (INCHES * columns + 0.9, (INCHES + 0.45) * n_rows)
-    figure = Figure(figsize=size, dpi=200, layout="constrained")
+    figure = Figure(figsize=size, dpi=120, layout="constrained")
     panels = figure.subplots(n_rows, columns, squeeze=False).ravel()
     held = np.zeros(packing.n, bool)
     held[table.coordinates.backbone] = True

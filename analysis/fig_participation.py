@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import json
 import sys
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +21,11 @@ from mode_files import (
     Key,
     Tables,
     add_sides,
+    asked,
     bin_edges,
     draw_binned,
     draw_legend,
-    read_tables,
     samples_text,
-    selected,
 )
 from sweep_files import COLORS, MARKERS, mean
 
@@ -74,13 +72,8 @@ def report(key: Key, samples: list[ModeTable]) -> dict[str, Any]:
 
 def main() -> None:
     """Read, average, draw, report."""
-    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument("modes", type=Path, nargs="+", metavar="MODES", help="folder or files")
-    parser.add_argument("--alpha", type=float, nargs="+", default=[], help="only these (all)")
-    parser.add_argument("--u0", type=float, nargs="+", default=[], help="only these (all)")
-    parser.add_argument("--out", type=Path, default=Path("participation.png"), help="(%(default)s)")
-    options = parser.parse_args()
-    tables = selected(read_tables(options.modes), options.alpha, options.u0)
+    options = asked(__doc__, "participation.png")
+    tables = options.tables
     draw(tables, options.out)
     rows = [report(key, samples) for key, samples in tables.items()]
     print(json.dumps({"out": str(options.out), "participation": rows}))

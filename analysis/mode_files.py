@@ -7,6 +7,7 @@ others, at sqrt(-lambda) on an axis that runs the other way.
 from __future__ import annotations
 
 import math
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -232,6 +233,25 @@ def _dress(row: Sides, limits: Sequence[tuple[float, float] | None]) -> None:
     row.stable.tick_params(labelleft=False, left=False, which="both")
     row.unstable.spines["right"].set_visible(False)
     row.stable.spines["left"].set(linestyle=(0, (4, 3)), color="0.5")
+
+
+class Asked(NamedTuple):
+    """Command line of a figure of modes."""
+
+    tables: Tables
+    out: Path
+
+
+def asked(doc: str | None, out: str) -> Asked:
+    """Read the command line and the files it names; errors as `read_tables` and `selected`."""
+    parser = ArgumentParser(description=doc, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("modes", type=Path, nargs="+", metavar="MODES", help="folder or files")
+    parser.add_argument("--alpha", type=float, nargs="+", default=[], help="only these (all)")
+    parser.add_argument("--u0", type=float, nargs="+", default=[], help="only these (all)")
+    parser.add_argument("--out", type=Path, default=Path(out), help="(%(default)s)")
+    options = parser.parse_args()
+    tables = selected(read_tables(options.modes), options.alpha, options.u0)
+    return Asked(tables, options.out)
 
 
 def selected(tables: Tables, alphas: Sequence[float], energies: Sequence[float]) -> Tables:

@@ -43,6 +43,20 @@ template <int D, class S = double> struct Contact {
   Torque<D, S> torque_j;
 };
 
+/// No bond yet; the bonds themselves stay unset, most pairs of a list being apart.
+template <int D, class S> Contact<D, S> without_bonds(ContactStatus status)
+{
+  Contact<D, S> contact;
+  contact.status = status;
+  contact.kind = ContactKind::TIP_TO_TIP;
+  contact.n_bonds = 0;
+  contact.error = 0.0;
+  contact.energy = 0.0;
+  contact.force = {};
+  contact.torque_i = contact.torque_j = {};
+  return contact;
+}
+
 /// What the drag on the substrate needs of a particle (Marschall & Teitel 2018, Eqs. 8-12): its
 /// area (volume in 3D) and, per body axis, the integral of the squared distance from that axis over
 /// it, divided by it (their I, Eq. 10, about z in 2D).

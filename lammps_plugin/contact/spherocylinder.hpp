@@ -221,8 +221,9 @@ template <int D, class S> class SpherocylinderContact {
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0) return discs();
     const Feet<D, S> closest = closest_feet(pair);
-    if (!touches(closest.distance_sq)) return empty(ContactStatus::APART);
-    if (is_coincident(closest) || spines_cross(pair)) return empty(ContactStatus::CROSSING);
+    if (!touches(closest.distance_sq)) return without_bonds<D, S>(ContactStatus::APART);
+    if (is_coincident(closest) || spines_cross(pair))
+      return without_bonds<D, S>(ContactStatus::CROSSING);
     return law.sides == Sides::ONE ? one_bond(closest) : two_bonds();
   }
 
@@ -246,34 +247,20 @@ template <int D, class S> class SpherocylinderContact {
     return feet.distance_sq <= COINCIDENT * reach * COINCIDENT * reach;
   }
 
-  /// No bond yet; the bonds themselves stay unset, most pairs of a list being apart.
-  static Contact<D, S> empty(ContactStatus status)
-  {
-    Contact<D, S> contact;
-    contact.status = status;
-    contact.kind = ContactKind::TIP_TO_TIP;
-    contact.n_bonds = 0;
-    contact.error = 0.0;
-    contact.energy = 0.0;
-    contact.force = {};
-    contact.torque_i = contact.torque_j = {};
-    return contact;
-  }
-
   /// What the general path gives for two spines of no length, without the search for feet.
   Contact<D, S> discs() const
   {
     const Feet<D, S> centres{0.0, 0.0, pair.r, norm_sq(pair.r)};
-    if (!touches(centres.distance_sq)) return empty(ContactStatus::APART);
-    if (is_coincident(centres)) return empty(ContactStatus::CROSSING);
-    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
+    if (!touches(centres.distance_sq)) return without_bonds<D, S>(ContactStatus::APART);
+    if (is_coincident(centres)) return without_bonds<D, S>(ContactStatus::CROSSING);
+    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
     add_bond(contact, centres, sqrt(centres.distance_sq), whole());
     return contact;
   }
 
   Contact<D, S> one_bond(const Feet<D, S> &closest) const
   {
-    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
+    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
     const S distance = sqrt(closest.distance_sq);
     if (abs_sine(pair) < PARALLEL_SINE) {
       const EndFeet<D, S> ends(pair);
@@ -308,7 +295,7 @@ template <int D, class S> class SpherocylinderContact {
         return side_to_side(ends, closest, weights, depth);
       }
     }
-    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
+    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
     contact.kind = kind_of(pair, closest);
     add_bond(contact, closest, distance, whole());
     return contact;
@@ -333,7 +320,7 @@ template <int D, class S> class SpherocylinderContact {
         0.5 * (depth.gradient * (weights.second * E_b - weights.mean * excess) +
                by_mean * law_of.energy_gradient(mean));
 
-    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
+    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
     add_bond(contact, closest, distance, {1.0 - by_mean, 0.0, slope, 0.5 * by_mean});
     const S second = b > 0.0 ? weights.second * depth.two_bonds : S(0.0);

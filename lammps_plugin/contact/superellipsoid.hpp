@@ -59,16 +59,16 @@ template <int D, class S> class SuperellipsoidContact {
   {
     const double reach = i.bounding_radius + j.bounding_radius;
     const T distance_sq = value_of(norm_sq(r));
-    if (!(distance_sq < T(reach) * reach)) return empty(ContactStatus::APART);
+    if (!(distance_sq < T(reach) * reach)) return without_bonds<D, S>(ContactStatus::APART);
     if (distance_sq <= COINCIDENT_CENTRES * reach * COINCIDENT_CENTRES * reach) {
-      return empty(ContactStatus::CROSSING);
+      return without_bonds<D, S>(ContactStatus::CROSSING);
     }
     if (is_round(i) && is_round(j)) return touching(spheres(), T(0));  // bounded by themselves
     const FoundTangency<D, T> found = find_tangency(last);
     if (last != nullptr) *last = found.at.normal;
-    if (found.is_apart) return empty(ContactStatus::APART);
-    if (!(found.gap < T(USELESS))) return empty(ContactStatus::UNCONVERGED);
-    if (!(found.at.scale < 1)) return empty(ContactStatus::APART);
+    if (found.is_apart) return without_bonds<D, S>(ContactStatus::APART);
+    if (!(found.gap < T(USELESS))) return without_bonds<D, S>(ContactStatus::UNCONVERGED);
+    if (!(found.at.scale < 1)) return without_bonds<D, S>(ContactStatus::APART);
     return touching(in_scalar(found.at), found.gap);
   }
 
@@ -106,19 +106,6 @@ template <int D, class S> class SuperellipsoidContact {
     }
   }
 
-  static Contact<D, S> empty(ContactStatus status)
-  {
-    Contact<D, S> contact;
-    contact.status = status;
-    contact.kind = ContactKind::TIP_TO_TIP;
-    contact.n_bonds = 0;
-    contact.error = 0.0;
-    contact.energy = 0.0;
-    contact.force = {};
-    contact.torque_i = contact.torque_j = {};
-    return contact;
-  }
-
   /// In dual numbers the law's own slope is a constant: `own_stiffness` stands for what it leaves
   /// out (see ContactDerivatives).
   Contact<D, S> touching(const Tangency<D, S> &at, const T &gap) const
@@ -128,7 +115,7 @@ template <int D, class S> class SuperellipsoidContact {
     const S steepness = norm(gradient), reach = T(1) / steepness;
     const Vec<D, S> arm_i = -at.point_i, arm_j = at.point_j;
 
-    Contact<D, S> contact = empty(ContactStatus::TOUCHING);
+    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
     contact.n_bonds = 1;
     contact.error = static_cast<double>(gap);
     contact.energy = law.energy(overlap);

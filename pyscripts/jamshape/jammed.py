@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -406,7 +406,12 @@ def thinned(history: History) -> tuple[list[int], list[float], list[float]]:
 
 def summary(out: Path) -> dict[str, Any]:
     """Summarise a finished packing."""
+    return summary_of(out, _SUMMARY)
+
+
+def summary_of(out: Path, names: Iterable[str]) -> dict[str, Any]:
+    """Pick attributes of a finished packing, None for NaN, and say whether it is in equilibrium."""
     stored = read_attributes(out)
-    found = {name: stored[name] for name in _SUMMARY if name in stored}
+    found = {name: stored[name] for name in names if name in stored}
     tidy = {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in found.items()}
     return {"out": str(out), **tidy, "reached": stored["outcome"] in {o.value for o in _REACHED}}

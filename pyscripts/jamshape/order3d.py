@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from jamshape.packing import UNIT_QUATERNION_TOLERANCE, FloatArray, IntArray
 from jamshape.superellipsoid_shape import director_axis
@@ -30,46 +30,13 @@ class Order(NamedTuple):
     """(3,) unit vector, of either sign; arbitrary where there is no order."""
 
 
-def body_axes(quaternions: ArrayLike) -> FloatArray:
-    """Turn quaternions into unit vectors along the body's x, y and z axes.
-
-    Parameters
-    ----------
-    quaternions : (..., 4) array_like
-        w i j k; the length does not matter.
-
-    Returns
-    -------
-    (..., 3, 3) array of float64
-        Row k is the body's axis k in the coordinates of the box.
-
-    Raises
-    ------
-    ValueError
-        If the shape is another, or a quaternion is zero or not finite.
-    """
-    q = np.asarray(quaternions, np.float64)
-    if q.ndim < 1 or q.shape[-1] != 4:
-        msg = f"quaternions have shape {q.shape}, expected (..., 4)"
-        raise ValueError(msg)
-    length = np.linalg.norm(q, axis=-1, keepdims=True)
-    if not (np.isfinite(length) & (length > 0)).all():
-        msg = "quaternions hold zero, NaN or infinity, expected rotations"
-        raise ValueError(msg)
-    w, i, j, k = np.moveaxis(q / length, -1, 0)
-    x = [w * w + i * i - j * j - k * k, 2 * (i * j + w * k), 2 * (i * k - w * j)]
-    y = [2 * (i * j - w * k), w * w - i * i + j * j - k * k, 2 * (j * k + w * i)]
-    z = [2 * (i * k + w * j), 2 * (j * k - w * i), w * w - i * i - j * j + k * k]
-    return np.stack([np.stack(axis, axis=-1) for axis in (x, y, z)], axis=-2)
-
-
 def directors(axes: ArrayLike, semi_axes: ArrayLike) -> FloatArray:
     """Choose the axis of each particle that tells its direction, for the nematic order.
 
     Parameters
     ----------
     axes : (N, 3, 3) array_like
-        From `body_axes`.
+        From `jamshape.packing.body_axes`.
     semi_axes : (3,) or (N, 3) array_like, [length]
         Of all particles or of each; `jamshape.superellipsoid_shape.director_axis` says which axis.
 
@@ -128,7 +95,7 @@ def cubatic_order(axes: ArrayLike) -> Order:
     Parameters
     ----------
     axes : (N, 3, 3) array_like
-        Unit vectors u along the rows, from `body_axes`; neither order nor signs matter.
+        Unit vectors u along the rows, from `jamshape.packing.body_axes`; neither order nor signs matter.
 
     Returns
     -------
@@ -173,11 +140,8 @@ def local_nematic_order(directors: ArrayLike, pairs: IntArray) -> FloatArray:
     """
     s = _units("directors", directors, 2)
     of, neighbour = _both_ways(pairs, len(s))
-    total = np.zeros((len(s), 3, 3))
-    np.add.at(total, of, s[neighbour, :, None] * s[neighbour, None, :])
-    count = np.bincount(of, minlength=len(s))
-    mean = total / np.maximum(count, 1)[:, None, None]
-    return np.where(count > 0, np.linalg.eigvalsh(_tensors(mean))[:, -1], np.nan)
+    mean, has_any = _averaged(s[neighbour, :, None] * s[neighbour, None, :], of, len(s))
+    return np.where(has_any, np.linalg.eigvalsh(_tensors(mean))[:, -1], np.nan)
 
 
 def local_cubatic_order(axes: ArrayLike, pairs: IntArray) -> FloatArray:
@@ -205,10 +169,9 @@ def local_cubatic_order(axes: ArrayLike, pairs: IntArray) -> FloatArray:
     """
     u = _units("axes", axes, 3)
     of, neighbour = _both_ways(pairs, len(u))
-    total = np.zeros((len(u), 3))
-    np.add.at(total, of, _of_nearest(np.einsum("mtx,mkx->mtk", u[of], u[neighbour])))
-    count = np.bincount(of, minlength=len(u))
-    return np.where(count > 0, (total / np.maximum(count, 1)[:, None]).max(axis=1), np.nan)
+    along = _of_nearest(np.einsum("mtx,mkx->mtk", u[of], u[neighbour]))
+    mean, has_any = _averaged(along, of, len(u))
+    return np.where(has_any, mean.max(axis=1), np.nan)
 
 
 def _units(name: str, vectors: ArrayLike, dimensions: int) -> FloatArray:
@@ -236,6 +199,14 @@ def _both_ways(pairs: IntArray, n: int) -> tuple[IntArray, IntArray]:
         msg = f"{found}, expected 0 to {n - 1}"
         raise ValueError(msg)
     return given.ravel(), given[:, ::-1].ravel()
+
+
+def _averaged(values: FloatArray, of: IntArray, n: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Average the (M, ...) values of neighbours over each of n particles, and tell which have any."""
+    total = np.zeros((n, *values.shape[1:]))
+    np.add.at(total, of, values)
+    count = np.bincount(of, minlength=n)
+    return total / np.maximum(count, 1).reshape(-1, *[1] * (values.ndim - 1)), count > 0
 
 
 def _tensors(mean: FloatArray) -> FloatArray:

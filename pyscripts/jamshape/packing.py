@@ -184,24 +184,14 @@ class Packing:
         """(N, D) unit vectors along the body's x axis."""
         if self.dimension == 2:
             return np.column_stack([np.cos(self.orientation), np.sin(self.orientation)])
-        w, i, j, k = self.orientation.T
-        x_axis = np.column_stack(
-            [w * w + i * i - j * j - k * k, 2 * (i * j + w * k), 2 * (i * k - w * j)]
-        )
-        unit: FloatArray = x_axis / (self.orientation**2).sum(axis=1, keepdims=True)
-        return unit
+        return self.body_axes(0)
 
     def body_axes(self, k: int) -> FloatArray:
         """(N, D) unit vectors along the body's axis k."""
         if self.dimension == 2:
             cosine, sine = np.cos(self.orientation), np.sin(self.orientation)
             return np.column_stack([cosine, sine] if k == 0 else [-sine, cosine])
-        unit = np.zeros(3)
-        unit[k] = 1.0
-        w, v = self.orientation[:, :1], self.orientation[:, 1:]
-        turned = unit + 2 * np.cross(v, np.cross(v, unit) + w * unit)
-        found: FloatArray = turned / np.linalg.norm(turned, axis=1, keepdims=True)
-        return found
+        return body_axes(self.orientation)[:, k]
 
     @property
     def symmetry_axis(self) -> IntArray:
@@ -295,6 +285,39 @@ def angle_from_quaternion(quaternion: ArrayLike) -> FloatArray:
     q = np.where(q[..., :1] < 0, -q, q)
     angle = 2 * np.arctan2(q[..., 3], q[..., 0])
     return np.where(angle <= -np.pi, np.pi, angle)
+
+
+def body_axes(quaternions: ArrayLike) -> FloatArray:
+    """Turn quaternions into unit vectors along the body's x, y and z axes.
+
+    Parameters
+    ----------
+    quaternions : (..., 4) array_like
+        w i j k; the length does not matter.
+
+    Returns
+    -------
+    (..., 3, 3) array of float64
+        Row k is the body's axis k in the coordinates of the box.
+
+    Raises
+    ------
+    ValueError
+        If the shape is another, or a quaternion is zero or not finite.
+    """
+    q = np.asarray(quaternions, np.float64)
+    if q.ndim < 1 or q.shape[-1] != 4:
+        msg = f"quaternions have shape {q.shape}, expected (..., 4)"
+        raise ValueError(msg)
+    length = np.linalg.norm(q, axis=-1, keepdims=True)
+    if not (np.isfinite(length) & (length > 0)).all():
+        msg = "quaternions hold zero, NaN or infinity, expected rotations"
+        raise ValueError(msg)
+    w, i, j, k = np.moveaxis(q / length, -1, 0)
+    x = [w * w + i * i - j * j - k * k, 2 * (i * j + w * k), 2 * (i * k - w * j)]
+    y = [2 * (i * j - w * k), w * w - i * i + j * j - k * k, 2 * (j * k + w * i)]
+    z = [2 * (i * k + w * j), 2 * (j * k - w * i), w * w - i * i - j * j + k * k]
+    return np.stack([np.stack(axis, axis=-1) for axis in (x, y, z)], axis=-2)
 
 
 def guess_shape_style(diameters: ArrayLike) -> str:

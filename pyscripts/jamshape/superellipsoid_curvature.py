@@ -85,7 +85,7 @@ def contact_curvatures(
     shape : tuple of semi-axes and exponent
         (3,) and a number for all particles, or (N, 3) and (N,).
     axes : (N, 3, 3) array of float64
-        Unit vectors along the body's axes, from `jamshape.order3d.body_axes`.
+        Unit vectors along the body's axes, from `jamshape.packing.body_axes`.
     pairs : (M, 2) array of int64
     normals : (M, 3) array of float64
         Of the plane between the two particles, pointing into either.

@@ -19,11 +19,11 @@ import numpy as np
 
 from jamshape.contacts import find_contacts
 from jamshape.hard_monte_carlo import Thermal, equilibrate, without_overlaps
-from jamshape.jammed import Progress, energy_onset, require_attributes, thinned
+from jamshape.jammed import Progress, energy_onset, require_attributes, summary_of, thinned
 from jamshape.landscape import Landscape, State
-from jamshape.minimise import Minimum, Outcome, residual_of, rounding_floor
-from jamshape.order3d import body_axes, cubatic_order, directors, nematic_order
-from jamshape.packing import Box, FloatArray, Packing
+from jamshape.minimise import Minimum, residual_of, rounding_floor
+from jamshape.order3d import cubatic_order, directors, nematic_order
+from jamshape.packing import Box, FloatArray, Packing, body_axes
 from jamshape.quasistatic import Compression, Quasistatic, compress
 from jamshape.storage import RunWriter, read_attributes, read_packing, write_packing
 from jamshape.superellipsoid_shape import (
@@ -363,8 +363,4 @@ def order(packing: Packing) -> dict[str, float]:
 
 def summary(out: Path) -> dict[str, Any]:
     """Summarise a finished packing."""
-    stored = read_attributes(out)
-    found = {name: stored[name] for name in _SUMMARY if name in stored}
-    tidy = {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in found.items()}
-    reached = stored["outcome"] in {Outcome.CONVERGED.value, Outcome.SLIDING.value}
-    return {"out": str(out), **tidy, "reached": reached}
+    return summary_of(out, _SUMMARY)

@@ -5,7 +5,7 @@ On tables made up with known numbers, and on one small packing.
 
 import json
 import runpy
-import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -30,23 +30,6 @@ SCRIPTS = (*OF_MODES, *OF_PACKING, "jamming_distance")
 N = 40
 BANDS = {"low": 3, "middle": 5, "high": 110}
 U0 = 1e-15
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """Run a script in this process, which saves the time of starting it; return how it ended."""
-
-    def run_here(script, *arguments):
-        path = ANALYSIS / script
-        monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
-        monkeypatch.syspath_prepend(ANALYSIS)
-        try:
-            runpy.run_path(str(path), run_name="__main__")
-        except SystemExit as ended:
-            return ended.code
-        return 0
-
-    return run_here
 
 
 @pytest.fixture
@@ -189,7 +172,7 @@ def test_density_of_states(report, modes, tmp_path):
 def test_density_is_normalised(modes, monkeypatch):
     monkeypatch.syspath_prepend(ANALYSIS)
     script = runpy.run_path(str(ANALYSIS / "fig_density_of_states.py"))
-    tables = script["read_tables"]([modes])
+    tables = import_module("mode_files").read_tables([modes])
     samples = tables[(4.0, U0)]
     edges = script["bin_edges"](samples)
     both = [script["densities"](samples, edges, below=below) for below in (False, True)]

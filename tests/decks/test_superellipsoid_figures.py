@@ -1,8 +1,6 @@
 """The figures of superellipsoids, as their users run them, on a small sweep made here."""
 
 import json
-import runpy
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,23 +21,6 @@ OF_SWEEPS = (
 SCRIPTS = (*(f"fig_{name}.py" for name in OF_SWEEPS), "draw_superellipsoids.py")
 N = 20
 SHAPES = [(1.0, 1.0, 1.0), (1.0, 0.6, 1.0), (1.0, 1.0, 2.0), (1.0, 0.8, 1.25), (1.5, 1.0, 1.0)]
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """Run a script in this process, which saves the time of starting it; return how it ended."""
-
-    def run_here(script, *arguments):
-        path = ANALYSIS / script
-        monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
-        monkeypatch.syspath_prepend(ANALYSIS)
-        try:
-            runpy.run_path(str(path), run_name="__main__")
-        except SystemExit as ended:
-            return ended.code
-        return 0
-
-    return run_here
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """The figures of a sweep, as their users run them, on a folder of small packings made here."""
 
 import json
-import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -32,26 +31,11 @@ def report(figure, *arguments):
 
 
 @pytest.fixture
-def here(monkeypatch):
-    """Run a script in this process, which saves the time of starting it; return how it ended."""
-
-    def run_here(figure, *arguments):
-        path = ANALYSIS / f"fig_{figure}.py"
-        monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
-        monkeypatch.syspath_prepend(ANALYSIS)
-        with pytest.raises(SystemExit) as ended:
-            runpy.run_path(str(path), run_name="__main__")
-        return ended.value.code
-
-    return run_here
-
-
-@pytest.fixture
 def problem(here):
     """Run a script that must end with one sentence, which makes its exit code 1."""
 
     def sentence(figure, *arguments):
-        said = here(figure, *arguments)
+        said = here(f"fig_{figure}.py", *arguments)
         assert isinstance(said, str)
         assert "\n" not in said
         assert said.startswith(f"fig_{figure}.py: ")
@@ -123,7 +107,7 @@ def sweep(tmp_path_factory):
 
 @pytest.mark.parametrize("figure", SCRIPTS)
 def test_help(here, capsys, figure):
-    assert here(figure, "--help") == 0
+    assert here(f"fig_{figure}.py", "--help") == 0
     help_text = capsys.readouterr().out
     assert "of Marschall & Teitel, PRE 97, 012905" in help_text
     assert "--out" in help_text

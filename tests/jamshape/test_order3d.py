@@ -3,13 +3,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from jamshape.order3d import (
-    body_axes,
     cubatic_order,
     directors,
     local_cubatic_order,
     local_nematic_order,
     nematic_order,
 )
+from jamshape.packing import body_axes
 
 
 def random_axes(n, seed=1):

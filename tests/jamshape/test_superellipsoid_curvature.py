@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from jamshape.order3d import body_axes
+from jamshape.packing import body_axes
 from jamshape.superellipsoid_curvature import (
     contact_curvatures,
     curvature_at_normals,

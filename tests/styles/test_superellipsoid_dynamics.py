@@ -32,7 +32,7 @@ from superellipsoid_scenes import (
 )
 
 from jamshape import _contact
-from jamshape.order3d import body_axes
+from jamshape.packing import body_axes
 from jamshape.shapes import superellipsoid_bodies
 
 pytestmark = pytest.mark.lammps

@@ -32,7 +32,8 @@ from superellipsoid_scenes import (
 )
 
 from jamshape.lammps_files import write_data
-from jamshape.order3d import body_axes, cubatic_order, directors, nematic_order
+from jamshape.order3d import cubatic_order, directors, nematic_order
+from jamshape.packing import body_axes
 
 pytestmark = pytest.mark.lammps
 
