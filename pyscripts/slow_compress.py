@@ -32,6 +32,8 @@ def parse() -> argparse.Namespace:
         ("--n", 256, "particles"),
         ("--kappa", 1e-8, "compression rate"),
         ("--phi-start", 0.8, "packing fraction where the fast compression ends"),
+        ("--phi-slow", 0.0, "packing fraction from which --kappa holds; up to there --kappa-before"),
+        ("--kappa-before", 1e-6, "compression rate up to --phi-slow"),
         ("--phi-end", 0.9, "packing fraction to reach"),
         ("--p-end", math.inf, "pressure to reach"),
         ("--seed", 1, "of the random start"),
@@ -48,7 +50,9 @@ def parse() -> argparse.Namespace:
 
 def run(options: argparse.Namespace) -> None:
     """Begin, or go on."""
-    protocol = Protocol(options.kappa, options.phi_end, options.p_end, options.tolerance,
+    slowly = (options.phi_slow, options.kappa)
+    kappa = ((0.0, options.kappa_before), slowly) if options.phi_slow else options.kappa
+    protocol = Protocol(kappa, options.phi_end, options.p_end, options.tolerance,
                         method=options.method)  # fmt: skip
     if not options.out.exists():
         made_from = {key: getattr(options, key) for key in ("alpha", "n", "seed")}

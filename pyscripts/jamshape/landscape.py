@@ -109,7 +109,7 @@ class Curvature(NamedTuple):
     """Second derivatives of the energy at one state."""
 
     hessian: Any
-    """(n, n) scipy.sparse CSC matrix in the coordinates of the landscape."""
+    """(n, n) scipy.sparse CSC matrix in the coordinates of the landscape; its whole diagonal is stored."""
     coupling: FloatArray
     """(n,) d(gradient)/d(strain)."""
     strain_hessian: float
@@ -243,10 +243,21 @@ class Landscape:
     def curvature(self, state: State, *, extended: bool = False) -> Curvature:
         """Evaluate all second derivatives; arguments and errors as `evaluate`."""
         found = self.derivatives(state, extended=extended)
-        bonds = np.einsum(
-            "cb,cbi,cbj->cij", found["stiffness"], found["gradient"], found["gradient"]
-        )
-        return self._assembled(found, bonds + found["curvature"])
+        blocks, places = _contracted(found), self._places(found)
+        r, D = found["separation"], self.particles.dimension
+
+        # The affine strain moves i from j by r_ij.
+        by_strain = np.einsum("cij,cj->ci", blocks[:, :, :D], r)
+        pulled, used = by_strain[:, places.variable] * places.scale, places.column >= 0
+        coupling = np.bincount(places.column[used], pulled[used], self.size)
+        strain_hessian = float(np.einsum("ci,ci->", by_strain[:, :D], r))
+        hessian = self._summed(blocks, places)
+        return Curvature(hessian, coupling, strain_hessian, self._rattlers(found))
+
+    def hessian(self, state: State) -> Any:
+        """Give the Hessian alone, in doubles, as in `Curvature`; errors as `evaluate`."""
+        found = self.derivatives(state)
+        return self._summed(_contracted(found), self._places(found))
 
     def derivatives(self, state: State, *, extended: bool = False) -> dict[str, NDArray[Any]]:
         """Give second derivatives contact by contact, as `Shape.derivatives`.
@@ -270,8 +281,7 @@ class Landscape:
         column[self._free] = np.arange(self.size)
         return column
 
-    def _assembled(self, found: dict[str, NDArray[Any]], blocks: FloatArray) -> Curvature:
-        """Put the blocks (C, v, v) of contacts, v their variables, into one matrix."""
+    def _places(self, found: dict[str, NDArray[Any]]) -> _Places:
         D = self.particles.dimension
         i, j = found["particles"].T
         n_turns = self._free.shape[1] - D
@@ -281,24 +291,21 @@ class Landscape:
         scale = np.tile(scale, (len(i), 1))
         scale[:, D : D + n_turns] = 1 / self._length_or_1[i, None]
         scale[:, 2 * D + n_turns :] = 1 / self._length_or_1[j, None]
+        column = np.concatenate([self._column[i], self._column[j]], axis=1)
+        return _Places(variable, scale, column)
 
-        columns = np.concatenate([self._column[i], self._column[j]], axis=1)
-        entries = blocks[:, variable[:, None], variable] * scale[:, :, None] * scale[:, None, :]
-        row = np.broadcast_to(columns[:, :, None], entries.shape)
-        column = np.broadcast_to(columns[:, None, :], entries.shape)
+    def _summed(self, blocks: FloatArray, places: _Places) -> Any:
+        """Put the blocks (C, v, v) of contacts, v their variables, into one matrix."""
+        scale, n = places.scale, self.size
+        entries = blocks[:, places.variable[:, None], places.variable]
+        entries = entries * scale[:, :, None] * scale[:, None, :]
+        row = np.broadcast_to(places.column[:, :, None], entries.shape)
+        column = np.broadcast_to(places.column[:, None, :], entries.shape)
         used = (row >= 0) & (column >= 0)
-        hessian = scipy.sparse.csc_matrix(
-            (entries[used], (row[used], column[used])), shape=(self.size, self.size)
-        )
-
-        # The affine strain moves i from j by r_ij.
-        r = found["separation"]
-        by_strain = np.einsum("cij,cj->ci", blocks[:, :, :D], r)
-        coupling = np.zeros(self.size)
-        pulled = by_strain[:, variable] * scale
-        np.add.at(coupling, columns[columns >= 0], pulled[columns >= 0])
-        strain_hessian = float(np.einsum("ci,ci->", by_strain[:, :D], r))
-        return Curvature(hessian, coupling, strain_hessian, self._rattlers(found))
+        diagonal = np.arange(n)
+        values = np.concatenate([entries[used], np.zeros(n)])
+        at = np.concatenate([row[used], diagonal]), np.concatenate([column[used], diagonal])
+        return scipy.sparse.csc_matrix((values, at), shape=(n, n))
 
     def _rattlers(self, found: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
         n, D = self.particles.n, self.particles.dimension
@@ -314,6 +321,25 @@ class Landscape:
         if self._pairs is None or self._pairs.outrun_by(state, self.shape.turning_radius):
             self._pairs = _Pairs.near(self.shape, state.packing(self.particles), state)
         return self._pairs
+
+
+class _Places(NamedTuple):
+    """Where the derivatives by the variables of C contacts belong among the coordinates."""
+
+    variable: IntArray
+    """(v,) the variable of each coordinate of two particles."""
+    scale: FloatArray
+    """(C, v) its derivative by the coordinate."""
+    column: IntArray
+    """(C, v) the coordinate, -1 for none."""
+
+
+def _contracted(found: dict[str, NDArray[Any]]) -> FloatArray:
+    """(C, v, v) second derivatives of the energies of contacts."""
+    gradient = found["gradient"]
+    bonds = np.einsum("cb,cbi,cbj->cij", found["stiffness"], gradient, gradient)
+    total: FloatArray = bonds + found["curvature"]
+    return total
 
 
 @dataclass(frozen=True, eq=False)

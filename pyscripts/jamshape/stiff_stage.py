@@ -4,42 +4,32 @@ In a box of given strain the stage displacement x obeys
 
     drag (x - x_0) / h + dU/dx = 0,
 
-the minimum of U + (x - x_0).drag (x - x_0) / 2h. Newton's method on it would factorise at every contact that
-opens or closes, and never end in the kinks of U. Here the factors of one Hessian serve many stages, and what
-has changed since is learnt from differences of gradients (BFGS), of which those across a kink
-tell that the kink is a stiff valley (Lewis & Overton, Math. Program. 141, 135 (2013)).
+the minimum of U + (x - x_0).drag (x - x_0) / 2h. Its gradient is smooth between the kinks where bonds open and
+close, and Newton's full steps find which of them do so for all bonds at once (semismooth Newton: Qi & Sun, Math.
+Program. 58, 353 (1993)), mostly in three or four evaluations; searching along each step would let through one
+bond at a time. Steps that go round in circles are given up soon: half of the time, the time step was too
+long anyway.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections import deque
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse
 
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
-from jamshape.minimise import Bracket, limited
-from jamshape.newton import LEAST_SHIFT, Factorisation
+from jamshape.minimise import limited
+from jamshape.newton import LEAST_SHIFT, Factorisation, add_to_diagonal
 from jamshape.packing import FloatArray
 
-# A stage is given up after so many directions, and factorises anew after so many that did not bring
-# it to its end.
-_DIRECTIONS = 24
-_PER_FACTORISATION = (3, 3, 3, 6, 24)
+# A stage is given up after so many directions.
+_DIRECTIONS = 8
 
-# Evaluations along one direction; the force along it is to fall to this fraction.
-_TRIES = 12
-_FALL = 0.5
-
-# A guess with a force above this multiple of the typical one has gone through a collision; to find the
-# solution from there takes longer than to come closer to the collision first.
+# A guess with a force above this multiple of the typical one has gone through a collision.
 _COLLISION = 30.0
-
-# Pairs of differences that are kept.
-_MEMORY = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +74,9 @@ class Stage:
 
     def factorise(self, x: FloatArray) -> Factorisation:
         """Factorise the Hessian of what is minimised, with a shift if it is not positive definite."""
-        stretch = scipy.sparse.diags(self.stretch)
-        hessian = self.landscape.curvature(self.state(x)).hessian
-        matrix = (stretch @ hessian @ stretch + scipy.sparse.diags(self.drag)).tocsc()
+        matrix, stretch = self.landscape.hessian(self.state(x)), self.stretch
+        matrix.data *= stretch[matrix.indices] * np.repeat(stretch, np.diff(matrix.indptr))
+        matrix = add_to_diagonal(matrix, self.drag)
         shift, least = 0.0, LEAST_SHIFT * float(np.abs(matrix.diagonal()).max())
         while True:
             try:
@@ -107,31 +97,6 @@ class Solution(NamedTuple):
     factorisations: int
     directions: int
     solved: bool
-
-
-class _Secants:
-    """Inverse Hessian by L-BFGS from the factors of an older one."""
-
-    def __init__(self) -> None:
-        self._pairs: deque[tuple[FloatArray, FloatArray, float]] = deque(maxlen=_MEMORY)
-
-    def learn(self, step: FloatArray, change: FloatArray) -> None:
-        product = float(step @ change)
-        if product > 0:
-            self._pairs.append((step, change, 1 / product))
-
-    def forget(self) -> None:
-        self._pairs.clear()
-
-    def solve(self, factors: Factorisation, right: FloatArray) -> FloatArray:
-        q, weights = right.copy(), []
-        for step, change, inverse in reversed(self._pairs):
-            weights.append(inverse * float(step @ q))
-            q -= weights[-1] * change
-        q = factors.solve(q)
-        for (step, change, inverse), weight in zip(self._pairs, reversed(weights), strict=True):
-            q += (weight - inverse * float(change @ q)) * step
-        return q
 
 
 class Units(NamedTuple):
@@ -159,7 +124,7 @@ class Units(NamedTuple):
 
 def solve(
     stage: Stage,
-    guess: FloatArray,
+    guesses: tuple[FloatArray, FloatArray],
     factors: Factorisation | None,
     units: Units,
     accuracy: float,
@@ -169,7 +134,8 @@ def solve(
     Parameters
     ----------
     stage : Stage
-    guess : (n,) array
+    guesses : two (n,) arrays
+        The second is for when particles collide at the first.
     factors : Factorisation, optional
         Of an earlier, similar stage.
     units : Units
@@ -179,52 +145,43 @@ def solve(
     Raises
     ------
     CrossingError
-        If spines cross at the guess.
+        If spines cross at the second guess.
     """
-    secants, made = _Secants(), 0
-    x = guess
-    evaluation, gradient = stage.evaluate(x)
-    if np.abs(gradient).max(initial=0.0) > _COLLISION * units.force:
-        return Solution(x, evaluation, factors, 0, 0, False)
-    if factors is None:
-        factors, made = stage.factorise(x), 1
-    since = 0
+    (x, evaluation, gradient), made = _begun(stage, guesses, units), 0
     for directions in range(_DIRECTIONS):
-        step = -secants.solve(factors, gradient)
-        if units.of(stage.landscape, step, -gradient, stage.drag) <= accuracy:
+        step, size = np.zeros_like(x), math.inf
+        if factors is not None:
+            step, size = _correction(stage, gradient, factors, units)
+        if factors is None or size > accuracy:
+            factors, made = stage.factorise(x), made + 1
+            step, size = _correction(stage, gradient, factors, units)
+        if size <= accuracy:
             return Solution(x + step, evaluation, factors, made, directions, True)
-        if since >= _PER_FACTORISATION[min(made, len(_PER_FACTORISATION) - 1)]:
-            factors, made, since = stage.factorise(x), made + 1, 0
-            secants.forget()
-            step = -factors.solve(gradient)
-        since += 1
-        step = limited(stage.landscape, step)
-        moved, evaluation, new = _search(stage, x, gradient, evaluation, step)
-        secants.learn(moved - x, new - gradient)
-        x, gradient = moved, new
+        x = x + limited(stage.landscape, step)
+        try:
+            evaluation, gradient = stage.evaluate(x)
+        except CrossingError:
+            break
     return Solution(x, evaluation, factors, made, directions, False)
 
 
-def _search(
-    stage: Stage, x: FloatArray, gradient: FloatArray, evaluation: Evaluation, step: FloatArray
+def _correction(
+    stage: Stage, gradient: FloatArray, factors: Factorisation, units: Units
+) -> tuple[FloatArray, float]:
+    """Newton's step, and its size."""
+    step = -factors.solve(gradient)
+    return step, units.of(stage.landscape, step, -gradient, stage.drag)
+
+
+def _begun(
+    stage: Stage, guesses: tuple[FloatArray, FloatArray], units: Units
 ) -> tuple[FloatArray, Evaluation, FloatArray]:
-    """Go along a direction until the force along it has fallen, or turns round in a short bracket."""
-    slope = float(gradient @ step)
-    bracket, factor = Bracket(slope), 1.0
-    best = x, evaluation, gradient
-    for _ in range(_TRIES):
-        tried = x + factor * step
-        try:
-            evaluation, new = stage.evaluate(tried)
-        except CrossingError:
-            factor = bracket.next(factor, np.inf)
-            continue
-        here = float(new @ step)
-        best = tried, evaluation, new
-        if abs(here) <= _FALL * abs(slope) or (here < 0 and factor == 1.0):
-            break
-        factor = bracket.next(factor, here)
-    return best
+    """Evaluate the guess to start from."""
+    with contextlib.suppress(CrossingError):
+        evaluation, gradient = stage.evaluate(guesses[0])
+        if np.abs(gradient).max(initial=0.0) <= _COLLISION * units.force:
+            return guesses[0], evaluation, gradient
+    return guesses[1], *stage.evaluate(guesses[1])
 
 
 def rms(landscape: Landscape, vector: FloatArray) -> float:
