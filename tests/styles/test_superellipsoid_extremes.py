@@ -28,7 +28,7 @@ from jamshape.contacts import find_contacts
 pytestmark = pytest.mark.lammps
 
 # Relative to the largest force (torque); flat faces and sharp tips magnify rounding.
-TOLERANCE = 1e-11
+TOLERANCE = 1e-12
 
 P = (0.55, 10.0)
 AXES = {"w 0.1": [1.0, 1.0, 0.1], "w 10": [0.2, 0.2, 2.0], "w 0.1 and 10": [0.1, 1.0, 10.0]}
