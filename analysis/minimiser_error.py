@@ -3,7 +3,7 @@
     python analysis/minimiser_error.py --n 256 --seconds 60 --out runs/minimisers
     python analysis/minimiser_error.py --states runs/sweep3d/p1_w0.6_1_seed1.h5 --out runs/minimisers3d
 
-States may also be packings of make_packing.py, superellipsoids as well (of which LAMMPS's minimiser is left out). For every other state a packing at u0 = 1e-15 is made first (kept in the folder, and taken from there the next
+States may also be packings of make_packing.py, superellipsoids as well. For every other state a packing at u0 = 1e-15 is made first (kept in the folder, and taken from there the next
 time); nearly round rods start from jammed discs, given spines of random directions. All minimisers then start from it, each particle displaced at random by 1e-6 of its radius, which
 is many overlaps; the two energy targets start from it compressed by a strain of 1e-6. A curve is the best residual so
 far; the table gives the seconds to residuals of 1e-4, 1e-6 and 1e-8, or what was reached, and how many times
@@ -168,10 +168,8 @@ def study(options: argparse.Namespace) -> dict[str, Row]:
         found: Row = {"minimisers": {}, "targets": {}}
         if path.exists():
             found = json.loads(path.read_text())
-        rods = state_of(name, options).shape_style == "spherocylinder"
-        minimisers = [m for m in MINIMISERS if rods or m != "lammps"]
         runs: list[tuple[str, str, Callable[..., Row], float]] = [
-            *(("minimisers", m, run_minimiser, options.seconds) for m in minimisers),
+            *(("minimisers", m, run_minimiser, options.seconds) for m in MINIMISERS),
             *(("targets", t, run_target, LONGER * options.seconds) for t in TARGETS),
         ]
         for group, method, run, seconds in runs:

@@ -172,6 +172,22 @@ nb::object superellipsoid_near(const Bodies &bodies_i, const Bodies &bodies_j, d
                                                : asked<3>(bodies_i, bodies_j, near);
 }
 
+template <int D> nb::object motions_sq(const Bodies &then, const Bodies &now)
+{
+  NewArray<double> bound({now.shape(0)});
+  for (std::size_t n = 0; n < now.shape(0); ++n) {
+    const auto before = body_at<D>(then, n), body = body_at<D>(now, n);
+    bound[n] = SuperellipsoidModel::motion_sq<D>(body.centre - before.centre, body,
+                                                 SuperellipsoidModel::pose<D>(before));
+  }
+  return bound.release();
+}
+
+nb::object superellipsoid_motion_sq(const Bodies &then, const Bodies &now)
+{
+  return dimension_of(then, now) == 2 ? motions_sq<2>(then, now) : motions_sq<3>(then, now);
+}
+
 nb::object superellipsoid_overlap(const Bodies &bodies_i, const Bodies &bodies_j)
 {
   const auto overlap = [](const auto &i, const auto &j) { return are_overlapping(i, j); };
@@ -258,6 +274,8 @@ void export_superellipsoid(nb::module_ &m)
       "centre of i to the tangency of the scaled bodies).");
   m.def("superellipsoid_near", &superellipsoid_near, "bodies_i"_a, "bodies_j"_a, "margin"_a,
         "Whether surfaces may be closer than `margin` (M,): false only where they are not.");
+  m.def("superellipsoid_motion_sq", &superellipsoid_motion_sq, "then"_a, "now"_a,
+        "Upper bound of the squared distance that any point of a body moved (M,).");
   m.def("superellipsoid_overlap", &superellipsoid_overlap, "bodies_i"_a, "bodies_j"_a,
         "Whether bodies share more than a point (M,).");
   m.def("superellipsoid_sums", &superellipsoid_sums, "diameters"_a, "exponent"_a, "position"_a,

@@ -234,13 +234,14 @@ struct SuperellipsoidModel {
   }
 
   /// Upper bound of the squared distance that any point of the body moved, |dx + sum x_k du_k| over
-  /// |x_k| <= a_k, by (a + b)^2 <= 2 a^2 + 2 b^2.
+  /// |x_k| <= a_k.
   template <int D>
   static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
   {
     double turned = 0.0;
     for (int k = 0; k < D; ++k) turned += now.semi_axes[k] * norm(now.axis[k] - then.axis[k]);
-    return turned == 0.0 ? norm_sq(shift) : 2.0 * (norm_sq(shift) + turned * turned);
+    const double moved = norm(shift) + turned;
+    return moved * moved;
   }
 };
 

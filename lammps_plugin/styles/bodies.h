@@ -33,12 +33,13 @@ template <class Model, int D> class StoredBodies {
   }
   void read_orientations(const ParticleView &view)
   {
-    for (std::size_t i = 0; i < now.size(); ++i) {
-      Model::template turn_to<D>(now[i], view.orientation(static_cast<int>(i)));
-    }
+    view.for_each_orientation(static_cast<int>(now.size()), [&](int i, const Quaternion &q) {
+      Model::template turn_to<D>(now[i], q);
+    });
   }
 
-  /// Poses kept for later.
+  /// Poses kept for later, exactly.
+  static constexpr double POSE_ERROR = 0.0;
   struct Pose {
     typename Model::template Pose<D> of_model;
   };
@@ -55,8 +56,7 @@ template <class Model, int D> class StoredBodies {
 };
 
 /// The same for large bodies: each kind of shape (semi-axes and p) is kept once, and a body put
-/// together where it is asked for, from LAMMPS's positions and the gathered orientations (which
-/// must be those of own and ghost particles then).
+/// together where it is asked for, from LAMMPS's positions and the orientations read last.
 template <class Model, int D> class AssembledBodies {
  public:
   using Body = typename Model::template Body<D>;
@@ -68,9 +68,7 @@ template <class Model, int D> class AssembledBodies {
   {
     Body body = kinds[kind[i]];
     std::copy_n(centres[i], D, body.centre.c);
-    if (orientations) {
-      Model::template turn_to<D>(body, orientations->orientation(static_cast<int>(i)));
-    }
+    if (!orientations.empty()) Model::template turn_to<D>(body, orientations[i]);
     return body;
   }
 
@@ -79,7 +77,7 @@ template <class Model, int D> class AssembledBodies {
     resize_closely(kind, n);
     kinds.clear();
     number_of.clear();
-    orientations = nullptr;
+    orientations.clear();
   }
   void set_shape(std::size_t i, const Shape &shape)
   {
@@ -90,30 +88,44 @@ template <class Model, int D> class AssembledBodies {
   }
 
   void read_centres(const double *const *x) { centres = x; }
-  void read_orientations(const ParticleView &view) { orientations = &view; }
+  void read_orientations(const ParticleView &view)
+  {
+    resize_closely(orientations, size());
+    view.for_each_orientation(static_cast<int>(size()),
+                              [&](int i, const Quaternion &q) { orientations[i] = q; });
+  }
 
   struct Pose {
     Vec<D> centre;
-    Quaternion orientation;
+    float w, i, j, k;
   };
   Pose pose(std::size_t i) const
   {
-    Pose pose{{}, {1.0, 0.0, 0.0, 0.0}};
+    Pose pose{{}, 1.0F, 0.0F, 0.0F, 0.0F};
     std::copy_n(centres[i], D, pose.centre.c);
-    if (orientations) pose.orientation = orientations->orientation(static_cast<int>(i));
+    if (!orientations.empty()) {
+      const Quaternion &q = orientations[i];
+      pose.w = static_cast<float>(q.w);
+      pose.i = static_cast<float>(q.i);
+      pose.j = static_cast<float>(q.j);
+      pose.k = static_cast<float>(q.k);
+    }
     return pose;
   }
+  /// By how far a point of a body at most is off in a pose, over the body's bounding radius.
+  static constexpr double POSE_ERROR = 1e-6;
   typename Model::template Pose<D> pose_of(std::size_t i, const Pose &pose) const
   {
     Body body = kinds[kind[i]];
     body.centre = pose.centre;
-    Model::template turn_to<D>(body, pose.orientation);
+    Model::template turn_to<D>(body, {pose.w, pose.i, pose.j, pose.k});
     return Model::template pose<D>(body);
   }
 
   double memory_usage() const
   {
     return static_cast<double>(kind.capacity() * sizeof(int) +
+                               orientations.capacity() * sizeof(Quaternion) +
                                kinds.size() * (sizeof(Body) + PER_ENTRY));
   }
 
@@ -124,7 +136,7 @@ template <class Model, int D> class AssembledBodies {
   std::vector<Body> kinds;
   std::map<std::tuple<double, double, double, double>, std::size_t> number_of;
   const double *const *centres = nullptr;
-  const ParticleView *orientations = nullptr;
+  std::vector<Quaternion> orientations;  // none where no particle turns
 };
 
 /// Bodies larger than this are put together when needed.

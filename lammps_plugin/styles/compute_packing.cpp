@@ -124,9 +124,8 @@ void ComputePacking::compute_density_and_stress()
     volume *= domain->prd[k];
     trace += pair->virial[k];
   }
-  const std::vector<Vec<3>> semi_axes = pair->particle_view().semi_axes(atom->nlocal);
   for (int i = 0; i < atom->nlocal; ++i) {
-    measure += pair->drag(semi_axes[i], atom->type[i]).measure;
+    measure += pair->drag(pair->particle_view().semi_axes(i), atom->type[i]).measure;
   }
   vector[PHI] = sum(measure) / volume;
   vector[U] = sum(pair->eng_vdwl) / volume;
@@ -135,12 +134,10 @@ void ComputePacking::compute_density_and_stress()
 
 void ComputePacking::compute_order()
 {
-  ParticleView &view = pair->particle_view();
-  const std::vector<Vec<3>> semi_axes = view.semi_axes(atom->nlocal);
-  view.read_orientations(atom->nlocal);
+  const ParticleView &view = pair->particle_view();
   std::vector<Vec<3>> axes;  // of particles that have a direction
   for (int i = 0; i < atom->nlocal; ++i) {
-    const std::optional<int> along = pair->director(semi_axes[i], atom->type[i]);
+    const std::optional<int> along = pair->director(view.semi_axes(i), atom->type[i]);
     if (along) axes.push_back(body_axis(view.orientation(i), *along));
   }
   const double n = sum(static_cast<double>(axes.size()));
@@ -186,14 +183,12 @@ void ComputePacking::compute_cubatic_order()
 {
   vector[C_4] = 0.0;
   if (domain->dimension == 2 || !pair->has_three_axes()) return;
-  ParticleView &view = pair->particle_view();
-  view.read_orientations(atom->nlocal);
   std::vector<Vec<3>> axes, mine;
   const LAMMPS_NS::bigint stride = 1 + (atom->natoms - 1) / MOST_TRIED;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    for (int k = 0; k < 3; ++k) axes.push_back(body_axis(view.orientation(i), k));
+  pair->particle_view().for_each_orientation(atom->nlocal, [&](int i, const Quaternion &q) {
+    for (int k = 0; k < 3; ++k) axes.push_back(body_axis(q, k));
     if (atom->tag[i] % stride == 0) mine.insert(mine.end(), axes.end() - 3, axes.end());
-  }
+  });
   const std::vector<Vec<3>> tried = gather(mine, world);
   std::vector<double> sums(tried.size(), 0.0), all(tried.size());
   for (std::size_t t = 0; t < tried.size(); ++t) {
@@ -258,14 +253,13 @@ void ComputePacking::compute_contacts()
 
 void ComputePacking::compute_residuals(double mean_bond_force)
 {
-  const std::vector<Vec<3>> semi_axes = pair->particle_view().semi_axes(atom->nlocal);
   double sum_sq = 0.0, largest_sq = 0.0, largest_torque = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) {
     const double *f = atom->f[i], *t = atom->torque[i];
     const double force_sq = f[0] * f[0] + f[1] * f[1] + f[2] * f[2];
     sum_sq += force_sq;
     largest_sq = std::max(largest_sq, force_sq);
-    const Vec<3> moment = pair->drag(semi_axes[i], atom->type[i]).moment;
+    const Vec<3> moment = pair->drag(pair->particle_view().semi_axes(i), atom->type[i]).moment;
     const double gyration = std::sqrt(std::max({moment[0], moment[1], moment[2]}));
     largest_torque =
         std::max(largest_torque, std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) / gyration);

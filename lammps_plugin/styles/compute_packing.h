@@ -10,15 +10,16 @@ namespace jamshape {
 /// compute ID all packing
 ///
 /// Global vector, all intensive:
+///
 ///    1 phi       packing fraction
 ///    2 u         energy density U / L^d
 ///    3 p         pressure, trace of the virial / (d L^d)
 ///    4 z         bonds per non-rattler, a side-to-side contact counted as two
-///    5 S_2       nematic order (2D: Marschall & Teitel Eq. 16; 3D: largest eigenvalue of the Q
-///    tensor) 6 S_4       tetratic order (2D: Eq. 16; 3D: mean P_4 about the nematic director) 7
-///    fmax      largest net force on a particle over the mean bond force 8 frms      root mean
-///    square of the same 9 z_single  contacts per non-rattler, a side-to-side contact counted as
-///    one
+///    5 S_2       nematic order (2D: Marschall & Teitel Eq. 16; 3D: largest eigenvalue of Q)
+///    6 S_4       tetratic order (2D: Eq. 16; 3D: mean P_4 about the nematic director)
+///    7 fmax      largest net force on a particle over the mean bond force
+///    8 frms      root mean square of the same
+///    9 z_single  contacts per non-rattler, a side-to-side contact counted as one
 ///   10 rattlers  their number
 ///   11 bonds     the number of all bonds, a side-to-side contact counted as two
 ///   12 overlap   largest overlap 1 - r/d

@@ -55,7 +55,7 @@ OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineB
 {
 }
 
-OverdampedFlow::~OverdampedFlow() { memory->destroy(values); }
+OverdampedFlow::~OverdampedFlow() { memory->sfree(values); }
 
 /* ----------------------------------------------------------------------
    set-up
@@ -88,12 +88,11 @@ bool OverdampedFlow::begin_run()
 
 void OverdampedFlow::measure_particles()
 {
-  const std::vector<Vec<3>> semi_axes = pair->particle_view().semi_axes(atom->nlocal);
   std::map<std::tuple<int, double, double, double>, std::size_t> number_of;
   mobilities.clear();
-  resize_closely(kind, semi_axes.size());
-  for (std::size_t i = 0; i < semi_axes.size(); ++i) {
-    const Vec<3> &axes = semi_axes[i];
+  resize_closely(kind, static_cast<std::size_t>(atom->nlocal));
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const Vec<3> axes = pair->particle_view().semi_axes(i);
     const auto found = number_of.emplace(std::make_tuple(atom->type[i], axes[0], axes[1], axes[2]),
                                          mobilities.size());
     if (found.second) mobilities.push_back(mobility_of(axes, atom->type[i]));
@@ -125,7 +124,7 @@ Rate OverdampedFlow::mobility_times(int i, const Vec<3> &force, const Vec<3> &to
 {
   const Mobility &m = mobilities[kind[i]];
   if (dimension == 2) return {m.shift * force, {{0.0, 0.0, m.turn[2] * torque[2]}}};
-  if (!pair->particles_turn()) return {m.shift * force, {}};  // nobody reads orientations then
+  if (!pair->particles_turn()) return {m.shift * force, {}};
   Vec<3> turn{};
   const Quaternion q = pair->particle_view().orientation(i);
   for (int b = 0; b < 3; ++b) {
@@ -172,24 +171,21 @@ void add(Rate &to, double weight, const Rate &rate)
 
 }  // namespace
 
-Rate OverdampedFlow::stored_rate(int i) const
-{
-  return read_rate(values[i] + dimension, dimension);
-}
+Rate OverdampedFlow::stored_rate(int i) const { return read_rate(row(i) + dimension, dimension); }
 
 Rate OverdampedFlow::register_of(int i, int which) const
 {
-  return read_rate(values[i] + dimension + n_rates + n_turns + which * n_rates, dimension);
+  return read_rate(row(i) + dimension + n_rates + n_turns + which * n_rates, dimension);
 }
 
 Vec<3> OverdampedFlow::read_coordinates(int i) const
 {
-  return {{values[i][0], values[i][1], dimension == 2 ? 0.0 : values[i][2]}};
+  return {{row(i)[0], row(i)[1], dimension == 2 ? 0.0 : row(i)[2]}};
 }
 
 Quaternion OverdampedFlow::orientation_at_start(int i) const
 {
-  const double *q = values[i] + dimension + n_rates;
+  const double *q = row(i) + dimension + n_rates;
   if (dimension == 2) return {q[0], 0.0, 0.0, q[1]};
   return {q[0], q[1], q[2], q[3]};
 }
@@ -200,12 +196,9 @@ Quaternion OverdampedFlow::orientation_at_start(int i) const
 
 void OverdampedFlow::hold_start()
 {
-  const bool turn = pair->particles_turn();
-  if (turn || dimension == 3) pair->particle_view().read_orientations(atom->nlocal);
-  if (!turn) return;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    const Quaternion q = pair->particle_view().orientation(i);
-    double *to = values[i] + dimension + n_rates;
+  if (!pair->particles_turn()) return;
+  pair->particle_view().for_each_orientation(atom->nlocal, [&](int i, const Quaternion &q) {
+    double *to = row(i) + dimension + n_rates;
     to[0] = q.w;
     if (dimension == 2) {
       to[1] = q.k;
@@ -214,7 +207,7 @@ void OverdampedFlow::hold_start()
       to[2] = q.j;
       to[3] = q.k;
     }
-  }
+  });
 }
 
 /// Without the components that are zero in the plane.
@@ -228,10 +221,7 @@ void OverdampedFlow::write_rate(double *to, const Rate &rate) const
   }
 }
 
-void OverdampedFlow::store_rate(int i, const Rate &rate)
-{
-  write_rate(values[i] + dimension, rate);
-}
+void OverdampedFlow::store_rate(int i, const Rate &rate) { write_rate(row(i) + dimension, rate); }
 
 void OverdampedFlow::store_rates(double scale)
 {
@@ -285,7 +275,7 @@ double OverdampedFlow::place(int i, const Move &m, bool is_last)
     difference = m.present * norm(present_rate(i).shift - m.to * stored_rate(i).shift);
   }
   if (n_registers > 0 && !is_last) {
-    double *const last = values[i] + dimension + n_rates + n_turns;
+    double *const last = row(i) + dimension + n_rates + n_turns;
     std::copy_n(last, n_rates, last + n_rates);
     write_rate(last, moved);
   }
@@ -293,7 +283,7 @@ double OverdampedFlow::place(int i, const Move &m, bool is_last)
   const Vec<3> x = box.position(coordinates, atom->image[i], m.to);
   for (int k = 0; k < dimension; ++k) {
     atom->x[i][k] = x[k];
-    if (is_last) values[i][k] = coordinates[k];
+    if (is_last) row(i)[k] = coordinates[k];
   }
   if (!pair->particles_turn()) return difference;
   const Quaternion q = orientation_at_start(i);
@@ -304,13 +294,10 @@ double OverdampedFlow::place(int i, const Move &m, bool is_last)
 
 void OverdampedFlow::move(const Move &m, bool is_last)
 {
-  ParticleView &view = pair->particle_view();
-  if (pair->particles_turn()) view.read_orientations(atom->nlocal);
   double largest = 0.0;
   farthest = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) largest = std::max(largest, place(i, m, is_last));
   if (!can_retry) largest_difference = largest;
-  if (pair->particles_turn()) view.write_orientations(atom->nlocal);
 }
 
 bool OverdampedFlow::move_by(const Move &m)
@@ -333,7 +320,6 @@ double OverdampedFlow::rms_of(const Move &m)
 {
   double mine[4] = {0.0, 0.0, 0.0, 0.0}, all[4];
   largest_difference = 0.0;
-  if (dimension == 3) pair->particle_view().read_orientations(atom->nlocal);
   for (int i = 0; i < atom->nlocal; ++i) {
     const Rate stored = stored_rate(i);
     if (norm(stored.shift) == 0.0 && norm(vec3(atom->f[i])) == 0.0) continue;
@@ -446,19 +432,20 @@ double OverdampedFlow::sum(double mine) const
   return all;
 }
 
-// The direction of the Lanczos iteration takes the place of the stored rates, free between steps.
-
 int OverdampedFlow::pack_direction(int n, const int *list, double *buf) const
 {
-  for (int k = 0; k < n; ++k) buf = std::copy_n(values[list[k]] + dimension, n_rates, buf);
+  for (int k = 0; k < n; ++k) buf = std::copy_n(&directions[n_rates * list[k]], n_rates, buf);
   return n * n_rates;
 }
 
 void OverdampedFlow::unpack_direction(int n, int first, const double *buf)
 {
-  for (int i = first; i < first + n; ++i, buf += n_rates) {
-    std::copy_n(buf, n_rates, values[i] + dimension);
-  }
+  std::copy_n(buf, n_rates * n, &directions[n_rates * first]);
+}
+
+Rate OverdampedFlow::direction(int i) const
+{
+  return read_rate(&directions[n_rates * i], dimension);
 }
 
 /// Adds stiffness times the direction, over all bonds, to the force arrays of own atoms.
@@ -474,7 +461,7 @@ void OverdampedFlow::apply_stiffness()
     }
   };
   pair->for_each_bond([&](const LocalBond &b) {
-    const Rate of_i = stored_rate(b.i), of_j = stored_rate(b.j);
+    const Rate of_i = direction(b.i), of_j = direction(b.j);
     const Vec<3> lever_i = cross(b.arm_i, b.normal), lever_j = cross(b.arm_j, b.normal);
     const double opening =
         dot(b.normal, of_i.shift - of_j.shift) + dot(lever_i, of_i.turn) - dot(lever_j, of_j.turn);
@@ -519,11 +506,10 @@ void OverdampedFlow::add_force(int i, double factor, const Rate &rate)
 double OverdampedFlow::largest_rate(double tolerance)
 {
   const int nlocal = atom->nlocal;
-  const std::size_t size = static_cast<std::size_t>(n_rates) * nlocal;
-  pair->particle_view().read_orientations(nlocal);
-  std::vector<double> saved(size);
+  // Forces wait in the places of the stored rates, which are free between steps.
+  directions.resize(n_rates * (nlocal + static_cast<std::size_t>(atom->nghost)));
   for (int i = 0; i < nlocal; ++i) {
-    pack_force(i, &saved[n_rates * i]);
+    pack_force(i, row(i) + dimension);
     double start[6];
     for (int k = 0; k < n_rates; ++k) start[k] = hashed(atom->tag[i], k);
     unpack_force(i, start);
@@ -545,14 +531,15 @@ double OverdampedFlow::largest_rate(double tolerance)
       off_diagonal.push_back(length);
     }
     for (int i = 0; i < nlocal; ++i) {
-      const Rate before = stored_rate(i), rate = present_rate(i);
-      store_rate(i, {(1.0 / length) * rate.shift, (1.0 / length) * rate.turn});
+      const Rate before = direction(i), rate = present_rate(i);
+      write_rate(&directions[n_rates * i],
+                 {(1.0 / length) * rate.shift, (1.0 / length) * rate.turn});
       set_force(i, step == 0 ? 0.0 : -length, before);
     }
     apply_stiffness();
     mine = 0.0;
     for (int i = 0; i < nlocal; ++i) {
-      const Rate rate = stored_rate(i);
+      const Rate rate = direction(i);
       mine += dot(rate.shift, vec3(atom->f[i])) + dot(rate.turn, vec3(atom->torque[i]));
     }
     diagonal.push_back(sum(mine));
@@ -562,10 +549,11 @@ double OverdampedFlow::largest_rate(double tolerance)
       found = better;
     }
     for (int i = 0; i < nlocal; ++i) {
-      add_force(i, -diagonal.back(), stored_rate(i));
+      add_force(i, -diagonal.back(), direction(i));
     }
   }
-  for (int i = 0; i < nlocal; ++i) unpack_force(i, &saved[n_rates * i]);
+  for (int i = 0; i < nlocal; ++i) unpack_force(i, row(i) + dimension);
+  directions = {};
   return largest_eigenvalue(diagonal, off_diagonal);
 }
 
@@ -598,7 +586,6 @@ void OverdampedFlow::stop(const std::string &found) const
 
 double OverdampedFlow::dissipated_power() const
 {
-  pair->particle_view().read_orientations(atom->nlocal);
   double mine = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) {
     const Rate rate = present_rate(i);
@@ -620,27 +607,28 @@ double OverdampedFlow::stage_difference() const
 
 void OverdampedFlow::grow(int nmax)
 {
-  memory->grow(values, nmax, width(), "overdamped/affine:values");
+  const bigint size = static_cast<bigint>(sizeof(double)) * width() * nmax;
+  values = static_cast<double *>(memory->srealloc(values, size, "overdamped/affine:values"));
 }
 
-void OverdampedFlow::copy(int from, int to) { std::copy_n(values[from], width(), values[to]); }
+void OverdampedFlow::copy(int from, int to) { std::copy_n(row(from), width(), row(to)); }
 
 void OverdampedFlow::set(int i)
 {
   const Vec<3> y = box.reference(atom->x[i], atom->image[i], box.scale(update->ntimestep));
-  std::fill_n(values[i], width(), 0.0);
-  std::copy_n(y.c, dimension, values[i]);
+  std::fill_n(row(i), width(), 0.0);
+  std::copy_n(y.c, dimension, row(i));
 }
 
 int OverdampedFlow::pack(int i, double *buf) const
 {
-  std::copy_n(values[i], width(), buf);
+  std::copy_n(row(i), width(), buf);
   return width();
 }
 
 int OverdampedFlow::unpack(int i, const double *buf)
 {
-  std::copy_n(buf, width(), values[i]);
+  std::copy_n(buf, width(), row(i));
   return width();
 }
 

@@ -78,7 +78,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /// derivative of the energy without the prestress), by Lanczos' method, from below. Kinks of the
   /// energy, where differences of forces blow up, do not enter. The prestress is smaller by the
   /// overlap, but for long nearly parallel rods in 3D, whose true rate may be twice this one.
-  /// Ends when an iteration adds less than this fraction. Needs the place of the stored rates.
+  /// Ends when an iteration adds less than this fraction. Takes the place of the stored rates.
   double largest_rate(double tolerance = 0.0);
   /// Means over all bonds.
   struct Touching {
@@ -108,7 +108,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   int pack(int i, double *buf) const;
   int unpack(int i, const double *buf);
   int n_coordinates() const { return dimension; }
-  double *coordinates(int i) { return values[i]; }
+  double *coordinates(int i) { return row(i); }
   int width() const { return dimension + n_rates + n_turns + n_registers * n_rates; }
   double memory_usage() const;
 
@@ -124,7 +124,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   PairContact *pair;
   // Per atom: coordinates, rates of the stored stage, orientation at the step's start, registers
   // (displacements of the last move and of the one before).
-  double **values;
+  double *values;
   bool can_retry;
   double farthest;  // of the last move, over what is allowed
   double seen;
@@ -141,6 +141,9 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   };
   std::vector<Mobility> mobilities;  // of each kind of particle
   std::vector<int> kind;             // of own atoms
+  std::vector<double> directions;    // of own and ghost atoms, while the Lanczos iteration runs
+
+  double *row(int i) const { return values + static_cast<std::size_t>(width()) * i; }
 
   Mobility mobility_of(const Vec<3> &semi_axes, int type) const;
   /// Force and torque (in the places of a rate) that move a particle at a rate.
@@ -150,6 +153,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   Rate stored_rate(int i) const;
   Rate register_of(int i, int which) const;
   void store_rate(int i, const Rate &rate);
+  Rate direction(int i) const;
   void write_rate(double *to, const Rate &rate) const;
   Rate sum_of(int i, const Move &move) const;
   double length_of(int i, const Rate &of, double scale) const;

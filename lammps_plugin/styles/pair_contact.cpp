@@ -78,20 +78,20 @@ void PairContact::require_arguments(bool is_right, int narg) const
 /// cutoffs follow from the particles themselves, never from an input that could be too short.
 void PairContact::measure_particles()
 {
-  const std::vector<Vec<3>> semi_axes = particles.semi_axes(atom->nlocal);
   std::vector<double> mine(atom->ntypes + 1, 0.0);
   int turning = 0;
   for (int i = 0; i < atom->nlocal; ++i) {
     const int type = atom->type[i];
-    if (!is_valid_shape(semi_axes[i], type)) {
-      const Vec<3> diameters = 2.0 * semi_axes[i];
+    const Vec<3> semi_axes = particles.semi_axes(i);
+    if (!is_valid_shape(semi_axes, type)) {
+      const Vec<3> diameters = 2.0 * semi_axes;
       error->one(FLERR, style_name() + " found atom " + std::to_string(atom->tag[i]) +
                             " with diameters " + std::to_string(diameters[0]) + " " +
                             std::to_string(diameters[1]) + " " + std::to_string(diameters[2]) +
                             ", expected that " + shape_rule() + ": correct its shape.");
     }
-    mine[type] = std::max(mine[type], bounding_radius(semi_axes[i], type));
-    turning |= turns(semi_axes[i], type);
+    mine[type] = std::max(mine[type], bounding_radius(semi_axes, type));
+    turning |= turns(semi_axes, type);
   }
   largest_radius.resize(mine.size());
   MPI_Allreduce(mine.data(), largest_radius.data(), static_cast<int>(mine.size()), MPI_DOUBLE,
@@ -150,17 +150,13 @@ void PairContact::setup()
   }
 }
 
-void PairContact::require_same_bounds(const std::vector<Vec<3>> &semi_axes) const
+void PairContact::require_same_bound(int i, const Vec<3> &semi_axes) const
 {
-  for (std::size_t i = 0; i < semi_axes.size(); ++i) {
-    const int type = atom->type[i];
-    if (bounding_radius(semi_axes[i], type) > largest_radius[type]) {
-      error->one(FLERR,
-                 "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
-                     " larger than at the start of the run, so the ghost cutoff is too short: "
-                     "do not use 'pre no' in the run after changing shapes.");
-    }
-  }
+  const int type = atom->type[i];
+  if (bounding_radius(semi_axes, type) <= largest_radius[type]) return;
+  error->one(FLERR, "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+                        " larger than at the start of the run, so the ghost cutoff is too short: "
+                        "do not use 'pre no' in the run after changing shapes.");
 }
 
 void PairContact::require_in_plane(int n) const
@@ -251,7 +247,7 @@ void PairContact::read_restart(FILE *fp)
 
 double PairContact::memory_usage()
 {
-  return Pair::memory_usage() + particles.memory_usage() +
+  return Pair::memory_usage() +
          static_cast<double>((x_extra.capacity() + f_extra.capacity() + gyration.capacity()) *
                              sizeof(double));
 }
@@ -268,10 +264,9 @@ void PairContact::min_xf_pointers(int, double **x, double **f)
   const std::size_t n = static_cast<std::size_t>(atom->nlocal);
   x_extra.resize(std::max<std::size_t>(1, n * rotations()));
   f_extra.resize(x_extra.size());
-  const std::vector<Vec<3>> semi_axes = particles.semi_axes(atom->nlocal);
   gyration.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Vec<3> moment = drag(semi_axes[i], atom->type[i]).moment;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const Vec<3> moment = drag(particles.semi_axes(i), atom->type[i]).moment;
     gyration[i] = std::sqrt(std::max({moment[0], moment[1], moment[2]}));
   }
   *x = x_extra.data();
@@ -283,7 +278,6 @@ void PairContact::min_xf_get(int)
   double *x = nullptr, *f = nullptr;
   min_xf_pointers(0, &x, &f);
   const int nlocal = atom->nlocal;
-  particles.read_orientations(nlocal);
   for (int i = 0; i < nlocal; ++i) {
     const Quaternion q = particles.orientation(i);
     const double *torque = atom->torque[i];
@@ -304,7 +298,6 @@ void PairContact::min_xf_get(int)
 void PairContact::min_x_set(int)
 {
   const int nlocal = atom->nlocal;
-  particles.read_orientations(nlocal);
   for (int i = 0; i < nlocal; ++i) {
     const double scale = 1.0 / gyration[i];
     const Quaternion q =
@@ -313,7 +306,6 @@ void PairContact::min_x_set(int)
             : rotation_by(scale * Vec<3>{{x_extra[3 * i], x_extra[3 * i + 1], x_extra[3 * i + 2]}});
     particles.set_orientation(i, q);
   }
-  particles.write_orientations(nlocal);
 }
 
 }  // namespace jamshape

@@ -57,7 +57,7 @@ class PairContact : public LAMMPS_NS::Pair {
   /// Each bond once over all ranks and with tag[i] <= tag[j].
   std::vector<LocalBond> reported_bonds();
 
-  ParticleView &particle_view() { return particles; }
+  const ParticleView &particle_view() const { return particles; }
 
  protected:
   ParticleView particles;
@@ -81,7 +81,7 @@ class PairContact : public LAMMPS_NS::Pair {
 
   [[noreturn]] void stop_at_crossing(int i, int j);
   [[noreturn]] void stop_at_unconverged(int i, int j);
-  void require_same_bounds(const std::vector<Vec<3>> &semi_axes) const;
+  void require_same_bound(int i, const Vec<3> &semi_axes) const;
   void require_in_plane(int n) const;
 
   /// Whether the pair (own i, j) is this rank's to report: with newton off both owners see it.

@@ -125,7 +125,7 @@ template <class Model> class PairContactOf : public PairContact {
   Bodies<3> in_3d;
   double margin = 0.0;
   std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
-  std::vector<float> last_normal;   // D a close pair, for shapes that start from it; zeros at first
+  std::vector<float> last_normal;   // D a close pair, if contacts start from it; zeros at first
 
   template <int D> Bodies<D> &all()
   {
@@ -184,11 +184,11 @@ template <class Model> class PairContactOf : public PairContact {
                              const typename Model::Law &law)
   {
     if constexpr (StartsFromNormal<D>::value) {
-      float *const last = &last_normal[static_cast<std::size_t>(D) * k];
-      Vec<D> normal;
-      for (int a = 0; a < D; ++a) normal[a] = last[a];
+      float *const last = any_turns ? &last_normal[static_cast<std::size_t>(D) * k] : nullptr;
+      Vec<D> normal{};
+      for (int a = 0; last && a < D; ++a) normal[a] = last[a];
       const Contact<D> contact = contact_of(i, j, law, normal);
-      for (int a = 0; a < D; ++a) last[a] = static_cast<float>(normal[a]);
+      for (int a = 0; last && a < D; ++a) last[a] = static_cast<float>(normal[a]);
       return contact;
     } else {
       return contact_of(i, j, law);
@@ -237,12 +237,12 @@ template <class Model> class PairContactOf : public PairContact {
 
   template <int D> void read_shapes()
   {
-    const std::vector<Vec<3>> semi_axes = particles.semi_axes(n_all());
-    require_same_bounds(semi_axes);
     BodiesOf<Model, D> &bodies = all<D>().now;
-    bodies.begin_shapes(semi_axes.size());
-    for (std::size_t i = 0; i < semi_axes.size(); ++i) {
-      bodies.set_shape(i, *shape_from(semi_axes[i], atom->type[i]));
+    bodies.begin_shapes(static_cast<std::size_t>(n_all()));
+    for (int i = 0; i < n_all(); ++i) {
+      const Vec<3> semi_axes = particles.semi_axes(i);
+      require_same_bound(i, semi_axes);
+      bodies.set_shape(i, *shape_from(semi_axes, atom->type[i]));
     }
   }
 
@@ -250,9 +250,7 @@ template <class Model> class PairContactOf : public PairContact {
   {
     BodiesOf<Model, D> &bodies = all<D>().now;
     bodies.read_centres(atom->x);
-    if (!any_turns) return;
-    particles.read_orientations(n_all());
-    bodies.read_orientations(particles);
+    if (any_turns) bodies.read_orientations(particles);
   }
 
   template <int D> void choose_pairs()
@@ -272,7 +270,7 @@ template <class Model> class PairContactOf : public PairContact {
       first.push_back(static_cast<int>(partner.size()));
     }
     if (partner.capacity() > partner.size() + partner.size() / 4) partner.shrink_to_fit();
-    if constexpr (StartsFromNormal<D>::value) {
+    if (StartsFromNormal<D>::value && any_turns) {
       last_normal.clear();
       resize_closely(last_normal, D * partner.size());
     }
@@ -294,7 +292,8 @@ template <class Model> class PairContactOf : public PairContact {
       scale[k] = domain->prd[k] / bodies.box_then[k];
       strain = std::max(strain, std::abs(1.0 - scale[k]));
     }
-    const double left = margin - strain * (cutforce + margin);
+    const double left =
+        margin - strain * (cutforce + margin) - BodiesOf<Model, D>::POSE_ERROR * cutforce;
     if (left <= 0.0) return true;
     double most_sq = 0.0;
     for (std::size_t i = 0; i < bodies.then.size(); ++i) {
@@ -313,7 +312,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   template <int D> void visit_bonds(const std::function<void(const LocalBond &)> &visit)
   {
-    read_poses<D>();  // others gather orientations in the same place
+    read_poses<D>();
     const BodiesOf<Model, D> &bodies = all<D>().now;
     for (int n = 0; n < list->inum; ++n) {
       const int i = list->ilist[n];

@@ -6,7 +6,9 @@
 #include "compat.h"
 #include "pointers.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -20,7 +22,7 @@ template <class T> void resize_closely(std::vector<T> &values, std::size_t n)
 }
 
 /// The only reader and writer of how LAMMPS stores ellipsoids: orientations and semi-axes of own
-/// and ghost atoms, gathered into plain arrays.
+/// and ghost atoms. It keeps nothing: a copy of all orientations would be a tenth of the memory.
 class ParticleView : protected LAMMPS_NS::Pointers {
  public:
   explicit ParticleView(LAMMPS_NS::LAMMPS *lmp) : Pointers(lmp) {}
@@ -28,27 +30,29 @@ class ParticleView : protected LAMMPS_NS::Pointers {
   /// Stops with one sentence unless every atom is an ellipsoid. `style` is named in it.
   void require_ellipsoids(const std::string &style) const;
 
-  /// Gathers the orientations of atoms 0 to n - 1 (own first, then ghosts).
-  void read_orientations(int n);
+  Vec<3> semi_axes(int i) const;
   Quaternion orientation(int i) const;
+  void set_orientation(int i, const Quaternion &q) const;
 
-  /// The semi-axes of atoms 0 to n - 1.
-  std::vector<Vec<3>> semi_axes(int n);
-
-  /// Changes an orientation that was read, and gives all of them back to LAMMPS.
-  void set_orientation(int i, const Quaternion &q);
-  void write_orientations(int n);
-
-  double memory_usage() const;
+  /// Shows the orientations of atoms 0 to n - 1 (own first, then ghosts) as `visit(i, q)`: for
+  /// many atoms less work than to ask for each.
+  template <class Visit> void for_each_orientation(int n, const Visit &visit) const
+  {
+    int index[BLOCK];
+    double packed[PER_ORIENTATION * BLOCK];
+    for (int begin = 0; begin < n; begin += BLOCK) {
+      const int size = std::min(BLOCK, n - begin);
+      std::iota(index, index + size, begin);
+      ellipsoids()->pack_comm_bonus(size, index, packed);
+      for (int k = 0; k < size; ++k) visit(begin + k, quaternion(packed + PER_ORIENTATION * k));
+    }
+  }
 
  private:
   static constexpr int PER_ORIENTATION = 4, PER_SHAPE = 8, BLOCK = 256;
 
-  std::vector<int> indices;
-  std::vector<double> orientations;
-
   LAMMPS_NS::AtomVecEllipsoid *ellipsoids() const;
-  int *first_indices(int n);
+  static Quaternion quaternion(const double *q) { return {q[0], q[1], q[2], q[3]}; }
 };
 
 }  // namespace jamshape

@@ -59,6 +59,9 @@ def superellipsoid_scales(
 def superellipsoid_near(
     bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64], margin: float
 ) -> NDArray[np.bool_]: ...
+def superellipsoid_motion_sq(
+    then: NDArray[np.float64], now: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
 def superellipsoid_overlap(
     bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64]
 ) -> NDArray[np.bool_]: ...

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jamshape.lammps_files import write_data
-from jamshape.packing import Box, Packing, angle_from_quaternion
+from jamshape.packing import Box, Packing, angle_from_quaternion, guess_shape_style
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -134,7 +134,10 @@ class Session:
         self.commands(f"{_ATOMS}\nread_restart {path}\n{_POSES}")
 
     def packing(self, time: float = 0.0) -> Packing:
-        """Return the present state, sorted by ID, with the time that it is told."""
+        """Return the present state, sorted by ID, with the time that it is told.
+
+        Shapes are guessed from diameters, as of files, and exponents are not known.
+        """
         lmp = self.lmp
         n = lmp.get_natoms()
         lo, hi, *_ = lmp.extract_box()
@@ -143,11 +146,12 @@ class Session:
         def rows(name: str, kind: int, width: int) -> NDArray[Any]:
             return np.array(lmp.gather(name, kind, width)).reshape(n, width)
 
-        quaternion = rows("c_orient", 1, 4)
+        quaternion, diameters = rows("c_orient", 1, 4), rows("c_shape", 1, 3)
         return Packing(
             position=rows("x", 1, 3)[:, :d],
             orientation=angle_from_quaternion(quaternion) if d == 2 else quaternion,
-            diameters=rows("c_shape", 1, 3),
+            diameters=diameters,
+            shape_style=guess_shape_style(diameters),
             species=rows("type", 0, 1)[:, 0],
             id=np.arange(1, n + 1),
             image=rows("image", 0, 3)[:, :d],

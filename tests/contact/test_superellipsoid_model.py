@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from superellipsoid_pairs import EXPONENTS, at_scale, contacts, packed, random_pairs, scales
+from superellipsoid_pairs import (
+    EXPONENTS,
+    at_scale,
+    contacts,
+    gauge,
+    matrix_of,
+    packed,
+    random_bodies,
+    random_pairs,
+    scales,
+)
 
 from jamshape import _contact
 
@@ -74,6 +84,61 @@ def test_no_near_pair_is_rejected(dimension, measured):
         closer = (eta < 1.0 - 1e-12) | (gap_upper_bound(i, j, eta) < margin * (1.0 - 1e-12))
         assert np.all(near[closer])
         measured(**{f"kept_in_vain_{margin}": np.mean(near[~closer])})
+
+
+def moved_a_little(rng, bodies, amplitude):
+    """Shifted and turned at random by about these amounts."""
+    centre = bodies.centre + amplitude[:, None] * rng.normal(size=bodies.centre.shape)
+    turn = bodies.turn + amplitude[:, None] * rng.normal(size=bodies.turn.shape)
+    if bodies.dimension == 3:
+        turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    return bodies.replaced(centre=centre, turn=turn)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_no_point_of_a_body_moves_farther_than_its_bound(dimension, measured):
+    rng = np.random.default_rng(31)
+    n = 5000
+    then = random_bodies(rng, n, dimension, rng.choice(EXPONENTS, n))
+    now = moved_a_little(rng, then, 10.0 ** rng.uniform(-6, 0, n))
+    bound = np.sqrt(_contact.superellipsoid_motion_sq(then.rows, now.rows))
+    farthest = np.zeros(n)
+    for _ in range(200):
+        x = rng.normal(size=(n, dimension))
+        x /= gauge(x, then.semi_axes[:, :dimension], then.p)[:, None]
+        ends = [b.centre + np.einsum("nij,nj->ni", matrix_of(b.turn), x) for b in (then, now)]
+        farthest = np.maximum(farthest, np.linalg.norm(ends[1] - ends[0], axis=1))
+    ratio = farthest / bound
+    measured(largest=ratio.max(), median=np.median(ratio))
+    assert ratio.max() <= 1.0 + 1e-9
+    assert np.median(ratio) > 0.3, "a bound this loose would cost rebuilds"
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_pairs_left_out_do_not_touch_before_they_used_the_margin_up(dimension, measured):
+    """The rule of the pair list: it is kept while both move by less than half the margin."""
+    rng = np.random.default_rng(32)
+    n, margin = 20000, 0.1
+    i, j = random_pairs(rng, n, dimension, *rng.choice(EXPONENTS, (2, n)))
+    i = at_scale(i, j, rng.uniform(1.0, 1.3, n))
+    left_out = ~_contact.superellipsoid_near(i.rows, j.rows, margin)
+    # Straight at each other, and turning.
+    toward = (j.centre - i.centre) / np.linalg.norm(j.centre - i.centre, axis=1, keepdims=True)
+    after = []
+    for bodies, sign in ((i, 1), (j, -1)):
+        turned = moved_a_little(rng, bodies, 10.0 ** rng.uniform(-4.0, -1.0, n))
+        share = rng.uniform(0.0, 0.5 * margin, (n, 1))
+        after.append(turned.replaced(centre=bodies.centre + sign * share * toward))
+    moves = [
+        np.sqrt(_contact.superellipsoid_motion_sq(then.rows, now.rows))
+        for then, now in zip((i, j), after, strict=True)
+    ]
+    is_kept = 2.0 * np.maximum(*moves) < margin
+    touching = contacts(*after)["status"] == 1
+    measured(kept=(left_out & is_kept).mean(), touching_later=(left_out & touching).mean())
+    assert (left_out & is_kept).sum() > 300
+    assert not (left_out & is_kept & touching).any()
+    assert (left_out & touching).any(), "some would be missed by a list kept too long"
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -2,6 +2,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 from test_contacts import make
 
 from jamshape.initial import Mixture, random_packing
@@ -150,6 +151,21 @@ def test_lammps_agrees_with_newton_and_lowers_the_energy():
     assert found.evaluation.energy < landscape.evaluate(start).energy
     assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-9)
     assert found.residual.largest < 1e-5
+
+
+@pytest.mark.lammps
+@pytest.mark.parametrize("packing_of", [ellipsoids, octahedra_and_boxes, superellipses])
+def test_lammps_minimises_superellipsoids(packing_of):
+    """Of several exponents, which are types in LAMMPS; from a start beside a minimum."""
+    landscape = Landscape(packing_of())
+    start = State.of(landscape.particles)
+    expected = minimise(landscape, start, "newton")
+    step = np.random.default_rng(2).normal(size=landscape.size)
+    close = landscape.displaced(expected.state, 1e-3 * landscape.length * step)
+    found = minimise(landscape, close, "lammps", Stop(evaluations=3000))
+    assert found.evaluation.energy < landscape.evaluate(close).energy
+    assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-9)
+    assert found.residual.largest < 1e-4
 
 
 @pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])

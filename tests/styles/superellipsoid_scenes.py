@@ -50,7 +50,8 @@ def exponents_of(packing):
     return table
 
 
-def crowd(dimension=3, kinds=(0, 1, 2, 3), n=48, phi=0.8, seed=1, spread=0.15):
+def crowd(dimension=3, kinds=(0, 1, 2, 3), n=48, phi=0.8, seed=1, spread=0.15, *,
+          shapes=(AXES, EXPONENTS)):  # fmt: skip
     """On a jittered lattice, turned at random, with deep and shallow overlaps."""
     rng = np.random.default_rng(seed)
     kind = np.array(kinds)[np.arange(n) % len(kinds)]
@@ -60,7 +61,8 @@ def crowd(dimension=3, kinds=(0, 1, 2, 3), n=48, phi=0.8, seed=1, spread=0.15):
     cells = cells + 0.5 + rng.uniform(-0.15, 0.15, cells.shape)
     scale = 1 + spread * rng.uniform(-1, 1, (n, 1))
     turn = rng.normal(size=(n, 4)) if dimension == 3 else rng.uniform(-4, 4, n)
-    unit = particles(cells - side / 2, turn, scale * AXES[kind], EXPONENTS[kind],
+    axes, exponents = map(np.asarray, shapes)
+    unit = particles(cells - side / 2, turn, scale * axes[kind], exponents[kind],
                      [side] * dimension)  # fmt: skip
     edge = side * (unit.phi / phi) ** (1 / dimension)
     edge = 2.0**-20 * np.round(2.0**20 * edge)  # periodic images are then exact
@@ -69,14 +71,25 @@ def crowd(dimension=3, kinds=(0, 1, 2, 3), n=48, phi=0.8, seed=1, spread=0.15):
     return unit.with_(position=position, box=box)
 
 
-def tiny_box(dimension=3):
+def tiny_box(dimension=3, exponents=(1.5, 0.75)):
     """Two that touch their own images and several images of each other."""
     if dimension == 2:
         return particles([[0.0, 0.0], [0.25, 1.0]], [0.0, 0.3], [[1.5, 0.6, 1], [1.2, 0.5, 1]],
-                         [1.5, 0.75], [2.5, 1.75])  # fmt: skip
+                         exponents, [2.5, 1.75])  # fmt: skip
     quaternion = [[1.0, 0.0, 0.02, 0.0], [1.0, 0.3, 0.0, 0.1]]
     return particles([[0, 0, 0], [0.25, 1.0, 0.1]], quaternion, [[1.5, 0.6, 0.5], [1.2, 0.5, 0.5]],
-                     [1.5, 0.75], [2.5, 1.75, 1.0625])  # fmt: skip
+                     exponents, [2.5, 1.75, 1.0625])  # fmt: skip
+
+
+def far_apart(pairs, side=8.0):
+    """Pairs of bodies, rows as of `superellipsoid_bodies`, with the first body of each on a grid."""
+    first, second = (np.array(rows, float) for rows in zip(*pairs, strict=True))
+    at = np.zeros((len(pairs), 3))
+    at[:, 0] = side * (np.arange(len(pairs)) - 0.5 * (len(pairs) - 1))
+    position = np.stack([at, at + second[:, :3] - first[:, :3]], axis=1).reshape(-1, 3)
+    rows = np.stack([first, second], axis=1).reshape(-1, first.shape[1])
+    edges = [side * len(pairs), side, side]
+    return particles(position, rows[:, 3:7], rows[:, 7:10], rows[:, 10], edges)
 
 
 # --- input ---------------------------------------------------------------------------------------

@@ -192,6 +192,28 @@ def test_neither_skin_nor_start_of_the_contact_solver_matter(dimension, tmp_path
     assert forces < 1e-12
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_contacts_found_from_the_last_normal_are_those_found_from_nothing(
+    dimension, tmp_path, measured
+):
+    """`run 0` makes the list, and with it the normals, anew."""
+    packing = crowd(dimension)
+    with loaded(packing, tmp_path, skin=1.0) as session:
+        session.commands(f"{fix(1e-3, 1e-3)}\nrun 20")
+        warm = state_of(session, packing)
+        rebuilds = fix_vector(session, "drive", 7)
+        session.commands("run 0")
+        cold = state_of(session, packing)
+    differences = [
+        np.abs(found - wanted).max() / np.abs(wanted).max()
+        for found, wanted in ((warm.force, cold.force), (warm.torque, cold.torque))
+    ]
+    measured(force=differences[0], torque=differences[1], rebuilds=rebuilds)
+    assert rebuilds == 0, "the first forces were found from normals of the steps before"
+    assert not np.array_equal(warm.force, cold.force), "both were found from nothing"
+    assert max(differences) < 1e-13
+
+
 def test_no_contact_is_missed_while_a_dilute_state_becomes_dense(tmp_path, measured):
     packing = crowd(n=32, phi=0.3)
     largest = 0.0

@@ -105,7 +105,8 @@ def one_scene(case, folder):
         {THERMO}
         {dump(f"{label}.dump")}
         run 0
-        print "{label} $(pe:%.17g) $(press:%.17g) $(c_packing[1]:%.17g)" append thermo"""
+        print "{label} $(pe:%.17g) $(press:%.17g) $(c_packing[1]:%.17g) &
+            $(c_packing[5]:%.17g) $(c_packing[14]:%.17g)" append thermo"""
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +126,7 @@ def on_two_ranks(tmp_path_factory):
 
 @pytest.mark.parametrize("case", CASES, ids="-".join)
 def test_forces_on_two_ranks_equal_the_bindings(case, on_two_ranks, measured):
-    state, (pe, press, phi) = on_two_ranks[case]
+    state, (pe, press, phi, *_) = on_two_ranks[case]
     assert_state_and_thermo(case[0], state, pe, press, phi, measured)
 
 
@@ -208,6 +209,13 @@ def test_unlike_types_mix_their_epsilon_unless_told(tmp_path):
     np.testing.assert_allclose(energy[0], sums(packing, 1.0)["energy"], rtol=1e-13)
 
 
+def orders_of(packing):
+    """S_2 and C_4."""
+    axes = body_axes(packing.orientation)
+    nematic = nematic_order(directors(axes, packing.diameters))
+    return nematic.magnitude, cubatic_order(axes).magnitude
+
+
 @pytest.mark.parametrize("kinds", [(0,), (1,), (2,), (3,)])
 @pytest.mark.parametrize("is_aligned", [True, False])
 def test_order_is_that_of_the_library(kinds, is_aligned, tmp_path):
@@ -219,8 +227,12 @@ def test_order_is_that_of_the_library(kinds, is_aligned, tmp_path):
     with loaded(packing, tmp_path) as session:
         session.commands(f"{THERMO}\nrun 0")
         values = global_vector(session, "packing")
-    axes = body_axes(packing.orientation)
-    nematic = nematic_order(directors(axes, packing.diameters))
-    expected = nematic.magnitude, cubatic_order(axes).magnitude
-    np.testing.assert_allclose((values[4], values[13]), expected, rtol=1e-12)
+    np.testing.assert_allclose((values[4], values[13]), orders_of(packing), rtol=1e-12)
     assert values[10] == sums(packing)["n_bonds"]
+
+
+@pytest.mark.parametrize("newton", ["on", "off"])
+@pytest.mark.parametrize("name", ["p 0.75", "p 1", "p 1.5", "p 2"])
+def test_order_on_two_ranks_is_that_of_the_library(name, newton, on_two_ranks):
+    _, (*_, S_2, C_4) = on_two_ranks[name, newton]
+    np.testing.assert_allclose((S_2, C_4), orders_of(packing_of(name)), rtol=1e-12)
