@@ -18,7 +18,9 @@ def measured(request):
 
 
 def numbers_of(report):
-    return {name: x for key, of in report.user_properties if key == MEASURED for name, x in of.items()}
+    return {
+        name: x for key, of in report.user_properties if key == MEASURED for name, x in of.items()
+    }
 
 
 def pytest_terminal_summary(terminalreporter, config):
