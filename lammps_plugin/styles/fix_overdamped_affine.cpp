@@ -214,7 +214,7 @@ void FixOverdampedAffine::check_stability(bigint step)
   next_check = step + (until_strained < static_cast<double>(check_every)
                            ? static_cast<bigint>(until_strained)
                            : check_every);
-  largest_rate = flow->largest_rate();
+  largest_rate = flow->largest_rate_of_bonds();
   const double limit = largest_stable_dt();
   if (update->dt <= NEAR_LIMIT * limit) {
     warned = false;

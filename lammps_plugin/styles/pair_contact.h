@@ -23,6 +23,13 @@ struct LocalBond {
   bool on_side_i, on_side_j;
 };
 
+/// Second derivatives of a contact's energy by x_i - x_j and by the rotations of i and of j (in 2D 4
+/// variables, in 3D 9): the lower triangle, row by row.
+struct LocalCurvature {
+  int i, j;
+  const std::vector<double> &triangle;
+};
+
 /// What every pair style of ours is, whatever its shape: coefficients, cutoffs from the particles'
 /// sizes, restarts, and orientation as extra degrees of freedom of LAMMPS's minimisers. The loop
 /// over contacts is in PairContactOf.
@@ -54,6 +61,12 @@ class PairContact : public LAMMPS_NS::Pair {
 
   /// Shows every bond of this rank's pairs, at the current positions, to `visit`.
   virtual void for_each_bond(const std::function<void(const LocalBond &)> &visit) = 0;
+  /// Shows the second derivatives of every contact of this rank's pairs, prestress included. Costs
+  /// `curvature_cost` times as much as forces.
+  virtual void for_each_curvature(const std::function<void(const LocalCurvature &)> &visit) = 0;
+  virtual int curvature_cost() const = 0;
+  /// False where forces jump: beside a jump the second derivative says nothing of stiffness.
+  virtual bool has_smooth_forces() const { return true; }
   /// Each bond once over all ranks and with tag[i] <= tag[j].
   std::vector<LocalBond> reported_bonds();
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "contact/contact.hpp"
+#include "contact/pair_derivatives.hpp"
 #include "contact/rotation.hpp"
 #include "contact/vec.hpp"
 
@@ -49,6 +50,17 @@ template <class Model> class PairContactOf : public PairContact {
   void for_each_bond(const std::function<void(const LocalBond &)> &visit) override
   {
     domain->dimension == 2 ? visit_bonds<2>(visit) : visit_bonds<3>(visit);
+  }
+
+  void for_each_curvature(const std::function<void(const LocalCurvature &)> &visit) override
+  {
+    domain->dimension == 2 ? visit_curvatures<2>(visit) : visit_curvatures<3>(visit);
+  }
+
+  /// One for the contact itself.
+  int curvature_cost() const override
+  {
+    return 1 + (domain->dimension == 2 ? PAIR_VARIABLES<2> : PAIR_VARIABLES<3>);
   }
 
   SubstrateDrag drag(const Vec<3> &semi_axes, int type) const override
@@ -330,6 +342,53 @@ template <class Model> class PairContactOf : public PairContact {
                  in_space<D>(bond.arm_i), in_space<D>(bond.arm_i + r), bond.distance, bond.reach,
                  bond.energy, bond.stiffness, bond.on_side_i, bond.on_side_j});
         }
+      }
+    }
+  }
+
+  template <int D> void visit_curvatures(const std::function<void(const LocalCurvature &)> &visit)
+  {
+    const std::vector<Vec<3>> semi_axes = particles.semi_axes(n_all());
+    particles.read_orientations(n_all());
+    std::vector<double> triangle;
+    for (int n = 0; n < list->inum; ++n) {
+      const int i = list->ilist[n];
+      for (int k = first[n]; k < first[n + 1]; ++k) {
+        const int j = partner[k];
+        const ContactDerivatives<D, double> found =
+            derivatives_at<Model, D, double>(posed_pair<D>(i, j, semi_axes));
+        if (found.contact.status != ContactStatus::TOUCHING) continue;
+        fill_triangle<D>(found, triangle);
+        visit({i, j, triangle});
+      }
+    }
+  }
+
+  template <int D>
+  PosedPair<Model, D, double> posed_pair(int i, int j, const std::vector<Vec<3>> &semi_axes) const
+  {
+    Vec<D> r;
+    for (int k = 0; k < D; ++k) r[k] = atom->x[i][k] - atom->x[j][k];
+    return {*shape_from(semi_axes[i], atom->type[i]),
+            *shape_from(semi_axes[j], atom->type[j]),
+            r,
+            particles.orientation(i),
+            particles.orientation(j),
+            law_of(i, j)};
+  }
+
+  template <int D>
+  static void fill_triangle(const ContactDerivatives<D, double> &of, std::vector<double> &triangle)
+  {
+    triangle.clear();
+    for (int row = 0; row < of.N; ++row) {
+      for (int col = 0; col <= row; ++col) {
+        double sum = of.curvature[row][col];
+        for (int b = 0; b < of.contact.n_bonds; ++b) {
+          const double stiffness = of.contact.bond[b].own_stiffness;
+          sum += stiffness * of.gradient[b][row] * of.gradient[b][col];
+        }
+        triangle.push_back(sum);
       }
     }
   }
