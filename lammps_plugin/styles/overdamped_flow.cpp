@@ -86,6 +86,14 @@ bool OverdampedFlow::begin_run()
   return sum(moved) == 0.0;
 }
 
+double OverdampedFlow::largest_strain() const
+{
+  double mine = INFINITY, all;
+  for (const Mobility &m : mobilities) mine = std::min(mine, m.step_limit / m.longest);
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_MIN, world);
+  return all;
+}
+
 void OverdampedFlow::measure_particles()
 {
   const std::vector<Vec<3>> semi_axes = pair->particle_view().semi_axes(atom->nlocal);

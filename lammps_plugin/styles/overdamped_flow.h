@@ -32,6 +32,9 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
 
   /// False when particles are not where the last run left them.
   bool begin_run();
+  /// Strain of a step that pushes touching particles into each other by half their radius, as far
+  /// as forces may move them in a step; over all particles, after `begin_run`.
+  double largest_strain() const;
   /// Drag coefficients of own atoms; after every exchange of atoms.
   void measure_particles();
 
