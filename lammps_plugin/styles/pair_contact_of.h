@@ -88,6 +88,10 @@ template <class Model> class PairContactOf : public PairContact {
   {
     return Model::turns(*shape_from(semi_axes, type));
   }
+  Shortcut shortcut(const Vec<3> &semi_axes, int type) const override
+  {
+    return Model::shortcut(*shape_from(semi_axes, type));
+  }
   double bounding_radius(const Vec<3> &semi_axes, int type) const override
   {
     const auto shape = *shape_from(semi_axes, type);
@@ -117,7 +121,9 @@ template <class Model> class PairContactOf : public PairContact {
 
   typename Model::Law law_of(int i, int j) const
   {
-    return Model::law(options, k_e[atom->type[i]][atom->type[j]]);
+    typename Model::Law law = Model::law(options, k_e[atom->type[i]][atom->type[j]]);
+    law.shortcuts = !general.contact;
+    return law;
   }
 
   template <int D> struct Bodies {
@@ -135,7 +141,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   Bodies<2> in_2d;
   Bodies<3> in_3d;
-  double margin = 0.0;
+  double margin = 0.0, n_listed = 0.0;
   std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
   std::vector<float> last_normal;   // D a close pair, for shapes that start from it; zeros at first
 
@@ -153,6 +159,7 @@ template <class Model> class PairContactOf : public PairContact {
   template <int D> void compute_in()
   {
     update_pairs<D>();
+    report_left_out(n_listed, static_cast<double>(partner.size()));
     if (any_turns) {
       evflag ? evaluate<D, true, true>() : evaluate<D, true, false>();
     } else {
@@ -273,14 +280,18 @@ template <class Model> class PairContactOf : public PairContact {
     if (D == 2 && any_turns) require_in_plane(atom->nlocal);
     first.assign(1, 0);
     partner.clear();
+    n_listed = 0.0;
     for (int n = 0; n < list->inum; ++n) {
       const int i = list->ilist[n];
       const Body<D> &body = bodies.now[i];
       const int *const neighbours = list->firstneigh[i];
       for (int k = 0; k < list->numneigh[i]; ++k) {
         const int j = neighbours[k] & NEIGHMASK;
-        if (Model::template closer_than<D>(margin, body, bodies.now[j])) partner.push_back(j);
+        if (general.pairs || Model::template closer_than<D>(margin, body, bodies.now[j])) {
+          partner.push_back(j);
+        }
       }
+      n_listed += list->numneigh[i];
       first.push_back(static_cast<int>(partner.size()));
     }
     if (partner.capacity() > partner.size() + partner.size() / 4) partner.shrink_to_fit();
