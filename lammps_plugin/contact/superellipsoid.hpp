@@ -66,7 +66,8 @@ template <int D, class S> class SuperellipsoidContact {
     if (distance_sq <= COINCIDENT_CENTRES * reach * COINCIDENT_CENTRES * reach) {
       return without_bonds<D, S>(ContactStatus::CROSSING);
     }
-    if (shortcuts && is_round(i) && is_round(j)) return touching(spheres(), T(0));  // bounded by themselves
+    if (shortcuts && is_round(i) && is_round(j))
+      return touching(spheres(), T(0));  // bounded by themselves
     const FoundTangency<D, T> found = find_tangency(last);
     if (last != nullptr) *last = found.at.normal;
     if (found.is_apart) return without_bonds<D, S>(ContactStatus::APART);

@@ -179,8 +179,8 @@ void FixOverdampedAffine::require_strain(double strain) const
   const double radii = 0.5 * strain / flow->largest_strain();
   if (radii <= 0.5) return;  // false for NaN
   char found[128];
-  std::snprintf(found, sizeof(found), "a strain of %g in one step, which pushes a particle %g radii",
-                strain, radii);
+  std::snprintf(found, sizeof(found),
+                "a strain of %g in one step, which pushes a particle %g radii", strain, radii);
   flow->stop("found " + std::string(found) +
              " into its neighbour, expected at most half its radius: use a smaller timestep.");
 }

@@ -214,8 +214,8 @@ void PairContact::report_left_out(double listed, double close)
   }
   said = text + numbers;
   if (comm->me == 0 && text != told) {
-    LAMMPS_NS::utils::logmesg(
-        lmp, "pair_style " + style_name() + " leaves out of this scene: " + said + "\n");
+    LAMMPS_NS::utils::logmesg(lmp, "pair_style " + style_name() +
+                                       " leaves out of this scene: " + said + "\n");
   }
   told = text;
 }

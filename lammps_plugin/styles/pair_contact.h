@@ -23,8 +23,8 @@ struct LocalBond {
   bool on_side_i, on_side_j;
 };
 
-/// Second derivatives of a contact's energy by x_i - x_j and by the rotations of i and of j (in 2D 4
-/// variables, in 3D 9): the lower triangle, row by row.
+/// Second derivatives of a contact's energy by x_i - x_j and by the rotations of i and of j (in 2D
+/// 4 variables, in 3D 9): the lower triangle, row by row.
 struct LocalCurvature {
   int i, j;
   const std::vector<double> &triangle;

@@ -113,4 +113,3 @@ def test_results_are_the_same_to_rounding(name, what, tmp_path):
     assert np.abs(start.force - start_there.force).max() < 1e-13 * largest
     assert np.abs(start.torque - start_there.torque).max() < 1e-13 * largest
     assert max(pose_differences(end, end_there)) < 1e-12
-
