@@ -295,8 +295,8 @@ def parse() -> argparse.Namespace:
     )
     parser.add_argument("--out", type=Path, default=Path("runs/scene_savings"), help="folder")
     parser.add_argument("--n", type=int, default=1024, help="particles; half of them in 3D (1024)")
-    parser.add_argument("--rounds", type=int, default=15, help="turns of each (15)")
-    parser.add_argument("--seconds", type=float, default=0.3, help="of a turn (0.3)")
+    parser.add_argument("--rounds", type=int, default=11, help="turns of each (11)")
+    parser.add_argument("--seconds", type=float, default=0.15, help="of a turn (0.15)")
     parser.add_argument("--quick", action="store_true", help="200 particles, 3 turns of 0.02 s")
     options = parser.parse_args()
     if options.quick:
