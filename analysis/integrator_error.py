@@ -4,7 +4,8 @@
 
 Rods (alpha = 4) and nearly round ones (alpha = 0.01), `sides two`, are compressed from a little below
 jamming to beyond it with each integrator and tolerance; errors of the pressure are against a run with
-a tolerance of 1e-7. Heun's method with dt = 0.01 is run for a short stretch, and its cost
+a tolerance of 1e-7 (1e-6 for alpha = 0.01 at kappa = 1e-6, where one particle that rests on a kink of
+the energy takes most of the steps: 1e-7 does not end in minutes). Heun's method with dt = 0.01 is run for a short stretch, and its cost
 extrapolated. Writes a table (Markdown), a picture and the numbers (JSON); finished runs are kept and
 not repeated. Seconds are of the processor. The last line of standard output is one JSON object.
 """
@@ -33,6 +34,7 @@ PHI_START, KAPPA_START = 0.4, 1e-4
 PHI = {4.0: (0.84, 0.88), 0.01: (0.83, 0.86)}  # from and to, under alpha
 ROWS = 40
 REFERENCE = ("rkc2", 1e-7)
+LOOSER = {(0.01, 1e-6): 1e-6}  # tolerance of the reference, under alpha and kappa
 METHODS = (
     ("heun/adaptive", 1e-3), ("heun/adaptive", 1e-4),
     ("rkc2", 1e-3), ("rkc2", 1e-4), ("rkc2", 1e-5),
@@ -211,7 +213,7 @@ def main() -> None:
     with tqdm(cases, unit="case") as bar:
         for case in bar:
             bar.set_postfix_str(case.name)
-            rows += rows_of(options.out, case, reference)
+            rows += rows_of(options.out, case, LOOSER.get((case.alpha, case.kappa), reference))
             text = table(rows)
             (options.out / "integrator_error.md").write_text(text)
             draw(rows, options.out / "integrator_error.png")

@@ -158,7 +158,8 @@ def draw(rows: list[dict[str, Any]], tiles: list[dict[str, Any]], out: Path) -> 
         left.plot([], [], marker, color="0.3", mfc="none", label=f"{band} band")
     left.set_xlabel("seconds")
     left.set_ylabel("relative error of eigenvalues, median and largest")
-    left.legend(fontsize=8)
+    # Errors fill the whole panel, so that no corner is free.
+    left.legend(fontsize=8, ncols=len(MARKERS), loc="lower center", bbox_to_anchor=(0.5, 1.0))
     for method in METHODS:
         n = [row["n"] for row in rows]
         seconds = [row["methods"][method]["seconds"] for row in rows]

@@ -13,6 +13,9 @@ enum class ContactStatus { APART, TOUCHING, CROSSING, UNCONVERGED };
 /// `compute contact/local` and of the Python bindings.
 enum class ContactKind { TIP_TO_TIP = 0, TIP_TO_SIDE = 1, SIDE_TO_SIDE = 2 };
 
+/// Shapes that are spared the search that contacts of others need, among themselves.
+enum class Shortcut { NONE, ROUND, ELLIPSOIDS };
+
 /// One point of contact that carries one force. Vectors are in space coordinates.
 template <int D, class S = double> struct Bond {
   Vec<D, S> normal;      // unit, into i

@@ -72,6 +72,7 @@ enum class Sides { ONE = 1, TWO = 2 };
 struct SpherocylinderLaw {
   Harmonic harmonic;
   Sides sides;
+  bool shortcuts = true;  // false: discs by the search for feet, too
 };
 
 /// Below this |sin| of the angle between them two spines are parallel: their one bond sits in the
@@ -219,7 +220,7 @@ template <int D, class S> class SpherocylinderContact {
 
   Contact<D, S> evaluate() const
   {
-    if (pair.A_i == 0.0 && pair.A_j == 0.0) return discs();
+    if (pair.A_i == 0.0 && pair.A_j == 0.0 && law.shortcuts) return discs();
     const Feet<D, S> closest = closest_feet(pair);
     if (!touches(closest.distance_sq)) return without_bonds<D, S>(ContactStatus::APART);
     if (is_coincident(closest) || spines_cross(pair))
@@ -394,6 +395,12 @@ struct SpherocylinderModel {
       "a spherocylinder has diameters (2(A+R), 2R, 2R), its long axis the body's x";
 
   static Law law(Options sides, double k_e) { return {{k_e}, sides}; }
+
+  /// Whose contacts need no search.
+  static Shortcut shortcut(const Shape &shape)
+  {
+    return shape.half_length > 0.0 ? Shortcut::NONE : Shortcut::ROUND;
+  }
 
   /// Other shapes have an exponent.
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)

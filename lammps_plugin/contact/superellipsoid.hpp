@@ -17,6 +17,7 @@ namespace jamshape {
 /// overlap 1 - eta^2.
 struct SuperellipsoidLaw {
   double epsilon;
+  bool shortcuts = true;  // false: spheres and ellipsoids by the search of all exponents, too
 };
 
 /// Centres closer than this times the sum of the bounding radii are one point: no normal exists.
@@ -39,7 +40,8 @@ template <int D, class S> class SuperellipsoidContact {
   using Body = SuperellipsoidBody<D, S>;
 
   SuperellipsoidContact(const Body &body_i, const Body &body_j, const SuperellipsoidLaw &of) :
-      i(body_i), j(body_j), r(body_i.centre - body_j.centre), law{of.epsilon}
+      i(body_i), j(body_j), r(body_i.centre - body_j.centre), law{of.epsilon},
+      shortcuts(of.shortcuts)
   {
   }
 
@@ -52,6 +54,7 @@ template <int D, class S> class SuperellipsoidContact {
   const Body &i, &j;
   Vec<D, S> r;
   Harmonic law;
+  bool shortcuts;
 
   static constexpr bool IS_PLAIN = sizeof(S) == sizeof(T);  // no derivatives beside the value
 
@@ -63,7 +66,8 @@ template <int D, class S> class SuperellipsoidContact {
     if (distance_sq <= COINCIDENT_CENTRES * reach * COINCIDENT_CENTRES * reach) {
       return without_bonds<D, S>(ContactStatus::CROSSING);
     }
-    if (is_round(i) && is_round(j)) return touching(spheres(), T(0));  // bounded by themselves
+    if (shortcuts && is_round(i) && is_round(j))
+      return touching(spheres(), T(0));  // bounded by themselves
     const FoundTangency<D, T> found = find_tangency(last);
     if (last != nullptr) *last = found.at.normal;
     if (found.is_apart) return without_bonds<D, S>(ContactStatus::APART);
@@ -90,10 +94,10 @@ template <int D, class S> class SuperellipsoidContact {
   FoundTangency<D, T> find_tangency(const Vec<D, T> *last) const
   {
     if constexpr (IS_PLAIN) {
-      return tangency_of(i, j, TangencyWish<D, T>{r, true, last});
+      return tangency_of(i, j, TangencyWish<D, T>{r, true, last, shortcuts});
     } else {
       const SuperellipsoidBody<D, T> plain_i = plain<T>(i), plain_j = plain<T>(j);
-      return tangency_of(plain_i, plain_j, TangencyWish<D, T>{plain<T>(r), true, last});
+      return tangency_of(plain_i, plain_j, TangencyWish<D, T>{plain<T>(r), true, last, shortcuts});
     }
   }
 
@@ -172,6 +176,12 @@ struct SuperellipsoidModel {
   }
 
   static bool turns(const Shape &shape) { return !shape.is_round(); }
+
+  static Shortcut shortcut(const Shape &shape)
+  {
+    if (shape.is_round()) return Shortcut::ROUND;
+    return shape.p == 1.0 ? Shortcut::ELLIPSOIDS : Shortcut::NONE;
+  }
 
   template <int D> static SubstrateDrag drag(const Shape &shape)
   {

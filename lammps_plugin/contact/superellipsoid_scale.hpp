@@ -22,11 +22,12 @@ template <int D, class T> struct FoundTangency {
 };
 
 /// What is asked of a pair: r = x_i - x_j, whether "apart" is answer enough where a plane divides
-/// the bodies, and a normal to begin with (or null).
+/// the bodies, a normal to begin with (or null), and whether ellipsoids may take their own path.
 template <int D, class T> struct TangencyWish {
   Vec<D, T> r;
   bool may_stop_apart;
   const Vec<D, T> *last;
+  bool shortcuts = true;
 };
 
 /// Finds the tangency of two bodies in plain numbers T. From the ellipsoids of the same axes, where
@@ -40,7 +41,7 @@ template <int D, class T> class TangencySearch {
 
   /// Bodies are symmetric about their centres, so exchanging them leaves r as it is.
   TangencySearch(const Body &body_i, const Body &body_j, const TangencyWish<D, T> &wish) :
-      r(wish.r), may_stop_apart(wish.may_stop_apart),
+      r(wish.r), may_stop_apart(wish.may_stop_apart), shortcuts(wish.shortcuts),
       is_swapped(detail::is_by_normal(body_i.p) && !detail::is_by_normal(body_j.p)),
       i(is_swapped ? body_j : body_i), j(is_swapped ? body_i : body_j)
   {
@@ -132,7 +133,7 @@ template <int D, class T> class TangencySearch {
 
  private:
   Vec<D, T> r;
-  bool may_stop_apart, is_swapped;
+  bool may_stop_apart, shortcuts, is_swapped;
   const Body &i, &j;  // a body with p > 1 comes first
 
   static constexpr T TOLERANCE = sizeof(T) > 8 ? T(1e-11) : T(1e-9);
@@ -141,7 +142,7 @@ template <int D, class T> class TangencySearch {
   static constexpr double BARRIERS[] = {1e-4,  1e-6,  1e-8,  1e-9,
                                         1e-10, 1e-11, 1e-12, 1e-13};  // their last mu
 
-  bool are_ellipsoids() const { return i.p == 1.0 && j.p == 1.0; }
+  bool are_ellipsoids() const { return shortcuts && i.p == 1.0 && j.p == 1.0; }
 
   FoundTangency<D, T> of_ellipsoids(const detail::ByNormalOfEllipsoids<D, T> &ellipsoids,
                                     Vec<D, T> n) const

@@ -10,6 +10,7 @@
 #include "utils.h"
 
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -41,7 +42,7 @@ struct Saved {
 
 FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), check_every(1000), next_check(0), largest_rate(0.0), warned(false),
-    running(false)
+    was_told(false), running(false)
 {
   const auto fail = [&](const std::string &found_and_expected) {
     error->all(FLERR, "fix overdamped/affine found " + found_and_expected);
@@ -155,21 +156,43 @@ void FixOverdampedAffine::setup_post_neighbor()
 {
   box->begin_run();
   const bool is_known = flow->begin_run();
-  if (StepState *const state = integrator->state()) {
-    if (!is_known) state->h = 0.0;
-    require_timestep();
-  }
+  if (StepState *const state = integrator->state(); state && !is_known) state->h = 0.0;
+  require_timestep();
+  tell_what_is_left_out();
   running = true;
 }
 
 void FixOverdampedAffine::require_timestep() const
 {
   const double strain = std::abs(box->state().rate) * update->dt;
+  if (!integrator->state()) return require_strain(std::abs(strain));
   if (update->dt >= 0.0 && strain <= LARGEST_STRAIN) return;
-  const std::string dt = std::to_string(update->dt);
-  error->all(FLERR, "fix overdamped/affine found timestep " + dt + ", a strain of " +
-                        std::to_string(strain) +
-                        ", expected a step from 0 to a strain of 1: the integrator divides it.");
+  flow->stop("found timestep " + std::to_string(update->dt) + ", a strain of " +
+             std::to_string(strain) +
+             ", expected a step from 0 to a strain of 1: the integrator divides it.");
+}
+
+/// Of a step that is taken as it is; before it is, since a box that shrinks to nothing takes the
+/// state with it.
+void FixOverdampedAffine::require_strain(double strain) const
+{
+  const double radii = 0.5 * strain / flow->largest_strain();
+  if (radii <= 0.5) return;  // false for NaN
+  char found[128];
+  std::snprintf(found, sizeof(found),
+                "a strain of %g in one step, which pushes a particle %g radii", strain, radii);
+  flow->stop("found " + std::string(found) +
+             " into its neighbour, expected at most half its radius: use a smaller timestep.");
+}
+
+/// The numbers are the pair style's to say; see PairContact::report_left_out.
+void FixOverdampedAffine::tell_what_is_left_out()
+{
+  if (comm->me != 0 || was_told) return;
+  was_told = true;
+  std::string text = "energy and virial of stages within steps";
+  if (!integrator->state()) text += ", second derivatives";
+  LAMMPS_NS::utils::logmesg(lmp, "fix overdamped/affine leaves out of this scene: " + text + "\n");
 }
 
 void FixOverdampedAffine::post_neighbor()
@@ -214,7 +237,7 @@ void FixOverdampedAffine::check_stability(bigint step)
   next_check = step + (until_strained < static_cast<double>(check_every)
                            ? static_cast<bigint>(until_strained)
                            : check_every);
-  largest_rate = flow->largest_rate();
+  largest_rate = flow->largest_rate_of_bonds();
   const double limit = largest_stable_dt();
   if (update->dt <= NEAR_LIMIT * limit) {
     warned = false;

@@ -53,9 +53,11 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   std::unique_ptr<Integrator> integrator;
   LAMMPS_NS::bigint check_every, next_check;
   double largest_rate;
-  bool warned, running;
+  bool warned, was_told, running;
 
   void require_timestep() const;
+  void require_strain(double strain) const;
+  void tell_what_is_left_out();
   double present_rate() const;
   double largest_stable_dt() const;
   double of_substeps(int n) const;

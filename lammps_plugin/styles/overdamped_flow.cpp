@@ -86,6 +86,14 @@ bool OverdampedFlow::begin_run()
   return sum(moved) == 0.0;
 }
 
+double OverdampedFlow::largest_strain() const
+{
+  double mine = INFINITY, all;
+  for (const Mobility &m : mobilities) mine = std::min(mine, m.step_limit / m.longest);
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_MIN, world);
+  return all;
+}
+
 void OverdampedFlow::measure_particles()
 {
   std::map<std::tuple<int, double, double, double>, std::size_t> number_of;
@@ -448,30 +456,86 @@ Rate OverdampedFlow::direction(int i) const
   return read_rate(&directions[n_rates * i], dimension);
 }
 
-/// Adds stiffness times the direction, over all bonds, to the force arrays of own atoms.
-void OverdampedFlow::apply_stiffness()
+/// To ghosts, whose forces are cleared: what follows adds to them.
+void OverdampedFlow::send_direction()
 {
-  ++evaluations;
   comm->forward_comm_fix(fix, n_rates);
   clear_forces(atom->nlocal);
-  const auto add = [&](int i, const Vec<3> &force_on, const Vec<3> &torque_on) {
-    for (int k = 0; k < 3; ++k) {
-      atom->f[i][k] += force_on[k];
-      atom->torque[i][k] += torque_on[k];
-    }
-  };
+}
+
+void OverdampedFlow::add_load(int i, const Vec<3> &force_on, const Vec<3> &torque_on)
+{
+  for (int k = 0; k < 3; ++k) {
+    atom->f[i][k] += force_on[k];
+    atom->torque[i][k] += torque_on[k];
+  }
+}
+
+/// Adds the stiffness of all bonds times the direction to the force arrays of own atoms.
+void OverdampedFlow::add_bonds_times_direction()
+{
+  ++evaluations;
+  send_direction();
   pair->for_each_bond([&](const LocalBond &b) {
     const Rate of_i = direction(b.i), of_j = direction(b.j);
     const Vec<3> lever_i = cross(b.arm_i, b.normal), lever_j = cross(b.arm_j, b.normal);
     const double opening =
         dot(b.normal, of_i.shift - of_j.shift) + dot(lever_i, of_i.turn) - dot(lever_j, of_j.turn);
     const double tension = b.stiffness * opening;
-    add(b.i, tension * b.normal, tension * lever_i);
+    add_load(b.i, tension * b.normal, tension * lever_i);
     if (force->newton_pair || b.j < atom->nlocal) {
-      add(b.j, -tension * b.normal, -tension * lever_j);
+      add_load(b.j, -tension * b.normal, -tension * lever_j);
     }
   });
   if (force->newton) comm->reverse_comm();
+}
+
+OverdampedFlow::Curvatures OverdampedFlow::curvatures()
+{
+  evaluations += pair->curvature_cost();
+  Curvatures all;
+  pair->for_each_curvature([&](const LocalCurvature &c) {
+    all.i.push_back(c.i);
+    all.j.push_back(c.j);
+    all.triangles.insert(all.triangles.end(), c.triangle.begin(), c.triangle.end());
+  });
+  return all;
+}
+
+void OverdampedFlow::add_curvatures_times_direction(const Curvatures &of)
+{
+  send_direction();
+  dimension == 2 ? add_curvatures_times<2>(of) : add_curvatures_times<3>(of);
+  if (force->newton) comm->reverse_comm();
+}
+
+template <int D> void OverdampedFlow::add_curvatures_times(const Curvatures &of)
+{
+  constexpr int TURNS = D == 2 ? 1 : 3, N = D + 2 * TURNS, FIRST_AXIS = 3 - TURNS;
+  const double *entry = of.triangles.data();
+  for (std::size_t c = 0; c < of.i.size(); ++c) {
+    const int i = of.i[c], j = of.j[c];
+    const Rate of_i = direction(i), of_j = direction(j);
+    double x[N], y[N] = {};
+    for (int k = 0; k < D; ++k) x[k] = of_i.shift[k] - of_j.shift[k];
+    for (int k = 0; k < TURNS; ++k) {
+      x[D + k] = of_i.turn[FIRST_AXIS + k];
+      x[D + TURNS + k] = of_j.turn[FIRST_AXIS + k];
+    }
+    for (int row = 0; row < N; ++row) {
+      for (int col = 0; col < row; ++col, ++entry) {
+        y[row] += *entry * x[col];
+        y[col] += *entry * x[row];
+      }
+      y[row] += *entry++ * x[row];
+    }
+    Vec<3> pull{}, turn_i{}, turn_j{};
+    std::copy_n(y, D, pull.c);
+    std::copy_n(y + D, TURNS, turn_i.c + FIRST_AXIS);
+    std::copy_n(y + D + TURNS, TURNS, turn_j.c + FIRST_AXIS);
+    add_load(i, pull, turn_i);
+    if (force->newton_pair || j < atom->nlocal) add_load(j, -1.0 * pull, turn_j);
+  }
 }
 
 /// Force and torque on i without the components that are zero in the plane, and back.
@@ -503,7 +567,22 @@ void OverdampedFlow::add_force(int i, double factor, const Rate &rate)
   }
 }
 
+double OverdampedFlow::largest_rate_of_bonds()
+{
+  return largest_eigenvalue_of([&] { add_bonds_times_direction(); }, 0.0);
+}
+
 double OverdampedFlow::largest_rate(double tolerance)
+{
+  if (!pair->has_smooth_forces()) {
+    return largest_eigenvalue_of([&] { add_bonds_times_direction(); }, tolerance);
+  }
+  const Curvatures all = curvatures();
+  return largest_eigenvalue_of([&] { add_curvatures_times_direction(all); }, tolerance);
+}
+
+double OverdampedFlow::largest_eigenvalue_of(const std::function<void()> &add_stiffness_times,
+                                             double tolerance)
 {
   const int nlocal = atom->nlocal;
   // Forces wait in the places of the stored rates, which are free between steps.
@@ -518,7 +597,7 @@ double OverdampedFlow::largest_rate(double tolerance)
   // Lanczos' method in the metric of the drag, in which mobility times stiffness is symmetric. Each
   // direction is the rate of a force; what is left of the next one is in the force arrays.
   std::vector<double> diagonal, off_diagonal;
-  double found = 0.0;
+  double found = 0.0, size = 0.0;
   for (int step = 0; step < LANCZOS_STEPS; ++step) {
     double mine = 0.0;
     for (int i = 0; i < nlocal; ++i) {
@@ -527,7 +606,7 @@ double OverdampedFlow::largest_rate(double tolerance)
     }
     const double length = std::sqrt(sum(mine));
     if (step > 0) {
-      if (!(length > EXHAUSTED * diagonal[0])) break;
+      if (!(length > EXHAUSTED * size)) break;
       off_diagonal.push_back(length);
     }
     for (int i = 0; i < nlocal; ++i) {
@@ -536,13 +615,14 @@ double OverdampedFlow::largest_rate(double tolerance)
                  {(1.0 / length) * rate.shift, (1.0 / length) * rate.turn});
       set_force(i, step == 0 ? 0.0 : -length, before);
     }
-    apply_stiffness();
+    add_stiffness_times();
     mine = 0.0;
     for (int i = 0; i < nlocal; ++i) {
       const Rate rate = direction(i);
       mine += dot(rate.shift, vec3(atom->f[i])) + dot(rate.turn, vec3(atom->torque[i]));
     }
     diagonal.push_back(sum(mine));
+    size = std::max(size, std::abs(diagonal.back()));
     if (tolerance > 0.0) {
       const double better = largest_eigenvalue(diagonal, off_diagonal);
       if (step >= LANCZOS_STEPS_AT_LEAST && better <= (1.0 + tolerance) * found) break;

@@ -6,6 +6,7 @@
 #include "affine_box.h"
 #include "fix.h"
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,9 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
 
   /// False when particles are not where the last run left them.
   bool begin_run();
+  /// Strain of a step that pushes touching particles into each other by half their radius, as far
+  /// as forces may move them in a step; over all particles, after `begin_run`.
+  double largest_strain() const;
   /// Drag coefficients of own atoms; after every exchange of atoms.
   void measure_particles();
 
@@ -74,12 +78,15 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
 
   /* numbers about the flow */
 
-  /// Largest relaxation rate: the largest eigenvalue of mobility times stiffness (the second
-  /// derivative of the energy without the prestress), by Lanczos' method, from below. Kinks of the
-  /// energy, where differences of forces blow up, do not enter. The prestress is smaller by the
-  /// overlap, but for long nearly parallel rods in 3D, whose true rate may be twice this one.
-  /// Ends when an iteration adds less than this fraction. Takes the place of the stored rates.
-  double largest_rate(double tolerance = 0.0);
+  /// Largest relaxation rate: the largest eigenvalue of mobility times stiffness, by Lanczos'
+  /// method, from below. Needs the place of the stored rates. Of the bonds: without the prestress,
+  /// so that kinks of the energy, where second derivatives blow up, do not enter; but for long
+  /// nearly parallel rods in 3D the true rate may be twice, for nearly round ones in the plane
+  /// several times this one.
+  double largest_rate_of_bonds();
+  /// Of the whole second derivative, where forces have no jumps, else of the bonds. Ends when an
+  /// iteration adds less than this fraction.
+  double largest_rate(double tolerance);
   /// Means over all bonds.
   struct Touching {
     double bonds;    // how many
@@ -168,7 +175,18 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   double sum(double mine) const;
   void pack_force(int i, double *to) const;
   void unpack_force(int i, const double *from);
-  void apply_stiffness();
+  double largest_eigenvalue_of(const std::function<void()> &add_stiffness_times, double tolerance);
+  void send_direction();
+  void add_load(int i, const Vec<3> &force_on, const Vec<3> &torque_on);
+  void add_bonds_times_direction();
+  /// Second derivatives of all contacts, to be applied many times.
+  struct Curvatures {
+    std::vector<int> i, j;
+    std::vector<double> triangles;
+  };
+  Curvatures curvatures();
+  void add_curvatures_times_direction(const Curvatures &of);
+  template <int D> void add_curvatures_times(const Curvatures &of);
   void rebuild_lists();
 };
 

@@ -20,7 +20,8 @@ namespace jamshape {
 using LAMMPS_NS::bigint;
 
 PairContact::PairContact(LAMMPS_NS::LAMMPS *lmp) :
-    Pair(lmp), particles(lmp), k_e(nullptr), any_turns(true)
+    Pair(lmp), particles(lmp), k_e(nullptr), any_turns(true), any_round(false),
+    any_ellipsoids(false), is_new_run(false)
 {
   no_virial_fdotr_compute = 1;  // sum_i x_i F_i loses digits that the pairwise sum keeps
   single_enable = 0;
@@ -79,7 +80,7 @@ void PairContact::require_arguments(bool is_right, int narg) const
 void PairContact::measure_particles()
 {
   std::vector<double> mine(atom->ntypes + 1, 0.0);
-  int turning = 0;
+  int found[3] = {0, 0, 0};  // particles that turn, round ones, ellipsoids
   for (int i = 0; i < atom->nlocal; ++i) {
     const int type = atom->type[i];
     const Vec<3> semi_axes = particles.semi_axes(i);
@@ -91,14 +92,19 @@ void PairContact::measure_particles()
                             ", expected that " + shape_rule() + ": correct its shape.");
     }
     mine[type] = std::max(mine[type], bounding_radius(semi_axes, type));
-    turning |= turns(semi_axes, type);
+    const Shortcut its = shortcut(semi_axes, type);
+    found[0] |= general.rotation || turns(semi_axes, type);
+    found[1] |= its == Shortcut::ROUND;
+    found[2] |= its == Shortcut::ELLIPSOIDS;
   }
   largest_radius.resize(mine.size());
   MPI_Allreduce(mine.data(), largest_radius.data(), static_cast<int>(mine.size()), MPI_DOUBLE,
                 MPI_MAX, world);
-  int anywhere;
-  MPI_Allreduce(&turning, &anywhere, 1, MPI_INT, MPI_MAX, world);
-  any_turns = anywhere;
+  int anywhere[3];
+  MPI_Allreduce(found, anywhere, 3, MPI_INT, MPI_MAX, world);
+  any_turns = anywhere[0];
+  any_round = anywhere[1];
+  any_ellipsoids = anywhere[2];
 }
 
 void PairContact::init_style()
@@ -139,6 +145,7 @@ double PairContact::init_one(int i, int j)
 
 void PairContact::setup()
 {
+  is_new_run = true;
   const double needed = cutforce + neighbor->skin;
   for (int k = 0; k < domain->dimension; ++k) {
     if (comm->mode == LAMMPS_NS::Comm::SINGLE && comm->cutghost[k] < needed) {
@@ -149,6 +156,71 @@ void PairContact::setup()
     }
   }
 }
+
+/* ----------------------------------------------------------------------
+   what a scene does not need
+------------------------------------------------------------------------- */
+
+void PairContact::read_general(int narg, char **arg)
+{
+  general = General();
+  if (narg == 0) return;
+  bool is_known = std::string(arg[0]) == "general" && narg > 1;
+  for (int k = 1; k < narg; ++k) {
+    const std::string what = arg[k];
+    general.rotation |= what == "rotation";
+    general.pairs |= what == "pairs";
+    general.contact |= what == "contact";
+    is_known = is_known && (what == "rotation" || what == "pairs" || what == "contact");
+  }
+  if (is_known) return;
+  std::string found;
+  for (int k = 0; k < narg; ++k) found += std::string(" ") + arg[k];
+  error->all(FLERR, "pair_style " + style_name() + " found '" + found.substr(1) +
+                        "', expected 'general' and any of rotation, pairs, contact: leave it out "
+                        "but for tests and timings.");
+}
+
+std::vector<std::string> PairContact::spared() const
+{
+  const bool is_plane = domain->dimension == 2;
+  std::vector<std::string> found{"energy and virial of steps without output"};
+  if (is_plane) found.emplace_back("the third dimension");
+  if (!any_turns) found.emplace_back("rotation and torque");
+  if (any_round && !general.contact) {
+    found.emplace_back(is_plane ? "the search for contacts of discs"
+                                : "the search for contacts of spheres");
+  }
+  if (any_ellipsoids && !general.contact) {
+    found.emplace_back(is_plane ? "the search of other exponents for ellipses"
+                                : "the search of other exponents for ellipsoids");
+  }
+  return found;
+}
+
+void PairContact::report_left_out(double listed, double close)
+{
+  if (!is_new_run) return;
+  is_new_run = false;
+  const double mine[2] = {listed, close};
+  double all[2];
+  MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, world);
+  std::string text;
+  for (const std::string &what : spared()) text += (text.empty() ? "" : ", ") + what;
+  std::string numbers;
+  if (all[0] > all[1]) {
+    const double percent = std::round(100.0 * (1.0 - all[1] / all[0]));
+    numbers = ", " + std::to_string(static_cast<int>(percent)) + " % of the listed pairs";
+  }
+  said = text + numbers;
+  if (comm->me == 0 && text != told) {
+    LAMMPS_NS::utils::logmesg(lmp, "pair_style " + style_name() +
+                                       " leaves out of this scene: " + said + "\n");
+  }
+  told = text;
+}
+
+/* ---------------------------------------------------------------------- */
 
 void PairContact::require_same_bound(int i, const Vec<3> &semi_axes) const
 {

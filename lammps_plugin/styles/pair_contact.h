@@ -23,6 +23,13 @@ struct LocalBond {
   bool on_side_i, on_side_j;
 };
 
+/// Second derivatives of a contact's energy by x_i - x_j and by the rotations of i and of j (in 2D
+/// 4 variables, in 3D 9): the lower triangle, row by row.
+struct LocalCurvature {
+  int i, j;
+  const std::vector<double> &triangle;
+};
+
 /// What every pair style of ours is, whatever its shape: coefficients, cutoffs from the particles'
 /// sizes, restarts, and orientation as extra degrees of freedom of LAMMPS's minimisers. The loop
 /// over contacts is in PairContactOf.
@@ -47,6 +54,10 @@ class PairContact : public LAMMPS_NS::Pair {
   virtual SubstrateDrag drag(const Vec<3> &semi_axes, int type) const = 0;
   bool particles_turn() const { return any_turns; }
 
+  /// What this scene is spared, as it is written to the log: a sentence, empty before the first
+  /// evaluation.
+  const std::string &left_out() const { return said; }
+
   /// The body axis (0, 1, 2) that tells a particle's direction; nothing for those that have none.
   virtual std::optional<int> director(const Vec<3> &semi_axes, int type) const = 0;
   /// Whether all three axes of the bodies count, as for the cubatic order.
@@ -54,6 +65,12 @@ class PairContact : public LAMMPS_NS::Pair {
 
   /// Shows every bond of this rank's pairs, at the current positions, to `visit`.
   virtual void for_each_bond(const std::function<void(const LocalBond &)> &visit) = 0;
+  /// Shows the second derivatives of every contact of this rank's pairs, prestress included. Costs
+  /// `curvature_cost` times as much as forces.
+  virtual void for_each_curvature(const std::function<void(const LocalCurvature &)> &visit) = 0;
+  virtual int curvature_cost() const = 0;
+  /// False where forces jump: beside a jump the second derivative says nothing of stiffness.
+  virtual bool has_smooth_forces() const { return true; }
   /// Each bond once over all ranks and with tag[i] <= tag[j].
   std::vector<LocalBond> reported_bonds();
 
@@ -63,6 +80,13 @@ class PairContact : public LAMMPS_NS::Pair {
   ParticleView particles;
   double **k_e;
   bool any_turns;
+  /// Where the general path is taken although the scene does not need it: for tests and timings.
+  struct General {
+    bool rotation = false, pairs = false, contact = false;
+  } general;
+
+  /// 'general WHAT ...' from the first of these arguments on; nothing where there is none.
+  void read_general(int narg, char **arg);
 
   /// Names the style, its energy and what has no contact force, in messages.
   virtual std::string style_name() const = 0;
@@ -75,6 +99,7 @@ class PairContact : public LAMMPS_NS::Pair {
   virtual bool is_valid_shape(const Vec<3> &semi_axes, int type) const = 0;
   virtual std::string shape_rule() const = 0;
   virtual bool turns(const Vec<3> &semi_axes, int type) const = 0;
+  virtual Shortcut shortcut(const Vec<3> &semi_axes, int type) const = 0;
   virtual double bounding_radius(const Vec<3> &semi_axes, int type) const = 0;
 
   void require_arguments(bool is_right, int narg) const;
@@ -84,6 +109,10 @@ class PairContact : public LAMMPS_NS::Pair {
   void require_same_bound(int i, const Vec<3> &semi_axes) const;
   void require_in_plane(int n) const;
 
+  /// At the first evaluation of a run: tells the log what was left out, when that has changed.
+  /// `listed` pairs were in LAMMPS's list of this rank, `close` of them are kept.
+  void report_left_out(double listed, double close);
+
   /// Whether the pair (own i, j) is this rank's to report: with newton off both owners see it.
   bool is_mine(int i, int j) const;
 
@@ -91,11 +120,15 @@ class PairContact : public LAMMPS_NS::Pair {
   std::vector<double> largest_radius;    // per type: bounding radius of the largest particle
   std::vector<double> x_extra, f_extra;  // rotations as lengths, for the minimiser
   std::vector<double> gyration;          // length per radian of each own particle
+  bool any_round, any_ellipsoids;
+  bool is_new_run;
+  std::string told, said;  // the last line in the log, without and with its numbers
 
   void allocate();
   void measure_particles();
   void request_minimiser();
   int rotations() const;
+  std::vector<std::string> spared() const;
 };
 
 }  // namespace jamshape

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "contact/contact.hpp"
+#include "contact/pair_derivatives.hpp"
 #include "contact/rotation.hpp"
 #include "contact/vec.hpp"
 
@@ -51,6 +52,17 @@ template <class Model> class PairContactOf : public PairContact {
     domain->dimension == 2 ? visit_bonds<2>(visit) : visit_bonds<3>(visit);
   }
 
+  void for_each_curvature(const std::function<void(const LocalCurvature &)> &visit) override
+  {
+    domain->dimension == 2 ? visit_curvatures<2>(visit) : visit_curvatures<3>(visit);
+  }
+
+  /// One for the contact itself.
+  int curvature_cost() const override
+  {
+    return 1 + (domain->dimension == 2 ? PAIR_VARIABLES<2> : PAIR_VARIABLES<3>);
+  }
+
   SubstrateDrag drag(const Vec<3> &semi_axes, int type) const override
   {
     const auto shape = *shape_from(semi_axes, type);
@@ -75,6 +87,10 @@ template <class Model> class PairContactOf : public PairContact {
   bool turns(const Vec<3> &semi_axes, int type) const override
   {
     return Model::turns(*shape_from(semi_axes, type));
+  }
+  Shortcut shortcut(const Vec<3> &semi_axes, int type) const override
+  {
+    return Model::shortcut(*shape_from(semi_axes, type));
   }
   double bounding_radius(const Vec<3> &semi_axes, int type) const override
   {
@@ -105,7 +121,9 @@ template <class Model> class PairContactOf : public PairContact {
 
   typename Model::Law law_of(int i, int j) const
   {
-    return Model::law(options, k_e[atom->type[i]][atom->type[j]]);
+    typename Model::Law law = Model::law(options, k_e[atom->type[i]][atom->type[j]]);
+    law.shortcuts = !general.contact;
+    return law;
   }
 
   template <int D> struct Bodies {
@@ -123,7 +141,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   Bodies<2> in_2d;
   Bodies<3> in_3d;
-  double margin = 0.0;
+  double margin = 0.0, n_listed = 0.0;
   std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
   std::vector<float> last_normal;   // D a close pair, if contacts start from it; zeros at first
 
@@ -141,6 +159,7 @@ template <class Model> class PairContactOf : public PairContact {
   template <int D> void compute_in()
   {
     update_pairs<D>();
+    report_left_out(n_listed, static_cast<double>(partner.size()));
     if (any_turns) {
       evflag ? evaluate<D, true, true>() : evaluate<D, true, false>();
     } else {
@@ -259,14 +278,18 @@ template <class Model> class PairContactOf : public PairContact {
     if (D == 2 && any_turns) require_in_plane(atom->nlocal);
     first.assign(1, 0);
     partner.clear();
+    n_listed = 0.0;
     for (int n = 0; n < list->inum; ++n) {
       const int i = list->ilist[n];
       const Body<D> &body = bodies.now[i];
       const int *const neighbours = list->firstneigh[i];
       for (int k = 0; k < list->numneigh[i]; ++k) {
         const int j = neighbours[k] & NEIGHMASK;
-        if (Model::template closer_than<D>(margin, body, bodies.now[j])) partner.push_back(j);
+        if (general.pairs || Model::template closer_than<D>(margin, body, bodies.now[j])) {
+          partner.push_back(j);
+        }
       }
+      n_listed += list->numneigh[i];
       first.push_back(static_cast<int>(partner.size()));
     }
     if (partner.capacity() > partner.size() + partner.size() / 4) partner.shrink_to_fit();
@@ -329,6 +352,50 @@ template <class Model> class PairContactOf : public PairContact {
                  in_space<D>(bond.arm_i), in_space<D>(bond.arm_i + r), bond.distance, bond.reach,
                  bond.energy, bond.stiffness, bond.on_side_i, bond.on_side_j});
         }
+      }
+    }
+  }
+
+  template <int D> void visit_curvatures(const std::function<void(const LocalCurvature &)> &visit)
+  {
+    std::vector<double> triangle;
+    for (int n = 0; n < list->inum; ++n) {
+      const int i = list->ilist[n];
+      for (int k = first[n]; k < first[n + 1]; ++k) {
+        const int j = partner[k];
+        const ContactDerivatives<D, double> found =
+            derivatives_at<Model, D, double>(posed_pair<D>(i, j));
+        if (found.contact.status != ContactStatus::TOUCHING) continue;
+        fill_triangle<D>(found, triangle);
+        visit({i, j, triangle});
+      }
+    }
+  }
+
+  template <int D> PosedPair<Model, D, double> posed_pair(int i, int j) const
+  {
+    Vec<D> r;
+    for (int k = 0; k < D; ++k) r[k] = atom->x[i][k] - atom->x[j][k];
+    return {*shape_from(particles.semi_axes(i), atom->type[i]),
+            *shape_from(particles.semi_axes(j), atom->type[j]),
+            r,
+            particles.orientation(i),
+            particles.orientation(j),
+            law_of(i, j)};
+  }
+
+  template <int D>
+  static void fill_triangle(const ContactDerivatives<D, double> &of, std::vector<double> &triangle)
+  {
+    triangle.clear();
+    for (int row = 0; row < of.N; ++row) {
+      for (int col = 0; col <= row; ++col) {
+        double sum = of.curvature[row][col];
+        for (int b = 0; b < of.contact.n_bonds; ++b) {
+          const double stiffness = of.contact.bond[b].own_stiffness;
+          sum += stiffness * of.gradient[b][row] * of.gradient[b][col];
+        }
+        triangle.push_back(sum);
       }
     }
   }

@@ -16,8 +16,9 @@ std::optional<int> PairSpherocylinderHarmonic::director(const Vec<3> &semi_axes,
 
 void PairSpherocylinderHarmonic::settings(int narg, char **arg)
 {
-  const std::string keyword = narg == 2 ? arg[0] : "", value = narg == 2 ? arg[1] : "";
-  if (keyword != "sides" || (value != "one" && value != "two")) {
+  const std::string keyword = narg >= 2 ? arg[0] : "", value = narg >= 2 ? arg[1] : "";
+  const bool is_longer = narg > 2 && std::string(arg[2]) != "general";
+  if (keyword != "sides" || (value != "one" && value != "two") || is_longer) {
     std::string found;
     for (int k = 0; k < narg; ++k) found += std::string(" ") + arg[k];
     error->all(FLERR, "pair_style spherocylinder/harmonic found '" + found +
@@ -25,6 +26,7 @@ void PairSpherocylinderHarmonic::settings(int narg, char **arg)
                           "bonds for side-to-side contacts).");
   }
   options = value == "one" ? Sides::ONE : Sides::TWO;
+  read_general(narg - 2, arg + 2);
 }
 
 void PairSpherocylinderHarmonic::write_restart(FILE *fp)

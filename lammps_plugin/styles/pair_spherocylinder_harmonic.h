@@ -16,6 +16,9 @@ class PairSpherocylinderHarmonic : public PairContactOf<SpherocylinderModel> {
 
   std::optional<int> director(const Vec<3> &semi_axes, int type) const override;
 
+  /// The lever arm of the one bond jumps from end to end of parallel rods.
+  bool has_smooth_forces() const override { return options == Sides::TWO; }
+
   void settings(int narg, char **arg) override;
   void write_restart(FILE *fp) override;
   void read_restart(FILE *fp) override;

@@ -47,7 +47,7 @@ std::optional<int> PairSuperellipsoidHarmonic::director(const Vec<3> &semi_axes,
 
 void PairSuperellipsoidHarmonic::settings(int narg, char **arg)
 {
-  if (narg == 0) return;
+  if (narg == 0 || std::string(arg[0]) == "general") return read_general(narg, arg);
   std::string found;
   for (int k = 0; k < narg; ++k) found += std::string(" ") + arg[k];
   error->all(FLERR,

@@ -59,5 +59,14 @@ void jamshape_register(void *handle)
   }
   add_styles(lmp);
 }
+
+/// What the scene at hand is spared, as in the log; empty before the first evaluation. Valid until
+/// the next run.
+const char *jamshape_left_out(void *handle)
+{
+  const auto *lmp = static_cast<LAMMPS *>(handle);
+  const auto *pair = dynamic_cast<jamshape::PairContact *>(lmp->force->pair);
+  return pair ? pair->left_out().c_str() : "";
+}
 }
 #pragma GCC visibility pop

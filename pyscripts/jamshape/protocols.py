@@ -274,6 +274,7 @@ def begin(session: Session, settings: Compression, start: Packing, to: Recording
     run = CompressionRun(session, settings, start)
     attributes = dataclasses.asdict(settings) | dict(to.attributes)
     attributes |= {"phi_start": start.phi, "rows": to.rows, "frames": to.frames, "finished": False}
+    attributes["left_out"] = session.left_out()
     RunWriter.create(to.path, run.packing(), attributes, run.measure())
     return run
 
@@ -318,7 +319,10 @@ def record(run: CompressionRun, to: Recording) -> Iterator[Sample]:
 def summary(path: Path) -> dict[str, object]:
     """Summarise a run: its end and, where the pressure rises, the onset of jamming."""
     observables = read_observables(path)
-    last = {name: float(observables[name][-1]) for name in ("phi", "p", "z", "S_2", "S_4")}
+    last: dict[str, object] = {
+        name: float(observables[name][-1]) for name in ("phi", "p", "z", "S_2", "S_4")
+    }
+    last["left_out"] = read_attributes(path).get("left_out", "")
     try:
         fit = fit_onset(observables["phi"], observables["p"])
     except ValueError:  # the run ends below jamming

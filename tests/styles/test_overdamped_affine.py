@@ -421,12 +421,12 @@ def test_power_balance_along_a_driven_run(dimension, kappa, between, sides, tmp_
 # --- stability -----------------------------------------------------------------------------------
 
 
-def forces_of(packing):
-    found = contacts.forces(packing)
+def forces_of(packing, sides):
+    found = contacts.forces(packing, 1.0, sides)
     return np.column_stack([found.force, found.torque]).ravel()
 
 
-def hessian_by_differences(packing, step=1e-7):
+def hessian_by_differences(packing, step=1e-7, sides=1):
     """Second derivatives of the energy by positions and rotations, from the bindings' forces."""
     D, n = packing.dimension, packing.n
     rotations = 1 if D == 2 else 3
@@ -442,7 +442,7 @@ def hessian_by_differences(packing, step=1e-7):
                 vectors = np.zeros((n, rotations))
                 vectors[row, k - D] = sign * step
                 changed = turned(packing, vectors[:, 0] if D == 2 else vectors)
-            change.append(forces_of(changed))
+            change.append(forces_of(changed, sides))
         columns.append((change[1] - change[0]) / (2 * step))
     hessian = np.array(columns)
     return (hessian + hessian.T) / 2
@@ -504,16 +504,16 @@ def stability_scene(dimension, alpha, seed=2):
     return kicked(relaxed(start, 2000), 0.003, 5)
 
 
-def estimated_rate(packing, k_d, folder):
+def estimated_rate(packing, k_d, folder, sides="one", integrator="heun"):
     """The fix's estimate, its limit of the time step, and the estimate on two ranks."""
     setup = f"""
-        fix move all overdamped/affine drag {k_d} compress 0.0
+        fix move all overdamped/affine drag {k_d} compress 0.0 integrator {integrator}
         timestep 1e-4
         run 0"""
-    with loaded(packing, folder) as session:
+    with loaded(packing, folder, sides=sides) as session:
         session.commands(setup)
         rate, limit = fix_vector(session, "move", 3), fix_vector(session, "move", 4)
-    text = load_plugin() + scene(packing, folder / "s.data") + setup
+    text = load_plugin() + scene(packing, folder / "s.data", sides=sides) + setup
     text += "\nvariable rate equal f_move[3]\nprint 'rate $(v_rate:%.17g)'"
     out = run_lmp_well(text, folder, ranks=2)
     return rate, limit, float(out.split("rate ")[-1].split()[0])
@@ -540,6 +540,37 @@ def test_estimated_rate_is_the_largest_eigenvalue(dimension, alpha, tmp_path, me
     assert max(of_differences) < 1.02
     if dimension == 2 or alpha < 1:
         assert sorted(of_differences)[2] > 0.97
+
+
+def rate_of_rkc2(packing, folder):
+    """Over the largest eigenvalue with the prestress, and over the estimate of the bonds."""
+    rate, _, on_two_ranks = estimated_rate(packing, 1.3, folder, "two", "rkc2")
+    np.testing.assert_allclose(on_two_ranks, rate, rtol=1e-9)
+    hessian = hessian_by_differences(packing, sides=2)
+    of_bonds = estimated_rate(packing, 1.3, folder, "two")[0]
+    return rate / largest_relaxation_rate(hessian, packing, 1.3), rate / of_bonds
+
+
+# Lanczos' method ends early, from below; the margin of the step control is 1.15.
+LOWEST_RATE = 1 / 1.15
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_integrators_that_choose_their_steps_see_the_prestress(dimension, tmp_path, measured):
+    found = [rate_of_rkc2(stability_scene(dimension, 4.0, seed), tmp_path)[0] for seed in (1, 2, 3)]
+    measured(low=min(found) - 1, high=max(found) - 1)
+    assert min(found) > LOWEST_RATE
+    assert max(found) < 1 + 1e-4
+
+
+def test_nearly_round_rods_turn_faster_than_their_bonds_say(tmp_path, measured):
+    """On flat sides that the dynamics have brought together."""
+    for seed in (1, 2):
+        start = dense(2, alpha=0.01, n=20, phi=0.88, kick=0.0, seed=seed)
+        of_whole, of_bonds = rate_of_rkc2(relaxed(start, 20000), tmp_path)
+        measured(**{f"whole_{seed}": of_whole - 1, f"bonds_{seed}": of_bonds})
+        assert LOWEST_RATE < of_whole < 1 + 1e-3
+        assert of_bonds > 1.3
 
 
 @pytest.mark.parametrize("sides", SIDES)
