@@ -28,8 +28,9 @@ from jamshape.packing import FloatArray
 # A stage is given up after so many directions.
 _DIRECTIONS = 8
 
-# Steps turn round if the cosine of their angle is below minus this.
-_BACK = 0.8
+# Steps turn round at a kink if the cosine of their angle is below minus this. Among the first ones, that are
+# all of smooth stages, it is contacts that close.
+_BACK, _SMOOTH = 0.8, 4
 
 # Solutions are on a kink that steps cross to and fro; where several are crossed at once, finding the point
 # on all of them takes long. They may be so many times the accuracy away.
@@ -165,11 +166,12 @@ def solve(
         if size <= accuracy:
             return Solution(at.x + step, at.evaluation, factors, made, directions, True)
         step = limited(stage.landscape, step)
-        if size <= _ACROSS_KINKS * accuracy and _turns_round(step, before):
+        turns_round = directions >= _SMOOTH and _turns_round(step, before)
+        if turns_round and size <= _ACROSS_KINKS * accuracy:
             return Solution(at.x + 0.5 * step, at.evaluation, factors, made, directions, True)
         try:
             tried = _Point.of(stage, at.x + step)
-            if float(tried.gradient @ step) > 0 and _turns_round(step, before):
+            if turns_round and float(tried.gradient @ step) > 0:
                 tried = _on_kink(stage, at, tried, accuracy / size)
         except CrossingError:
             break
