@@ -28,6 +28,14 @@ from jamshape.packing import FloatArray
 # A stage is given up after so many directions.
 _DIRECTIONS = 8
 
+# Steps turn round at a kink if the cosine of their angle is below minus this. Among the first ones, that are
+# all of smooth stages, it is contacts that close.
+_BACK, _SMOOTH = 0.8, 4
+
+# Solutions are on a kink that steps cross to and fro; where several are crossed at once, finding the point
+# on all of them takes long. They may be so many times the accuracy away.
+_ACROSS_KINKS = 10.0
+
 # A guess with a force above this multiple of the typical one has gone through a collision.
 _COLLISION = 30.0
 
@@ -147,41 +155,78 @@ def solve(
     CrossingError
         If spines cross at the second guess.
     """
-    (x, evaluation, gradient), made = _begun(stage, guesses, units), 0
+    at, made, before = _begun(stage, guesses, units), 0, np.zeros(stage.landscape.size)
     for directions in range(_DIRECTIONS):
-        step, size = np.zeros_like(x), math.inf
+        step, size = before, math.inf
         if factors is not None:
-            step, size = _correction(stage, gradient, factors, units)
+            step, size = _correction(stage, at, factors, units)
         if factors is None or size > accuracy:
-            factors, made = stage.factorise(x), made + 1
-            step, size = _correction(stage, gradient, factors, units)
+            factors, made = stage.factorise(at.x), made + 1
+            step, size = _correction(stage, at, factors, units)
         if size <= accuracy:
-            return Solution(x + step, evaluation, factors, made, directions, True)
-        x = x + limited(stage.landscape, step)
+            return Solution(at.x + step, at.evaluation, factors, made, directions, True)
+        step = limited(stage.landscape, step)
+        turns_round = directions >= _SMOOTH and _turns_round(step, before)
+        if turns_round and size <= _ACROSS_KINKS * accuracy:
+            return Solution(at.x + 0.5 * step, at.evaluation, factors, made, directions, True)
         try:
-            evaluation, gradient = stage.evaluate(x)
+            tried = _Point.of(stage, at.x + step)
+            if turns_round and float(tried.gradient @ step) > 0:
+                tried = _on_kink(stage, at, tried, accuracy / size)
         except CrossingError:
             break
-    return Solution(x, evaluation, factors, made, directions, False)
+        at, before = tried, step
+    return Solution(at.x, at.evaluation, factors, made, directions, False)
+
+
+class _Point(NamedTuple):
+    """A displacement, and what was found there."""
+
+    x: FloatArray
+    evaluation: Evaluation
+    gradient: FloatArray
+
+    @classmethod
+    def of(cls, stage: Stage, x: FloatArray) -> _Point:
+        return cls(x, *stage.evaluate(x))
+
+
+def _begun(stage: Stage, guesses: tuple[FloatArray, FloatArray], units: Units) -> _Point:
+    """Evaluate the guess to start from."""
+    with contextlib.suppress(CrossingError):
+        first = _Point.of(stage, guesses[0])
+        if np.abs(first.gradient).max(initial=0.0) <= _COLLISION * units.force:
+            return first
+    return _Point.of(stage, guesses[1])
 
 
 def _correction(
-    stage: Stage, gradient: FloatArray, factors: Factorisation, units: Units
+    stage: Stage, at: _Point, factors: Factorisation, units: Units
 ) -> tuple[FloatArray, float]:
     """Newton's step, and its size."""
-    step = -factors.solve(gradient)
-    return step, units.of(stage.landscape, step, -gradient, stage.drag)
+    step = -factors.solve(at.gradient)
+    return step, units.of(stage.landscape, step, -at.gradient, stage.drag)
 
 
-def _begun(
-    stage: Stage, guesses: tuple[FloatArray, FloatArray], units: Units
-) -> tuple[FloatArray, Evaluation, FloatArray]:
-    """Evaluate the guess to start from."""
-    with contextlib.suppress(CrossingError):
-        evaluation, gradient = stage.evaluate(guesses[0])
-        if np.abs(gradient).max(initial=0.0) <= _COLLISION * units.force:
-            return guesses[0], evaluation, gradient
-    return guesses[1], *stage.evaluate(guesses[1])
+def _turns_round(step: FloatArray, before: FloatArray) -> bool:
+    """Whether a step goes back most of the way that the last one came."""
+    return float(step @ before) < -_BACK * float(np.linalg.norm(step) * np.linalg.norm(before))
+
+
+def _on_kink(stage: Stage, low: _Point, high: _Point, width: float) -> _Point:
+    """Find a kink by bisection to a part of the way, with the mean of its sides' gradients that does not
+    push across: zero where the kink holds the solution.
+    """  # fmt: skip
+    across = high.x - low.x
+    for _ in range(math.ceil(math.log2(1 / width))):
+        middle = _Point.of(stage, 0.5 * (low.x + high.x))
+        if float(middle.gradient @ across) > 0:
+            high = middle
+        else:
+            low = middle
+    here, there = float(low.gradient @ across), float(high.gradient @ across)
+    mean = (there * low.gradient - here * high.gradient) / (there - here)
+    return _Point(high.x, high.evaluation, mean)
 
 
 def rms(landscape: Landscape, vector: FloatArray) -> float:
