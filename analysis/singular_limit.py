@@ -34,7 +34,7 @@ from jamshape import jammed
 from jamshape.approach import Approach
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
-from jamshape.storage import read_attributes
+from jamshape.storage import read_attributes, require_attributes
 from jamshape.target import Target, TargetError, find
 
 PAPER = {"flat": PAPER_FLAT[0.01].value, "z": 4.43, "rattlers": 34 / 1024}  # alpha = 0.01
@@ -105,7 +105,7 @@ def make(discs: Sample, options: Namespace) -> Sample:
     target = Target(discs.number("u0"))
     known |= {name: getattr(target, name) for name in ("u0", "accuracy", "tolerance")}
     if jammed.is_done(path):
-        jammed.require_attributes(path, known)
+        require_attributes(path, known)
     else:
         began = time.perf_counter()
         rods, start = with_spines(discs.contacts()[0], options.alpha, options.seed)

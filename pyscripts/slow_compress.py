@@ -17,7 +17,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from jamshape.slow_run import begin, is_finished, make_start, record, summary
+from jamshape.slow_run import begin, is_finished, make_start, record, require_same, summary
 from jamshape.stiff_compression import METHODS, Protocol
 from jamshape.storage import read_attributes, read_packing
 
@@ -32,7 +32,11 @@ def parse() -> argparse.Namespace:
         ("--n", 256, "particles"),
         ("--kappa", 1e-8, "compression rate"),
         ("--phi-start", 0.8, "packing fraction where the fast compression ends"),
-        ("--phi-slow", 0.0, "packing fraction from which --kappa holds; up to there --kappa-before"),
+        (
+            "--phi-slow",
+            0.0,
+            "packing fraction from which --kappa holds; up to there --kappa-before",
+        ),
         ("--kappa-before", 1e-6, "compression rate up to --phi-slow"),
         ("--phi-end", 0.9, "packing fraction to reach"),
         ("--p-end", math.inf, "pressure to reach"),
@@ -49,12 +53,16 @@ def parse() -> argparse.Namespace:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Begin, or go on."""
+    """Begin, or go on; a finished run is left alone."""
     slowly = (options.phi_slow, options.kappa)
     kappa = ((0.0, options.kappa_before), slowly) if options.phi_slow else options.kappa
     protocol = Protocol(kappa, options.phi_end, options.p_end, options.tolerance,
                         method=options.method)  # fmt: skip
-    if not options.out.exists():
+    if options.out.exists():
+        require_same(options.out, protocol)
+        if is_finished(options.out):
+            return
+    else:
         made_from = {key: getattr(options, key) for key in ("alpha", "n", "seed")}
         if options.start:
             start, stored = read_packing(options.start), read_attributes(options.start)
@@ -73,8 +81,7 @@ def run(options: argparse.Namespace) -> None:
 if __name__ == "__main__":
     arguments = parse()
     try:
-        if not is_finished(arguments.out):
-            run(arguments)
+        run(arguments)
         print(json.dumps(summary(arguments.out)))
     except (ValueError, OSError, RuntimeError) as error:
         sys.exit(f"slow_compress.py: {error}")

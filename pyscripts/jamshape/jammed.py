@@ -31,6 +31,7 @@ from jamshape.storage import (
     read_attributes,
     read_observables,
     read_packing,
+    require_attributes,
     write_packing,
 )
 from jamshape.target import Search, Target, direct, require_reachable
@@ -197,23 +198,6 @@ def require_same(out: Path, sample: Sample) -> None:
     """Refuse a finished packing that is another one than asked for; errors as below."""
     require_attributes(out, sample.attributes())
     _require_particles(out, sample)
-
-
-def require_attributes(out: Path, expected: Mapping[str, Any], what: str = "a packing") -> None:
-    """Refuse a file with other attributes than expected.
-
-    Raises
-    ------
-    ValueError
-    """
-    stored = read_attributes(out)
-    for name, value in expected.items():
-        if stored.get(name) != value:
-            msg = (
-                f"{out} holds {what} with {name} = {stored.get(name)}, expected {value};"
-                " write to another file, or make it again"
-            )
-            raise ValueError(msg)
 
 
 def _require_compression(run: Path, sample: Sample) -> None:

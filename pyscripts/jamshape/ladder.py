@@ -17,11 +17,11 @@ import numpy as np
 
 from jamshape import superellipsoid_jammed
 from jamshape.contacts import find_contacts, find_rattlers
-from jamshape.jammed import is_done, require_attributes, write_minimum
+from jamshape.jammed import is_done, write_minimum
 from jamshape.landscape import Landscape, State
 from jamshape.minimise import Outcome, Stop, minimise
 from jamshape.packing import Packing
-from jamshape.storage import read_attributes, read_packing
+from jamshape.storage import read_attributes, read_packing, require_attributes
 from jamshape.target import Search, Target, TargetError, direct
 
 # What must agree in the packing and in a rung that is there already.

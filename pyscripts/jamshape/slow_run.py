@@ -21,6 +21,7 @@ from jamshape.storage import (
     read_attributes,
     read_observables,
     read_packing,
+    require_attributes,
 )
 
 # Steps between two frames, from which a run goes on.
@@ -59,11 +60,21 @@ def begin(
     path: Path, start: Packing, protocol: Protocol, attributes: Mapping[str, Any] | None = None
 ) -> None:
     """Write the file of a run with its first frame."""
-    stored = dataclasses.asdict(protocol) | {"kappa": np.array(protocol.kappa), "sides": 2}
+    stored = _as_attributes(protocol) | {"sides": 2}
     flow = Flow(State.of(start))
     stored |= dict(attributes or {}) | {"phi_start": start.phi, "finished": False}
     first = start.with_(step=0, time=0.0)
     RunWriter.create(path, _as_frame(flow, first), stored | _counts(flow))
+
+
+def require_same(path: Path, protocol: Protocol) -> None:
+    """Refuse the file of a run with another protocol.
+
+    Raises
+    ------
+    ValueError
+    """
+    require_attributes(path, _as_attributes(protocol), "a compression")
 
 
 def is_finished(path: Path) -> bool:
@@ -124,6 +135,10 @@ def _keep(writer: RunWriter, rows: list[Step], flow: Flow, like: Packing) -> Non
 
 def _as_frame(flow: Flow, like: Packing) -> Packing:
     return dataclasses.replace(flow.state.packing(like), step=flow.steps, time=flow.time)
+
+
+def _as_attributes(protocol: Protocol) -> dict[str, Any]:
+    return dataclasses.asdict(protocol) | {"kappa": np.array(protocol.kappa)}
 
 
 def _counts(flow: Flow) -> dict[str, float]:

@@ -214,9 +214,10 @@ def _turns_round(step: FloatArray, before: FloatArray) -> bool:
 
 
 def _on_kink(stage: Stage, low: _Point, high: _Point, width: float) -> _Point:
-    """Find a kink by bisection to a part of the way, with the mean of its sides' gradients that does not
-    push across: zero where the kink holds the solution.
-    """  # fmt: skip
+    """Find a kink by bisection, to a part of the way between two points.
+
+    Its gradient is the mean of its sides' that does not push across: zero where it holds the solution.
+    """
     across = high.x - low.x
     for _ in range(math.ceil(math.log2(1 / width))):
         middle = _Point.of(stage, 0.5 * (low.x + high.x))

@@ -178,6 +178,23 @@ def read_attributes(path: PathLike) -> dict[str, Any]:
         return {name: _plain(value) for name, value in attributes.items()}
 
 
+def require_attributes(out: Path, expected: Mapping[str, Any], what: str = "a packing") -> None:
+    """Refuse a file with other attributes than expected.
+
+    Raises
+    ------
+    ValueError
+    """
+    stored = read_attributes(out)
+    for name, value in expected.items():
+        if not np.array_equal(stored.get(name, np.nan), value):
+            msg = (
+                f"{out} holds {what} with {name} = {stored.get(name)}, expected {value};"
+                " write to another file, or make it again"
+            )
+            raise ValueError(msg)
+
+
 def read_observables(path: PathLike) -> dict[str, NDArray[Any]]:
     """Read all observables as arrays (T, ...), T = 1 in a packing; errors as `read_packing`."""
     with _opened(path) as file:

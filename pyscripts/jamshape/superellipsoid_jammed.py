@@ -19,13 +19,19 @@ import numpy as np
 
 from jamshape.contacts import find_contacts
 from jamshape.hard_monte_carlo import Thermal, equilibrate, without_overlaps
-from jamshape.jammed import Progress, energy_onset, require_attributes, summary_of, thinned
+from jamshape.jammed import Progress, energy_onset, summary_of, thinned
 from jamshape.landscape import Landscape, State
 from jamshape.minimise import Minimum, residual_of, rounding_floor
 from jamshape.order3d import cubatic_order, directors, nematic_order
 from jamshape.packing import Box, FloatArray, Packing, body_axes
 from jamshape.quasistatic import Compression, Quasistatic, compress
-from jamshape.storage import RunWriter, read_attributes, read_packing, write_packing
+from jamshape.storage import (
+    RunWriter,
+    read_attributes,
+    read_packing,
+    require_attributes,
+    write_packing,
+)
 from jamshape.superellipsoid_shape import (
     asphericity,
     axes_from,
