@@ -249,7 +249,7 @@ class Landscape:
         # The affine strain moves i from j by r_ij.
         by_strain = np.einsum("cij,cj->ci", blocks[:, :, :D], r)
         pulled, used = by_strain[:, places.variable] * places.scale, places.column >= 0
-        coupling = np.bincount(places.column[used], pulled[used], self.size)
+        coupling = np.bincount(places.column[used], pulled[used], self.size).astype(np.float64)
         strain_hessian = float(np.einsum("ci,ci->", by_strain[:, :D], r))
         hessian = self._summed(blocks, places)
         return Curvature(hessian, coupling, strain_hessian, self._rattlers(found))
