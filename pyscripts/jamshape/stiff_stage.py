@@ -26,15 +26,15 @@ from jamshape.newton import LEAST_SHIFT, Factorisation, add_to_diagonal
 from jamshape.packing import FloatArray
 
 # A stage is given up after so many directions.
-_DIRECTIONS = 8
+_DIRECTIONS = 10
 
-# Steps turn round at a kink if the cosine of their angle is below minus this. Among the first ones, that are
-# all of smooth stages, it is contacts that close.
-_BACK, _SMOOTH = 0.8, 4
+# After so many directions, which are enough for smooth stages, what is left are kinks: where the force along a
+# step has turned round, to this fraction of what it was, and the solution is nearer than so many accuracies.
+_SMOOTH, _OVERSHOT, _NEAR = 3, 0.3, 100.0
 
-# Solutions are on a kink that steps cross to and fro; where several are crossed at once, finding the point
-# on all of them takes long. They may be so many times the accuracy away.
-_ACROSS_KINKS = 10.0
+# On several kinks at once the last digits take long: the solution may then be so many accuracies away, less
+# than the error of the step.
+_ON_KINKS = 10.0
 
 # A guess with a force above this multiple of the typical one has gone through a collision.
 _COLLISION = 30.0
@@ -155,27 +155,29 @@ def solve(
     CrossingError
         If spines cross at the second guess.
     """
-    at, made, before = _begun(stage, guesses, units), 0, np.zeros(stage.landscape.size)
+    at, made, kinks = _begun(stage, guesses, units), 0, _Kinks()
     for directions in range(_DIRECTIONS):
-        step, size = before, math.inf
+        step, size = at.x, math.inf
         if factors is not None:
-            step, size = _correction(stage, at, factors, units)
+            step = kinks.newton_step(factors, at)
+            size = units.of(stage.landscape, step, -at.gradient, stage.drag)
         if factors is None or size > accuracy:
             factors, made = stage.factorise(at.x), made + 1
-            step, size = _correction(stage, at, factors, units)
+            step = kinks.newton_step(factors, at)
+            size = units.of(stage.landscape, step, -at.gradient, stage.drag)
         if size <= accuracy:
             return Solution(at.x + step, at.evaluation, factors, made, directions, True)
-        step = limited(stage.landscape, step)
-        turns_round = directions >= _SMOOTH and _turns_round(step, before)
-        if turns_round and size <= _ACROSS_KINKS * accuracy:
+        if directions > _SMOOTH and size <= _ON_KINKS * accuracy:
             return Solution(at.x + 0.5 * step, at.evaluation, factors, made, directions, True)
+        step = limited(stage.landscape, step)
         try:
             tried = _Point.of(stage, at.x + step)
-            if turns_round and float(tried.gradient @ step) > 0:
-                tried = _on_kink(stage, at, tried, accuracy / size)
+            overshot = tried.gradient @ step > -_OVERSHOT * (at.gradient @ step)
+            if directions >= _SMOOTH and overshot and size <= _NEAR * accuracy:
+                tried = kinks.between(stage, at, tried, accuracy / size)
         except CrossingError:
             break
-        at, before = tried, step
+        at = tried
     return Solution(at.x, at.evaluation, factors, made, directions, False)
 
 
@@ -200,34 +202,39 @@ def _begun(stage: Stage, guesses: tuple[FloatArray, FloatArray], units: Units) -
     return _Point.of(stage, guesses[1])
 
 
-def _correction(
-    stage: Stage, at: _Point, factors: Factorisation, units: Units
-) -> tuple[FloatArray, float]:
-    """Newton's step, and its size."""
-    step = -factors.solve(at.gradient)
-    return step, units.of(stage.landscape, step, -at.gradient, stage.drag)
+class _Kinks:
+    """Kinks that were found, as stiff valleys on top of the factors (BFGS), and how to find one."""
 
+    def __init__(self) -> None:
+        self._pairs: list[tuple[FloatArray, FloatArray, float]] = []
 
-def _turns_round(step: FloatArray, before: FloatArray) -> bool:
-    """Whether a step goes back most of the way that the last one came."""
-    return float(step @ before) < -_BACK * float(np.linalg.norm(step) * np.linalg.norm(before))
+    def newton_step(self, factors: Factorisation, at: _Point) -> FloatArray:
+        q, weights = -at.gradient, []
+        for across, jump, inverse in reversed(self._pairs):
+            weights.append(inverse * float(across @ q))
+            q = q - weights[-1] * jump
+        q = factors.solve(q)
+        for (across, jump, inverse), weight in zip(self._pairs, reversed(weights), strict=True):
+            q += (weight - inverse * float(jump @ q)) * across
+        return q
 
+    def between(self, stage: Stage, low: _Point, high: _Point, width: float) -> _Point:
+        """Find a kink by bisection, to a part of the way between two points.
 
-def _on_kink(stage: Stage, low: _Point, high: _Point, width: float) -> _Point:
-    """Find a kink by bisection, to a part of the way between two points.
-
-    Its gradient is the mean of its sides' that does not push across: zero where it holds the solution.
-    """
-    across = high.x - low.x
-    for _ in range(math.ceil(math.log2(1 / width))):
-        middle = _Point.of(stage, 0.5 * (low.x + high.x))
-        if float(middle.gradient @ across) > 0:
-            high = middle
-        else:
-            low = middle
-    here, there = float(low.gradient @ across), float(high.gradient @ across)
-    mean = (there * low.gradient - here * high.gradient) / (there - here)
-    return _Point(high.x, high.evaluation, mean)
+        The gradient is the mean of its sides' that does not push across: zero where it holds the solution.
+        """
+        way = high.x - low.x
+        for _ in range(math.ceil(math.log2(1 / width))):
+            middle = _Point.of(stage, 0.5 * (low.x + high.x))
+            if float(middle.gradient @ way) > 0:
+                high = middle
+            else:
+                low = middle
+        across, jump = high.x - low.x, high.gradient - low.gradient
+        here, there = float(low.gradient @ across), float(high.gradient @ across)
+        self._pairs.append((across, jump, 1 / (there - here)))
+        mean = (there * low.gradient - here * high.gradient) / (there - here)
+        return _Point(high.x, high.evaluation, mean)
 
 
 def rms(landscape: Landscape, vector: FloatArray) -> float:
