@@ -29,8 +29,9 @@ from jamshape.packing import FloatArray
 _DIRECTIONS = 10
 
 # After so many directions, which are enough for smooth stages, what is left are kinks: where the force along a
-# step has turned round, to this fraction of what it was, and the solution is nearer than so many accuracies.
-_SMOOTH, _OVERSHOT, _NEAR = 3, 0.3, 100.0
+# step has turned round, to this fraction of what it was, and the solution is nearer than so many accuracies or
+# steps go straight to and fro, with this cosine.
+_SMOOTH, _OVERSHOT, _NEAR, _BACK = 3, 0.3, 100.0, 0.95
 
 # On several kinks at once the last digits take long: the solution may then be so many accuracies away, less
 # than the error of the step.
@@ -156,6 +157,7 @@ def solve(
         If spines cross at the second guess.
     """
     at, made, kinks = _begun(stage, guesses, units), 0, _Kinks()
+    before = np.zeros(stage.landscape.size)
     for directions in range(_DIRECTIONS):
         step, size = at.x, math.inf
         if factors is not None:
@@ -173,11 +175,12 @@ def solve(
         try:
             tried = _Point.of(stage, at.x + step)
             overshot = tried.gradient @ step > -_OVERSHOT * (at.gradient @ step)
-            if directions >= _SMOOTH and overshot and size <= _NEAR * accuracy:
+            found = size <= _NEAR * accuracy or _turns_round(step, before)
+            if directions >= _SMOOTH and overshot and found:
                 tried = kinks.between(stage, at, tried, accuracy / size)
         except CrossingError:
             break
-        at = tried
+        at, before = tried, step
     return Solution(at.x, at.evaluation, factors, made, directions, False)
 
 
@@ -200,6 +203,11 @@ def _begun(stage: Stage, guesses: tuple[FloatArray, FloatArray], units: Units) -
         if np.abs(first.gradient).max(initial=0.0) <= _COLLISION * units.force:
             return first
     return _Point.of(stage, guesses[1])
+
+
+def _turns_round(step: FloatArray, before: FloatArray) -> bool:
+    """Whether a step goes straight back."""
+    return float(step @ before) < -_BACK * float(np.linalg.norm(step) * np.linalg.norm(before))
 
 
 class _Kinks:
