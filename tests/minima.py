@@ -72,7 +72,7 @@ def _backbone(landscape, state):
     """Stiff and soft part of the Hessian without rattlers: (B, n) rows of the bonds, (n, n)."""
     backbone, found, held = _held(landscape, state)
     found = {name: values[held] for name, values in found.items()}
-    soft = landscape._assembled(found, found["curvature"]).hessian.toarray()
+    soft = landscape._summed(found["curvature"], landscape._places(found)).toarray()
 
     contact, slot = np.nonzero(found["stiffness"])
     i, j = found["particles"][contact].T

@@ -30,7 +30,7 @@ _BELOW = -4.0
 
 # Modes are resolved if their relative errors are below the first number. For others, if further away than
 # the second times the shift, the shift moves up, so many times at most.
-_RESOLVED = 1e-8
+_RESOLVED = 1e-9
 _FAR = 100.0
 _CLIMBS = 4
 

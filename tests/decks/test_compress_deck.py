@@ -32,7 +32,7 @@ def command(out, ranks=1, **settings):
 def run_deck(out, ranks=1, **settings):
     done = subprocess.run(
         command(out, ranks, **settings), cwd=REPOSITORY, env=environment(), text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=120, check=False,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=300, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-3000:]
     warnings = [line for line in done.stdout.splitlines() if "WARNING" in line]

@@ -107,7 +107,7 @@ def run_lmp(text, folder, ranks=1):
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
-        timeout=120,
+        timeout=300,
         check=False,
     )
 
