@@ -50,6 +50,8 @@ def spheroids(n: int) -> str:
     return f"pyscripts/make_packing.py {shape} --n {n} --u0 1e-12 --out spheroids_{n}.h5"
 
 
+STIFF = "analysis/stiff_error.py --n 128 --tolerances 1e-2 3e-3 1e-3 3e-4 --out ."
+
 STUDIES = {
     "heun": Study(
         "Heun's method: the time step",
@@ -67,8 +69,8 @@ STUDIES = {
         "The implicit integrator of slow compressions",
         ["analysis/stiff_error.py --quick --out ."],
         [
-            "analysis/stiff_error.py --n 256 --alpha 4 --out .",
-            "analysis/stiff_error.py --n 256 --alpha 0.01 --phi-from 0.83 --phi-to 0.86 --out .",
+            f"{STIFF} --alpha 4 --phi-from 0.835 --phi-to 0.865 --kappas 1e-6 1e-8",
+            f"{STIFF} --alpha 0.01 --phi-from 0.83 --phi-to 0.85 --kappas 1e-6",
         ],
         ["stiff_error_*.png"],
     ),
