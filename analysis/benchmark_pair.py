@@ -228,6 +228,15 @@ def parse() -> Namespace:
     return parser.parse_args()
 
 
+def publish(out: Path, rows: list[Row]) -> None:
+    """Write the table and the numbers, and print both."""
+    head = "".join(f"{key}: {value}  \n" for key, value in about().items())
+    numbers = json.dumps(about() | {"rows": rows}) + "\n"
+    out.write_text(f"{head}\n{markdown(rows)}")
+    out.with_suffix(".json").write_text(numbers)
+    print(out.read_text(), numbers, sep="\n", end="")
+
+
 def main() -> None:
     """Measure, and write what was found."""
     options = parse()
@@ -239,10 +248,7 @@ def main() -> None:
         rows += rates(options, measure, phi, n) if measure != "memory" else []
     if "memory" in options.measure:
         rows += memory(options, options.phi[-1], 1024)
-    head = "".join(f"{key}: {value}  \n" for key, value in about().items())
-    options.out.write_text(f"{head}\n{markdown(rows)}")
-    options.out.with_suffix(".json").write_text(json.dumps(about() | {"rows": rows}) + "\n")
-    print(options.out.read_text(), options.out.with_suffix(".json").read_text(), sep="\n", end="")
+    publish(options.out, rows)
 
 
 if __name__ == "__main__":

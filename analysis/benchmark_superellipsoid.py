@@ -20,14 +20,13 @@ last line of output is that JSON object.
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace, RawTextHelpFormatter
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from benchmark_pair import Row, about, markdown, run_deck
+from benchmark_pair import Row, publish, run_deck
 from tqdm import tqdm
 
 from jamshape.session import Session, plugin_path
@@ -181,10 +180,7 @@ def main() -> None:
     if "memory" in options.measure:
         for p in options.p:
             rows += memory(options, p, options.w[0])
-    head = "".join(f"{key}: {value}  \n" for key, value in about().items())
-    options.out.write_text(f"{head}\n{markdown(rows)}")
-    options.out.with_suffix(".json").write_text(json.dumps(about() | {"rows": rows}) + "\n")
-    print(options.out.read_text(), options.out.with_suffix(".json").read_text(), sep="\n", end="")
+    publish(options.out, rows)
 
 
 if __name__ == "__main__":

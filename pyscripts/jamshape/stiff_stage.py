@@ -7,8 +7,9 @@ In a box of given strain the stage displacement x obeys
 the minimum of U + (x - x_0).drag (x - x_0) / 2h. Its gradient is smooth between the kinks where bonds open and
 close, and Newton's full steps find which of them do so for all bonds at once (semismooth Newton: Qi & Sun, Math.
 Program. 58, 353 (1993)), mostly in three or four evaluations; searching along each step would let through one
-bond at a time. Steps that go round in circles are given up soon: half of the time, the time step was too
-long anyway.
+bond at a time. On a kink that holds the solution steps go to and fro: it is found by bisection and kept as a stiff
+valley (Lewis & Overton, Math. Program. 141, 135 (2013)). Stages that do not end are given up soon: half of the
+time, the time step was too long anyway.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ _DIRECTIONS = 10
 # steps go straight to and fro, with this cosine.
 _SMOOTH, _OVERSHOT, _NEAR, _BACK = 3, 0.3, 100.0, 0.95
 
-# On several kinks at once the last digits take long: the solution may then be so many accuracies away, less
-# than the error of the step.
+# After these directions a solution may be so many accuracies away, less than the error of the step: on several
+# kinks at once the last digits take long. It is put half-way along the step, between the sides of a kink.
 _ON_KINKS = 10.0
 
 # A guess with a force above this multiple of the typical one has gone through a collision.
@@ -149,24 +150,21 @@ def solve(
         Of an earlier, similar stage.
     units : Units
     accuracy : float
-        Correction that may be left, in these units.
+        Correction that may be left, in these units; ten times as much on kinks.
 
     Raises
     ------
     CrossingError
         If spines cross at the second guess.
     """
-    at, made, kinks = _begun(stage, guesses, units), 0, _Kinks()
+    at, made, kinks = _begun(stage, guesses, units), 0, _Kinks(stage, units)
     before = np.zeros(stage.landscape.size)
     for directions in range(_DIRECTIONS):
-        step, size = at.x, math.inf
-        if factors is not None:
-            step = kinks.newton_step(factors, at)
-            size = units.of(stage.landscape, step, -at.gradient, stage.drag)
-        if factors is None or size > accuracy:
+        correction = kinks.correction(factors, at) if factors else None
+        if correction is None or correction.size > accuracy:
             factors, made = stage.factorise(at.x), made + 1
-            step = kinks.newton_step(factors, at)
-            size = units.of(stage.landscape, step, -at.gradient, stage.drag)
+            correction = kinks.correction(factors, at)
+        step, size = correction
         if size <= accuracy:
             return Solution(at.x + step, at.evaluation, factors, made, directions, True)
         if directions > _SMOOTH and size <= _ON_KINKS * accuracy:
@@ -175,9 +173,9 @@ def solve(
         try:
             tried = _Point.of(stage, at.x + step)
             overshot = tried.gradient @ step > -_OVERSHOT * (at.gradient @ step)
-            found = size <= _NEAR * accuracy or _turns_round(step, before)
-            if directions >= _SMOOTH and overshot and found:
-                tried = kinks.between(stage, at, tried, accuracy / size)
+            is_kink = size <= _NEAR * accuracy or _turns_round(step, before)
+            if directions >= _SMOOTH and overshot and is_kink:
+                tried = kinks.between(at, tried, accuracy / size)
         except CrossingError:
             break
         at, before = tried, step
@@ -194,6 +192,13 @@ class _Point(NamedTuple):
     @classmethod
     def of(cls, stage: Stage, x: FloatArray) -> _Point:
         return cls(x, *stage.evaluate(x))
+
+
+class _Correction(NamedTuple):
+    """A step, and how large it is in the units of errors."""
+
+    step: FloatArray
+    size: float
 
 
 def _begun(stage: Stage, guesses: tuple[FloatArray, FloatArray], units: Units) -> _Point:
@@ -213,10 +218,12 @@ def _turns_round(step: FloatArray, before: FloatArray) -> bool:
 class _Kinks:
     """Kinks that were found, as stiff valleys on top of the factors (BFGS), and how to find one."""
 
-    def __init__(self) -> None:
+    def __init__(self, stage: Stage, units: Units) -> None:
+        self._stage, self._units = stage, units
         self._pairs: list[tuple[FloatArray, FloatArray, float]] = []
 
-    def newton_step(self, factors: Factorisation, at: _Point) -> FloatArray:
+    def correction(self, factors: Factorisation, at: _Point) -> _Correction:
+        """Newton's step from a point."""
         q, weights = -at.gradient, []
         for across, jump, inverse in reversed(self._pairs):
             weights.append(inverse * float(across @ q))
@@ -224,16 +231,17 @@ class _Kinks:
         q = factors.solve(q)
         for (across, jump, inverse), weight in zip(self._pairs, reversed(weights), strict=True):
             q += (weight - inverse * float(jump @ q)) * across
-        return q
+        stage = self._stage
+        return _Correction(q, self._units.of(stage.landscape, q, -at.gradient, stage.drag))
 
-    def between(self, stage: Stage, low: _Point, high: _Point, width: float) -> _Point:
+    def between(self, low: _Point, high: _Point, width: float) -> _Point:
         """Find a kink by bisection, to a part of the way between two points.
 
         The gradient is the mean of its sides' that does not push across: zero where it holds the solution.
         """
         way = high.x - low.x
         for _ in range(math.ceil(math.log2(1 / width))):
-            middle = _Point.of(stage, 0.5 * (low.x + high.x))
+            middle = _Point.of(self._stage, 0.5 * (low.x + high.x))
             if float(middle.gradient @ way) > 0:
                 high = middle
             else:
