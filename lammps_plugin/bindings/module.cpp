@@ -5,6 +5,7 @@ void export_spherocylinder(nanobind::module_ &m);
 void export_superellipsoid(nanobind::module_ &m);
 void export_rattlers(nanobind::module_ &m);
 void export_hard_particles(nanobind::module_ &m);
+void export_vicinity(nanobind::module_ &m);
 }  // namespace jamshape
 
 NB_MODULE(_contact, m)
@@ -14,4 +15,5 @@ NB_MODULE(_contact, m)
   jamshape::export_superellipsoid(m);
   jamshape::export_rattlers(m);
   jamshape::export_hard_particles(m);
+  jamshape::export_vicinity(m);
 }

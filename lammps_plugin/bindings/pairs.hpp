@@ -113,10 +113,9 @@ nb::dict derivatives_in(const PackingArrays &arrays, const typename Model::Law &
   std::vector<std::size_t> touching;
   std::vector<ContactDerivatives<D, S>> found;
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const PosedPair<Model, D, S> pair = pairs.at(p);
-    if (contact_at(pair).status != ContactStatus::TOUCHING) continue;
+    if (pairs.contact(p, pairs.separation(p)).status != ContactStatus::TOUCHING) continue;
     touching.push_back(p);
-    found.push_back(derivatives_at(pair));
+    found.push_back(derivatives_at(pairs.at(p)));
   }
   const std::size_t n = found.size();
   NewArray<std::int64_t> pair({n});

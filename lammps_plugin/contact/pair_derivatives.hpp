@@ -19,15 +19,19 @@ template <class Model, int D, class S> struct PosedPair {
   typename Model::Law law;
 };
 
-/// A contact with the second derivatives of its energy, in two parts: the sum over bonds of
-/// own_stiffness * gradient (x) gradient, and `curvature`, all that comes from the forces
-/// themselves (Marschall & Teitel 2018, Eqs. 38-40: H and -S). Kept apart since the second is
-/// smaller by the overlap and would drown in their sum.
-template <int D, class S> struct ContactDerivatives {
+/// The second derivatives of a contact's energy, in two parts: the sum over bonds of own_stiffness
+/// * gradient (x) gradient, and `curvature`, all that comes from the forces themselves (Marschall &
+/// Teitel 2018, Eqs. 38-40: H and -S). Kept apart since the second is smaller by the overlap and
+/// would drown in their sum.
+template <int D, class S> struct SecondDerivatives {
   static constexpr int N = PAIR_VARIABLES<D>;
-  Contact<D, S> contact;
   S gradient[2][N];  // of the distance of each bond
   S curvature[N][N];
+};
+
+/// With the contact.
+template <int D, class S> struct ContactDerivatives : SecondDerivatives<D, S> {
+  Contact<D, S> contact;
 };
 
 namespace detail {
@@ -69,30 +73,43 @@ template <class Model, int D, class S> Contact<D, S> contact_at(const PosedPair<
   return contact_of(body_i, body_j, pair.law);
 }
 
-/// Adds the second derivatives, by running the code of the forces on dual numbers.
+/// A body that its own rotation variables, from `first` on, turn: for the code of the forces to run
+/// on dual numbers.
 template <class Model, int D, class S>
-ContactDerivatives<D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
+typename Model::template Body<D, Dual<PAIR_VARIABLES<D>, S>>
+turned_body(const typename Model::Shape &shape, const QuaternionOf<S> &orientation, int first)
+{
+  using Number = Dual<PAIR_VARIABLES<D>, S>;
+  auto body = Model::template body<D, Number>(shape);
+  const auto variables = detail::variables_from<D>(first);
+  Model::template turn_to<D, Number>(
+      body, detail::turned_by_variables<PAIR_VARIABLES<D>, S>(orientation, variables));
+  return body;
+}
+
+/// Where the rotation variables of i and of j begin.
+template <int D> inline constexpr int FIRST_OF_I = D;
+template <int D> inline constexpr int FIRST_OF_J = D + ROTATIONS<D>;
+
+/// r as the first D variables.
+template <int D, class S> Vec<D, Dual<PAIR_VARIABLES<D>, S>> as_variables(const Vec<D, S> &r)
+{
+  Vec<D, Dual<PAIR_VARIABLES<D>, S>> variables;
+  for (int k = 0; k < D; ++k) variables[k] = Dual<PAIR_VARIABLES<D>, S>::variable(r[k], k);
+  return variables;
+}
+
+/// Reads the second derivatives out of a contact that touches.
+template <int D, class S>
+void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>> &dual,
+                      SecondDerivatives<D, S> &result)
 {
   constexpr int N = PAIR_VARIABLES<D>, M = ROTATIONS<D>;
-  using Number = Dual<N, S>;
-  auto body_i = Model::template body<D, Number>(pair.shape_i);
-  auto body_j = Model::template body<D, Number>(pair.shape_j);
-  for (int k = 0; k < D; ++k) body_i.centre[k] = Number::variable(pair.r[k], k);
-  const auto turn_i = detail::variables_from<D>(D), turn_j = detail::variables_from<D>(D + M);
-  Model::template turn_to<D, Number>(body_i,
-                                     detail::turned_by_variables<N, S>(pair.orientation_i, turn_i));
-  Model::template turn_to<D, Number>(body_j,
-                                     detail::turned_by_variables<N, S>(pair.orientation_j, turn_j));
-  const Contact<D, Number> dual = contact_of(body_i, body_j, pair.law);
-
-  ContactDerivatives<D, S> result{};
-  result.contact = contact_at(pair);
-  if (dual.status != ContactStatus::TOUCHING) return result;
   for (int b = 0; b < dual.n_bonds; ++b) {
-    const Bond<D, S> &bond = result.contact.bond[b];
-    for (int k = 0; k < D; ++k) result.gradient[b][k] = bond.normal[k];
-    for (int k = 0; k < M; ++k) result.gradient[b][D + k] = bond.lever_i[k];
-    for (int k = 0; k < M; ++k) result.gradient[b][D + M + k] = bond.lever_j[k];
+    const auto &bond = dual.bond[b];
+    for (int k = 0; k < D; ++k) result.gradient[b][k] = value_of(bond.normal[k]);
+    for (int k = 0; k < M; ++k) result.gradient[b][D + k] = value_of(bond.lever_i[k]);
+    for (int k = 0; k < M; ++k) result.gradient[b][D + M + k] = value_of(bond.lever_j[k]);
   }
   for (int col = 0; col < N; ++col) {
     for (int k = 0; k < D; ++k) result.curvature[k][col] = -dual.force[k].d[col];
@@ -107,6 +124,19 @@ ContactDerivatives<D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
       result.curvature[row][col] = result.curvature[col][row] = mean;
     }
   }
+}
+
+/// Adds the second derivatives, by running the code of the forces on dual numbers.
+template <class Model, int D, class S>
+ContactDerivatives<D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
+{
+  auto body_i = turned_body<Model, D, S>(pair.shape_i, pair.orientation_i, FIRST_OF_I<D>);
+  const auto body_j = turned_body<Model, D, S>(pair.shape_j, pair.orientation_j, FIRST_OF_J<D>);
+  body_i.centre = as_variables<D, S>(pair.r);
+  const auto dual = contact_of(body_i, body_j, pair.law);
+  ContactDerivatives<D, S> result{};
+  result.contact = contact_at(pair);
+  if (dual.status == ContactStatus::TOUCHING) read_derivatives<D, S>(dual, result);
   return result;
 }
 

@@ -34,30 +34,24 @@ template <class Model, int D, class S> class PosedPairs {
  public:
   PosedPairs(const std::vector<typename Model::Shape> &particle_shapes, const SplitPoses &at,
              const PairList &list, const typename Model::Law &contact_law) :
-      shapes(particle_shapes), poses(at), pairs(list), law(contact_law),
-      orientation(particle_shapes.size())
+      shapes(particle_shapes), poses(at), pairs(list), law(contact_law)
   {
-    for (std::size_t n = 0; n < shapes.size(); ++n) orientation[n] = orientation_of(n);
+    body.reserve(shapes.size());
+    orientation.reserve(shapes.size());
+    for (std::size_t n = 0; n < shapes.size(); ++n) {
+      orientation.push_back(orientation_of(n));
+      body.push_back(Model::template body<D, S>(shapes[n]));
+      if (Model::turns(shapes[n])) Model::template turn_to<D, S>(body[n], orientation[n]);
+    }
   }
 
   std::size_t size() const { return pairs.n; }
+  std::size_t n_particles() const { return shapes.size(); }
+  const typename Model::Law &contact_law() const { return law; }
   std::size_t first(std::size_t p) const { return pairs.particles[2 * p]; }
   std::size_t second(std::size_t p) const { return pairs.particles[2 * p + 1]; }
 
-  PosedPair<Model, D, S> at(std::size_t p) const
-  {
-    const std::size_t i = first(p), j = second(p);
-    return {shapes[i], shapes[j], separation(p), orientation[i], orientation[j], law};
-  }
-
- private:
-  using Long = long double;
-  const std::vector<typename Model::Shape> &shapes;
-  SplitPoses poses;
-  PairList pairs;
-  typename Model::Law law;
-  std::vector<QuaternionOf<S>> orientation;
-
+  /// x_i - x_j.
   Vec<D, S> separation(std::size_t p) const
   {
     const std::size_t i = first(p), j = second(p);
@@ -75,20 +69,79 @@ template <class Model, int D, class S> class PosedPairs {
     return r;
   }
 
+  /// The contact of a pair of this separation.
+  Contact<D, S> contact(std::size_t p, const Vec<D, S> &r) const
+  {
+    typename Model::template Body<D, S> body_i = body[first(p)];
+    body_i.centre = r;
+    return contact_of(body_i, body[second(p)], law);
+  }
+
+  /// A body that its rotation variables, from `first` on, turn.
+  auto turned(std::size_t n, int first_variable) const
+  {
+    return turned_body<Model, D, S>(shapes[n], orientation[n], first_variable);
+  }
+
+  PosedPair<Model, D, S> at(std::size_t p) const
+  {
+    const std::size_t i = first(p), j = second(p);
+    return {shapes[i], shapes[j], separation(p), orientation[i], orientation[j], law};
+  }
+
+ private:
+  using Long = long double;
+  const std::vector<typename Model::Shape> &shapes;
+  SplitPoses poses;
+  PairList pairs;
+  typename Model::Law law;
+  std::vector<QuaternionOf<S>> orientation;
+  std::vector<typename Model::template Body<D, S>> body;  // at the origin
+
   QuaternionOf<S> orientation_of(std::size_t n) const
   {
-    const auto component = [&](std::size_t index) {
-      return static_cast<Long>(poses.orientation[0][index]) + poses.orientation[1][index];
-    };
     if constexpr (D == 2) {
-      const Long half = 0.5 * component(n);
-      return {static_cast<S>(std::cos(half)), S(0.0), S(0.0), static_cast<S>(std::sin(half))};
+      const S half = 0.5 * component<S>(n);
+      return {std::cos(half), S(0.0), S(0.0), std::sin(half)};
     } else {
-      const QuaternionOf<Long> q = normalized(QuaternionOf<Long>{
-          component(4 * n), component(4 * n + 1), component(4 * n + 2), component(4 * n + 3)});
+      const QuaternionOf<Long> q =
+          normalized(QuaternionOf<Long>{component<Long>(4 * n), component<Long>(4 * n + 1),
+                                        component<Long>(4 * n + 2), component<Long>(4 * n + 3)});
       return {static_cast<S>(q.w), static_cast<S>(q.i), static_cast<S>(q.j), static_cast<S>(q.k)};
     }
   }
+
+  template <class T> T component(std::size_t index) const
+  {
+    return static_cast<T>(poses.orientation[0][index]) +
+           static_cast<T>(poses.orientation[1][index]);
+  }
+};
+
+/// The bodies of posed pairs in dual numbers, each once as the first and once as the second of a
+/// pair.
+template <class Model, int D, class S> class TurnedBodies {
+ public:
+  explicit TurnedBodies(const PosedPairs<Model, D, S> &posed) : pairs(posed)
+  {
+    as_i.reserve(pairs.n_particles());
+    as_j.reserve(pairs.n_particles());
+    for (std::size_t n = 0; n < pairs.n_particles(); ++n) {
+      as_i.push_back(pairs.turned(n, FIRST_OF_I<D>));
+      as_j.push_back(pairs.turned(n, FIRST_OF_J<D>));
+    }
+  }
+
+  Contact<D, Dual<PAIR_VARIABLES<D>, S>> contact(std::size_t p) const
+  {
+    auto body_i = as_i[pairs.first(p)];
+    body_i.centre = as_variables<D, S>(pairs.separation(p));
+    return contact_of(body_i, as_j[pairs.second(p)], pairs.contact_law());
+  }
+
+ private:
+  const PosedPairs<Model, D, S> &pairs;
+  std::vector<typename Model::template Body<D, Dual<PAIR_VARIABLES<D>, S>>> as_i, as_j;
 };
 
 /// Sums over all pairs.
@@ -113,8 +166,8 @@ PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_part
   sums.force.assign(n_particles, Vec<D, S>{});
   sums.torque.assign(n_particles, Torque<D, S>{});
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const PosedPair<Model, D, S> pair = pairs.at(p);
-    const Contact<D, S> contact = contact_at(pair);
+    const Vec<D, S> r = pairs.separation(p);
+    const Contact<D, S> contact = pairs.contact(p, r);
     if (contact.status == ContactStatus::APART) continue;
     if (contact.status != ContactStatus::TOUCHING) {
       const bool is_crossing = contact.status == ContactStatus::CROSSING;
@@ -128,7 +181,7 @@ PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_part
     sums.torque[pairs.first(p)] += contact.torque_i;
     sums.torque[pairs.second(p)] += contact.torque_j;
     for (int a = 0; a < D; ++a) {
-      for (int b = 0; b < D; ++b) sums.virial[D * a + b] += pair.r[a] * contact.force[b];
+      for (int b = 0; b < D; ++b) sums.virial[D * a + b] += r[a] * contact.force[b];
     }
     for (int b = 0; b < contact.n_bonds; ++b) sums.bond_force += norm(contact.bond[b].force);
     sums.n_bonds += contact.n_bonds;

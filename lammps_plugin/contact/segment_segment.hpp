@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace jamshape {
 
@@ -16,6 +17,16 @@ template <int D, class S = double> struct SpinePair {
   Vec<D, S> u_j;
   double A_j;
 };
+
+/// The pair without its derivatives: searches and other decisions look at values alone.
+template <int D, class S> SpinePair<D, ValueOf<S>> values_of(const SpinePair<D, S> &p)
+{
+  if constexpr (std::is_same_v<S, ValueOf<S>>) {
+    return p;
+  } else {
+    return {values_of(p.r), values_of(p.u_i), p.A_i, values_of(p.u_j), p.A_j};
+  }
+}
 
 /// A point on each spine, s along u_i from the centre of i and t along u_j from the centre of j,
 /// and the vector from the point on j to the point on i.
@@ -65,6 +76,18 @@ template <int D, class S> struct TipFeet {
     for (int k = 0; k < 4; ++k) distance_sq[k] = norm_sq(p.r + s[k] * p.u_i - t[k] * p.u_j);
   }
 
+  /// A tip and its foot, of the same pair in any scalar.
+  template <class T> Feet<D, T> feet(const SpinePair<D, T> &p, int k) const
+  {
+    if constexpr (std::is_same_v<T, S>) {
+      return feet_at(p, s[k], t[k]);
+    } else if (k < 2) {
+      return feet_at(p, T(s[k]), foot_on_j(p, T(s[k])));
+    } else {
+      return feet_at(p, foot_on_i(p, T(t[k])), T(t[k]));
+    }
+  }
+
   /// Index of the least distance; without branches, which nothing could predict.
   int nearest() const
   {
@@ -99,15 +122,15 @@ template <int D, class S> struct EndFeet {
 
   explicit EndFeet(const SpinePair<D, S> &p)
   {
-    const TipFeet<D, S> tips(p);
-    const int j_plus = dot(p.u_i, p.u_j) < 0.0 ? 3 : 2, j_minus = 5 - j_plus;
-    const auto feet = [&](int k) { return feet_at(p, tips.s[k], tips.t[k]); };
-    const auto closer = [&](const Feet<D, S> &a, const Feet<D, S> &b) {
-      return is_closer(p, b, a) ? b : a;
-    };
-    plus = closer(feet(0), feet(j_plus));
-    minus = closer(feet(1), feet(j_minus));
-    minus_is_nearer = is_closer(p, minus, plus);
+    const auto values = values_of(p);
+    const TipFeet<D, ValueOf<S>> tips(values);
+    const int j_plus = dot(values.u_i, values.u_j) < 0.0 ? 3 : 2, j_minus = 5 - j_plus;
+    const auto feet = [&](int k) { return feet_at(values, tips.s[k], tips.t[k]); };
+    const auto closer = [&](int a, int b) { return is_closer(values, feet(b), feet(a)) ? b : a; };
+    const int at_plus = closer(0, j_plus), at_minus = closer(1, j_minus);
+    minus_is_nearer = is_closer(values, feet(at_minus), feet(at_plus));
+    plus = tips.feet(p, at_plus);
+    minus = tips.feet(p, at_minus);
   }
 
   const Feet<D, S> &nearer() const { return minus_is_nearer ? minus : plus; }

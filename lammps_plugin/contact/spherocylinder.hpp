@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 
 namespace jamshape {
 
@@ -221,11 +222,17 @@ template <int D, class S> class SpherocylinderContact {
   Contact<D, S> evaluate() const
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0 && law.shortcuts) return discs();
-    const Feet<D, S> closest = closest_feet(pair);
+    const auto values = values_of(pair);
+    const auto closest = closest_feet(values);
     if (!touches(closest.distance_sq)) return without_bonds<D, S>(ContactStatus::APART);
-    if (is_coincident(closest) || spines_cross(pair))
+    if (is_coincident(closest) || spines_cross(values))
       return without_bonds<D, S>(ContactStatus::CROSSING);
-    return law.sides == Sides::ONE ? one_bond(closest) : two_bonds();
+    if (law.sides == Sides::TWO) return two_bonds();
+    if constexpr (std::is_same_v<S, ValueOf<S>>) {
+      return one_bond(closest);
+    } else {
+      return one_bond(closest_feet(pair));
+    }
   }
 
  private:
@@ -241,9 +248,12 @@ template <int D, class S> class SpherocylinderContact {
   };
   static Share whole() { return {1.0, 0.0, 0.0, 0.0}; }
 
-  bool touches(const S &distance_sq) const { return distance_sq < S(reach) * reach; }
+  template <class T> bool touches(const T &distance_sq) const
+  {
+    return distance_sq < T(reach) * reach;
+  }
 
-  bool is_coincident(const Feet<D, S> &feet) const
+  template <class T> bool is_coincident(const Feet<D, T> &feet) const
   {
     return feet.distance_sq <= COINCIDENT * reach * COINCIDENT * reach;
   }

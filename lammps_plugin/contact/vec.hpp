@@ -56,6 +56,14 @@ template <int D, class S> S norm_sq(const Vec<D, S> &a) { return dot(a, a); }
 
 template <int D, class S> S norm(const Vec<D, S> &a) { return sqrt(norm_sq(a)); }
 
+/// Component by component.
+template <int D, class S> Vec<D, ValueOf<S>> values_of(const Vec<D, S> &a)
+{
+  Vec<D, ValueOf<S>> values;
+  for (int k = 0; k < D; ++k) values[k] = value_of(a[k]);
+  return values;
+}
+
 template <class S> Vec<1, S> cross(const Vec<2, S> &a, const Vec<2, S> &b)
 {
   return {{a[0] * b[1] - a[1] * b[0]}};

@@ -104,3 +104,62 @@ def superellipsoid_sweeps(
     n_sweeps: int,
     seed: int,
 ) -> dict[str, Any]: ...
+
+class SymmetricFactors:
+    n_negative: int
+    def __init__(
+        self, start: NDArray[np.int32], row: NDArray[np.int32], value: NDArray[np.float64]
+    ) -> None: ...
+    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]: ...
+
+class _Vicinity:
+    largest_diagonal: float
+    def move_to(
+        self,
+        position: NDArray[np.float64],
+        orientation: NDArray[np.float64],
+        edges: NDArray[np.float64],
+    ) -> None: ...
+    def evaluate(
+        self, x: NDArray[np.float64], strain: float, extended: bool
+    ) -> tuple[float, NDArray[np.float64], float, float, int, int, int] | None: ...
+    def linearise(
+        self, x: NDArray[np.float64], strain: float, diagonal: NDArray[np.float64]
+    ) -> None: ...
+    def factorised(self, shift: float) -> SymmetricFactors | None: ...
+
+class SpherocylinderVicinity(_Vicinity):
+    def __init__(
+        self,
+        diameters: NDArray[np.float64],
+        position: NDArray[np.float64],
+        orientation: NDArray[np.float64],
+        edges: NDArray[np.float64],
+        pairs: NDArray[np.int64],
+        shift: NDArray[np.int64],
+        k_e: float,
+        sides: int,
+        column: NDArray[np.int64],
+        rotation_length: NDArray[np.float64],
+        turning_radius: NDArray[np.float64],
+        skin: float,
+        reach: float,
+    ) -> None: ...
+
+class SuperellipsoidVicinity(_Vicinity):
+    def __init__(
+        self,
+        diameters: NDArray[np.float64],
+        exponent: NDArray[np.float64],
+        position: NDArray[np.float64],
+        orientation: NDArray[np.float64],
+        edges: NDArray[np.float64],
+        pairs: NDArray[np.int64],
+        shift: NDArray[np.int64],
+        epsilon: float,
+        column: NDArray[np.int64],
+        rotation_length: NDArray[np.float64],
+        turning_radius: NDArray[np.float64],
+        skin: float,
+        reach: float,
+    ) -> None: ...

@@ -22,7 +22,7 @@ from jamshape.packing import FloatArray, IntArray, LongArray, Packing
 from jamshape.shapes import PairArrays, Shape, shape_of
 
 # Pairs whose surfaces are closer than this fraction of the smallest radius are looked at.
-_SKIN = 0.1
+_SKIN = 0.3
 
 _TURN = 2 * np.arccos(np.longdouble(-1))
 
@@ -139,7 +139,7 @@ class Landscape:
         self.particles, self.k_e, self.sides = packing, k_e, sides
         self.shape = shape_of(packing, k_e, sides)
         self.evaluations = 0
-        self._pairs: _Pairs | None = None
+        self._pairs: Pairs | None = None
 
     @property
     def rotation_length(self) -> FloatArray:
@@ -157,6 +157,11 @@ class Landscape:
         return 2 * float(self.inner_radius.min())
 
     @cached_property
+    def shortest_lever(self) -> float:
+        """The smallest of `rotation_length` where there is one, else infinite."""
+        return float(self.rotation_length[self.rotation_length > 0].min(initial=np.inf))
+
+    @cached_property
     def _free(self) -> NDArray[np.bool_]:
         """(N, D + rotations) which components are coordinates."""
         D = self.particles.dimension
@@ -164,7 +169,7 @@ class Landscape:
         n_turns = 1 if D == 2 else 3
         return np.column_stack([np.ones((len(turns), D), bool), *[turns] * n_turns])
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of coordinates n."""
         return int(self._free.sum())
@@ -192,10 +197,10 @@ class Landscape:
         """Gather an (n,) vector from (N, D + rotations), as `components` spreads it."""
         return components[self._free]
 
-    @property
-    def components_per_particle(self) -> int:
-        """D + rotations."""
-        return int(self._free.shape[1])
+    @cached_property
+    def is_rotation(self) -> NDArray[np.bool_]:
+        """(n,) whether a coordinate is a rotation."""
+        return np.nonzero(self._free)[1] >= self.particles.dimension
 
     def particle_of_coordinate(self) -> IntArray:
         """(n,) the particle that each coordinate belongs to."""
@@ -218,18 +223,9 @@ class Landscape:
             If a contact did not converge.
         """
         self.evaluations += 1
-        pairs = self._pairs_at(state)
+        pairs = self.pairs_at(state)
         found = self.shape.sums(self._arrays(state, pairs), extended=extended)
-        if found["crossing"] >= 0:
-            first, second = self.particles.id[pairs.particles[found["crossing"]]]
-            msg = (
-                f"the {self.shape.core} of particles {first} and {second} cross, expected overlaps smaller"
-                " than the particles; start from a state without crossings"
-            )
-            raise CrossingError(msg)
-        if found["unconverged"] >= 0:
-            first, second = self.particles.id[pairs.particles[found["unconverged"]]]
-            raise ValueError(unconverged_sentence(first, second))
+        self.refuse(pairs, found["crossing"], found["unconverged"])
         slope = -np.column_stack([found["force"], found["torque"] / self._length_or_1[:, None]])
         n_bonds = found["n_bonds"]
         return Evaluation(
@@ -239,6 +235,19 @@ class Landscape:
             bond_force=found["bond_force"] / max(n_bonds, 1),
             n_bonds=n_bonds,
         )
+
+    def refuse(self, pairs: Pairs, crossing: int, unconverged: int) -> None:
+        """Raise as `evaluate` does for a pair that crosses or is unconverged, unless it is -1."""
+        if crossing >= 0:
+            first, second = self.particles.id[pairs.particles[crossing]]
+            msg = (
+                f"the {self.shape.core} of particles {first} and {second} cross, expected overlaps smaller"
+                " than the particles; start from a state without crossings"
+            )
+            raise CrossingError(msg)
+        if unconverged >= 0:
+            first, second = self.particles.id[pairs.particles[unconverged]]
+            raise ValueError(unconverged_sentence(first, second))
 
     def curvature(self, state: State, *, extended: bool = False) -> Curvature:
         """Evaluate all second derivatives; arguments and errors as `evaluate`."""
@@ -254,17 +263,12 @@ class Landscape:
         hessian = self._summed(blocks, places)
         return Curvature(hessian, coupling, strain_hessian, self._rattlers(found))
 
-    def hessian(self, state: State) -> Any:
-        """Give the Hessian alone, in doubles, as in `Curvature`; errors as `evaluate`."""
-        found = self.derivatives(state)
-        return self._summed(_contracted(found), self._places(found))
-
     def derivatives(self, state: State, *, extended: bool = False) -> dict[str, NDArray[Any]]:
         """Give second derivatives contact by contact, as `Shape.derivatives`.
 
         Its rows `pair` are those of `particles`, an array (C, 2) that is added here.
         """
-        pairs = self._pairs_at(state)
+        pairs = self.pairs_at(state)
         found = self.shape.derivatives(self._arrays(state, pairs), extended=extended)
         found["particles"] = pairs.particles[found["pair"]]
         found["shift"] = pairs.shift[found["pair"]]
@@ -275,7 +279,7 @@ class Landscape:
         return np.where(self.rotation_length > 0, self.rotation_length, 1.0)
 
     @cached_property
-    def _column(self) -> IntArray:
+    def column(self) -> IntArray:
         """(N, D + rotations) number of each coordinate, -1 for none."""
         column = np.full(self._free.shape, -1)
         column[self._free] = np.arange(self.size)
@@ -291,7 +295,7 @@ class Landscape:
         scale = np.tile(scale, (len(i), 1))
         scale[:, D : D + n_turns] = 1 / self._length_or_1[i, None]
         scale[:, 2 * D + n_turns :] = 1 / self._length_or_1[j, None]
-        column = np.concatenate([self._column[i], self._column[j]], axis=1)
+        column = np.concatenate([self.column[i], self.column[j]], axis=1)
         return _Places(variable, scale, column)
 
     def _summed(self, blocks: FloatArray, places: _Places) -> Any:
@@ -314,12 +318,13 @@ class Landscape:
         flat = found["on_side"].any(axis=1) | (found["n_bonds"] == 2)[:, None]
         return _contact.find_rattlers(n, D, found["particles"], normals, flat)
 
-    def _arrays(self, state: State, pairs: _Pairs) -> PairArrays:
+    def _arrays(self, state: State, pairs: Pairs) -> PairArrays:
         return PairArrays(*state.split, pairs.particles, pairs.shift)
 
-    def _pairs_at(self, state: State) -> _Pairs:
+    def pairs_at(self, state: State) -> Pairs:
+        """Give the pairs that may touch at a state: the list that there is, or a new one."""
         if self._pairs is None or self._pairs.outrun_by(state, self.shape.turning_radius):
-            self._pairs = _Pairs.near(self.shape, state.packing(self.particles), state)
+            self._pairs = Pairs.near(self.shape, state.packing(self.particles), state)
         return self._pairs
 
 
@@ -343,17 +348,21 @@ def _contracted(found: dict[str, NDArray[Any]]) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Pairs:
-    """Pairs of particles whose surfaces were closer than `skin` at a state."""
+class Pairs:
+    """Pairs of particles whose surfaces were closer than a skin at a state."""
 
     particles: IntArray
+    """(M, 2)"""
     shift: IntArray
+    """(M, D) box edges to add to the second."""
     then: State
     skin: float
     reach: float
+    """How far apart their centres may be."""
 
     @classmethod
-    def near(cls, shape: Shape, packing: Packing, state: State) -> _Pairs:
+    def near(cls, shape: Shape, packing: Packing, state: State) -> Pairs:
+        """Find them."""
         skin = _SKIN * float(shape.inner_radius.min())
         near = shape.near(packing, skin)
         reach = 2 * float(shape.outer_radius.max()) + skin
@@ -367,9 +376,11 @@ class _Pairs:
         scale = edges / edges_then
         left = self.skin - float(np.abs(scale - 1).max()) * self.reach
         moved = np.sqrt(((position - scale * position_then) ** 2).sum(axis=1))
-        turned = np.sqrt(((orientation - orientation_then) ** 2).sum(axis=1))
-        if now.dimension == 3:
-            turned *= 2.3  # the chord of the quaternions is half of the angle, or a little less
+        turn = orientation - orientation_then
+        if now.dimension == 2:
+            turned = np.abs(turn - 2 * np.pi * np.rint(turn / (2 * np.pi)))[:, 0]
+        else:  # the chord of the quaternions is half of the angle, or a little less
+            turned = 2.3 * np.sqrt((turn**2).sum(axis=1))
         return bool(2 * (moved + turning_radius * turned).max(initial=0.0) >= left)
 
 

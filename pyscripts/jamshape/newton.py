@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse
-from scipy.sparse.linalg import splu
 
+from jamshape import _contact
 from jamshape.landscape import Landscape
 from jamshape.packing import FloatArray
 
@@ -42,36 +42,41 @@ def add_to_diagonal(matrix: Any, values: float | FloatArray) -> Any:
 
 
 class Factorisation:
-    """Factors of M + shift, by SuperLU.
+    """Factors L D L^T of a sparse symmetric matrix, by Eigen.
 
     Without pivoting, so that the signs of the pivots are those of the eigenvalues (Sylvester's law of
     inertia).
 
     Parameters
     ----------
-    matrix : (n, n) CSC matrix
-    shift : float
-
-    Raises
-    ------
-    RuntimeError
-        If it is singular.
+    factors : jamshape._contact.SymmetricFactors
     """
 
-    def __init__(self, matrix: Any, shift: float) -> None:
-        self._lu = splu(
-            add_to_diagonal(matrix, shift),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-        pivots = self._lu.U.diagonal()
-        self.n_negative = int((~(pivots > 0)).sum())  # and what is not a number
+    def __init__(self, factors: Any) -> None:
+        self._factors = factors
+        self.n_negative: int = factors.n_negative
+        """Pivots that are not positive."""
+
+    @classmethod
+    def of(cls, matrix: Any, shift: float) -> Factorisation:
+        """Factorise an (n, n) CSC matrix with a shift of its diagonal.
+
+        Raises
+        ------
+        RuntimeError
+            If it is singular.
+        """
+        shifted = add_to_diagonal(matrix, shift)
+        start, row = shifted.indptr.astype(np.int32), shifted.indices.astype(np.int32)
+        return cls(_contact.SymmetricFactors(start, row, shifted.data))
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve for one (n,) or several (n, k) right-hand sides."""
-        solution: FloatArray = self._lu.solve(right)
-        return solution
+        if right.ndim == 1:
+            solution: FloatArray = self._factors.solve(right[None])[0]
+            return solution
+        columns: FloatArray = self._factors.solve(np.ascontiguousarray(right.T)).T
+        return columns
 
 
 @dataclass
@@ -91,7 +96,7 @@ class Regularised:
         self.shift = max(self.shift, LEAST_SHIFT * scale)
         while True:
             try:
-                factors = Factorisation(matrix, self.shift)
+                factors = Factorisation.of(matrix, self.shift)
             except RuntimeError:  # exactly singular
                 factors = None
             if factors is not None and factors.n_negative == 0:

@@ -39,6 +39,21 @@ class PairArrays(NamedTuple):
     """(M, D)"""
 
 
+class Extent(NamedTuple):
+    """How far the pairs of `PairArrays` hold, and what the coordinates are."""
+
+    column: IntArray
+    """(N, 3) numbers of the coordinates x, y, rotation; -1 for none."""
+    rotation_length: FloatArray
+    """(N,) as in `Shape`"""
+    turning_radius: FloatArray
+    """(N,) as in `Shape`"""
+    skin: float
+    """What surfaces may come closer before pairs are to be found anew."""
+    reach: float
+    """How far apart centres of pairs are at most."""
+
+
 class Shape(Protocol):
     """Particles of one shape style: their sizes, pairs that may touch, and the sums over these."""
 
@@ -61,6 +76,9 @@ class Shape(Protocol):
 
     def derivatives(self, arrays: PairArrays, *, extended: bool) -> dict[str, NDArray[Any]]:
         """Evaluate second derivatives contact by contact."""
+
+    def vicinity(self, arrays: PairArrays, extent: Extent) -> Any:
+        """Compile the energy about a state in two dimensions, as `jamshape._contact` has it."""
 
     def turning_axes(self, packing: Packing) -> FloatArray:
         """(N, rotations, T) orthogonal unit vectors that contacts can turn particles about."""
@@ -99,6 +117,11 @@ class Spherocylinders:
             self._diameters, *arrays, *self._law, extended
         )
         return found
+
+    def vicinity(self, arrays: PairArrays, extent: Extent) -> Any:
+        """As `Shape.vicinity`."""
+        k_e, sides = self._law
+        return _contact.SpherocylinderVicinity(self._diameters, *arrays, k_e, sides, *extent)
 
     def turning_axes(self, packing: Packing) -> FloatArray:
         """Two in space: a rod spins freely about its own axis."""
@@ -141,6 +164,13 @@ class Superellipsoids:
             self._packing.diameters, self._packing.exponent, *arrays, self._epsilon, extended
         )
         return found
+
+    def vicinity(self, arrays: PairArrays, extent: Extent) -> Any:
+        """As `Shape.vicinity`."""
+        packing = self._packing
+        return _contact.SuperellipsoidVicinity(
+            packing.diameters, packing.exponent, *arrays, self._epsilon, *extent
+        )
 
     def turning_axes(self, packing: Packing) -> FloatArray:
         """Three in space; two for spheroids, which spin freely about their axis."""

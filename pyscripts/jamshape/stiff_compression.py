@@ -22,6 +22,7 @@ from jamshape.landscape import CrossingError, Evaluation, Landscape, State
 from jamshape.newton import Factorisation
 from jamshape.packing import FloatArray, Packing
 from jamshape.stiff_stage import Stage, Units, rms, solve, stretch_of
+from jamshape.vicinity import Vicinity
 
 # Stages are solved to this fraction of the local error that is allowed.
 _STAGE_ACCURACY = 0.03
@@ -279,7 +280,10 @@ class _Run:
 
     def __init__(self, landscape: Landscape, flow: Flow, protocol: Protocol) -> None:
         self.landscape, self.flow, self.protocol = landscape, flow, protocol
+        self.vicinity = Vicinity(landscape, flow.state)
+        self._still = np.zeros(landscape.size)
         self.drag = drag_coefficients(landscape, protocol.k_d)
+        self._least_drag = float(self.drag.min())
         self.area = float(landscape.particles.measures.sum())
         self.size = 2 * float(landscape.inner_radius.mean())
         self.kappa = 0.0
@@ -292,7 +296,7 @@ class _Run:
         """Take a step; give the evaluation at its end, its error and size."""
         flow = self.flow
         self.kappa, phi_end = self.protocol.leg(self.phi)
-        here = self.landscape.evaluate(flow.state, extended=False)
+        here = self.vicinity.evaluate(self._still, 0.0, extended=False)
         if not flow.velocity.size:
             self._begin(here)
         longest = 0.5 * math.log(phi_end / self.phi) / self.kappa
@@ -344,7 +348,7 @@ class _Run:
     @property
     def _stable(self) -> float:
         """About the longest explicit step, [time]: drag over stiffness of a contact or two."""
-        return _EXPLICIT_BELOW * float(self.drag.min()) * self.size**2 / self.landscape.k_e
+        return _EXPLICIT_BELOW * self._least_drag * self.size**2 / self.landscape.k_e
 
     def _begin(self, here: Evaluation) -> None:
         flow = self.flow
@@ -359,7 +363,7 @@ class _Run:
 
     def _unit(self, evaluation: Evaluation) -> float:
         """Typical overlap, at least what the drag on a particle a diameter from the centre makes."""
-        least = self.kappa * float(self.drag.min()) * self.size
+        least = self.kappa * self._least_drag * self.size
         return max(evaluation.bond_force, least) * self.size**2 / self.landscape.k_e
 
     def _units(self, evaluation: Evaluation) -> Units:
@@ -389,7 +393,7 @@ class _Run:
             flow.forget()
         times = method.times
         velocities: list[FloatArray] = []
-        evaluation, last = here, np.zeros(landscape.size)
+        evaluation, last = here, self._still
         for k, row in enumerate(method.weights):
             own = row[k] * dt
             centre = self._combined(row, velocities, dt)
@@ -398,7 +402,7 @@ class _Run:
                 continue
             strain = math.expm1(-self.kappa * times[k] * dt)
             drag = self.drag * stretch_of(landscape, strain) ** 2 / own
-            stage = Stage(landscape, flow.state, strain, drag, centre, self._is_extended(unit))
+            stage = Stage(self.vicinity, strain, drag, centre, self._is_extended(unit))
             guess = centre + own * self._predicted(times[k] * dt, velocities, times, dt)
             found = solve(stage, (guess, last), flow._factors, units, accuracy)
             flow.factorisations += found.factorisations
@@ -434,14 +438,13 @@ class _Run:
         return flow.velocity + after * flow.acceleration
 
     def _explicit(self, dt: float, here: Evaluation) -> _Attempt:
-        flow, landscape = self.flow, self.landscape
+        landscape = self.landscape
         extended = self._is_extended(self._unit(here))
         velocities, evaluation = [-here.gradient / self.drag], here
         for after, row in zip(_HEUN_EULER.times[1:], _HEUN_EULER.weights[1:], strict=True):
             x = self._combined(row, velocities, dt)
             strain = math.expm1(-self.kappa * after * dt)
-            state = landscape.displaced(flow.state, x).strained(strain)
-            evaluation = landscape.evaluate(state, extended=extended)
+            evaluation = self.vicinity.evaluate(x, strain, extended=extended)
             stretch = stretch_of(landscape, strain)
             velocities.append(-evaluation.gradient / (stretch * self.drag))
         error = 0.5 * dt * (velocities[1] - velocities[0])
@@ -451,7 +454,8 @@ class _Run:
         flow = self.flow
         strain = math.expm1(-self.kappa * dt)
         stretch = stretch_of(self.landscape, strain)
-        flow.state = self.landscape.displaced(flow.state, attempt.x).strained(strain)
+        flow.state = self.vicinity.at(attempt.x, strain)
+        self.vicinity.move_to(flow.state)
         flow.acceleration = stretch * (attempt.velocities[-1] - flow.velocity) / dt
         flow.velocity = stretch * attempt.velocities[-1]
         flow.time += dt

@@ -17,14 +17,16 @@ from __future__ import annotations
 import contextlib
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from jamshape.landscape import CrossingError, Evaluation, Landscape, State
+from jamshape.landscape import CrossingError, Evaluation, Landscape
 from jamshape.minimise import limited
-from jamshape.newton import LEAST_SHIFT, Factorisation, add_to_diagonal
+from jamshape.newton import Factorisation
 from jamshape.packing import FloatArray
+from jamshape.vicinity import Vicinity
 
 # A stage is given up after so many directions.
 _DIRECTIONS = 10
@@ -48,9 +50,8 @@ class Stage:
 
     Parameters
     ----------
-    landscape : Landscape
-    base : State
-        From which displacements count.
+    vicinity : Vicinity
+        About the state from which displacements count.
     strain : float
         Of the box since then: x moves particles by (1 + strain) x and turns them by x.
     drag : (n,) array
@@ -61,41 +62,30 @@ class Stage:
         Whether doubles are too short.
     """
 
-    landscape: Landscape
-    base: State
+    vicinity: Vicinity
     strain: float
     drag: FloatArray
     centre: FloatArray
     extended: bool
 
-    @property
+    @cached_property
     def stretch(self) -> FloatArray:
         """(n,) displacement of a particle per coordinate: 1 + strain, or 1 for rotations."""
         return stretch_of(self.landscape, self.strain)
 
-    def state(self, x: FloatArray) -> State:
-        """Displace and strain the base."""
-        return self.landscape.displaced(self.base, x).strained(self.strain)
+    @property
+    def landscape(self) -> Landscape:
+        """The landscape of the vicinity."""
+        return self.vicinity.landscape
 
     def evaluate(self, x: FloatArray) -> tuple[Evaluation, FloatArray]:
         """Energy of the landscape, and the gradient of what is minimised."""
-        found = self.landscape.evaluate(self.state(x), extended=self.extended)
+        found = self.vicinity.evaluate(x, self.strain, extended=self.extended)
         return found, self.stretch * found.gradient + self.drag * (x - self.centre)
 
     def factorise(self, x: FloatArray) -> Factorisation:
         """Factorise the Hessian of what is minimised, with a shift if it is not positive definite."""
-        matrix, stretch = self.landscape.hessian(self.state(x)), self.stretch
-        matrix.data *= stretch[matrix.indices] * np.repeat(stretch, np.diff(matrix.indptr))
-        matrix = add_to_diagonal(matrix, self.drag)
-        shift, least = 0.0, LEAST_SHIFT * float(np.abs(matrix.diagonal()).max())
-        while True:
-            try:
-                factors = Factorisation(matrix, shift)
-            except RuntimeError:  # exactly singular
-                factors = None
-            if factors is not None and factors.n_negative == 0:
-                return factors
-            shift = max(10 * shift, least, float(self.drag.min()))
+        return self.vicinity.factorise(x, self.strain, self.drag)
 
 
 class Solution(NamedTuple):
@@ -260,6 +250,4 @@ def rms(landscape: Landscape, vector: FloatArray) -> float:
 
 def stretch_of(landscape: Landscape, strain: float) -> FloatArray:
     """(n,) 1 + strain for displacements, 1 for rotations."""
-    stretch = np.ones((landscape.particles.n, landscape.components_per_particle))
-    stretch[:, : landscape.particles.dimension] += strain
-    return landscape.coordinates(stretch)
+    return np.where(landscape.is_rotation, 1.0, 1.0 + strain)

@@ -23,7 +23,7 @@ def test_negative_pivots_are_as_many_as_negative_eigenvalues(n, seed, shift):
     matrix = random_symmetric(n, seed)
     values = np.linalg.eigvalsh(matrix.toarray()) + shift
     assert np.abs(values).min() > 1e-6  # so that the sign is beyond doubt
-    assert Factorisation(matrix, shift).n_negative == (values < 0).sum()
+    assert Factorisation.of(matrix, shift).n_negative == (values < 0).sum()
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -32,7 +32,7 @@ def test_solution_solves(seed):
     matrix = random_symmetric(80, seed)
     matrix = (matrix @ matrix.T + 1e-3 * scipy.sparse.identity(80)).tocsc()
     right = rng.normal(size=(80, 2))
-    factors = Factorisation(matrix, 0.25)
+    factors = Factorisation.of(matrix, 0.25)
     shifted = matrix.toarray() + 0.25 * np.eye(80)
     for b in (right, right[:, 0]):
         x = factors.solve(b)

@@ -8,6 +8,7 @@ from jamshape.minimise import minimise
 from jamshape.newton import Factorisation, add_to_diagonal
 from jamshape.stiff_compression import drag_coefficients
 from jamshape.stiff_stage import Stage, Units, solve
+from jamshape.vicinity import Vicinity
 
 STRAIN, ACCURACY = -3e-4, 1e-5
 
@@ -22,7 +23,7 @@ def jammed():
 def stage_of(jammed, h):
     landscape, state = jammed
     drag = drag_coefficients(landscape) / h
-    return Stage(landscape, state, STRAIN, drag, np.zeros(landscape.size), extended=False)
+    return Stage(Vicinity(landscape, state), STRAIN, drag, np.zeros(landscape.size), extended=False)
 
 
 def units_of(landscape, state):
@@ -77,16 +78,16 @@ class Folded(Stage):
 
     def evaluate(self, x):
         matrix, b, across, height = self.parts
-        found = self.landscape.evaluate(self.base)
+        found = self.landscape.evaluate(self.vicinity.base)
         return found, matrix @ x - b + across.T @ (height * np.sign(across @ x))
 
     def factorise(self, x):  # noqa: ARG002 - the same everywhere
-        return Factorisation(self.parts[0], 0.0)
+        return Factorisation.of(self.parts[0], 0.0)
 
 
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-4, 1e-6])
 def test_a_solution_on_a_kink_near_by_is_found(jammed, accuracy):
-    landscape, state = jammed
+    landscape, _ = jammed
     n, rng = landscape.size, np.random.default_rng(2)
     root = rng.normal(size=(n, n)) / np.sqrt(n)
     matrix = add_to_diagonal(scipy.sparse.csc_matrix(root @ root.T), 1.0)
@@ -101,7 +102,7 @@ def test_a_solution_on_a_kink_near_by_is_found(jammed, accuracy):
 
     units = Units(1.0, float(exact @ (matrix @ exact)), 1.0)
     plain = stage_of(jammed, 1.0)
-    stage = Folded(landscape, state, 0.0, np.zeros(n), plain.centre, extended=False)
+    stage = Folded(plain.vicinity, 0.0, np.zeros(n), plain.centre, extended=False)
     stage.put(matrix, b, across, height)
     away = rng.normal(size=n)
     start = exact + 20 * accuracy * np.sqrt(units.energy / (away @ (matrix @ away))) * away

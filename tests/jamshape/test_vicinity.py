@@ -1,0 +1,127 @@
+import numpy as np
+import pytest
+from test_landscape import pressed_named
+
+from jamshape.landscape import CrossingError, Landscape, State
+from jamshape.vicinity import Vicinity
+
+STRAIN = -2e-4
+RODS = "rods of alpha 4"
+PLANAR = ("discs", "rods of alpha 0.01", RODS, "discs and rods", "superellipses")
+
+
+@pytest.fixture(params=PLANAR)
+def packing(request):
+    return pressed_named(request.param)
+
+
+def about(packing, size=1e-4):
+    """Give a vicinity, coordinates near it, and the state there."""
+    landscape, state = Landscape(packing), State.of(packing)
+    x = size * np.random.default_rng(3).normal(size=landscape.size)
+    vicinity = Vicinity(landscape, state)
+    return vicinity, x, landscape.displaced(state, x).strained(STRAIN)
+
+
+@pytest.mark.parametrize("extended", [False, True])
+def test_energy_and_gradient_are_those_of_the_landscape(packing, extended):
+    vicinity, x, state = about(packing)
+    found = vicinity.evaluate(x, STRAIN, extended=extended)
+    expected = Landscape(packing).evaluate(state, extended=extended)
+    scale = np.abs(expected.gradient).max()
+    assert found.gradient == pytest.approx(expected.gradient, rel=0, abs=1e-14 * scale)
+    for name in ("energy", "strain_gradient", "bond_force", "n_bonds"):
+        assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-14)
+    assert expected.n_bonds > 5
+
+
+def test_factors_are_those_of_the_hessian_of_the_landscape(packing):
+    vicinity, x, state = about(packing)
+    landscape = vicinity.landscape
+    stretch = np.where(landscape.is_rotation, 1.0, 1.0 + STRAIN)
+    hessian = stretch[:, None] * landscape.curvature(state).hessian.toarray() * stretch
+    diagonal = 1.0 + np.arange(landscape.size) / landscape.size - hessian.diagonal().min()
+    right = np.random.default_rng(4).normal(size=landscape.size)
+    vicinity.evaluate(x, STRAIN, extended=False)
+    found = vicinity.factorise(x, STRAIN, diagonal).solve(right)
+    expected = np.linalg.solve(hessian + np.diag(diagonal), right)
+    assert found == pytest.approx(expected, rel=0, abs=1e-11 * np.abs(expected).max())
+
+
+def test_what_is_not_positive_definite_is_shifted_just_enough():
+    vicinity, x, _ = about(pressed_named(RODS))
+    hessian = vicinity.landscape.curvature(vicinity.at(x, STRAIN)).hessian.toarray()
+    least = np.linalg.eigvalsh(hessian)[0]
+    below = np.full(len(x), -least - 1.0)  # the least eigenvalue is then -1
+    assert least + below[0] == pytest.approx(-1)
+    vicinity.evaluate(x, STRAIN, extended=False)
+    factors = vicinity.factorise(x, STRAIN, np.abs(below) * 1e-3)
+    assert factors.n_negative == 0
+    right = np.ones(len(x))
+    assert right @ factors.solve(right) > 0
+
+
+@pytest.mark.parametrize("moves", [1, 30])
+def test_pairs_are_found_anew_where_they_no_longer_hold(packing, moves):
+    landscape, state = Landscape(packing), State.of(packing)
+    vicinity, rng = Vicinity(landscape, state), np.random.default_rng(5)
+    for _ in range(moves):
+        x = 0.05 * landscape.length / np.sqrt(moves) * rng.normal(size=landscape.size)
+        try:
+            found = vicinity.evaluate(x, STRAIN, extended=True)
+        except CrossingError:
+            continue
+        vicinity.move_to(vicinity.at(x, STRAIN))
+    expected = Landscape(packing).evaluate(vicinity.base)
+    assert found.energy == pytest.approx(expected.energy, rel=1e-12)
+    assert found.gradient == pytest.approx(expected.gradient, rel=0, abs=1e-12)
+
+
+def test_factors_that_are_held_outlive_later_ones(packing):
+    vicinity, x, _ = about(packing)
+    right = np.ones(len(x))
+    held = vicinity.factorise(x, 0.0, np.full(len(x), 1e2))
+    before = held.solve(right)
+    for diagonal in (1e3, 1e4, 1e5):
+        vicinity.factorise(x, 0.0, np.full(len(x), diagonal))
+    assert (held.solve(right) == before).all()
+
+
+def test_a_whole_turn_changes_nothing_and_needs_no_new_pairs():
+    vicinity, x, _ = about(pressed_named(RODS))
+    landscape = vicinity.landscape
+    turns = np.zeros((landscape.particles.n, 3))
+    turns[:, 2] = 2 * np.pi * landscape.rotation_length
+    pairs = landscape.pairs_at(vicinity.base)
+    expected = vicinity.evaluate(x, 0.0, extended=True).energy
+    vicinity.move_to(vicinity.at(landscape.coordinates(turns), 0.0))
+    assert vicinity.evaluate(x, 0.0, extended=True).energy == pytest.approx(expected, rel=1e-13)
+    assert landscape.pairs_at(vicinity.base) is pairs
+
+
+def test_spines_that_cross_are_named():
+    vicinity, x, _ = about(pressed_named(RODS))
+    landscape = vicinity.landscape
+    i, j = landscape.pairs_at(vicinity.base).particles[0]
+    shift = landscape.pairs_at(vicinity.base).shift[0]
+    moves = np.zeros((landscape.particles.n, 3))
+    base = vicinity.base
+    moves[i, :2] = base.position[j] + shift * base.edges - base.position[i]
+    moves[i, 2] = 0.3 * landscape.rotation_length[i]
+    with pytest.raises(CrossingError, match="cross"):
+        vicinity.evaluate(landscape.coordinates(moves), 0.0, extended=False)
+    assert len(x) == landscape.size
+
+
+def test_coordinates_of_another_length_are_refused():
+    vicinity, x, _ = about(pressed_named(RODS))
+    with pytest.raises(ValueError, match=f"has {len(x) - 1} components, expected one for each of"):
+        vicinity.evaluate(x[1:], 0.0, extended=False)
+    with pytest.raises(ValueError, match="diagonal"):
+        vicinity.factorise(x, 0.0, x[1:])
+
+
+def test_three_dimensions_are_refused():
+    packing = pressed_named("rods in space")
+    with pytest.raises(ValueError, match="three dimensions, expected two"):
+        Vicinity(Landscape(packing), State.of(packing))
