@@ -3,15 +3,17 @@
     python analysis/fig_slow_compression.py RUN.h5 [MORE.h5 ...] --packing PACKING.h5 --out slow.png
 
 Runs are of pyscripts/slow_compress.py or compress.py; there is a column for each alpha and N, with p on a
-linear axis above and on a logarithmic one below. Lines mark phi_J of the slowest run, from the line
-through its pressure just above the onset (Fig. 4), and of packings at an energy. The last line of
-standard output is one JSON object with, for each run, the median relative difference of its pressure
-from that of the slowest run above that one's phi_J.
+linear axis above and on a logarithmic one below, and a line for each rate: the mean over samples (seeds),
+which are drawn thin. Vertical lines mark phi_J of the slowest rate, from the lines through the pressures
+just above the onsets (Fig. 4), and of packings at an energy. Prints a table (Markdown) of phi_J, of
+how far it lies from that of the slowest rate, and of the pressure above phi_J over that of the slowest
+rate, sample by sample, with standard errors. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
@@ -23,7 +25,7 @@ from jamshape.jamming import OnsetFit, fit_onset
 from jamshape.packing import FloatArray
 from jamshape.storage import read_attributes, read_observables
 
-# Packing fractions where two runs are compared.
+# Packing fractions where runs are averaged and compared.
 GRID = 1000
 
 
@@ -33,6 +35,7 @@ class Run(NamedTuple):
     path: Path
     alpha: float
     n: int
+    seed: int
     kappa: float
     phi: FloatArray
     p: FloatArray
@@ -53,45 +56,151 @@ def read(path: Path) -> Run:
         fit = fit_onset(phi, p)
     except ValueError:  # it ends below jamming, or rearranges too soon
         fit = None
-    return Run(path, float(attributes["alpha"]), int(attributes["n"]), kappa, phi, p, fit)
+    system = float(attributes["alpha"]), int(attributes["n"]), int(attributes.get("seed", 0))
+    return Run(path, *system, kappa, phi, p, fit)
 
 
-def draw(runs: list[Run], packings: list[dict[str, Any]], out: Path) -> None:
+class Ensemble(NamedTuple):
+    """Samples of one system compressed at one rate."""
+
+    alpha: float
+    n: int
+    kappa: float
+    runs: list[Run]
+
+    @classmethod
+    def all_of(cls, runs: list[Run]) -> list[Ensemble]:
+        """Group runs, the fastest of each system first."""
+        keys = sorted({(r.alpha, r.n, -r.kappa) for r in runs})
+        return [
+            cls(alpha, n, -rate, [r for r in runs if (r.alpha, r.n, -r.kappa) == (alpha, n, rate)])
+            for alpha, n, rate in keys
+        ]
+
+    @property
+    def onsets(self) -> dict[int, float]:
+        """phi_J of each seed that has one."""
+        return {run.seed: run.fit.phi_J for run in self.runs if run.fit}
+
+    def onset(self) -> Mean:
+        """Mean phi_J; the error of the fit where there is one sample."""
+        if len(self.onsets) == 1:
+            fit = next(run.fit for run in self.runs if run.fit)
+            return Mean(fit.phi_J, fit.phi_J_error, 1)
+        return Mean.of(list(self.onsets.values()))
+
+    def pressure(self) -> tuple[FloatArray, FloatArray]:
+        """Mean p(phi) where all samples have one."""
+        phi = np.linspace(max(r.phi[0] for r in self.runs), min(r.phi[-1] for r in self.runs), GRID)
+        return phi, np.mean([np.interp(phi, r.phi, r.p) for r in self.runs], axis=0)
+
+
+class Mean(NamedTuple):
+    """A mean over samples and its standard error."""
+
+    value: float
+    error: float
+    samples: int
+
+    @classmethod
+    def of(cls, values: list[float]) -> Mean:
+        """Average; not a number without samples, no error with one."""
+        n = len(values)
+        error = float(np.std(values, ddof=1) / np.sqrt(n)) if n > 1 else float("nan")
+        return cls(float(np.mean(values)) if n else float("nan"), error, n)
+
+    def plain(self) -> dict[str, float | None]:
+        """Give numbers that JSON knows."""
+        return {k: v if math.isfinite(v) else None for k, v in self._asdict().items()}
+
+    def __str__(self) -> str:
+        """Write it with as many digits as its error has."""
+        if not math.isfinite(self.value):
+            return ""
+        if not math.isfinite(self.error):
+            return f"{self.value:.4f}"
+        return f"{self.value:.4f} +- {self.error:.4f}"
+
+
+def draw(ensembles: list[Ensemble], packings: list[dict[str, Any]], out: Path) -> None:
     """Draw one column for each alpha and N."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    systems = sorted({(run.alpha, run.n) for run in runs})
+    systems = sorted({(of.alpha, of.n) for of in ensembles})
     figure = Figure(figsize=(4.5 * len(systems), 6), dpi=150, layout="constrained")
     axes = figure.subplots(2, len(systems), squeeze=False, sharex="col")
     for (alpha, n), (linear, logarithmic) in zip(systems, axes.T, strict=True):
-        of = [run for run in runs if (run.alpha, run.n) == (alpha, n)]
-        of.sort(key=lambda run: -run.kappa)
-        for k, run in enumerate(of):
-            for axis in (linear, logarithmic):
-                axis.plot(run.phi, run.p, "-", color=f"C{k}", lw=1, label=f"{run.kappa:g}")
-        fitted = [run.fit for run in of if run.fit]
+        own = [of for of in ensembles if (of.alpha, of.n) == (alpha, n)]
         for axis in (linear, logarithmic):
-            if fitted:
-                label = rf"$\phi_J$ = {fitted[-1].phi_J:.5f}, fit"
-                axis.axvline(fitted[-1].phi_J, color="k", ls="--", lw=0.8, label=label)
-            for packing in packings:
-                if (packing.get("alpha"), packing.get("n")) == (alpha, n):
-                    label = rf"$\phi_J$ = {packing['phi_J']:.5f}, energy"
-                    axis.axvline(packing["phi_J"], color="k", ls=":", lw=0.8, label=label)
+            for k, of in enumerate(own):
+                draw_pressures(axis, of, f"C{k}")
+            draw_onsets(axis, own, [p for p in packings if is_of(p, alpha, n)])
         linear.set(title=rf"$\alpha$ = {alpha:g}, N = {n}", ylabel="pressure $p$")
         logarithmic.set(xlabel=r"packing fraction $\phi$", ylabel="pressure $p$", yscale="log")
-        linear.legend(title=r"$\kappa$", fontsize=7)
+        linear.legend(title=r"$\kappa$ (samples)", fontsize=7)
     figure.savefig(out)
 
 
-def difference(run: Run, slowest: Run) -> float | None:
-    """Median relative difference of the pressures above phi_J of the slowest run."""
-    if slowest.fit is None:
-        return None
-    end = min(run.phi[-1], slowest.phi[-1])
-    phi = np.linspace(max(slowest.fit.phi_J, run.phi[0], slowest.phi[0]), end, GRID)
+def draw_pressures(axis: Any, of: Ensemble, color: str) -> None:
+    """Draw the samples thin, their mean thick."""
+    if len(of.runs) > 1:
+        for run in of.runs:
+            axis.plot(run.phi, run.p, "-", color=color, lw=0.4, alpha=0.5)
+    axis.plot(*of.pressure(), "-", color=color, lw=1.2, label=f"{of.kappa:g} ({len(of.runs)})")
+
+
+def draw_onsets(axis: Any, own: list[Ensemble], packings: list[dict[str, Any]]) -> None:
+    """Mark phi_J of the slowest rate that has one, and of packings."""
+    fitted = [of.onset() for of in own if of.onsets]
+    if fitted:
+        label = rf"$\phi_J$ = {fitted[-1].value:.5f}, fit"
+        axis.axvline(fitted[-1].value, color="k", ls="--", lw=0.8, label=label)
+    if packings:
+        mean = float(np.mean([packing["phi_J"] for packing in packings]))
+        axis.axvline(mean, color="k", ls=":", lw=0.8, label=rf"$\phi_J$ = {mean:.5f}, energy")
+
+
+def is_of(packing: dict[str, Any], alpha: float, n: int) -> bool:
+    """Whether a packing is of a system."""
+    return (packing.get("alpha"), packing.get("n")) == (alpha, n)
+
+
+def excess(run: Run, slowest: Run, phi_J: float) -> float:
+    """Mean pressure above phi_J over that of the slowest rate, less 1, of one sample."""
+    phi = np.linspace(
+        max(phi_J, run.phi[0], slowest.phi[0]), min(run.phi[-1], slowest.phi[-1]), GRID
+    )
     p, of_slowest = np.interp(phi, run.phi, run.p), np.interp(phi, slowest.phi, slowest.p)
-    return float(np.median(np.abs(p / of_slowest - 1)))
+    return float(p.mean() / of_slowest.mean() - 1)
+
+
+def row(of: Ensemble, ensembles: list[Ensemble]) -> dict[str, Any]:
+    """One row of the table."""
+    slowest = [other for other in ensembles if (other.alpha, other.n) == (of.alpha, of.n)][-1]
+    twins = {run.seed: run for run in slowest.runs}
+    shifts = [phi - slowest.onsets[s] for s, phi in of.onsets.items() if s in slowest.onsets]
+    onset = slowest.onset().value
+    found: dict[str, Any] = {"alpha": of.alpha, "n": of.n, "kappa": of.kappa}
+    found |= {"runs": [str(run.path) for run in of.runs], "phi_J": of.onset()}
+    if of is slowest:
+        return found | {"shift": None, "excess": None}
+    pairs = [(run, twins[run.seed]) for run in of.runs if run.seed in twins]
+    above = [excess(*pair, onset) for pair in pairs] if math.isfinite(onset) else []
+    return found | {"shift": Mean.of(shifts), "excess": Mean.of(above)}
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Write the rows as Markdown."""
+    names = (
+        *("alpha", "N", "kappa", "samples", "phi_J", "phi_J less that of the slowest"),
+        "p above phi_J over that of the slowest, less 1",
+    )
+    lines = ["| " + " | ".join(names) + " |", "| --- " * len(names) + "|"]
+    for r in rows:
+        cells = (f"{r['alpha']:g}", r["n"], f"{r['kappa']:g}", len(r["runs"]), r["phi_J"],
+                 r["shift"] or "", r["excess"] or "")  # fmt: skip
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return "\n".join(lines) + "\n"
 
 
 def main() -> None:
@@ -101,18 +210,14 @@ def main() -> None:
     parser.add_argument("--packing", type=Path, nargs="*", default=[], help="of make_packing.py")
     parser.add_argument("--out", type=Path, default=Path("slow.png"), help="(slow.png)")
     options = parser.parse_args()
-    runs = [read(path) for path in options.runs]
-    packings = [read_attributes(path) for path in options.packing]
-    draw(runs, packings, options.out)
-    slowest = {(r.alpha, r.n): r for r in sorted(runs, key=lambda run: -run.kappa)}
-    rows = [
-        {"run": str(r.path), "alpha": r.alpha, "n": r.n, "kappa": r.kappa, "phi": float(r.phi[-1]),
-         "p": float(r.p[-1]), "phi_J": r.fit.phi_J if r.fit else None,
-         "phi_J_error": r.fit.phi_J_error if r.fit else None,
-         "difference": difference(r, slowest[r.alpha, r.n])}
-        for r in runs
-    ]  # fmt: skip
-    print(json.dumps({"out": str(options.out), "runs": rows}))
+    ensembles = Ensemble.all_of([read(path) for path in options.runs])
+    draw(ensembles, [read_attributes(path) for path in options.packing], options.out)
+    rows = [row(of, ensembles) for of in ensembles]
+    print(table(rows))
+    plain = [
+        {k: v.plain() if isinstance(v, Mean) else v for k, v in found.items()} for found in rows
+    ]
+    print(json.dumps({"out": str(options.out), "rows": plain}))
 
 
 if __name__ == "__main__":

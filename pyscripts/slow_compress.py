@@ -42,6 +42,11 @@ def parse() -> argparse.Namespace:
         ("--p-end", math.inf, "pressure to reach"),
         ("--seed", 1, "of the random start"),
         ("--tolerance", 1e-3, "local error of a step over the typical overlap"),
+        (
+            "--largest-drop",
+            math.inf,
+            "part of the energy that a step may lose, such as 0.1 to resolve plastic events",
+        ),
     ):
         parser.add_argument(
             name, type=type(default), default=default, help=f"{meaning} ({default})"
@@ -57,7 +62,7 @@ def run(options: argparse.Namespace) -> None:
     slowly = (options.phi_slow, options.kappa)
     kappa = ((0.0, options.kappa_before), slowly) if options.phi_slow else options.kappa
     protocol = Protocol(kappa, options.phi_end, options.p_end, options.tolerance,
-                        method=options.method)  # fmt: skip
+                        largest_drop=options.largest_drop, method=options.method)  # fmt: skip
     if options.out.exists():
         require_same(options.out, protocol)
         if is_finished(options.out):

@@ -30,8 +30,8 @@ _STAGE_ACCURACY = 0.03
 # Steps change by these factors, and aim at this fraction of the error that is allowed.
 _LARGEST_GROWTH, _LEAST_GROWTH, _SAFETY = 3.0, 0.2, 0.85
 
-# After a stage without a solution.
-_RETREAT = 0.25
+# After a stage without a solution, and after one where the energy falls too far.
+_RETREAT, _FALLING = 0.25, 0.5
 
 # Steps that do not grow after one that was rejected.
 _HELD = 2
@@ -92,6 +92,10 @@ class Protocol:
         Drag, [energy time / length^(D + 2)].
     largest_strain
         Of the box in a step.
+    largest_drop
+        Part of the elastic energy that a step may lose: plastic events, where particles move by
+        themselves and the energy falls, are resolved in time by so many steps. Not of energies
+        below that to which the drag on the particles pushes them.
     method
         One of `METHODS`.
 
@@ -107,10 +111,11 @@ class Protocol:
     tolerance: float = 1e-3
     k_d: float = 1.0
     largest_strain: float = 1e-3
+    largest_drop: float = math.inf
     method: str = "tr-bdf2"
 
     def __post_init__(self) -> None:
-        for name in ("phi_end", "p_end", "tolerance", "k_d", "largest_strain"):
+        for name in ("phi_end", "p_end", "tolerance", "k_d", "largest_strain", "largest_drop"):
             if not getattr(self, name) > 0:
                 msg = f"{name} is {getattr(self, name)}, expected a positive number"
                 raise ValueError(msg)
@@ -175,10 +180,11 @@ class Flow:
     """Steps that are not to grow any more."""
     _factors: Factorisation | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
+    _is_fresh: bool = True
 
     def forget(self) -> None:
         """Drop what is kept for speed, so that what follows depends on the public fields alone."""
-        self._factors = None
+        self._factors, self._is_fresh = None, True
 
 
 class Step(NamedTuple):
@@ -295,6 +301,10 @@ class _Run:
     def step(self) -> tuple[Evaluation, float, float]:
         """Take a step; give the evaluation at its end, its error and size."""
         flow = self.flow
+        if flow._is_fresh:
+            self.landscape.forget_pairs()
+            self.vicinity.move_to(flow.state)
+            flow._is_fresh = False
         self.kappa, phi_end = self.protocol.leg(self.phi)
         here = self.vicinity.evaluate(self._still, 0.0, extended=False)
         if not flow.velocity.size:
@@ -312,7 +322,7 @@ class _Run:
                 flow.rejected += 1
                 flow.held = _HELD
                 flow.dt = _RETREAT * dt
-                flow.forget()
+                flow._factors = None
                 if flow.dt < self._stable:
                     flow.explicit_left = _EXPLICIT_IN_A_ROW
                 continue
@@ -321,6 +331,11 @@ class _Run:
             order = _HEUN_EULER.order_of_error if explicit else self._method.order_of_error
             growth = _SAFETY * max(relative, 1e-10) ** (-1 / order)
             growth = min(max(growth, _LEAST_GROWTH), _LARGEST_GROWTH)
+            if not explicit and self._falls_too_far(attempt.evaluation, here):
+                flow.rejected += 1
+                flow.held = _HELD
+                flow.dt = _FALLING * dt
+                continue
             if relative <= 1 or (explicit and dt <= _LEAST_STEP * self._stable):
                 break
             flow.rejected += 1
@@ -340,6 +355,12 @@ class _Run:
             flow.dt = max(flow.dt, dt)
         self._accept(attempt, dt)
         return attempt.evaluation, error, dt
+
+    def _falls_too_far(self, now: Evaluation, before: Evaluation) -> bool:
+        # Contacts no stronger than what the box's motion pushes come and go without an event.
+        push = self.kappa * self._least_drag * float(self.flow.state.edges.max())
+        least = self.landscape.particles.n * (push * self.size) ** 2 / self.landscape.k_e
+        return before.energy - now.energy > self.protocol.largest_drop * max(before.energy, least)
 
     @property
     def _method(self) -> Method:
@@ -390,7 +411,7 @@ class _Run:
         unit, units = self._unit(here), self._units(here)
         accuracy = _STAGE_ACCURACY * self.protocol.tolerance
         if not 1 / _SAME_STEP < dt / max(flow._dt_of_factors, 1e-300) < _SAME_STEP:
-            flow.forget()
+            flow._factors = None
         times = method.times
         velocities: list[FloatArray] = []
         evaluation, last = here, self._still

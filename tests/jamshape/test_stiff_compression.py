@@ -173,6 +173,26 @@ def test_work_hardly_depends_on_the_rate():
     assert max(evaluations) < 3000
 
 
+def largest_drop(steps):
+    """Part of the energy that a step loses; where there are more than the contacts of a flow."""
+    energy = np.array([step.u / step.phi for step in steps])
+    before, after = energy[:-1], energy[1:]
+    return (1 - after / np.maximum(before, 1e-9))[before > 1e-9].max()
+
+
+def test_plastic_events_are_resolved_in_time_where_asked(jamming):
+    # kappa 1e-8: an event takes as long as particles relax, and steps go over it.
+    whole, resolved = (
+        ended(jamming, Protocol(1e-8, 0.9, tolerance=1e-2, largest_drop=drop))[2]
+        for drop in (np.inf, 0.05)
+    )
+    assert largest_drop(whole) > 0.3
+    # A row's energy is that of the last evaluation, a correction away from the step's end.
+    assert largest_drop(resolved) < 0.0505
+    assert len(resolved) > len(whole)
+    assert resolved[-1].p == pytest.approx(whole[-1].p, rel=1e-2)
+
+
 def test_going_on_from_between_two_steps_gives_the_same_to_the_bit(jamming):
     protocol = Protocol(1e-5, 0.85)
     landscape, flow = Landscape(jamming), Flow(State.of(jamming))
