@@ -11,6 +11,7 @@ from test_minimise import squeezed
 from jamshape.hessian import dynamical_matrix
 from jamshape.landscape import Landscape
 from jamshape.minimise import Residual
+from jamshape.modes import spectrum
 from jamshape.target import Target, find
 
 # n, alpha, packing fraction just below jamming, seed
@@ -36,6 +37,29 @@ def jammed(name, u0=1e-15):
 def matrix_of(name, u0=1e-15):
     landscape, minimum = jammed(name, u0)
     return dynamical_matrix(landscape, minimum.state)
+
+
+@cache
+def sliding():
+    """The first small packing of rods in which some slide, and its matrix.
+
+    Which packing a start leads to depends on the last digits; some of each few have rods that slide.
+    """
+    for seed in range(1, 20):
+        packing, state = squeezed(16, 4, 0.8, seed)
+        landscape = Landscape(packing)
+        minimum = find(landscape, state, Target(1e-15))
+        matrix = dynamical_matrix(landscape, minimum.state)
+        found = spectrum(matrix)
+        values = np.abs(found.eigenvalues[~found.is_translation])
+        if values.min() < 1e-12:
+            return landscape, minimum, matrix
+    raise AssertionError
+
+
+def second_order(matrix):
+    """The size of eigenvalues that are of second order in the prestress."""
+    return abs(matrix.prestress).max() ** 2
 
 
 def synthetic(n=48, m=40, size=1e-8, n_sliding=2, seed=0):
