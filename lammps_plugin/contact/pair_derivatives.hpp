@@ -36,12 +36,14 @@ template <int D, class S> struct ContactDerivatives : SecondDerivatives<D, S> {
 
 namespace detail {
 
+/// In the plane, where q.i = q.j = 0.
 template <int N, class S>
 QuaternionOf<Dual<N, S>> turned_by_variables(const QuaternionOf<S> &q, const Vec<1, int> &first)
 {
-  const Dual<N, S> one(1.0), zero(0.0);
-  const QuaternionOf<Dual<N, S>> turn{one, zero, zero, 0.5 * Dual<N, S>::variable(0.0, first[0])};
-  return turn * QuaternionOf<Dual<N, S>>{q.w, q.i, q.j, q.k};
+  QuaternionOf<Dual<N, S>> turned{q.w, q.i, q.j, q.k};
+  turned.w.d[first[0]] = -0.5 * q.k;
+  turned.k.d[first[0]] = 0.5 * q.w;
+  return turned;
 }
 
 template <int N, class S>

@@ -18,13 +18,15 @@ template <int D, class S = double> struct SpinePair {
   double A_j;
 };
 
-/// The pair without its derivatives: searches and other decisions look at values alone.
-template <int D, class S> SpinePair<D, ValueOf<S>> values_of(const SpinePair<D, S> &p)
+/// The pair without its derivatives, itself if it has none: searches and other decisions look at
+/// values alone.
+template <int D, class S> decltype(auto) values_of(const SpinePair<D, S> &p)
 {
-  if constexpr (std::is_same_v<S, ValueOf<S>>) {
-    return p;
+  using Value = ValueOf<S>;
+  if constexpr (std::is_same_v<S, Value>) {
+    return (p);
   } else {
-    return {values_of(p.r), values_of(p.u_i), p.A_i, values_of(p.u_j), p.A_j};
+    return SpinePair<D, Value>{values_of(p.r), values_of(p.u_i), p.A_i, values_of(p.u_j), p.A_j};
   }
 }
 
@@ -122,7 +124,7 @@ template <int D, class S> struct EndFeet {
 
   explicit EndFeet(const SpinePair<D, S> &p)
   {
-    const auto values = values_of(p);
+    const auto &values = values_of(p);
     const TipFeet<D, ValueOf<S>> tips(values);
     const int j_plus = dot(values.u_i, values.u_j) < 0.0 ? 3 : 2, j_minus = 5 - j_plus;
     const auto feet = [&](int k) { return feet_at(values, tips.s[k], tips.t[k]); };

@@ -222,7 +222,7 @@ template <int D, class S> class SpherocylinderContact {
   Contact<D, S> evaluate() const
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0 && law.shortcuts) return discs();
-    const auto values = values_of(pair);
+    const auto &values = values_of(pair);
     const auto closest = closest_feet(values);
     if (!touches(closest.distance_sq)) return without_bonds<D, S>(ContactStatus::APART);
     if (is_coincident(closest) || spines_cross(values))
@@ -368,9 +368,13 @@ template <int D, class S> class SpherocylinderContact {
     Bond<D, S> &bond = contact.bond[contact.n_bonds++];
     bond.normal = normal;
     bond.force = force;
-    bond.arm_i = feet.s * pair.u_i - (radius_i * distance * inverse_reach) * normal;
-    bond.lever_i = feet.s * cross(pair.u_i, normal);
-    bond.lever_j = -feet.t * cross(pair.u_j, normal);
+    // Nobody asks for derivatives of these.
+    const auto &values = values_of(pair);
+    const auto along = values_of(normal);
+    const auto depth = radius_i * value_of(distance) * value_of(inverse_reach);
+    bond.arm_i = constants_of<S>(value_of(feet.s) * values.u_i - depth * along);
+    bond.lever_i = constants_of<S>(value_of(feet.s) * cross(values.u_i, along));
+    bond.lever_j = constants_of<S>(-value_of(feet.t) * cross(values.u_j, along));
     bond.distance = distance;
     bond.reach = reach;
     bond.energy = energy;

@@ -64,6 +64,14 @@ template <int D, class S> Vec<D, ValueOf<S>> values_of(const Vec<D, S> &a)
   return values;
 }
 
+/// The same in another scalar, as constants.
+template <class S, int D, class V> Vec<D, S> constants_of(const Vec<D, V> &values)
+{
+  Vec<D, S> constants;
+  for (int k = 0; k < D; ++k) constants[k] = S(values[k]);
+  return constants;
+}
+
 template <class S> Vec<1, S> cross(const Vec<2, S> &a, const Vec<2, S> &b)
 {
   return {{a[0] * b[1] - a[1] * b[0]}};
