@@ -77,8 +77,14 @@ def all_cases() -> list[Case]:
     import stability_contacts  # noqa: PLC0415
     import stability_lammps  # noqa: PLC0415
     import stability_solvers  # noqa: PLC0415
+    import stability_superellipsoids  # noqa: PLC0415
 
-    modules = (stability_contacts, stability_lammps, stability_solvers)
+    modules = (
+        stability_contacts,
+        stability_lammps,
+        stability_superellipsoids,
+        stability_solvers,
+    )
     cases = [case for module in modules for case in module.cases()]
     labels = [case.label for case in cases]
     assert len(set(labels)) == len(labels), "a case is there twice"

@@ -23,7 +23,9 @@ _ROUNDING = (
     "flat on flat at a tilt of 1e-12 the bounds of the scale meet to 5.1e-13 (p 0.55) and 5.7e-13 "
     "(p 10), not to 1e-13"
 )
+_SIX_DECIMALS = "sentences of the fix give time steps with six decimals, below 1e-6 as 0.000000"
 KNOWN = {
+    "fix overdamped/affine, superellipsoids: dt 2 of a limit of 1e-11": _SIX_DECIMALS,
     **{f"contact of superellipsoids: aligned to 1e-12, p {p}": _ROUNDING for p in ("0.55", "10")},
     **{
         f"LAMMPS minimize: alpha 1e-6 to 100 in one box, {style}, line quadratic": _LINE_SEARCH
