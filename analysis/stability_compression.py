@@ -176,7 +176,7 @@ def energy_lost_in_a_step(drop: float) -> float:
     """Largest part of the energy that a step loses with such a `largest_drop`, over it."""
     packing, _ = _plastic()
     u = np.array([s.u for s in ended(packing, replace(_EVENTFUL, largest_drop=drop)).steps])
-    # Not of energies to which drag pushes a contact at this rate, nor within explicit steps.
+    # Not of energies to which drag pushes a contact at this rate.
     above = u[:-1] > 1e-12
     return float((1 - u[1:] / u[:-1])[above].max()) / drop
 
