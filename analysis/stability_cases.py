@@ -74,11 +74,19 @@ class Case:
 def all_cases() -> list[Case]:
     """List all cases, part by part."""
     # Imported here, since these modules take `Case` from this one.
+    import stability_compression  # noqa: PLC0415
     import stability_contacts  # noqa: PLC0415
     import stability_lammps  # noqa: PLC0415
     import stability_solvers  # noqa: PLC0415
+    import stability_superellipsoids  # noqa: PLC0415
 
-    modules = (stability_contacts, stability_lammps, stability_solvers)
+    modules = (
+        stability_contacts,
+        stability_lammps,
+        stability_superellipsoids,
+        stability_solvers,
+        stability_compression,
+    )
     cases = [case for module in modules for case in module.cases()]
     labels = [case.label for case in cases]
     assert len(set(labels)) == len(labels), "a case is there twice"

@@ -71,6 +71,12 @@ def set_up(sides: str = "one", k_e: float = 1.0, skin: float = SKIN) -> str:
     return f"""
         pair_style spherocylinder/harmonic sides {sides}
         pair_coeff * * {k_e!r}
+{neighbours(skin)}"""
+
+
+def neighbours(skin: float = SKIN) -> str:
+    """Input of the neighbour list."""
+    return f"""
         neighbor {skin!r} {"bin" if skin < 30 else "nsq"}
         neigh_modify every 1 delay 0 check yes one 10000 page 1000000"""
 

@@ -212,10 +212,14 @@ def jammed(alpha: float, n: int = 16, phi: float = 0.9, seed: int = 1) -> Packin
 
 @cache
 def scattered_superellipsoids(
-    p: tuple[float, ...], w: tuple[float, ...], dimension: int = 3, overlap: float = 0.2
+    p: tuple[float, ...],
+    w: tuple[float, ...],
+    dimension: int = 3,
+    overlap: float = 0.2,
+    n: int = 12,
 ) -> Packing:
     """Of these exponents and ratios of semi-axes, moved apart, then pressed together."""
-    rng, n = np.random.default_rng(3), 12
+    rng = np.random.default_rng(3)
     ratio = np.resize(np.asarray(w), n)
     axes = 0.5 * np.column_stack([np.ones(n), np.ones(n), ratio])
     if dimension == 2:

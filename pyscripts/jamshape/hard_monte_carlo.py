@@ -6,6 +6,7 @@ of a few sweeps.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -67,8 +68,10 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
     Raises
     ------
     ValueError
-        If particles overlap at the start, or the box is shorter than two of them.
+        If particles overlap at the start, are no superellipsoids, the box is shorter than two of them,
+        or moves have no positive size.
     """
+    _check(thermal)
     while thermal.n_done < n_sweeps:
         packing, n = thermal.packing, min(_SWEEPS, n_sweeps - thermal.n_done)
         block = np.random.SeedSequence([seed, thermal.n_done]).generate_state(1, np.uint64)[0]
@@ -94,6 +97,15 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
         change = np.clip(thermal.acceptance / _ACCEPTANCE, 1 / _CHANGE, _CHANGE)
         thermal.size = float(min(thermal.size * change, 2.0))
         yield thermal
+
+
+def _check(thermal: Thermal) -> None:
+    if thermal.packing.shape_style != "superellipsoid":
+        msg = f"particles are of style {thermal.packing.shape_style}, expected superellipsoids"
+        raise ValueError(msg)
+    if not (math.isfinite(thermal.size) and thermal.size > 0):
+        msg = f"size is {thermal.size}, expected a positive number of semi-axes"
+        raise ValueError(msg)
 
 
 def without_overlaps(packing: Packing) -> Packing:

@@ -43,6 +43,9 @@ _SAME_STEP = 1.5
 _EXPLICIT_BELOW, _EXPLICIT_IN_A_ROW = 0.5, 20
 _LEAST_STEP = 1e-3
 
+# Spines that cross within so small a fraction of the times of contacts and of the box cross whatever the step.
+_AT_ONCE = 1e-9
+
 # Doubles are too short where their rounding is above this fraction of the accuracy of a stage.
 _ROUNDING = 0.1
 
@@ -227,7 +230,7 @@ def compress(landscape: Landscape, flow: Flow, protocol: Protocol) -> Iterator[S
     ValueError
         If the particles are not in two dimensions.
     CrossingError
-        If spines cross at the start.
+        If spines cross at the start, or at a rate that their contacts do not withstand.
     """
     run = _Run(landscape, flow, protocol)
     while run.phi < protocol.phi_end * (1 - 1e-12):
@@ -293,6 +296,7 @@ class _Run:
         self.area = float(landscape.particles.measures.sum())
         self.size = 2 * float(landscape.inner_radius.mean())
         self.kappa = 0.0
+        self._crossing: CrossingError | None = None
 
     @property
     def phi(self) -> float:
@@ -319,6 +323,7 @@ class _Run:
                 dt, clipped = min(dt, self._stable), False
             attempt = self._tried(dt, explicit, here)
             if attempt is None:
+                self._refuse_crossing(dt)
                 flow.rejected += 1
                 flow.held = _HELD
                 flow.dt = _RETREAT * dt
@@ -355,6 +360,16 @@ class _Run:
             flow.dt = max(flow.dt, dt)
         self._accept(attempt, dt)
         return attempt.evaluation, error, dt
+
+    def _refuse_crossing(self, dt: float) -> None:
+        if self._crossing is None or dt > _AT_ONCE * min(self._stable, 1 / self.kappa):
+            return
+        spines = str(self._crossing).partition(",")[0]
+        msg = (
+            f"{spines} at phi = {self.phi:.6g} at the rate kappa = {self.kappa:g}, expected a rate that their"
+            " contacts withstand; compress more slowly, or end at a smaller phi"
+        )
+        raise CrossingError(msg)
 
     def _falls_too_far(self, now: Evaluation, before: Evaluation) -> bool:
         # Contacts no stronger than what the box's motion pushes come and go without an event.
@@ -399,11 +414,13 @@ class _Run:
         return rounding > _ROUNDING * _STAGE_ACCURACY * self.protocol.tolerance * unit
 
     def _tried(self, dt: float, explicit: bool, here: Evaluation) -> _Attempt | None:
+        self._crossing = None
         try:
             if explicit:
                 return self._explicit(dt, here)
             return self._implicit(dt, here)
-        except CrossingError:
+        except CrossingError as error:
+            self._crossing = error
             return None
 
     def _implicit(self, dt: float, here: Evaluation) -> _Attempt | None:

@@ -115,6 +115,19 @@ def test_overlaps_and_small_boxes_are_refused():
         next(equilibrate(Thermal(alone), 10, 1))
 
 
+@pytest.mark.parametrize("size", [0.0, -1.0, np.nan, np.inf])
+def test_moves_without_a_size_are_refused(size):
+    with pytest.raises(ValueError, match=f"size is {size}, expected a positive number"):
+        next(equilibrate(Thermal(spheroids(), size=size), 10, 1))
+
+
+def test_other_particles_are_refused():
+    rods = scattered(np.tile([2.0, 1.0, 1.0], (4, 1)), np.ones(4), 0.1)
+    rods = rods.with_(shape_style="spherocylinder")
+    with pytest.raises(ValueError, match="style spherocylinder, expected superellipsoids"):
+        next(equilibrate(Thermal(rods), 10, 1))
+
+
 def test_opening_the_box_removes_the_last_overlaps():
     packing = scattered(np.tile([1.0, 1.0, 1.5], (30, 1)), np.ones(30), 0.55)
     found = minimise(Landscape(packing), State.of(packing), "lbfgs", Stop(lowest=1e-10))

@@ -4,7 +4,7 @@ from scipy.integrate import solve_ivp
 from test_minimise import squeezed
 
 from jamshape import stiff_compression
-from jamshape.landscape import Landscape, State
+from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.minimise import minimise
 from jamshape.packing import Box, Packing
 from jamshape.stiff_compression import METHODS, Flow, Protocol, Step, compress, drag_coefficients
@@ -234,3 +234,10 @@ def test_senseless_numbers_are_refused(numbers, sentence):
 
 def test_steps_are_rows_of_numbers():
     assert Step._fields[:6] == ("step", "time", "strain", "phi", "p", "u")
+
+
+def test_a_rate_that_drives_spines_across_each_other_is_refused():
+    packing = packing_of(2.0, [[5.0, 5.0], [5.3, 6.2]], [0.0, 1.5], L=6.0)
+    sentence = r"spines of particles 1 and 2 cross at phi = .* kappa = 100, expected .* more slowly"
+    with pytest.raises(CrossingError, match=sentence):
+        ended(packing, Protocol(1e2, 3.0))
