@@ -2,6 +2,7 @@
 
 #include "bindings/arrays.hpp"
 #include "bindings/pairs.hpp"
+#include "text.hpp"
 
 namespace jamshape {
 
@@ -84,7 +85,7 @@ nb::dict contacts(const Bodies &bodies_i, const Bodies &bodies_j, const Spherocy
 SpherocylinderLaw law_of(double k_e, int sides)
 {
   require(sides == 1 || sides == 2, "sides is " + std::to_string(sides) + ", expected 1 or 2.");
-  require(k_e > 0.0, "k_e is " + std::to_string(k_e) + ", expected a positive energy.");
+  require(k_e > 0.0, "k_e is " + shown(k_e) + ", expected a positive energy.");
   return SpherocylinderModel::law(static_cast<Sides>(sides), k_e);
 }
 

@@ -2,6 +2,7 @@
 
 #include "bindings/arrays.hpp"
 #include "bindings/pairs.hpp"
+#include "text.hpp"
 
 #include <nanobind/stl/optional.h>
 #include <optional>
@@ -54,7 +55,7 @@ int dimension_of(const Bodies &i, const Bodies &j)
 
 SuperellipsoidLaw law_of(double epsilon)
 {
-  require(epsilon > 0.0, "epsilon is " + std::to_string(epsilon) + ", expected a positive energy.");
+  require(epsilon > 0.0, "epsilon is " + shown(epsilon) + ", expected a positive energy.");
   return SuperellipsoidModel::law({}, epsilon);
 }
 

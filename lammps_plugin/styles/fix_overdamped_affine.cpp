@@ -6,6 +6,7 @@
 #include "error.h"
 #include "modify.h"
 #include "neighbor.h"
+#include "text.hpp"
 #include "update.h"
 #include "utils.h"
 
@@ -167,8 +168,7 @@ void FixOverdampedAffine::require_timestep() const
   const double strain = std::abs(box->state().rate) * update->dt;
   if (!integrator->state()) return require_strain(std::abs(strain));
   if (update->dt >= 0.0 && strain <= LARGEST_STRAIN) return;
-  flow->stop("found timestep " + std::to_string(update->dt) + ", a strain of " +
-             std::to_string(strain) +
+  flow->stop("found timestep " + shown(update->dt) + ", a strain of " + shown(strain) +
              ", expected a step from 0 to a strain of 1: the integrator divides it.");
 }
 
@@ -243,12 +243,12 @@ void FixOverdampedAffine::check_stability(bigint step)
     warned = false;
     return;
   }
-  const std::string found = "fix overdamped/affine found timestep " + std::to_string(update->dt);
-  const std::string largest = std::to_string(limit) + " (2 over the largest relaxation rate " +
-                              std::to_string(largest_rate) + ")";
+  const std::string found = "fix overdamped/affine found timestep " + shown(update->dt);
+  const std::string largest =
+      shown(limit) + " (2 over the largest relaxation rate " + shown(largest_rate) + ")";
   if (update->dt > limit) {
     error->all(FLERR, found + " past the stability limit " + largest + ": use a timestep below " +
-                          std::to_string(NEAR_LIMIT * limit) + ".");
+                          shown(NEAR_LIMIT * limit) + ".");
   }
   if (!warned && comm->me == 0) {
     error->warning(FLERR, found + " close to the stability limit " + largest +

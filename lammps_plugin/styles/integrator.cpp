@@ -2,6 +2,7 @@
 
 #include "runge_kutta_chebyshev.h"
 #include "step_control.h"
+#include "text.hpp"
 
 #include <cmath>
 #include <map>
@@ -117,7 +118,7 @@ double tolerance_of(const IntegratorOptions &options)
 {
   const double tolerance = options.tolerance.value_or(DEFAULT_TOLERANCE);
   if (!(tolerance >= 1e-12 && tolerance <= 0.1)) {
-    throw std::invalid_argument("tolerance " + std::to_string(tolerance) +
+    throw std::invalid_argument("tolerance " + shown(tolerance) +
                                 ", expected a number from 1e-12 to 0.1.");
   }
   return tolerance;

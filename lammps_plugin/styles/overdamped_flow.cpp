@@ -11,6 +11,7 @@
 #include "modify.h"
 #include "neighbor.h"
 #include "pair_contact.h"
+#include "text.hpp"
 #include "update.h"
 
 #include <algorithm>
@@ -269,7 +270,7 @@ void OverdampedFlow::require_small(int i, const Rate &moved, double scale)
   }
   if (distance <= limit) return;  // false for NaN
   error->one(FLERR, "fix overdamped/affine found that one step moves atom " +
-                        std::to_string(atom->tag[i]) + " by " + std::to_string(distance) +
+                        std::to_string(atom->tag[i]) + " by " + shown(distance) +
                         ", expected at most half its radius: use a smaller timestep.");
 }
 

@@ -7,6 +7,7 @@
 #include "force.h"
 #include "memory.h"
 #include "neighbor.h"
+#include "text.hpp"
 #include "update.h"
 #include "utils.h"
 
@@ -87,9 +88,9 @@ void PairContact::measure_particles()
     if (!is_valid_shape(semi_axes, type)) {
       const Vec<3> diameters = 2.0 * semi_axes;
       error->one(FLERR, style_name() + " found atom " + std::to_string(atom->tag[i]) +
-                            " with diameters " + std::to_string(diameters[0]) + " " +
-                            std::to_string(diameters[1]) + " " + std::to_string(diameters[2]) +
-                            ", expected that " + shape_rule() + ": correct its shape.");
+                            " with diameters " + shown(diameters[0]) + " " + shown(diameters[1]) +
+                            " " + shown(diameters[2]) + ", expected that " + shape_rule() +
+                            ": correct its shape.");
     }
     mine[type] = std::max(mine[type], bounding_radius(semi_axes, type));
     const Shortcut its = shortcut(semi_axes, type);
@@ -150,8 +151,7 @@ void PairContact::setup()
   for (int k = 0; k < domain->dimension; ++k) {
     if (comm->mode == LAMMPS_NS::Comm::SINGLE && comm->cutghost[k] < needed) {
       error->all(FLERR, "pair_style " + style_name() + " found a ghost cutoff of " +
-                            std::to_string(comm->cutghost[k]) + ", expected at least " +
-                            std::to_string(needed) +
+                            shown(comm->cutghost[k]) + ", expected at least " + shown(needed) +
                             ": raise it with 'comm_modify cutoff' so that no contact is missed.");
     }
   }

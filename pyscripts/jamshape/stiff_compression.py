@@ -336,12 +336,13 @@ class _Run:
             order = _HEUN_EULER.order_of_error if explicit else self._method.order_of_error
             growth = _SAFETY * max(relative, 1e-10) ** (-1 / order)
             growth = min(max(growth, _LEAST_GROWTH), _LARGEST_GROWTH)
-            if not explicit and self._falls_too_far(attempt.evaluation, here):
+            is_least = explicit and dt <= _LEAST_STEP * self._stable
+            if not is_least and self._falls_too_far(attempt.evaluation, here):
                 flow.rejected += 1
                 flow.held = _HELD
                 flow.dt = _FALLING * dt
                 continue
-            if relative <= 1 or (explicit and dt <= _LEAST_STEP * self._stable):
+            if relative <= 1 or is_least:
                 break
             flow.rejected += 1
             # Contacts that open or close within the step leave errors of first order.

@@ -23,16 +23,11 @@ _ROUNDING = (
     "flat on flat at a tilt of 1e-12 the bounds of the scale meet to 5.1e-13 (p 0.55) and 5.7e-13 "
     "(p 10), not to 1e-13"
 )
-_SIX_DECIMALS = "sentences of the fix give time steps with six decimals, below 1e-6 as 0.000000"
 _FREE_MOTION = (
     "a single contact below jamming opens and closes by more than its overlap at kappa of 1e-10 and "
     "below: free motion is resolved to sqrt(overlap size) only, as ARCHITECTURE says"
 )
-_EXPLICIT = (
-    "explicit steps lose up to 13 %: they are not held to largest_drop, which does not say so"
-)
 KNOWN = {
-    "implicit compression: largest_drop 0.03": _EXPLICIT,
     **{
         f"implicit compression: kappa {case} of the steady overlap": _FREE_MOTION
         for case in (
@@ -43,7 +38,6 @@ KNOWN = {
             "1e-10, tr-bdf2, from 10",
         )
     },
-    "fix overdamped/affine, superellipsoids: dt 2 of a limit of 1e-11": _SIX_DECIMALS,
     **{f"contact of superellipsoids: aligned to 1e-12, p {p}": _ROUNDING for p in ("0.55", "10")},
     **{
         f"LAMMPS minimize: alpha 1e-6 to 100 in one box, {style}, line quadratic": _LINE_SEARCH

@@ -152,10 +152,10 @@ def test_wrong_fix_commands(command, sentence, sentence_of):
     assert re.fullmatch(f"fix overdamped/affine found {sentence}", sentence_of(command))
 
 
-@pytest.mark.parametrize(("dt", "strain"), [("-0.5", "-0.000500"), ("2000.0", "2.000000")])
+@pytest.mark.parametrize(("dt", "strain"), [("-0.5", "-0.0005"), ("2000", "2")])
 def test_steps_that_cannot_be_divided(dt, strain, sentence_of):
     assert sentence_of(f"{FIX} integrator rkc2\ntimestep {dt}\nrun 1") == (
-        f"fix overdamped/affine found timestep {float(dt):.6f}, a strain of {strain}, expected a "
+        f"fix overdamped/affine found timestep {dt}, a strain of {strain}, expected a "
         "step from 0 to a strain of 1: the integrator divides it."
     )
 
@@ -213,7 +213,7 @@ def test_every_atom_needs_a_shape(sentence_of):
 )
 def test_shapes_must_be_spherocylinders(diameters, sentence_of):
     shape = " ".join(map(str, diameters))
-    listed = " ".join(f"{d:.6f}" for d in diameters)
+    listed = " ".join(f"{d:g}" for d in diameters)
     assert sentence_of(f"set atom 2 shape {shape}\nrun 0") == (
         f"spherocylinder/harmonic found atom 2 with diameters {listed}, expected that a "
         "spherocylinder has diameters (2(A+R), 2R, 2R), its long axis the body's x: correct its "
