@@ -69,8 +69,8 @@ STUDIES = {
         "The implicit integrator of slow compressions",
         ["analysis/stiff_error.py --quick --out ."],
         [
-            f"{STIFF} --alpha 4 --phi-from 0.835 --phi-to 0.865 --kappas 1e-6 1e-8",
-            f"{STIFF} --alpha 0.01 --phi-from 0.83 --phi-to 0.85 --kappas 1e-6",
+            f"{STIFF} --alpha 4 --phi-from 0.8 --phi-to 0.9 --kappas 1e-6 1e-8",
+            f"{STIFF} --alpha 0.01 --phi-from 0.8 --phi-to 0.88 --kappas 1e-6 1e-8",
         ],
         ["stiff_error_*.png"],
     ),

@@ -5,9 +5,9 @@
 Runs are of pyscripts/slow_compress.py or compress.py; there is a column for each alpha and N, with p on a
 linear axis above and on a logarithmic one below, and a line for each rate: the mean over samples (seeds),
 which are drawn thin. Vertical lines mark phi_J of the slowest rate, from the lines through the pressures
-just above the onsets (Fig. 4), and of packings at an energy. Prints a table (Markdown) of phi_J, of
-how far it lies from that of the slowest rate, and of the pressure above phi_J over that of the slowest
-rate, sample by sample, with standard errors. The last line of standard output is one JSON object.
+just above the onsets (Fig. 4), and of packings at an energy. Prints a table (Markdown) of what runs cost (medians;
+beside Heun's method with dt = 0.01), of phi_J, of how far it lies from that of the slowest rate, and of
+the pressure above phi_J over that of the slowest rate, sample by sample, with standard errors. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import json
 import math
 import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,8 +30,21 @@ from jamshape.storage import read_attributes, read_observables
 GRID = 1000
 
 
+# Of Heun's method, whose evaluations are compared.
+HEUN_DT = 0.01
+
+
+class Cost(NamedTuple):
+    """What a slow compression cost."""
+
+    evaluations: float
+    heun: float
+    """Evaluations of Heun's method with its fixed time step, over these."""
+    seconds: float
+
+
 class Run(NamedTuple):
-    """A compression, and its onset if it has one."""
+    """A compression, its onset if it has one, its cost if that is known."""
 
     path: Path
     alpha: float
@@ -40,6 +54,7 @@ class Run(NamedTuple):
     phi: FloatArray
     p: FloatArray
     fit: OnsetFit | None
+    cost: Cost | None
 
 
 def read(path: Path) -> Run:
@@ -57,7 +72,16 @@ def read(path: Path) -> Run:
     except ValueError:  # it ends below jamming, or rearranges too soon
         fit = None
     system = float(attributes["alpha"]), int(attributes["n"]), int(attributes.get("seed", 0))
-    return Run(path, *system, kappa, phi, p, fit)
+    return Run(path, *system, kappa, phi, p, fit, cost_of(attributes, kappa))
+
+
+def cost_of(attributes: Mapping[str, Any], kappa: float) -> Cost | None:
+    """Read what a run of slow_compress.py cost."""
+    if "flow_evaluations" not in attributes:
+        return None
+    evaluations = float(attributes["flow_evaluations"])
+    heun = 2 * float(attributes["flow_strain"]) / (kappa * HEUN_DT)
+    return Cost(evaluations, heun / evaluations, float(attributes["flow_wall_seconds"]))
 
 
 class Ensemble(NamedTuple):
@@ -181,6 +205,9 @@ def row(of: Ensemble, ensembles: list[Ensemble]) -> dict[str, Any]:
     shifts = [phi - slowest.onsets[s] for s, phi in of.onsets.items() if s in slowest.onsets]
     onset = slowest.onset().value
     found: dict[str, Any] = {"alpha": of.alpha, "n": of.n, "kappa": of.kappa}
+    costs = [run.cost for run in of.runs if run.cost]
+    medians = np.median(costs, axis=0).tolist() if costs else [None] * len(Cost._fields)
+    found |= dict(zip(Cost._fields, medians, strict=True))
     found |= {"runs": [str(run.path) for run in of.runs], "phi_J": of.onset()}
     if of is slowest:
         return found | {"shift": None, "excess": None}
@@ -192,12 +219,13 @@ def row(of: Ensemble, ensembles: list[Ensemble]) -> dict[str, Any]:
 def table(rows: list[dict[str, Any]]) -> str:
     """Write the rows as Markdown."""
     names = (
-        *("alpha", "N", "kappa", "samples", "phi_J", "phi_J less that of the slowest"),
-        "p above phi_J over that of the slowest, less 1",
+        *("alpha", "N", "kappa", "samples", "evaluations", "Heun's over these", "seconds", "phi_J"),
+        *("phi_J less that of the slowest", "p above phi_J over that of the slowest, less 1"),
     )
     lines = ["| " + " | ".join(names) + " |", "| --- " * len(names) + "|"]
     for r in rows:
-        cells = (f"{r['alpha']:g}", r["n"], f"{r['kappa']:g}", len(r["runs"]), r["phi_J"],
+        cost = ["" if r[name] is None else f"{r[name]:.3g}" for name in Cost._fields]
+        cells = (f"{r['alpha']:g}", r["n"], f"{r['kappa']:g}", len(r["runs"]), *cost, r["phi_J"],
                  r["shift"] or "", r["excess"] or "")  # fmt: skip
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     return "\n".join(lines) + "\n"
