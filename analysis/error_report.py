@@ -135,17 +135,19 @@ def run(name: str, options: argparse.Namespace) -> dict[str, Any]:
         found: dict[str, Any] = json.loads(record.read_text())
         if found["full"] == options.full and not found["failed"]:
             return found
-    began, printed, failed = time.perf_counter(), "", ""
+    began, failed = time.perf_counter(), ""
+    printed: list[str] = []
     commands = STUDIES[name].full if options.full else STUDIES[name].short
     for command in commands:
-        printed, failed = printed_by(command, folder)
+        text, failed = printed_by(command, folder)
         if failed:
             break
+        printed += ["\n".join(text.strip().splitlines()[:-1])]  # all but the JSON line
     found = {
         "full": options.full,
         "commands": [f".venv/bin/python {command}" for command in commands],
         "seconds": time.perf_counter() - began,
-        "printed": "\n".join(printed.strip().splitlines()[:-1]),  # all but the JSON line
+        "printed": "\n\n".join(filter(None, printed)),
         "failed": failed,
     }
     record.write_text(json.dumps(found, indent=1))
