@@ -591,16 +591,16 @@ def test_time_steps_near_the_limit_warn_and_past_it_stop(sides, tmp_path):
             tmp_path,
         )
 
-    warning = f"found timestep {0.95 * limit:.6f} close to the stability limit {limit:.6f}"
+    warning = f"found timestep {0.95 * limit:g} close to the stability limit {limit:g}"
     calm, near, past = (run_at(fraction) for fraction in (0.85, 0.95, 1.05))
     assert calm.returncode == 0
     assert "WARNING: fix overdamped/affine" not in calm.stdout
     assert near.returncode == 0
     assert near.stdout.count(warning) == 1
     assert re.fullmatch(
-        rf"fix overdamped/affine found timestep {1.05 * limit:.6f} past the stability limit "
-        rf"{limit:.6f} \(2 over the largest relaxation rate {2 / limit:.6f}\): use a timestep below "
-        rf"{0.9 * limit:.6f}\.",
+        rf"fix overdamped/affine found timestep {1.05 * limit:g} past the stability limit "
+        rf"{limit:g} \(2 over the largest relaxation rate {2 / limit:g}\): use a timestep below "
+        rf"{0.9 * limit:g}\.",
         error_of(past),
     )
 
