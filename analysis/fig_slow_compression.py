@@ -185,17 +185,23 @@ def draw_onsets(axis: Any, own: list[Ensemble], packings: list[dict[str, Any]]) 
 
 
 def is_of(packing: dict[str, Any], alpha: float, n: int) -> bool:
-    """Whether a packing is of a system."""
-    return (packing.get("alpha"), packing.get("n")) == (alpha, n)
+    """Whether a file holds a packing of a system; beside packings lie the runs that made them."""
+    return "phi_J" in packing and (packing.get("alpha"), packing.get("n")) == (alpha, n)
 
 
-def excess(run: Run, slowest: Run, phi_J: float) -> float:
-    """Mean pressure above phi_J over that of the slowest rate, less 1, of one sample."""
+def pressures_above(run: Run, slowest: Run, phi_J: float) -> tuple[float, float]:
+    """Mean pressures above phi_J of a run and of the slowest one of the same sample."""
     phi = np.linspace(
         max(phi_J, run.phi[0], slowest.phi[0]), min(run.phi[-1], slowest.phi[-1]), GRID
     )
     p, of_slowest = np.interp(phi, run.phi, run.p), np.interp(phi, slowest.phi, slowest.p)
-    return float(p.mean() / of_slowest.mean() - 1)
+    return float(p.mean()), float(of_slowest.mean())
+
+
+def excess(pairs: list[tuple[float, float]]) -> Mean:
+    """Mean difference of such pressures, over the mean of the second; a sample alone may have none."""
+    p, of_slowest = np.array(pairs).reshape(-1, 2).T
+    return Mean.of(((p - of_slowest) / of_slowest.mean()).tolist() if len(p) else [])
 
 
 def row(of: Ensemble, ensembles: list[Ensemble]) -> dict[str, Any]:
@@ -212,8 +218,8 @@ def row(of: Ensemble, ensembles: list[Ensemble]) -> dict[str, Any]:
     if of is slowest:
         return found | {"shift": None, "excess": None}
     pairs = [(run, twins[run.seed]) for run in of.runs if run.seed in twins]
-    above = [excess(*pair, onset) for pair in pairs] if math.isfinite(onset) else []
-    return found | {"shift": Mean.of(shifts), "excess": Mean.of(above)}
+    above = [pressures_above(*pair, onset) for pair in pairs] if math.isfinite(onset) else []
+    return found | {"shift": Mean.of(shifts), "excess": excess(above)}
 
 
 def table(rows: list[dict[str, Any]]) -> str:
