@@ -127,12 +127,23 @@ template <int D, class S> struct EndFeet {
     const auto &values = values_of(p);
     const TipFeet<D, ValueOf<S>> tips(values);
     const int j_plus = dot(values.u_i, values.u_j) < 0.0 ? 3 : 2, j_minus = 5 - j_plus;
-    const auto feet = [&](int k) { return feet_at(values, tips.s[k], tips.t[k]); };
-    const auto closer = [&](int a, int b) { return is_closer(values, feet(b), feet(a)) ? b : a; };
-    const int at_plus = closer(0, j_plus), at_minus = closer(1, j_minus);
-    minus_is_nearer = is_closer(values, feet(at_minus), feet(at_plus));
-    plus = tips.feet(p, at_plus);
-    minus = tips.feet(p, at_minus);
+    struct AtTip {
+      int tip;
+      Feet<D, ValueOf<S>> feet;
+    };
+    const auto closer = [&](int a, int b) {
+      const AtTip at_a{a, tips.feet(values, a)}, at_b{b, tips.feet(values, b)};
+      return is_closer(values, at_b.feet, at_a.feet) ? at_b : at_a;
+    };
+    const AtTip at_plus = closer(0, j_plus), at_minus = closer(1, j_minus);
+    minus_is_nearer = is_closer(values, at_minus.feet, at_plus.feet);
+    if constexpr (std::is_same_v<S, ValueOf<S>>) {
+      plus = at_plus.feet;
+      minus = at_minus.feet;
+    } else {
+      plus = tips.feet(p, at_plus.tip);
+      minus = tips.feet(p, at_minus.tip);
+    }
   }
 
   const Feet<D, S> &nearer() const { return minus_is_nearer ? minus : plus; }
