@@ -151,7 +151,7 @@ def draw(ensembles: list[Ensemble], packings: list[dict[str, Any]], out: Path) -
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     systems = sorted({(of.alpha, of.n) for of in ensembles})
-    figure = Figure(figsize=(4.5 * len(systems), 6), dpi=150, layout="constrained")
+    figure = Figure(figsize=(4.5 * len(systems), 6), dpi=100, layout="constrained")
     axes = figure.subplots(2, len(systems), squeeze=False, sharex="col")
     for (alpha, n), (linear, logarithmic) in zip(systems, axes.T, strict=True):
         own = [of for of in ensembles if (of.alpha, of.n) == (alpha, n)]
