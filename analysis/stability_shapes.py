@@ -31,15 +31,9 @@ _UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 Pair = tuple[ArrayLike, ArrayLike]
 
 
-def particles(
-    position: ArrayLike,
-    orientation: ArrayLike,
-    semi_axes: ArrayLike,
-    exponent: ArrayLike,
-    edges: ArrayLike,
-) -> Packing:
-    """Superellipsoids from arrays; one shape may stand for all. Each exponent is a type of its own."""
-    packing = superellipsoids(position, orientation, semi_axes, exponent, edges)
+def particles(*arrays: ArrayLike) -> Packing:
+    """As `superellipsoids`; one shape may stand for all. Each exponent is a type of its own."""
+    packing = superellipsoids(*arrays)
     return packing.with_(species=1 + np.unique(packing.exponent, return_inverse=True)[1])
 
 
