@@ -75,6 +75,12 @@ struct PackingArrays {
   }
 };
 
+/// A pair of `PairSums` as Python takes it, -1 for none.
+template <int D, class S> std::int64_t pair_or_none(std::size_t pair)
+{
+  return pair == PairSums<D, S>::NONE ? -1 : static_cast<std::int64_t>(pair);
+}
+
 template <class Model, int D, class S>
 nb::dict sums_in(const PackingArrays &arrays, const typename Model::Law &law)
 {
@@ -96,11 +102,8 @@ nb::dict sums_in(const PackingArrays &arrays, const typename Model::Law &law)
   result["bond_force"] = static_cast<double>(sums.bond_force);
   result["n_bonds"] = sums.n_bonds;
   result["error"] = sums.error;
-  const auto pair_or_none = [](std::size_t pair) {
-    return pair == PairSums<D, S>::NONE ? -1 : static_cast<std::int64_t>(pair);
-  };
-  result["crossing"] = pair_or_none(sums.crossing);
-  result["unconverged"] = pair_or_none(sums.unconverged);
+  result["crossing"] = pair_or_none<D, S>(sums.crossing);
+  result["unconverged"] = pair_or_none<D, S>(sums.unconverged);
   return result;
 }
 

@@ -1,8 +1,8 @@
 #include "contact/spherocylinder.hpp"
 
 #include "bindings/arrays.hpp"
+#include "bindings/laws.hpp"
 #include "bindings/pairs.hpp"
-#include "text.hpp"
 
 namespace jamshape {
 
@@ -82,18 +82,11 @@ nb::dict contacts(const Bodies &bodies_i, const Bodies &bodies_j, const Spherocy
   return result;
 }
 
-SpherocylinderLaw law_of(double k_e, int sides)
-{
-  require(sides == 1 || sides == 2, "sides is " + std::to_string(sides) + ", expected 1 or 2.");
-  require(k_e > 0.0, "k_e is " + shown(k_e) + ", expected a positive energy.");
-  return SpherocylinderModel::law(static_cast<Sides>(sides), k_e);
-}
-
 nb::dict spherocylinder_contacts(const Bodies &bodies_i, const Bodies &bodies_j, double k_e,
                                  int sides)
 {
   require_same_shape(bodies_i, bodies_j);
-  const SpherocylinderLaw law = law_of(k_e, sides);
+  const SpherocylinderLaw law = spherocylinder_law(k_e, sides);
   return dimension_of(bodies_i) == 2 ? contacts<2>(bodies_i, bodies_j, law)
                                      : contacts<3>(bodies_i, bodies_j, law);
 }
@@ -104,7 +97,7 @@ nb::dict spherocylinder_sums(const Array2<double> &diameters, const Array3<doubl
                              double k_e, int sides, bool extended)
 {
   return pair_sums<SpherocylinderModel>({diameters, position, orientation, edges, pairs, shift},
-                                        law_of(k_e, sides), extended);
+                                        spherocylinder_law(k_e, sides), extended);
 }
 
 nb::dict spherocylinder_derivatives(const Array2<double> &diameters, const Array3<double> &position,
@@ -114,7 +107,8 @@ nb::dict spherocylinder_derivatives(const Array2<double> &diameters, const Array
                                     bool extended)
 {
   return pair_derivatives<SpherocylinderModel>(
-      {diameters, position, orientation, edges, pairs, shift}, law_of(k_e, sides), extended);
+      {diameters, position, orientation, edges, pairs, shift}, spherocylinder_law(k_e, sides),
+      extended);
 }
 
 template <int D>

@@ -1,8 +1,8 @@
 #include "contact/superellipsoid.hpp"
 
 #include "bindings/arrays.hpp"
+#include "bindings/laws.hpp"
 #include "bindings/pairs.hpp"
-#include "text.hpp"
 
 #include <nanobind/stl/optional.h>
 #include <optional>
@@ -53,12 +53,6 @@ int dimension_of(const Bodies &i, const Bodies &j)
   return dimension_of(i);
 }
 
-SuperellipsoidLaw law_of(double epsilon)
-{
-  require(epsilon > 0.0, "epsilon is " + shown(epsilon) + ", expected a positive energy.");
-  return SuperellipsoidModel::law({}, epsilon);
-}
-
 template <int D>
 nb::dict contacts(const Bodies &bodies_i, const Bodies &bodies_j, const SuperellipsoidLaw &law)
 {
@@ -101,7 +95,7 @@ nb::dict contacts(const Bodies &bodies_i, const Bodies &bodies_j, const Superell
 
 nb::dict superellipsoid_contacts(const Bodies &bodies_i, const Bodies &bodies_j, double epsilon)
 {
-  const SuperellipsoidLaw law = law_of(epsilon);
+  const SuperellipsoidLaw law = superellipsoid_law(epsilon);
   return dimension_of(bodies_i, bodies_j) == 2 ? contacts<2>(bodies_i, bodies_j, law)
                                                : contacts<3>(bodies_i, bodies_j, law);
 }
@@ -202,8 +196,8 @@ nb::dict superellipsoid_sums(const Array2<double> &diameters, const Array1<doubl
                              const Array2<std::int64_t> &shift, double epsilon, bool extended)
 {
   return pair_sums<SuperellipsoidModel>(
-      {diameters, position, orientation, edges, pairs, shift, &exponent}, law_of(epsilon),
-      extended);
+      {diameters, position, orientation, edges, pairs, shift, &exponent},
+      superellipsoid_law(epsilon), extended);
 }
 
 nb::dict superellipsoid_derivatives(const Array2<double> &diameters, const Array1<double> &exponent,
@@ -214,8 +208,8 @@ nb::dict superellipsoid_derivatives(const Array2<double> &diameters, const Array
                                     bool extended)
 {
   return pair_derivatives<SuperellipsoidModel>(
-      {diameters, position, orientation, edges, pairs, shift, &exponent}, law_of(epsilon),
-      extended);
+      {diameters, position, orientation, edges, pairs, shift, &exponent},
+      superellipsoid_law(epsilon), extended);
 }
 
 nb::object superellipsoid_bounding_radius(const Array2<double> &diameters,

@@ -4,6 +4,7 @@
 #include "contact/superellipsoid.hpp"
 
 #include "bindings/arrays.hpp"
+#include "bindings/laws.hpp"
 #include "bindings/pairs.hpp"
 
 #include <nanobind/stl/shared_ptr.h>
@@ -88,13 +89,10 @@ template <class Model, class S> nb::object sums(const Vicinity<Model> &of, const
   const PairSums<2, S> sums = of.template sums<S>(at);
   NewArray<double> gradient({of.n()});
   of.gradient(sums, gradient.row(0));
-  const auto pair_or_none = [](std::size_t pair) {
-    return pair == PairSums<2, S>::NONE ? -1 : static_cast<std::int64_t>(pair);
-  };
   return nb::make_tuple(static_cast<double>(sums.energy), gradient.release(),
                         static_cast<double>(-sums.virial[0] - sums.virial[3]),
                         static_cast<double>(sums.bond_force), sums.n_bonds,
-                        pair_or_none(sums.crossing), pair_or_none(sums.unconverged));
+                        pair_or_none<2, S>(sums.crossing), pair_or_none<2, S>(sums.unconverged));
 }
 
 template <class Model>
@@ -187,7 +185,7 @@ void export_vicinity(nb::module_ &m)
          const Array1<double> &turning_radius, double skin, double reach) {
         make<SpherocylinderModel>(place, {diameters, position, orientation, edges, pairs, shift},
                                   {column, rotation_length, turning_radius, skin, reach},
-                                  SpherocylinderModel::law(static_cast<Sides>(sides), k_e));
+                                  spherocylinder_law(k_e, sides));
       },
       "diameters"_a, "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "k_e"_a,
       "sides"_a, "column"_a, "rotation_length"_a, "turning_radius"_a, "skin"_a, "reach"_a,
@@ -207,8 +205,7 @@ void export_vicinity(nb::module_ &m)
          const Array1<double> &turning_radius, double skin, double reach) {
         make<SuperellipsoidModel>(
             place, {diameters, position, orientation, edges, pairs, shift, &exponent},
-            {column, rotation_length, turning_radius, skin, reach},
-            SuperellipsoidModel::law({}, epsilon));
+            {column, rotation_length, turning_radius, skin, reach}, superellipsoid_law(epsilon));
       },
       "diameters"_a, "exponent"_a, "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a,
       "epsilon"_a, "column"_a, "rotation_length"_a, "turning_radius"_a, "skin"_a, "reach"_a,

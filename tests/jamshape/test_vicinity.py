@@ -128,3 +128,11 @@ def test_three_dimensions_are_refused():
     packing = pressed_named("rods in space")
     with pytest.raises(ValueError, match="three dimensions, expected two"):
         Vicinity(Landscape(packing), State.of(packing))
+
+
+def test_a_law_that_does_not_exist_is_refused():
+    packing = pressed_named(RODS)
+    with pytest.raises(ValueError, match="sides is 3, expected 1 or 2"):
+        Vicinity(Landscape(packing, sides=3), State.of(packing))
+    with pytest.raises(ValueError, match="k_e is -1e-07, expected a positive energy"):
+        Vicinity(Landscape(packing, k_e=-1e-7), State.of(packing))
