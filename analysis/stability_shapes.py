@@ -31,9 +31,9 @@ _UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 Pair = tuple[ArrayLike, ArrayLike]
 
 
-def particles(*arrays: ArrayLike) -> Packing:
+def particles(*arrays: ArrayLike, **named: ArrayLike) -> Packing:
     """As `superellipsoids`; one shape may stand for all. Each exponent is a type of its own."""
-    packing = superellipsoids(*arrays)
+    packing = superellipsoids(*arrays, **named)
     return packing.with_(species=1 + np.unique(packing.exponent, return_inverse=True)[1])
 
 
