@@ -12,6 +12,38 @@
 
 namespace jamshape {
 
+/// Throws unless pairs (M, 2) and shift (M, D) are of N particles.
+inline void require_pairs(const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
+                          std::size_t D, std::size_t N)
+{
+  require(pairs.shape(1) == 2 && shift.shape(1) == D && shift.shape(0) == pairs.shape(0),
+          "pairs and shift have no shapes (M, 2) and (M, D).");
+  const std::int64_t *const first = pairs.data(), *const last = first + pairs.size();
+  require(std::all_of(first, last,
+                      [&](std::int64_t i) { return i >= 0 && static_cast<std::size_t>(i) < N; }),
+          "a pair names a particle that does not exist.");
+}
+
+/// From diameters (N, 3) and, of shapes that have them, exponents (N,).
+template <class Model>
+std::vector<typename Model::Shape> shapes_of(const Array2<double> &diameters,
+                                             const Array1<double> *exponent)
+{
+  const std::size_t N = diameters.shape(0);
+  require(diameters.shape(1) == 3, "diameters have no shape (N, 3).");
+  require(exponent == nullptr || exponent->shape(0) == N, "exponent has no shape (N,).");
+  std::vector<typename Model::Shape> result;
+  result.reserve(N);
+  for (std::size_t i = 0; i < N; ++i) {
+    const double p = exponent == nullptr ? 1.0 : exponent->data()[i];
+    const auto shape = Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), p);
+    require(shape.has_value(),
+            "particle " + std::to_string(i) + " is no such shape: " + Model::SHAPE_RULE + ".");
+    result.push_back(*shape);
+  }
+  return result;
+}
+
 /// Arguments of the functions over all pairs of a packing, as they come from Python.
 struct PackingArrays {
   const Array2<double> &diameters;           // (N, 3)
@@ -29,20 +61,12 @@ struct PackingArrays {
   {
     const std::size_t D = edges.shape(1);
     require(edges.shape(0) == 2 && (D == 2 || D == 3), "edges have no shape (2, D).");
-    require(diameters.shape(1) == 3, "diameters have no shape (N, 3).");
     require(position.shape(0) == 2 && position.shape(1) == n() && position.shape(2) == D,
             "position has no shape (2, N, D).");
     require(orientation.shape(0) == 2 && orientation.shape(1) == n() &&
                 orientation.shape(2) == (D == 2 ? 1 : 4),
             "orientation has no shape (2, N, 1) in 2D or (2, N, 4) in 3D.");
-    require(exponent == nullptr || exponent->shape(0) == n(), "exponent has no shape (N,).");
-    require(pairs.shape(1) == 2 && shift.shape(1) == D && shift.shape(0) == pairs.shape(0),
-            "pairs and shift have no shapes (M, 2) and (M, D).");
-    const std::int64_t *const first = pairs.data(), *const last = first + pairs.size();
-    require(
-        std::all_of(first, last,
-                    [&](std::int64_t i) { return i >= 0 && static_cast<std::size_t>(i) < n(); }),
-        "a pair names a particle that does not exist.");
+    require_pairs(pairs, shift, D, n());
   }
 
   SplitPoses poses() const
@@ -59,32 +83,12 @@ struct PackingArrays {
   }
 
   PairList list() const { return {pairs.shape(0), pairs.data(), shift.data()}; }
-
-  template <class Model> std::vector<typename Model::Shape> shapes() const
-  {
-    std::vector<typename Model::Shape> result;
-    result.reserve(n());
-    for (std::size_t i = 0; i < n(); ++i) {
-      const double p = exponent == nullptr ? 1.0 : exponent->data()[i];
-      const auto shape = Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), p);
-      require(shape.has_value(),
-              "particle " + std::to_string(i) + " is no such shape: " + Model::SHAPE_RULE + ".");
-      result.push_back(*shape);
-    }
-    return result;
-  }
 };
-
-/// A pair of `PairSums` as Python takes it, -1 for none.
-template <int D, class S> std::int64_t pair_or_none(std::size_t pair)
-{
-  return pair == PairSums<D, S>::NONE ? -1 : static_cast<std::int64_t>(pair);
-}
 
 template <class Model, int D, class S>
 nb::dict sums_in(const PackingArrays &arrays, const typename Model::Law &law)
 {
-  const auto shapes = arrays.shapes<Model>();
+  const auto shapes = shapes_of<Model>(arrays.diameters, arrays.exponent);
   const auto sums =
       sum_over(PosedPairs<Model, D, S>(shapes, arrays.poses(), arrays.list(), law), shapes.size());
   NewArray<double> force({shapes.size(), D}), torque({shapes.size(), ROTATIONS<D>});
@@ -102,8 +106,8 @@ nb::dict sums_in(const PackingArrays &arrays, const typename Model::Law &law)
   result["bond_force"] = static_cast<double>(sums.bond_force);
   result["n_bonds"] = sums.n_bonds;
   result["error"] = sums.error;
-  result["crossing"] = pair_or_none<D, S>(sums.crossing);
-  result["unconverged"] = pair_or_none<D, S>(sums.unconverged);
+  result["crossing"] = sums.crossing;
+  result["unconverged"] = sums.unconverged;
   return result;
 }
 
@@ -111,7 +115,7 @@ template <class Model, int D, class S>
 nb::dict derivatives_in(const PackingArrays &arrays, const typename Model::Law &law)
 {
   constexpr int N = PAIR_VARIABLES<D>;
-  const auto shapes = arrays.shapes<Model>();
+  const auto shapes = shapes_of<Model>(arrays.diameters, arrays.exponent);
   const PosedPairs<Model, D, S> pairs(shapes, arrays.poses(), arrays.list(), law);
   std::vector<std::size_t> touching;
   std::vector<ContactDerivatives<D, S>> found;

@@ -1,11 +1,10 @@
-#include "landscape/vicinity.hpp"
-
 #include "contact/spherocylinder.hpp"
 #include "contact/superellipsoid.hpp"
 
 #include "bindings/arrays.hpp"
 #include "bindings/laws.hpp"
 #include "bindings/pairs.hpp"
+#include "landscape/stage.hpp"
 
 #include <nanobind/stl/shared_ptr.h>
 
@@ -33,46 +32,48 @@ struct PoseArrays {
   }
 };
 
-/// What of a vicinity is not in the arrays of the packing.
-struct Extent {
+/// What coordinates are, as they come from Python.
+struct CoordinateArrays {
   const Array2<std::int64_t> &column;     // (N, 3)
   const Array1<double> &rotation_length;  // (N,)
   const Array1<double> &turning_radius;   // (N,)
-  double skin, reach;
+
+  Coordinates read(std::size_t N) const
+  {
+    require(column.shape(1) == 3, "the packing has three dimensions, expected two.");
+    require(column.shape(0) == N && rotation_length.shape(0) == N && turning_radius.shape(0) == N,
+            "column, rotation_length and turning_radius have no shapes (N, 3), (N,) and (N,).");
+    const std::int64_t *const first = column.data(), *const last = first + column.size();
+    const std::int64_t highest = first == last ? -1 : *std::max_element(first, last);
+    std::vector<double> per_length;
+    for (std::size_t i = 0; i < N; ++i) {
+      const double length = rotation_length.data()[i];
+      per_length.push_back(length > 0.0 ? 1.0 / length : 0.0);
+    }
+    const double *const radius = turning_radius.data();
+    return {static_cast<std::size_t>(highest + 1), {first, last}, per_length, {radius, radius + N}};
+  }
 };
 
-Coordinates coordinates_of(const Extent &extent)
+void check_poses(const PoseArrays &poses, std::size_t N)
 {
-  const std::int64_t *const first = extent.column.data(), *const last =
-                                                              first + extent.column.size();
-  const std::int64_t highest = first == last ? -1 : *std::max_element(first, last);
-  std::vector<double> per_length;
-  for (std::size_t i = 0; i < extent.rotation_length.shape(0); ++i) {
-    const double length = extent.rotation_length.data()[i];
-    per_length.push_back(length > 0.0 ? 1.0 / length : 0.0);
-  }
-  return {static_cast<std::size_t>(highest + 1), {first, last}, per_length};
+  require(poses.position.size() == 4 * N && poses.orientation.size() == 2 * N &&
+              poses.edges.size() == 4,
+          "position, orientation and edges have no shapes (2, N, 2), (2, N, 1) and (2, 2).");
 }
 
 template <class Model>
-void make(Vicinity<Model> *place, const PackingArrays &arrays, const Extent &extent,
-          const typename Model::Law &law)
+void take(Vicinity<Model> &of, const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
+          const PoseArrays &then, const Vec<2> &hold)
 {
-  arrays.check();
-  const std::size_t N = arrays.n();
-  require(arrays.dimension() == 2, "the packing has three dimensions, expected two.");
-  require(extent.column.shape(0) == N && extent.column.shape(1) == 3 &&
-              extent.rotation_length.shape(0) == N && extent.turning_radius.shape(0) == N,
-          "column, rotation_length and turning_radius have no shapes (N, 3), (N,) and (N,).");
-  const std::int64_t *const pairs = arrays.pairs.data(), *const shift = arrays.shift.data();
-  const double *const radius = extent.turning_radius.data();
-  NearPairs near{{pairs, pairs + arrays.pairs.size()},
-                 {shift, shift + arrays.shift.size()},
-                 PoseArrays{arrays.position, arrays.orientation, arrays.edges}.sum(),
-                 extent.skin,
-                 extent.reach,
-                 {radius, radius + N}};
-  new (place) Vicinity<Model>(arrays.shapes<Model>(), coordinates_of(extent), std::move(near), law);
+  check_poses(then, of.n_particles());
+  require(of.has_base(), "there is no base yet, expected move_to before.");
+  require_pairs(pairs, shift, 2, of.n_particles());
+  of.take({{pairs.data(), pairs.data() + pairs.size()},
+           {shift.data(), shift.data() + shift.size()},
+           then.sum(),
+           hold[0],
+           hold[1]});
 }
 
 template <class Model>
@@ -84,15 +85,18 @@ Displacement checked(const Vicinity<Model> &of, const Array1<double> &x, double 
   return {x.data(), strain};
 }
 
-template <class Model, class S> nb::object sums(const Vicinity<Model> &of, const Displacement &at)
+nb::object array_of(const double *from, std::size_t n)
 {
-  const PairSums<2, S> sums = of.template sums<S>(at);
-  NewArray<double> gradient({of.n()});
-  of.gradient(sums, gradient.row(0));
-  return nb::make_tuple(static_cast<double>(sums.energy), gradient.release(),
-                        static_cast<double>(-sums.virial[0] - sums.virial[3]),
-                        static_cast<double>(sums.bond_force), sums.n_bonds,
-                        pair_or_none<2, S>(sums.crossing), pair_or_none<2, S>(sums.unconverged));
+  NewArray<double> to({n});
+  std::copy_n(from, n, to.row(0));
+  return to.release();
+}
+
+nb::object tuple_of(const LandscapeSums &sums)
+{
+  return nb::make_tuple(sums.energy, array_of(sums.gradient.data(), sums.gradient.size()),
+                        sums.strain_gradient, sums.bond_force, sums.n_bonds, sums.crossing,
+                        sums.unconverged);
 }
 
 template <class Model>
@@ -100,32 +104,110 @@ nb::object evaluate(const Vicinity<Model> &of, const Array1<double> &x, double s
                     bool extended)
 {
   const Displacement at = checked(of, x, strain);
-  if (of.is_beyond(at)) return nb::none();
-  return extended ? sums<Model, long double>(of, at) : sums<Model, double>(of, at);
+  return of.is_beyond(at) ? nb::none() : tuple_of(of.evaluate(at, extended));
 }
 
 template <class Model>
-void linearise(Vicinity<Model> &of, const Array1<double> &x, double strain,
-               const Array1<double> &diagonal)
+Factors factorise(Vicinity<Model> &of, const Array1<double> &x, double strain,
+                  const Array1<double> &diagonal)
 {
   require(diagonal.shape(0) == of.n(), "diagonal has another length than there are coordinates.");
-  of.linearise(checked(of, x, strain), diagonal.data());
+  require(of.has_pairs(), "there are no pairs yet, expected take_pairs before.");
+  const Factors found = of.factorise(checked(of, x, strain), diagonal.data());
+  require(found != nullptr, "the Hessian holds what is not a number.");
+  return found;
+}
+
+Eigen::Map<const Eigen::VectorXd> vector(const Array1<double> &of)
+{
+  return {of.data(), static_cast<Eigen::Index>(of.shape(0))};
 }
 
 template <class Model>
 void move_to(Vicinity<Model> &of, const Array3<double> &position, const Array3<double> &orientation,
              const Array2<double> &edges)
 {
-  const std::size_t N = of.n_particles();
-  require(position.size() == 4 * N && orientation.size() == 2 * N && edges.size() == 4,
-          "position, orientation and edges have no shapes (2, N, 2), (2, N, 1) and (2, 2).");
-  of.move_to(PoseArrays{position, orientation, edges}.sum());
+  const PoseArrays poses{position, orientation, edges};
+  check_poses(poses, of.n_particles());
+  of.move_to(poses.sum());
+}
+
+/// A stage with its scales, and the guesses that it starts from.
+struct PosedStage {
+  Stage equation;
+  StageUnits units;
+  StageLimits limits;
+  Eigen::VectorXd guess, other;
+};
+
+template <class Model>
+StageEnd solve_stage(Vicinity<Model> &of, const PosedStage &stage, const Factors &factors,
+                     const nb::callable &renew)
+{
+  for (const auto *part :
+       {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
+    require(static_cast<std::size_t>(part->size()) == of.n(),
+            "a part of a stage has another length than there are coordinates.");
+  }
+  const auto renewed = [&](const Displacement &at) { renew(array_of(at.x, of.n()), at.strain); };
+  return StageSolver<Model>(of, stage.equation, stage.units, stage.limits, renewed)
+      .solve(stage.guess, stage.other, factors);
+}
+
+double size_of(const StageUnits &units, const Array1<double> &shift, const Array1<double> &force,
+               const Array1<double> &drag)
+{
+  require(shift.shape(0) == force.shape(0) && shift.shape(0) == drag.shape(0),
+          "shift, force and drag have different lengths.");
+  return units.size(vector(shift), vector(force), vector(drag));
+}
+
+void export_stages(nb::module_ &m)
+{
+  using namespace nb::literals;
+  nb::class_<StageUnits>(m, "StageUnits", "What errors of displacements are measured in.")
+      .def(nb::init<double, double, double, double>(), "force"_a, "energy"_a, "length"_a,
+           "n_particles"_a)
+      .def_ro("force", &StageUnits::force)
+      .def_ro("energy", &StageUnits::energy)
+      .def_ro("length", &StageUnits::length)
+      .def("size", &size_of, "shift"_a, "force"_a, "drag"_a,
+           "Of a displacement (n,), the force that makes it and the drag over the time.");
+  nb::class_<StageLimits>(m, "StageLimits")
+      .def(nb::init<double, double, double>(), "accuracy"_a, "longest_step"_a, "widest_turn"_a);
+  nb::class_<PosedStage>(m, "Stage", "drag (x - centre) + dU/dx = 0 in a box of given strain.")
+      .def(
+          "__init__",
+          [](PosedStage *place, double strain, const Array1<double> &drag,
+             const Array1<double> &centre, bool extended, const StageUnits &units,
+             const StageLimits &limits, const Array1<double> &guess, const Array1<double> &other) {
+            new (place) PosedStage{{strain, vector(drag), vector(centre), extended},
+                                   units,
+                                   limits,
+                                   vector(guess),
+                                   vector(other)};
+          },
+          "strain"_a, "drag"_a, "centre"_a, "extended"_a, "units"_a, "limits"_a, "guess"_a,
+          "other"_a);
+  nb::class_<StageEnd>(m, "StageEnd")
+      .def_prop_ro("x", [](const StageEnd &end) { return array_of(end.x.data(), end.x.size()); })
+      .def_prop_ro("sums", [](const StageEnd &end) { return tuple_of(end.sums); })
+      .def_ro("factors", &StageEnd::factors)
+      .def_ro("evaluations", &StageEnd::evaluations)
+      .def_ro("factorisations", &StageEnd::factorisations)
+      .def_ro("directions", &StageEnd::directions)
+      .def_ro("solved", &StageEnd::solved);
 }
 
 nb::object solve(const SymmetricFactors &factors, const Array2<double> &right)
 {
-  NewArray<double> solution({right.shape(0), right.shape(1)});
-  factors.solve(right.data(), right.shape(0), solution.row(0));
+  const std::size_t n = right.shape(1);
+  require(n == factors.size(), "right has another length than the matrix.");
+  NewArray<double> solution({right.shape(0), n});
+  for (std::size_t k = 0; k < right.shape(0); ++k) {
+    const Eigen::Map<const Eigen::VectorXd> side(right.data() + k * n, n);
+    Eigen::Map<Eigen::VectorXd>(solution.row(k), n) = factors.solve(side);
+  }
   return solution.release();
 }
 
@@ -136,10 +218,13 @@ void make_factors(SymmetricFactors *place, const Array1<int> &start, const Array
   require(n >= 0 && row.shape(0) == value.shape(0) &&
               static_cast<std::size_t>(start.data()[n]) == row.shape(0),
           "start, row and value are not the columns of a sparse matrix.");
-  const LowerTriangle matrix = Eigen::Map<const LowerTriangle>(
+  const UpperTriangle matrix = Eigen::Map<const UpperTriangle>(
       n, n, static_cast<Eigen::Index>(row.shape(0)), start.data(), row.data(), value.data());
-  new (place) SymmetricFactors(matrix);
-  if (!place->factorise(matrix)) {
+  const Order order = sparse_order(matrix);
+  UpperTriangle ordered(n, n);
+  ordered.selfadjointView<Eigen::Upper>() = matrix.selfadjointView<Eigen::Upper>().twistedBy(order);
+  new (place) SymmetricFactors(ordered, order);
+  if (!place->factorise(ordered)) {
     place->~SymmetricFactors();
     throw std::runtime_error("The matrix is singular.");
   }
@@ -156,11 +241,22 @@ template <class Model> auto export_methods(nb::class_<Vicinity<Model>> class_)
           "None where the pairs no longer hold, or energy, gradient (n,), derivative by the\n"
           "strain, sum of the magnitudes of bond forces, number of bonds, and a pair that crosses\n"
           "and one that is unconverged, or -1.")
-      .def("linearise", &linearise<Model>, "x"_a, "strain"_a, "diagonal"_a,
-           "Take the Hessian by these coordinates plus a diagonal (n,).")
-      .def_prop_ro("largest_diagonal", &Vicinity<Model>::largest_diagonal, "Of that matrix.")
-      .def("factorised", &Vicinity<Model>::factorised, "shift"_a,
-           "SymmetricFactors of that matrix plus a shift; None if singular.");
+      .def("factorise", &factorise<Model>, "x"_a, "strain"_a, "diagonal"_a,
+           "SymmetricFactors of the Hessian by these coordinates plus a diagonal (n,), shifted if\n"
+           "it is not positive definite.")
+      .def(
+          "take_pairs",
+          [](Vicinity<Model> &of, const Array3<double> &position, const Array3<double> &orientation,
+             const Array2<double> &edges, const Array2<std::int64_t> &pairs,
+             const Array2<std::int64_t> &shift, double skin, double reach) {
+            take(of, pairs, shift, {position, orientation, edges}, {{skin, reach}});
+          },
+          "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "skin"_a, "reach"_a,
+          "Pairs of centres within reach, which hold until surfaces may have come closer by skin\n"
+          "than at these poses.")
+      .def("solve_stage", &solve_stage<Model>, "stage"_a, "factors"_a.none(), "renew"_a,
+           "The StageEnd of a Stage, with factors of an earlier one; renew(x, strain) takes pairs\n"
+           "that hold there.");
 }
 
 }  // namespace
@@ -170,45 +266,42 @@ void export_vicinity(nb::module_ &m)
   using namespace nb::literals;
   nb::class_<SymmetricFactors>(m, "SymmetricFactors")
       .def("__init__", &make_factors, "start"_a, "row"_a, "value"_a,
-           "Of a matrix in CSC, of which the lower triangle is read. RuntimeError if singular.")
+           "Of a matrix in CSC, of which the upper triangle is read. RuntimeError if singular.")
       .def_prop_ro("n_negative", &SymmetricFactors::n_negative)
       .def("solve", &solve, "right"_a, "For the rows of right (k, n).");
+  m.attr("LEAST_SHIFT") = LEAST_SHIFT;
+  export_stages(m);
 
   nb::class_<Vicinity<SpherocylinderModel>> rods(m, "SpherocylinderVicinity");
   rods.def(
       "__init__",
-      [](Vicinity<SpherocylinderModel> *place, const Array2<double> &diameters,
-         const Array3<double> &position, const Array3<double> &orientation,
-         const Array2<double> &edges, const Array2<std::int64_t> &pairs,
-         const Array2<std::int64_t> &shift, double k_e, int sides,
-         const Array2<std::int64_t> &column, const Array1<double> &rotation_length,
-         const Array1<double> &turning_radius, double skin, double reach) {
-        make<SpherocylinderModel>(place, {diameters, position, orientation, edges, pairs, shift},
-                                  {column, rotation_length, turning_radius, skin, reach},
-                                  spherocylinder_law(k_e, sides));
+      [](Vicinity<SpherocylinderModel> *place, const Array2<double> &diameters, double k_e,
+         int sides, const Array2<std::int64_t> &column, const Array1<double> &rotation_length,
+         const Array1<double> &turning_radius) {
+        auto shapes = shapes_of<SpherocylinderModel>(diameters, nullptr);
+        Coordinates names =
+            CoordinateArrays{column, rotation_length, turning_radius}.read(diameters.shape(0));
+        new (place) Vicinity<SpherocylinderModel>(std::move(shapes), std::move(names),
+                                                  spherocylinder_law(k_e, sides));
       },
-      "diameters"_a, "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "k_e"_a,
-      "sides"_a, "column"_a, "rotation_length"_a, "turning_radius"_a, "skin"_a, "reach"_a,
-      "Arguments to sides as in spherocylinder_sums, in the plane; column (N, 3) numbers of the\n"
-      "coordinates x, y, rotation, or -1; the pairs hold until surfaces may have come closer by "
-      "skin.");
+      "diameters"_a, "k_e"_a, "sides"_a, "column"_a, "rotation_length"_a, "turning_radius"_a,
+      "Of particles in the plane; column (N, 3) numbers of the coordinates x, y, rotation, or -1.\n"
+      "Before anything else, move_to a base; pairs are asked for by what evaluate gives.");
   export_methods(rods);
 
   nb::class_<Vicinity<SuperellipsoidModel>> ellipses(m, "SuperellipsoidVicinity");
   ellipses.def(
       "__init__",
       [](Vicinity<SuperellipsoidModel> *place, const Array2<double> &diameters,
-         const Array1<double> &exponent, const Array3<double> &position,
-         const Array3<double> &orientation, const Array2<double> &edges,
-         const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift, double epsilon,
-         const Array2<std::int64_t> &column, const Array1<double> &rotation_length,
-         const Array1<double> &turning_radius, double skin, double reach) {
-        make<SuperellipsoidModel>(
-            place, {diameters, position, orientation, edges, pairs, shift, &exponent},
-            {column, rotation_length, turning_radius, skin, reach}, superellipsoid_law(epsilon));
+         const Array1<double> &exponent, double epsilon, const Array2<std::int64_t> &column,
+         const Array1<double> &rotation_length, const Array1<double> &turning_radius) {
+        auto shapes = shapes_of<SuperellipsoidModel>(diameters, &exponent);
+        Coordinates names =
+            CoordinateArrays{column, rotation_length, turning_radius}.read(diameters.shape(0));
+        new (place) Vicinity<SuperellipsoidModel>(std::move(shapes), std::move(names),
+                                                  superellipsoid_law(epsilon));
       },
-      "diameters"_a, "exponent"_a, "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a,
-      "epsilon"_a, "column"_a, "rotation_length"_a, "turning_radius"_a, "skin"_a, "reach"_a,
+      "diameters"_a, "exponent"_a, "epsilon"_a, "column"_a, "rotation_length"_a, "turning_radius"_a,
       "As SpherocylinderVicinity.");
   export_methods(ellipses);
 }

@@ -152,11 +152,9 @@ template <int D, class S> struct PairSums {
   Vec<D * D, S> virial{};  // sum of r (x) force on i
   S bond_force = 0.0;      // sum of the magnitudes
   std::size_t n_bonds = 0;
-  double error = 0.0;              // the largest of a contact
-  std::size_t crossing = NONE;     // the first pair of this status
-  std::size_t unconverged = NONE;  // likewise
-
-  static constexpr std::size_t NONE = static_cast<std::size_t>(-1);
+  double error = 0.0;             // the largest of a contact
+  std::int64_t crossing = -1;     // the first pair of this status, -1 for none
+  std::int64_t unconverged = -1;  // likewise
 };
 
 template <class Model, int D, class S>
@@ -171,8 +169,8 @@ PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_part
     if (contact.status == ContactStatus::APART) continue;
     if (contact.status != ContactStatus::TOUCHING) {
       const bool is_crossing = contact.status == ContactStatus::CROSSING;
-      std::size_t &first = is_crossing ? sums.crossing : sums.unconverged;
-      if (first == PairSums<D, S>::NONE) first = p;
+      std::int64_t &first = is_crossing ? sums.crossing : sums.unconverged;
+      if (first < 0) first = static_cast<std::int64_t>(p);
       continue;
     }
     sums.energy += contact.energy;

@@ -1,22 +1,43 @@
 #pragma once
 
 #include <cstddef>
+#include <Eigen/OrderingMethods>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+#include <utility>
 
 namespace jamshape {
 
-/// The lower triangle of a sparse symmetric matrix, column by column.
-using LowerTriangle = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
+/// The smallest shift of a diagonal, over its largest element: rounding in the factorisation is
+/// just below it, and so is what it does to modes that are stiff at all.
+inline constexpr double LEAST_SHIFT = 1e-13;
+
+/// The upper triangle of a sparse symmetric matrix, column by column.
+using UpperTriangle = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
+
+/// Where each row goes.
+using Order = Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int>;
+
+/// An order of rows in which factors stay sparse (approximate minimum degree).
+template <class Matrix> Order sparse_order(const Matrix &symmetric)
+{
+  Order inverse;
+  Eigen::AMDOrdering<int>()(symmetric.template selfadjointView<Eigen::Upper>(), inverse);
+  return inverse.inverse();
+}
 
 /// Factors L D L^T of sparse symmetric matrices of one pattern. Without pivoting, so that the signs
 /// of D are those of the eigenvalues (Sylvester's law of inertia).
 class SymmetricFactors {
  public:
-  explicit SymmetricFactors(const LowerTriangle &pattern) { factors.analyzePattern(pattern); }
+  /// Of matrices whose rows are in this order already; vectors come as they were before.
+  SymmetricFactors(const UpperTriangle &pattern, Order rows) : order(std::move(rows))
+  {
+    factors.analyzePattern(pattern);
+  }
 
   /// False if a pivot is zero.
-  bool factorise(const LowerTriangle &matrix)
+  bool factorise(const UpperTriangle &matrix)
   {
     factors.factorize(matrix);
     return factors.info() == Eigen::Success;
@@ -29,18 +50,17 @@ class SymmetricFactors {
     return static_cast<std::size_t>((!(pivots.array() > 0.0)).count());
   }
 
-  /// For several right-hand sides, one after the other.
-  void solve(const double *right, std::size_t n_sides, double *solution) const
+  std::size_t size() const { return static_cast<std::size_t>(factors.rows()); }
+
+  Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const
   {
-    const Eigen::Index n = factors.rows();
-    for (std::size_t k = 0; k < n_sides; ++k) {
-      const Eigen::Map<const Eigen::VectorXd> b(right + k * n, n);
-      Eigen::Map<Eigen::VectorXd>(solution + k * n, n) = factors.solve(b);
-    }
+    const Eigen::VectorXd ordered = order * right, found = factors.solve(ordered);
+    return order.inverse() * found;
   }
 
  private:
-  Eigen::SimplicialLDLT<LowerTriangle, Eigen::Lower, Eigen::AMDOrdering<int>> factors;
+  Order order;
+  Eigen::SimplicialLDLT<UpperTriangle, Eigen::Upper, Eigen::NaturalOrdering<int>> factors;
 };
 
 }  // namespace jamshape

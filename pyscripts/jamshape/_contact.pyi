@@ -5,6 +5,7 @@ half_length, radius; of superellipsoids (M, 6) in 2D, (M, 11) in 3D: centre, ang
 w i j k, semi-axes, exponent p.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,8 @@ def superellipsoid_sweeps(
     seed: int,
 ) -> dict[str, Any]: ...
 
+LEAST_SHIFT: float
+
 class SymmetricFactors:
     n_negative: int
     def __init__(
@@ -112,38 +115,85 @@ class SymmetricFactors:
     ) -> None: ...
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
+class StageUnits:
+    force: float
+    energy: float
+    length: float
+    def __init__(self, force: float, energy: float, length: float, n_particles: float) -> None: ...
+    def size(
+        self,
+        shift: NDArray[np.float64],
+        force: NDArray[np.float64],
+        drag: NDArray[np.float64],
+    ) -> float: ...
+
+class StageLimits:
+    def __init__(self, accuracy: float, longest_step: float, widest_turn: float) -> None: ...
+
+class Stage:
+    def __init__(
+        self,
+        strain: float,
+        drag: NDArray[np.float64],
+        centre: NDArray[np.float64],
+        extended: bool,
+        units: StageUnits,
+        limits: StageLimits,
+        guess: NDArray[np.float64],
+        other: NDArray[np.float64],
+    ) -> None: ...
+
+class StageEnd:
+    x: NDArray[np.float64]
+    sums: tuple[float, NDArray[np.float64], float, float, int, int, int]
+    factors: SymmetricFactors | None
+    evaluations: int
+    factorisations: int
+    directions: int
+    solved: bool
+
 class _Vicinity:
-    largest_diagonal: float
     def move_to(
         self,
         position: NDArray[np.float64],
         orientation: NDArray[np.float64],
         edges: NDArray[np.float64],
     ) -> None: ...
-    def evaluate(
-        self, x: NDArray[np.float64], strain: float, extended: bool
-    ) -> tuple[float, NDArray[np.float64], float, float, int, int, int] | None: ...
-    def linearise(
-        self, x: NDArray[np.float64], strain: float, diagonal: NDArray[np.float64]
-    ) -> None: ...
-    def factorised(self, shift: float) -> SymmetricFactors | None: ...
-
-class SpherocylinderVicinity(_Vicinity):
-    def __init__(
+    def take_pairs(
         self,
-        diameters: NDArray[np.float64],
         position: NDArray[np.float64],
         orientation: NDArray[np.float64],
         edges: NDArray[np.float64],
         pairs: NDArray[np.int64],
         shift: NDArray[np.int64],
+        skin: float,
+        reach: float,
+    ) -> None: ...
+    def evaluate(
+        self, x: NDArray[np.float64], strain: float, extended: bool
+    ) -> tuple[float, NDArray[np.float64], float, float, int, int, int] | None: ...
+    def factorise(
+        self,
+        x: NDArray[np.float64],
+        strain: float,
+        diagonal: NDArray[np.float64],
+    ) -> SymmetricFactors: ...
+    def solve_stage(
+        self,
+        stage: Stage,
+        factors: SymmetricFactors | None,
+        renew: Callable[[NDArray[np.float64], float], None],
+    ) -> StageEnd: ...
+
+class SpherocylinderVicinity(_Vicinity):
+    def __init__(
+        self,
+        diameters: NDArray[np.float64],
         k_e: float,
         sides: int,
         column: NDArray[np.int64],
         rotation_length: NDArray[np.float64],
         turning_radius: NDArray[np.float64],
-        skin: float,
-        reach: float,
     ) -> None: ...
 
 class SuperellipsoidVicinity(_Vicinity):
@@ -151,15 +201,8 @@ class SuperellipsoidVicinity(_Vicinity):
         self,
         diameters: NDArray[np.float64],
         exponent: NDArray[np.float64],
-        position: NDArray[np.float64],
-        orientation: NDArray[np.float64],
-        edges: NDArray[np.float64],
-        pairs: NDArray[np.int64],
-        shift: NDArray[np.int64],
         epsilon: float,
         column: NDArray[np.int64],
         rotation_length: NDArray[np.float64],
         turning_radius: NDArray[np.float64],
-        skin: float,
-        reach: float,
     ) -> None: ...

@@ -17,12 +17,13 @@ import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
 from jamshape import _contact
-from jamshape.contacts import unconverged_sentence
+from jamshape.contacts import NearPairs, unconverged_sentence
 from jamshape.packing import FloatArray, IntArray, LongArray, Packing
-from jamshape.shapes import PairArrays, Shape, shape_of
+from jamshape.shapes import PairArrays, shape_of
 
-# Pairs whose surfaces are closer than this fraction of the smallest radius are looked at.
-_SKIN = 0.3
+# Pairs whose surfaces are closer than this fraction of the smallest radius are looked at; they are looked for among
+# those that are closer than so many times as much.
+_SKIN, _WIDE = 0.3, 5.0
 
 _TURN = 2 * np.arccos(np.longdouble(-1))
 
@@ -140,6 +141,7 @@ class Landscape:
         self.shape = shape_of(packing, k_e, sides)
         self.evaluations = 0
         self._pairs: Pairs | None = None
+        self._wide: Pairs | None = None
 
     @property
     def rotation_length(self) -> FloatArray:
@@ -185,7 +187,7 @@ class Landscape:
 
     def forget_pairs(self) -> None:
         """Look for pairs anew, so that what follows depends on the state alone, to the last bit."""
-        self._pairs = None
+        self._pairs = self._wide = None
 
     def components(self, vector: FloatArray) -> FloatArray:
         """Spread an (n,) vector over (N, D + rotations), 0 where there is no coordinate."""
@@ -324,8 +326,26 @@ class Landscape:
     def pairs_at(self, state: State) -> Pairs:
         """Give the pairs that may touch at a state: the list that there is, or a new one."""
         if self._pairs is None or self._pairs.outrun_by(state, self.shape.turning_radius):
-            self._pairs = Pairs.near(self.shape, state.packing(self.particles), state)
+            return self.renewed_pairs(state)
         return self._pairs
+
+    def renewed_pairs(self, state: State) -> Pairs:
+        """Find the pairs that may touch at a state, among those of a wider skin, which hold for longer."""
+        skin = _SKIN * float(self.shape.inner_radius.min())
+        packing, wide = state.packing(self.particles), self._wide
+        if wide is None or wide.outrun_by(state, self.shape.turning_radius, skin):
+            near = self.shape.near(packing, _WIDE * skin)
+            wide = Pairs.of(near, state, _WIDE * skin, self._reach)
+            self._wide = wide
+        self._pairs = Pairs.of(
+            self.shape.nearer(packing, wide.near, skin), state, skin, self._reach
+        )
+        return self._pairs
+
+    @cached_property
+    def _reach(self) -> float:
+        """How far apart the centres of touching particles may be."""
+        return 2 * float(self.shape.outer_radius.max())
 
 
 class _Places(NamedTuple):
@@ -361,20 +381,22 @@ class Pairs:
     """How far apart their centres may be."""
 
     @classmethod
-    def near(cls, shape: Shape, packing: Packing, state: State) -> Pairs:
-        """Find them."""
-        skin = _SKIN * float(shape.inner_radius.min())
-        near = shape.near(packing, skin)
-        reach = 2 * float(shape.outer_radius.max()) + skin
+    def of(cls, near: NearPairs, state: State, skin: float, reach: float) -> Pairs:
+        """Of surfaces that are closer than a skin, and centres than a reach beside that skin."""
         pairs = np.column_stack([near.first, near.second])
-        return cls(pairs, near.shift, state, skin, reach)
+        return cls(pairs, near.shift, state, skin, reach + skin)
 
-    def outrun_by(self, now: State, turning_radius: FloatArray) -> bool:
-        """Whether two surfaces may have come closer by `skin`."""
+    @property
+    def near(self) -> NearPairs:
+        """As the functions of `contacts` take them."""
+        return NearPairs(*self.particles.T, self.shift)
+
+    def outrun_by(self, now: State, turning_radius: FloatArray, kept: float = 0.0) -> bool:
+        """Whether two surfaces may have come closer by `skin`, or by what is left of it."""
         position, orientation, edges = (part[0] for part in now.split)
         position_then, orientation_then, edges_then = (part[0] for part in self.then.split)
         scale = edges / edges_then
-        left = self.skin - float(np.abs(scale - 1).max()) * self.reach
+        left = self.skin - kept - float(np.abs(scale - 1).max()) * self.reach
         moved = np.sqrt(((position - scale * position_then) ** 2).sum(axis=1))
         turn = orientation - orientation_then
         if now.dimension == 2:

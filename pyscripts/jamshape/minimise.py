@@ -23,8 +23,8 @@ from jamshape.packing import FloatArray
 
 # A Newton step moves no particle by more than this fraction of the smallest radius, and turns none
 # by more than this angle.
-_LONGEST_STEP = 0.1
-_WIDEST_TURN = 0.2
+LONGEST_STEP = 0.1
+WIDEST_TURN = 0.2
 
 # `auto` changes from L-BFGS to Newton below this residual, or where L-BFGS no longer gains.
 _NEWTON_BELOW = 1e-2
@@ -287,13 +287,13 @@ def _newton(descent: Descent) -> Outcome:
 
 def limited(landscape: Landscape, step: FloatArray) -> FloatArray:
     """Shorten a step that moves or turns a particle too far."""
-    longest = _LONGEST_STEP * 0.5 * landscape.length
+    longest = LONGEST_STEP * 0.5 * landscape.length
     largest = float(np.abs(step).max(initial=0.0))
-    if 2 * largest < longest and largest < _WIDEST_TURN * landscape.shortest_lever:
+    if 2 * largest < longest and largest < WIDEST_TURN * landscape.shortest_lever:
         return step  # most are, and this is all that needs to be known
     shift, turn = landscape.motion(step)
     excess = max(
-        np.sqrt((shift**2).sum(axis=1)).max() / longest, np.abs(turn).max() / _WIDEST_TURN, 1.0
+        np.sqrt((shift**2).sum(axis=1)).max() / longest, np.abs(turn).max() / WIDEST_TURN, 1.0
     )
     return np.asarray(step / excess)
 

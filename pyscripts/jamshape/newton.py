@@ -12,9 +12,8 @@ from jamshape import _contact
 from jamshape.landscape import Landscape
 from jamshape.packing import FloatArray
 
-# The smallest shift, relative to the largest diagonal element: rounding in the factorisation is
-# just below it, and so is what it does to modes that are stiff at all.
-LEAST_SHIFT = 1e-13
+# The smallest shift, over the largest diagonal element.
+LEAST_SHIFT: float = _contact.LEAST_SHIFT
 
 # The first one, in units of k_e and `Landscape.length`.
 _FIRST_SHIFT = 1e-6
@@ -53,7 +52,7 @@ class Factorisation:
     """
 
     def __init__(self, factors: Any) -> None:
-        self._factors = factors
+        self.compiled = factors
         self.n_negative: int = factors.n_negative
         """Pivots that are not positive."""
 
@@ -73,9 +72,9 @@ class Factorisation:
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve for one (n,) or several (n, k) right-hand sides."""
         if right.ndim == 1:
-            solution: FloatArray = self._factors.solve(right[None])[0]
+            solution: FloatArray = self.compiled.solve(right[None])[0]
             return solution
-        columns: FloatArray = self._factors.solve(np.ascontiguousarray(right.T)).T
+        columns: FloatArray = self.compiled.solve(np.ascontiguousarray(right.T)).T
         return columns
 
 

@@ -39,8 +39,8 @@ class PairArrays(NamedTuple):
     """(M, D)"""
 
 
-class Extent(NamedTuple):
-    """How far the pairs of `PairArrays` hold, and what the coordinates are."""
+class Coordinates(NamedTuple):
+    """What coordinates of a packing in two dimensions are."""
 
     column: IntArray
     """(N, 3) numbers of the coordinates x, y, rotation; -1 for none."""
@@ -48,10 +48,6 @@ class Extent(NamedTuple):
     """(N,) as in `Shape`"""
     turning_radius: FloatArray
     """(N,) as in `Shape`"""
-    skin: float
-    """What surfaces may come closer before pairs are to be found anew."""
-    reach: float
-    """How far apart centres of pairs are at most."""
 
 
 class Shape(Protocol):
@@ -71,13 +67,16 @@ class Shape(Protocol):
     def near(self, packing: Packing, margin: float) -> NearPairs:
         """Find all pairs whose surfaces are closer than a margin, once each, in their order."""
 
+    def nearer(self, packing: Packing, pairs: NearPairs, margin: float) -> NearPairs:
+        """Select those of some pairs that are."""
+
     def sums(self, arrays: PairArrays, *, extended: bool) -> dict[str, Any]:
         """Sum energy, forces, torques and virial over pairs."""
 
     def derivatives(self, arrays: PairArrays, *, extended: bool) -> dict[str, NDArray[Any]]:
         """Evaluate second derivatives contact by contact."""
 
-    def vicinity(self, arrays: PairArrays, extent: Extent) -> Any:
+    def vicinity(self, coordinates: Coordinates) -> Any:
         """Compile the energy about a state in two dimensions, as `jamshape._contact` has it."""
 
     def turning_axes(self, packing: Packing) -> FloatArray:
@@ -96,13 +95,16 @@ class Spherocylinders:
 
     def near(self, packing: Packing, margin: float) -> NearPairs:
         """As `Shape.near`."""
-        rows = bodies(packing)
-        wide = rows.copy()
+        wide = bodies(packing)
         wide[:, -1] += 0.5 * margin
-        found = each_once(near_pairs(wide, wide, packing.box))
-        i, j = rows[found.first], shifted(rows[found.second], found.shift, packing.box)
+        return self.nearer(packing, each_once(near_pairs(wide, wide, packing.box)), margin)
+
+    def nearer(self, packing: Packing, pairs: NearPairs, margin: float) -> NearPairs:
+        """As `Shape.nearer`."""
+        rows = bodies(packing)
+        i, j = rows[pairs.first], shifted(rows[pairs.second], pairs.shift, packing.box)
         gaps = _contact.spine_distances(i, j) - i[:, -1] - j[:, -1]
-        return found.take(gaps < margin)
+        return pairs.take(gaps < margin)
 
     def sums(self, arrays: PairArrays, *, extended: bool) -> dict[str, Any]:
         """As `Shape.sums`."""
@@ -118,10 +120,9 @@ class Spherocylinders:
         )
         return found
 
-    def vicinity(self, arrays: PairArrays, extent: Extent) -> Any:
+    def vicinity(self, coordinates: Coordinates) -> Any:
         """As `Shape.vicinity`."""
-        k_e, sides = self._law
-        return _contact.SpherocylinderVicinity(self._diameters, *arrays, k_e, sides, *extent)
+        return _contact.SpherocylinderVicinity(self._diameters, *self._law, *coordinates)
 
     def turning_axes(self, packing: Packing) -> FloatArray:
         """Two in space: a rod spins freely about its own axis."""
@@ -146,10 +147,13 @@ class Superellipsoids:
     def near(self, packing: Packing, margin: float) -> NearPairs:
         """As `Shape.near`."""
         wide = spheres(packing.position, self.outer_radius + 0.5 * margin)
-        found = each_once(near_pairs(wide, wide, packing.box))
+        return self.nearer(packing, each_once(near_pairs(wide, wide, packing.box)), margin)
+
+    def nearer(self, packing: Packing, pairs: NearPairs, margin: float) -> NearPairs:
+        """As `Shape.nearer`."""
         rows = superellipsoid_bodies(packing)
-        i, j = rows[found.first], shifted(rows[found.second], found.shift, packing.box)
-        return found.take(_contact.superellipsoid_near(i, j, margin))
+        i, j = rows[pairs.first], shifted(rows[pairs.second], pairs.shift, packing.box)
+        return pairs.take(_contact.superellipsoid_near(i, j, margin))
 
     def sums(self, arrays: PairArrays, *, extended: bool) -> dict[str, Any]:
         """As `Shape.sums`."""
@@ -165,11 +169,11 @@ class Superellipsoids:
         )
         return found
 
-    def vicinity(self, arrays: PairArrays, extent: Extent) -> Any:
+    def vicinity(self, coordinates: Coordinates) -> Any:
         """As `Shape.vicinity`."""
         packing = self._packing
         return _contact.SuperellipsoidVicinity(
-            packing.diameters, packing.exponent, *arrays, self._epsilon, *extent
+            packing.diameters, packing.exponent, self._epsilon, *coordinates
         )
 
     def turning_axes(self, packing: Packing) -> FloatArray:

@@ -8,7 +8,6 @@ from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.minimise import minimise
 from jamshape.packing import Box, Packing
 from jamshape.stiff_compression import METHODS, Flow, Protocol, Step, compress, drag_coefficients
-from jamshape.stiff_stage import stretch_of
 
 
 def packing_of(alpha, position, angle, L=10.0):
@@ -41,15 +40,18 @@ def reference(packing, kappa, phi_end):
     landscape, start = Landscape(packing), State.of(packing)
     drag = drag_coefficients(landscape)
 
+    def stretch_of(strain):
+        return np.where(landscape.is_rotation, 1.0, 1.0 + strain)
+
     def velocity(t, x):
         strain = np.expm1(-kappa * t)
         found = landscape.evaluate(landscape.displaced(start, x).strained(strain))
-        return -found.gradient / (stretch_of(landscape, strain) * drag)
+        return -found.gradient / (stretch_of(strain) * drag)
 
     def jacobian(t, x):
         strain = np.expm1(-kappa * t)
         hessian = landscape.curvature(landscape.displaced(start, x).strained(strain)).hessian
-        stretch = stretch_of(landscape, strain)
+        stretch = stretch_of(strain)
         return -(hessian.toarray() * stretch) / (stretch * drag)[:, None]
 
     end = 0.5 * np.log(phi_end / packing.phi) / kappa

@@ -1,0 +1,232 @@
+#pragma once
+
+#include "landscape/vicinity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace jamshape {
+
+/// The equation of one stage of an implicit step: in a box of given strain the displacement x obeys
+///     drag (x - centre) + dU/dx = 0,
+/// the minimum of U + (x - centre).drag (x - centre) / 2. Drag coefficients (n,) are over the time.
+struct Stage {
+  double strain;
+  Eigen::VectorXd drag, centre;
+  bool extended;  // whether doubles are too short
+};
+
+/// What errors are measured in. A displacement that changes overlaps counts by their change: in the
+/// energy norm, over that of the overlaps that are there. One that slides along contacts counts
+/// where it has changed the overlaps in second order: over the square root of overlap times size.
+struct StageUnits {
+  double force;   // of a typical bond
+  double energy;  // twice the typical energy of the packing
+  double length;  // sqrt(overlap size)
+  double n_particles;
+
+  /// Size of a displacement (n,), with the force (n,) that makes it and the drag over the time.
+  template <class X, class F, class C>
+  double size(const X &shift, const F &pull, const C &drag) const
+  {
+    const double work = shift.dot(pull - drag.cwiseProduct(shift));
+    const double hard = std::sqrt(std::max(work, 0.0) / energy);
+    return std::max(hard, shift.norm() / std::sqrt(n_particles) / length);
+  }
+};
+
+/// Correction that may be left, in these units, and how far a particle may move and turn in one.
+struct StageLimits {
+  double accuracy, longest_step, widest_turn;
+};
+
+using Factors = std::shared_ptr<SymmetricFactors>;
+
+/// Where the solution of a stage ended: refused are guesses whose `sums` say why.
+struct StageEnd {
+  Eigen::VectorXd x;
+  LandscapeSums sums;
+  Factors factors;
+  int evaluations, factorisations, directions;
+  bool solved;
+};
+
+/// Solves a stage as the minimisation that it is. Its gradient is smooth between the kinks where
+/// bonds open and close, and Newton's full steps find which of them do so for all bonds at once
+/// (semismooth Newton: Qi & Sun, Math. Program. 58, 353 (1993)), mostly in three or four
+/// evaluations; searching along each step would let through one bond at a time. On a kink that
+/// holds the solution steps go to and fro: it is found by bisection and kept as a stiff valley, a
+/// BFGS update of the factors (Lewis & Overton, Math. Program. 141, 135 (2013)). Stages that do not
+/// end are given up soon: half of the time, the time step was too long anyway.
+template <class Model> class StageSolver {
+ public:
+  using Vector = Eigen::VectorXd;
+  /// Finds pairs anew that hold at a displacement.
+  using Renew = std::function<void(const Displacement &)>;
+
+  StageSolver(Vicinity<Model> &landscape, const Stage &equation, const StageUnits &scales,
+              const StageLimits &bounds, Renew renew) :
+      about(landscape), stage(equation), units(scales), limits(bounds),
+      renew_pairs(std::move(renew)), stretch(landscape.stretch(equation.strain))
+  {
+  }
+
+  /// From a guess, or from another one if particles collide there; with factors of an earlier,
+  /// similar stage, if there are any.
+  StageEnd solve(const Vector &guess, const Vector &other, Factors found)
+  {
+    factors = std::move(found);
+    Point at = begin(guess, other);
+    Vector before = Vector::Zero(guess.size());
+    for (; directions < DIRECTIONS && !at.sums.is_refused(); ++directions) {
+      const Correction correction = correction_at(at);
+      if (!factors) break;
+      if (correction.size <= limits.accuracy) {
+        at.x += correction.step;
+        return end(std::move(at), true);
+      }
+      const Vector step = shortened(correction.step);
+      Point tried = point(at.x + step);
+      if (!tried.sums.is_refused() && is_past_a_kink(at, tried, step, before, correction.size)) {
+        tried = between(at, std::move(tried), limits.accuracy / correction.size);
+      }
+      if (tried.sums.crossing >= 0) break;
+      at = std::move(tried);
+      before = step;
+    }
+    return end(std::move(at), false);
+  }
+
+ private:
+  /// A stage is given up after so many directions.
+  static constexpr int DIRECTIONS = 10;
+
+  /// After so many directions, which are enough for smooth stages, what is left are kinks: where
+  /// the force along a step has turned round, to this fraction of what it was, and the solution is
+  /// nearer than so many accuracies or steps go straight to and fro, with this cosine.
+  static constexpr int SMOOTH = 3;
+  static constexpr double OVERSHOT = 0.3, NEAR = 100.0, BACK = 0.95;
+
+  /// A guess with a force above this multiple of the typical one has gone through a collision.
+  static constexpr double COLLISION = 30.0;
+
+  struct Point {
+    Vector x;
+    LandscapeSums sums;
+    Vector gradient;  // of what is minimised
+  };
+
+  struct Correction {
+    Vector step;
+    double size;
+  };
+
+  struct Kink {
+    Vector across, jump;
+    double inverse;
+  };
+
+  Vicinity<Model> &about;
+  const Stage &stage;
+  const StageUnits &units;
+  const StageLimits &limits;
+  Renew renew_pairs;
+  Vector stretch;
+  Factors factors;
+  std::vector<Kink> kinks;
+  int evaluations = 0, factorisations = 0, directions = 0;
+
+  StageEnd end(Point at, bool solved) const
+  {
+    return {std::move(at.x), std::move(at.sums), factors, evaluations,
+            factorisations,  directions,         solved};
+  }
+
+  Point point(Vector x)
+  {
+    const Displacement at{x.data(), stage.strain};
+    if (about.is_beyond(at)) renew_pairs(at);
+    ++evaluations;
+    LandscapeSums sums = about.evaluate(at, stage.extended);
+    Vector gradient =
+        stretch.cwiseProduct(sums.gradient) + stage.drag.cwiseProduct(x - stage.centre);
+    return {std::move(x), std::move(sums), std::move(gradient)};
+  }
+
+  Point begin(const Vector &guess, const Vector &other)
+  {
+    Point first = point(guess);
+    const bool collides = first.gradient.size() > 0 &&
+                          !(first.gradient.cwiseAbs().maxCoeff() <= COLLISION * units.force);
+    return first.sums.crossing >= 0 || collides ? point(other) : first;
+  }
+
+  /// By the factors that there are, unless they leave more than rounding.
+  Correction correction_at(const Point &at)
+  {
+    if (factors) {
+      Correction found = newton(at);
+      if (found.size <= limits.accuracy) return found;
+    }
+    factors = about.factorise({at.x.data(), stage.strain}, stage.drag.data());
+    ++factorisations;
+    return factors ? newton(at) : Correction{};
+  }
+
+  /// Newton's step, by BFGS for the kinks that were found.
+  Correction newton(const Point &at) const
+  {
+    Vector q = -at.gradient;
+    std::vector<double> weights(kinks.size());
+    for (std::size_t k = kinks.size(); k-- > 0;) {
+      weights[k] = kinks[k].inverse * kinks[k].across.dot(q);
+      q -= weights[k] * kinks[k].jump;
+    }
+    q = factors->solve(q);
+    for (std::size_t k = 0; k < kinks.size(); ++k) {
+      q += (weights[k] - kinks[k].inverse * kinks[k].jump.dot(q)) * kinks[k].across;
+    }
+    const double size = units.size(q, -at.gradient, stage.drag);
+    return {std::move(q), size};
+  }
+
+  Vector shortened(const Vector &step) const
+  {
+    return about.part_within(step.data(), limits.longest_step, limits.widest_turn) * step;
+  }
+
+  bool is_past_a_kink(const Point &at, const Point &tried, const Vector &step, const Vector &before,
+                      double size) const
+  {
+    if (directions < SMOOTH) return false;
+    const bool overshot = tried.gradient.dot(step) > -OVERSHOT * at.gradient.dot(step);
+    const bool turns_round = step.dot(before) < -BACK * step.norm() * before.norm();
+    return overshot && (size <= NEAR * limits.accuracy || turns_round);
+  }
+
+  /// Finds a kink by bisection, to a part of the way between two points. The gradient there is the
+  /// mean of its sides' that does not push across: zero where it holds the solution.
+  Point between(Point low, Point high, double width)
+  {
+    const Vector way = high.x - low.x;
+    for (int left = static_cast<int>(std::ceil(std::log2(1.0 / width))); left > 0; --left) {
+      Point middle = point(0.5 * (low.x + high.x));
+      if (middle.sums.is_refused()) return middle;
+      (middle.gradient.dot(way) > 0.0 ? high : low) = std::move(middle);
+    }
+    Kink kink{high.x - low.x, high.gradient - low.gradient, 0.0};
+    const double here = low.gradient.dot(kink.across), there = high.gradient.dot(kink.across);
+    kink.inverse = 1.0 / (there - here);
+    high.gradient = kink.inverse * (there * low.gradient - here * high.gradient);
+    kinks.push_back(std::move(kink));
+    return high;
+  }
+};
+
+}  // namespace jamshape
