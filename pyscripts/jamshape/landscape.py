@@ -389,7 +389,7 @@ class Pairs:
     @property
     def near(self) -> NearPairs:
         """As the functions of `contacts` take them."""
-        return NearPairs(*self.particles.T, self.shift)
+        return NearPairs(self.particles[:, 0], self.particles[:, 1], self.shift)
 
     def outrun_by(self, now: State, turning_radius: FloatArray, kept: float = 0.0) -> bool:
         """Whether two surfaces may have come closer by `skin`, or by what is left of it."""

@@ -122,7 +122,8 @@ class Spherocylinders:
 
     def vicinity(self, coordinates: Coordinates) -> Any:
         """As `Shape.vicinity`."""
-        return _contact.SpherocylinderVicinity(self._diameters, *self._law, *coordinates)
+        k_e, sides = self._law
+        return _contact.SpherocylinderVicinity(self._diameters, k_e, sides, *coordinates)
 
     def turning_axes(self, packing: Packing) -> FloatArray:
         """Two in space: a rod spins freely about its own axis."""
