@@ -155,7 +155,12 @@ def main() -> None:
     draw(rows, options.out / "contact_error.png")
     print(text)
     totals = {key: sum(r[key] for r in rows) for key in ("pairs", "uncertain", "fallbacks")}
-    print(json.dumps({"out": str(options.out), **totals}))
+    curves = []
+    for ratio in AXIS_RATIOS:
+        of = [r for r in rows if r["axis_ratio"] == ratio and r["p"] is not None]
+        curves += [{"name": f"w = {ratio:g}", "seconds": [1e-6 * r["microseconds"] for r in of],
+                    "error": [r["largest_gap"] for r in of]}]  # fmt: skip
+    print(json.dumps({"out": str(options.out), **totals, "curves": curves}))
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parents[1]
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+OVERVIEW, LEAST_DRAWN = "overview.png", 1e-20
 PACKAGES = ("jamshape", "numpy", "scipy", "h5py", "matplotlib")
 
 
@@ -34,6 +35,8 @@ class Study(NamedTuple):
     """Command lines, first those that prepare; they run in the study's folder. Pictures are patterns there."""
 
     title: str
+    error: str
+    """What its curves show: the last JSON line of a script may have `curves` of name, seconds, error."""
     short: list[str]
     full: list[str]
     pictures: list[str]
@@ -55,33 +58,39 @@ STIFF = "analysis/stiff_error.py --n 128 --tolerances 1e-2 3e-3 1e-3 3e-4 --out 
 STUDIES = {
     "heun": Study(
         "Heun's method: the time step",
+        "p, median relative error",
         ["analysis/heun_error.py --n 64 --out ."],
         ["analysis/heun_error.py --out ."],
         ["heun_error.png"],
     ),
     "integrators": Study(
         "Integrators of the fix",
+        "p, median relative error",
         ["analysis/integrator_error.py --quick --out ."],
         ["analysis/integrator_error.py --out ."],
         ["integrator_error.png"],
     ),
     "implicit": Study(
         "The implicit integrator of slow compressions",
+        "p, median relative error",
         ["analysis/stiff_error.py --quick --out ."],
         [
             f"{STIFF} --alpha 4 --phi-from 0.8 --phi-to 0.9 --kappas 1e-6 1e-8",
             f"{STIFF} --alpha 0.01 --phi-from 0.8 --phi-to 0.88 --kappas 1e-6 1e-8",
+            f"{STIFF} --alpha 4 --phi-from 0.8 --phi-to 0.9 --kappas 1e-10 --seconds 600",
         ],
         ["stiff_error_*.png"],
     ),
     "minimisers": Study(
         "Minimisers and energy targets, rods",
+        "largest net force / mean bond force",
         ["analysis/minimiser_error.py --n 48 --seconds 2 --states 1 4 --out ."],
         ["analysis/minimiser_error.py --n 256 --seconds 10 --out ."],
         ["minimisers.png"],
     ),
     "minimisers3d": Study(
         "Minimisers and energy targets, spheroids",
+        "largest net force / mean bond force",
         [
             spheroids(40),
             "analysis/minimiser_error.py --seconds 2 --states spheroids_40.h5 --out .",
@@ -94,12 +103,14 @@ STUDIES = {
     ),
     "contact": Study(
         "Contacts of superellipsoids",
+        "scale, largest bound of its relative error",
         ["analysis/contact_error.py --pairs 1000 --out ."],
         ["analysis/contact_error.py --out ."],
         ["contact_error.png"],
     ),
     "spectra": Study(
         "Spectra of dynamical matrices",
+        "eigenvalues, largest relative error",
         [
             rods(32),
             rods(64),
@@ -137,17 +148,21 @@ def run(name: str, options: argparse.Namespace) -> dict[str, Any]:
             return found
     began, failed = time.perf_counter(), ""
     printed: list[str] = []
+    curves: list[dict[str, Any]] = []
     commands = STUDIES[name].full if options.full else STUDIES[name].short
     for command in commands:
         text, failed = printed_by(command, folder)
         if failed:
             break
-        printed += ["\n".join(text.strip().splitlines()[:-1])]  # all but the JSON line
+        *tables, numbers = text.strip().splitlines()
+        printed += ["\n".join(tables)]
+        curves += json.loads(numbers).get("curves", [])
     found = {
         "full": options.full,
         "commands": [f".venv/bin/python {command}" for command in commands],
         "seconds": time.perf_counter() - began,
         "printed": "\n\n".join(filter(None, printed)),
+        "curves": curves,
         "failed": failed,
     }
     record.write_text(json.dumps(found, indent=1))
@@ -174,6 +189,40 @@ def printed_by(command: str, folder: Path) -> tuple[str, str]:
     return "", f"{command}: {said[-1]}"
 
 
+def draw_curves(axis: Any, curves: list[dict[str, Any]]) -> None:
+    """Draw the curves of one study: 'method, case', a colour for each method."""
+    colours: dict[str, str] = {}
+    for curve in curves:
+        method = curve["name"].partition(",")[0]
+        label = None if method in colours else method
+        colour = colours.setdefault(method, f"C{len(colours)}")
+        error = [max(e, LEAST_DRAWN) for e in curve["error"]]
+        axis.loglog(curve["seconds"], error, ".-", color=colour, lw=0.8, label=label)
+    axis.grid(visible=True, alpha=0.3)
+    axis.legend(fontsize=7)
+
+
+def draw(records: dict[str, dict[str, Any]], path: Path) -> bool:
+    """Draw a panel of error against seconds for each study; whether there is one."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help
+
+    drawn = {name: found["curves"] for name, found in records.items() if found["curves"]}
+    if not drawn:
+        return False
+    columns = min(len(drawn), 4)
+    lines = -(-len(drawn) // columns)
+    figure = Figure(figsize=(4 * columns, 3.4 * lines), dpi=100, layout="constrained")
+    axes = figure.subplots(lines, columns, squeeze=False).ravel()
+    for axis in axes[len(drawn) :]:
+        axis.set_visible(False)
+    for axis, (name, curves) in zip(axes, drawn.items(), strict=False):
+        draw_curves(axis, curves)
+        axis.set_title(STUDIES[name].title, fontsize=9)
+        axis.set(xlabel="run time (s)", ylabel=STUDIES[name].error)
+    figure.savefig(path)
+    return True
+
+
 def page(records: dict[str, dict[str, Any]], out: Path) -> str:
     """Write what was done as Markdown."""
     versions = ", ".join(f"{p} {importlib.metadata.version(p)}" for p in PACKAGES)
@@ -183,6 +232,8 @@ def page(records: dict[str, dict[str, Any]], out: Path) -> str:
         f"{platform.platform()}, {os.cpu_count()} cores, Python {platform.python_version()}; {versions}.",
         "",
     ]
+    if draw(records, out / OVERVIEW):
+        lines += [f"![error against run time of every part]({OVERVIEW})", ""]
     for name, found in records.items():
         lines += [f"## {STUDIES[name].title}", ""]
         lines += [f"    {command}" for command in found["commands"]]

@@ -170,7 +170,13 @@ def main() -> None:
     draw(rows, options.out / "heun_error.png")
     print(text)
     limit = min(r["dt_limit"] for r in rows)
-    print(json.dumps({"out": str(options.out), "dt_limit": limit, "refused": refused}))
+    curves = []
+    for sides, name in ((1, "one"), (2, "two")):
+        of = [r for r in rows if r["sides"] == sides]
+        curves += [{"name": f"sides {name}", "seconds": [r["wall_seconds"] for r in of],
+                    "error": [r["p_median"] for r in of]}]  # fmt: skip
+    found = {"out": str(options.out), "dt_limit": limit, "refused": refused, "curves": curves}
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

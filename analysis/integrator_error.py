@@ -193,6 +193,17 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     plt.close(figure)
 
 
+def curves(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Median errors against seconds, one curve for each integrator and compression."""
+    found: dict[str, dict[str, Any]] = {}
+    for r in rows:
+        name = f"{r['method']}, N = {r['n']}, alpha = {r['alpha']:g}, kappa = {r['kappa']:g}"
+        curve = found.setdefault(name, {"name": name, "seconds": [], "error": []})
+        curve["seconds"].append(r["seconds"])
+        curve["error"].append(r["median"])
+    return list(found.values())
+
+
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(
@@ -218,7 +229,7 @@ def main() -> None:
             (options.out / "integrator_error.md").write_text(text)
             draw(rows, options.out / "integrator_error.png")
     print(text)
-    print(json.dumps({"out": str(options.out), "rows": rows}))
+    print(json.dumps({"out": str(options.out), "rows": rows, "curves": curves(rows)}))
 
 
 if __name__ == "__main__":

@@ -222,7 +222,17 @@ def main(options: argparse.Namespace) -> None:
     results = study(options)
     draw(results, options.out / "minimisers.png")
     print(table(results))
-    print(json.dumps({"out": str(options.out / "minimisers.png"), "n": options.n}))
+    curves = [
+        {
+            "name": f"{method}, {Path(name).stem}",
+            "seconds": row["seconds"],
+            "error": row["residual"],
+        }
+        for name, result in results.items()
+        for method, row in result["minimisers"].items()
+    ]
+    found = {"out": str(options.out / "minimisers.png"), "n": options.n, "curves": curves}
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

@@ -174,6 +174,19 @@ def draw(rows: list[dict[str, Any]], tiles: list[dict[str, Any]], out: Path) -> 
     figure.savefig(out)
 
 
+def curves(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Largest relative errors of each band against seconds, one curve for each method and band."""
+    found: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        for method, of in row["methods"].items():
+            for band, errors_of in of["bands"].items():
+                name = f"{method.replace('_', ' ')}, {band} band"
+                curve = found.setdefault(name, {"name": name, "seconds": [], "error": []})
+                curve["seconds"].append(of["seconds"])
+                curve["error"].append(errors_of["largest"])
+    return list(found.values())
+
+
 def main() -> None:
     """Measure, draw, report."""
     parser = argparse.ArgumentParser(
@@ -189,7 +202,8 @@ def main() -> None:
     tiles = [measure_tiles(options.packings[0], k) for k in options.tiles]
     show(rows, tiles)
     draw(rows, tiles, options.out)
-    print(json.dumps({"out": str(options.out), "packings": rows, "tiles": tiles}))
+    found = {"out": str(options.out), "packings": rows, "tiles": tiles}
+    print(json.dumps(found | {"curves": curves(rows)}))
 
 
 if __name__ == "__main__":

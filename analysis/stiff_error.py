@@ -151,6 +151,17 @@ def draw(runs: list[dict[str, Any]], rows: list[dict[str, Any]], path: Path) -> 
     figure.savefig(path)
 
 
+def curves(rows: list[dict[str, Any]], options: Namespace) -> list[dict[str, Any]]:
+    """Median errors against seconds, one curve for each rate."""
+    found = []
+    for kappa in options.kappas:
+        of = [r for r in rows if r["kappa"] == kappa and math.isfinite(r["p_median"])]
+        found += [{"name": f"kappa = {kappa:g}, alpha = {options.alpha:g}",
+                   "seconds": [r["cpu_seconds"] for r in of],
+                   "error": [r["p_median"] for r in of]}]  # fmt: skip
+    return found
+
+
 def main() -> None:
     """Command line."""
     parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
@@ -182,7 +193,8 @@ def main() -> None:
         (options.out / f"stiff_error_{tag}.md").write_text(text)
     draw(runs, rows, options.out / f"stiff_error_{tag}.png")
     print(text)
-    print(json.dumps({"out": str(options.out), "heun": heun, "rows": rows}))
+    found = {"out": str(options.out), "heun": heun, "rows": rows}
+    print(json.dumps(found | {"curves": curves(rows, options)}))
 
 
 if __name__ == "__main__":

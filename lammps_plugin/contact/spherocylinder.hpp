@@ -80,9 +80,11 @@ struct SpherocylinderLaw {
 /// middle of the overlap of the spines (Marschall & Teitel 2018, Sec. II, taken modulo pi).
 inline constexpr double PARALLEL_SINE = 1e-8;
 
-/// The second bond fades in over this fraction of the shorter half length of spine overlap, and
-/// over this range of |cos| of the angle.
+/// What side-to-side contacts have beside the first bond fades in over this fraction of the shorter
+/// half length of spine overlap, the second bond at least over that fraction of R_i + R_j, and over
+/// this range of |cos| of the angle.
 inline constexpr double FADE_LENGTH = 0.05;
+inline constexpr double FADE_REACH = 0.02;
 inline constexpr double FADE_COSINE_START = 0.5;
 inline constexpr double FADE_COSINE_RANGE = 0.35;
 
@@ -110,28 +112,46 @@ template <class S> struct BondWeights {
   S second_per_cosine, mean_per_cosine;
 };
 
-/// W_b = S(l / (c A_min)) S((|cos| - 0.5) / 0.35) and W_m = S(l / (c A_min)) (1 - S((sin d / (0.1
-/// A_min))^2)), l the spread of the two ends, S the smooth step. Both go to 0 smoothly where the
-/// second bond ends: at spines that just begin to overlap and at large angles, where the rule of
-/// Marschall & Teitel (Fig. 6) jumps.
+/// Spine overlap over which the second bond fades in. The ends of rods move by d times the angle:
+/// over a small part of the half length of nearly round rods the second bond would come and go like
+/// a kink.
+inline double fade_length(double shorter, double reach)
+{
+  return std::clamp(FADE_REACH * reach, FADE_LENGTH * shorter, shorter);
+}
+
+/// The smooth step from 0 to 1 over a length, and its derivative.
+template <class S> struct Fade {
+  S weight, gradient;
+
+  Fade(const S &spread, double length) :
+      weight(smooth_step(spread / length)), gradient(smooth_step_gradient(spread / length) / length)
+  {
+  }
+};
+
+/// W_b = S(l / L) S((|cos| - 0.5) / 0.35) and W_m = S(l / (0.05 A_min)) (1 - S((sin d / (0.1
+/// A_min))^2)), l the spread of the two ends, L the `fade_length`, S the smooth step. Both go to 0
+/// smoothly where the second bond ends: at spines that just begin to overlap and at large angles,
+/// where the rule of Marschall & Teitel (Fig. 6) jumps.
 template <int D, class S>
 BondWeights<S> bond_weights(const SpinePair<D, S> &p, const EndFeet<D, S> &ends, double reach)
 {
   const double shorter = std::min(p.A_i, p.A_j);
   if (shorter == 0.0) return {};
   const S cosine = dot(p.u_i, p.u_j);
-  const S x_length = ends.spread() / (FADE_LENGTH * shorter);
+  const S spread = ends.spread();
+  const Fade<S> second(spread, fade_length(shorter, reach)), mean(spread, FADE_LENGTH * shorter);
   const S x_cosine = (abs(cosine) - FADE_COSINE_START) / FADE_COSINE_RANGE;
   const double sine = DEEP_SINE * shorter / reach;
   const S x_sine = norm_sq(cross(p.u_i, p.u_j)) / (sine * sine);
-  const S by_length = smooth_step(x_length), by_cosine = smooth_step(x_cosine);
+  const S by_cosine = smooth_step(x_cosine);
   const S by_sine = 1.0 - smooth_step(x_sine);
-  const S per_spread = smooth_step_gradient(x_length) / (FADE_LENGTH * shorter);
   const S by_cosine_gradient = copysign(smooth_step_gradient(x_cosine) / FADE_COSINE_RANGE, cosine);
   const S by_sine_gradient = 2.0 * cosine * smooth_step_gradient(x_sine) / (sine * sine);
-  return {by_length * by_cosine,          by_length * by_sine,
-          per_spread * by_cosine,         per_spread * by_sine,
-          by_length * by_cosine_gradient, by_length * by_sine_gradient};
+  return {second.weight * by_cosine,          mean.weight * by_sine,
+          second.gradient * by_cosine,        mean.gradient * by_sine,
+          second.weight * by_cosine_gradient, mean.weight * by_sine_gradient};
 }
 
 /// How much of the two bonds is left at a mean overlap, D = 1 - S(ln y / ln 16) of y = overlap over

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from reference_energy import Approach, fade_length, sine_range
+from reference_energy import Approach, fade_length, mean_fade_length, sine_range
 from spherocylinder_pairs import EPS, cross, energies, turned
 
 # Steps of this many d: short enough to straddle the switch of a clamped foot, where the second
@@ -11,7 +11,7 @@ from spherocylinder_pairs import EPS, cross, energies, turned
 # which removes the error of second order and averages rounding.
 STEP = 7e-8
 MULTIPLES = np.linspace(1.0, 3.0, 9)
-# Of the length over which two bonds fade in.
+# Of the length over which the mean of two bonds fades in.
 STEP_IN_FADE = 1e-4
 
 
@@ -42,7 +42,7 @@ def step_lengths(pairs, sides):
     step = STEP * pairs.d
     if sides == 1:
         return step
-    in_fade = STEP_IN_FADE * fade_length(pairs)
+    in_fade = STEP_IN_FADE * mean_fade_length(pairs)
     return np.where(is_clear_of_fade(pairs), step, np.minimum(step, in_fade))
 
 

@@ -26,6 +26,7 @@ from spherocylinder_pairs import (
     FADE_DEPTH,
     FADE_LENGTH,
     cross,
+    length_of_fade,
     row_dot,
     scaled,
 )
@@ -115,7 +116,12 @@ def shorter_or(pairs, of_discs):
 
 
 def fade_length(pairs):
-    """Spine overlap over which two bonds fade in; none for discs, which have no second."""
+    """Spine overlap over which the second bond fades in; none for discs, which have no second."""
+    return length_of_fade(shorter_or(pairs, np.inf), pairs.d)
+
+
+def mean_fade_length(pairs):
+    """Spine overlap over which the mean of the two bonds fades in, at most that of the second."""
     return FADE_LENGTH * shorter_or(pairs, np.inf)
 
 
@@ -149,8 +155,13 @@ class Approach:
 
     @cached_property
     def by_length(self):
-        """What the step of both weights is taken of."""
+        """What the step of the second bond's weight is taken of."""
         return self.spread / fade_length(self.pairs)
+
+    @cached_property
+    def mean_by_length(self):
+        """What that of the mean bond's weight is."""
+        return self.spread / mean_fade_length(self.pairs)
 
     @cached_property
     def by_cosine(self):
@@ -168,7 +179,7 @@ class Approach:
 
     @cached_property
     def mean_weight(self):
-        return smooth_step(self.by_length) * (1.0 - smooth_step(self.by_sine))
+        return smooth_step(self.mean_by_length) * (1.0 - smooth_step(self.by_sine))
 
     @cached_property
     def overlap(self):
@@ -254,7 +265,7 @@ def branches(pairs, sides):
     columns = [*sliding(x.plus), *sliding(x.minus), np.sign(row_dot(pairs.u_i, pairs.u_j)), inside]
     columns.append(np.where(whole, 0.0, x.plus.exact <= x.minus.exact))
     by_depth = np.log(np.maximum(x.depth, 0.1)) / np.log(FADE_DEPTH)
-    steps = (x.by_length, x.by_cosine, by_depth)
+    steps = (x.by_length, x.mean_by_length, x.by_cosine, by_depth)
     columns += [np.sign(step) + np.sign(step - 1.0) for step in steps]
     columns += [x.by_sine > 1.0, x.overlap > 0.0, x.far_overlap > 0.0]
     return np.column_stack(columns).astype(int)

@@ -18,9 +18,14 @@ APART, TOUCHING, CROSSING = 0, 1, 2
 TIP_TO_TIP, TIP_TO_SIDE, SIDE_TO_SIDE = 0, 1, 2
 
 EPS = np.finfo(float).eps
-FADE_LENGTH, FADE_DEPTH = 0.05, 16.0
+FADE_LENGTH, FADE_REACH, FADE_DEPTH = 0.05, 0.02, 16.0
 FADE_COSINE_START, FADE_COSINE_RANGE = 0.5, 0.35
 DEEP_SINE = 0.1
+
+
+def length_of_fade(shorter, d):
+    """Spine overlap over which the second bond fades in."""
+    return np.clip(FADE_REACH * d, FADE_LENGTH * shorter, shorter)
 
 
 @dataclass
@@ -271,10 +276,10 @@ def parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), fading=False, dept
     """
     shapes = random_shapes(rng, n, alpha)
     overlap = limited_to_depth(shapes, overlap, depth)
-    A_i, A_j = shapes[:2]
+    A_i, A_j, d = shapes[0], shapes[1], shapes[2] + shapes[3]
     u_j = random_directions(rng, n, dimension)
     sign = rng.choice([-1.0, 1.0], n)
-    most = FADE_LENGTH * np.minimum(A_i, A_j) if fading else A_i + A_j
+    most = length_of_fade(np.minimum(A_i, A_j), d) if fading else A_i + A_j
     offset = rng.choice([-1.0, 1.0], n) * (A_i + A_j - most * rng.uniform(1e-3, 0.999, n))
     low, high = np.maximum(offset - A_i, -A_j), np.minimum(offset + A_i, A_j)
     t = 0.5 * (low + high)
@@ -288,8 +293,8 @@ def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), least_tilt=
 
     The far ends are `least_tilt` to 0.9 of the built overlap further apart.
 
-    Half of them have spines that overlap by no more than the length over which the second bond
-    fades in.
+    Half of them have spines that overlap by no more than the length over which the second bond,
+    or the mean of both, fades in.
     """
     shapes = random_shapes(rng, n, alpha)
     overlap = limited_to_depth(shapes, overlap, depth)
@@ -299,7 +304,10 @@ def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), least_tilt=
     towards = rng.choice([-1.0, 1.0], n)  # i's spine leaves its tip along towards * u_j
     fading = np.arange(n) % 4 < 2
     shorter = np.minimum(A_i, A_j)
-    stretch = np.where(fading, 1.2 * FADE_LENGTH * shorter, 2.0 * A_j) * rng.uniform(1e-3, 0.999, n)
+    of_second = np.arange(n) % 4 == 0  # the others fade with the mean of both
+    fade = np.where(of_second, length_of_fade(shorter, d), FADE_LENGTH * shorter)
+    most = np.where(fading, 1.2 * fade, 2.0 * A_j)
+    stretch = most * rng.uniform(1e-3, 0.999, n)
     t = towards * (A_j - stretch)
     common = np.minimum(2.0 * A_i, stretch)
 
@@ -373,7 +381,8 @@ def side_pairs(rng, n, dimension, sides):
         alpha = (0.1, 100.0)
         for m, depth in ((n // 4, 0.999), (n // 8, np.inf)):
             both, half_overlap = parallel(rng, m, dimension, overlaps(rng, m), alpha, depth=depth)
-            whole = 2.0 * half_overlap > 1.001 * FADE_LENGTH * np.minimum(both.A_i, both.A_j)
+            fade = length_of_fade(np.minimum(both.A_i, both.A_j), both.d)
+            whole = 2.0 * half_overlap > 1.001 * fade
             parts.append(both[whole])
         parts += [
             nearly_parallel(rng, n, dimension, overlaps(rng, n), alpha, depth=0.5 * FADE_DEPTH),

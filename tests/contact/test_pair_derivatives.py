@@ -13,11 +13,11 @@ from reference_energy import (
     branches,
     complex_step_gradient,
     fade_length,
+    mean_fade_length,
     sine_range,
 )
 from spherocylinder_pairs import (
     EPS,
-    FADE_LENGTH,
     SIDE_TO_SIDE,
     TIP_TO_SIDE,
     TIP_TO_TIP,
@@ -27,6 +27,7 @@ from spherocylinder_pairs import (
     deep,
     disc_to_disc,
     disc_to_rod,
+    length_of_fade,
     nearly_parallel,
     overlaps,
     parallel,
@@ -82,7 +83,8 @@ def parallel_in_the_plane(rng, dimension):
     """Of all depths; in space the second derivatives by a twist have two sides."""
     assert dimension == 2
     pairs, half = parallel(rng, 2 * N, 2, overlaps(rng, 2 * N, 1e-4), (0.01, 100.0))
-    return pairs[2.0 * half > 1.01 * FADE_LENGTH * np.minimum(pairs.A_i, pairs.A_j)]
+    fade = length_of_fade(np.minimum(pairs.A_i, pairs.A_j), pairs.d)
+    return pairs[2.0 * half > 1.01 * fade]
 
 
 def becoming_one(rng, dimension):
@@ -142,7 +144,7 @@ def steps(packing):
     shorter = np.minimum(pairs.A_i, pairs.A_j)
     length = np.minimum(x.overlap * pairs.d, np.where(shorter > 0.0, shorter, pairs.d))
     fading = (x.by_length > 0.0) & (x.by_length < 1.0)
-    length = np.where(fading, np.minimum(length, fade_length(pairs)), length)
+    length = np.where(fading, np.minimum(length, mean_fade_length(pairs)), length)
     not_two = x.two_bonds < 1.0
     between = not_two & (x.two_bonds > 0.0)
     length = np.where(between, np.minimum(length, shorter**2 / pairs.d), length)
@@ -550,7 +552,7 @@ def exact_poses(dimension):
                     A_i, A_j, d = alpha_i, size * alpha_j, 1.0 + size
                     gap = (1.0 - overlap) * d
                     along = A_i + A_j
-                    edge = along - FADE_LENGTH * min(A_i, A_j)
+                    edge = along - length_of_fade(min(A_i, A_j), d)
                     poses = [(past * x + gap * y, x) for past in (0.0, 0.5 * along, along, edge)]
                     poses += [((along + gap) * x, x), ((A_i + gap) * y, y), ((A_j + gap) * x, y)]
                     r += [pose[0] for pose in poses]

@@ -10,7 +10,6 @@ from spherocylinder_pairs import (
     CROSSING,
     EPS,
     EVERY_CLASS,
-    FADE_LENGTH,
     SIDE_TO_SIDE,
     TIP_TO_SIDE,
     TIP_TO_TIP,
@@ -22,6 +21,7 @@ from spherocylinder_pairs import (
     disc_to_disc,
     disc_to_rod,
     force_scale,
+    length_of_fade,
     log_uniform,
     nearly_parallel,
     overlaps,
@@ -114,7 +114,9 @@ def test_parallel_rods_with_two_bonds_carry_the_same_at_both_ends(dimension, mea
     pairs, half = parallel(rng, 12_000, dimension, overlaps(rng, 12_000, 1e-14), depth=0.999)
     shorter = np.minimum(pairs.A_i, pairs.A_j)
     rounding = EPS * pairs.extent / pairs.d
-    clear = (2.0 * half > 1.001 * FADE_LENGTH * shorter) & (pairs.overlap > 10.0 * rounding)
+    clear = (2.0 * half > 1.001 * length_of_fade(shorter, pairs.d)) & (
+        pairs.overlap > 10.0 * rounding
+    )
     pairs, half, rounding = pairs[clear], half[clear], rounding[clear]
     result = contacts(pairs, 2, K_E)
     assert len(pairs) > 6000

@@ -17,12 +17,12 @@ from reference_energy import (
 from spherocylinder_pairs import (
     DEEP_SINE,
     EPS,
-    FADE_LENGTH,
     SIDE_TO_SIDE,
     TIP_TO_SIDE,
     TOUCHING,
     Pairs,
     contacts,
+    length_of_fade,
     log_uniform,
     overlaps,
     parallel,
@@ -215,7 +215,7 @@ def test_the_same_scan_sees_a_spread_on_one_spine_jump(dimension, measured):
     def one_spine_energy(pairs):
         x = Approach(pairs)
         shorter = np.minimum(pairs.A_i, pairs.A_j)
-        fade = smooth_step(np.abs(x.plus.s - x.minus.s) / (FADE_LENGTH * shorter))
+        fade = smooth_step(np.abs(x.plus.s - x.minus.s) / length_of_fade(shorter, pairs.d))
         second = fade * smooth_step(x.by_cosine)
         _, shallow = library(1)(pairs)
         return one_bond_energy(pairs) + second * repulsive_law(x.far_overlap), shallow
@@ -335,7 +335,7 @@ def side_by_side(rng, n, dimension, overlap, depth):
     A_i, A_j = np.where(i_is_shorter, [shorter, longer], [longer, shorter])
     u_j = random_directions(rng, n, dimension)
     normal = random_perpendicular(rng, u_j)
-    past = (A_i + A_j - 1.01 * FADE_LENGTH * shorter) * rng.uniform(-1.0, 1.0, n)
+    past = (A_i + A_j - 1.01 * length_of_fade(shorter, R_i + R_j)) * rng.uniform(-1.0, 1.0, n)
     u_i = scaled(rng.choice([-1.0, 1.0], n), u_j)
     zero = np.zeros(n)
     pairs = placed((A_i, A_j, R_i, R_j), u_i, u_j, zero, zero, normal, overlap)
@@ -372,7 +372,8 @@ def test_energy_of_parallel_rods_grows_on_approach_and_never_pulls(dimension, me
     start, normal = side_by_side(rng, n, dimension, deepest, np.full(n, 100.0))
     slid = row_dot(start.r, start.u_j)
     whole = start.A_i + start.A_j
-    lengths = FADE_LENGTH * np.minimum(start.A_i, start.A_j) * rng.uniform(0.1, 1.2, n)
+    fade = length_of_fade(np.minimum(start.A_i, start.A_j), start.d)
+    lengths = fade * rng.uniform(0.1, 1.2, n)
     fading = np.arange(n) % 2 == 0
     slide = np.where(fading, np.sign(slid) * (whole - lengths) - slid, 0.0)
     start = start.replaced(r=start.r + scaled(slide, start.u_j))
