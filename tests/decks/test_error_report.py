@@ -31,11 +31,16 @@ def test_a_study_is_run_once_and_its_page_regenerates_it(error_report, tmp_path,
     assert "    .venv/bin/python analysis/contact_error.py --pairs 3 --out ." in page
     assert "| p | w | largest gap |" in page
     assert "numpy" in page
+    assert "](overview.png)" in page
+    curves = json.loads((tmp_path / "contact" / "record.json").read_text())["curves"]
+    assert all(0 < e < 1e-11 for curve in curves for e in curve["error"])
+    assert all(0 < s < 1e-3 for curve in curves for s in curve["seconds"])
     picture = tmp_path / "contact" / "contact_error.png"
     assert f"({picture.relative_to(tmp_path)})" in page
     drawn = picture.stat().st_mtime_ns
     assert error_report.main(options(tmp_path)) == 0
     assert picture.stat().st_mtime_ns == drawn
+    assert (tmp_path / "overview.png").stat().st_size > 5000
     assert error_report.main(options(tmp_path, again=True)) == 0
     assert picture.stat().st_mtime_ns > drawn
 
@@ -48,6 +53,7 @@ def test_a_study_that_fails_does_not_stop_the_others(error_report, tmp_path, cap
     page = (tmp_path / "report.md").read_text()
     assert "**Failed:**" in page
     assert "| p | w |" in page
+    assert "](overview.png)" in page
 
 
 def test_scripts_of_all_studies_exist(monkeypatch):

@@ -37,18 +37,21 @@ def exact(request):
     return _EXACT[request.param]
 
 
-def assert_bounds_hold_and_are_not_loose(found, exact, skip):
+def assert_bounds_hold_and_are_not_loose(found, exact, matrix):
+    """Below a millionth of the eigenvalue, or what doubles make of the prestress; or the error is large."""
     error = errors(found.eigenvalues, exact)
     assert (error <= found.solver_error).all()
-    tight = found.solver_error <= np.maximum(1e4 * error, 1e-6 * np.abs(found.eigenvalues))
-    assert (tight | skip).all()
+    rounding = np.finfo(float).eps * abs(matrix.prestress).max()
+    least = np.maximum(rounding, 1e-6 * np.abs(found.eigenvalues))
+    tight = found.solver_error <= np.maximum(1e4 * error, least)
+    assert (tight | found.is_translation).all()
 
 
 @pytest.mark.parametrize("method", ["projected", "refined"])
 def test_every_eigenvalue_is_within_its_bound(exact, method, measured):
     matrix, values = exact
     found = spectrum(matrix, method)
-    assert_bounds_hold_and_are_not_loose(found, values, found.is_translation)
+    assert_bounds_hold_and_are_not_loose(found, values, matrix)
     size = np.maximum(np.abs(found.eigenvalues), second_order(matrix))
     relative = errors(found.eigenvalues, values) / size
     measured(error=relative[~found.is_translation].max())
