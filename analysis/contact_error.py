@@ -155,11 +155,11 @@ def main() -> None:
     draw(rows, options.out / "contact_error.png")
     print(text)
     totals = {key: sum(r[key] for r in rows) for key in ("pairs", "uncertain", "fallbacks")}
-    curves = []
-    for ratio in AXIS_RATIOS:
-        of = [r for r in rows if r["axis_ratio"] == ratio and r["p"] is not None]
-        curves += [{"name": f"w = {ratio:g}", "seconds": [1e-6 * r["microseconds"] for r in of],
-                    "error": [r["largest_gap"] for r in of]}]  # fmt: skip
+    curves = [
+        {"name": f"w = {r['axis_ratio']:g}, p = {r['p']}", "seconds": [1e-6 * r["microseconds"]],
+         "error": [r["largest_gap"]]}
+        for r in rows
+    ]  # fmt: skip
     print(json.dumps({"out": str(options.out), **totals, "curves": curves}))
 
 

@@ -73,7 +73,10 @@ STUDIES = {
     "implicit": Study(
         "The implicit integrator of slow compressions",
         "p, median relative error",
-        ["analysis/stiff_error.py --quick --out ."],
+        [
+            "analysis/stiff_error.py --n 32 --kappas 1e-6 1e-8 --tolerances 1e-2 3e-3 1e-3 3e-4 1e-4"
+            " --phi-from 0.82 --phi-to 0.87 --seconds 20 --out ."
+        ],
         [
             f"{STIFF} --alpha 4 --phi-from 0.8 --phi-to 0.9 --kappas 1e-6 1e-8",
             f"{STIFF} --alpha 0.01 --phi-from 0.8 --phi-to 0.88 --kappas 1e-6 1e-8",
@@ -191,6 +194,8 @@ def printed_by(command: str, folder: Path) -> tuple[str, str]:
 
 def draw_curves(axis: Any, curves: list[dict[str, Any]]) -> None:
     """Draw the curves of one study: 'method, case', a colour for each method."""
+    from matplotlib.ticker import NullFormatter  # noqa: PLC0415 - not needed for --help
+
     colours: dict[str, str] = {}
     for curve in curves:
         method = curve["name"].partition(",")[0]
@@ -198,6 +203,8 @@ def draw_curves(axis: Any, curves: list[dict[str, Any]]) -> None:
         colour = colours.setdefault(method, f"C{len(colours)}")
         error = [max(e, LEAST_DRAWN) for e in curve["error"]]
         axis.loglog(curve["seconds"], error, ".-", color=colour, lw=0.8, label=label)
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.yaxis.set_minor_formatter(NullFormatter())
     axis.grid(visible=True, alpha=0.3)
     axis.legend(fontsize=7)
 
