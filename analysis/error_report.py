@@ -53,6 +53,9 @@ def spheroids(n: int) -> str:
     return f"pyscripts/make_packing.py {shape} --n {n} --u0 1e-12 --out spheroids_{n}.h5"
 
 
+SHORT_STIFF = (
+    "analysis/stiff_error.py --n 32 --kappas 1e-6 1e-8 --tolerances 1e-2 3e-3 1e-3 3e-4 1e-4"
+)
 STIFF = "analysis/stiff_error.py --n 128 --tolerances 1e-2 3e-3 1e-3 3e-4 --out ."
 
 STUDIES = {
@@ -74,8 +77,7 @@ STUDIES = {
         "The implicit integrator of slow compressions",
         "p, median relative error",
         [
-            "analysis/stiff_error.py --n 32 --kappas 1e-6 1e-8 --tolerances 1e-2 3e-3 1e-3 3e-4 1e-4"
-            " --phi-from 0.82 --phi-to 0.87 --seconds 20 --out ."
+            f"{SHORT_STIFF} --phi-from 0.82 --phi-to 0.87 --seconds 20 --out .",
         ],
         [
             f"{STIFF} --alpha 4 --phi-from 0.8 --phi-to 0.9 --kappas 1e-6 1e-8",
