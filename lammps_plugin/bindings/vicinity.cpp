@@ -241,6 +241,12 @@ template <class Model> auto export_methods(nb::class_<Vicinity<Model>> class_)
           "None where the pairs no longer hold, or energy, gradient (n,), derivative by the\n"
           "strain, sum of the magnitudes of bond forces, number of bonds, and a pair that crosses\n"
           "and one that is unconverged, or -1.")
+      .def(
+          "stretch",
+          [](const Vicinity<Model> &of, double strain) {
+            return array_of(of.stretch(strain).data(), of.n());
+          },
+          "strain"_a, "(n,) 1 + strain for displacements, 1 for rotations.")
       .def("factorise", &factorise<Model>, "x"_a, "strain"_a, "diagonal"_a,
            "SymmetricFactors of the Hessian by these coordinates plus a diagonal (n,), shifted if\n"
            "it is not positive definite.")

@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <Eigen/Core>
 #include <memory>
-#include <optional>
 #include <vector>
 
 namespace jamshape {

@@ -172,6 +172,7 @@ class _Vicinity:
     def evaluate(
         self, x: NDArray[np.float64], strain: float, extended: bool
     ) -> tuple[float, NDArray[np.float64], float, float, int, int, int] | None: ...
+    def stretch(self, strain: float) -> NDArray[np.float64]: ...
     def factorise(
         self,
         x: NDArray[np.float64],

@@ -159,11 +159,6 @@ class Landscape:
         return 2 * float(self.inner_radius.min())
 
     @cached_property
-    def shortest_lever(self) -> float:
-        """The smallest of `rotation_length` where there is one, else infinite."""
-        return float(self.rotation_length[self.rotation_length > 0].min(initial=np.inf))
-
-    @cached_property
     def _free(self) -> NDArray[np.bool_]:
         """(N, D + rotations) which components are coordinates."""
         D = self.particles.dimension
@@ -198,11 +193,6 @@ class Landscape:
     def coordinates(self, components: FloatArray) -> FloatArray:
         """Gather an (n,) vector from (N, D + rotations), as `components` spreads it."""
         return components[self._free]
-
-    @cached_property
-    def is_rotation(self) -> NDArray[np.bool_]:
-        """(n,) whether a coordinate is a rotation."""
-        return np.nonzero(self._free)[1] >= self.particles.dimension
 
     def particle_of_coordinate(self) -> IntArray:
         """(n,) the particle that each coordinate belongs to."""

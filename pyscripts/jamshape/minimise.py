@@ -288,9 +288,6 @@ def _newton(descent: Descent) -> Outcome:
 def limited(landscape: Landscape, step: FloatArray) -> FloatArray:
     """Shorten a step that moves or turns a particle too far."""
     longest = LONGEST_STEP * 0.5 * landscape.length
-    largest = float(np.abs(step).max(initial=0.0))
-    if 2 * largest < longest and largest < WIDEST_TURN * landscape.shortest_lever:
-        return step  # most are, and this is all that needs to be known
     shift, turn = landscape.motion(step)
     excess = max(
         np.sqrt((shift**2).sum(axis=1)).max() / longest, np.abs(turn).max() / WIDEST_TURN, 1.0

@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from jamshape import _contact
 from jamshape.landscape import Evaluation, Landscape, Pairs, State
 from jamshape.minimise import LONGEST_STEP, WIDEST_TURN
@@ -133,7 +131,8 @@ class Vicinity:
 
     def stretch(self, strain: float) -> FloatArray:
         """(n,) 1 + strain for displacements, 1 for rotations."""
-        return np.where(self.landscape.is_rotation, 1.0, 1.0 + strain)
+        found: FloatArray = self._compiled.stretch(strain)
+        return found
 
     @property
     def _longest_step(self) -> float:

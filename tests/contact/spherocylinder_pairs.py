@@ -304,7 +304,7 @@ def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), least_tilt=
     towards = rng.choice([-1.0, 1.0], n)  # i's spine leaves its tip along towards * u_j
     fading = np.arange(n) % 4 < 2
     shorter = np.minimum(A_i, A_j)
-    of_second = np.arange(n) % 4 == 0  # the others fade with the mean of both
+    of_second = np.arange(n) % 8 == 0  # the others fade with the mean of both
     fade = np.where(of_second, length_of_fade(shorter, d), FADE_LENGTH * shorter)
     most = np.where(fading, 1.2 * fade, 2.0 * A_j)
     stretch = most * rng.uniform(1e-3, 0.999, n)

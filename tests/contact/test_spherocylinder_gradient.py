@@ -109,7 +109,7 @@ def test_bonds_that_fade_and_bonds_that_are_one_are_among_the_pairs(dimension):
     for least, among in (
         (2000, is_between(x.by_length) & ~not_two),
         (2000, is_between(x.mean_by_length) & not_two),
-        (1900, is_between(x.by_cosine)),
+        (2000, is_between(x.by_cosine)),
         (2000, is_between(x.by_sine) & not_two),
         (1000, is_between(x.two_bonds) & (x.mean_weight > 0.0)),
         (1000, is_between(x.two_bonds) & (x.mean_weight == 0.0)),

@@ -41,7 +41,7 @@ def reference(packing, kappa, phi_end):
     drag = drag_coefficients(landscape)
 
     def stretch_of(strain):
-        return np.where(landscape.is_rotation, 1.0, 1.0 + strain)
+        return 1.0 + landscape.coordinates(np.tile([strain, strain, 0.0], (packing.n, 1)))
 
     def velocity(t, x):
         strain = np.expm1(-kappa * t)

@@ -38,7 +38,7 @@ def test_energy_and_gradient_are_those_of_the_landscape(packing, extended):
 def test_factors_are_those_of_the_hessian_of_the_landscape(packing):
     vicinity, x, state = about(packing)
     landscape = vicinity.landscape
-    stretch = np.where(landscape.is_rotation, 1.0, 1.0 + STRAIN)
+    stretch = 1.0 + landscape.coordinates(np.tile([STRAIN, STRAIN, 0.0], (packing.n, 1)))
     hessian = stretch[:, None] * landscape.curvature(state).hessian.toarray() * stretch
     diagonal = 1.0 + np.arange(landscape.size) / landscape.size - hessian.diagonal().min()
     right = np.random.default_rng(4).normal(size=landscape.size)
