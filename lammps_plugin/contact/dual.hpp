@@ -73,6 +73,12 @@ template <int N, class S = double> struct Dual {
     return a.chain(root, 1 / (2 * root));
   }
   friend Dual log(const Dual &a) { return a.chain(std::log(a.value), 1 / a.value); }
+  friend Dual log1p(const Dual &a) { return a.chain(std::log1p(a.value), 1 / (1 + a.value)); }
+  friend Dual expm1(const Dual &a)
+  {
+    const S grown = std::expm1(a.value);
+    return a.chain(grown, 1 + grown);
+  }
   /// Of a base that is not negative, to a constant power that is at least 1.
   friend Dual pow(const Dual &a, const S &exponent)
   {

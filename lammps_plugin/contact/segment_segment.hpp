@@ -38,6 +38,11 @@ template <int D, class S = double> struct Feet {
   S distance_sq;
 };
 
+template <int D, class S> Feet<D, ValueOf<S>> values_of(const Feet<D, S> &f)
+{
+  return {value_of(f.s), value_of(f.t), values_of(f.delta), value_of(f.distance_sq)};
+}
+
 template <int D, class S> Feet<D, S> feet_at(const SpinePair<D, S> &p, const S &s, const S &t)
 {
   const Vec<D, S> delta = p.r + s * p.u_i - t * p.u_j;
@@ -149,10 +154,8 @@ template <int D, class S> struct EndFeet {
   const Feet<D, S> &nearer() const { return minus_is_nearer ? minus : plus; }
   const Feet<D, S> &farther() const { return minus_is_nearer ? plus : minus; }
 
-  /// Distance between the two ends, the mean over both spines. The mean, not the value on one
-  /// spine: it does not change when i and j are exchanged, nor when the nearer tip of an end
-  /// changes.
-  S spread() const { return 0.5 * (abs(plus.s - minus.s) + abs(plus.t - minus.t)); }
+  /// Whether the two ends are different points.
+  bool are_apart() const { return plus.s != minus.s || plus.t != minus.t; }
 
   /// The middle between the two ends, on both spines.
   Feet<D, S> middle(const SpinePair<D, S> &p) const

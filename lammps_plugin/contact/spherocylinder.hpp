@@ -4,7 +4,7 @@
 #include "contact/harmonic.hpp"
 #include "contact/rotation.hpp"
 #include "contact/segment_segment.hpp"
-#include "contact/smooth_step.hpp"
+#include "contact/side_to_side.hpp"
 #include "contact/vec.hpp"
 
 #include <algorithm>
@@ -80,21 +80,6 @@ struct SpherocylinderLaw {
 /// middle of the overlap of the spines (Marschall & Teitel 2018, Sec. II, taken modulo pi).
 inline constexpr double PARALLEL_SINE = 1e-8;
 
-/// What side-to-side contacts have beside the first bond fades in over this fraction of the shorter
-/// half length of spine overlap, the second bond at least over that fraction of R_i + R_j, and over
-/// this range of |cos| of the angle.
-inline constexpr double FADE_LENGTH = 0.05;
-inline constexpr double FADE_REACH = 0.02;
-inline constexpr double FADE_COSINE_START = 0.5;
-inline constexpr double FADE_COSINE_RANGE = 0.35;
-
-/// Two bonds become one while their mean overlap (as a length) grows from A_min^2 / d to DEEP times
-/// that; the one is then free of a kink for rods that are parallel to this sine, in units of A_min
-/// / d. At larger angles the feet of the two ends, moving by d sin, are too far from where the ends
-/// are.
-inline constexpr double DEEP = 16.0;
-inline constexpr double DEEP_SINE = 0.1;
-
 /// Feet closer than this times R_i + R_j are one point: no direction is left to push along.
 inline constexpr double COINCIDENT = 1e-14;
 
@@ -104,73 +89,6 @@ SpinePair<D, S> spine_pair(const SpherocylinderBody<D, S> &i, const Spherocylind
   return {i.centre - j.centre, i.axis, i.half_length, j.axis, j.half_length};
 }
 
-/// Weights of the second bond and of the mean bond, with their derivatives by the spread of the two
-/// ends and by u_i.u_j.
-template <class S> struct BondWeights {
-  S second, mean;
-  S second_per_spread, mean_per_spread;
-  S second_per_cosine, mean_per_cosine;
-};
-
-/// Spine overlap over which the second bond fades in. The ends of rods move by d times the angle:
-/// over a small part of the half length of nearly round rods the second bond would come and go like
-/// a kink.
-inline double fade_length(double shorter, double reach)
-{
-  return std::clamp(FADE_REACH * reach, FADE_LENGTH * shorter, shorter);
-}
-
-/// The smooth step from 0 to 1 over a length, and its derivative.
-template <class S> struct Fade {
-  S weight, gradient;
-
-  Fade(const S &spread, double length) :
-      weight(smooth_step(spread / length)), gradient(smooth_step_gradient(spread / length) / length)
-  {
-  }
-};
-
-/// W_b = S(l / L) S((|cos| - 0.5) / 0.35) and W_m = S(l / (0.05 A_min)) (1 - S((sin d / (0.1
-/// A_min))^2)), l the spread of the two ends, L the `fade_length`, S the smooth step. Both go to 0
-/// smoothly where the second bond ends: at spines that just begin to overlap and at large angles,
-/// where the rule of Marschall & Teitel (Fig. 6) jumps.
-template <int D, class S>
-BondWeights<S> bond_weights(const SpinePair<D, S> &p, const EndFeet<D, S> &ends, double reach)
-{
-  const double shorter = std::min(p.A_i, p.A_j);
-  if (shorter == 0.0) return {};
-  const S cosine = dot(p.u_i, p.u_j);
-  const S spread = ends.spread();
-  const Fade<S> second(spread, fade_length(shorter, reach)), mean(spread, FADE_LENGTH * shorter);
-  const S x_cosine = (abs(cosine) - FADE_COSINE_START) / FADE_COSINE_RANGE;
-  const double sine = DEEP_SINE * shorter / reach;
-  const S x_sine = norm_sq(cross(p.u_i, p.u_j)) / (sine * sine);
-  const S by_cosine = smooth_step(x_cosine);
-  const S by_sine = 1.0 - smooth_step(x_sine);
-  const S by_cosine_gradient = copysign(smooth_step_gradient(x_cosine) / FADE_COSINE_RANGE, cosine);
-  const S by_sine_gradient = 2.0 * cosine * smooth_step_gradient(x_sine) / (sine * sine);
-  return {second.weight * by_cosine,          mean.weight * by_sine,
-          second.gradient * by_cosine,        mean.gradient * by_sine,
-          second.weight * by_cosine_gradient, mean.weight * by_sine_gradient};
-}
-
-/// How much of the two bonds is left at a mean overlap, D = 1 - S(ln y / ln 16) of y = overlap over
-/// (A_min / d)^2, and its derivative.
-template <class S> struct Depth {
-  S two_bonds;
-  S gradient;
-};
-
-template <int D, class S>
-Depth<S> depth_at(const S &mean_overlap, const SpinePair<D, S> &p, double reach)
-{
-  const double shorter = std::min(p.A_i, p.A_j);
-  const S y = mean_overlap * reach * reach / (shorter * shorter);
-  if (y <= 1.0) return {1.0, 0.0};
-  const S x = log(y) / log(DEEP);
-  return {1.0 - smooth_step(x), -smooth_step_gradient(x) / (log(DEEP) * mean_overlap)};
-}
-
 /// Gradient of an energy of the pair with respect to r and to rotations of i and j.
 template <int D, class S> struct PairGradient {
   Vec<D, S> r;
@@ -178,32 +96,24 @@ template <int D, class S> struct PairGradient {
   Torque<D, S> rotation_j;
 };
 
-/// From the derivatives by the spread of the two ends and by u_i.u_j.
+/// Adds what a weight does, from the energy's derivative by it.
 template <int D, class S>
-PairGradient<D, S> gradient_through(const SpinePair<D, S> &p, const EndFeet<D, S> &ends,
-                                    const S &per_spread, const S &per_cosine)
+void add_through(PairGradient<D, S> &gradient, const SpinePair<D, S> &p,
+                 const BondWeight<D, S> &weight, const S &per_weight)
 {
-  PairGradient<D, S> gradient{};
-  const S sign_s = copysign(S(0.5), ends.plus.s - ends.minus.s) * per_spread;
-  const S sign_t = copysign(S(0.5), ends.plus.t - ends.minus.t) * per_spread;
-  const auto add_foot = [&](const Feet<D, S> &feet, const S &per_s, const S &per_t) {
-    if (abs(feet.s) < p.A_i) {  // s = u_i.(t u_j - r) slides; at a tip it is fixed
-      gradient.r -= per_s * p.u_i;
-      gradient.rotation_i += per_s * cross(p.u_i, feet.t * p.u_j - p.r);
-      gradient.rotation_j += (per_s * feet.t) * cross(p.u_j, p.u_i);
-    } else if (abs(feet.t) < p.A_j) {  // t = u_j.(r + s u_i)
-      gradient.r += per_t * p.u_j;
-      gradient.rotation_j += per_t * cross(p.u_j, p.r + feet.s * p.u_i);
-      gradient.rotation_i += (per_t * feet.s) * cross(p.u_i, p.u_j);
-    }
-  };
-  add_foot(ends.plus, sign_s, sign_t);
-  add_foot(ends.minus, -sign_s, -sign_t);
-
+  const S per_part = per_weight * weight.per_part, per_cosine = per_weight * weight.per_cosine;
+  for (int k = 0; k < 2 && per_part != 0.0; ++k) {
+    const double sign = k == 0 ? 1.0 : -1.0;
+    const Vec<D, S> tip_i = (sign * p.A_i) * p.u_i, tip_j = (sign * p.A_j) * p.u_j;
+    const S per_i = per_part * weight.opposite.per_foot_on_i[k];  // of u_i.(tip_j - r)
+    const S per_j = per_part * weight.opposite.per_foot_on_j[k];  // of u_j.(tip_i + r)
+    gradient.r += per_j * p.u_j - per_i * p.u_i;
+    gradient.rotation_i += per_i * cross(p.u_i, tip_j - p.r) + per_j * cross(tip_i, p.u_j);
+    gradient.rotation_j += per_j * cross(p.u_j, tip_i + p.r) + per_i * cross(tip_j, p.u_i);
+  }
   const Torque<D, S> turn = per_cosine * cross(p.u_i, p.u_j);
   gradient.rotation_i += turn;
   gradient.rotation_j -= turn;
-  return gradient;
 }
 
 /// Class of a contact with one bond. Two feet inside the flat parts happen only for skew rods in
@@ -218,18 +128,20 @@ template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Fe
 /// Contact of two spherocylinders in 2D or 3D. With overlaps a of the shortest distance of the
 /// spines and b of the far end of the overlap of the spines, E the harmonic law, m = (a + b) / 2:
 ///     Sides::ONE  V = E(a)                     (Marschall & Teitel 2018, Eqs. 3, 5, 22)
-///     Sides::TWO  V = E(a) + W_b D E(b) + W_m (1 - D) (E(m) - E(a))
-/// In the second, W_b and W_m are `bond_weights`, D the `depth_at` m. Overlaps below (A_min / d)^2
-/// have D = 1: the paper's two bonds (Fig. 6), without the jumps of its rule. Particles that are
-/// nearly round for their overlap have D = 0: their two bonds are one contact, which a fading
-/// second bond would push aside harder than the contact pushes; E(m) leaves of it the one bond
-/// without its kink for parallel rods.
+///     Sides::TWO  V = E(a) + D F(a, b, W_b) + W_m (1 - D) (E(m) - E(a))
+/// In the second, W_b and W_m are `second_weight` and `mean_weight`, D is of the `Depth` of m, F
+/// the `SecondBond`, E(b) where W_b = 1. Overlaps far below (A_min / d)^2 have D = 1, F = W_b E(b):
+/// the paper's two bonds (Fig. 6), without the jumps of its rule. Particles that are nearly round
+/// for their overlap have D = 0: their two bonds are one contact, which a fading second bond would
+/// push aside harder than the contact pushes; E(m) leaves of it the one bond without its kink for
+/// parallel rods.
 ///
 /// Force and torques are its exact derivatives. What is left are kinks: where the nearer tip of the
 /// far end changes, of relative size of the angle between the rods; where the two bonds change
-/// places while the weights are below 1, of size 1 - W; and in 3D, for twisted rods, of full
-/// strength. Exactly parallel rods with Sides::ONE sit on such a kink: the lever arm is the middle
-/// of the overlap of the spines, which lies between both sides' and is the same for i, j exchanged.
+/// places while W_b is below 1, of size 1 - W_b for small overlaps, over at most A_min / 20; and in
+/// 3D, for twisted rods, of full strength. Exactly parallel rods with Sides::ONE sit on such a
+/// kink: the lever arm is the middle of the overlap of the spines, which lies between both sides'
+/// and is the same for i, j exchanged.
 template <int D, class S> class SpherocylinderContact {
  public:
   SpherocylinderContact(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j,
@@ -295,7 +207,7 @@ template <int D, class S> class SpherocylinderContact {
     const S distance = sqrt(closest.distance_sq);
     if (abs_sine(pair) < PARALLEL_SINE) {
       const EndFeet<D, S> ends(pair);
-      if (ends.spread() > 0.0) {
+      if (ends.are_apart()) {
         contact.kind = ContactKind::SIDE_TO_SIDE;
         // The energy stays that of the shortest distance, so that it does not jump at
         // PARALLEL_SINE.
@@ -317,13 +229,18 @@ template <int D, class S> class SpherocylinderContact {
     const Feet<D, S> &far_end = ends.farther();
     const S distance = sqrt(closest.distance_sq), a = overlap_at(distance);
     const double shorter = std::min(pair.A_i, pair.A_j);
-    if (touches(far_end.distance_sq) || 0.5 * a * reach * reach > shorter * shorter) {
-      const BondWeights<S> weights = bond_weights(pair, ends, reach);
-      const S far_distance = sqrt(far_end.distance_sq), b = overlap_at(far_distance);
-      const Depth<S> depth = depth_at(0.5 * (a + b), pair, reach);
-      const bool has_second = weights.second > 0.0 && depth.two_bonds > 0.0 && b > 0.0;
-      if (has_second || (weights.mean > 0.0 && depth.two_bonds < 1.0)) {
-        return side_to_side(ends, closest, weights, depth);
+    const bool may_be_deep = 0.5 * a * reach * reach > shorter * shorter;
+    if (shorter > 0.0 && (touches(far_end.distance_sq) || may_be_deep)) {
+      // Most have two whole bonds, or one: that is seen without derivatives.
+      const SideToSide<D, ValueOf<S>> side(values_of(pair), values_of(closest), values_of(far_end),
+                                           reach);
+      if (side.has_two_whole_bonds()) return two_whole_bonds(closest, far_end);
+      if (side.has_second() || side.has_mean()) {
+        if constexpr (std::is_same_v<S, ValueOf<S>>) {
+          return side_to_side(closest, far_end, side);
+        } else {
+          return side_to_side(closest, far_end, {pair, closest, far_end, reach});
+        }
       }
     }
     Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
@@ -332,39 +249,44 @@ template <int D, class S> class SpherocylinderContact {
     return contact;
   }
 
-  Contact<D, S> side_to_side(const EndFeet<D, S> &ends, const Feet<D, S> &closest,
-                             const BondWeights<S> &weights, const Depth<S> &depth) const
+  Contact<D, S> two_whole_bonds(const Feet<D, S> &closest, const Feet<D, S> &far_end) const
   {
-    const Harmonic &law_of = law.harmonic;
-    const S distance = sqrt(closest.distance_sq), far_distance = sqrt(ends.farther().distance_sq);
-    const S a = overlap_at(distance), b = overlap_at(far_distance), mean = 0.5 * (a + b);
-    const S E_b = b > 0.0 ? law_of.energy(b) : S(0.0);
-    // E(m) - E(a) from the difference of the feet, since the overlaps differ by less than they
-    // round.
-    const Feet<D, S> &far_end = ends.farther();
-    const Vec<D, S> step = (far_end.s - closest.s) * pair.u_i - (far_end.t - closest.t) * pair.u_j;
-    const S drop =
-        0.5 * inverse_reach * dot(step, far_end.delta + closest.delta) / (far_distance + distance);
-    const S excess = -drop * law_of.energy_gradient(a - 0.5 * drop), deep = 1.0 - depth.two_bonds;
-    const S by_mean = weights.mean * deep;
-    const S slope =  // by a and by b alike, through their mean
-        0.5 * (depth.gradient * (weights.second * E_b - weights.mean * excess) +
-               by_mean * law_of.energy_gradient(mean));
+    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
+    contact.kind = ContactKind::SIDE_TO_SIDE;
+    add_bond(contact, closest, sqrt(closest.distance_sq), whole());
+    add_bond(contact, far_end, sqrt(far_end.distance_sq), whole());
+    return contact;
+  }
+
+  Contact<D, S> side_to_side(const Feet<D, S> &closest, const Feet<D, S> &far_end,
+                             const SideToSide<D, S> &side) const
+  {
+    const auto &[overlap, depth, weight, mean_weight] = side;
+    const Harmonic &harmonic = law.harmonic;
+    const S excess =  // E(m) - E(a)
+        -overlap.drop * harmonic.energy_gradient(overlap.a - 0.5 * overlap.drop);
+    const S two_bonds = depth.two_bonds, deep = 1.0 - two_bonds, by_mean = mean_weight.value * deep;
+    const SecondBond<S> second = side.has_second()
+                                     ? SecondBond<S>(harmonic, overlap, weight.value, depth.wide)
+                                     : SecondBond<S>();
+    const S per_length = second.by_weight * weight.per_length * side.fade_length_per_wide(pair);
+    const S through_mean =  // by a and by b alike
+        0.5 * (depth.two_bonds_gradient * (second.energy - mean_weight.value * excess) +
+               two_bonds * (per_length + second.by_wide) * depth.wide_gradient +
+               by_mean * harmonic.energy_gradient(overlap.mean));
 
     Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
-    add_bond(contact, closest, distance, {1.0 - by_mean, 0.0, slope, 0.5 * by_mean});
-    const S second = b > 0.0 ? weights.second * depth.two_bonds : S(0.0);
-    add_bond(contact, ends.farther(), far_distance,
-             {second, by_mean * law_of.energy(mean), slope, 0.5 * by_mean});
+    add_bond(contact, closest, sqrt(closest.distance_sq),
+             {1.0 - by_mean, 0.0, through_mean + two_bonds * second.rest_by_a, 0.5 * by_mean});
+    add_bond(contact, far_end, sqrt(far_end.distance_sq),
+             {side.has_second() ? two_bonds * weight.value : S(0.0),
+              by_mean * harmonic.energy(overlap.mean) + two_bonds * second.rest,
+              through_mean + two_bonds * second.rest_by_b, 0.5 * by_mean});
 
-    const S per_second = depth.two_bonds * E_b, per_mean = deep * excess;
-    const S per_spread =
-        per_second * weights.second_per_spread + per_mean * weights.mean_per_spread;
-    const S per_cosine =
-        per_second * weights.second_per_cosine + per_mean * weights.mean_per_cosine;
-    if (per_spread == 0.0 && per_cosine == 0.0) return contact;
-    const PairGradient<D, S> fading = gradient_through(pair, ends, per_spread, per_cosine);
+    PairGradient<D, S> fading{};
+    add_through(fading, pair, weight, two_bonds * second.by_weight);
+    add_through(fading, pair, mean_weight, deep * excess);
     contact.force -= fading.r;
     contact.bond[1].force -= fading.r;
     contact.torque_i -= fading.rotation_i;

@@ -21,16 +21,18 @@ from typing import NamedTuple
 import numpy as np
 from spherocylinder_pairs import (
     DEEP_SINE,
+    FADE_CORNER,
     FADE_COSINE_RANGE,
     FADE_COSINE_START,
     FADE_DEPTH,
     FADE_LENGTH,
+    SHALLOW,
     cross,
-    length_of_fade,
     row_dot,
     scaled,
 )
 
+LEAST_WEIGHT = 1e-12
 IMAGINARY_STEP = 1e-30
 
 
@@ -116,13 +118,42 @@ def shorter_or(pairs, of_discs):
 
 
 def fade_length(pairs):
-    """Spine overlap over which the second bond fades in; none for discs, which have no second."""
-    return length_of_fade(shorter_or(pairs, np.inf), pairs.d)
+    """Spine overlap over which the second bond fades in."""
+    return Approach(pairs).fade_length.real
 
 
 def mean_fade_length(pairs):
     """Spine overlap over which the mean of the two bonds fades in, at most that of the second."""
     return FADE_LENGTH * shorter_or(pairs, np.inf)
+
+
+def softly_limited(x, bound, length):
+    """x that slows down over a length before the bounds, and ends half of it inside them."""
+    outside = np.abs(x.real) > bound
+    inside = np.where(outside, bound, absolute(x))
+    into = inside - bound + length
+    y = np.where(into.real > 0.0, into, 0.0) / length
+    return np.where(x.real < 0.0, -1.0, 1.0) * (inside - length * (y**3 - 0.5 * y**4))
+
+
+def feet_of_tips(pairs):
+    """On the line of the other spine, with half of the tip's sign and that spine's half length."""
+    sign = np.where(row_dot(pairs.u_i, pairs.u_j).real < 0.0, -0.5, 0.5)
+    for e in (1.0, -1.0):
+        tip_i, tip_j = scaled(e * pairs.A_i, pairs.u_i), scaled(e * pairs.A_j, pairs.u_j)
+        yield e * sign, row_dot(pairs.u_i, tip_j - pairs.r), pairs.A_i
+        yield e * sign, row_dot(pairs.u_j, pairs.r + tip_i), pairs.A_j
+
+
+def opposite_parts(pairs, length):
+    """Of either spine what lies between the feet of the other's tips, the mean over both.
+
+    Feet slow down over a length before they stop at a tip.
+    """
+    total = 0.0
+    for sign, foot_at, bound in feet_of_tips(pairs):
+        total = total + sign * softly_limited(foot_at, bound, length)
+    return np.where(np.minimum(pairs.A_i, pairs.A_j) > 0.0, total, 0.0)
 
 
 def sine_range(pairs):
@@ -148,20 +179,31 @@ class Approach:
         return Foot(*(np.where(nearer, y, x) for x, y in zip(self.plus, self.minus, strict=True)))
 
     @cached_property
-    def spread(self):
-        """Distance between the two bonds along the spines, the mean over both."""
+    def apart(self):
+        """Distance between the two ends, the mean over both spines."""
         plus, minus = self.plus, self.minus
         return 0.5 * (absolute(plus.s - minus.s) + absolute(plus.t - minus.t))
 
     @cached_property
+    def wide(self):
+        """B, how far the second bond fades in over all of A_min instead of a small part."""
+        y = np.where(self.depth.real > SHALLOW, self.depth, SHALLOW)
+        return smooth_step(1.0 - np.log(y) / np.log(SHALLOW))
+
+    @cached_property
+    def fade_length(self):
+        return shorter_or(self.pairs, 1.0) * (FADE_LENGTH + (1.0 - FADE_LENGTH) * self.wide)
+
+    @cached_property
     def by_length(self):
         """What the step of the second bond's weight is taken of."""
-        return self.spread / fade_length(self.pairs)
+        return opposite_parts(self.pairs, FADE_CORNER * self.fade_length) / self.fade_length
 
     @cached_property
     def mean_by_length(self):
         """What that of the mean bond's weight is."""
-        return self.spread / mean_fade_length(self.pairs)
+        length = FADE_LENGTH * shorter_or(self.pairs, 1.0)
+        return opposite_parts(self.pairs, FADE_CORNER * length) / length
 
     @cached_property
     def by_cosine(self):
@@ -208,10 +250,26 @@ class Approach:
         return mean / (shorter_or(self.pairs, np.inf) / self.pairs.d) ** 2
 
     @cached_property
+    def second_energy(self):
+        """F = W E(a) (b / a)^(2 + B (1 / W - 1))."""
+        a, b, W = self.overlap, self.far_overlap, self.second_weight
+        has = (b.real > 0.0) & (W.real > LEAST_WEIGHT)
+        a, b, W = np.where(has, a, 1.0), np.where(has, b, 1.0), np.where(has, W, 1.0)
+        ratio = b / a
+        nearly_one = np.where(has & (ratio.real > 0.5), self.drop / a, 0.0)
+        log_ratio = np.where(ratio.real > 0.5, log_of_1_less(nearly_one), np.log(ratio))
+        return np.where(has, W * law(b) * np.exp(self.wide * (1.0 / W - 1.0) * log_ratio), 0.0)
+
+    @cached_property
     def two_bonds(self):
         """D, how much of the two bonds is left."""
         y = np.where(self.depth.real > 1.0, self.depth, 1.0)
         return 1.0 - smooth_step(np.log(y) / np.log(FADE_DEPTH))
+
+
+def log_of_1_less(x):
+    """NumPy's own has lost the digits of a small complex x."""
+    return np.log1p(-x.real) - (x - x.real) / (1.0 - x.real)
 
 
 def overlap_of(square, d):
@@ -232,16 +290,15 @@ def one_bond_energy(pairs):
 
 def two_bond_energy(pairs):
     x = Approach(pairs)
-    a, b, D = x.overlap, x.far_overlap, x.two_bonds
+    a, D = x.overlap, x.two_bonds
     excess = -0.5 * x.drop * (a - 0.25 * x.drop)  # E(m) - E(a)
-    second = x.second_weight * D * repulsive_law(b)
-    return repulsive_law(a) + second + x.mean_weight * (1.0 - D) * excess
+    return repulsive_law(a) + D * x.second_energy + x.mean_weight * (1.0 - D) * excess
 
 
 def printed_two_bond_energy(pairs):
     """The rule as printed: both ends of the overlap of the spines counted wherever both overlap."""
     x = Approach(pairs)
-    second = np.where(x.spread.real > 0.0, repulsive_law(x.far_overlap), 0.0)
+    second = np.where(x.apart.real > 0.0, repulsive_law(x.far_overlap), 0.0)
     return repulsive_law(x.overlap) + second
 
 
@@ -267,7 +324,11 @@ def branches(pairs, sides):
     by_depth = np.log(np.maximum(x.depth, 0.1)) / np.log(FADE_DEPTH)
     steps = (x.by_length, x.mean_by_length, x.by_cosine, by_depth)
     columns += [np.sign(step) + np.sign(step - 1.0) for step in steps]
-    columns += [x.by_sine > 1.0, x.overlap > 0.0, x.far_overlap > 0.0]
+    for length in (x.fade_length, FADE_LENGTH * shorter_or(pairs, 1.0)):
+        for _, foot_at, bound in feet_of_tips(pairs):
+            into = (np.abs(foot_at) - bound) / (FADE_CORNER * length)
+            columns.append(np.sign(foot_at) * (np.sign(into) + np.sign(into + 1.0)))
+    columns += [x.depth > SHALLOW, x.by_sine > 1.0, x.overlap > 0.0, x.far_overlap > 0.0]
     return np.column_stack(columns).astype(int)
 
 

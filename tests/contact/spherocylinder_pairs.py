@@ -18,14 +18,27 @@ APART, TOUCHING, CROSSING = 0, 1, 2
 TIP_TO_TIP, TIP_TO_SIDE, SIDE_TO_SIDE = 0, 1, 2
 
 EPS = np.finfo(float).eps
-FADE_LENGTH, FADE_REACH, FADE_DEPTH = 0.05, 0.02, 16.0
+FADE_LENGTH, FADE_CORNER, FADE_DEPTH, SHALLOW = 0.05, 0.25, 16.0, 0.01
 FADE_COSINE_START, FADE_COSINE_RANGE = 0.5, 0.35
 DEEP_SINE = 0.1
 
 
-def length_of_fade(shorter, d):
-    """Spine overlap over which the second bond fades in."""
-    return np.clip(FADE_REACH * d, FADE_LENGTH * shorter, shorter)
+def length_of_fade(shorter, depth):
+    """Spine overlap over which the second bond fades in, at a mean overlap over (A_min / d)^2."""
+    x = 1.0 - np.log(np.clip(depth, SHALLOW, 1.0)) / np.log(SHALLOW)
+    wide = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+    return shorter * (FADE_LENGTH + (1.0 - FADE_LENGTH) * wide)
+
+
+def least_whole(shorter, depth):
+    """Overlap of the spines of parallel rods from which on the second bond is whole."""
+    return (1.0 + 0.5 * FADE_CORNER) * length_of_fade(shorter, depth)
+
+
+def least_whole_of(pairs):
+    """Of pairs as they were built."""
+    shapes = (pairs.A_i, pairs.A_j, pairs.R_i, pairs.R_j)
+    return least_whole(np.minimum(pairs.A_i, pairs.A_j), depth_of(shapes, pairs.overlap))
 
 
 @dataclass
@@ -264,8 +277,13 @@ def skew(rng, n, overlap, angle, alpha=(1e-6, 100.0)):
 
 def limited_to_depth(shapes, overlap, depth):
     """Overlaps up to `depth` times (A_min / d)^2, beyond which two bonds become one."""
+    return np.minimum(overlap, depth * overlap / depth_of(shapes, overlap))
+
+
+def depth_of(shapes, overlap):
+    """Overlaps over (A_min / d)^2."""
     A_i, A_j, R_i, R_j = shapes
-    return np.minimum(overlap, depth * (np.minimum(A_i, A_j) / (R_i + R_j)) ** 2)
+    return overlap * ((R_i + R_j) / np.minimum(A_i, A_j)) ** 2
 
 
 def parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), fading=False, depth=np.inf):
@@ -276,11 +294,13 @@ def parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), fading=False, dept
     """
     shapes = random_shapes(rng, n, alpha)
     overlap = limited_to_depth(shapes, overlap, depth)
-    A_i, A_j, d = shapes[0], shapes[1], shapes[2] + shapes[3]
+    A_i, A_j = shapes[:2]
     u_j = random_directions(rng, n, dimension)
     sign = rng.choice([-1.0, 1.0], n)
-    most = length_of_fade(np.minimum(A_i, A_j), d) if fading else A_i + A_j
-    offset = rng.choice([-1.0, 1.0], n) * (A_i + A_j - most * rng.uniform(1e-3, 0.999, n))
+    shorter = np.minimum(A_i, A_j)
+    most = least_whole(shorter, depth_of(shapes, overlap)) if fading else A_i + A_j
+    least = 0.03 if fading else 1e-3  # a second bond of less is none
+    offset = rng.choice([-1.0, 1.0], n) * (A_i + A_j - most * rng.uniform(least, 0.999, n))
     low, high = np.maximum(offset - A_i, -A_j), np.minimum(offset + A_i, A_j)
     t = 0.5 * (low + high)
     s = sign * (t - offset)  # offset is that of i's centre along u_j
@@ -305,9 +325,11 @@ def nearly_parallel(rng, n, dimension, overlap, alpha=(1e-6, 100.0), least_tilt=
     fading = np.arange(n) % 4 < 2
     shorter = np.minimum(A_i, A_j)
     of_second = np.arange(n) % 8 == 0  # the others fade with the mean of both
-    fade = np.where(of_second, length_of_fade(shorter, d), FADE_LENGTH * shorter)
+    of_overlap = length_of_fade(shorter, depth_of(shapes, overlap))
+    fade = np.where(of_second, of_overlap, FADE_LENGTH * shorter)
     most = np.where(fading, 1.2 * fade, 2.0 * A_j)
-    stretch = most * rng.uniform(1e-3, 0.999, n)
+    # A second bond of less is none.
+    stretch = np.maximum(most * rng.uniform(1e-3, 0.999, n), 0.03 * of_overlap)
     t = towards * (A_j - stretch)
     common = np.minimum(2.0 * A_i, stretch)
 
@@ -381,12 +403,13 @@ def side_pairs(rng, n, dimension, sides):
         alpha = (0.1, 100.0)
         for m, depth in ((n // 4, 0.999), (n // 8, np.inf)):
             both, half_overlap = parallel(rng, m, dimension, overlaps(rng, m), alpha, depth=depth)
-            fade = length_of_fade(np.minimum(both.A_i, both.A_j), both.d)
-            whole = 2.0 * half_overlap > 1.001 * fade
+            whole = 2.0 * half_overlap > 1.001 * least_whole_of(both)
             parts.append(both[whole])
         parts += [
             nearly_parallel(rng, n, dimension, overlaps(rng, n), alpha, depth=0.5 * FADE_DEPTH),
             deep(rng, n // 2, dimension, overlaps(rng, n // 2)),
+            # Short rods at larger angles.
+            nearly_parallel(rng, m, dimension, overlaps(rng, m, 0.1), (0.3, 2.0), depth=2.0),
         ]
     if dimension == 3:
         parts.append(skew(rng, n, overlaps(rng, n), rng.uniform(0.5, 0.5 * np.pi, n)))

@@ -9,6 +9,7 @@ import pytest
 from pair_packings import LONG, PairPacking
 from reference_energy import (
     ENERGIES,
+    LEAST_WEIGHT,
     Approach,
     branches,
     complex_step_gradient,
@@ -18,6 +19,7 @@ from reference_energy import (
 )
 from spherocylinder_pairs import (
     EPS,
+    FADE_CORNER,
     SIDE_TO_SIDE,
     TIP_TO_SIDE,
     TIP_TO_TIP,
@@ -27,7 +29,8 @@ from spherocylinder_pairs import (
     deep,
     disc_to_disc,
     disc_to_rod,
-    length_of_fade,
+    least_whole,
+    least_whole_of,
     nearly_parallel,
     overlaps,
     parallel,
@@ -83,8 +86,7 @@ def parallel_in_the_plane(rng, dimension):
     """Of all depths; in space the second derivatives by a twist have two sides."""
     assert dimension == 2
     pairs, half = parallel(rng, 2 * N, 2, overlaps(rng, 2 * N, 1e-4), (0.01, 100.0))
-    fade = length_of_fade(np.minimum(pairs.A_i, pairs.A_j), pairs.d)
-    return pairs[2.0 * half > 1.01 * fade]
+    return pairs[2.0 * half > 1.01 * least_whole_of(pairs)]
 
 
 def becoming_one(rng, dimension):
@@ -143,7 +145,7 @@ def steps(packing):
     x = Approach(pairs)
     shorter = np.minimum(pairs.A_i, pairs.A_j)
     length = np.minimum(x.overlap * pairs.d, np.where(shorter > 0.0, shorter, pairs.d))
-    fading = (x.by_length > 0.0) & (x.by_length < 1.0)
+    fading = (x.apart > 0.0) & (x.apart < x.fade_length)
     length = np.where(fading, np.minimum(length, mean_fade_length(pairs)), length)
     not_two = x.two_bonds < 1.0
     between = not_two & (x.two_bonds > 0.0)
@@ -287,7 +289,7 @@ def test_distances_gradients_and_stiffnesses_are_those_of_the_bonds(
     bonds = [(0, slice(None), lambda pairs: Approach(pairs).closest.square)]
     bonds += [(1, both, lambda pairs: Approach(pairs).far_end.square)] * bool(both.any())
     # Parallel rods may be nearer at either end.
-    tied = (np.abs(x.drop) < 1e-15 * pairs.extent / pairs.d) & (x.spread > 0.0)
+    tied = (np.abs(x.drop) < 1e-15 * pairs.extent / pairs.d) & (x.by_length > 0.0)
     for b, among, square in bonds:
         bond = pairs[among]
         distance = np.sqrt(square(bond))
@@ -390,7 +392,7 @@ def rounding_of_second_derivatives(packing):
     inside = (np.abs(x.closest.s) < pairs.A_i) & (np.abs(x.closest.t) < pairs.A_j)
     slides = np.where(inside, 1.0 / np.where(inside, sine, 1.0) ** 2, 0.0)
     fading = (x.by_length > 0.0) & (x.by_length < 1.0)
-    by_length = np.where(fading, pairs.extent / fade_length(pairs), 0.0)
+    by_length = np.where(fading, pairs.extent / (FADE_CORNER * fade_length(pairs)), 0.0)
     between = (x.two_bonds > 0.0) & (x.two_bonds < 1.0)
     by_depth = np.where(between, relative / x.overlap, 0.0)
     by_sine = np.where(x.mean_weight * (1.0 - x.two_bonds) > 0.0, 1.0 / sine_range(pairs), 0.0)
@@ -479,7 +481,8 @@ def shallow(rng, dimension):
         parts.append(skew(rng, n, overlap, rng.uniform(0.5, 0.5 * np.pi, n), alpha))
     pairs = concatenated(*parts)
     x = Approach(pairs)
-    return pairs[(x.by_length == 0.0) | (x.by_length > 1.001) | (x.far_overlap < 0.0)]
+    whole = (x.second_weight < LEAST_WEIGHT) | (x.second_weight == 1.0)
+    return pairs[whole | (x.far_overlap < 0.0)]
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -494,7 +497,7 @@ def test_curvature_of_shallow_contacts_has_closed_forms(dimension, sides, measur
     pairs = packing.plain()
     x = Approach(pairs)
     expected = scaled_matrix(-K_E * x.overlap / pairs.d, distance_hessian(pairs, x.closest))
-    second = (x.far_overlap > 0.0) & (x.second_weight > 0.0) & (sides == 2)
+    second = (x.far_overlap > 0.0) & (x.second_weight > LEAST_WEIGHT) & (sides == 2)
     assert np.all(x.second_weight[second] == 1.0) or sides == 1
     push = -K_E * np.where(second, x.far_overlap, 0.0) / pairs.d
     expected += scaled_matrix(push, distance_hessian(pairs, x.far_end))
@@ -552,7 +555,9 @@ def exact_poses(dimension):
                     A_i, A_j, d = alpha_i, size * alpha_j, 1.0 + size
                     gap = (1.0 - overlap) * d
                     along = A_i + A_j
-                    edge = along - length_of_fade(min(A_i, A_j), d)
+                    shorter = min(A_i, A_j)
+                    depth = overlap * (d / shorter) ** 2 if shorter > 0.0 else 0.0
+                    edge = along - least_whole(shorter, depth)
                     poses = [(past * x + gap * y, x) for past in (0.0, 0.5 * along, along, edge)]
                     poses += [((along + gap) * x, x), ((A_i + gap) * y, y), ((A_j + gap) * x, y)]
                     r += [pose[0] for pose in poses]

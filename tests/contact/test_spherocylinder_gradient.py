@@ -19,6 +19,7 @@ from reference_energy import (
 from spherocylinder_pairs import (
     EPS,
     EVERY_CLASS,
+    SHALLOW,
     SIDE_TO_SIDE,
     contacts,
     force_scale,
@@ -143,10 +144,10 @@ def test_parallel_rods_with_one_bond_sit_in_the_middle_of_their_kink(dimension, 
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_parallel_rods_with_a_fading_second_bond_lie_within_their_kink(dimension, measured):
-    """E(a) + W E(b): where a and b change places the torque jumps by (1 - W) force times spread."""
+    """E(a) + W E(b): where a and b change places the torque jumps by (1 - W) force times length."""
     rng = np.random.default_rng([3, dimension])
     pairs, _ = parallel(
-        rng, N, dimension, overlaps(rng, N), alpha=(1.0, 100.0), fading=True, depth=1.0
+        rng, N, dimension, overlaps(rng, N), alpha=(1.0, 100.0), fading=True, depth=SHALLOW
     )
     assert np.all(contacts(pairs, 2, K_E)["n_bonds"] == 2)
     beyond, jump = one_sided_comparison(pairs, 2)

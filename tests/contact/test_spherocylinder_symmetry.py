@@ -21,7 +21,7 @@ from spherocylinder_pairs import (
     disc_to_disc,
     disc_to_rod,
     force_scale,
-    length_of_fade,
+    least_whole_of,
     log_uniform,
     nearly_parallel,
     overlaps,
@@ -112,11 +112,8 @@ def test_one_bond_is_the_contact_that_was_built(dimension, measured):
 def test_parallel_rods_with_two_bonds_carry_the_same_at_both_ends(dimension, measured):
     rng = np.random.default_rng([12, dimension])
     pairs, half = parallel(rng, 12_000, dimension, overlaps(rng, 12_000, 1e-14), depth=0.999)
-    shorter = np.minimum(pairs.A_i, pairs.A_j)
     rounding = EPS * pairs.extent / pairs.d
-    clear = (2.0 * half > 1.001 * length_of_fade(shorter, pairs.d)) & (
-        pairs.overlap > 10.0 * rounding
-    )
+    clear = (2.0 * half > 1.001 * least_whole_of(pairs)) & (pairs.overlap > 10.0 * rounding)
     pairs, half, rounding = pairs[clear], half[clear], rounding[clear]
     result = contacts(pairs, 2, K_E)
     assert len(pairs) > 6000
