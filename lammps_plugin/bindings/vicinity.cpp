@@ -199,7 +199,7 @@ void export_stages(nb::module_ &m)
       .def_ro("solved", &StageEnd::solved);
 }
 
-nb::object solve(const SymmetricFactors &factors, const Array2<double> &right)
+template <class AnyFactors> nb::object solve(const AnyFactors &factors, const Array2<double> &right)
 {
   const std::size_t n = right.shape(1);
   require(n == factors.size(), "right has another length than the matrix.");
@@ -248,7 +248,7 @@ template <class Model> auto export_methods(nb::class_<Vicinity<Model>> class_)
           },
           "strain"_a, "(n,) 1 + strain for displacements, 1 for rotations.")
       .def("factorise", &factorise<Model>, "x"_a, "strain"_a, "diagonal"_a,
-           "SymmetricFactors of the Hessian by these coordinates plus a diagonal (n,), shifted if\n"
+           "BlockFactors of the Hessian by these coordinates plus a diagonal (n,), shifted if\n"
            "it is not positive definite.")
       .def(
           "take_pairs",
@@ -274,7 +274,10 @@ void export_vicinity(nb::module_ &m)
       .def("__init__", &make_factors, "start"_a, "row"_a, "value"_a,
            "Of a matrix in CSC, of which the upper triangle is read. RuntimeError if singular.")
       .def_prop_ro("n_negative", &SymmetricFactors::n_negative)
-      .def("solve", &solve, "right"_a, "For the rows of right (k, n).");
+      .def("solve", &solve<SymmetricFactors>, "right"_a, "For the rows of right (k, n).");
+  nb::class_<BlockFactors>(m, "BlockFactors", "Of a positive definite matrix.")
+      .def_prop_ro("n_negative", [](const BlockFactors &) { return 0; })
+      .def("solve", &solve<BlockFactors>, "right"_a, "For the rows of right (k, n).");
   m.attr("LEAST_SHIFT") = LEAST_SHIFT;
   export_stages(m);
 

@@ -46,7 +46,7 @@ struct StageLimits {
   double accuracy, longest_step, widest_turn;
 };
 
-using Factors = std::shared_ptr<SymmetricFactors>;
+using Factors = std::shared_ptr<BlockFactors>;
 
 /// Where the solution of a stage ended: refused are guesses whose `sums` say why.
 struct StageEnd {

@@ -3,7 +3,7 @@
 #include "contact/pair_derivatives.hpp"
 #include "contact/pair_sum.hpp"
 
-#include "landscape/symmetric_factors.hpp"
+#include "landscape/block_factors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -87,8 +87,7 @@ template <class Model> class Vicinity {
   {
     pairs = std::move(near);
     measure_from_pairs();
-    sort_rows();
-    hessian = pattern();
+    find_blocks();
     factors.clear();
   }
 
@@ -144,28 +143,28 @@ template <class Model> class Vicinity {
   /// Factors of the Hessian by the base's coordinates plus a diagonal (n,), with a shift, smallest
   /// by powers of ten, that leaves no negative pivot; nothing of what is not finite. Spines that
   /// cross add nothing.
-  std::shared_ptr<SymmetricFactors> factorise(const Displacement &at, const double *diagonal)
+  std::shared_ptr<BlockFactors> factorise(const Displacement &at, const double *diagonal)
   {
     fill_hessian(at);
     double first = 0.0, smallest = INFINITY;
-    for (std::size_t c = 0; c < n(); ++c) {
-      on_diagonal(c) += diagonal[c];
-      first = std::max(first, LEAST_SHIFT * std::abs(on_diagonal(c)));
+    each_on_diagonal([&](std::int64_t c, double &value) {
+      value += diagonal[c];
+      first = std::max(first, LEAST_SHIFT * std::abs(value));
       smallest = std::min(smallest, diagonal[c]);
-    }
+    });
     first = std::max(first, smallest);
-    const std::shared_ptr<SymmetricFactors> found = spare();
+    const std::shared_ptr<BlockFactors> found = spare();
     for (double shift = 0.0; std::isfinite(shift);) {
-      if (found->factorise(hessian) && found->n_negative() == 0) return found;
+      if (found->factorise(hessian)) return found;
       const double next = std::max(10.0 * shift, first);
-      for (std::size_t c = 0; c < n(); ++c) on_diagonal(c) += next - shift;
+      each_on_diagonal([&](std::int64_t, double &value) { value += next - shift; });
       shift = next;
     }
     return nullptr;
   }
 
  private:
-  static constexpr int VARIABLES = PAIR_VARIABLES<2>, BLOCK = 6;
+  static constexpr int VARIABLES = PAIR_VARIABLES<2>;
 
   /// Doubles and their small rests.
   struct SplitArrays {
@@ -186,14 +185,19 @@ template <class Model> class Vicinity {
   Law law;
   Poses base;
   std::vector<double> from_then;
-  Order row;              // (n,) of each coordinate in `hessian`
-  std::vector<int> slot;  // (M, BLOCK, BLOCK) in the values of `hessian`, -1 for none
-  UpperTriangle hessian;
-  std::vector<std::shared_ptr<SymmetricFactors>> factors;
+  std::shared_ptr<const BlockPattern> pattern;
+  std::vector<int> block;  // (M,) of each pair below the diagonal of `hessian`
+  BlockMatrix hessian;
+  std::vector<std::shared_ptr<BlockFactors>> factors;
 
-  double &on_diagonal(std::size_t c)
+  /// Each coordinate with its element on the Hessian's diagonal.
+  template <class Then> void each_on_diagonal(const Then &then)
   {
-    return hessian.valuePtr()[hessian.outerIndexPtr()[row.indices()[c] + 1] - 1];
+    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
+      const std::int64_t c = coordinates.column[k];
+      const int own = static_cast<int>(k % BLOCK);
+      if (c >= 0) then(c, hessian.diagonal[pattern->place[k / BLOCK]](own, own));
+    }
   }
 
   template <class S> LandscapeSums sums(const Displacement &at) const
@@ -272,74 +276,18 @@ template <class Model> class Vicinity {
     return split;
   }
 
-  /// Particle by particle, in an order in which factors stay sparse.
-  void sort_rows()
+  void find_blocks()
   {
-    const std::size_t N = shapes.size();
-    std::vector<Eigen::Triplet<double>> entries;
-    for (std::size_t i = 0; i < N; ++i) entries.emplace_back(i, i, 1.0);
+    pattern = std::make_shared<BlockPattern>(coordinates.column, pairs.particles);
+    block.clear();
     for (std::size_t p = 0; p < pairs.list().n; ++p) {
-      const auto [low, high] = std::minmax(pairs.particles[2 * p], pairs.particles[2 * p + 1]);
-      entries.emplace_back(low, high, 1.0);
-    }
-    UpperTriangle neighbours(N, N);
-    neighbours.setFromTriplets(entries.begin(), entries.end());
-    const Order particles = sparse_order(neighbours).inverse();
-    row.resize(n());
-    int next = 0;
-    for (std::size_t place = 0; place < N; ++place) {
-      for (int k = 0; k < 3; ++k) {
-        const std::int64_t c = coordinates.column[3 * particles.indices()[place] + k];
-        if (c >= 0) row.indices()[c] = next++;
-      }
+      const int i = place(p, 0), j = place(p, 1);
+      block.push_back(pattern->find(std::min(i, j), std::max(i, j)));
     }
   }
 
-  /// Rows of the coordinates of both particles of a pair, -1 for none: x, y, rotation of i, then of
-  /// j.
-  void rows_of(std::size_t p, int (&to)[BLOCK]) const
-  {
-    for (int side = 0; side < 2; ++side) {
-      const std::int64_t i = pairs.particles[2 * p + side];
-      for (int k = 0; k < 3; ++k) {
-        const std::int64_t c = coordinates.column[3 * i + k];
-        to[3 * side + k] = c < 0 ? -1 : row.indices()[c];
-      }
-    }
-  }
-
-  /// The Hessian's pattern, its whole diagonal last in each column; fills `slot`.
-  UpperTriangle pattern()
-  {
-    const std::size_t M = pairs.list().n;
-    std::vector<Eigen::Triplet<double>> entries;
-    for (std::size_t c = 0; c < n(); ++c) entries.emplace_back(c, c, 0.0);
-    int rows[BLOCK];
-    const auto each_upper = [&](std::size_t p, const auto &then) {
-      rows_of(p, rows);
-      for (int a = 0; a < BLOCK; ++a) {
-        for (int b = 0; b < BLOCK; ++b) {
-          if (0 <= rows[a] && rows[a] <= rows[b]) then(a, b);
-        }
-      }
-    };
-    for (std::size_t p = 0; p < M; ++p) {
-      each_upper(p, [&](int a, int b) { entries.emplace_back(rows[a], rows[b], 0.0); });
-    }
-    UpperTriangle matrix(n(), n());
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    slot.assign(M * BLOCK * BLOCK, -1);
-    for (std::size_t p = 0; p < M; ++p) {
-      each_upper(p, [&](int a, int b) {
-        const int *const first = matrix.innerIndexPtr();
-        const int *const begin = first + matrix.outerIndexPtr()[rows[b]];
-        const int *const end = first + matrix.outerIndexPtr()[rows[b] + 1];
-        slot[(p * BLOCK + a) * BLOCK + b] =
-            static_cast<int>(std::lower_bound(begin, end, rows[a]) - first);
-      });
-    }
-    return matrix;
-  }
+  /// Row of a pair's first or second particle in `hessian`.
+  int place(std::size_t p, int side) const { return pattern->place[pairs.particles[2 * p + side]]; }
 
   void fill_hessian(const Displacement &at)
   {
@@ -347,48 +295,80 @@ template <class Model> class Vicinity {
     const SplitArrays poses = displaced(at);
     const PosedPairs<Model, 2, double> posed(shapes, poses.view(), pairs.list(), law);
     const TurnedBodies<Model, 2, double> turned(posed);
-    std::fill_n(hessian.valuePtr(), hessian.nonZeros(), 0.0);
+    clear_hessian();
     for (std::size_t p = 0; p < posed.size(); ++p) {
       const Contact<2, Number> contact = turned.contact(p);
-      if (contact.status == ContactStatus::TOUCHING) add_block(p, contact, at);
+      if (contact.status == ContactStatus::TOUCHING) add_blocks(p, contact, 1.0 + at.strain);
     }
   }
 
-  void add_block(std::size_t p, const Contact<2, Dual<VARIABLES>> &contact, const Displacement &at)
+  /// Zero, with 1 for each coordinate that a particle does not have.
+  void clear_hessian()
+  {
+    hessian.diagonal.assign(shapes.size(), Block::Zero());
+    hessian.below.assign(pattern->row.size(), Block::Zero());
+    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
+      const int own = static_cast<int>(k % BLOCK);
+      if (coordinates.column[k] < 0) hessian.diagonal[pattern->place[k / BLOCK]](own, own) = 1.0;
+    }
+  }
+
+  /// Second derivatives by the variables of a pair that touches.
+  static Eigen::Matrix<double, VARIABLES, VARIABLES>
+  by_variables(const Contact<2, Dual<VARIABLES>> &contact)
   {
     SecondDerivatives<2, double> found;
     read_derivatives<2, double>(contact, found);
-    double by[VARIABLES][VARIABLES];
+    Eigen::Matrix<double, VARIABLES, VARIABLES> by;
     for (int a = 0; a < VARIABLES; ++a) {
       for (int b = 0; b < VARIABLES; ++b) {
-        by[a][b] = found.curvature[a][b];
+        by(a, b) = found.curvature[a][b];
         for (int k = 0; k < contact.n_bonds; ++k) {
-          by[a][b] +=
+          by(a, b) +=
               value_of(contact.bond[k].own_stiffness) * found.gradient[k][a] * found.gradient[k][b];
         }
       }
     }
-    const double s = 1.0 + at.strain;
-    const double turn_i = coordinates.radians_per_length[pairs.particles[2 * p]];
-    const double turn_j = coordinates.radians_per_length[pairs.particles[2 * p + 1]];
-    const double scale[BLOCK] = {s, s, turn_i, -s, -s, turn_j};
-    constexpr int variable[BLOCK] = {0, 1, 2, 0, 1, 3};
-    const int *slots = &slot[p * BLOCK * BLOCK];
-    double *const values = hessian.valuePtr();
-    for (int a = 0; a < BLOCK; ++a) {
-      for (int b = 0; b < BLOCK; ++b, ++slots) {
-        if (*slots >= 0) values[*slots] += scale[a] * scale[b] * by[variable[a]][variable[b]];
+    return by;
+  }
+
+  void add_blocks(std::size_t p, const Contact<2, Dual<VARIABLES>> &contact, double stretch)
+  {
+    const auto by = by_variables(contact);
+    constexpr int variable[2][BLOCK] = {{0, 1, 2}, {0, 1, 3}};
+    double scale[2][BLOCK];
+    for (int side = 0; side < 2; ++side) {
+      const double along = side == 0 ? stretch : -stretch;
+      scale[side][0] = scale[side][1] = along;
+      scale[side][2] = coordinates.radians_per_length[pairs.particles[2 * p + side]];
+    }
+    const auto between = [&](int rows, int columns) {
+      Block found;
+      for (int a = 0; a < BLOCK; ++a) {
+        for (int b = 0; b < BLOCK; ++b) {
+          found(a, b) =
+              scale[rows][a] * scale[columns][b] * by(variable[rows][a], variable[columns][b]);
+        }
       }
+      return found;
+    };
+    const int i = place(p, 0), j = place(p, 1);
+    hessian.diagonal[i] += between(0, 0);
+    hessian.diagonal[j] += between(1, 1);
+    if (i == j) {  // a particle and its own image
+      hessian.diagonal[i] += between(0, 1) + between(1, 0);
+    } else {
+      hessian.below[block[p]] += i > j ? between(0, 1) : between(1, 0);
     }
   }
 
-  /// Factors that nobody else holds: their analysis of the pattern is worth several factorisations.
-  std::shared_ptr<SymmetricFactors> spare()
+  /// Factors that nobody else holds.
+  std::shared_ptr<BlockFactors> spare()
   {
     for (const auto &one : factors) {
       if (one.use_count() == 1) return one;
     }
-    factors.push_back(std::make_shared<SymmetricFactors>(hessian, row));
+    factors.push_back(std::make_shared<BlockFactors>(pattern));
     return factors.back();
   }
 };
