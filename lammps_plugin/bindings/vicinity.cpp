@@ -64,7 +64,7 @@ void check_poses(const PoseArrays &poses, std::size_t N)
 
 template <class Model>
 void take(Vicinity<Model> &of, const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
-          const PoseArrays &then, const Vec<2> &hold)
+          const PoseArrays &then, const Vec<3> &hold)
 {
   check_poses(then, of.n_particles());
   require(of.has_base(), "there is no base yet, expected move_to before.");
@@ -73,7 +73,8 @@ void take(Vicinity<Model> &of, const Array2<std::int64_t> &pairs, const Array2<s
            {shift.data(), shift.data() + shift.size()},
            then.sum(),
            hold[0],
-           hold[1]});
+           hold[1]},
+          hold[2]);
 }
 
 template <class Model>
@@ -100,11 +101,10 @@ nb::object tuple_of(const LandscapeSums &sums)
 }
 
 template <class Model>
-nb::object evaluate(const Vicinity<Model> &of, const Array1<double> &x, double strain,
-                    bool extended)
+nb::object evaluate(Vicinity<Model> &of, const Array1<double> &x, double strain, bool extended)
 {
   const Displacement at = checked(of, x, strain);
-  return of.is_beyond(at) ? nb::none() : tuple_of(of.evaluate(at, extended));
+  return of.holds(at) ? tuple_of(of.evaluate(at, extended)) : nb::none();
 }
 
 template <class Model>
@@ -130,6 +130,31 @@ void move_to(Vicinity<Model> &of, const Array3<double> &position, const Array3<d
   const PoseArrays poses{position, orientation, edges};
   check_poses(poses, of.n_particles());
   of.move_to(poses.sum());
+}
+
+/// Fills the doubles and their small rests of an array (2, ...).
+void split_into(NewArray<double> &to, const long double *from, std::size_t size)
+{
+  for (std::size_t k = 0; k < size; ++k) {
+    to[k] = static_cast<double>(from[k]);
+    to[size + k] = static_cast<double>(from[k] - to[k]);
+  }
+}
+
+nb::object tuple_of(const Poses &poses)
+{
+  const std::size_t N = poses.angle.size();
+  NewArray<double> position({2, N, 2}), orientation({2, N, 1}), edges({2, 2});
+  split_into(position, poses.position.data(), 2 * N);
+  split_into(orientation, poses.angle.data(), N);
+  split_into(edges, &poses.edges[0], 2);
+  return nb::make_tuple(position.release(), orientation.release(), edges.release());
+}
+
+template <class Model> nb::object move(Vicinity<Model> &of, const Array1<double> &x, double strain)
+{
+  of.move(checked(of, x, strain));
+  return tuple_of(of.poses());
 }
 
 /// A stage with its scales, and the guesses that it starts from.
@@ -236,6 +261,8 @@ template <class Model> auto export_methods(nb::class_<Vicinity<Model>> class_)
   class_
       .def("move_to", &move_to<Model>, "position"_a, "orientation"_a, "edges"_a,
            "Count coordinates from these poses, doubles and their small rests.")
+      .def("move", &move<Model>, "x"_a, "strain"_a,
+           "Count coordinates from a point near the base; gives its poses as move_to takes them.")
       .def(
           "evaluate", &evaluate<Model>, "x"_a, "strain"_a, "extended"_a,
           "None where the pairs no longer hold, or energy, gradient (n,), derivative by the\n"
@@ -254,12 +281,14 @@ template <class Model> auto export_methods(nb::class_<Vicinity<Model>> class_)
           "take_pairs",
           [](Vicinity<Model> &of, const Array3<double> &position, const Array3<double> &orientation,
              const Array2<double> &edges, const Array2<std::int64_t> &pairs,
-             const Array2<std::int64_t> &shift, double skin, double reach) {
-            take(of, pairs, shift, {position, orientation, edges}, {{skin, reach}});
+             const Array2<std::int64_t> &shift, double wide, double reach, double skin) {
+            take(of, pairs, shift, {position, orientation, edges}, {{wide, reach, skin}});
           },
-          "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "skin"_a, "reach"_a,
-          "Pairs of centres within reach, which hold until surfaces may have come closer by skin\n"
-          "than at these poses.")
+          "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "wide"_a, "reach"_a,
+          "skin"_a,
+          "All pairs of surfaces that are closer than a wide skin at these poses, and centres "
+          "than\n"
+          "reach; from them those within skin are chosen anew as particles move.")
       .def("solve_stage", &solve_stage<Model>, "stage"_a, "factors"_a.none(), "renew"_a,
            "The StageEnd of a Stage, with factors of an earlier one; renew(x, strain) takes pairs\n"
            "that hold there.");

@@ -67,7 +67,7 @@ struct StageEnd {
 template <class Model> class StageSolver {
  public:
   using Vector = Eigen::VectorXd;
-  /// Finds pairs anew that hold at a displacement.
+  /// Lets the vicinity take pairs of which some hold at a displacement.
   using Renew = std::function<void(const Displacement &)>;
 
   StageSolver(Vicinity<Model> &landscape, const Stage &equation, const StageUnits &scales,
@@ -151,12 +151,18 @@ template <class Model> class StageSolver {
   Point point(Vector x)
   {
     const Displacement at{x.data(), stage.strain};
-    if (about.is_beyond(at)) renew_pairs(at);
+    if (!about.holds(at)) renew(at);
     ++evaluations;
     LandscapeSums sums = about.evaluate(at, stage.extended);
     Vector gradient =
         stretch.cwiseProduct(sums.gradient) + stage.drag.cwiseProduct(x - stage.centre);
     return {std::move(x), std::move(sums), std::move(gradient)};
+  }
+
+  void renew(const Displacement &at)
+  {
+    renew_pairs(at);
+    about.holds(at);
   }
 
   Point begin(const Vector &guess, const Vector &other)

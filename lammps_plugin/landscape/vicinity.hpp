@@ -30,12 +30,12 @@ struct Coordinates {
   std::vector<double> radians_per_length, turning_radius;
 };
 
-/// Pairs that were near each other at some poses, and as long as no surface has come nearer by
-/// `skin`.
+/// Pairs whose surfaces were closer than `skin` at some poses, and centres than `reach`.
 struct NearPairs {
   std::vector<std::int64_t> particles, shift;  // (M, 2)
   Poses then;
   double skin, reach;
+  std::vector<double> to_base{};  // (N, 3) x, y and angle since `then`, apart from the box's strain
 
   PairList list() const { return {particles.size() / 2, particles.data(), shift.data()}; }
 };
@@ -73,49 +73,52 @@ template <class Model> class Vicinity {
   std::size_t n() const { return coordinates.n; }
   std::size_t n_particles() const { return shapes.size(); }
   bool has_base() const { return base.position.size() == 2 * shapes.size(); }
-  bool has_pairs() const { return !from_then.empty(); }
+  bool has_pairs() const { return !pairs.to_base.empty(); }
+  const Poses &poses() const { return base; }
 
   /// From where coordinates count.
   void move_to(const Poses &poses)
   {
     base = poses;
-    if (has_pairs()) measure_from_pairs();
+    for (NearPairs *list : {&wide, &pairs}) {
+      if (!list->to_base.empty()) measure(*list);
+    }
   }
 
-  /// Pairs that hold from now on.
-  void take(NearPairs near)
+  /// To a point near the base. Whole turns are left out: they would cost digits.
+  void move(const Displacement &at)
   {
-    pairs = std::move(near);
-    measure_from_pairs();
-    find_blocks();
-    factors.clear();
+    constexpr long double TURN = 2.0L * 3.14159265358979323846264338327950288L;
+    Poses poses = moved(at);
+    for (long double &angle : poses.angle) angle -= TURN * std::rint(angle / TURN);
+    move_to(poses);
   }
 
-  /// Whether two surfaces may have come closer by the skin, or there are no pairs yet.
-  bool is_beyond(const Displacement &at) const
+  /// Pairs of a wide skin, from which those within a smaller one are chosen again and again.
+  void take(NearPairs wider, double smaller_skin)
   {
-    if (!has_pairs()) return true;
-    double most = 0.0, scaled = 0.0;
-    const double stretch = 1.0 + at.strain;
-    for (int k = 0; k < 2; ++k) {
-      const double scale = stretch * static_cast<double>(base.edges[k] / pairs.then.edges[k]);
-      scaled = std::max(scaled, std::abs(scale - 1.0));
-    }
-    for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const double x = stretch * (from_then[3 * i] + component(at, i, 0));
-      const double y = stretch * (from_then[3 * i + 1] + component(at, i, 1));
-      double turned = std::abs(from_then[3 * i + 2] + turn(at, i));
-      if (turned > M_PI) turned = std::abs(std::remainder(turned, 2.0 * M_PI));
-      most = std::max(most, std::sqrt(x * x + y * y) + coordinates.turning_radius[i] * turned);
-    }
-    return 2.0 * most >= pairs.skin - scaled * pairs.reach;
+    wide = std::move(wider);
+    measure(wide);
+    skin = smaller_skin;
+    choose({std::vector<double>(n()).data(), 0.0});
+  }
+
+  /// Whether the pairs that there are hold at a point, chosen anew if need be; if not, others are
+  /// to be taken before anything is asked for there.
+  bool holds(const Displacement &at)
+  {
+    if (!has_pairs()) return false;
+    if (!is_beyond(pairs, at)) return true;
+    const Eigen::Map<const Eigen::VectorXd> x(at.x, static_cast<Eigen::Index>(n()));
+    if (is_beyond(wide, at, skin) || !x.allFinite()) return false;
+    choose(at);
+    return true;
   }
 
   LandscapeSums evaluate(const Displacement &at, bool extended) const
   {
     return extended ? sums<long double>(at) : sums<double>(at);
   }
-
   /// (n,) by how much a coordinate moves its particle: 1 + strain, and 1 for rotations.
   Eigen::VectorXd stretch(double strain) const
   {
@@ -181,10 +184,11 @@ template <class Model> class Vicinity {
 
   std::vector<Shape> shapes;
   Coordinates coordinates;
-  NearPairs pairs;
+  NearPairs wide, pairs;             // `pairs` are those of `wide` that are within `skin`
+  std::vector<std::int64_t> chosen;  // (M,) which of them
+  double skin = 0.0;
   Law law;
   Poses base;
-  std::vector<double> from_then;
   std::shared_ptr<const BlockPattern> pattern;
   std::vector<int> block;  // (M,) of each pair below the diagonal of `hessian`
   BlockMatrix hessian;
@@ -210,9 +214,12 @@ template <class Model> class Vicinity {
             static_cast<double>(-sums.virial[0] - sums.virial[3]),
             static_cast<double>(sums.bond_force),
             sums.n_bonds,
-            sums.crossing,
-            sums.unconverged};
+            of_wide(sums.crossing),
+            of_wide(sums.unconverged)};
   }
+
+  /// The number of a pair, or -1, as whoever gave the pairs knows it.
+  std::int64_t of_wide(std::int64_t p) const { return p < 0 ? p : chosen[p]; }
 
   template <class S> Eigen::VectorXd gradient(const PairSums<2, S> &sums) const
   {
@@ -228,17 +235,66 @@ template <class Model> class Vicinity {
     return found;
   }
 
-  void measure_from_pairs()
+  void measure(NearPairs &list) const
   {
-    from_then.resize(3 * shapes.size());
+    list.to_base.resize(3 * shapes.size());
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       for (int k = 0; k < 2; ++k) {
-        const long double scale = base.edges[k] / pairs.then.edges[k];
-        from_then[3 * i + k] =
-            static_cast<double>(base.position[2 * i + k] - scale * pairs.then.position[2 * i + k]);
+        const long double scale = base.edges[k] / list.then.edges[k];
+        list.to_base[3 * i + k] =
+            static_cast<double>(base.position[2 * i + k] - scale * list.then.position[2 * i + k]);
       }
-      from_then[3 * i + 2] = static_cast<double>(base.angle[i] - pairs.then.angle[i]);
+      list.to_base[3 * i + 2] = static_cast<double>(base.angle[i] - list.then.angle[i]);
     }
+  }
+
+  /// Whether two surfaces may have come closer by the skin, or by what is left of it.
+  bool is_beyond(const NearPairs &list, const Displacement &at, double kept = 0.0) const
+  {
+    double most = 0.0, scaled = 0.0;
+    const double stretch = 1.0 + at.strain;
+    for (int k = 0; k < 2; ++k) {
+      const double scale = stretch * static_cast<double>(base.edges[k] / list.then.edges[k]);
+      scaled = std::max(scaled, std::abs(scale - 1.0));
+    }
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const double x = stretch * (list.to_base[3 * i] + component(at, i, 0));
+      const double y = stretch * (list.to_base[3 * i + 1] + component(at, i, 1));
+      double turned = std::abs(list.to_base[3 * i + 2] + turn(at, i));
+      if (turned > M_PI) turned = std::abs(std::remainder(turned, 2.0 * M_PI));
+      most = std::max(most, std::sqrt(x * x + y * y) + coordinates.turning_radius[i] * turned);
+    }
+    return 2.0 * most >= list.skin - kept - scaled * list.reach;
+  }
+
+  /// Those of the wide pairs that are within the smaller skin at a point.
+  void choose(const Displacement &at)
+  {
+    pairs = {{}, {}, moved(at), skin, wide.reach - wide.skin + skin};
+    chosen.clear();
+    const SplitArrays poses = displaced(at);
+    const PosedPairs<Model, 2, double> posed(shapes, poses.view(), wide.list(), law);
+    for (std::size_t p = 0; p < posed.size(); ++p) {
+      if (!are_closer(posed.at(p))) continue;
+      chosen.push_back(static_cast<std::int64_t>(p));
+      for (int k = 0; k < 2; ++k) {
+        pairs.particles.push_back(wide.particles[2 * p + k]);
+        pairs.shift.push_back(wide.shift[2 * p + k]);
+      }
+    }
+    measure(pairs);
+    pattern = nullptr;
+    factors.clear();
+  }
+
+  bool are_closer(const PosedPair<Model, 2, double> &pair) const
+  {
+    auto body_i = Model::template body<2, double>(pair.shape_i);
+    auto body_j = Model::template body<2, double>(pair.shape_j);
+    body_i.centre = pair.r;
+    Model::template turn_to<2, double>(body_i, pair.orientation_i);
+    Model::template turn_to<2, double>(body_j, pair.orientation_j);
+    return Model::closer_than(skin, body_i, body_j);
   }
 
   double component(const Displacement &at, std::size_t i, int k) const
@@ -250,6 +306,23 @@ template <class Model> class Vicinity {
   double turn(const Displacement &at, std::size_t i) const
   {
     return component(at, i, 2) * coordinates.radians_per_length[i];
+  }
+
+  long double moved(const Displacement &at, std::size_t i, int k) const
+  {
+    return (1.0L + at.strain) * (base.position[2 * i + k] + component(at, i, k));
+  }
+
+  /// Poses at a point.
+  Poses moved(const Displacement &at) const
+  {
+    Poses poses = base;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      for (int k = 0; k < 2; ++k) poses.position[2 * i + k] = moved(at, i, k);
+      poses.angle[i] += turn(at, i);
+    }
+    for (int k = 0; k < 2; ++k) poses.edges[k] *= 1.0L + at.strain;
+    return poses;
   }
 
   SplitArrays displaced(const Displacement &at) const
@@ -264,15 +337,15 @@ template <class Model> class Vicinity {
       whole = static_cast<double>(value);
       rest = static_cast<double>(value - whole);
     };
-    const long double stretch = 1.0L + at.strain;
     for (std::size_t i = 0; i < N; ++i) {
       for (int k = 0; k < 2; ++k) {
-        put(stretch * (base.position[2 * i + k] + component(at, i, k)),
-            split.position[0][2 * i + k], split.position[1][2 * i + k]);
+        put(moved(at, i, k), split.position[0][2 * i + k], split.position[1][2 * i + k]);
       }
       put(base.angle[i] + turn(at, i), split.angle[0][i], split.angle[1][i]);
     }
-    for (int k = 0; k < 2; ++k) put(stretch * base.edges[k], split.edges[0][k], split.edges[1][k]);
+    for (int k = 0; k < 2; ++k) {
+      put((1.0L + at.strain) * base.edges[k], split.edges[0][k], split.edges[1][k]);
+    }
     return split;
   }
 
@@ -291,6 +364,7 @@ template <class Model> class Vicinity {
 
   void fill_hessian(const Displacement &at)
   {
+    if (!pattern) find_blocks();
     using Number = Dual<VARIABLES>;
     const SplitArrays poses = displaced(at);
     const PosedPairs<Model, 2, double> posed(shapes, poses.view(), pairs.list(), law);

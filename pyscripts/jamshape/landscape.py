@@ -62,6 +62,11 @@ class State:
         position, orientation, edges = map(_split, (self.position, self.orientation, self.edges))
         return position, orientation, edges
 
+    @classmethod
+    def joined(cls, position: FloatArray, orientation: FloatArray, edges: FloatArray) -> State:
+        """Add doubles and their small rests, each array (2, ...) as `split` gives them."""
+        return cls(*(np.add(*part, dtype=np.longdouble) for part in (position, orientation, edges)))
+
     @property
     def dimension(self) -> int:
         """Number of dimensions, 2 or 3."""
@@ -321,16 +326,24 @@ class Landscape:
 
     def renewed_pairs(self, state: State) -> Pairs:
         """Find the pairs that may touch at a state, among those of a wider skin, which hold for longer."""
-        skin = _SKIN * float(self.shape.inner_radius.min())
-        packing, wide = state.packing(self.particles), self._wide
-        if wide is None or wide.outrun_by(state, self.shape.turning_radius, skin):
-            near = self.shape.near(packing, _WIDE * skin)
-            wide = Pairs.of(near, state, _WIDE * skin, self._reach)
-            self._wide = wide
-        self._pairs = Pairs.of(
-            self.shape.nearer(packing, wide.near, skin), state, skin, self._reach
-        )
+        wide, packing = self.wide_pairs(state), state.packing(self.particles)
+        near = self.shape.nearer(packing, wide.near, self.skin)
+        self._pairs = Pairs.of(near, state, self.skin, self._reach)
         return self._pairs
+
+    def wide_pairs(self, state: State) -> Pairs:
+        """Give the pairs of a wider skin, as long as all that may touch at a state are among them."""
+        wide = self._wide
+        if wide is None or wide.outrun_by(state, self.shape.turning_radius, self.skin):
+            skin = _WIDE * self.skin
+            near = self.shape.near(state.packing(self.particles), skin)
+            wide = self._wide = Pairs.of(near, state, skin, self._reach)
+        return wide
+
+    @cached_property
+    def skin(self) -> float:
+        """How close the surfaces of pairs are that may touch, [length]."""
+        return _SKIN * float(self.shape.inner_radius.min())
 
     @cached_property
     def _reach(self) -> float:

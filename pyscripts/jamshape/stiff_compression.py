@@ -496,8 +496,8 @@ class _Run:
         flow = self.flow
         strain = math.expm1(-self.kappa * dt)
         stretch = self.vicinity.stretch(strain)
-        flow.state = self.vicinity.at(attempt.x, strain)
-        self.vicinity.move_to(flow.state)
+        self.vicinity.move(attempt.x, strain)
+        flow.state = self.vicinity.base
         flow.acceleration = stretch * (attempt.velocities[-1] - flow.velocity) / dt
         flow.velocity = stretch * attempt.velocities[-1]
         flow.time += dt

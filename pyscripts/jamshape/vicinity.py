@@ -74,7 +74,7 @@ class Vicinity:
             Coordinates(landscape.column, landscape.rotation_length, landscape.shape.turning_radius)
         )
         self.move_to(base)
-        self._take(landscape.pairs_at(base))
+        self._take(landscape.wide_pairs(base))
 
     def move_to(self, base: State) -> None:
         """Count coordinates from another state."""
@@ -84,7 +84,11 @@ class Vicinity:
     def forget_pairs(self) -> None:
         """Look for pairs anew, so that what follows depends on the base alone, to the last bit."""
         self.landscape.forget_pairs()
-        self._take(self.landscape.pairs_at(self.base))
+        self._take(self.landscape.wide_pairs(self.base))
+
+    def move(self, x: FloatArray, strain: float) -> None:
+        """Count coordinates from the state `at(x, strain)`."""
+        self.base = State.joined(*self._compiled.move(x, strain))
 
     def at(self, x: FloatArray, strain: float) -> State:
         """Move along (n,) coordinates, then strain box and positions."""
@@ -145,10 +149,11 @@ class Vicinity:
         return Evaluation(energy, gradient, strain_gradient, bond_force, n_bonds)
 
     def _renew(self, x: FloatArray, strain: float) -> None:
-        self._take(self.landscape.renewed_pairs(self.at(x, strain)))
+        self._take(self.landscape.wide_pairs(self.at(x, strain)))
 
     def _take(self, pairs: Pairs) -> None:
         self._pairs = pairs
         self._compiled.take_pairs(
-            *pairs.then.split, pairs.particles, pairs.shift, pairs.skin, pairs.reach
-        )
+            *pairs.then.split, pairs.particles, pairs.shift, pairs.skin, pairs.reach,
+            self.landscape.skin,
+        )  # fmt: skip
