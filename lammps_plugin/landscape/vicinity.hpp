@@ -416,23 +416,22 @@ template <class Model> class Vicinity {
       scale[side][0] = scale[side][1] = along;
       scale[side][2] = coordinates.radians_per_length[pairs.particles[2 * p + side]];
     }
-    const auto between = [&](int rows, int columns) {
-      Block found;
-      for (int a = 0; a < BLOCK; ++a) {
-        for (int b = 0; b < BLOCK; ++b) {
-          found(a, b) =
+    const auto add = [&](Block &to, int rows, int columns) {
+      for (int b = 0; b < BLOCK; ++b) {
+        for (int a = 0; a < BLOCK; ++a) {
+          to(a, b) +=
               scale[rows][a] * scale[columns][b] * by(variable[rows][a], variable[columns][b]);
         }
       }
-      return found;
     };
     const int i = place(p, 0), j = place(p, 1);
-    hessian.diagonal[i] += between(0, 0);
-    hessian.diagonal[j] += between(1, 1);
+    add(hessian.diagonal[i], 0, 0);
+    add(hessian.diagonal[j], 1, 1);
     if (i == j) {  // a particle and its own image
-      hessian.diagonal[i] += between(0, 1) + between(1, 0);
+      add(hessian.diagonal[i], 0, 1);
+      add(hessian.diagonal[i], 1, 0);
     } else {
-      hessian.below[block[p]] += i > j ? between(0, 1) : between(1, 0);
+      add(hessian.below[block[p]], i > j ? 0 : 1, i > j ? 1 : 0);
     }
   }
 

@@ -8,6 +8,7 @@ rotation in it. Needs no LAMMPS.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -65,7 +66,7 @@ class State:
     @classmethod
     def joined(cls, position: FloatArray, orientation: FloatArray, edges: FloatArray) -> State:
         """Add doubles and their small rests, each array (2, ...) as `split` gives them."""
-        return cls(*(np.add(*part, dtype=np.longdouble) for part in (position, orientation, edges)))
+        return cls(*(np.longdouble(x[0]) + x[1] for x in (position, orientation, edges)))
 
     @property
     def dimension(self) -> int:
@@ -75,7 +76,7 @@ class State:
     @property
     def volume(self) -> float:
         """Area in 2D, volume in 3D, [length^D]."""
-        return float(np.prod(self.edges))
+        return float(math.prod(self.edges))
 
     def strained(self, strain: float) -> State:
         """Scale box and positions by 1 + strain; rotations stay (Marschall & Teitel 2018, Eq. 20)."""

@@ -183,11 +183,13 @@ class Flow:
     """Steps that are not to grow any more."""
     _factors: Factorisation | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
+    _here: Evaluation | None = field(default=None, repr=False)
+    """At the end of the last step, before the last correction of its last stage."""
     _is_fresh: bool = True
 
     def forget(self) -> None:
         """Drop what is kept for speed, so that what follows depends on the public fields alone."""
-        self._factors, self._is_fresh = None, True
+        self._factors, self._here, self._is_fresh = None, None, True
 
 
 class Step(NamedTuple):
@@ -310,7 +312,8 @@ class _Run:
             self.vicinity.forget_pairs()
             flow._is_fresh = False
         self.kappa, phi_end = self.protocol.leg(self.phi)
-        here = self.vicinity.evaluate(self._still, 0.0, extended=False)
+        # What units and energies are taken from may be as little off as stages are.
+        here = flow._here or self._evaluated()
         if not flow.velocity.size:
             self._begin(here)
         longest = 0.5 * math.log(phi_end / self.phi) / self.kappa
@@ -321,6 +324,8 @@ class _Run:
             explicit = flow.explicit_left > 0 or dt < self._stable
             if explicit:
                 dt, clipped = min(dt, self._stable), False
+            if explicit and here is flow._here:
+                here = self._evaluated()
             attempt = self._tried(dt, explicit, here)
             if attempt is None:
                 self._refuse_crossing(dt)
@@ -361,6 +366,10 @@ class _Run:
             flow.dt = max(flow.dt, dt)
         self._accept(attempt, dt)
         return attempt.evaluation, error, dt
+
+    def _evaluated(self) -> Evaluation:
+        """Evaluate the present state."""
+        return self.vicinity.evaluate(self._still, 0.0, extended=False)
 
     def _refuse_crossing(self, dt: float) -> None:
         if self._crossing is None or dt > _AT_ONCE * min(self._stable, 1 / self.kappa):
@@ -464,10 +473,8 @@ class _Run:
         self, weights: tuple[float, ...], velocities: list[FloatArray], dt: float
     ) -> FloatArray:
         """Displacement by the velocities that there are so far."""
-        total = np.zeros(self.landscape.size)
-        for weight, velocity in zip(weights, velocities, strict=False):
-            total += dt * weight * velocity
-        return total
+        known = zip(weights, velocities, strict=False)
+        return sum((dt * weight * velocity for weight, velocity in known), start=self._still)
 
     def _predicted(
         self, after: float, velocities: list[FloatArray], times: list[float], dt: float
@@ -497,7 +504,7 @@ class _Run:
         strain = math.expm1(-self.kappa * dt)
         stretch = self.vicinity.stretch(strain)
         self.vicinity.move(attempt.x, strain)
-        flow.state = self.vicinity.base
+        flow.state, flow._here = self.vicinity.base, attempt.evaluation
         flow.acceleration = stretch * (attempt.velocities[-1] - flow.velocity) / dt
         flow.velocity = stretch * attempt.velocities[-1]
         flow.time += dt
