@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 from test_landscape import pressed_named
+from test_minimise import squeezed
 
+from jamshape.contacts import find_contacts
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.vicinity import Vicinity
 
@@ -36,11 +38,23 @@ def test_energy_and_gradient_are_those_of_the_landscape(packing, extended):
 
 
 def test_factors_are_those_of_the_hessian_of_the_landscape(packing):
+    require_factors_of_the_hessian(packing)
+
+
+def test_particles_that_touch_their_own_images_have_the_factors_of_the_hessian():
+    packing, state = squeezed(2, 4.0, 1.0)
+    i, j = find_contacts(state.packing(packing), sides=2).pairs.T
+    assert (i == j).any()
+    require_factors_of_the_hessian(state.packing(packing))
+
+
+def require_factors_of_the_hessian(packing):
     vicinity, x, state = about(packing)
     landscape = vicinity.landscape
     stretch = 1.0 + landscape.coordinates(np.tile([STRAIN, STRAIN, 0.0], (packing.n, 1)))
     hessian = stretch[:, None] * landscape.curvature(state).hessian.toarray() * stretch
-    diagonal = 1.0 + np.arange(landscape.size) / landscape.size - hessian.diagonal().min()
+    least = min(np.linalg.eigvalsh(hessian)[0], 0.0)
+    diagonal = 1.0 + np.arange(landscape.size) / landscape.size - least
     right = np.random.default_rng(4).normal(size=landscape.size)
     vicinity.evaluate(x, STRAIN, extended=False)
     found = vicinity.factorise(x, STRAIN, diagonal).solve(right)
