@@ -41,14 +41,15 @@ def add_to_diagonal(matrix: Any, values: float | FloatArray) -> Any:
 
 
 class Factorisation:
-    """Factors L D L^T of a sparse symmetric matrix, by Eigen.
+    """Factors L D L^T of a sparse symmetric matrix.
 
     Without pivoting, so that the signs of the pivots are those of the eigenvalues (Sylvester's law of
     inertia).
 
     Parameters
     ----------
-    factors : jamshape._contact.SymmetricFactors
+    factors : jamshape._contact.SymmetricFactors or BlockFactors
+        By Eigen, or by blocks of particles.
     """
 
     def __init__(self, factors: Any) -> None:
