@@ -75,8 +75,9 @@ template <class S> struct SoftlyLimited {
 /// down over a length before they stop at a tip, so that it has no corners.
 template <int D, class S> struct OppositeParts {
   S mean{0.0}, per_length{0.0};
-  S per_foot_on_i[2], per_foot_on_j[2];  // derivatives, for the feet of the other's + and - tip
+  S per_foot_on_i[2]{}, per_foot_on_j[2]{};  // derivatives, for the feet of the other's + and - tip
 
+  OppositeParts() = default;
   OppositeParts(const SpinePair<D, S> &p, const S &length)
   {
     const double sign = dot(p.u_i, p.u_j) < S(0.0) ? -0.5 : 0.5;
@@ -99,8 +100,9 @@ template <int D, class S> struct OppositeParts {
 /// opposite parts of the spines; with its derivatives by l, by the length and by u_i.u_j.
 template <int D, class S> struct BondWeight {
   OppositeParts<D, S> opposite;
-  S value, per_part, per_length, per_cosine;
+  S value{0.0}, per_part{0.0}, per_length{0.0}, per_cosine{0.0};
 
+  BondWeight() = default;
   BondWeight(const SpinePair<D, S> &p, const S &length, const S &of_angle, const S &gradient) :
       opposite(p, FADE_CORNER * length)
   {
@@ -183,9 +185,10 @@ template <int D, class S> struct SideToSide {
 
   SideToSide(const SpinePair<D, S> &p, const Feet<D, S> &near, const Feet<D, S> &far,
              double reach) :
-      overlap(p, near, far, reach), depth(overlap.mean, shorter(p), reach),
-      second(second_weight(p, fade_length(p, depth.wide))), mean(mean_weight(p, shorter(p), reach))
+      overlap(p, near, far, reach), depth(overlap.mean, shorter(p), reach)
   {
+    if (depth.two_bonds > 0.0) second = second_weight(p, fade_length(p, depth.wide));
+    if (depth.two_bonds < 1.0) mean = mean_weight(p, shorter(p), reach);
   }
 
   bool has_second() const

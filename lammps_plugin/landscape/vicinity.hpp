@@ -119,6 +119,7 @@ template <class Model> class Vicinity {
   {
     return extended ? sums<long double>(at) : sums<double>(at);
   }
+
   /// (n,) by how much a coordinate moves its particle: 1 + strain, and 1 for rotations.
   Eigen::VectorXd stretch(double strain) const
   {
