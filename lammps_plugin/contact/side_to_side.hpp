@@ -184,8 +184,7 @@ template <int D, class S> struct SideToSide {
   BondWeight<D, S> second, mean;
 
   SideToSide(const SpinePair<D, S> &p, const Feet<D, S> &near, const Feet<D, S> &far,
-             double reach) :
-      overlap(p, near, far, reach), depth(overlap.mean, shorter(p), reach)
+             double reach) : overlap(p, near, far, reach), depth(overlap.mean, shorter(p), reach)
   {
     if (depth.two_bonds > 0.0) second = second_weight(p, fade_length(p, depth.wide));
     if (depth.two_bonds < 1.0) mean = mean_weight(p, shorter(p), reach);
