@@ -38,10 +38,10 @@ def exact(request):
 
 
 def assert_bounds_hold_and_are_not_loose(found, exact):
-    """Below a millionth of the eigenvalue or a tenth of what rounding of the entries does; or the error is large."""
+    """Below a millionth of the eigenvalue or what rounding of the entries does; or the error is large."""
     error = errors(found.eigenvalues, exact)
     assert (error <= found.solver_error).all()
-    least = np.maximum(0.1 * found.entry_error, 1e-6 * np.abs(found.eigenvalues))
+    least = np.maximum(found.entry_error, 1e-6 * np.abs(found.eigenvalues))
     tight = found.solver_error <= np.maximum(1e4 * error, least)
     assert (tight | found.is_translation).all()
 
