@@ -135,6 +135,24 @@ BondWeight<D, S> mean_weight(const SpinePair<D, S> &p, double shorter, double re
   return {p, FADE_LENGTH * shorter, 1.0 - smooth_step(x), gradient};
 }
 
+/// Whether rods that touch at both ends have two whole bonds because they are shallow, nearly
+/// parallel and far enough side by side: most have, and need no weights.
+template <int D, class S>
+bool are_plainly_whole(const SpinePair<D, S> &p, const S &overlap, double reach)
+{
+  const double shorter = std::min(p.A_i, p.A_j);
+  const S cosine = abs(dot(p.u_i, p.u_j));
+  if (overlap * reach * reach > SHALLOW * shorter * shorter) return false;
+  if (cosine < FADE_COSINE_START + FADE_COSINE_RANGE) return false;
+  const auto part = [&](const S &middle, double bound, const S &half) {
+    return limited<S>(middle + half, bound) - limited<S>(middle - half, bound);
+  };
+  const S opposite =
+      part(dot(p.u_i, p.r), p.A_i, p.A_j * cosine) + part(dot(p.u_j, p.r), p.A_j, p.A_i * cosine);
+  // Feet that slow down lose at most the length over which they do.
+  return opposite >= 2.0 * (1.0 + FADE_CORNER) * FADE_LENGTH * shorter;
+}
+
 /// Overlaps a of the nearer end, b of the farther one, their mean m, and a - m: from the difference
 /// of the feet, since the overlaps differ by less than they round.
 template <class S> struct EndOverlaps {

@@ -230,8 +230,12 @@ template <int D, class S> class SpherocylinderContact {
     const S distance = sqrt(closest.distance_sq), a = overlap_at(distance);
     const double shorter = std::min(pair.A_i, pair.A_j);
     const bool may_be_deep = 0.5 * a * reach * reach > shorter * shorter;
-    if (shorter > 0.0 && (touches(far_end.distance_sq) || may_be_deep)) {
-      // Most have two whole bonds, or one: that is seen without derivatives.
+    const bool has_two_ends = touches(far_end.distance_sq);
+    if (has_two_ends && are_plainly_whole(values_of(pair), value_of(a), reach)) {
+      return two_whole_bonds(closest, far_end);
+    }
+    if (shorter > 0.0 && (has_two_ends || may_be_deep)) {
+      // Of the others, too, many have two whole bonds, or one: that is seen without derivatives.
       const SideToSide<D, ValueOf<S>> side(values_of(pair), values_of(closest), values_of(far_end),
                                            reach);
       if (side.has_two_whole_bonds()) return two_whole_bonds(closest, far_end);
