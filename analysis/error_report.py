@@ -17,6 +17,7 @@ import importlib.metadata
 import json
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import time
@@ -145,9 +146,11 @@ def parse() -> argparse.Namespace:
 def run(name: str, options: argparse.Namespace) -> dict[str, Any]:
     """Run a study unless its result is there; return its record."""
     folder: Path = options.out / name
+    if options.again and folder.exists():
+        shutil.rmtree(folder)  # scripts keep what they have finished
     folder.mkdir(parents=True, exist_ok=True)
     record = folder / "record.json"
-    if record.exists() and not options.again:
+    if record.exists():
         found: dict[str, Any] = json.loads(record.read_text())
         if found["full"] == options.full and not found["failed"]:
             return found

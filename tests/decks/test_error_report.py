@@ -41,8 +41,11 @@ def test_a_study_is_run_once_and_its_page_regenerates_it(error_report, tmp_path,
     assert error_report.main(options(tmp_path)) == 0
     assert picture.stat().st_mtime_ns == drawn
     assert (tmp_path / "overview.png").stat().st_size > 5000
+    finished = tmp_path / "contact" / "finished_run.json"
+    finished.touch()
     assert error_report.main(options(tmp_path, again=True)) == 0
     assert picture.stat().st_mtime_ns > drawn
+    assert not finished.exists()
 
 
 def test_a_study_that_fails_does_not_stop_the_others(error_report, tmp_path, capsys):
