@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.contacts import ContactNetwork, coordination, find_contacts, find_rattlers
-from jamshape.lammps_files import read_any
+from jamshape.files.lammps_text import read_any
 from jamshape.packing import Box, FloatArray, IntArray, Packing
-from jamshape.storage import FileFormatError, read_attributes
+from jamshape.files.h5md import FileFormatError, read_attributes
 
 SMALL, BIG, RATTLER, CONTACT = "#86c98a", "#6ea6dc", "#cfcfcf", "#d7191c"
 INCHES, MARGIN = 7.0, np.array([0.1, 0.35])  # of the longer edge, around the box

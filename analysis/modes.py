@@ -3,7 +3,7 @@
     python analysis/modes.py PACKING.h5 --out modes.h5
 
 Eigenvalues of the dynamical matrix with signs and error bounds, bands and their counts, participation,
-kinds of motion and elastic moduli, to HDF5 (see jamshape.mode_table). PACKING is H5MD as make_packing.py
+kinds of motion and elastic moduli, to HDF5 (see jamshape.vibration.table). PACKING is H5MD as make_packing.py
 writes it. Needs no LAMMPS. The last line of standard output is one JSON object.
 """
 
@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.hessian import Scope, dynamical_matrix
+from jamshape.vibration.hessian import Scope, dynamical_matrix
 from jamshape.landscape import Landscape, State
-from jamshape.mode_statistics import density_of_states, mean_in_bins, redundancies
-from jamshape.mode_table import BANDS, ModeTable, tabulate, write_modes
-from jamshape.modes import METHODS, Spectrum, spectrum
-from jamshape.sparse_modes import lowest, near
-from jamshape.storage import read_attributes, read_packing
+from jamshape.vibration.statistics import density_of_states, mean_in_bins, redundancies
+from jamshape.vibration.table import BANDS, ModeTable, tabulate, write_modes
+from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
+from jamshape.vibration.sparse_modes import lowest, near
+from jamshape.files.h5md import read_attributes, read_packing
 
 SHOWN = 12  # modes of the printed table
 KINDS = {"rotation": "o", "parallel": "s", "perpendicular": "D"}

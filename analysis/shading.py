@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jamshape.packing import FloatArray, IntArray, Packing
-from jamshape.surfaces import SurfaceMesh, surface_mesh
+from jamshape.shapes.superellipsoid_surface import SurfaceMesh, surface_mesh
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,9 +17,9 @@ import numpy as np
 from sweep_files import BLACK, BLUE, GREEN, ORANGE, RED, SKY, Mean, Sample, finished, mean
 
 from jamshape.contacts import find_contacts
-from jamshape.order3d import directors, local_cubatic_order, local_nematic_order
+from jamshape.measures.order3d import directors, local_cubatic_order, local_nematic_order
 from jamshape.packing import FloatArray, Packing, body_axes
-from jamshape.storage import read_packing
+from jamshape.files.h5md import read_packing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

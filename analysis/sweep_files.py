@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from jamshape.contacts import BoolArray, ContactNetwork, find_contacts, find_rattlers
 from jamshape.packing import Packing
-from jamshape.storage import read_attributes, read_observables, read_packing
+from jamshape.files.h5md import read_attributes, read_observables, read_packing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

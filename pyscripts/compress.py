@@ -15,10 +15,10 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from jamshape.initial import Mixture, random_packing
+from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.packing import Packing
-from jamshape.protocols import Compression, Recording, begin, is_finished, record, resume, summary
-from jamshape.session import Session
+from jamshape.flow.compression import Compression, Recording, begin, is_finished, record, resume, summary
+from jamshape.lammps.session import Session
 
 
 def parse() -> argparse.Namespace:

@@ -8,10 +8,10 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from jamshape.initial import Mixture, random_packing
-from jamshape.lammps_files import write_data
+from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.files.lammps_text import write_data
 from jamshape.packing import Packing
-from jamshape.storage import write_packing
+from jamshape.files.h5md import write_packing
 
 
 def parse() -> argparse.Namespace:

@@ -21,10 +21,11 @@ from typing import Any
 
 from tqdm import tqdm
 
-from jamshape import jammed, superellipsoid_jammed
-from jamshape.approach import Approach
-from jamshape.quasistatic import Quasistatic
-from jamshape.target import Target
+from jamshape.protocols import jammed
+from jamshape.protocols import superellipsoid_jammed
+from jamshape.protocols.approach import Approach
+from jamshape.protocols.quasistatic import Quasistatic
+from jamshape.minima.target import Target
 
 # Options with their types, defaults by shape (None: not an option of it) and meanings.
 OPTIONS = (

@@ -11,7 +11,7 @@ from spherocylinder_pairs import EPS, concatenated, disc_to_disc, tip_to_side, t
 
 from jamshape import _contact
 from jamshape.contacts import bodies, each_once, find_contacts, forces, near_pairs
-from jamshape.initial import Mixture, random_packing
+from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.packing import Box
 
 K_E = 1.7

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jamshape import contacts
-from jamshape.lammps_files import read_any, read_data, read_dump
+from jamshape.contacts import network as contacts
+from jamshape.files.lammps_text import read_any, read_data, read_dump
 
 sys.path.append(str(Path(__file__).parents[1] / "styles"))
 

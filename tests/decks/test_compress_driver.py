@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jamshape.storage import read_attributes, read_observables, read_packing, read_report
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 
 pytestmark = pytest.mark.lammps
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jamshape.lammps_files import read_data, read_dump
+from jamshape.files.lammps_text import read_data, read_dump
 
 sys.path.append(str(Path(__file__).parents[1] / "styles"))
 

@@ -10,8 +10,8 @@ import pytest
 
 from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape, State
-from jamshape.minimise import residual_of
-from jamshape.storage import read_attributes, read_observables, read_packing, read_report
+from jamshape.minima.minimise import residual_of
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 
 pytestmark = pytest.mark.lammps
 

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from jamshape.hessian import Coordinates, dynamical_matrix
-from jamshape.initial import Mixture, random_packing
-from jamshape.jammed import write_minimum
+from jamshape.vibration.hessian import Coordinates, dynamical_matrix
+from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.jammed import write_minimum
 from jamshape.landscape import Landscape, State
-from jamshape.minimise import Stop, minimise
-from jamshape.mode_table import ModeTable, tabulate, write_modes
-from jamshape.modes import spectrum
-from jamshape.storage import read_attributes, read_packing, write_packing
-from jamshape.target import Target, find
+from jamshape.minima.minimise import Stop, minimise
+from jamshape.vibration.table import ModeTable, tabulate, write_modes
+from jamshape.vibration.spectrum import spectrum
+from jamshape.files.h5md import read_attributes, read_packing, write_packing
+from jamshape.minima.target import Target, find
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 OF_MODES = ("density_of_states", "participation", "mode_components", "band_frequency")

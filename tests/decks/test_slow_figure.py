@@ -8,7 +8,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "analysis"))
 
 from fig_slow_compression import Cost, Ensemble, Run, draw, row, table
 
-from jamshape.jamming import fit_onset
+from jamshape.measures.onset import fit_onset
 
 ONSETS = {1: 0.85, 2: 0.852, 3: 0.86}
 SHIFTS = {1: 0.001, 2: 0.002, 3: 0.003}

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from jamshape.packing import Box, Packing
-from jamshape.quasistatic import Quasistatic
-from jamshape.storage import read_attributes, read_packing, write_packing
-from jamshape.superellipsoid_jammed import Sample, make
-from jamshape.target import Target
+from jamshape.protocols.quasistatic import Quasistatic
+from jamshape.files.h5md import read_attributes, read_packing, write_packing
+from jamshape.protocols.superellipsoid_jammed import Sample, make
+from jamshape.minima.target import Target
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 OF_SWEEPS = (

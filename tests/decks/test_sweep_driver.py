@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from jamshape.storage import read_attributes, read_packing
+from jamshape.files.h5md import read_attributes, read_packing
 
 pytestmark = pytest.mark.lammps
 

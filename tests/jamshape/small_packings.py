@@ -8,11 +8,11 @@ import numpy as np
 import scipy.sparse
 from test_minimise import squeezed
 
-from jamshape.hessian import dynamical_matrix
+from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.landscape import Landscape
-from jamshape.minimise import Residual
-from jamshape.modes import spectrum
-from jamshape.target import Target, find
+from jamshape.minima.minimise import Residual
+from jamshape.vibration.spectrum import spectrum
+from jamshape.minima.target import Target, find
 
 # n, alpha, packing fraction just below jamming, seed
 SMALL = {

@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "analysis"))
 import stability_shapes
 from stability_shapes import SCENES, crowd, exponents_of, far_apart, particles, tiny_box
 
-from jamshape.lammps_files import write_data
-from jamshape.session import Session
+from jamshape.files.lammps_text import write_data
+from jamshape.lammps.session import Session
 
 __all__ = ["SCENES", "crowd", "exponents_of", "far_apart", "particles", "tiny_box"]
 

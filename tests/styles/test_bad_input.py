@@ -20,7 +20,7 @@ from lammps_scenes import (
     scene,
 )
 
-from jamshape.lammps_files import write_data
+from jamshape.files.lammps_text import write_data
 
 pytestmark = pytest.mark.lammps
 
@@ -314,7 +314,7 @@ def test_late_list_rebuilds_are_set_right(tmp_path):
 def test_another_version_of_lammps_is_refused():
     code = """
 import ctypes
-from jamshape.session import Session, plugin_path
+from jamshape.lammps.session import Session, plugin_path
 Session().close()
 plugin = ctypes.CDLL(str(plugin_path()))
 ctypes.c_int.in_dll(plugin, "jamshape_built_for").value = 20200101

@@ -23,8 +23,9 @@ from lammps_scenes import (
     with_odd_ids,
 )
 
-from jamshape import _contact, contacts
-from jamshape.order import orientational_order
+from jamshape import _contact
+from jamshape.contacts import network as contacts
+from jamshape.measures.order import orientational_order
 
 pytestmark = pytest.mark.lammps
 

@@ -19,8 +19,8 @@ from lammps_scenes import (
     state_of,
 )
 
-from jamshape import contacts
-from jamshape.initial import Mixture, random_packing
+from jamshape.contacts import network as contacts
+from jamshape.protocols.random_start import Mixture, random_packing
 
 pytestmark = pytest.mark.lammps
 

@@ -38,8 +38,8 @@ from lammps_scenes import (
 )
 from scipy.spatial import cKDTree
 
-from jamshape import contacts
-from jamshape.lammps_files import write_data
+from jamshape.contacts import network as contacts
+from jamshape.files.lammps_text import write_data
 
 pytestmark = pytest.mark.lammps
 

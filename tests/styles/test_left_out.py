@@ -16,7 +16,7 @@ from lammps_scenes import (
 from superellipsoid_scenes import crowd
 from superellipsoid_scenes import scene as scene_of_superellipsoids
 
-from jamshape.session import Session
+from jamshape.lammps.session import Session
 
 pytestmark = pytest.mark.lammps
 

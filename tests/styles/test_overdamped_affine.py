@@ -34,7 +34,8 @@ from lammps_scenes import (
     wrapped,
 )
 
-from jamshape import _contact, contacts
+from jamshape import _contact
+from jamshape.contacts import network as contacts
 
 pytestmark = pytest.mark.lammps
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from jamshape.initial import Mixture, random_packing
-from jamshape.protocols import Compression, CompressionRun
-from jamshape.session import Session
+from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.flow.compression import Compression, CompressionRun
+from jamshape.lammps.session import Session
 
 pytestmark = pytest.mark.lammps
 

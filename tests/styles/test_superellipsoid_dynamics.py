@@ -33,7 +33,7 @@ from superellipsoid_scenes import (
 
 from jamshape import _contact
 from jamshape.packing import body_axes
-from jamshape.shapes import superellipsoid_bodies
+from jamshape.landscape.adapter import superellipsoid_bodies
 
 pytestmark = pytest.mark.lammps
 

@@ -31,8 +31,8 @@ from superellipsoid_scenes import (
     tiny_box,
 )
 
-from jamshape.lammps_files import write_data
-from jamshape.order3d import cubatic_order, directors, nematic_order
+from jamshape.files.lammps_text import write_data
+from jamshape.measures.order3d import cubatic_order, directors, nematic_order
 from jamshape.packing import body_axes
 
 pytestmark = pytest.mark.lammps

@@ -1,0 +1,213 @@
+"""Error against run time of every way to find modes, and how run time grows with the packing.
+
+    python analysis/spectrum_error.py SMALL.h5 [LARGER.h5 ...] --tiles 2 6 --out spectrum_error.png
+
+Packings as make_packing.py writes them. On the left, for each packing and method, the relative error of every
+mode against the refined spectrum (or the bound of that one, where it is larger), medians and largest in each
+band. On the right, seconds against N; --tiles adds copies of the first packing beside each other, with the
+stiffness of bonds varied by a tenth so that they differ, of which the 20 softest modes are found. Seconds
+are of the processor. The last line of standard output is one JSON object.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.sparse
+
+from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix
+from jamshape.landscape import Landscape, State
+from jamshape.vibration.statistics import bands
+from jamshape.vibration.spectrum import Spectrum, spectrum
+from jamshape.packing import Box, FloatArray, IntArray, Packing
+from jamshape.vibration.sparse_modes import lowest
+from jamshape.files.h5md import read_packing
+
+METHODS = ("plain", "first_order", "projected", "refined", "sparse")
+COLORS = dict(zip(METHODS, ("#999999", "#e69f00", "#0072b2", "#009e73", "#cc79a7"), strict=True))
+MARKERS = {"low": "v", "middle": "s", "high": "^"}
+SOFTEST = 20  # modes of copies
+BEYOND = 10  # modes of the high band that the sparse method finds besides all below
+
+
+class Timed(NamedTuple):
+    """What a method found, and in how much time of the processor."""
+
+    found: Spectrum
+    seconds: float
+
+
+def timed(call: Callable[[], Spectrum]) -> Timed:
+    """Measure a call."""
+    began = time.process_time()
+    found = call()
+    return Timed(found, time.process_time() - began)
+
+
+def errors(found: Spectrum, reference: Spectrum) -> tuple[IntArray, FloatArray]:
+    """Compare modes in order of size: rows of the reference, and relative errors of those whose sign it knows.
+
+    A sparse spectrum holds the softest; its modes are those of the reference's that are softest.
+    """
+    real = np.flatnonzero(~reference.is_translation)
+    rows = real[np.argsort(np.abs(reference.eigenvalues[real]), kind="stable")]
+    ours = found.eigenvalues[~found.is_translation]
+    rows = np.sort(rows[: len(ours)])
+    difference = np.abs(np.sort(ours) - reference.eigenvalues[rows])
+    size = np.abs(reference.eigenvalues[rows])
+    sure = reference.sign[rows] != 0
+    relative = np.maximum(difference, reference.solver_error[rows])[sure] / size[sure]
+    return rows[sure], relative
+
+
+def measure(path: Path) -> dict[str, Any]:
+    """Run every method on one packing."""
+    packing = read_packing(path)
+    matrix = dynamical_matrix(Landscape(packing), State.of(packing))
+    runs = {m: timed(partial(spectrum, matrix, m)) for m in METHODS if m != "sparse"}
+    reference = runs["refined"].found
+    parts = bands(matrix, reference)
+    n_below = sum(band.n_modes for band in parts if band.name != "high")
+    runs["sparse"] = timed(lambda: lowest(matrix, n_below + BEYOND))
+    rows: dict[str, Any] = {}
+    for method, run in runs.items():
+        which, relative = errors(run.found, reference)
+        rows[method] = {"seconds": run.seconds, "bands": {}}
+        for band in parts:
+            own = relative[np.isin(which, band.modes)]
+            if len(own):
+                both = {"median": float(np.median(own)), "largest": float(own.max())}
+                rows[method]["bands"][band.name] = {"modes": len(own), **both}
+    return {"packing": str(path), "n": packing.n, "coordinates": matrix.size, "methods": rows}
+
+
+def tiled(packing: Packing, k: int) -> tuple[Packing, State]:
+    """Put k x k copies beside each other."""
+    position, orientation, edges = packing.poses()
+    shifts = np.array(list(np.ndindex(k, k)))
+    where = np.concatenate([position + shift * edges for shift in shifts])
+    turned = np.tile(orientation, k * k)
+    large = Packing(
+        position=where.astype(np.float64),
+        orientation=turned.astype(np.float64),
+        diameters=np.tile(packing.diameters, (k * k, 1)),
+        species=np.tile(packing.species, k * k),
+        id=np.arange(1, packing.n * k * k + 1),
+        box=Box(packing.box.lo, k * packing.box.edges),
+    ).with_poses(where, turned, k * edges)
+    return large, State.of(large)
+
+
+def varied(matrix: DynamicalMatrix) -> DynamicalMatrix:
+    """Vary the stiffness of every bond by a tenth, at random."""
+    factors = 1 + 0.1 * np.random.default_rng(0).uniform(-1, 1, matrix.n_bonds)
+    return replace(matrix, compatibility=scipy.sparse.diags(factors) @ matrix.compatibility)
+
+
+def measure_tiles(path: Path, k: int) -> dict[str, Any]:
+    """Time the sparse method on copies."""
+    packing, state = tiled(read_packing(path), k)
+    began = time.process_time()
+    matrix = dynamical_matrix(Landscape(packing), state)
+    assembly = time.process_time() - began
+    run = timed(lambda: lowest(varied(matrix), SOFTEST))
+    real = np.abs(run.found.eigenvalues) > run.found.bound
+    relative = (run.found.bound / np.abs(run.found.eigenvalues))[real]
+    return {
+        "n": packing.n,
+        "seconds": run.seconds,
+        "assembly_seconds": assembly,
+        "relative_bound": float(relative.max()) if len(relative) else None,
+    }
+
+
+def show(rows: list[dict[str, Any]], tiles: list[dict[str, Any]]) -> None:
+    """Print both tables."""
+    print("   n  method       seconds  band     modes  median error  largest error")
+    for row in rows:
+        for method, of in row["methods"].items():
+            for band, e in of["bands"].items():
+                start = f"{row['n']:5} {method:11} {of['seconds']:9.3g}  {band:7}"
+                print(f"{start} {e['modes']:6}  {e['median']:12.2e}  {e['largest']:13.2e}")
+    for tile in tiles:
+        print(f"{tile['n']} particles, {SOFTEST} softest modes: {tile['seconds']:.3g} s")
+
+
+def draw(rows: list[dict[str, Any]], tiles: list[dict[str, Any]], out: Path) -> None:
+    """Draw errors and growth."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
+
+    figure = Figure(figsize=(11, 4.5), dpi=150, layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for row in rows:
+        for method, of in row["methods"].items():
+            for band, e in of["bands"].items():
+                values = [max(e[key], 1e-20) for key in ("median", "largest")]
+                style: dict[str, Any] = {"color": COLORS[method], "marker": MARKERS[band]}
+                left.loglog([of["seconds"]] * 2, values, **style, mfc="none", lw=0.8)
+    for band, marker in MARKERS.items():
+        left.plot([], [], marker, color="0.3", mfc="none", label=f"{band} band")
+    left.set_xlabel("seconds")
+    left.set_ylabel("relative error of eigenvalues, median and largest")
+    # Errors fill the whole panel, so that no corner is free.
+    left.legend(fontsize=8, ncols=len(MARKERS), loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    for method in METHODS:
+        n = [row["n"] for row in rows]
+        seconds = [row["methods"][method]["seconds"] for row in rows]
+        right.loglog(n, seconds, "o-", color=COLORS[method], label=method.replace("_", " "))
+    if tiles:
+        label = f"sparse, {SOFTEST} softest of copies"
+        x, y = [t["n"] for t in tiles], [t["seconds"] for t in tiles]
+        right.loglog(x, y, "D--", color=COLORS["sparse"], mfc="none", label=label)
+    right.set_xlabel("particles")
+    right.set_ylabel("seconds")
+    right.legend(fontsize=8)
+    figure.savefig(out)
+
+
+def curves(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Largest relative errors of each band against seconds, one curve for each method and band."""
+    found: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        for method, of in row["methods"].items():
+            for band, errors_of in of["bands"].items():
+                name = f"{method.replace('_', ' ')}, {band} band"
+                curve = found.setdefault(name, {"name": name, "seconds": [], "error": []})
+                curve["seconds"].append(of["seconds"])
+                curve["error"].append(errors_of["largest"])
+    return list(found.values())
+
+
+def main() -> None:
+    """Measure, draw, report."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("packings", type=Path, nargs="+", metavar="PACKING.h5")
+    parser.add_argument("--tiles", type=int, nargs="*", default=[], help="copies along each edge")
+    parser.add_argument(
+        "--out", type=Path, default=Path("spectrum_error.png"), help="(%(default)s)"
+    )
+    options = parser.parse_args()
+    rows = [measure(path) for path in options.packings]
+    tiles = [measure_tiles(options.packings[0], k) for k in options.tiles]
+    show(rows, tiles)
+    draw(rows, tiles, options.out)
+    found = {"out": str(options.out), "packings": rows, "tiles": tiles}
+    print(json.dumps(found | {"curves": curves(rows)}))
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (OSError, ValueError) as error:
+        sys.exit(f"spectrum_error.py: {error}")

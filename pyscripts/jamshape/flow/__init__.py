@@ -1,0 +1,1 @@
+"""Overdamped motion: by LAMMPS, and implicit."""

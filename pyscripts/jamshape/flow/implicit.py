@@ -1,0 +1,511 @@
+"""Overdamped compression at any rate, however slow: adaptive, implicit and L-stable.
+
+The motion of Marschall & Teitel 2018, Eqs. 6-13, in coordinates scaled by the box, where the affine part is
+exact and what is left is mobility times force: a gradient flow, stiff as soon as particles touch. Explicit
+methods must resolve the relaxation of a contact whatever the rate; here the step follows the path of the
+packing, and its cost hardly depends on the rate. Where a packing rearranges, the step falls to the
+relaxation time and grows again. In two dimensions; needs no LAMMPS.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from jamshape import _contact
+from jamshape.landscape import CrossingError, Evaluation, Landscape, State
+from jamshape.landscape.newton import Factorisation
+from jamshape.packing import FloatArray, Packing
+from jamshape.landscape.vicinity import Stage, Units, Vicinity
+
+# Stages are solved to this fraction of the local error that is allowed. Ten times as much leaves velocities on kinks
+# that have the next steps rejected: packings of nearly round rods then cost ten times as many.
+_STAGE_ACCURACY = 0.003
+
+# Steps change by these factors, and aim at this fraction of the error that is allowed.
+_LARGEST_GROWTH, _LEAST_GROWTH, _SAFETY = 3.0, 0.2, 0.85
+
+# After a stage without a solution, and after one where the energy falls too far.
+_RETREAT, _FALLING = 0.25, 0.5
+
+# Steps that do not grow after one that was rejected.
+_HELD = 2
+
+# Factors of a step serve another one whose size differs by less than this factor.
+_SAME_STEP = 1.5
+
+# Below this fraction of drag over stiffness steps are explicit, so many in a row.
+_EXPLICIT_BELOW, _EXPLICIT_IN_A_ROW = 0.5, 20
+_LEAST_STEP = 1e-3
+
+# Spines that cross within so small a fraction of the times of contacts and of the box cross whatever the step.
+_AT_ONCE = 1e-9
+
+# Doubles are too short where their rounding is above this fraction of the accuracy of a stage.
+_ROUNDING = 0.1
+
+
+class Method(NamedTuple):
+    """A diagonally implicit Runge-Kutta method whose last stage is the end of the step."""
+
+    weights: tuple[tuple[float, ...], ...]
+    """Lower triangle of the tableau; an explicit stage has 0 on the diagonal."""
+    error: tuple[float, ...]
+    """Weights of the estimate of the local error."""
+    order_of_error: int
+
+    @property
+    def times(self) -> list[float]:
+        """Times of the stages, over the step."""
+        return [sum(row) for row in self.weights]
+
+
+_G = 1 - math.sqrt(0.5)
+_W = math.sqrt(0.125)
+
+METHODS = {
+    # Alexander 1977, SIAM J. Numer. Anal. 14, 1006; beside it a method of first order.
+    "sdirk2": Method(((_G,), (1 - _G, _G)), (0.5 - _G, _G - 0.5), 2),
+    # Hosea & Shampine 1996, Appl. Numer. Math. 20, 21; beside it a method of third order.
+    "tr-bdf2": Method(((0.0,), (_G, _G), (_W, _W, _G)), ((4 * _W - 1) / 3, -1 / 3, 2 * _G / 3), 3),
+}
+
+_HEUN_EULER = Method(((0.0,), (1.0, 0.0), (0.5, 0.5, 0.0)), (-0.5, 0.5, 0.0), 2)
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """How to compress.
+
+    Parameters
+    ----------
+    kappa
+        Rate, dL/dt = -kappa L, [1/time]; or rates and the packing fractions from which they hold,
+        ``((phi, kappa), ...)``, ascending in phi.
+    phi_end, p_end
+        It ends at this packing fraction, or at the first step with this pressure.
+    tolerance
+        Local error of a step over the typical overlap.
+    k_d
+        Drag, [energy time / length^(D + 2)].
+    largest_strain
+        Of the box in a step.
+    largest_drop
+        Part of the elastic energy that a step may lose: plastic events, where particles move by
+        themselves and the energy falls, are resolved in time by so many steps. Not of energies
+        below that to which the drag on the particles pushes them.
+    method
+        One of `METHODS`.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range.
+    """
+
+    kappa: float | tuple[tuple[float, float], ...] = 1e-8
+    phi_end: float = 0.9
+    p_end: float = math.inf
+    tolerance: float = 1e-3
+    k_d: float = 1.0
+    largest_strain: float = 1e-3
+    largest_drop: float = math.inf
+    method: str = "tr-bdf2"
+
+    def __post_init__(self) -> None:
+        for name in ("phi_end", "p_end", "tolerance", "k_d", "largest_strain", "largest_drop"):
+            if not getattr(self, name) > 0:
+                msg = f"{name} is {getattr(self, name)}, expected a positive number"
+                raise ValueError(msg)
+        phis, rates = zip(*self.rates, strict=True)
+        if not all(math.isfinite(rate) and rate > 0 for rate in rates):
+            msg = f"kappa is {self.kappa}, expected positive rates"
+            raise ValueError(msg)
+        if list(phis) != sorted(set(phis)):
+            msg = f"kappa is {self.kappa}, expected ascending packing fractions"
+            raise ValueError(msg)
+        if self.method not in METHODS:
+            msg = f"the method is {self.method!r}, expected one of {', '.join(METHODS)}"
+            raise ValueError(msg)
+
+    @property
+    def rates(self) -> tuple[tuple[float, float], ...]:
+        """Packing fractions and the rates from there on."""
+        if isinstance(self.kappa, tuple):
+            return self.kappa
+        return ((0.0, self.kappa),)
+
+    def leg(self, phi: float) -> tuple[float, float]:
+        """Give the rate at phi, and the packing fraction up to which it holds."""
+        nearly = phi * (1 + 1e-13)
+        kappa = next((rate for start, rate in reversed(self.rates) if start <= nearly),
+                     self.rates[0][1])  # fmt: skip
+        ends = [start for start, _ in self.rates if start > nearly]
+        return kappa, min([*ends, self.phi_end])
+
+
+@dataclass(eq=False)
+class Flow:
+    """A compression between two steps: all that is needed to go on from here.
+
+    Parameters
+    ----------
+    state : State
+    dt : float, [time]
+        Size of the next step; 0 to choose one.
+    velocity : (n,) array, [length / time]
+        Of the non-affine motion, at the end of the last step, in the coordinates of the landscape;
+        empty to find it.
+    acceleration : (n,) array, [length / time^2]
+        Its change over the last step; both only predict, unless the method has an explicit stage.
+    """
+
+    state: State
+    dt: float = 0.0
+    velocity: FloatArray = field(default_factory=lambda: np.empty(0))
+    acceleration: FloatArray = field(default_factory=lambda: np.empty(0))
+    time: float = 0.0
+    strain: float = 0.0
+    """Of the box since the start, -ln L / L_0."""
+    steps: int = 0
+    rejected: int = 0
+    explicit: int = 0
+    evaluations: int = 0
+    factorisations: int = 0
+    wall_seconds: float = 0.0
+    explicit_left: int = 0
+    held: int = 0
+    """Steps that are not to grow any more."""
+    _factors: Factorisation | None = field(default=None, repr=False)
+    _dt_of_factors: float = 0.0
+    _here: Evaluation | None = field(default=None, repr=False)
+    """At the end of the last step, before the last correction of its last stage."""
+    _is_fresh: bool = True
+
+    def forget(self) -> None:
+        """Drop what is kept for speed, so that what follows depends on the public fields alone."""
+        self._factors, self._here, self._is_fresh = None, None, True
+
+
+class Step(NamedTuple):
+    """An accepted step; counts are since the start of the flow."""
+
+    step: int
+    time: float
+    strain: float
+    phi: float
+    p: float
+    u: float
+    dt: float
+    error: float
+    """Local error over the typical overlap."""
+    evaluations: int
+    factorisations: int
+    rejected: int
+    explicit: int
+    wall_seconds: float
+
+
+def compress(landscape: Landscape, flow: Flow, protocol: Protocol) -> Iterator[Step]:
+    """Compress to the end of the protocol.
+
+    Parameters
+    ----------
+    landscape : Landscape
+        Of particles in two dimensions.
+    flow : Flow
+        Where to begin, or to go on; moved along.
+    protocol : Protocol
+
+    Yields
+    ------
+    Step
+        After each accepted step.
+
+    Raises
+    ------
+    ValueError
+        If the particles are not in two dimensions.
+    CrossingError
+        If spines cross at the start, or at a rate that their contacts do not withstand.
+    """
+    run = _Run(landscape, flow, protocol)
+    while run.phi < protocol.phi_end * (1 - 1e-12):
+        began, evaluations = time.perf_counter(), landscape.evaluations
+        found, error, dt = run.step()
+        flow.wall_seconds += time.perf_counter() - began
+        flow.evaluations += landscape.evaluations - evaluations
+        flow.steps += 1
+        volume = flow.state.volume
+        pressure = -found.strain_gradient / (2 * volume)
+        yield Step(
+            flow.steps, flow.time, flow.strain, run.phi, pressure, found.energy / volume, dt, error,
+            flow.evaluations, flow.factorisations, flow.rejected, flow.explicit, flow.wall_seconds,
+        )  # fmt: skip
+        if pressure >= protocol.p_end:
+            return
+
+
+def drag_coefficients(landscape: Landscape, k_d: float = 1.0) -> FloatArray:
+    """(n,) drag over velocity: k_d Area, and k_d Area I / A^2 for rotations, as lengths A theta.
+
+    Marschall & Teitel 2018, Eqs. 11 and 12.
+
+    Raises
+    ------
+    ValueError
+        If the particles are not in two dimensions.
+    """
+    packing = landscape.particles
+    if packing.dimension != 2:
+        msg = f"the packing has {packing.dimension} dimensions, expected 2"
+        raise ValueError(msg)
+    measure, moment = _drag(packing)
+    length = np.where(landscape.rotation_length > 0, landscape.rotation_length, 1.0)
+    turning = measure * moment[:, 2] / length**2
+    return k_d * landscape.coordinates(np.column_stack([measure, measure, turning]))
+
+
+def _drag(packing: Packing) -> tuple[FloatArray, FloatArray]:
+    if packing.shape_style == "spherocylinder":
+        return _contact.spherocylinder_drag(packing.half_length, packing.radius, 2)
+    return _contact.superellipsoid_drag(packing.diameters, packing.exponent, 2)
+
+
+class _Attempt(NamedTuple):
+    """A step that was tried."""
+
+    x: FloatArray
+    velocities: list[FloatArray]
+    error: float
+    evaluation: Evaluation
+
+
+class _Run:
+    """A flow on its landscape."""
+
+    def __init__(self, landscape: Landscape, flow: Flow, protocol: Protocol) -> None:
+        self.landscape, self.flow, self.protocol = landscape, flow, protocol
+        self.vicinity = Vicinity(landscape, flow.state)
+        self._still = np.zeros(landscape.size)
+        self.drag = drag_coefficients(landscape, protocol.k_d)
+        self._least_drag = float(self.drag.min())
+        self.area = float(landscape.particles.measures.sum())
+        self.size = 2 * float(landscape.inner_radius.mean())
+        self.kappa = 0.0
+        self._crossing: CrossingError | None = None
+
+    @property
+    def phi(self) -> float:
+        return self.area / self.flow.state.volume
+
+    def step(self) -> tuple[Evaluation, float, float]:
+        """Take a step; give the evaluation at its end, its error and size."""
+        flow = self.flow
+        if flow._is_fresh:
+            self.vicinity.move_to(flow.state)
+            self.vicinity.forget_pairs()
+            flow._is_fresh = False
+        self.kappa, phi_end = self.protocol.leg(self.phi)
+        # What units and energies are taken from may be as little off as stages are.
+        here = flow._here or self._evaluated()
+        if not flow.velocity.size:
+            self._begin(here)
+        longest = 0.5 * math.log(phi_end / self.phi) / self.kappa
+        while True:
+            dt = min(flow.dt, self.protocol.largest_strain / self.kappa)
+            clipped = dt >= 0.999 * longest
+            dt = longest if clipped else dt
+            explicit = flow.explicit_left > 0 or dt < self._stable
+            if explicit:
+                dt, clipped = min(dt, self._stable), False
+            if explicit and here is flow._here:
+                here = self._evaluated()
+            attempt = self._tried(dt, explicit, here)
+            if attempt is None:
+                self._refuse_crossing(dt)
+                flow.rejected += 1
+                flow.held = _HELD
+                flow.dt = _RETREAT * dt
+                flow._factors = None
+                if flow.dt < self._stable:
+                    flow.explicit_left = _EXPLICIT_IN_A_ROW
+                continue
+            error = attempt.error
+            relative = error / self.protocol.tolerance
+            order = _HEUN_EULER.order_of_error if explicit else self._method.order_of_error
+            growth = _SAFETY * max(relative, 1e-10) ** (-1 / order)
+            growth = min(max(growth, _LEAST_GROWTH), _LARGEST_GROWTH)
+            is_least = explicit and dt <= _LEAST_STEP * self._stable
+            if not is_least and self._falls_too_far(attempt.evaluation, here):
+                flow.rejected += 1
+                flow.held = _HELD
+                flow.dt = _FALLING * dt
+                continue
+            if relative <= 1 or is_least:
+                break
+            flow.rejected += 1
+            # Contacts that open or close within the step leave errors of first order.
+            flow.dt = dt * max(_SAFETY / relative, _LEAST_GROWTH)
+        if flow.held > 0:
+            flow.held -= 1
+            growth = min(growth, 1.0)
+        if explicit:
+            flow.explicit += 1
+            flow.explicit_left = max(flow.explicit_left - 1, 0)
+            if flow.explicit_left == 0 and growth > 1:
+                growth = max(growth, 4 * self._stable / dt)
+        if not (clipped and growth > 1):
+            flow.dt = dt * growth
+        else:
+            flow.dt = max(flow.dt, dt)
+        self._accept(attempt, dt)
+        return attempt.evaluation, error, dt
+
+    def _evaluated(self) -> Evaluation:
+        """Evaluate the present state."""
+        return self.vicinity.evaluate(self._still, 0.0, extended=False)
+
+    def _refuse_crossing(self, dt: float) -> None:
+        if self._crossing is None or dt > _AT_ONCE * min(self._stable, 1 / self.kappa):
+            return
+        spines = str(self._crossing).partition(",")[0]
+        msg = (
+            f"{spines} at phi = {self.phi:.6g} at the rate kappa = {self.kappa:g}, expected a rate that their"
+            " contacts withstand; compress more slowly, or end at a smaller phi"
+        )
+        raise CrossingError(msg)
+
+    def _falls_too_far(self, now: Evaluation, before: Evaluation) -> bool:
+        # Contacts no stronger than what the box's motion pushes come and go without an event.
+        push = self.kappa * self._least_drag * float(self.flow.state.edges.max())
+        least = self.landscape.particles.n * (push * self.size) ** 2 / self.landscape.k_e
+        return before.energy - now.energy > self.protocol.largest_drop * max(before.energy, least)
+
+    @property
+    def _method(self) -> Method:
+        return METHODS[self.protocol.method]
+
+    @property
+    def _stable(self) -> float:
+        """About the longest explicit step, [time]: drag over stiffness of a contact or two."""
+        return _EXPLICIT_BELOW * self._least_drag * self.size**2 / self.landscape.k_e
+
+    def _begin(self, here: Evaluation) -> None:
+        flow = self.flow
+        flow.velocity = -here.gradient / self.drag
+        flow.acceleration = np.zeros_like(flow.velocity)
+        if flow.dt == 0.0:
+            speed = self._rms(flow.velocity)
+            flow.dt = min(
+                0.1 * self.protocol.tolerance**0.5 * self._unit(here) / max(speed, 1e-300),
+                0.01 * self.protocol.largest_strain / self.kappa,
+            )
+
+    def _unit(self, evaluation: Evaluation) -> float:
+        """Typical overlap, at least what the drag on a particle a diameter from the centre makes."""
+        least = self.kappa * self._least_drag * self.size
+        return max(evaluation.bond_force, least) * self.size**2 / self.landscape.k_e
+
+    def _rms(self, vector: FloatArray) -> float:
+        """Root mean square over particles of an (n,) vector of coordinates."""
+        return float(np.linalg.norm(vector)) / math.sqrt(self.landscape.particles.n)
+
+    def _units(self, evaluation: Evaluation) -> Units:
+        overlap = self._unit(evaluation)
+        bonds = max(evaluation.n_bonds, self.landscape.particles.n)
+        energy = bonds * self.landscape.k_e * (overlap / self.size) ** 2
+        force = self.landscape.k_e * overlap / self.size**2
+        return Units(force, energy, math.sqrt(overlap * self.size), self.landscape.particles.n)
+
+    def _is_extended(self, unit: float) -> bool:
+        rounding = float(np.finfo(np.float64).eps) * self.size
+        return rounding > _ROUNDING * _STAGE_ACCURACY * self.protocol.tolerance * unit
+
+    def _tried(self, dt: float, explicit: bool, here: Evaluation) -> _Attempt | None:
+        self._crossing = None
+        try:
+            if explicit:
+                return self._explicit(dt, here)
+            return self._implicit(dt, here)
+        except CrossingError as error:
+            self._crossing = error
+            return None
+
+    def _implicit(self, dt: float, here: Evaluation) -> _Attempt | None:
+        flow, method = self.flow, self._method
+        unit, units = self._unit(here), self._units(here)
+        accuracy = _STAGE_ACCURACY * self.protocol.tolerance
+        if not 1 / _SAME_STEP < dt / max(flow._dt_of_factors, 1e-300) < _SAME_STEP:
+            flow._factors = None
+        times = method.times
+        velocities: list[FloatArray] = []
+        evaluation, last = here, self._still
+        for k, row in enumerate(method.weights):
+            own = row[k] * dt
+            centre = self._combined(row, velocities, dt)
+            if own == 0.0:
+                velocities.append(flow.velocity)
+                continue
+            strain = math.expm1(-self.kappa * times[k] * dt)
+            drag = self.drag * self.vicinity.stretch(strain) ** 2 / own
+            guess = centre + own * self._predicted(times[k] * dt, velocities, times, dt)
+            stage = Stage(strain, drag, centre, (guess, last), self._is_extended(unit))
+            found = self.vicinity.solve(stage, flow._factors, units, accuracy)
+            flow.factorisations += found.factorisations
+            flow._factors, flow._dt_of_factors = found.factors, dt
+            if not found.solved:
+                return None
+            evaluation, last = found.evaluation, found.x
+            velocities.append((found.x - centre) / own)
+        error = self._combined(method.error, velocities, dt)
+        force = drag * error
+        assert found.factors is not None
+        size = self._units(evaluation).size(found.factors.solve(force), force, drag)
+        return _Attempt(found.x, velocities, size, evaluation)
+
+    def _combined(
+        self, weights: tuple[float, ...], velocities: list[FloatArray], dt: float
+    ) -> FloatArray:
+        """Displacement by the velocities that there are so far."""
+        known = zip(weights, velocities, strict=False)
+        return sum((dt * weight * velocity for weight, velocity in known), start=self._still)
+
+    def _predicted(
+        self, after: float, velocities: list[FloatArray], times: list[float], dt: float
+    ) -> FloatArray:
+        """Extrapolate the velocity to a time after the start of the step."""
+        flow = self.flow
+        if velocities and times[len(velocities) - 1] > 0:
+            last = times[len(velocities) - 1] * dt
+            slope = (velocities[-1] - flow.velocity) / last
+            return velocities[-1] + (after - last) * slope
+        return flow.velocity + after * flow.acceleration
+
+    def _explicit(self, dt: float, here: Evaluation) -> _Attempt:
+        extended = self._is_extended(self._unit(here))
+        velocities, evaluation = [-here.gradient / self.drag], here
+        for after, row in zip(_HEUN_EULER.times[1:], _HEUN_EULER.weights[1:], strict=True):
+            x = self._combined(row, velocities, dt)
+            strain = math.expm1(-self.kappa * after * dt)
+            evaluation = self.vicinity.evaluate(x, strain, extended=extended)
+            stretch = self.vicinity.stretch(strain)
+            velocities.append(-evaluation.gradient / (stretch * self.drag))
+        error = 0.5 * dt * (velocities[1] - velocities[0])
+        return _Attempt(x, velocities, self._rms(error) / self._unit(evaluation), evaluation)
+
+    def _accept(self, attempt: _Attempt, dt: float) -> None:
+        flow = self.flow
+        strain = math.expm1(-self.kappa * dt)
+        stretch = self.vicinity.stretch(strain)
+        self.vicinity.move(attempt.x, strain)
+        flow.state, flow._here = self.vicinity.base, attempt.evaluation
+        flow.acceleration = stretch * (attempt.velocities[-1] - flow.velocity) / dt
+        flow.velocity = stretch * attempt.velocities[-1]
+        flow.time += dt
+        flow.strain += self.kappa * dt

@@ -1,0 +1,161 @@
+"""Slow compressions in files: a run of `stiff_compression` recorded in H5MD, which goes on after a kill."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.measures.onset import fit_onset
+from jamshape.landscape import Landscape, State
+from jamshape.packing import Packing
+from jamshape.flow.compression import Compression, CompressionRun
+from jamshape.lammps.session import Session
+from jamshape.flow.implicit import Flow, Protocol, Step, compress
+from jamshape.files.h5md import (
+    RunWriter,
+    read_attributes,
+    read_observables,
+    read_packing,
+    require_attributes,
+)
+
+# Steps between two frames, from which a run goes on.
+STEPS_PER_FRAME = 100
+
+# The fast compression that makes a start.
+_PHI_RANDOM, _KAPPA_FAST, _DT_FAST = 0.4, 1e-4, 0.2
+
+_ROW = (
+    "phi",
+    "p",
+    "u",
+    "strain",
+    "dt",
+    "error",
+    "evaluations",
+    "factorisations",
+    "rejected",
+    "explicit",
+)
+
+_COUNTS = ("dt", "time", "strain", "steps", "rejected", "explicit", "evaluations", "factorisations",
+           "wall_seconds", "explicit_left", "held")  # fmt: skip
+
+
+def make_start(alpha: float, n: int, seed: int, phi: float) -> Packing:
+    """Compress a random packing fast, in LAMMPS; errors as `initial.random_packing`."""
+    packing = random_packing(n, _PHI_RANDOM, seed, Mixture.bidisperse(alpha))
+    with Session() as session:
+        run = CompressionRun(session, Compression(_KAPPA_FAST, phi, _DT_FAST, 2), packing)
+        run.advance(run.last_step)
+        return run.packing()
+
+
+def begin(
+    path: Path, start: Packing, protocol: Protocol, attributes: Mapping[str, Any] | None = None
+) -> None:
+    """Write the file of a run with its first frame."""
+    stored = _as_attributes(protocol) | {"sides": 2}
+    flow = Flow(State.of(start))
+    stored |= dict(attributes or {}) | {"phi_start": start.phi, "finished": False}
+    first = start.with_(step=0, time=0.0)
+    RunWriter.create(path, _as_frame(flow, first), stored | _counts(flow))
+
+
+def require_same(path: Path, protocol: Protocol) -> None:
+    """Refuse the file of a run with another protocol.
+
+    Raises
+    ------
+    ValueError
+    """
+    require_attributes(path, _as_attributes(protocol), "a compression")
+
+
+def is_finished(path: Path) -> bool:
+    """Whether the file holds a run that reached its end."""
+    return path.exists() and bool(read_attributes(path).get("finished"))
+
+
+def summary(path: Path) -> dict[str, object]:
+    """Summarise a run: its end, its cost and, where the pressure rises, the onset of jamming."""
+    observables, stored = read_observables(path), read_attributes(path)
+    found: dict[str, object] = {"out": str(path)}
+    found |= {name: float(observables[name][-1]) for name in ("phi", "p", "u")}
+    cost = ("steps", "rejected", "explicit", "evaluations", "factorisations", "wall_seconds")
+    found |= {name: float(stored[f"flow_{name}"]) for name in cost}
+    try:
+        fit = fit_onset(observables["phi"], observables["p"])
+    except ValueError:  # the run ends below jamming
+        return found | {"phi_J": None}
+    return found | {"phi_J": fit.phi_J, "phi_J_error": fit.phi_J_error}
+
+
+def record(path: Path) -> Iterator[Step]:
+    """Go on from the last frame to the end, writing rows and frames.
+
+    Yields
+    ------
+    Step
+        After each accepted step; rows are in the file with the next frame.
+    """
+    stored = read_attributes(path)
+    writer = RunWriter.open(path)
+    writer.truncate(int(stored["flow_steps"]))
+    protocol, flow = _protocol(stored), _flow(path, stored)
+    landscape = Landscape(read_packing(path, 0))
+    rows: list[Step] = []
+    for step in compress(landscape, flow, protocol):
+        rows.append(step)
+        if step.step % STEPS_PER_FRAME == 0:
+            _keep(writer, rows, flow, landscape.particles)
+        yield step
+    if rows:
+        _keep(writer, rows, flow, landscape.particles)
+    writer.set_attributes({"finished": True})
+
+
+def _keep(writer: RunWriter, rows: list[Step], flow: Flow, like: Packing) -> None:
+    """Write a frame, and the rows up to it; what follows depends on the frame alone."""
+    flow.forget()
+    steps, times = [row.step for row in rows], [row.time for row in rows]
+    writer.append_series(steps, times, {k: [getattr(row, k) for row in rows] for k in _ROW})
+    seconds, errors = [row.wall_seconds for row in rows], [row.error for row in rows]
+    writer.append_report(steps, seconds, errors)
+    motion = {"velocity": flow.velocity, "acceleration": flow.acceleration}
+    writer.append(_as_frame(flow, like), motion)
+    writer.set_attributes(_counts(flow))
+    rows.clear()
+
+
+def _as_frame(flow: Flow, like: Packing) -> Packing:
+    return dataclasses.replace(flow.state.packing(like), step=flow.steps, time=flow.time)
+
+
+def _as_attributes(protocol: Protocol) -> dict[str, Any]:
+    return dataclasses.asdict(protocol) | {"kappa": np.array(protocol.kappa)}
+
+
+def _counts(flow: Flow) -> dict[str, float]:
+    return {f"flow_{name}": getattr(flow, name) for name in _COUNTS}
+
+
+def _flow(path: Path, stored: Mapping[str, Any]) -> Flow:
+    counts = {name: stored[f"flow_{name}"] for name in _COUNTS}
+    flow = Flow(State.of(read_packing(path)), **counts)
+    if flow.steps:
+        found = read_observables(path)
+        flow.velocity, flow.acceleration = found["velocity"][-1], found["acceleration"][-1]
+    return flow
+
+
+def _protocol(stored: Mapping[str, Any]) -> Protocol:
+    values = {field.name: stored[field.name] for field in dataclasses.fields(Protocol)}
+    rates = np.asarray(values.pop("kappa"))
+    kappa = tuple((float(a), float(b)) for a, b in rates) if rates.ndim else float(rates)
+    return Protocol(kappa=kappa, **values)

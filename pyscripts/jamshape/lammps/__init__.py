@@ -1,0 +1,1 @@
+"""LAMMPS with the plugin loaded."""

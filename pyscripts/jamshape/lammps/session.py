@@ -1,0 +1,183 @@
+"""LAMMPS with the plugin loaded: the only module that knows the `lammps` package."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jamshape.files.lammps_text import write_data
+from jamshape.packing import Box, Packing, angle_from_quaternion, guess_shape_style
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import TracebackType
+
+# Styles need a dimension and an atom style before the state; a restart file brings both.
+_ATOMS = "units lj\natom_style ellipsoid\natom_modify map array"
+_POSES = """compute orient all property/atom quatw quati quatj quatk
+            compute shape all property/atom shapex shapey shapez"""
+
+# Of the smallest diameter.
+_SKIN = 0.3
+_WIDEST_BIN = 50.0
+
+PLUGIN_NAME = "jamshape_plugin.so"
+
+
+class PluginError(RuntimeError):
+    """LAMMPS or the compiled plugin is missing."""
+
+
+def plugin_path() -> Path:
+    """Path of the compiled plugin of this installation.
+
+    Raises
+    ------
+    PluginError
+        When the installation has none, because it was built without LAMMPS.
+    """
+    from jamshape import _contact  # noqa: PLC0415 - the plugin is installed beside the bindings
+
+    path = Path(str(_contact.__file__)).with_name(PLUGIN_NAME)
+    if not path.is_file():
+        msg = (
+            f"Found no LAMMPS plugin at {path}, expected one: install lammps, liblammps-dev and "
+            "python3-lammps, then install jamshape again."
+        )
+        raise PluginError(msg)
+    return path
+
+
+class Session:
+    """One LAMMPS instance that knows our styles; a context manager.
+
+    Parameters
+    ----------
+    log
+        Log file; None for none.
+    screen
+        Whether LAMMPS writes to standard output.
+    arguments
+        More command-line arguments of `lmp`, such as ``("-var", "alpha", "4")``.
+
+    Notes
+    -----
+    Debian's LAMMPS has no C++ exceptions: an error in a command prints its sentence and ends the
+    process. Close what must survive before each call. Without `screen`, its errors and warnings
+    still reach standard error, through a filter that outlives the process.
+    """
+
+    def __init__(
+        self, log: str | Path | None = None, *, screen: bool = False, arguments: Sequence[str] = ()
+    ) -> None:
+        try:
+            from lammps import lammps  # noqa: PLC0415 - analysis must not need LAMMPS
+        except ImportError as error:
+            msg = (
+                "Found no Python module lammps, expected Debian's python3-lammps: install it, and "
+                "use a Python that sees system packages."
+            )
+            raise PluginError(msg) from error
+        plugin = plugin_path()
+        options = ["-nocite", "-log", str(log) if log else "none"]
+        self._complaints: subprocess.Popen[bytes] | None = None
+        if not screen:
+            self._complaints = subprocess.Popen(
+                ["sed", "-u", "-n", "-E", "/^(ERROR|WARNING)/p"], stdin=subprocess.PIPE, stdout=2
+            )
+            assert self._complaints.stdin is not None
+            options += ["-screen", f"/dev/fd/{self._complaints.stdin.fileno()}"]
+        self.lmp: Any = lammps(cmdargs=[*options, *arguments])
+        self._library = ctypes.CDLL(str(plugin))
+        self._library.jamshape_register.argtypes = [ctypes.c_void_p]
+        self._library.jamshape_register(self.lmp.lmp)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the instance."""
+        self.lmp.close()
+        if self._complaints:
+            self._complaints.communicate()
+
+    def commands(self, text: str) -> None:
+        """Run LAMMPS input, one command a line."""
+        for line in text.strip().splitlines():
+            self.lmp.command(line.strip())
+
+    def left_out(self) -> str:
+        """Say what the last run spared this scene, as the log does."""
+        function = self._library.jamshape_left_out
+        function.argtypes, function.restype = [ctypes.c_void_p], ctypes.c_char_p
+        return str(function(self.lmp.lmp).decode())
+
+    def load(self, packing: Packing) -> None:
+        """Read a packing into a fresh instance."""
+        self.commands(f"{_ATOMS}\ndimension {packing.dimension}")
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "start.data"
+            write_data(path, packing)
+            self.commands(f"read_data {path}")
+        self.commands(_POSES)
+
+    def load_restart(self, path: str | Path) -> None:
+        """Read a restart file into a fresh instance."""
+        self.commands(f"{_ATOMS}\nread_restart {path}\n{_POSES}")
+
+    def packing(self, time: float = 0.0) -> Packing:
+        """Return the present state, sorted by ID, with the time that it is told.
+
+        Shapes are guessed from diameters, as of files, and exponents are not known.
+        """
+        lmp = self.lmp
+        n = lmp.get_natoms()
+        lo, hi, *_ = lmp.extract_box()
+        d = int(lmp.extract_setting("dimension"))
+
+        def rows(name: str, kind: int, width: int) -> NDArray[Any]:
+            return np.array(lmp.gather(name, kind, width)).reshape(n, width)
+
+        quaternion, diameters = rows("c_orient", 1, 4), rows("c_shape", 1, 3)
+        return Packing(
+            position=rows("x", 1, 3)[:, :d],
+            orientation=angle_from_quaternion(quaternion) if d == 2 else quaternion,
+            diameters=diameters,
+            shape_style=guess_shape_style(diameters),
+            species=rows("type", 0, 1)[:, 0],
+            id=np.arange(1, n + 1),
+            image=rows("image", 0, 3)[:, :d],
+            box=Box(np.array(lo[:d]), np.array(hi[:d]) - np.array(lo[:d])),
+            step=self.step,
+            time=time,
+        )
+
+    def neighbours(self) -> str:
+        """Input that sets the neighbour list up in the unit of length of the particles."""
+        diameters = self.packing().diameters
+        # Bins of a plane, which is one unit thick, may not be a hundred times wider than that.
+        style = "bin" if diameters.max() < _WIDEST_BIN else "nsq"
+        skin = _SKIN * float(diameters.min())
+        return (
+            f"neighbor {skin!r} {style}\n"
+            "neigh_modify every 1 delay 0 check yes one 10000 page 1000000"
+        )
+
+    @property
+    def step(self) -> int:
+        """The current time step."""
+        return int(self.lmp.extract_global("ntimestep"))

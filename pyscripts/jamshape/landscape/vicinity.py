@@ -1,0 +1,159 @@
+"""The energy landscape about one state, compiled: what an integrator asks for thousands of times.
+
+The same energy as `Landscape`, as a function of displacements from a base and of a strain; evaluations
+and factors of the Hessian cost a small part of those there. In two dimensions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from jamshape import _contact
+from jamshape.landscape import Evaluation, Landscape, Pairs, State
+from jamshape.minima.minimise import LONGEST_STEP, WIDEST_TURN
+from jamshape.landscape.newton import Factorisation
+from jamshape.packing import FloatArray
+from jamshape.landscape.adapter import Coordinates
+
+# Force, energy and length in which errors of displacements are measured.
+Units = _contact.StageUnits
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One stage of an implicit step: drag (x - centre) + dU/dx = 0 in a box of given strain.
+
+    Parameters
+    ----------
+    strain : float
+        Of the box since the base: x moves particles by (1 + strain) x and turns them by x.
+    drag : (n,) array
+        Drag coefficients in these coordinates, over the time: [energy / length^2].
+    centre : (n,) array
+        [length]
+    guesses : two (n,) arrays
+        Where to begin; the second is for when particles collide at the first.
+    extended : bool
+        Whether doubles are too short.
+    """
+
+    strain: float
+    drag: FloatArray
+    centre: FloatArray
+    guesses: tuple[FloatArray, FloatArray]
+    extended: bool = False
+
+
+class Solution(NamedTuple):
+    """Where the solution of a stage ended."""
+
+    x: FloatArray
+    evaluation: Evaluation
+    """Before the last correction."""
+    factors: Factorisation | None
+    factorisations: int
+    directions: int
+    solved: bool
+
+
+class Vicinity:
+    """Energy, gradient and Hessian of a landscape about a base that moves along.
+
+    Parameters
+    ----------
+    landscape : Landscape
+        Whose pairs it uses and whose evaluations it counts.
+    base : State
+        From where coordinates count.
+    """
+
+    def __init__(self, landscape: Landscape, base: State) -> None:
+        self.landscape = landscape
+        self._compiled = landscape.shape.vicinity(
+            Coordinates(landscape.column, landscape.rotation_length, landscape.shape.turning_radius)
+        )
+        self.move_to(base)
+        self._take(landscape.wide_pairs(base))
+
+    def move_to(self, base: State) -> None:
+        """Count coordinates from another state."""
+        self.base = base
+        self._compiled.move_to(*base.split)
+
+    def forget_pairs(self) -> None:
+        """Look for pairs anew, so that what follows depends on the base alone, to the last bit."""
+        self.landscape.forget_pairs()
+        self._take(self.landscape.wide_pairs(self.base))
+
+    def move(self, x: FloatArray, strain: float) -> None:
+        """Count coordinates from the state `at(x, strain)`."""
+        self.base = State.joined(*self._compiled.move(x, strain))
+
+    def at(self, x: FloatArray, strain: float) -> State:
+        """Move along (n,) coordinates, then strain box and positions."""
+        return self.landscape.displaced(self.base, x).strained(strain)
+
+    def evaluate(self, x: FloatArray, strain: float, *, extended: bool) -> Evaluation:
+        """Evaluate as `Landscape.evaluate` does at `at(x, strain)`, with its errors."""
+        self.landscape.evaluations += 1
+        found = self._compiled.evaluate(x, strain, extended)
+        if found is None:
+            self._renew(x, strain)
+            found = self._compiled.evaluate(x, strain, extended)
+        return self._accepted(found)
+
+    def factorise(self, x: FloatArray, strain: float, diagonal: FloatArray) -> Factorisation:
+        """Factorise the Hessian by x plus a diagonal; with a shift if it is not positive definite.
+
+        For an x where it was evaluated.
+        """
+        return Factorisation(self._compiled.factorise(x, strain, diagonal))
+
+    def solve(
+        self, stage: Stage, factors: Factorisation | None, units: Units, accuracy: float
+    ) -> Solution:
+        """Solve a stage until the next correction is smaller than an accuracy in these units.
+
+        Factors of an earlier, similar stage spare others.
+
+        Raises
+        ------
+        CrossingError
+            If spines cross at the second guess.
+        """
+        limits = _contact.StageLimits(accuracy, self._longest_step, WIDEST_TURN)
+        posed = _contact.Stage(
+            stage.strain, stage.drag, stage.centre, stage.extended, units, limits, *stage.guesses
+        )
+        end = self._compiled.solve_stage(posed, factors and factors.compiled, self._renew)
+        self.landscape.evaluations += end.evaluations
+        found = None if end.factors is None else Factorisation(end.factors)
+        return Solution(
+            end.x, self._accepted(end.sums), found, end.factorisations, end.directions, end.solved
+        )
+
+    def stretch(self, strain: float) -> FloatArray:
+        """(n,) 1 + strain for displacements, 1 for rotations."""
+        found: FloatArray = self._compiled.stretch(strain)
+        return found
+
+    @property
+    def _longest_step(self) -> float:
+        return LONGEST_STEP * 0.5 * self.landscape.length
+
+    def _accepted(self, found: Any) -> Evaluation:
+        energy, gradient, strain_gradient, bond_force, n_bonds, crossing, unconverged = found
+        self.landscape.refuse(self._pairs, crossing, unconverged)
+        bond_force /= max(n_bonds, 1)
+        return Evaluation(energy, gradient, strain_gradient, bond_force, n_bonds)
+
+    def _renew(self, x: FloatArray, strain: float) -> None:
+        self._take(self.landscape.wide_pairs(self.at(x, strain)))
+
+    def _take(self, pairs: Pairs) -> None:
+        self._pairs = pairs
+        self._compiled.take_pairs(
+            *pairs.then.split, pairs.particles, pairs.shift, pairs.skin, pairs.reach,
+            self.landscape.skin,
+        )  # fmt: skip

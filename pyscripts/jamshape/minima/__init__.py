@@ -1,0 +1,1 @@
+"""Minimisers, and packings at a chosen energy."""

@@ -1,0 +1,1 @@
+"""How packings are made: random starts, approaches to jamming, whole paths."""

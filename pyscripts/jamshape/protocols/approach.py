@@ -1,0 +1,142 @@
+"""Slow approach to jamming in LAMMPS: compression at a rate that falls as the pressure rises.
+
+The pressure of a flowing state is the rate times a viscosity that diverges at phi_J. A fixed slow rate wastes
+nearly all of its time far below; here the rate is halved whenever the pressure passes a bound, down to
+the slowest rate, and the run ends when that one no longer keeps the pressure low: the state is jammed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jamshape.flow.compression import Compression, CompressionRun, Sample
+
+if TYPE_CHECKING:
+    from jamshape.packing import Packing
+    from jamshape.lammps.session import Session
+
+_NO_END = 1e3  # a packing fraction that is never reached
+
+# Time steps stay below this fraction of what is stable; denser states allow less.
+_STABLE = 0.6
+
+# Strain between rows: at most this while the rate is high; this part of the pressure when it falls.
+_LARGEST_STRAIN = 1e-3
+_PART = 0.3
+
+
+@dataclass(frozen=True)
+class Approach:
+    """How to approach jamming.
+
+    Parameters
+    ----------
+    kappa
+        The slowest rate, with which it ends, [1/time].
+    kappa_start
+        The rate at the start.
+    p_flow
+        Pressure above which the rate is halved, [energy / length^D].
+    p_end
+        Pressure to reach at the slowest rate.
+    p_open
+        Pressure to return to by opening the box at that rate.
+    dt
+        Time step; lowered to what the fix says is stable.
+    strain
+        Of the box, from one row to the next, at the slowest rate; more while it is faster.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive, or `kappa` above `kappa_start`.
+    """
+
+    kappa: float = 1e-7
+    kappa_start: float = 1e-4
+    p_flow: float = 2e-4
+    p_end: float = 1e-3
+    p_open: float = 1e-6
+    dt: float = 0.25
+    strain: float = 5e-5
+
+    def __post_init__(self) -> None:
+        for name in ("kappa", "kappa_start", "p_flow", "p_end", "p_open", "dt", "strain"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                msg = f"{name} is {value}, expected a positive number"
+                raise ValueError(msg)
+        if self.kappa > self.kappa_start:
+            msg = f"kappa is {self.kappa}, expected at most kappa_start = {self.kappa_start}"
+            raise ValueError(msg)
+
+
+def begin_approach(session: Session, start: Packing, settings: Approach) -> CompressionRun:
+    """Prepare a run in a fresh session."""
+    flow = Compression(kappa=settings.kappa_start, phi_end=_NO_END, dt=settings.dt, sides=2)
+    return CompressionRun(session, flow, start)
+
+
+def resume_approach(session: Session, restart: Path, stored: Mapping[str, Any]) -> CompressionRun:
+    """Go on from a LAMMPS restart file, with the stored `rate`, `dt` and `restart_time`."""
+    flow = Compression(kappa=stored["rate"], phi_end=_NO_END, dt=stored["dt"], sides=2)
+    return CompressionRun(session, flow, restart, time=stored["restart_time"])
+
+
+def approach(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
+    """Compress until the state is jammed, then open the box until the pressure is nearly gone.
+
+    Parameters
+    ----------
+    run : CompressionRun
+        As `begin_approach` gives it.
+    settings : Approach
+
+    Yields
+    ------
+    Sample
+        Observables after every `settings.strain`, or less; `kappa` is one of them, negative while
+        the box is opened.
+    """
+    if run.settings.kappa > 0:
+        yield from _compress(run, settings)
+    yield from _open(run, settings)
+
+
+def _compress(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
+    while True:
+        # Fast rates pass states that nobody looks at.
+        finer = math.sqrt(settings.kappa / run.settings.kappa)
+        sample = _advance(run, settings, min(settings.strain / finer, _LARGEST_STRAIN))
+        yield sample
+        kappa, pressure = run.settings.kappa, sample.observables["p"]
+        if kappa == settings.kappa and pressure >= settings.p_end:
+            return
+        if kappa > settings.kappa and pressure >= settings.p_flow:
+            run.change(kappa=max(kappa / 2, settings.kappa))
+
+
+def _open(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
+    if run.settings.kappa > 0:
+        run.change(kappa=-settings.kappa)
+    pressure = run.measure()["p"]
+    while pressure > settings.p_open:
+        # Near jamming the pressure is about 0.3 (phi - phi_J): go a part of the way.
+        sample = _advance(run, settings, min(settings.strain, _PART * pressure))
+        yield sample
+        pressure = sample.observables["p"]
+
+
+def _advance(run: CompressionRun, settings: Approach, strain: float) -> Sample:
+    step = abs(run.settings.kappa) * run.settings.dt
+    run.advance(run.session.step + max(1, round(strain / step)))
+    sample = run.sample()
+    sample.observables["kappa"] = run.settings.kappa
+    stable = min(settings.dt, _STABLE * sample.observables["dt_max"])
+    if not 0.5 * stable <= run.settings.dt <= stable:
+        run.change(dt=0.7 * stable if stable < settings.dt else stable)
+    return sample

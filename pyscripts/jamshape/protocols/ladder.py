@@ -1,0 +1,149 @@
+"""One packing at several energies: led from rung to rung, up and down from the one it is known at.
+
+Steps in sqrt(u) are small enough for the particles to follow (`target.direct`); where they rearrange
+all the same, the rung says how many of the contacts are still those of the packing it began with.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.protocols import superellipsoid_jammed
+from jamshape.contacts import find_contacts, find_rattlers
+from jamshape.protocols.jammed import is_done, write_minimum
+from jamshape.landscape import Landscape, State
+from jamshape.minima.minimise import Outcome, Stop, minimise
+from jamshape.packing import Packing
+from jamshape.files.h5md import read_attributes, read_packing, require_attributes
+from jamshape.minima.target import Search, Target, TargetError, direct
+
+# What must agree in the packing and in a rung that is there already.
+_IDENTITY = ("alpha", "n", "seed", "size_ratio")
+_IDENTITY_3D = ("p", "w1", "w2", "n", "seed", "protocol", "n_sweeps")  # p of rods is the pressure
+
+# A box that was opened has been opened too far below this fraction of u0; how long to look.
+_FALLEN = 1e-2
+_EVALUATIONS = 2000
+
+
+class Rung(NamedTuple):
+    """One packing of a ladder."""
+
+    path: Path
+    u0: float
+    made: bool
+    """Whether it was made now, and not there before."""
+    failure: str
+    """Why it is not there; empty if it is."""
+
+
+def climb(
+    source: Path, energies: Iterable[float], folder: Path, target: Target | None = None
+) -> Iterator[Rung]:
+    """Lead a packing to other energies, going on with what an earlier call has left.
+
+    Parameters
+    ----------
+    source : Path
+        A finished packing of `jammed.make` or `superellipsoid_jammed.make`.
+    energies : iterable of float
+        Energy densities u0, in any order, [energy / length^D].
+    folder : Path
+        Where rungs are written, named after the source and u0.
+    target : Target, optional
+        How accurately; its u0 does not matter.
+
+    Yields
+    ------
+    Rung
+        Those above the energy of the source in ascending order, then those below in descending
+        order, each led there from the one before. After one that fails, the next is led from the
+        last that did not.
+
+    Raises
+    ------
+    ValueError
+        If the source is no finished packing, an energy is not positive, or a rung that is there
+        belongs to another packing.
+    """
+    if not is_done(source):
+        msg = f"{source} does not exist, expected a packing of make_packing.py"
+        raise ValueError(msg)
+    stored = read_attributes(source)
+    targets = sorted({replace(target or Target(), u0=u0) for u0 in energies}, key=lambda t: t.u0)
+    own = stored.get("u0", stored["u"])
+    up = [t for t in targets if t.u0 >= own]
+    down = [t for t in reversed(targets) if t.u0 < own]
+    for part in (up, down):
+        last = source
+        for goal in part:
+            rung = _step(source, stored, last, folder, goal)
+            yield rung
+            last = last if rung.failure else rung.path
+
+
+def rung_path(source: Path, u0: float, folder: Path) -> Path:
+    """Name the file of one rung."""
+    return folder / f"{source.stem}_u{u0:g}.h5"
+
+
+def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: Target) -> Rung:
+    """Make one rung from the one before, unless it is there."""
+    out = rung_path(source, goal.u0, folder)
+    if is_done(out):
+        names = _IDENTITY_3D if "w1" in stored else _IDENTITY
+        identity = {name: stored[name] for name in names if name in stored}
+        require_attributes(out, identity | {"u0": goal.u0})
+        return Rung(out, goal.u0, made=False, failure="")
+    began, start = time.perf_counter(), read_packing(last)
+    landscape = Landscape(start)
+    search = Search(_opened(landscape, State.of(start), goal), goal.step)
+    try:
+        for _ in direct(landscape, search, goal):
+            pass
+    except TargetError as error:
+        return Rung(out, goal.u0, made=False, failure=str(error))
+    assert search.minimum is not None
+    shared = _shared(read_packing(source), search.minimum.state.packing(start))
+    attributes = stored | {name: getattr(goal, name) for name in ("u0", "accuracy", "tolerance")}
+    attributes |= {"ladder_source": source.name, "contacts_shared": shared}
+    attributes |= {
+        "evaluations": landscape.evaluations,
+        "wall_seconds": time.perf_counter() - began,
+    }
+    are_rods = start.shape_style == "spherocylinder"
+    write = write_minimum if are_rods else superellipsoid_jammed.write_minimum
+    write(out, landscape, search.minimum, attributes)
+    return Rung(out, goal.u0, made=True, failure="")
+
+
+def _opened(landscape: Landscape, state: State, goal: Target) -> State:
+    """Open the box until u is about u0, which rods that slide would make slow in small steps.
+
+    By the law of `jammed.measure`: sqrt(u) is linear in phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
+    """
+    evaluation, volume, D = landscape.evaluate(state), state.volume, state.dimension
+    u, p = evaluation.energy / volume, -evaluation.strain_gradient / (D * volume)
+    if u <= goal.u0:
+        return state
+    strain = 2 * u / (p + u) * (1 - math.sqrt(goal.u0 / u)) / D
+    stop = Stop(goal.tolerance, lowest=_FALLEN * goal.u0, evaluations=_EVALUATIONS)
+    found = minimise(landscape, state.strained(strain), "newton", stop)
+    return state if found.outcome is Outcome.UNJAMMED else found.state
+
+
+def _shared(first: Packing, other: Packing) -> float:
+    """Fraction of the contacts of one packing, those with rattlers left out, that another one has."""
+    network = find_contacts(first, sides=2)
+    rattlers = find_rattlers(first, network)
+    held = network.pairs[~rattlers[network.pairs].any(axis=1)]
+    now = {tuple(pair) for pair in find_contacts(other, sides=2).pairs.tolist()}
+    kept = [tuple(pair) in now for pair in held.tolist()]
+    return float(np.mean(kept)) if kept else 1.0

@@ -1,0 +1,157 @@
+"""Athermal quasistatic compression: protocol 1 of Yuan et al., Soft Matter (2019), Sec. 2.2.
+
+The packing fraction grows by small steps, each followed by a minimisation, until the energy per particle is above
+a small tolerance; then the step is halved from the last unjammed state until the first jammed one is as
+close to the tolerance as asked. Of any shape; needs no LAMMPS.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from jamshape.landscape import Landscape, State
+from jamshape.minima.minimise import History, Minimum, Outcome, Stop, minimise
+
+# A step this small leads nowhere: the energy jumps there, by a rearrangement.
+_SMALLEST_STEP = 1e-9
+
+
+@dataclass(frozen=True)
+class Quasistatic:
+    """How to compress.
+
+    Parameters
+    ----------
+    step
+        Change of the packing fraction, Delta phi.
+    energy
+        U/N above which a packing is jammed, [energy].
+    closeness
+        The jammed packing has U/N of at most this factor times `energy`.
+    tolerance
+        Largest net force and torque of a particle over the mean bond force; the paper has the mean
+        net force below 1e-4, which this implies.
+    method
+        Minimiser.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range.
+    """
+
+    step: float = 1e-3
+    energy: float = 1e-10
+    closeness: float = 2.0
+    tolerance: float = 1e-4
+    method: str = "lbfgs"
+
+    def __post_init__(self) -> None:
+        for name in ("step", "energy", "tolerance"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                msg = f"{name} is {value}, expected a positive number"
+                raise ValueError(msg)
+        if not self.closeness > 1:
+            msg = f"closeness is {self.closeness}, expected a factor above 1"
+            raise ValueError(msg)
+
+
+@dataclass(eq=False)
+class Compression:
+    """A compression between two minimisations: all that is needed to go on from here.
+
+    Parameters
+    ----------
+    state
+        To be minimised next.
+    phi
+        Its packing fraction.
+    step
+        By which phi grows next.
+    loose, loose_phi
+        The densest unjammed state, if any.
+    minimum
+        The jammed packing, once it is found.
+    """
+
+    state: State
+    phi: float
+    step: float
+    loose: State | None = None
+    loose_phi: float = math.nan
+    minimum: Minimum | None = None
+    history: History = field(default_factory=History)
+
+    @classmethod
+    def of(cls, landscape: Landscape, state: State, protocol: Quasistatic) -> Compression:
+        """Begin at a state."""
+        return cls(state, _phi(landscape, state), protocol.step)
+
+    def go_on(self, phi: float) -> None:
+        """Compress the densest unjammed state to a packing fraction."""
+        assert self.loose is not None
+        strain = (self.loose_phi / phi) ** (1 / self.loose.dimension) - 1
+        self.state, self.phi = self.loose.strained(strain), phi
+
+
+def compress(
+    landscape: Landscape, compression: Compression, protocol: Quasistatic
+) -> Iterator[Compression]:
+    """Compress to the first jammed packing.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    compression : Compression
+        Where to begin, or to go on.
+    protocol : Quasistatic
+
+    Yields
+    ------
+    Compression
+        The same object after each minimisation. The last one has a minimum.
+
+    Raises
+    ------
+    ValueError
+        If the start is jammed.
+    """
+    while compression.minimum is None:
+        landscape.forget_pairs()  # what follows depends on `compression` alone
+        found = _minimised(landscape, compression, protocol)
+        per_particle = found.evaluation.energy / landscape.particles.n
+        if per_particle <= protocol.energy:
+            compression.loose, compression.loose_phi = found.state, compression.phi
+            compression.go_on(compression.phi + compression.step)
+        elif compression.loose is None:
+            msg = (
+                f"the start at phi = {compression.phi:.4g} is jammed with U/N = {per_particle:.3g},"
+                f" expected at most {protocol.energy:g}; start at a smaller phi"
+            )
+            raise ValueError(msg)
+        elif per_particle <= protocol.closeness * protocol.energy or (
+            compression.step < _SMALLEST_STEP
+        ):
+            compression.minimum, compression.state = found, found.state
+        else:
+            compression.step /= 2
+            compression.go_on(compression.loose_phi + compression.step)
+        yield compression
+
+
+def _minimised(landscape: Landscape, compression: Compression, protocol: Quasistatic) -> Minimum:
+    """Minimise until forces balance, or until the state is seen to be unjammed."""
+    state = compression.state
+    lowest = protocol.energy * landscape.particles.n / state.volume
+    stop = Stop(tolerance=protocol.tolerance, lowest=lowest)
+    found = minimise(landscape, state, protocol.method, stop, compression.history)
+    if found.outcome is Outcome.STALLED and protocol.method != "auto":
+        return minimise(landscape, found.state, "auto", stop, compression.history)
+    return found
+
+
+def _phi(landscape: Landscape, state: State) -> float:
+    return float(landscape.particles.measures.sum()) / state.volume

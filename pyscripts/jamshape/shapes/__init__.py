@@ -1,0 +1,1 @@
+"""What shapes are: one file for each, and the table of them; the only Python that knows which there are."""

@@ -1,0 +1,128 @@
+"""Surfaces of superellipsoids as triangles, to draw them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jamshape.packing import FloatArray, IntArray
+from jamshape.shapes.superellipsoid_size import checked
+
+# Newton's method on logarithms: steps below this are rounding, and it takes about ten.
+_STILL = 1e-12
+_MOST_STEPS = 200
+
+# Below this exponent 2p normals turn within so little of the surface that triangles there would be
+# slivers; those of this exponent are taken.
+_SHARP = 1.3
+
+# Stands for the logarithm of 0.
+_NOTHING = -600.0
+
+
+class SurfaceMesh(NamedTuple):
+    """Triangles on the surface of a body, in body coordinates."""
+
+    vertices: FloatArray
+    """(V, 3), [length], on the surface to rounding."""
+    triangles: IntArray
+    """(T, 3) rows of vertices, counter-clockwise seen from outside."""
+    normals: FloatArray
+    """(V, 3) outward unit normals of the surface at the vertices."""
+
+
+def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
+    """Cover a superellipsoid evenly with triangles.
+
+    Seen from the centre of a body in which position and normal count the same, |x|^2p + ... = 1 with
+    x + n instead of x, the vertices are those of a sphere's mesh; so flat sides, edges and tips all get
+    their share, at p from 0.5 to 20. The mesh has the symmetry of the body: edges of a box lie on
+    edges of triangles, and so do those of an octahedron.
+
+    Parameters
+    ----------
+    semi_axes : (3,) array_like, [length]
+    p : float
+    level : int
+        Each makes four triangles of one: 48, 192, 768, 3072 ...
+
+    Returns
+    -------
+    SurfaceMesh
+
+    Raises
+    ------
+    ValueError
+        If level is negative, there are several shapes, or the shape is none (`checked`).
+    """
+    axes, exponent = checked(semi_axes, p)
+    if axes.shape != (3,) or level < 0:
+        found = f"semi-axes have shape {axes.shape} and the level is {level}"
+        msg = f"{found}, expected (3,) for one body and a level from 0"
+        raise ValueError(msg)
+    directions, triangles = _sphere(level)
+    q = 2 * float(exponent)
+    log_u = _shares(np.abs(directions), max(q, _SHARP))
+    sign = np.sign(directions)
+    normal = sign * np.exp((1 - 1 / q) * log_u) / axes
+    return SurfaceMesh(
+        vertices=sign * np.exp(log_u / q) * axes,
+        triangles=triangles,
+        normals=normal / np.linalg.norm(normal, axis=1, keepdims=True),
+    )
+
+
+def _shares(directions: FloatArray, q: float) -> FloatArray:
+    """Logarithms of u = |x|^q, of sum 1, for which u^(1/q) + u^(1-1/q) has the given directions.
+
+    The two terms are coordinate and slope. Newton's method for log u and the unknown length at once.
+    """
+    with np.errstate(divide="ignore"):
+        goal = np.maximum(np.log(directions), _NOTHING)
+    log_u, length = 2 * goal, np.zeros(len(goal))
+    for _ in range(_MOST_STEPS):
+        position, slope = log_u / q, (1 - 1 / q) * log_u
+        both = np.logaddexp(position, slope)
+        rate = (np.exp(position - both) + (q - 1) * np.exp(slope - both)) / q
+        excess = (both - goal - length[:, None]) / rate
+        total = np.logaddexp.reduce(log_u, axis=1)
+        share = np.exp(log_u - total[:, None])
+        longer = ((share * excess).sum(axis=1) - total) / (share / rate).sum(axis=1)
+        change = longer[:, None] / rate - excess
+        log_u, length = log_u + change, length + longer
+        if np.abs(change).max() < _STILL * np.abs(log_u).max():
+            break
+    return np.asarray(log_u - np.logaddexp.reduce(log_u, axis=1)[:, None])
+
+
+def _sphere(level: int) -> tuple[FloatArray, IntArray]:
+    """Split a sphere along the nine mirror planes of a cube, and each part in 4^level.
+
+    Returns
+    -------
+    (V, 3) unit vectors, (T, 3) triangles
+    """
+    corners = np.array([[1, 0, 0], [1, 1, 0], [1, 1, 1]]) / np.sqrt([[1], [2], [3]])
+    orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 0, 2], [0, 2, 1], [2, 1, 0]]
+    signs = 1 - 2 * np.array(list(np.ndindex(2, 2, 2)))
+    parts = np.array([corners[:, order] * sign for order in orders for sign in signs])
+    for _ in range(level):
+        parts = _quartered(parts)
+    inward = np.linalg.det(parts) < 0
+    parts[inward] = parts[inward, ::-1]
+    # Rounding is taken off to tell which corners are one.
+    key = np.round(parts.reshape(-1, 3), 9) + 0.0
+    _, first, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return parts.reshape(-1, 3)[first], which.reshape(-1, 3).astype(np.int64)
+
+
+def _quartered(parts: FloatArray) -> FloatArray:
+    """Split (T, 3, 3) spherical triangles at the middles of their sides."""
+    middle = parts + np.roll(parts, -1, axis=1)  # of 0-1, 1-2 and 2-0
+    middle /= np.linalg.norm(middle, axis=2, keepdims=True)
+    a, b, c = np.moveaxis(parts, 1, 0)
+    ab, bc, ca = np.moveaxis(middle, 1, 0)
+    four = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.concatenate([np.stack(part, axis=1) for part in four])

@@ -1,0 +1,1 @@
+"""The dynamical matrix, its modes, and what follows from them."""

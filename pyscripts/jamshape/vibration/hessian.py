@@ -1,0 +1,474 @@
+"""The dynamical matrix of a packing: M = H - S over the particles that contacts hold in place.
+
+Marschall & Teitel 2018, Eqs. 23 and 38-40. The stiffness is kept as its factor C, one row a bond, with
+H = C^T C; the prestress S, smaller by the overlap, apart from it: their sum in doubles has lost the
+modes that are softer than 1e-16. General in the shape: what is taken of a landscape are its second
+derivatives contact by contact. Needs no LAMMPS.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from jamshape.landscape import Evaluation, Landscape, State
+from jamshape.minima.minimise import Residual, residual_of
+from jamshape.packing import FloatArray, IntArray
+
+# A state with a larger residual is no minimum, and has no modes.
+LARGEST_RESIDUAL = 1e-4
+
+# Rank-one parts of a contact's curvature this stiff, over the stiffest bond and over what the forces
+# alone can bring about, are bonds: where two bonds become one, it is no longer a bond's own.
+_STIFF = 0.1
+_BEYOND_FORCES = 4.0
+
+
+class NotAtMinimumError(ValueError):
+    """A state is no minimum of the energy; the sentence gives its residual."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """What the components of a mode are.
+
+    Parameters
+    ----------
+    particle : (n,) array of int64
+        Row of the packing that each coordinate belongs to, ascending.
+    kind : (n,) array of int64
+        0 to D - 1: displacement along that axis. D and up: a rotation.
+    direction : (n, D + T) array of float64
+        Displacement and rotation [radian] of that particle for each unit of length; T = 1 in 2D, 3 in
+        3D, in space coordinates.
+    n_all : int
+        Particles N of the packing, rattlers included.
+    dimension : int
+    """
+
+    particle: IntArray
+    kind: IntArray
+    direction: FloatArray
+    n_all: int
+    dimension: int
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates n."""
+        return len(self.particle)
+
+    @cached_property
+    def backbone(self) -> IntArray:
+        """(N',) rows of the packing that have coordinates."""
+        return np.unique(self.particle)
+
+    @property
+    def is_rotation(self) -> NDArray[np.bool_]:
+        """(n,) which coordinates are rotations."""
+        return self.kind >= self.dimension
+
+    @cached_property
+    def embedding(self) -> Any:
+        """(N (D + T), n) scipy.sparse matrix: displacements and rotations of all particles."""
+        width = self.direction.shape[1]
+        row = self.particle[:, None] * width + np.arange(width)
+        column = np.broadcast_to(np.arange(self.size)[:, None], row.shape)
+        used = self.direction != 0
+        entries = (self.direction[used], (row[used], column[used]))
+        return scipy.sparse.csr_matrix(entries, shape=(self.n_all * width, self.size))
+
+    def motion(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Spread an (n,) vector: (N, D) displacements and (N, T) rotations [radian], 0 elsewhere."""
+        components = (self.embedding @ vector).reshape(self.n_all, -1)
+        return components[:, : self.dimension], components[:, self.dimension :]
+
+
+class Bonds(NamedTuple):
+    """The m rows of the compatibility matrix."""
+
+    contact: IntArray
+    """(m,) row of `DynamicalMatrix.contacts`."""
+    slot: IntArray
+    """(m,) 0 or 1: which bond of it; 2: the one that two deep bonds have become."""
+    particles: IntArray
+    """(m, 2) rows of the packing."""
+    stiffness: FloatArray
+    """(m,) second derivative of the energy along the bond, [energy / length^2]."""
+    gradient: FloatArray
+    """(m, v) of its length by the pair's variables: r_i - r_j, rotations of i and of j [radian]."""
+
+
+class Strains(NamedTuple):
+    """What affine strains do to a packing, k of them, with all second derivatives of the energy."""
+
+    stretched: FloatArray
+    """(m, k) change of the bonds' lengths, times the roots of their stiffness."""
+    pushed: FloatArray
+    """(n, k) change of the forces by the prestress alone: -S between strain and coordinates."""
+    affine: FloatArray
+    """(k,) second derivative of the energy by the prestress alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicalMatrix:
+    """M = C^T C - S of n coordinates and m bonds (Marschall & Teitel 2018, Eqs. 38-40).
+
+    Every entry is a double that is off by a few roundings of the sizes that it was summed of.
+
+    Parameters
+    ----------
+    compatibility : (m, n) scipy.sparse CSR matrix, [sqrt(energy) / length]
+        C: one row a bond, the square root of its stiffness times the gradient of its length.
+    prestress : (n, n) scipy.sparse CSR matrix, [energy / length^2]
+        S, symmetric to the last bit.
+    prestress_sizes : (n, n) scipy.sparse CSR matrix
+        Sums of the magnitudes of what was added to each entry of S.
+    coordinates : Coordinates
+    bonds : Bonds
+    curvature : (C, v, v) array of float64
+        Second derivatives of the contacts' energies, without the bonds' stiffness: S contact by contact.
+    contacts : dict
+        `Landscape.derivatives` of the contacts between particles that are no rattlers.
+    gradient : (n,) array of float64, [energy / length]
+        Of the energy; 0 at a minimum.
+    residual : Residual
+        Largest net force and torque over the mean bond force; rattlers do not count.
+    bond_force : float, [energy / length]
+        Mean magnitude of the force of a bond.
+    volume : float, [length^D]
+    n_left_out : int
+        Contacts between these particles that are weaker than was asked for.
+    """
+
+    compatibility: Any
+    prestress: Any
+    prestress_sizes: Any
+    coordinates: Coordinates
+    bonds: Bonds
+    curvature: FloatArray
+    contacts: dict[str, NDArray[Any]]
+    gradient: FloatArray
+    residual: Residual
+    bond_force: float
+    volume: float
+    n_left_out: int = 0
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates n."""
+        return self.coordinates.size
+
+    @property
+    def n_bonds(self) -> int:
+        """Number of bonds N_c; a side-to-side contact has two."""
+        return len(self.bonds.contact)
+
+    @property
+    def n_particles(self) -> int:
+        """Number of particles N' that are no rattlers."""
+        return len(self.coordinates.backbone)
+
+    @property
+    def z(self) -> float:
+        """Bonds per particle, each counted at both its ends."""
+        return 2 * self.n_bonds / self.n_particles
+
+    @property
+    def stiffness(self) -> Any:
+        """(n, n) scipy.sparse CSR matrix H = C^T C."""
+        return (self.compatibility.T @ self.compatibility).tocsr()
+
+    @property
+    def matrix(self) -> Any:
+        """(n, n) scipy.sparse CSR matrix M = H - S, as far as doubles hold it."""
+        return (self.stiffness - self.prestress).tocsr()
+
+    @cached_property
+    def translations(self) -> FloatArray:
+        """(n, D c) orthonormal columns: M's null modes, D for each of c clusters of particles."""
+        backbone, D = self.coordinates.backbone, self.coordinates.dimension
+        first, second = np.searchsorted(backbone, self.bonds.particles.T)
+        n = len(backbone)
+        graph = scipy.sparse.coo_matrix((np.ones(len(first)), (first, second)), shape=(n, n))
+        n_clusters, cluster = connected_components(graph, directed=False)
+        own = cluster[np.searchsorted(backbone, self.coordinates.particle)]
+        moves = ~self.coordinates.is_rotation
+        columns = np.zeros((self.size, D * n_clusters))
+        columns[np.flatnonzero(moves), (D * own + self.coordinates.kind)[moves]] = 1.0
+        unit: FloatArray = columns / np.sqrt(columns.sum(axis=0))
+        return unit
+
+    def strained(self, strains: FloatArray) -> Strains:
+        """Take in (k, D, D) strains e, r_i - r_j -> (1 + e) (r_i - r_j), at fixed orientations."""
+        D = self.coordinates.dimension
+        moved = np.einsum("kab,cb->cka", strains, self.contacts["separation"])
+        rows = np.sqrt(self.bonds.stiffness)[:, None] * self.bonds.gradient[:, :D]
+        stretched = np.einsum("ma,mka->mk", rows, moved[self.bonds.contact])
+        bent = np.einsum("cva,cka->ckv", self.curvature[:, :, :D], moved)
+        scatter = _Scatter(self.contacts["particles"], self.coordinates)
+        pushed = np.column_stack([scatter.vector(bent[:, k]) for k in range(len(strains))])
+        return Strains(stretched, pushed, np.einsum("cka,cka->k", bent[:, :, :D], moved))
+
+
+@dataclass(frozen=True, eq=False)
+class Scope:
+    """What to take of a packing, and what a rotation counts for.
+
+    Parameters
+    ----------
+    rotation : str or (N,) array of float64, [length]
+        What a radian counts for: ``half_length`` (A theta, Marschall & Teitel 2018, Eq. 23; a theta of
+        superellipsoids), ``radius`` (R theta, or the shortest semi-axis) or lengths. What no contact can turn, discs, has no rotation in any case. Eigenvalues
+        of modes that rotate depend on this choice; their number, signs and zeros do not.
+    least_force : float
+        Leave out contacts whose force is below this fraction of the mean force of a bond: rods that slid
+        along flat sides up to others touch them with forces of second order in the overlap, which
+        minimisers in doubles do not see.
+    backbone : (N,) array of bool, optional
+        Particles to take, with the contacts between them; those that are no rattlers if left out.
+    force : bool
+        Also where the state is no minimum.
+    """
+
+    rotation: str | FloatArray = "half_length"
+    least_force: float = 0.0
+    backbone: NDArray[np.bool_] | None = None
+    force: bool = False
+
+
+def dynamical_matrix(
+    landscape: Landscape, state: State, scope: Scope | None = None
+) -> DynamicalMatrix:
+    """Assemble the dynamical matrix of a minimum of the energy.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    state : State
+    scope : Scope, optional
+
+    Returns
+    -------
+    DynamicalMatrix
+
+    Raises
+    ------
+    NotAtMinimumError
+        If the residual is above `LARGEST_RESIDUAL`, unless forced.
+    ValueError
+        If all particles are rattlers, or the scope's rotation is neither.
+    CrossingError
+        If two spines cross.
+    """
+    scope = scope or Scope()
+    evaluation = landscape.evaluate(state)
+    taken = (
+        ~landscape.curvature(state).rattlers
+        if scope.backbone is None
+        else np.asarray(scope.backbone)
+    )
+    if not taken.any():
+        msg = (
+            f"all {len(taken)} particles are rattlers, so that there is no mode to find,"
+            " expected a packing that is jammed"
+        )
+        raise ValueError(msg)
+    held = np.where(taken[landscape.particle_of_coordinate()], evaluation.gradient, 0.0)
+    residual = residual_of(landscape, evaluation._replace(gradient=held))
+    if residual.largest > LARGEST_RESIDUAL and not scope.force:
+        msg = (
+            f"the state is not at a minimum: its largest net force is {residual.largest:.2g} of the"
+            f" mean bond force, expected at most {LARGEST_RESIDUAL:g}; minimise it first,"
+            " or force it (--force)"
+        )
+        raise NotAtMinimumError(msg)
+    coordinates = _coordinates(landscape, state, taken, _lengths(landscape, scope.rotation))
+    weakest = scope.least_force * evaluation.bond_force
+    parts = _parts(landscape, state, coordinates, weakest)
+    return _matrix(landscape, state, evaluation, parts | {"residual": residual})
+
+
+def matrix_at(landscape: Landscape, state: State, like: DynamicalMatrix) -> DynamicalMatrix:
+    """Assemble the matrix of a state nearby, in the coordinates of another one; never refuses."""
+    evaluation = landscape.evaluate(state)
+    parts = _parts(landscape, state, like.coordinates)
+    return _matrix(
+        landscape, state, evaluation, parts | {"residual": residual_of(landscape, evaluation)}
+    )
+
+
+def _matrix(
+    landscape: Landscape, state: State, evaluation: Evaluation, parts: dict[str, Any]
+) -> DynamicalMatrix:
+    gradient = _gradient(landscape, evaluation.gradient, parts["coordinates"])
+    return DynamicalMatrix(
+        **parts, gradient=gradient, bond_force=evaluation.bond_force, volume=state.volume
+    )
+
+
+def _lengths(landscape: Landscape, rotation: str | FloatArray) -> FloatArray:
+    """(N,) lengths that a radian counts for; 0 where nothing turns."""
+    own = landscape.rotation_length
+    if isinstance(rotation, str):
+        known = {"half_length": own, "radius": landscape.inner_radius}
+        if rotation not in known:
+            msg = f"rotation is {rotation!r}, expected one of {', '.join(known)}, or lengths"
+            raise ValueError(msg)
+        chosen = known[rotation]
+    else:
+        chosen = np.broadcast_to(np.asarray(rotation, np.float64), own.shape)
+    lengths: FloatArray = np.where(own > 0, chosen, 0.0)
+    if not (np.isfinite(lengths) & (lengths > 0))[own > 0].all():
+        msg = "rotation lengths are not all positive, expected so for particles that can turn"
+        raise ValueError(msg)
+    return lengths
+
+
+def _coordinates(
+    landscape: Landscape, state: State, held: NDArray[np.bool_], lengths: FloatArray
+) -> Coordinates:
+    """List displacements and rotations of the particles that are held, particle by particle."""
+    D = state.dimension
+    axes = landscape.shape.turning_axes(state.packing(landscape.particles))
+    n, n_turns, T = axes.shape
+    direction = np.zeros((n, D + n_turns, D + T))
+    direction[:, :D, :D] = np.eye(D)
+    turns = lengths > 0
+    direction[turns, D:, D:] = axes[turns] / lengths[turns, None, None]
+    used = held[:, None] & (direction != 0).any(axis=2)
+    particle, kind = np.nonzero(used)
+    return Coordinates(particle, kind, direction[used], n, D)
+
+
+def _gradient(landscape: Landscape, gradient: FloatArray, coordinates: Coordinates) -> FloatArray:
+    """Express the gradient of a landscape in other coordinates."""
+    D = coordinates.dimension
+    components = landscape.components(gradient)
+    components[:, D:] *= landscape.rotation_length[:, None]  # per radian
+    return np.asarray(coordinates.embedding.T @ components.ravel())
+
+
+def _parts(
+    landscape: Landscape, state: State, coordinates: Coordinates, weakest: float = 0.0
+) -> dict[str, Any]:
+    """Make those fields of a DynamicalMatrix that come from the contacts, and the coordinates."""
+    every = landscape.derivatives(state, extended=True)
+    is_held = np.zeros(coordinates.n_all, bool)
+    is_held[coordinates.backbone] = True
+    held = is_held[every["particles"]].all(axis=1)
+    strong = every["bond_force"].sum(axis=1) >= weakest
+    contacts = {name: values[held & strong] for name, values in every.items()}
+    bonds, curvature = _bonds(contacts, landscape.rotation_length)
+    scatter = _Scatter(contacts["particles"], coordinates)
+    prestress, sizes = scatter.blocks(-curvature)
+    return {
+        "compatibility": scatter.rows(
+            np.sqrt(bonds.stiffness)[:, None] * bonds.gradient, bonds.contact
+        ),
+        "prestress": prestress,
+        "prestress_sizes": sizes,
+        "coordinates": coordinates,
+        "bonds": bonds,
+        "curvature": curvature,
+        "contacts": contacts,
+        "n_left_out": int((held & ~strong).sum()),
+    }
+
+
+def _bonds(contacts: dict[str, NDArray[Any]], lengths: FloatArray) -> tuple[Bonds, FloatArray]:
+    """List the bonds, and return the curvature (C, v, v) without what became bonds of its own."""
+    contact, slot = np.nonzero(contacts["stiffness"] > 0)
+    stiffness = contacts["stiffness"][contact, slot]
+    gradient = contacts["gradient"][contact, slot]
+    curvature = contacts["curvature"]
+    stiff, value, vector = _stiff_parts(contacts, lengths)
+    if len(stiff):
+        curvature = curvature.copy()
+        curvature[stiff] -= value[:, None, None] * vector[:, :, None] * vector[:, None, :]
+        contact = np.concatenate([contact, stiff])
+        slot = np.concatenate([slot, np.full(len(stiff), 2)])
+        stiffness = np.concatenate([stiffness, value])
+        gradient = np.concatenate([gradient, vector])
+    order = np.lexsort((slot, contact))
+    contact, slot = contact[order], slot[order]
+    particles = contacts["particles"][contact]
+    return Bonds(contact, slot, particles, stiffness[order], gradient[order]), curvature
+
+
+def _stiff_parts(
+    contacts: dict[str, NDArray[Any]], lengths: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Find contacts whose curvature holds a bond: which, its stiffness, its gradient.
+
+    Two bonds of nearly round particles that overlap deeply become one (`Sides::TWO` of
+    contact/spherocylinder.hpp), whose stiffness comes with the curvature.
+    """
+    curvature, v = contacts["curvature"], contacts["curvature"].shape[1]
+    D = contacts["separation"].shape[1]
+    T = (v - D) // 2
+    length = np.where(lengths > 0, lengths, 1.0)[contacts["particles"]]
+    unit = np.concatenate([np.ones((len(length), D)), np.repeat(length, T, axis=1)], axis=1)
+    values, vectors = np.linalg.eigh(curvature / (unit[:, :, None] * unit[:, None, :]))
+    largest, vector = values[:, -1], vectors[:, :, -1]
+    softest = contacts["bond_force"].sum(axis=1) * (1 / length).sum(axis=1)
+    stiffest = contacts["stiffness"].max(initial=0.0) or largest.max(initial=0.0)
+    found = np.flatnonzero((largest > _STIFF * stiffest) & (largest > _BEYOND_FORCES * softest))
+    return found, largest[found], (vector * unit)[found]
+
+
+class _Scatter:
+    """Puts rows and blocks in a pair's variables into matrices over coordinates."""
+
+    def __init__(self, particles: IntArray, coordinates: Coordinates) -> None:
+        D, T = coordinates.dimension, coordinates.direction.shape[1] - coordinates.dimension
+        separation, turn = np.arange(D), np.arange(D, D + T)
+        self._variable = np.concatenate([separation, turn, separation, turn + T])
+        self._sign = np.concatenate([np.ones(D + T), -np.ones(D), np.ones(T)])
+        width = D + T
+        ends = particles[:, :, None] * width + np.arange(width)
+        self._place = ends.reshape(len(particles), 2 * width)
+        self._embedding = coordinates.embedding
+
+    def rows(self, rows: FloatArray, contact: IntArray) -> Any:
+        """(m, n) CSR matrix of (m, v) rows of some contacts."""
+        place = self._place[contact]
+        entries = rows[:, self._variable] * self._sign
+        row = np.broadcast_to(np.arange(len(rows))[:, None], place.shape)
+        shape = (len(rows), self._embedding.shape[0])
+        flat = (entries.ravel(), (row.ravel(), place.ravel()))
+        return _tidy(scipy.sparse.csr_matrix(flat, shape=shape) @ self._embedding)
+
+    def vector(self, vectors: FloatArray) -> FloatArray:
+        """(n,) sum of (C, v) vectors."""
+        full = np.zeros(self._embedding.shape[0])
+        np.add.at(full, self._place, vectors[:, self._variable] * self._sign)
+        return np.asarray(self._embedding.T @ full)
+
+    def blocks(self, blocks: FloatArray) -> tuple[Any, Any]:
+        """(n, n) CSR matrix of (C, v, v) blocks, and that of the magnitudes."""
+        entries = blocks[:, self._variable[:, None], self._variable]
+        entries = entries * self._sign[:, None] * self._sign
+        row = np.broadcast_to(self._place[:, :, None], entries.shape).ravel()
+        column = np.broadcast_to(self._place[:, None, :], entries.shape).ravel()
+        E, shape = self._embedding, (self._embedding.shape[0],) * 2
+
+        def assembled(values: FloatArray, embedding: Any) -> Any:
+            full = scipy.sparse.csr_matrix((values.ravel(), (row, column)), shape=shape)
+            return _tidy(embedding.T @ full @ embedding)
+
+        matrix = assembled(entries, E)
+        return _tidy(0.5 * (matrix + matrix.T)), assembled(np.abs(entries), abs(E))
+
+
+def _tidy(matrix: Any) -> Any:
+    """CSR with ascending columns and without stored zeros."""
+    matrix = scipy.sparse.csr_matrix(matrix)
+    matrix.eliminate_zeros()
+    matrix.sort_indices()
+    return matrix

@@ -1,0 +1,151 @@
+"""Rayleigh quotients of a dynamical matrix in long double, and bounds of their errors."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from jamshape.vibration.extended import EPS as LONG_EPS
+from jamshape.vibration.extended import SparseRows
+from jamshape.vibration.hessian import DynamicalMatrix
+from jamshape.packing import FloatArray, LongArray
+
+EPS = float(np.finfo(np.float64).eps)
+
+# Entries of C and S are off by so many roundings at most: of their factors, and of sums.
+_ROUNDINGS = 4.0
+
+# Columns that are multiplied in long double at once, to bound memory.
+_COLUMNS = 256
+
+# Two modes that pull on each other by more than this fraction of their gap are close.
+CLOSE = 0.05
+
+
+class Quotients(NamedTuple):
+    """Rayleigh quotients of vectors with a dynamical matrix, in long double."""
+
+    value: LongArray
+    """(k,)"""
+    residual: FloatArray
+    """(k,) norms of M v - value v for |v| = 1: no further away than that is an eigenvalue."""
+    rounding: FloatArray
+    """(k,) of the value itself."""
+    entries: FloatArray
+    """(k,) how much rounding the entries of C and S can change the value."""
+
+
+class Images(NamedTuple):
+    """What a dynamical matrix makes of vectors (n, k), in long double."""
+
+    stretched: LongArray
+    """(m, k) C v."""
+    pushed: LongArray
+    """(n, k) S v."""
+    quotients: Quotients
+    residual: LongArray
+    """(n, k) M v - value v."""
+
+
+class Products:
+    """A dynamical matrix that multiplies in long double."""
+
+    def __init__(self, matrix: DynamicalMatrix) -> None:
+        self.C = SparseRows(matrix.compatibility)
+        self.Ct = SparseRows(matrix.compatibility.T)
+        self.S = SparseRows(matrix.prestress)
+        self._sizes_C, self._sizes_S = abs(matrix.compatibility), matrix.prestress_sizes
+
+    def images(self, vectors: NDArray[Any]) -> Images:
+        """Multiply unit columns (n, k)."""
+        v = np.asarray(vectors, np.longdouble)
+        stretched, pushed = self.C @ v, self.S @ v
+        square = (v**2).sum(axis=0)
+        value = ((stretched**2).sum(axis=0) - (v * pushed).sum(axis=0)) / square
+        residual = self.Ct @ stretched - pushed - value * v
+        size = np.abs(vectors).astype(np.float64)
+        by_C = (np.abs(stretched) * (self._sizes_C @ size)).sum(axis=0)
+        by_S = (size * (self._sizes_S @ size)).sum(axis=0)
+        sizes = np.asarray(2 * by_C + by_S, np.float64)
+        digits = 2 * (np.log2(len(v)) + 8) * LONG_EPS
+        quotients = Quotients(
+            value=value,
+            residual=norms(residual),
+            rounding=digits * sizes + EPS * np.abs(value).astype(np.float64),
+            entries=_ROUNDINGS * EPS * sizes,
+        )
+        return Images(stretched, pushed, quotients, residual)
+
+    def quotients(self, vectors: FloatArray) -> Quotients:
+        """Quotients of unit columns (n, k), a few at a time."""
+        parts = np.array_split(vectors, 1 + vectors.shape[1] // _COLUMNS, axis=1)
+        found = [self.images(part).quotients for part in parts]
+        return Quotients(*map(np.concatenate, zip(*found, strict=True)))
+
+
+def isolated_error(values: FloatArray, residual: FloatArray) -> FloatArray:
+    """Bound the distance to an eigenvalue by the residual or, if less, its square over the gap.
+
+    Kato and Temple. The second where intervals of the first kind are disjoint, so that there is one
+    eigenvalue in each.
+
+    Parameters
+    ----------
+    values, residual : (k,) array of float64
+        Rayleigh quotients, and norms of M v - value v.
+
+    Returns
+    -------
+    (k,) array of float64
+    """
+    order = np.argsort(values)
+    lower, upper = (values - residual)[order], (values + residual)[order]
+    # Neighbours by value are the nearest intervals as long as intervals do not overlap.
+    below = values[order] - np.concatenate([[-np.inf], np.maximum.accumulate(upper)[:-1]])
+    above = np.concatenate([np.minimum.accumulate(lower[::-1])[::-1][1:], [np.inf]]) - values[order]
+    gap = np.empty(len(values))
+    gap[order] = np.minimum(below, above)
+    isolated = gap > residual
+    squared = residual**2 / np.where(isolated, gap, 1.0)
+    return np.where(isolated, np.minimum(residual, squared), residual)
+
+
+def grouped_error(values: FloatArray, pull: FloatArray, others: FloatArray) -> FloatArray:
+    """Bound the same for modes of which it is known how much they pull on each other.
+
+    Modes that are close to each other are one group, which is off by what is within it and, squared over
+    the gap, what is between it and the rest.
+
+    Parameters
+    ----------
+    values : (k,) array of float64
+        Rayleigh quotients.
+    pull : (k, k) array of float64
+        Of modes i on modes j, |v_i.M v_j - value_j v_i.v_j|; 0 on the diagonal.
+    others : (l,) array of float64
+        Eigenvalues of modes that do not pull.
+
+    Returns
+    -------
+    (k,) array of float64
+    """
+    radius = np.sqrt((pull**2).sum(axis=0))
+    distance = np.abs(values[:, None] - values)
+    _, group = connected_components(CLOSE * distance <= np.maximum(pull, pull.T), directed=False)
+    bound = radius.copy()
+    for g in range(group.max(initial=-1) + 1):
+        own = group == g
+        away = (distance[~own][:, own] - radius[~own, None]).min(initial=np.inf)
+        gap = min(away, np.abs(np.subtract.outer(others, values[own])).min(initial=np.inf))
+        if gap > 0:
+            within = np.sqrt((pull[np.ix_(own, own)] ** 2).sum(axis=0))
+            bound[own] = np.minimum(radius[own], within + (pull[~own][:, own] ** 2).sum() / gap)
+    return np.asarray(bound)
+
+
+def norms(columns: LongArray) -> FloatArray:
+    """Norms (k,) of columns (n, k)."""
+    return np.sqrt(np.asarray((columns**2).sum(axis=0), np.float64))

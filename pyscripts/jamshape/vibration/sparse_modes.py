@@ -1,0 +1,218 @@
+"""A few modes of a large packing, without dense matrices: Lanczos iteration on the inverse of M - shift.
+
+Neither M nor a factor of it is formed, in which rounding would bury the prestress: what is factorised is
+
+    [ -(S + shift) / s   C^T ] [ v ]   [ b / s ]
+    [        C           -s  ] [ y ] = [  0    ]
+
+which has (M - shift) v = b and s y = C v. With s of the size of the prestress its entries are all of
+order one (but for the small s itself), so that rounding errors in the factors are like those of the
+entries of C and S.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.sparse
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
+
+from jamshape.vibration.hessian import DynamicalMatrix
+from jamshape.vibration.spectrum import Spectrum
+from jamshape.packing import FloatArray
+from jamshape.vibration.quotients import Products, isolated_error, norms
+
+# The shift for the lowest modes, over the square of the prestress that sliding modes come from.
+_BELOW = -4.0
+
+# Modes are resolved if their relative errors are below the first number. For others, if further away than
+# the second times the shift, the shift moves up, so many times at most.
+_RESOLVED = 1e-9
+_FAR = 100.0
+_CLIMBS = 4
+
+_COLUMNS = ("eigenvalues", "solver_error", "entry_error", "is_translation")
+
+
+class Solution(NamedTuple):
+    """Solutions v of (M - shift) v = b, and what is left of both equations."""
+
+    v: FloatArray
+    """(n, k)"""
+    y: FloatArray
+    """(m, k)"""
+
+
+class ShiftedInverse:
+    """Solves (M - shift) v = b.
+
+    Parameters
+    ----------
+    matrix : DynamicalMatrix
+    shift : float, [energy / length^2]
+        No eigenvalue, but for that of translations, 0: there, one particle of each cluster is held.
+    """
+
+    def __init__(self, matrix: DynamicalMatrix, shift: float) -> None:
+        self.matrix, self.shift = matrix, shift
+        C, S = matrix.compatibility, matrix.prestress
+        self.scale = max(typical_prestress(matrix), abs(shift))
+        held = shift * np.ones(matrix.size)
+        if shift == 0.0:
+            first = np.abs(matrix.translations).argmax(axis=0)
+            held[first] = -self.scale
+        one = scipy.sparse.identity(matrix.n_bonds)
+        blocks = [
+            [-(S + scipy.sparse.diags(held)) / self.scale, C.T],
+            [C, -self.scale * one],
+        ]
+        self._factors = splu(scipy.sparse.bmat(blocks, format="csc"))
+
+    def solve(self, b: FloatArray) -> Solution:
+        """Solve for (n, k) or (n,) right-hand sides, which push no cluster as a whole if shift is 0."""
+        return self._solved(b / self.scale, np.zeros((self.matrix.n_bonds, *b.shape[1:])))
+
+    def solve_both(self, b: FloatArray, c: FloatArray) -> Solution:
+        """Solve -(S + shift) v + C^T y = b, C v - y = c for (n, k) and (m, k) right-hand sides."""
+        found = self._solved(b / self.scale, c)
+        return Solution(found.v, self.scale * found.y)
+
+    def _solved(self, b: FloatArray, c: FloatArray) -> Solution:
+        both = self._factors.solve(np.concatenate([b, c]))
+        return Solution(both[: self.matrix.size], both[self.matrix.size :])
+
+
+def typical_prestress(matrix: DynamicalMatrix) -> float:
+    """Typical size of S: the median over its rows of their largest entry."""
+    largest = abs(matrix.prestress).max(axis=1).toarray()
+    typical = float(np.median(largest[largest > 0])) if (largest > 0).any() else 0.0
+    return max(typical, 1e-15 * _stiffest(matrix))
+
+
+def _stiffest(matrix: DynamicalMatrix) -> float:
+    return float((matrix.compatibility.data**2).max(initial=0.0)) or 1.0
+
+
+def lowest(matrix: DynamicalMatrix, k: int) -> Spectrum:
+    """Find the k softest modes but translations, from sliding modes up into the high band.
+
+    Softest are those nearest to a shift a little below zero, of the size of the eigenvalues of sliding
+    modes. Where bands are so far apart that one shift does not resolve the next, it follows them.
+
+    Parameters
+    ----------
+    matrix : DynamicalMatrix
+    k : int
+
+    Returns
+    -------
+    Spectrum
+        Without translations. Bounds take it that no mode between those found was missed.
+
+    Raises
+    ------
+    ValueError
+        If k is not from 1 to the number of modes less two, translations not counted.
+    """
+    began, known = time.perf_counter(), matrix.translations
+    _check(matrix, k)
+    shift = _BELOW * typical_prestress(matrix) ** 2 / _stiffest(matrix)
+    found: list[Spectrum] = []
+    for climb in range(_CLIMBS):
+        missing = k - sum(len(part.eigenvalues) for part in found)
+        some = _near(matrix, missing, shift, known)
+        size = np.abs(some.eigenvalues)
+        resolved = (some.solver_error <= _RESOLVED * size) | (size <= _FAR * -shift)
+        if resolved.all() or climb == _CLIMBS - 1:
+            found.append(some)
+            break
+        found.append(_picked(some, resolved))
+        known = np.linalg.qr(np.column_stack([known, some.vectors[:, resolved]]))[0]
+        shift = -0.5 * float(size[~resolved].min())
+    return _joined(found, time.perf_counter() - began)
+
+
+def near(matrix: DynamicalMatrix, k: int, shift: float) -> Spectrum:
+    """Find the k modes whose eigenvalues are nearest to a shift, not exactly one of them.
+
+    Arguments, result and errors otherwise as `lowest`.
+    """
+    _check(matrix, k)
+    return _near(matrix, k, shift, matrix.translations)
+
+
+def _check(matrix: DynamicalMatrix, k: int) -> None:
+    most = matrix.size - matrix.translations.shape[1] - 2
+    if not 1 <= k <= most:
+        msg = f"{k} modes were asked for, expected from 1 to {most}; take the whole spectrum"
+        raise ValueError(msg)
+
+
+def _near(matrix: DynamicalMatrix, k: int, shift: float, known: FloatArray) -> Spectrum:
+    """Find k modes besides those known, orthonormal columns."""
+    began = time.perf_counter()
+    inverse = ShiftedInverse(matrix, shift)
+
+    def apply(b: FloatArray) -> FloatArray:
+        return _without(known, inverse.solve(_without(known, b)).v)
+
+    operator = LinearOperator((matrix.size,) * 2, matvec=apply, dtype=np.float64)
+    start = _without(known, np.random.default_rng(0).normal(size=matrix.size))
+    count = min(matrix.size - 1, max(2 * k + 1, k + 40))
+    v = eigsh(operator, k, which="LM", v0=start, ncv=count, tol=0.0)[1]
+    return _bounded(inverse, _without(known, v), time.perf_counter() - began)
+
+
+def _picked(some: Spectrum, chosen: Any) -> Spectrum:
+    columns: dict[str, Any] = {name: getattr(some, name)[chosen] for name in _COLUMNS}
+    return replace(some, vectors=some.vectors[:, chosen], **columns)
+
+
+def _joined(parts: list[Spectrum], seconds: float) -> Spectrum:
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(p, name) for p in parts]) for name in _COLUMNS
+    }
+    vectors = np.column_stack([p.vectors for p in parts])
+    whole = replace(parts[0], vectors=vectors, wall_seconds=seconds, **columns)
+    return _picked(whole, np.argsort(whole.eigenvalues))
+
+
+def _without(T: FloatArray, vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors - T @ (T.T @ vectors))
+
+
+def _bounded(inverse: ShiftedInverse, v: FloatArray, seconds: float) -> Spectrum:
+    """Solve once more, and take the quotients of the solutions w with bounds.
+
+    (M - lambda) w = v - (lambda - shift) w is known without cancellation. What a computed solution
+    leaves of the second equation, r2, is as if C were changed by r2 w^T / |w|^2.
+    """
+    matrix, shift, scale = inverse.matrix, inverse.shift, np.longdouble(inverse.scale)
+    w, y = inverse.solve(v)
+    size = np.linalg.norm(w, axis=0)
+    w, y, b = w / size, y / size, v / size
+    products = Products(matrix)
+    at = products.images(w)
+    values = at.quotients.value
+    r2 = scale * y - at.stretched
+    r1 = b + at.pushed + shift * np.asarray(w, np.longdouble) - scale * (products.Ct @ y)
+    left = b - r1 + scale * w * (r2 * y).sum(axis=0) - (values - shift) * w
+    residual, by_C = norms(left), norms(r2)
+    change = 2 * norms(at.stretched) * by_C + by_C**2
+    doubles = values.astype(np.float64)
+    order = np.argsort(doubles)
+    error = isolated_error(doubles, residual) + change + at.quotients.rounding
+    return Spectrum(
+        eigenvalues=doubles[order],
+        vectors=w[:, order],
+        solver_error=error[order],
+        entry_error=at.quotients.entries[order],
+        is_translation=np.zeros(len(order), bool),
+        method="sparse",
+        wall_seconds=seconds,
+        n_before=-1,
+        singular_values=np.empty(0),
+    )

@@ -1,0 +1,213 @@
+"""Modes of a dynamical matrix M = C^T C - S, each eigenvalue with a bound of its error.
+
+The low bands lie ten to twenty orders of magnitude below the high one, where eigenvalues of M in doubles
+are noise; see `jamshape.vibration.two_levels` for what keeps them, and `jamshape.vibration.sparse_modes` for large packings.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from jamshape.vibration.hessian import DynamicalMatrix, matrix_at
+from jamshape.landscape import Landscape, State
+from jamshape.packing import FloatArray
+from jamshape.vibration.quotients import Products
+from jamshape.vibration.two_levels import Found, rank_of, two_levels
+
+# To estimate the error of a state, no coordinate moves by more than this fraction of a radius.
+_SHORT = 1e-3
+
+# Modes above this fraction of the largest eigenvalue follow the others on that way.
+_STIFF = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Modes of a dynamical matrix, by ascending eigenvalue.
+
+    Parameters
+    ----------
+    eigenvalues : (k,) array of float64, [energy / length^2]
+    vectors : (n, k) array of float64
+        Unit columns in the coordinates of the matrix.
+    solver_error : (k,) array of float64
+        Bound of the distance to an eigenvalue of the matrix as it is stored.
+    entry_error : (k,) array of float64
+        Bound of what the rounding of the matrix's entries can change.
+    is_translation : (k,) array of bool
+        Modes of the packing's clusters as wholes, whose eigenvalues are exactly 0.
+    method : str
+    wall_seconds : float
+    n_before : int
+        Number of modes below the first of these; -1 where unknown.
+    singular_values : (min(m, n),) array of float64, or empty
+        Of C, descending.
+    """
+
+    eigenvalues: FloatArray
+    vectors: FloatArray
+    solver_error: FloatArray
+    entry_error: FloatArray
+    is_translation: NDArray[np.bool_]
+    method: str
+    wall_seconds: float
+    n_before: int
+    singular_values: FloatArray
+
+    @property
+    def bound(self) -> FloatArray:
+        """(k,) bound of the error of each eigenvalue of this state."""
+        return self.solver_error + self.entry_error
+
+    @property
+    def sign(self) -> NDArray[np.int64]:
+        """(k,) 1 or -1 where the bound leaves no doubt, 0 elsewhere."""
+        sure = np.abs(self.eigenvalues) > self.bound
+        return np.where(sure, np.sign(self.eigenvalues), 0).astype(np.int64)
+
+    @property
+    def omega(self) -> FloatArray:
+        """(k,) frequencies sqrt(lambda); -sqrt(-lambda) of modes that lower the energy."""
+        frequency: FloatArray = np.sign(self.eigenvalues) * np.sqrt(np.abs(self.eigenvalues))
+        return frequency
+
+    def rank(self, residual: float = 0.0) -> int:
+        """Rank of C, that is of H; the residual of the state is that of its self stress."""
+        return rank_of(self.singular_values, residual)
+
+
+def spectrum(matrix: DynamicalMatrix, method: str = "projected") -> Spectrum:
+    """Find all modes, with dense matrices: for up to a few thousand coordinates.
+
+    Parameters
+    ----------
+    matrix : DynamicalMatrix
+    method : str
+        ``projected``: singular vectors of C, Schur complement, quotients in long double.
+        ``refined``: the same, and the low modes refined in long double (Ogita and Aishima, Japan J.
+        Indust. Appl. Math. 35, 1007 (2018)).
+        ``plain``: eigenvalues of M in doubles. ``first_order``: Marschall & Teitel 2018, Appendix B.
+        These two are for comparison: the low bands are noise in the one, sliding modes in both.
+
+    Returns
+    -------
+    Spectrum
+
+    Raises
+    ------
+    ValueError
+        If there is no such method.
+
+    See Also
+    --------
+    jamshape.vibration.sparse_modes.lowest : few modes of large packings.
+    """
+    if method not in METHODS:
+        msg = f"the method is {method!r}, expected one of {', '.join(METHODS)}"
+        raise ValueError(msg)
+    began = time.perf_counter()
+    found = METHODS[method](matrix)
+    order = np.argsort(found.eigenvalues, kind="stable")
+    is_translation = np.zeros(len(order), bool)
+    overlap = ((matrix.translations.T @ found.vectors) ** 2).sum(axis=0)
+    is_translation[np.argsort(-overlap)[: matrix.translations.shape[1]]] = True
+    return Spectrum(
+        eigenvalues=found.eigenvalues[order],
+        vectors=found.vectors[:, order],
+        solver_error=found.solver_error[order],
+        entry_error=found.entry_error[order],
+        is_translation=is_translation[order],
+        method=method,
+        wall_seconds=time.perf_counter() - began,
+        n_before=0,
+        singular_values=found.singular_values,
+    )
+
+
+def state_error(
+    landscape: Landscape, state: State, matrix: DynamicalMatrix, found: Spectrum
+) -> FloatArray:
+    """Estimate how much eigenvalues change on the way to the minimum that the forces point at.
+
+    The way is a Newton step, or that part of it which moves nothing by more than a thousandth of the
+    smallest radius; changes are then extrapolated. Where this estimate exceeds an eigenvalue, as it
+    often does for sliding modes, the packing has not settled along that mode, and not even the sign is
+    that of the minimum.
+
+    Parameters
+    ----------
+    landscape, state
+        What the matrix is of.
+    matrix : DynamicalMatrix
+    found : Spectrum
+        All its modes.
+
+    Returns
+    -------
+    (n,) array of float64, [energy / length^2]
+    """
+    sure = (found.sign != 0) & ~found.is_translation
+    slope = found.vectors[:, sure].T @ matrix.gradient
+    newton = -(found.vectors[:, sure] @ (slope / found.eigenvalues[sure]))
+    farthest = float(np.abs(newton).max(initial=0.0))
+    part = min(1.0, _SHORT * float(landscape.inner_radius.min()) / max(farthest, 1e-300))
+    shift, turn = matrix.coordinates.motion(part * newton)
+    there = Products(matrix_at(landscape, state.displaced(shift, turn), matrix))
+
+    stiff = found.eigenvalues > _STIFF * found.eigenvalues.max(initial=0.0)
+    at = there.images(found.vectors[:, ~stiff])
+    bent = (there.Ct @ at.stretched - at.pushed).astype(np.float64)
+    relaxed = (found.vectors[:, stiff].T @ bent) ** 2 / found.eigenvalues[stiff, None]
+    values = found.eigenvalues.copy()
+    values[~stiff] = at.quotients.value - relaxed.sum(axis=0)
+    values[stiff] = there.quotients(found.vectors[:, stiff]).value
+    change = np.abs(values - found.eigenvalues) / part
+    return np.where(found.is_translation, 0.0, change)
+
+
+def _plain(matrix: DynamicalMatrix) -> Found:
+    values, vectors = scipy.linalg.eigh(matrix.matrix.toarray())
+    return _found_as_is(matrix, values, vectors, np.empty(0))
+
+
+def _first_order(matrix: DynamicalMatrix) -> Found:
+    """Marschall & Teitel 2018, Appendix B: -S on the null space of H, and its mean elsewhere."""
+    C, S = matrix.compatibility.toarray(), matrix.prestress
+    _, sigma, right = scipy.linalg.svd(C)
+    rank = rank_of(sigma, matrix.residual.largest)
+    R, Z = right[:rank].T, right[rank:].T
+    low, turn = scipy.linalg.eigh(-(Z.T @ (S @ Z)))
+    high = sigma[:rank] ** 2 - (R * (S @ R)).sum(axis=0)
+    values, vectors = np.concatenate([low, high]), np.column_stack([Z @ turn, R])
+    return _found_as_is(matrix, values, vectors, sigma)
+
+
+def _found_as_is(
+    matrix: DynamicalMatrix, values: FloatArray, vectors: FloatArray, sigma: FloatArray
+) -> Found:
+    """Take eigenvalues as they are; their residuals bound their errors."""
+    at = Products(matrix).quotients(vectors)
+    off = np.abs(values - at.value).astype(np.float64)
+    return Found(values, vectors, at.residual + at.rounding + off, at.entries, sigma)
+
+
+def _projected(matrix: DynamicalMatrix) -> Found:
+    return two_levels(matrix, refine=False)
+
+
+def _refined(matrix: DynamicalMatrix) -> Found:
+    return two_levels(matrix, refine=True)
+
+
+METHODS: dict[str, Callable[[DynamicalMatrix], Found]] = {
+    "projected": _projected,
+    "refined": _refined,
+    "plain": _plain,
+    "first_order": _first_order,
+}

@@ -1,0 +1,324 @@
+"""What the modes of a packing are like: densities, participation, directions, bands and their counts.
+
+Marschall & Teitel 2018, Sec. III D.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+from scipy.sparse.csgraph import connected_components
+
+from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
+from jamshape.vibration.spectrum import Spectrum
+from jamshape.packing import FloatArray, IntArray, Packing
+from jamshape.vibration.two_levels import rank_of
+
+# The gap below the high band is the widest within this fraction of all modes (or so many modes) of
+# where the rank of H says that it is.
+_NEAR_RANK = 0.02
+_NEAR_RANK_MODES = 3
+
+# Bonds with a larger share than this in further states of self stress belong to them.
+_SHARE = 1e-3
+
+# Bonds weaker than this fraction of the mean force only just touch.
+_GRAZING = 1e-4
+
+
+class Components(NamedTuple):
+    """How much of each mode is what kind of motion; (k,) each, their sum is 1."""
+
+    parallel: FloatArray
+    """Displacement along the long axis (Marschall & Teitel 2018, Eq. 33)."""
+    perpendicular: FloatArray
+    """Displacement across it (Eq. 34)."""
+    rotation: FloatArray
+    """(Eq. 35)"""
+    of_round: FloatArray
+    """Displacement of particles that have no long axis, discs."""
+
+
+class Density(NamedTuple):
+    """Density of vibrational states in bins of equal relative width."""
+
+    edges: FloatArray
+    """(B + 1,) of omega, ascending."""
+    n_modes: IntArray
+    """(B,)"""
+    density: FloatArray
+    """(B,) with the integral 1 over all modes that were counted."""
+
+    @property
+    def omega(self) -> FloatArray:
+        """(B,) geometric middles of the bins."""
+        return np.sqrt(self.edges[1:] * self.edges[:-1])
+
+
+class Band(NamedTuple):
+    """Modes between two gaps, by size of their eigenvalues."""
+
+    name: str
+    """low: of second order in the prestress; middle: of first order; high: what bonds constrain."""
+    modes: IntArray
+    """Rows of the spectrum."""
+    n_negative: int
+    n_unsure: int
+    """Modes whose sign is within the error."""
+    mean_omega: float
+    """Mean frequency of those with positive eigenvalues; NaN if there is none."""
+    gap_below: float
+    """Smallest |lambda| of the band over the largest of the band below; inf if there is none."""
+
+    @property
+    def n_modes(self) -> int:
+        """Number of modes."""
+        return len(self.modes)
+
+
+class Counts(NamedTuple):
+    """Modes and bonds counted; n_modes = n_translations + n_floppy + rank."""
+
+    n_modes: int
+    n_translations: int
+    n_bonds: int
+    rank: int
+    """Of H, by the singular values of C."""
+    n_self_stress: int
+    """N_c - rank: one, and one more for each set of redundant bonds."""
+    n_floppy: int
+    """Modes but translations that H leaves free."""
+    n_grazing: int
+    """Bonds that only just touch, such as those that hold rods which slid up to them."""
+    high_expected: float
+    """N z / 2 = N_c (Marschall & Teitel 2018, Sec. III D)."""
+    low_expected: float
+    """N (z_iso - z) / 2 = n_modes - N_c, translations among them."""
+    softest_constraint: float
+    """Smallest singular value that counts as one."""
+    largest_of_self_stress: float
+    """Largest that does not."""
+
+
+class Redundancy(NamedTuple):
+    """A set of bonds that could carry stress by itself, beside that of the packing.
+
+    Such as a ring of rods with flat contacts; or a single second bond that has all but faded.
+    """
+
+    n_states: int
+    bonds: IntArray
+    """Rows of the compatibility matrix."""
+    particles: IntArray
+    """Rows of the packing."""
+    largest_singular_value: float
+    """Of C; 0 would be exactly redundant."""
+
+
+def participation(coordinates: Coordinates, vectors: FloatArray) -> FloatArray:
+    """Participation ratio of modes (Marschall & Teitel 2018, Eq. 32).
+
+    (sum u^2)^2 / (N sum u^4) over all components u: 3 for a mode spread evenly over x, y and A theta of N
+    particles (2 for discs), 1/N for one that moves a single coordinate.
+
+    Parameters
+    ----------
+    coordinates : Coordinates
+    vectors : (n, k) array of float64
+
+    Returns
+    -------
+    (k,) array of float64
+    """
+    squares = vectors**2
+    n = len(coordinates.backbone)
+    return np.asarray(squares.sum(axis=0) ** 2 / (n * (squares**2).sum(axis=0)))
+
+
+def components(coordinates: Coordinates, packing: Packing, vectors: FloatArray) -> Components:
+    """Split modes into displacement along and across the particles and rotation.
+
+    Parameters
+    ----------
+    coordinates : Coordinates
+    packing : Packing
+        Spherocylinders or other bodies of revolution about their x axes; where the three diameters
+        are equal a particle is round.
+    vectors : (n, k) array of float64
+        Unit columns.
+
+    Returns
+    -------
+    Components
+    """
+    D = coordinates.dimension
+    diameters = packing.diameters[coordinates.backbone]
+    is_round = (diameters[:, 0] == diameters[:, 1]) & (diameters[:, 0] == diameters[:, 2])
+    axes = packing.axes[coordinates.backbone]
+    moves = ~coordinates.is_rotation
+    shift = vectors[moves].reshape(len(axes), D, -1)
+    square = (shift**2).sum(axis=1)
+    along = np.einsum("id,idk->ik", axes, shift) ** 2
+    return Components(
+        parallel=along[~is_round].sum(axis=0),
+        perpendicular=(square - along)[~is_round].sum(axis=0),
+        rotation=(vectors[~moves] ** 2).sum(axis=0),
+        of_round=square[is_round].sum(axis=0),
+    )
+
+
+def density_of_states(omega: FloatArray, per_decade: int = 10) -> Density:
+    """Count frequencies in bins of equal relative width (Marschall & Teitel 2018, Sec. III D).
+
+    Parameters
+    ----------
+    omega : (k,) array of float64
+        Those that are not positive, unstable modes and translations, are left out.
+    per_decade : int
+
+    Returns
+    -------
+    Density
+        Without bins where there is no frequency.
+    """
+    positive = omega[omega > 0]
+    if not len(positive):
+        return Density(np.ones(1), np.zeros(0, np.int64), np.zeros(0))
+    low, high = np.log10(positive.min()), np.log10(positive.max())
+    first, last = np.floor(low * per_decade), np.floor(high * per_decade) + 1
+    edges = 10.0 ** (np.arange(first, last + 1) / per_decade)
+    edges[0], edges[-1] = min(edges[0], positive.min()), np.nextafter(edges[-1], np.inf)
+    count = np.histogram(positive, edges)[0].astype(np.int64)
+    return Density(edges, count, count / (len(positive) * np.diff(edges)))
+
+
+def mean_in_bins(values: FloatArray, omega: FloatArray, edges: FloatArray) -> FloatArray:
+    """Average (k,) values over the modes in bins of frequency: (B,), NaN where there is none."""
+    count = np.histogram(omega, edges)[0]
+    total = np.histogram(omega, edges, weights=values)[0]
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def count(matrix: DynamicalMatrix, found: Spectrum) -> Counts:
+    """Count modes and constraints; `found` is a whole spectrum with singular values."""
+    rank = found.rank(matrix.residual.largest)
+    sigma, n_moves = found.singular_values, matrix.translations.shape[1]
+    force = matrix.contacts["bond_force"]
+    n_grazing = int(((force > 0) & (force < _GRAZING * matrix.bond_force)).sum())
+    return Counts(
+        n_modes=matrix.size,
+        n_translations=n_moves,
+        n_bonds=matrix.n_bonds,
+        rank=rank,
+        n_self_stress=matrix.n_bonds - rank,
+        n_floppy=matrix.size - n_moves - rank,
+        n_grazing=n_grazing,
+        high_expected=matrix.n_particles * matrix.z / 2,
+        low_expected=matrix.size - matrix.n_particles * matrix.z / 2,
+        softest_constraint=float(sigma[rank - 1]) if rank else np.nan,
+        largest_of_self_stress=float(sigma[rank]) if rank < len(sigma) else 0.0,
+    )
+
+
+def bands(matrix: DynamicalMatrix, found: Spectrum) -> list[Band]:
+    """Split a whole spectrum into its bands, from the lowest, translations left out.
+
+    The high band begins at the widest gap near where the rank of H says so. Below it, modes of first and
+    of second order in the prestress are told apart by size: with the mean overlap x and stiffness k of
+    bonds, first order is about k x and second k x^2, and the cut is at k x^(3/2).
+
+    Parameters
+    ----------
+    matrix : DynamicalMatrix
+    found : Spectrum
+
+    Returns
+    -------
+    list of Band
+        Those that are not empty.
+    """
+    real = np.flatnonzero(~found.is_translation)
+    order = real[np.argsort(np.abs(found.eigenvalues[real]), kind="stable")]
+    size = np.abs(found.eigenvalues[order])
+    stiffness = float(matrix.bonds.stiffness.mean())
+    distance = float(matrix.contacts["distance"][matrix.contacts["distance"] > 0].mean())
+    cut = stiffness * (matrix.bond_force / (stiffness * distance)) ** 1.5
+    n_low = int((size < cut).sum())
+    n_below = _gap_near(size, n_low, len(size) - found.rank(matrix.residual.largest))
+    limits = {"low": (0, n_low), "middle": (n_low, n_below), "high": (n_below, len(size))}
+    return [
+        _band(found, name, order[first:last], size[first] / size[first - 1] if first else np.inf)
+        for name, (first, last) in limits.items()
+        if last > first
+    ]
+
+
+def _gap_near(size: FloatArray, least: int, expected: int) -> int:
+    """Count the modes below the widest gap that lies near an expected number."""
+    if expected <= least:
+        return least
+    reach = max(_NEAR_RANK_MODES, int(_NEAR_RANK * len(size)))
+    candidates = np.arange(max(least + 1, expected - reach), min(len(size) - 1, expected + reach))
+    width = size[candidates] / size[candidates - 1]
+    return int(candidates[np.argmax(width)]) if len(candidates) else expected
+
+
+def _band(found: Spectrum, name: str, modes: IntArray, gap: float) -> Band:
+    values, sign = found.eigenvalues[modes], found.sign[modes]
+    omega = np.sqrt(values[values > 0])
+    return Band(
+        name=name,
+        modes=np.sort(modes),
+        n_negative=int((sign < 0).sum()),
+        n_unsure=int((sign == 0).sum()),
+        mean_omega=float(omega.mean()) if len(omega) else np.nan,
+        gap_below=float(gap),
+    )
+
+
+def redundancies(matrix: DynamicalMatrix) -> list[Redundancy]:
+    """Find bonds that could carry stress beside that of the whole packing, such as rings of flat rods.
+
+    These are states of self stress, null vectors of C^T, orthogonal to the forces that balance in the
+    packing. Needs the singular vectors of C: as long as a whole spectrum.
+    """
+    left, sigma, _ = scipy.linalg.svd(matrix.compatibility.toarray())
+    null, own = left[:, rank_of(sigma, matrix.residual.largest) :], _self_stress(matrix)
+    further, share = np.linalg.svd(null - np.outer(own, own @ null), full_matrices=False)[:2]
+    return _grouped(matrix, further[:, share > 0.5])
+
+
+def _self_stress(matrix: DynamicalMatrix) -> FloatArray:
+    """(m,) unit vector of the forces of the bonds over the roots of their stiffness."""
+    bonds, force = matrix.bonds, matrix.contacts["bond_force"]
+    own = np.where(bonds.slot < 2, force[bonds.contact, np.minimum(bonds.slot, 1)], 0.0)
+    own = own / np.sqrt(bonds.stiffness)
+    return np.asarray(own / max(float(np.linalg.norm(own)), 1e-300))
+
+
+def _grouped(matrix: DynamicalMatrix, states: FloatArray) -> list[Redundancy]:
+    """Group the bonds of states of self stress (m, q), orthonormal, by shared particles."""
+    involved = np.flatnonzero((states**2).sum(axis=1) > _SHARE)
+    if not len(involved):
+        return []
+    particles = matrix.bonds.particles[involved]
+    graph = np.zeros((len(involved), matrix.coordinates.n_all), bool)
+    graph[np.arange(len(involved))[:, None], particles] = True
+    shared = graph.astype(np.int64) @ graph.T > 0
+    n_groups, group = connected_components(shared, directed=False)
+    return [_redundancy(matrix, states, involved[group == g]) for g in range(n_groups)]
+
+
+def _redundancy(matrix: DynamicalMatrix, states: FloatArray, bonds: IntArray) -> Redundancy:
+    """Describe those of some states of self stress (m, q) that are on some of the bonds."""
+    _, share, mix = np.linalg.svd(states[bonds], full_matrices=False)
+    own = states @ mix[share > 0.5].T
+    pushes = matrix.compatibility.T @ own
+    return Redundancy(
+        n_states=own.shape[1],
+        bonds=bonds,
+        particles=np.unique(matrix.bonds.particles[bonds]),
+        largest_singular_value=float(np.linalg.norm(pushes, 2)) if own.shape[1] else 0.0,
+    )

@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+from test_contact_statistics import rods
+from test_minimise import squeezed
+
+from jamshape.landscape import Landscape, State
+from jamshape.minima.minimise import minimise
+from jamshape.flow.implicit import drag_coefficients
+from jamshape.landscape.vicinity import Stage, Units, Vicinity
+
+STRAIN, ACCURACY = -1e-3, 1e-5
+
+
+class Posed:
+    """A stage of h in time about a state, and what is minimised."""
+
+    def __init__(self, landscape, state, h, extended=False):
+        self.vicinity, self.n = Vicinity(landscape, state), landscape.size
+        self.drag, self.extended = drag_coefficients(landscape) / h, extended
+        found = landscape.evaluate(state)
+        overlap = found.bond_force
+        self.units = Units(
+            overlap, found.n_bonds * overlap**2, np.sqrt(overlap), landscape.particles.n
+        )
+
+    def solve(self, *guesses, factors=None, accuracy=ACCURACY):
+        stage = Stage(STRAIN, self.drag, np.zeros(self.n), guesses, self.extended)
+        return self.vicinity.solve(stage, factors, self.units, accuracy)
+
+    def evaluate(self, x):
+        found = self.vicinity.evaluate(x, STRAIN, extended=self.extended)
+        return found, self.vicinity.stretch(STRAIN) * found.gradient + self.drag * x
+
+    def size(self, x, force):
+        return self.units.size(x, force, self.drag)
+
+
+@pytest.fixture(scope="module")
+def jammed():
+    packing, state = squeezed(24, 4.0, 0.93)
+    landscape = Landscape(packing)
+    return landscape, minimise(landscape, state).state
+
+
+@pytest.mark.parametrize("h", [1.0, 1e3, 1e6])
+def test_stages_are_solved_in_few_evaluations_while_bonds_open_and_close(jammed, h):
+    posed = Posed(*jammed, h)
+    start = np.zeros(posed.n)
+    bonds = posed.evaluate(start)[0].n_bonds
+    before = posed.vicinity.landscape.evaluations
+    found = posed.solve(start, start)
+    assert found.solved
+    assert posed.vicinity.landscape.evaluations - before <= 9
+    evaluation, gradient = posed.evaluate(found.x)
+    assert np.abs(gradient).max() < 1e-3 * posed.units.force
+    if h == 1e6:
+        assert evaluation.n_bonds != bonds
+
+
+def test_a_guess_in_a_collision_gives_way_to_the_other(jammed):
+    posed = Posed(*jammed, 1e3)
+    still = np.zeros(posed.n)
+    wild = np.random.default_rng(1).normal(size=posed.n)
+    expected = posed.solve(still, still)
+    assert expected.solved
+    assert posed.solve(wild, still).x == pytest.approx(expected.x, abs=0)
+
+
+def test_factors_of_an_earlier_stage_that_are_good_enough_are_kept(jammed):
+    posed = Posed(*jammed, 1.0)
+    still = np.zeros(posed.n)
+    first = posed.solve(still, still)
+    again = posed.solve(first.x, still, factors=first.factors)
+    assert first.factorisations > 0
+    assert again.factorisations == 0
+    assert again.factors.compiled is first.factors.compiled
+    assert np.abs(again.x - first.x).max() < 1e-6 * np.abs(first.x).max()
+
+
+@pytest.mark.parametrize("overlap_of_spines", [0.03, 0.06])
+def test_solutions_on_kinks_are_found_by_bisection(overlap_of_spines):
+    """Rods whose second bond is not whole become parallel, where the energy has a kink."""
+    tilt = 1e-7
+    packing = rods([[5.0, 5.0], [9.0 - overlap_of_spines, 5.999]], [tilt, 0.0], half_length=2.0)
+    landscape = Landscape(packing)
+    posed = Posed(landscape, State.of(packing), h=1.0)
+    still = np.zeros(posed.n)
+    found = posed.solve(still, still)
+    assert found.solved
+    assert landscape.evaluations > found.directions + 1
+    angle = posed.vicinity.at(found.x, STRAIN).orientation[:, 0]
+    assert abs(angle[0] - angle[1]) < 0.01 * tilt
+    # No place beside it is lower.
+    turn = still.copy()
+    turn[landscape.coordinates(np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])) > 0] = 1.0
+    slopes = [posed.evaluate(found.x + way * tilt * turn)[1] @ turn for way in (-1.0, 1.0)]
+    assert slopes[0] < -1e-4 * posed.units.force
+    assert slopes[1] > 1e-4 * posed.units.force
+    again = posed.solve(found.x, found.x, accuracy=1e-3 * ACCURACY)
+    assert again.solved
+    assert posed.size(again.x - found.x, posed.drag * (again.x - found.x)) < 3 * ACCURACY
+
+
+def test_factors_of_what_is_not_finite_are_refused(jammed):
+    posed = Posed(*jammed, 1.0)
+    with pytest.raises(ValueError, match="not a number"):
+        posed.vicinity.factorise(np.zeros(posed.n), 0.0, np.full(posed.n, np.nan))
+    assert not posed.solve(np.full(posed.n, np.nan), np.full(posed.n, np.nan)).solved

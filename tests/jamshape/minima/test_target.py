@@ -1,0 +1,233 @@
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from test_minimise import squeezed
+
+from jamshape.contacts import coordination, find_contacts
+from jamshape.landscape import Landscape
+from jamshape.minima.minimise import History, Outcome, minimise, residual_of
+from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
+
+# n, alpha, and the packing fraction just below jamming where the search begins
+STARTS = {"16 discs": (16, 0, 0.77), "32 discs": (32, 0, 0.815), "16 rods": (16, 1, 0.86)}
+ENERGIES = (1e-4, 1e-9, 1e-15, 1e-18)
+
+
+def start_of(name):
+    packing, state = squeezed(*STARTS[name])
+    return Landscape(packing), state
+
+
+@cache
+def found(name, u0):
+    landscape, state = start_of(name)
+    return find(landscape, state, Target(u0))
+
+
+def coordination_of(landscape, minimum):
+    packing = minimum.state.packing(landscape.particles)
+    return coordination(packing, find_contacts(packing, landscape.k_e, 2))
+
+
+def phi_J_of(landscape, minimum):
+    """Where the tangent of sqrt(u) over phi vanishes."""
+    phi = minimum.state.packing(landscape.particles).phi
+    u = minimum.energy_density
+    pressure = -minimum.evaluation.strain_gradient / (2 * minimum.state.volume)
+    return phi - 2 * phi * u / (pressure + u)
+
+
+@pytest.mark.parametrize("name", STARTS)
+@pytest.mark.parametrize("u0", ENERGIES)
+def test_direct_search_finds_the_energy_and_a_minimum(name, u0):
+    landscape, _ = start_of(name)
+    minimum = found(name, u0)
+    assert minimum.energy_density == pytest.approx(u0, rel=1e-7, abs=0)
+    assert minimum.outcome in {Outcome.CONVERGED, Outcome.SLIDING}
+    if minimum.outcome is Outcome.CONVERGED:
+        assert minimum.residual.largest <= 1e-8
+    # One who comes to it fresh finds the same.
+    again = Landscape(landscape.particles).evaluate(minimum.state)
+    assert again.energy / minimum.state.volume == pytest.approx(u0, rel=1e-7, abs=0)
+    assert residual_of(landscape, again).largest <= 2 * max(minimum.residual.largest, 1e-8)
+    hessian = landscape.curvature(minimum.state).hessian.toarray()
+    values = np.linalg.eigvalsh(hessian)
+    assert values.min() > -max(1e-10, 10 * math.sqrt(u0)) * values.max()
+
+
+@pytest.mark.parametrize("name", ["16 discs", "32 discs"])
+@pytest.mark.parametrize("u0", ENERGIES)
+def test_discs_end_converged(name, u0):
+    assert found(name, u0).outcome is Outcome.CONVERGED
+    assert found(name, u0).residual.largest <= 1e-8
+
+
+@pytest.mark.parametrize("name", ["16 discs", "32 discs"])
+@pytest.mark.parametrize("u0", [1e-9, 1e-15, 1e-18])
+def test_discs_are_isostatic_at_jamming(name, u0):
+    # D N' coordinates, less D translations, and one more contact for a pressure.
+    landscape, _ = start_of(name)
+    counts = coordination_of(landscape, found(name, u0))
+    N = landscape.particles.n - counts.n_rattlers
+    assert landscape.particles.n / 2 < N
+    assert counts.n_bonds == counts.n_contacts == 2 * N - 1
+    assert counts.z == pytest.approx(2 * (2 * N - 1) / N)
+
+
+def test_discs_far_above_jamming_have_more_contacts():
+    landscape, _ = start_of("32 discs")
+    counts = coordination_of(landscape, found("32 discs", 1e-4))
+    assert counts.n_bonds > 2 * (32 - counts.n_rattlers) - 1
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_energies_of_one_packing_lead_to_one_jamming_density(name):
+    # sqrt(u) is linear in phi: at u0 = 1e-9 phi is 1e-4 above phi_J, and known to a thousandth of it.
+    landscape, _ = start_of(name)
+    far, near = (found(name, u0) for u0 in (1e-9, 1e-15))
+    phi_J = phi_J_of(landscape, near)
+    assert far.state.packing(landscape.particles).phi - phi_J > 1e-5
+    assert phi_J_of(landscape, far) == pytest.approx(phi_J, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["16 discs", "32 discs"])
+def test_halving_comes_back_to_the_packing_of_the_direct_search(name):
+    landscape, _ = start_of(name)
+    expected, target = found(name, 1e-9), Target(1e-9)
+    search = Search(expected.state.strained(1.03e-7), step=1e-8)
+    for _ in halving(landscape, search, target):
+        pass
+    assert search.minimum.energy_density == pytest.approx(1e-9, rel=1e-7, abs=0)
+    assert search.minimum.residual.largest <= 1e-8
+    assert search.step < 1e-8
+    np.testing.assert_allclose(
+        search.minimum.state.edges.astype(float), expected.state.edges.astype(float), rtol=1e-10
+    )
+    held = ~landscape.curvature(expected.state).rattlers
+    moved = (search.minimum.state.position - expected.state.position)[held].astype(float)
+    assert np.abs(moved - moved.mean(axis=0)).max() < 1e-7
+
+
+def test_halving_reverses_where_it_passes_the_energy():
+    landscape, _ = start_of("16 discs")
+    state = found("16 discs", 1e-9).state.strained(1e-6)
+    steps, opens = [], []
+    for search in halving(landscape, Search(state, step=4e-7), Target(1e-9)):
+        steps.append(search.step)
+        opens.append(search.opening)
+    assert opens[0] is False  # below u0: the box is compressed
+    halved = np.diff(steps[:-1]) < 0
+    turned = np.diff(np.array(opens[:-1], int)) != 0
+    np.testing.assert_array_equal(halved, turned)
+    assert set(np.divide(steps[1:], steps[:-1])) == {0.5, 1.0}
+
+
+def test_halving_ends_with_a_sentence_where_lambda_is_too_short():
+    landscape, _ = start_of("16 discs")
+    search = Search(found("16 discs", 1e-9).state.strained(1.03e-7), step=1e-8)
+    sentence = r"lambda fell below 1e-09 at u = .*, expected u = 1e-09; use the direct search$"
+    with pytest.raises(TargetError, match=sentence):
+        for _ in halving(landscape, search, Target(1e-9), shortest=1e-9):
+            pass
+
+
+def copied(search):
+    return replace(search, history=History())
+
+
+@pytest.mark.parametrize("name", ["16 discs", "16 rods"])
+def test_resumed_from_any_point_it_gives_the_same_bits(name):
+    landscape, state = start_of(name)
+    target = Target(1e-12)
+    halfway = [Search(state, target.step)]
+    halfway += [copied(s) for s in direct(landscape, copied(halfway[0]), target)]
+    whole = halfway.pop().minimum
+    assert len(halfway) > 4
+    for point in (halfway[0], halfway[len(halfway) // 2], halfway[-1]):
+        search = copied(point)
+        for _ in direct(Landscape(landscape.particles), search, target):
+            pass
+        for part in ("position", "orientation", "edges"):
+            np.testing.assert_array_equal(
+                getattr(search.minimum.state, part), getattr(whole.state, part)
+            )
+        assert search.minimum.evaluation.energy == whole.evaluation.energy
+        assert search.minimum.outcome is whole.outcome
+
+
+def test_search_yields_after_every_minimisation_and_has_its_minimum_in_the_end_only():
+    landscape, state = start_of("16 discs")
+    minima, rows = [], []
+    for search in direct(landscape, Search(state, 5e-4), Target(1e-9)):
+        minima.append(search.minimum)
+        rows.append(len(search.history.residual))
+    assert minima[-1] is not None
+    assert all(m is None for m in minima[:-1])
+    assert search.state is minima[-1].state
+    assert np.all(np.diff(rows) > 0)
+    assert not list(direct(landscape, search, Target(1e-9)))  # nothing is left to do
+
+
+@pytest.mark.parametrize("strain", [-0.01, 0.01])
+def test_starts_above_and_below_jamming_both_arrive(strain):
+    landscape, _ = start_of("16 discs")
+    start = found("16 discs", 1e-9).state.strained(strain)
+    minimum = find(landscape, start, Target(1e-9))
+    assert minimum.energy_density == pytest.approx(1e-9, rel=1e-7, abs=0)
+    assert minimum.residual.largest <= 1e-8
+
+
+def test_result_is_a_minimum_at_fixed_box_already():
+    landscape, _ = start_of("32 discs")
+    minimum = found("32 discs", 1e-9)
+    again = minimise(landscape, minimum.state, "newton")
+    assert again.outcome is Outcome.CONVERGED
+    assert len(again.history.residual) == 1
+    assert again.energy_density == pytest.approx(minimum.energy_density, rel=1e-9)
+
+
+def test_steps_finer_than_the_strain_above_jamming_grow_at_once():
+    landscape, _ = start_of("16 discs")
+    target = Target(1e-9)
+    fine = target.strain_above_jamming(landscape)
+    assert 0.1 < fine / math.sqrt(1e-9) < 10
+    below = found("16 discs", 1e-9).state.strained(20 * fine)
+    search = Search(below, fine / 100)
+    steps = [s.step for s in direct(landscape, search, target)]
+    growing = steps[: steps.index(max(steps))]
+    assert max(steps) > fine
+    assert len(growing) < 20
+    assert search.minimum is not None
+
+
+@pytest.mark.parametrize("name", ["u0", "accuracy", "tolerance", "step"])
+@pytest.mark.parametrize("value", [0, -1e-9, math.nan, math.inf])
+def test_target_refuses(name, value):
+    with pytest.raises(ValueError, match=f"^{name} is {value}, expected a positive number$"):
+        Target(**{name: value})
+
+
+@pytest.mark.parametrize("u0", [1e-30, 1e-300, 0.1, 1.0])
+def test_energies_out_of_reach_are_refused_before_anything_is_done(u0):
+    landscape, state = start_of("16 discs")
+    with pytest.raises(ValueError, match=rf"^u0 is {u0:g}, whose overlaps are .*take another u0$"):
+        find(landscape, state, Target(u0))
+    assert landscape.evaluations == 0
+
+
+def test_a_start_far_above_jamming_is_opened_until_it_unjams():
+    packing, state = squeezed(24, 0.01, 0.80)
+    landscape = Landscape(packing)
+    above = find(landscape, state, Target(1e-12)).state.strained(-6e-3)
+    minimum = find(landscape, above, Target(1e-15))
+    assert minimum.energy_density == pytest.approx(1e-15, rel=1e-7, abs=0)
+    assert minimum.residual.largest <= 1e-8
+
+
+def test_target_is_met_within_its_accuracy():
+    target = Target(1e-12, accuracy=1e-3)
+    assert [target.is_met(1e-12 * x) for x in (1, 1.0009, 0.9991)] == [True] * 3
+    assert [target.is_met(1e-12 * x) for x in (1.0011, 0.9989, 0, math.nan)] == [False] * 4

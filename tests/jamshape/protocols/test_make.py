@@ -1,0 +1,369 @@
+from dataclasses import replace
+from functools import cache
+
+import h5py
+import numpy as np
+import pytest
+from test_minimise import squeezed
+
+from jamshape.protocols.approach import Approach
+from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
+from jamshape.protocols.random_start import InsertionError, Mixture
+from jamshape.protocols.jammed import (
+    Files,
+    Sample,
+    is_compressed,
+    is_done,
+    make,
+    measure,
+    require_same,
+    summary,
+    write_minimum,
+)
+from jamshape.landscape import Landscape, State
+from jamshape.minima.minimise import residual_of
+from jamshape.files.h5md import (
+    RunWriter,
+    read_attributes,
+    read_observables,
+    read_packing,
+    read_report,
+)
+from jamshape.minima.target import Target, find
+
+U0 = 1e-12
+SAMPLE = Sample(n=16, alpha=1.0, phi_start=0.5, target=Target(U0))
+FAST = Approach(kappa=1e-5, p_end=3e-4)
+
+
+@cache
+def start():
+    """A packing of rods just below jamming, in doubles."""
+    packing, state = squeezed(16, 1, 0.86)
+    return state.packing(packing).with_(position=state.packing(packing).position, step=3)
+
+
+@cache
+def minimum():
+    landscape = Landscape(start())
+    return landscape, find(landscape, State.of(start()), Target(U0))
+
+
+def compressed(out, packing=None):
+    """What a compression leaves that has reached its end."""
+    writer = RunWriter.create(Files(out).run, packing or start(), {"finished": False})
+    phi = np.linspace(0.80, 0.88, 60)
+    p = 0.3 * np.clip(phi - 0.85, 0, None)
+    kappa = np.where(np.arange(60) < 50, 1e-6, -1e-6)
+    writer.append_series(np.arange(60), np.arange(60.0), {"phi": phi, "p": p, "kappa": kappa})
+    writer.set_attributes(SAMPLE.attributes() | {"finished": True})
+
+
+def assert_same_result(out, expected):
+    for one, other in zip(read_packing(out).poses(), read_packing(expected).poses(), strict=True):
+        np.testing.assert_array_equal(one, other)
+    mine, others = read_attributes(out), read_attributes(expected)
+    for name in ("u", "p", "phi", "phi_J", "outcome", "residual", "n_contacts"):
+        assert mine.get(name) == others.get(name), name
+
+
+def test_file_of_a_minimum_holds_what_was_measured(tmp_path):
+    landscape, found = minimum()
+    out = tmp_path / "packing.h5"
+    write_minimum(out, landscape, found, {"alpha": 1.0, "note": "as given"})
+    attributes, observables = measure(landscape, found)
+    stored = read_attributes(out)
+    assert stored == attributes | {"alpha": 1.0, "note": "as given"}
+    read = read_observables(out)
+    assert read.keys() == observables.keys() >= {"rattler_ids", "net_force", "net_torque"}
+    for name, value in observables.items():
+        np.testing.assert_array_equal(read[name][0], value)
+    state = State.of(read_packing(out))
+    for name in ("position", "orientation", "edges"):
+        np.testing.assert_array_equal(getattr(state, name), getattr(found.state, name))
+    # Who reads the file finds the same energy, to the accuracy of an overlap of 1e-6.
+    again = Landscape(read_packing(out)).evaluate(state)
+    assert again.energy == pytest.approx(found.evaluation.energy, rel=1e-12)
+    assert residual_of(landscape, again).largest <= 2e-8
+    report = read_report(out)
+    assert len(report.step) == min(len(found.history.residual), 2000)
+    assert report.error[-1] == found.history.residual[-1]
+
+
+def test_measured_numbers_are_those_of_the_contacts():
+    landscape, found = minimum()
+    attributes, observables = measure(landscape, found)
+    packing = found.state.packing(landscape.particles)
+    network = find_contacts(packing, 1.0, 2)
+    forces = sum_forces(packing, network)
+    assert attributes["u"] == pytest.approx(U0, rel=1e-7, abs=0)
+    # Doubles have an overlap of 1e-6 to nine digits.
+    assert attributes["u"] == pytest.approx(forces.energy / packing.box.volume, rel=1e-6, abs=0)
+    assert attributes["p"] == pytest.approx(forces.pressure, rel=1e-6, abs=0)
+    assert attributes["phi"] == packing.phi
+    counts = coordination(packing, network)
+    assert {k: attributes[k] for k in counts._fields} == counts._asdict()
+    rattlers = packing.id[find_rattlers(packing, network)]
+    np.testing.assert_array_equal(observables["rattler_ids"], rattlers)
+    largest = max(attributes["residual_force"], attributes["residual_torque"])
+    assert largest <= attributes["residual"] <= 1e-8
+    assert attributes["outcome"] == "converged"
+
+
+def test_jamming_density_is_where_the_energy_vanishes():
+    landscape, found = minimum()
+    phi_J = measure(landscape, found)[0]["phi_J"]
+    finer = find(landscape, State.of(start()), Target(1e-16))
+    phi = finer.state.packing(landscape.particles).phi
+    assert phi_J == pytest.approx(phi, abs=1e-6)
+    assert phi_J < found.state.packing(landscape.particles).phi
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    out = tmp_path_factory.mktemp("whole") / "packing.h5"
+    compressed(out)
+    return out, list(make(SAMPLE, out))
+
+
+def test_a_compression_that_is_there_is_taken_and_searched_from(whole):
+    out, progress = whole
+    assert {at.stage for at in progress} == {"search"}
+    assert is_done(out)
+    assert is_compressed(Files(out).run)
+    assert not Files(out).search.exists()
+    assert progress[-1].energy_density == pytest.approx(U0, rel=1e-7, abs=0)
+    found, stored = summary(out), read_attributes(out)
+    assert found["reached"] is True
+    assert found["u"] == stored["u"] == pytest.approx(U0, rel=1e-7, abs=0)
+    assert found["phi"] == pytest.approx(progress[-1].phi, rel=1e-12)
+    identity = {"n": 16, "alpha": 1.0, "seed": 1, "phi_start": 0.5, "u0": U0, "size_ratio": 1.4}
+    assert {name: stored[name] for name in identity} == identity
+    assert stored["phi_J_compression"] == pytest.approx(0.85, abs=1e-3)
+    assert stored["evaluations"] > 10
+    assert stored["wall_seconds"] > 0
+
+
+@pytest.mark.parametrize("after", [1, 4])
+def test_a_search_that_was_killed_goes_on_to_the_same_bits(whole, tmp_path, after):
+    out = tmp_path / "packing.h5"
+    compressed(out)
+    assert len(whole[1]) > after + 1
+    for _ in range(2):  # twice, further on the second time
+        going = make(SAMPLE, out)
+        for _ in range(after):
+            last = next(going)
+        going.close()
+        assert not is_done(out)
+        assert Files(out).search.exists()
+    rest = list(make(SAMPLE, out))
+    assert last == whole[1][2 * after - 1]
+    assert len(rest) == len(whole[1]) - 2 * after
+    assert_same_result(out, whole[0])
+    assert not Files(out).search.exists()
+
+
+def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_path):
+    # Its first state is all doubles, those after it are not.
+    packing, state = squeezed(16, 1, 0.86)
+    apart = state.strained(0.006).packing(packing)
+    apart = apart.with_(position=apart.position, orientation=apart.orientation, box=apart.box)
+    assert not len(find_contacts(apart, 1.0, 2).pairs)
+    unbroken, out = tmp_path / "unbroken.h5", tmp_path / "packing.h5"
+    for path in (unbroken, out):
+        compressed(path, apart)
+    list(make(SAMPLE, unbroken))
+    going = make(SAMPLE, out)
+    next(going)
+    going.close()
+    list(make(SAMPLE, out))
+    assert_same_result(out, unbroken)
+
+
+def test_the_search_of_another_target_is_not_gone_on_with(tmp_path):
+    out = tmp_path / "packing.h5"
+    compressed(out)
+    going = make(SAMPLE, out)
+    for _ in range(3):
+        next(going)
+    going.close()
+    other = Sample(n=16, alpha=1.0, phi_start=0.5, target=Target(1e-8))
+    list(make(other, out))
+    assert read_attributes(out)["u"] == pytest.approx(1e-8, rel=1e-7, abs=0)
+
+
+OTHERS = {
+    "alpha = 1.0, expected 0.5": {"alpha": 0.5},
+    "n = 16, expected 24": {"n": 24},
+    "seed = 1, expected 9": {"seed": 9},
+    "approach_kappa = 1e-07, expected 1e-05": {"approach": FAST},
+    "mixture = False, expected True": {"mixture": Mixture.monodisperse(1.0)},
+}
+
+
+def refused(sample, out):
+    """Say why a sample is not made, after a look at the files, which must stay as they are."""
+    before = {path: path.read_bytes() for path in out.parent.iterdir()}
+    with pytest.raises(ValueError) as error:
+        next(make(sample, out))
+    assert {path: path.read_bytes() for path in out.parent.iterdir()} == before
+    sentence = str(error.value)
+    assert "\n" not in sentence
+    assert sentence.startswith(str(out))
+    return sentence
+
+
+@pytest.mark.parametrize("words", OTHERS)
+def test_the_compression_of_another_sample_is_neither_taken_nor_replaced(tmp_path, words):
+    out = tmp_path / "packing.h5"
+    compressed(out)
+    sentence = refused(replace(SAMPLE, **OTHERS[words]), out)
+    assert "run.h5 holds the compression of a packing with " in sentence
+    assert words in sentence
+    assert sentence.endswith("; write to another file, or make it again")
+
+
+def test_the_compression_of_another_mixture_is_refused(tmp_path):
+    sample = replace(SAMPLE, mixture=Mixture.monodisperse(1.0))
+    out = tmp_path / "packing.h5"
+    compressed(out)
+    RunWriter.open(Files(out).run).set_attributes(sample.attributes())
+    assert "expected those of another mixture" in refused(sample, out)
+
+
+@pytest.mark.lammps
+def test_the_compression_of_another_sample_is_replaced_where_that_is_asked_for(tmp_path):
+    out = tmp_path / "packing.h5"
+    for damaged in (False, True):
+        compressed(out)
+        if damaged:
+            cut(Files(out).run)
+        going = make(replace(SAMPLE, alpha=0.0, approach=FAST), out, again=True)
+        assert next(going).stage == "compression"
+        going.close()
+        assert read_attributes(Files(out).run)["alpha"] == 0
+
+
+def cut(path):
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+
+
+def edited(name, value):
+    def edit(path):
+        with h5py.File(path, "r+") as file:
+            file["particles/all"][name][...] = value
+
+    return edit
+
+
+def renamed_shape(path):
+    with h5py.File(path, "r+") as file:
+        file["particles/all"].attrs["shape_style"] = "superellipsoid"
+
+
+def emptied(path):
+    with h5py.File(path, "r+") as file:
+        for name in ("position", "orientation", "image"):
+            del file["particles/all"][name]["value"]
+            file["particles/all"][name]["value"] = np.zeros((2, 0, 2))
+
+
+DAMAGE = {
+    "is truncated or damaged, expected a complete HDF5 file; write it again": cut,
+    "is not an HDF5 file, expected one written by jamshape": lambda path: path.write_text("none"),
+    "position holds NaN or infinity, expected finite numbers": edited("position/value", np.nan),
+    "diameters hold -1.0, expected positive lengths": edited("diameters", -1.0),
+    "packing has no particles, expected at least one": emptied,
+}
+
+
+@pytest.mark.parametrize("words", DAMAGE)
+@pytest.mark.parametrize("stage", ["run", "search"])
+def test_damaged_files_are_refused_and_kept(tmp_path, words, stage):
+    out = tmp_path / "packing.h5"
+    compressed(out)
+    if stage == "search":
+        going = make(SAMPLE, out)
+        next(going)
+        going.close()
+    path = getattr(Files(out), stage)
+    DAMAGE[words](path)
+    sentence = refused(SAMPLE, out)
+    assert sentence.startswith(f"{path}: ")
+    assert words in sentence
+
+
+def test_the_compression_of_another_shape_is_refused(tmp_path):
+    out = tmp_path / "packing.h5"
+    compressed(out)
+    renamed_shape(Files(out).run)
+    words = "holds 16 particles of shape 'superellipsoid', expected 16 of 'spherocylinder'"
+    assert words in refused(SAMPLE, out)
+
+
+def test_a_finished_packing_of_another_sample_or_shape_is_refused(tmp_path):
+    out = tmp_path / "packing.h5"
+    landscape, found = minimum()
+    write_minimum(out, landscape, found, SAMPLE.attributes())
+    require_same(out, SAMPLE)
+    for words, changes in OTHERS.items():
+        with pytest.raises(ValueError, match=f"holds a packing with {words}; write to another"):
+            require_same(out, replace(SAMPLE, **changes))
+    with pytest.raises(ValueError, match="with u0 = 1e-12, expected 1e-10; write to another file"):
+        require_same(out, replace(SAMPLE, target=Target(1e-10)))
+    renamed_shape(out)
+    with pytest.raises(ValueError, match="of shape 'superellipsoid', expected 16 of 'sphero"):
+        require_same(out, SAMPLE)
+
+
+def test_a_file_that_is_no_finished_packing_is_neither_done_nor_replaced(tmp_path):
+    out = tmp_path / "run.h5"
+    RunWriter.create(out, start(), {"kappa": 1e-6})
+    sentence = (
+        r"run\.h5 holds no finished packing, expected one of make_packing\.py; write to anoth"
+    )
+    with pytest.raises(ValueError, match=sentence):
+        is_done(out)
+
+
+def test_a_run_without_its_end_is_not_compressed(tmp_path):
+    run = tmp_path / "run.h5"
+    assert not is_compressed(run)
+    RunWriter.create(run, start(), {"finished": False})
+    assert not is_compressed(run)
+    RunWriter.open(run).set_attributes({"finished": True})
+    assert is_compressed(run)
+    assert not is_done(tmp_path / "none.h5")
+
+
+@pytest.mark.lammps
+def test_a_compression_that_was_killed_goes_on_to_a_result(tmp_path):
+    sample = Sample(n=16, alpha=0.0, phi_start=0.5, target=Target(1e-6), approach=FAST)
+    unbroken, out = make(sample, tmp_path / "unbroken.h5"), tmp_path / "packing.h5"
+    rows = [next(unbroken) for _ in range(150)]
+    unbroken.close()
+    going = make(sample, out)
+    for _ in range(60):  # past the first restart file, which is written after 50 rows
+        next(going)
+    going.close()
+    assert list(tmp_path.glob("packing*restart*"))
+    assert not is_compressed(Files(out).run)
+    progress = list(make(sample, out))
+    assert {at.stage for at in progress} == {"compression", "search"}
+    for found, expected in zip(progress[:100], rows[50:], strict=True):
+        assert found.phi == pytest.approx(expected.phi, rel=1e-12)
+        assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-6, abs=1e-20)
+    phi = read_observables(Files(out).run)["phi"]
+    np.testing.assert_allclose(phi[:150], [at.phi for at in rows], rtol=1e-12)
+    assert is_compressed(Files(out).run)
+    assert summary(out)["reached"]
+    assert not list(tmp_path.glob("packing*restart*"))
+
+
+@pytest.mark.lammps
+def test_a_start_that_cannot_be_placed_leaves_no_file(tmp_path):
+    sample = Sample(n=16, alpha=4.0, phi_start=0.95)
+    with pytest.raises((ValueError, InsertionError)):
+        next(make(sample, tmp_path / "packing.h5"))
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,147 @@
+import numpy as np
+import pytest
+
+from jamshape.contacts import find_contacts
+from jamshape.vibration.hessian import dynamical_matrix
+from jamshape.landscape import Landscape, State
+from jamshape.minima.minimise import residual_of
+from jamshape.vibration.statistics import bands, count
+from jamshape.vibration.spectrum import spectrum
+from jamshape.protocols.quasistatic import Quasistatic
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
+from jamshape.protocols.superellipsoid_jammed import Sample, make, require_same, summary
+from jamshape.minima.target import Target, find
+
+COARSE = Quasistatic(step=1e-2)
+TIGHT = {"phi_start": 0.4, "quasistatic": COARSE, "target": Target(1e-12)}
+SAMPLES = {
+    "spheres": Sample(n=24, **TIGHT),
+    "spheroids": Sample(n=24, w1=0.7, **TIGHT),
+    "general ellipsoids": Sample(n=24, w1=0.8, w2=1.25, **TIGHT),
+    "boxes": Sample(n=24, p=1.5, **TIGHT),
+    "octahedra": Sample(n=24, p=0.85, **TIGHT),
+}
+FREEDOM = {"spheres": 3, "spheroids": 5}
+
+
+@pytest.fixture(scope="module")
+def packings(tmp_path_factory):
+    folder, made = tmp_path_factory.mktemp("superellipsoids"), {}
+
+    def get(name):
+        if name not in made:
+            made[name] = folder / f"{name}.h5"
+            for _ in make(SAMPLES[name], made[name]):
+                pass
+        return made[name]
+
+    return get
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_a_packing_is_at_its_energy_and_in_balance(packings, name):
+    packing, stored = read_packing(packings(name)), read_attributes(packings(name))
+    landscape, state = Landscape(packing), State.of(packing)
+    found = landscape.evaluate(state)
+    assert found.energy / state.volume == pytest.approx(1e-12, rel=1e-7)
+    assert residual_of(landscape, found).largest < 1e-8
+    assert stored["phi"] == pytest.approx(packing.phi, rel=1e-14)
+    assert 0.5 < stored["phi_J"] < stored["phi"] < 0.78
+    network = find_contacts(packing)
+    held = ~np.isin(packing.id[network.pairs], stored_rattlers(packings(name))).any(axis=1)
+    assert stored["n_contacts"] == held.sum()
+    assert summary(packings(name))["reached"]
+    assert len(read_report(packings(name)).error) > 10
+
+
+def stored_rattlers(path):
+    return read_observables(path)["rattler_ids"][-1]
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_missing_contacts_are_quartic_modes(packings, name):
+    # N_c = d_f (N - N_r) - 2 - N_q (Yuan et al. 2019, Sec. 3.2), that is rank(H) = N_c - 1.
+    packing = read_packing(packings(name))
+    matrix = dynamical_matrix(Landscape(packing), State.of(packing))
+    found = spectrum(matrix)
+    counts = count(matrix, found)
+    assert counts.rank == counts.n_bonds - 1
+    d_f = FREEDOM.get(name, 6)
+    assert matrix.size == d_f * matrix.n_particles
+    assert read_attributes(packings(name))["z_iso"] == 2 * d_f
+    n_quartic = sum(band.n_modes for band in bands(matrix, found) if band.name != "high")
+    assert matrix.n_bonds == d_f * matrix.n_particles - 2 - n_quartic
+    assert (n_quartic == 0) == (name == "spheres")
+    assert (found.sign[~found.is_translation] > 0).all()  # a minimum, to second order too
+
+
+def test_protocol_1_ends_just_above_the_jamming_that_the_direct_search_finds(tmp_path):
+    sample = Sample(n=24, w1=0.7, phi_start=0.4, quasistatic=COARSE)
+    for _ in make(sample, tmp_path / "bisected.h5"):
+        pass
+    packing, bisected = (read(tmp_path / "bisected.h5") for read in (read_packing, read_attributes))
+    assert 1e-10 < bisected["energy_per_particle"] <= 2e-10
+    assert bisected["residual_force"] <= 1e-4
+    landscape = Landscape(packing)
+    found = find(landscape, State.of(packing), Target(1e-14))
+    phi = found.state.packing(packing).phi
+    assert bisected["phi_J"] == pytest.approx(phi, abs=1e-6)
+    assert bisected["phi"] - phi > 5e-6
+
+
+def test_protocol_2_thermalises_and_goes_on_from_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr("jamshape.protocols.superellipsoid_jammed._STORE_SECONDS", 0.0)
+    sample = Sample(
+        n=40,
+        p=1.5,
+        protocol=2,
+        n_sweeps=200,
+        phi_thermal=0.4,
+        phi_start=0.3,
+        quasistatic=COARSE,
+        target=Target(1e-10),
+    )
+    stages = [at.stage.split()[0] for at in make(sample, tmp_path / "whole.h5")]
+    first, last = stages.index("sweep"), len(stages) - stages[::-1].index("sweep")
+    assert set(stages[:first]) == set(stages[last:]) - {"search"} == {"compression"}
+    for k, at in enumerate(make(sample, tmp_path / "cut.h5")):
+        if k == first + 7:
+            assert at.stage == "sweep 80"
+            break
+    seen = [at.stage.split()[0] for at in make(sample, tmp_path / "cut.h5")]
+    assert 0 < len(seen) < len(stages)
+    one, other = (read_packing(tmp_path / f"{name}.h5") for name in ("whole", "cut"))
+    np.testing.assert_array_equal(one.position, other.position)
+    np.testing.assert_array_equal(one.orientation, other.orientation)
+    assert read_attributes(tmp_path / "cut.h5")["acceptance"] > 0
+    assert not (tmp_path / "cut.h5.path.h5").exists()
+
+
+def test_another_sample_is_refused(tmp_path, packings, monkeypatch):
+    with pytest.raises(ValueError, match=r"a packing with w1 = 0\.7, expected 1"):
+        require_same(packings("spheroids"), SAMPLES["spheres"])
+    monkeypatch.setattr("jamshape.protocols.superellipsoid_jammed._STORE_SECONDS", 0.0)
+    out = tmp_path / "packing.h5"
+    next(make(SAMPLES["boxes"], out))
+    with pytest.raises(ValueError, match=r"the making of a packing with p = 1\.5, expected 0\.85"):
+        next(make(SAMPLES["octahedra"], out))
+    next(make(SAMPLES["octahedra"], out, again=True))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "sentence"),
+    [
+        ({"n": 0}, "n is 0, expected at least one particle"),
+        ({"protocol": 3}, "protocol is 3, expected 1 or 2"),
+        ({"phi_start": 1.5}, "expected 0 < phi < 1"),
+    ],
+)
+def test_senseless_samples_are_refused(numbers, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        Sample(**numbers)
+
+
+@pytest.mark.parametrize(("p", "w1", "w2"), [(0.5, 1, 1), (1, 1.5, 1), (1, 1, 0.5)])
+def test_senseless_shapes_are_refused(p, w1, w2):
+    with pytest.raises(ValueError, match="expected"):
+        Sample(p=p, w1=w1, w2=w2).start()
