@@ -19,10 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.contacts import ContactNetwork, coordination, find_contacts, find_rattlers
-from jamshape.files.lammps_text import read_any
-from jamshape.packing import Box, FloatArray, IntArray, Packing
 from jamshape.files.h5md import FileFormatError, read_attributes
+from jamshape.files.lammps_text import read_any
+from jamshape.packing import Box, Packing
 
 SMALL, BIG, RATTLER, CONTACT = "#86c98a", "#6ea6dc", "#cfcfcf", "#d7191c"
 INCHES, MARGIN = 7.0, np.array([0.1, 0.35])  # of the longer edge, around the box

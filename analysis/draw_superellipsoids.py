@@ -22,9 +22,10 @@ from shading import draw_packing, save_smooth, view
 from superellipsoid_files import LOCAL_ORDER, local_order
 from sweep_files import GREEN, RED, YELLOW, plain
 
-from jamshape.measures.order3d import directors
-from jamshape.packing import FloatArray, Packing, body_axes
+from jamshape.arrays import FloatArray
 from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.measures.order3d import directors
+from jamshape.packing import Packing, body_axes
 from jamshape.protocols.superellipsoid_jammed import order
 
 COLUMNS, INCHES = 3, 3.4

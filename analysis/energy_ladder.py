@@ -18,9 +18,9 @@ from typing import Any
 from sweep_files import REACHED
 from tqdm import tqdm
 
-from jamshape.protocols.ladder import Rung, climb
 from jamshape.files.h5md import read_attributes
 from jamshape.minima.target import Target
+from jamshape.protocols.ladder import Rung, climb
 
 SUMMARY = ("u0", "alpha", "seed", "outcome", "phi", "phi_J", "residual", "z", "contacts_shared")
 

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jamshape.vibration.hessian import dynamical_matrix
+from jamshape.arrays import FloatArray
+from jamshape.files.h5md import FileFormatError
 from jamshape.landscape import Landscape, State
+from jamshape.packing import Packing
+from jamshape.vibration.hessian import dynamical_matrix
+from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.statistics import mean_in_bins
 from jamshape.vibration.table import ModeTable, read_modes, tabulate
-from jamshape.vibration.spectrum import spectrum
-from jamshape.packing import FloatArray, Packing
-from jamshape.files.h5md import FileFormatError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

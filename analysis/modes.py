@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.landscape import Landscape, State
+from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.sparse_modes import lowest, near
+from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
 from jamshape.vibration.statistics import density_of_states, mean_in_bins, redundancies
 from jamshape.vibration.table import BANDS, ModeTable, tabulate, write_modes
-from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
-from jamshape.vibration.sparse_modes import lowest, near
-from jamshape.files.h5md import read_attributes, read_packing
 
 SHOWN = 12  # modes of the printed table
 KINDS = {"rotation": "o", "parallel": "s", "perpendicular": "D"}

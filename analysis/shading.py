@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from jamshape.packing import FloatArray, IntArray, Packing
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.packing import Packing
 from jamshape.shapes.superellipsoid_surface import SurfaceMesh, surface_mesh
 
 if TYPE_CHECKING:

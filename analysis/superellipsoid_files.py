@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from sweep_files import BLACK, BLUE, GREEN, ORANGE, RED, SKY, Mean, Sample, finished, mean
 
+from jamshape.arrays import FloatArray
 from jamshape.contacts import find_contacts
-from jamshape.measures.order3d import directors, local_cubatic_order, local_nematic_order
-from jamshape.packing import FloatArray, Packing, body_axes
 from jamshape.files.h5md import read_packing
+from jamshape.measures.order3d import directors, local_cubatic_order, local_nematic_order
+from jamshape.packing import Packing, body_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,13 +11,13 @@ import numpy as np
 from superellipsoid_files import packing_of
 from sweep_files import Sample
 
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.files.h5md import FileFormatError
+from jamshape.landscape import Landscape, State
 from jamshape.vibration.energy_along import AlongModes, EnergyAlong, quartic_crossover
 from jamshape.vibration.hessian import dynamical_matrix
-from jamshape.landscape import Landscape, State
-from jamshape.vibration.table import ModeTable, read_modes, tabulate, write_modes
 from jamshape.vibration.spectrum import spectrum
-from jamshape.packing import FloatArray, IntArray
-from jamshape.files.h5md import FileFormatError
+from jamshape.vibration.table import ModeTable, read_modes, tabulate, write_modes
 
 # What tells a packing from others.
 _IDENTITY = ("phi", "u", "seed")

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jamshape.contacts import BoolArray, ContactNetwork, find_contacts, find_rattlers
-from jamshape.packing import Packing
+from jamshape.arrays import BoolArray
+from jamshape.contacts import ContactNetwork, find_contacts, find_rattlers
 from jamshape.files.h5md import read_attributes, read_observables, read_packing
+from jamshape.packing import Packing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,10 +15,18 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from jamshape.protocols.random_start import Mixture, random_packing
-from jamshape.packing import Packing
-from jamshape.flow.compression import Compression, Recording, begin, is_finished, record, resume, summary
+from jamshape.flow.compression import (
+    Compression,
+    Recording,
+    begin,
+    is_finished,
+    record,
+    resume,
+    summary,
+)
 from jamshape.lammps.session import Session
+from jamshape.packing import Packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 
 def parse() -> argparse.Namespace:

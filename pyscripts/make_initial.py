@@ -8,10 +8,10 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.files.h5md import write_packing
 from jamshape.files.lammps_text import write_data
 from jamshape.packing import Packing
-from jamshape.files.h5md import write_packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 
 def parse() -> argparse.Namespace:

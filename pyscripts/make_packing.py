@@ -21,11 +21,10 @@ from typing import Any
 
 from tqdm import tqdm
 
-from jamshape.protocols import jammed
-from jamshape.protocols import superellipsoid_jammed
+from jamshape.minima.target import Target
+from jamshape.protocols import jammed, superellipsoid_jammed
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.minima.target import Target
 
 # Options with their types, defaults by shape (None: not an option of it) and meanings.
 OPTIONS = (

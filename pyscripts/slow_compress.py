@@ -17,9 +17,9 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from jamshape.flow.slow_run import begin, is_finished, make_start, record, require_same, summary
-from jamshape.flow.implicit import METHODS, Protocol
 from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.flow.implicit import METHODS, Protocol
+from jamshape.flow.slow_run import begin, is_finished, make_start, record, require_same, summary
 
 
 def parse() -> argparse.Namespace:

@@ -37,10 +37,10 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from jamshape.files.lammps_text import write_data
-from jamshape.packing import Packing
-from jamshape.lammps.session import plugin_path
 from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.files.lammps_text import write_data
+from jamshape.lammps.session import plugin_path
+from jamshape.packing import Packing
 
 Row = dict[str, Any]
 Run = namedtuple("Run", "n peak_bytes rate core_share")

@@ -29,12 +29,13 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.arrays import FloatArray
 from jamshape.files.lammps_text import read_data, write_data
-from jamshape.landscape import Landscape, State
-from jamshape.packing import Box, FloatArray, Packing
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
+from jamshape.landscape import Landscape, State
+from jamshape.packing import Box, Packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 PHI_START, PHI = 0.4, 0.86
 PHI_3D = {1.0: 0.66, 1.5: 0.72}  # under the semi-axis w

@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from jamshape.protocols.random_start import Mixture, random_packing
-from jamshape.packing import Packing
+from jamshape.files.h5md import read_packing, write_packing
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
-from jamshape.files.h5md import read_packing, write_packing
+from jamshape.packing import Packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 KAPPA = 1e-4
 PHI_START, PHI_FROM, PHI_TO = 0.4, 0.84, 0.88

@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from jamshape.protocols.random_start import Mixture, random_packing
-from jamshape.packing import Packing
+from jamshape.files.h5md import read_packing, write_packing
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
-from jamshape.files.h5md import read_packing, write_packing
+from jamshape.packing import Packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 PHI_START, KAPPA_START = 0.4, 1e-4
 PHI = {4.0: (0.84, 0.88), 0.01: (0.83, 0.86)}  # from and to, under alpha

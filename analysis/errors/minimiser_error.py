@@ -28,14 +28,14 @@ import numpy as np
 from singular_limit import with_spines
 from tqdm import tqdm
 
-from jamshape.protocols.approach import Approach
-from jamshape.protocols.random_start import Mixture
-from jamshape.protocols.jammed import Sample, is_done, make, write_minimum
+from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import History, Stop, minimise
-from jamshape.packing import Packing
-from jamshape.files.h5md import read_packing
 from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
+from jamshape.packing import Packing
+from jamshape.protocols.approach import Approach
+from jamshape.protocols.jammed import Sample, is_done, make, write_minimum
+from jamshape.protocols.random_start import Mixture
 
 MINIMISERS = ("auto", "newton", "lbfgs", "lammps", "paper")
 LEVELS = (1e-4, 1e-6, 1e-8)

@@ -24,13 +24,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse
 
-from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix
-from jamshape.landscape import Landscape, State
-from jamshape.vibration.statistics import bands
-from jamshape.vibration.spectrum import Spectrum, spectrum
-from jamshape.packing import Box, FloatArray, IntArray, Packing
-from jamshape.vibration.sparse_modes import lowest
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.h5md import read_packing
+from jamshape.landscape import Landscape, State
+from jamshape.packing import Box, Packing
+from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix
+from jamshape.vibration.sparse_modes import lowest
+from jamshape.vibration.spectrum import Spectrum, spectrum
+from jamshape.vibration.statistics import bands
 
 METHODS = ("plain", "first_order", "projected", "refined", "sparse")
 COLORS = dict(zip(METHODS, ("#999999", "#e69f00", "#0072b2", "#009e73", "#cc79a7"), strict=True))

@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.files.h5md import read_packing, write_packing
+from jamshape.flow.compression import Compression, CompressionRun
+from jamshape.flow.implicit import METHODS, Flow, Protocol, compress
+from jamshape.lammps.session import Session
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
-from jamshape.flow.compression import Compression, CompressionRun
-from jamshape.lammps.session import Session
-from jamshape.flow.implicit import METHODS, Flow, Protocol, compress
-from jamshape.files.h5md import read_packing, write_packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 HEUN_DT = 0.01
 HEUN_STEPS = 2000

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.packing import FloatArray
+from jamshape.arrays import FloatArray
 from jamshape.files.h5md import read_attributes, read_observables
 
 ENSEMBLE = ("n", "alpha", "kappa", "size_ratio")

@@ -22,9 +22,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.measures.onset import OnsetFit, fit_onset
-from jamshape.packing import FloatArray
+from jamshape.arrays import FloatArray
 from jamshape.files.h5md import read_attributes, read_observables
+from jamshape.measures.onset import OnsetFit, fit_onset
 
 # Packing fractions where runs are averaged and compared.
 GRID = 1000

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.measures.onset import OnsetFit, fit_onset
-from jamshape.packing import FloatArray
+from jamshape.arrays import FloatArray
 from jamshape.files.h5md import read_attributes, read_observables
+from jamshape.measures.onset import OnsetFit, fit_onset
 
 PAPER_PHI_J = {0.0: 0.8412, 1.0: 0.8875, 4.0: 0.866}  # Secs. III A, B; by alpha, at N = 1024
 ENSEMBLE = ("alpha", "n", "kappa", "size_ratio")

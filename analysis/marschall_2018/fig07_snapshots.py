@@ -19,8 +19,9 @@ import numpy as np
 from draw import BIG, CONTACT, RATTLER, SHORTEST, SMALL, images, outlines
 from sweep_files import Sample, choose_alphas, read_sweep
 
-from jamshape.contacts import BoolArray, ContactNetwork
-from jamshape.packing import FloatArray, Packing
+from jamshape.arrays import BoolArray, FloatArray
+from jamshape.contacts import ContactNetwork
+from jamshape.packing import Packing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

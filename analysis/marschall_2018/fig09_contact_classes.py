@@ -35,7 +35,12 @@ from sweep_files import (
     samples_text,
 )
 
-from jamshape.measures.contact_statistics import ClassFractions, FlatFraction, class_fractions, flat_fraction
+from jamshape.measures.contact_statistics import (
+    ClassFractions,
+    FlatFraction,
+    class_fractions,
+    flat_fraction,
+)
 
 PAPER_FLAT = {0.01: Mean(0.963, math.nan, 0)}  # Sec. III C
 STYLES = {

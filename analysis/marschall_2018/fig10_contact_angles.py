@@ -20,8 +20,8 @@ import numpy as np
 from draw import outlines
 from sweep_files import COLORS, Mean, Sample, choose_alphas, mean, read_sweep
 
+from jamshape.arrays import FloatArray
 from jamshape.measures.contact_statistics import angle_density, angle_edges, contact_angles
-from jamshape.packing import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

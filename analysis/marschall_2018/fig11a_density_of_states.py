@@ -31,8 +31,8 @@ from mode_files import (
 )
 from sweep_files import COLORS, MARKERS, PAPER_STYLE, mean, plain
 
+from jamshape.arrays import FloatArray
 from jamshape.vibration.table import ModeTable
-from jamshape.packing import FloatArray
 
 # Sec. III D, N = 1024, u = 1e-15: fractions of modes, and frequencies in the bands.
 PAPER_FRACTIONS = {

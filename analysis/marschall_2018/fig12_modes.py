@@ -22,9 +22,10 @@ import numpy as np
 from draw import RATTLER, images, outlines
 from mode_files import mode_text, pick_modes, table_of
 
-from jamshape.vibration.table import ModeTable
-from jamshape.packing import Box, FloatArray, Packing
+from jamshape.arrays import FloatArray
 from jamshape.files.h5md import read_packing
+from jamshape.packing import Box, Packing
+from jamshape.vibration.table import ModeTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

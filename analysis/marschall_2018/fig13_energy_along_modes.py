@@ -23,10 +23,10 @@ from mode_files import mode_text, pick_modes, scientific, table_of
 from sweep_files import plain
 from tqdm import tqdm
 
+from jamshape.arrays import FloatArray
+from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.vibration.energy_along import AlongModes, Crossover, EnergyAlong, fit_crossover
 from jamshape.vibration.table import ModeTable
-from jamshape.packing import FloatArray
-from jamshape.files.h5md import read_attributes, read_packing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,8 +22,8 @@ import numpy as np
 from mode_files import Tables, number, read_tables, selected, sizes, stable, unstable
 from sweep_files import BLUE, RED, Mean, mean, plain
 
+from jamshape.arrays import FloatArray
 from jamshape.vibration.table import ModeTable
-from jamshape.packing import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from sweep_files import COLORS, MARKERS, Sample, choose_alphas, plain, read_sweep
 
-from jamshape.packing import FloatArray
+from jamshape.arrays import FloatArray
 from jamshape.files.h5md import read_observables
 
 PAPER_ALPHAS = (0.01, 4.0)

@@ -30,12 +30,12 @@ from scipy.stats import ks_2samp
 from sweep_files import Mean, Sample, Sweep, mean, read_sweep
 from tqdm import tqdm
 
+from jamshape.files.h5md import read_attributes, require_attributes
+from jamshape.landscape import Landscape, State
+from jamshape.minima.target import Target, TargetError, find
+from jamshape.packing import Packing
 from jamshape.protocols import jammed
 from jamshape.protocols.approach import Approach
-from jamshape.landscape import Landscape, State
-from jamshape.packing import Packing
-from jamshape.files.h5md import read_attributes, require_attributes
-from jamshape.minima.target import Target, TargetError, find
 
 PAPER = {"flat": PAPER_FLAT[0.01].value, "z": 4.43, "rattlers": 34 / 1024}  # alpha = 0.01
 NAMES = {"from_discs": "from discs", "compressed": "compressed rods"}

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 from shading import lit, mean_normals, view
 
-from jamshape.packing import FloatArray
+from jamshape.arrays import FloatArray
 from jamshape.shapes.superellipsoid_size import (
     asphericity,
     axes_from,

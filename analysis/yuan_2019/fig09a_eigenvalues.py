@@ -21,8 +21,8 @@ from superellipsoid_files import Kind, parser_of, read_groups
 from superellipsoid_modes import by_size, kept_modes, modes_option, quartic_count
 from tqdm import tqdm
 
+from jamshape.arrays import FloatArray
 from jamshape.vibration.table import ModeTable
-from jamshape.packing import FloatArray
 
 Tables = dict[Kind, ModeTable]
 SMOOTH = 31  # modes that the share of rotation is averaged over

@@ -29,8 +29,9 @@ from superellipsoid_files import (
 )
 from sweep_files import Sample, plain
 
+from jamshape.arrays import FloatArray
 from jamshape.contacts import find_contacts
-from jamshape.packing import FloatArray, body_axes
+from jamshape.packing import body_axes
 from jamshape.shapes.superellipsoid_curvature import contact_curvatures
 
 PER_DECADE = 6

@@ -1,6 +1,6 @@
-#include "contact/hard_particles.hpp"
+#include "packing/hard_particles.hpp"
 
-#include "contact/superellipsoid.hpp"
+#include "contact/superellipsoid/superellipsoid.hpp"
 
 #include "bindings/arrays.hpp"
 

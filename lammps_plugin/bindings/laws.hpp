@@ -1,7 +1,7 @@
 #pragma once
 
-#include "contact/spherocylinder.hpp"
-#include "contact/superellipsoid.hpp"
+#include "contact/spherocylinder/spherocylinder.hpp"
+#include "contact/superellipsoid/superellipsoid.hpp"
 
 #include "bindings/arrays.hpp"
 #include "text.hpp"

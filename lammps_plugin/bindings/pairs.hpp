@@ -1,9 +1,9 @@
 #pragma once
 
 #include "contact/pair_derivatives.hpp"
-#include "contact/pair_sum.hpp"
 
 #include "bindings/arrays.hpp"
+#include "packing/pair_sum.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "contact/rattlers.hpp"
+#include "packing/rattlers.hpp"
 
 #include "bindings/arrays.hpp"
 

@@ -1,4 +1,4 @@
-#include "contact/spherocylinder.hpp"
+#include "contact/spherocylinder/spherocylinder.hpp"
 
 #include "bindings/arrays.hpp"
 #include "bindings/laws.hpp"

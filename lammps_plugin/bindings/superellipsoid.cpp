@@ -1,4 +1,4 @@
-#include "contact/superellipsoid.hpp"
+#include "contact/superellipsoid/superellipsoid.hpp"
 
 #include "bindings/arrays.hpp"
 #include "bindings/laws.hpp"

@@ -1,5 +1,5 @@
-#include "contact/spherocylinder.hpp"
-#include "contact/superellipsoid.hpp"
+#include "contact/spherocylinder/spherocylinder.hpp"
+#include "contact/superellipsoid/superellipsoid.hpp"
 
 #include "bindings/arrays.hpp"
 #include "bindings/laws.hpp"

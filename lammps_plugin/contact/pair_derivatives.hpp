@@ -1,9 +1,9 @@
 #pragma once
 
 #include "contact/contact.hpp"
-#include "contact/dual.hpp"
-#include "contact/rotation.hpp"
-#include "contact/vec.hpp"
+#include "contact/math/dual.hpp"
+#include "contact/math/rotation.hpp"
+#include "contact/math/vec.hpp"
 
 namespace jamshape {
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include "contact/pair_derivatives.hpp"
-#include "contact/pair_sum.hpp"
 
 #include "landscape/block_factors.hpp"
+#include "packing/pair_sum.hpp"
 
 #include <algorithm>
 #include <cmath>

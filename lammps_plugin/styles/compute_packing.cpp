@@ -1,13 +1,13 @@
 #include "compute_packing.h"
 
-#include "contact/rattlers.hpp"
-#include "contact/symmetric_eigen.hpp"
+#include "contact/math/symmetric_eigen.hpp"
 
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
 #include "force.h"
+#include "packing/rattlers.hpp"
 #include "update.h"
 
 #include <algorithm>

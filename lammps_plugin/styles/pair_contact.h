@@ -1,7 +1,7 @@
 #pragma once
 
 #include "contact/contact.hpp"
-#include "contact/vec.hpp"
+#include "contact/math/vec.hpp"
 
 #include "pair.h"
 #include "particle_view.h"

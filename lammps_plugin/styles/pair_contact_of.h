@@ -1,9 +1,9 @@
 #pragma once
 
 #include "contact/contact.hpp"
+#include "contact/math/rotation.hpp"
+#include "contact/math/vec.hpp"
 #include "contact/pair_derivatives.hpp"
-#include "contact/rotation.hpp"
-#include "contact/vec.hpp"
 
 #include "atom.h"
 #include "bodies.h"

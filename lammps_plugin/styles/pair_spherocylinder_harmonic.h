@@ -1,6 +1,6 @@
 #pragma once
 
-#include "contact/spherocylinder.hpp"
+#include "contact/spherocylinder/spherocylinder.hpp"
 
 #include "pair_contact_of.h"
 

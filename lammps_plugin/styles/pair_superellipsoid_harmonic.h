@@ -1,6 +1,6 @@
 #pragma once
 
-#include "contact/superellipsoid.hpp"
+#include "contact/superellipsoid/superellipsoid.hpp"
 
 #include "pair_contact_of.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "contact/rotation.hpp"
-#include "contact/vec.hpp"
+#include "contact/math/rotation.hpp"
+#include "contact/math/vec.hpp"
 
 #include "compat.h"
 #include "pointers.h"

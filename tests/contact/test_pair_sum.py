@@ -11,8 +11,8 @@ from spherocylinder_pairs import EPS, concatenated, disc_to_disc, tip_to_side, t
 
 from jamshape import _contact
 from jamshape.contacts import bodies, each_once, find_contacts, forces, near_pairs
-from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.packing import Box
+from jamshape.protocols.random_start import Mixture, random_packing
 
 K_E = 1.7
 MIXTURES = {

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jamshape.files.h5md import RunWriter, write_packing
 from jamshape.files.lammps_text import write_data
 from jamshape.measures.order import orientational_order
 from jamshape.packing import Box, Packing
-from jamshape.files.h5md import RunWriter, write_packing
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 PHI_J = 0.866

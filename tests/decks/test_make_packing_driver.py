@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from jamshape.contacts import find_contacts
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import residual_of
-from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 
 pytestmark = pytest.mark.lammps
 

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from jamshape.vibration.hessian import Coordinates, dynamical_matrix
-from jamshape.protocols.random_start import Mixture, random_packing
-from jamshape.protocols.jammed import write_minimum
+from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import Stop, minimise
-from jamshape.vibration.table import ModeTable, tabulate, write_modes
-from jamshape.vibration.spectrum import spectrum
-from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.minima.target import Target, find
+from jamshape.protocols.jammed import write_minimum
+from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.vibration.hessian import Coordinates, dynamical_matrix
+from jamshape.vibration.spectrum import spectrum
+from jamshape.vibration.table import ModeTable, tabulate, write_modes
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 OF_MODES = ("density_of_states", "participation", "mode_components", "band_frequency")

@@ -10,12 +10,12 @@ import h5py
 import numpy as np
 import pytest
 
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.files.h5md import FileFormatError, write_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import Stop, minimise
-from jamshape.vibration.table import BANDS, read_modes
-from jamshape.files.h5md import FileFormatError, write_packing
 from jamshape.minima.target import Target, find
+from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.vibration.table import BANDS, read_modes
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 

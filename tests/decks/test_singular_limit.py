@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jamshape.protocols.random_start import Mixture, random_packing
-from jamshape.protocols.jammed import write_minimum
+from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import Stop, minimise
-from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.minima.target import Target, find
+from jamshape.protocols.jammed import write_minimum
+from jamshape.protocols.random_start import Mixture, random_packing
 
 SCRIPT = Path(__file__).parents[2] / "analysis" / "singular_limit.py"
 N, U0 = 16, 1e-14

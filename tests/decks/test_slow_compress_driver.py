@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, write_packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "slow_compress.py"
 RATES = ("--kappa", "1e-6", "--phi-slow", "0.63", "--kappa-before", "1e-4")

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jamshape.files.h5md import read_attributes, read_packing, write_packing
+from jamshape.minima.target import Target
 from jamshape.packing import Box, Packing
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.protocols.superellipsoid_jammed import Sample, make
-from jamshape.minima.target import Target
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 OF_SWEEPS = (

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jamshape.measures.contact_statistics import class_fractions, contact_angles, flat_fraction
 from jamshape.contacts import find_contacts
-from jamshape.protocols.random_start import Mixture, random_packing
-from jamshape.packing import Box
 from jamshape.files.h5md import RunWriter, read_packing, write_packing
+from jamshape.measures.contact_statistics import class_fractions, contact_angles, flat_fraction
+from jamshape.packing import Box
+from jamshape.protocols.random_start import Mixture, random_packing
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 SCRIPTS = ("phi_j", "snapshots", "contact_number", "contact_classes", "contact_angles", "residuals")

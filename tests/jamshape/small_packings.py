@@ -8,11 +8,11 @@ import numpy as np
 import scipy.sparse
 from test_minimise import squeezed
 
-from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.landscape import Landscape
 from jamshape.minima.minimise import Residual
-from jamshape.vibration.spectrum import spectrum
 from jamshape.minima.target import Target, find
+from jamshape.vibration.hessian import dynamical_matrix
+from jamshape.vibration.spectrum import spectrum
 
 # n, alpha, packing fraction just below jamming, seed
 SMALL = {

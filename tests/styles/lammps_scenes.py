@@ -15,8 +15,8 @@ import numpy as np
 
 from jamshape.contacts import network as contacts
 from jamshape.files.lammps_text import write_data
-from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.lammps.session import Session, plugin_path
+from jamshape.packing import Box, Packing, angle_from_quaternion
 
 REPOSITORY = Path(__file__).parents[2]
 # An error of LAMMPS ends this process: LAMMPS_SCREEN=1 with `pytest -s` shows its sentence.

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
+from jamshape.protocols.random_start import Mixture, random_packing
 
 pytestmark = pytest.mark.lammps
 

@@ -32,8 +32,8 @@ from superellipsoid_scenes import (
 )
 
 from jamshape import _contact
-from jamshape.packing import body_axes
 from jamshape.landscape.adapter import superellipsoid_bodies
+from jamshape.packing import body_axes
 
 pytestmark = pytest.mark.lammps
 

@@ -7,10 +7,10 @@ the more so the faster. The bounds say in which direction and by how much at mos
 import numpy as np
 import pytest
 
-from jamshape.protocols.random_start import Mixture, random_packing
-from jamshape.measures.onset import fit_onset
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
+from jamshape.measures.onset import fit_onset
+from jamshape.protocols.random_start import Mixture, random_packing
 
 pytestmark = [pytest.mark.lammps, pytest.mark.validate]
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jamshape.protocols.approach import Approach
-from jamshape.protocols.random_start import Mixture
-from jamshape.protocols.jammed import Sample, make
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.minima.target import Target
+from jamshape.protocols.approach import Approach
+from jamshape.protocols.jammed import Sample, make
+from jamshape.protocols.random_start import Mixture
 
 pytestmark = [pytest.mark.lammps, pytest.mark.validate]
 

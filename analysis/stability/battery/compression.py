@@ -25,13 +25,13 @@ from stability_scenes import (
 
 from jamshape import _contact
 from jamshape.contacts import superellipsoid_bodies
-from jamshape.protocols.thermal import Thermal, equilibrate, without_overlaps
+from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import minimise
 from jamshape.packing import Packing
-from jamshape.protocols.quasistatic import Compression, Quasistatic
+from jamshape.protocols.quasistatic import Quasistatic, QuasistaticRun
 from jamshape.protocols.quasistatic import compress as compress_quasistatically
-from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress
+from jamshape.protocols.thermal import Thermal, equilibrate, without_overlaps
 
 IMPLICIT, QUASISTATIC, THERMAL = (
     "implicit compression",
@@ -272,7 +272,7 @@ def _loose(dimension: int, p: float, w: float, n: int = 8) -> Packing:
 def _first_jammed(packing: Packing, protocol: Quasistatic, k_e: float = 1.0) -> tuple[float, ...]:
     """Give its phi, U/N over the energy asked for, the residual, and the densest loose phi."""
     landscape = Landscape(packing, k_e)
-    compression = Compression.of(landscape, State.of(packing), protocol)
+    compression = QuasistaticRun.of(landscape, State.of(packing), protocol)
     for _ in compress_quasistatically(landscape, compression, protocol):
         pass
     assert compression.minimum is not None

@@ -35,9 +35,10 @@ from stability_scenes import (
 )
 
 from jamshape import _contact
+from jamshape.arrays import FloatArray, LongArray
 from jamshape.contacts import find_contacts, superellipsoid_bodies
 from jamshape.landscape import Landscape, State
-from jamshape.packing import FloatArray, LongArray, Packing
+from jamshape.packing import Packing
 
 ROD, SUPER = "contact of spherocylinders", "contact of superellipsoids"
 ROD_SUM, SUPER_SUM = "landscape, spherocylinders", "landscape, superellipsoids"

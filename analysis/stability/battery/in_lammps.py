@@ -34,11 +34,12 @@ from stability_scenes import (
     stack,
 )
 
+from jamshape.arrays import FloatArray
 from jamshape.contacts import find_contacts, sum_forces
 from jamshape.files.lammps_text import write_data
-from jamshape.packing import FloatArray, Packing
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session, plugin_path
+from jamshape.packing import Packing
 
 PAIR, FIX, MINIMIZE = (
     "pair spherocylinder/harmonic",

@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 from stability_scenes import superellipsoids
 
 from jamshape import _contact
+from jamshape.arrays import FloatArray
 from jamshape.landscape import State
-from jamshape.packing import Box, FloatArray, Packing
 from jamshape.landscape.adapter import PairArrays, shape_of
+from jamshape.packing import Box, Packing
 
 # Shapes of `crowd`.
 AXES = np.array([[0.5, 0.6, 0.8], [0.35, 0.7, 0.7], [0.6, 0.6, 0.6], [0.5, 0.5, 0.9]])

@@ -13,11 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jamshape.arrays import FloatArray, LongArray
 from jamshape.contacts import find_contacts
-from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import Stop, minimise
-from jamshape.packing import Box, FloatArray, LongArray, Packing
+from jamshape.packing import Box, Packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 EPS = float(np.finfo(np.float64).eps)
 LONG_EPS = float(np.finfo(np.longdouble).eps)

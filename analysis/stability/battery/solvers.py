@@ -22,13 +22,14 @@ from stability_scenes import (
     stack,
 )
 
-from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.arrays import FloatArray
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import Minimum, Outcome, Stop, minimise
-from jamshape.vibration.spectrum import Spectrum, spectrum
-from jamshape.packing import FloatArray, Packing
 from jamshape.minima.target import Target, find
+from jamshape.packing import Packing
+from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix
+from jamshape.vibration.spectrum import Spectrum, spectrum
 
 MINIMISER, TARGET, SPECTRUM, START = "minimisers", "energy target", "spectrum", "random start"
 

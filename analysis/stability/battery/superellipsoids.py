@@ -38,10 +38,11 @@ from stability_shapes import (
 )
 
 from jamshape import _contact
+from jamshape.arrays import FloatArray
 from jamshape.contacts import superellipsoid_bodies
 from jamshape.files.lammps_text import write_data
-from jamshape.packing import FloatArray, Packing
 from jamshape.lammps.session import Session, plugin_path
+from jamshape.packing import Packing
 
 PAIR, FIX, RANKS = (
     "pair superellipsoid/harmonic",

@@ -2,7 +2,6 @@
 
 from jamshape.contacts.network import (
     Bonds,
-    BoolArray,
     ContactKind,
     ContactNetwork,
     Coordination,
@@ -25,7 +24,29 @@ from jamshape.contacts.network import (
 
 __all__ = [
     "Bonds",
-    "BoolArray",
+    "ContactKind",
+    "ContactNetwork",
+    "Coordination",
+    "Forces",
+    "NearPairs",
+    "bodies",
+    "coordination",
+    "each_once",
+    "find_contacts",
+    "find_rattlers",
+    "forces",
+    "near_pairs",
+    "outer_radius",
+    "shifted",
+    "spheres",
+    "sum_forces",
+    "superellipsoid_bodies",
+    "unconverged_sentence",
+]
+
+
+__all__ = [
+    "Bonds",
     "ContactKind",
     "ContactNetwork",
     "Coordination",

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from jamshape import _contact
-from jamshape.packing import Box, FloatArray, IntArray, Packing
-
-BoolArray = NDArray[np.bool_]
+from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.packing import Box, Packing
 
 _TOUCHING, _CROSSING, _UNCONVERGED = 1, 2, 3  # ContactStatus of contact/contact.hpp
 _CORE = {"spherocylinder": "spines", "superellipsoid": "centres"}  # what must not cross

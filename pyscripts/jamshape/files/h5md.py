@@ -42,7 +42,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jamshape.packing import Box, FloatArray, IntArray, Packing
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.packing import Box, Packing
 
 if TYPE_CHECKING:
     import h5py

@@ -19,15 +19,9 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from jamshape.packing import (
-    Box,
-    FloatArray,
-    IntArray,
-    Packing,
-    angle_from_quaternion,
-    guess_shape_style,
-)
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.h5md import HDF5_SIGNATURE, FileFormatError, PathLike, read_packing, replacing
+from jamshape.packing import Box, Packing, angle_from_quaternion, guess_shape_style
 
 _PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional file
 _POSITION = ("x", "y", "z")

@@ -9,9 +9,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from jamshape.files.h5md import RunWriter, read_attributes, read_observables, read_series
 from jamshape.measures.onset import fit_onset
 from jamshape.packing import Packing
-from jamshape.files.h5md import RunWriter, read_attributes, read_observables, read_series
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -96,7 +96,7 @@ class Compression:
 
 
 @dataclass(frozen=True)
-class Sample:
+class Row:
     """One row of a compression: where it is and what it measures."""
 
     step: int
@@ -192,7 +192,7 @@ class CompressionRun:
         # It moves atoms into the box and orders them anew, which neighbour lists must follow.
         self.session.commands(f"write_restart {path}\nrun 0 post no")
 
-    def samples(self, every: int) -> Iterator[Sample]:
+    def samples(self, every: int) -> Iterator[Row]:
         """Run to the end and yield a row at each multiple of `every` steps, and at the end."""
         while self.session.step < self.last_step:
             self.advance(min(self.last_step, (self.session.step // every + 1) * every))
@@ -204,11 +204,11 @@ class CompressionRun:
             steps = min(step - self.session.step, _LONGEST_RUN)
             self.session.commands(f"run {steps} pre no post no")
 
-    def sample(self) -> Sample:
+    def sample(self) -> Row:
         """Measure the present state."""
         step = self.session.step
         wall = perf_counter() - self._began
-        return Sample(step, self.time, wall, self.measure())
+        return Row(step, self.time, wall, self.measure())
 
     def measure(self) -> dict[str, float]:
         """Return observables of the present state, named as in `compute packing`."""
@@ -290,7 +290,7 @@ def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
     return run, to
 
 
-def record(run: CompressionRun, to: Recording) -> Iterator[Sample]:
+def record(run: CompressionRun, to: Recording) -> Iterator[Row]:
     """Run to the end, writing each sample to the file before it is yielded."""
     writer = RunWriter.open(to.path)
     whole = run.settings.steps(float(read_attributes(to.path)["phi_start"]))
@@ -299,7 +299,7 @@ def record(run: CompressionRun, to: Recording) -> Iterator[Sample]:
     name_of_error = "local_error" if run.settings.chooses_steps else "step_error"
     run.keep_restarts(per_frame, to.restart_prefix)
 
-    def keep(sample: Sample) -> Sample:
+    def keep(sample: Row) -> Row:
         if sample.step % per_frame == 0 or sample.step == run.last_step:
             writer.append(run.packing(), sample.observables)
         else:

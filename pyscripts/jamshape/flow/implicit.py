@@ -18,10 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 from jamshape import _contact
+from jamshape.arrays import FloatArray
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
 from jamshape.landscape.newton import Factorisation
-from jamshape.packing import FloatArray, Packing
 from jamshape.landscape.vicinity import Stage, Units, Vicinity
+from jamshape.packing import Packing
 
 # Stages are solved to this fraction of the local error that is allowed. Ten times as much leaves velocities on kinks
 # that have the next steps rejected: packings of nearly round rods then cost ten times as many.

@@ -9,13 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.protocols.random_start import Mixture, random_packing
-from jamshape.measures.onset import fit_onset
-from jamshape.landscape import Landscape, State
-from jamshape.packing import Packing
-from jamshape.flow.compression import Compression, CompressionRun
-from jamshape.lammps.session import Session
-from jamshape.flow.implicit import Flow, Protocol, Step, compress
 from jamshape.files.h5md import (
     RunWriter,
     read_attributes,
@@ -23,6 +16,13 @@ from jamshape.files.h5md import (
     read_packing,
     require_attributes,
 )
+from jamshape.flow.compression import Compression, CompressionRun
+from jamshape.flow.implicit import Flow, Protocol, Step, compress
+from jamshape.lammps.session import Session
+from jamshape.landscape import Landscape, State
+from jamshape.measures.onset import fit_onset
+from jamshape.packing import Packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 # Steps between two frames, from which a run goes on.
 STEPS_PER_FRAME = 100

@@ -17,3 +17,13 @@ __all__ = [
     "Pairs",
     "State",
 ]
+
+
+__all__ = [
+    "CrossingError",
+    "Curvature",
+    "Evaluation",
+    "Landscape",
+    "Pairs",
+    "State",
+]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jamshape import _contact
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.contacts import (
     NearPairs,
     bodies,
@@ -21,7 +22,7 @@ from jamshape.contacts import (
     spheres,
     superellipsoid_bodies,
 )
-from jamshape.packing import FloatArray, IntArray, Packing
+from jamshape.packing import Packing
 
 
 class PairArrays(NamedTuple):

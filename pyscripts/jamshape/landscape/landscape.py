@@ -18,9 +18,10 @@ import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
 from jamshape import _contact
+from jamshape.arrays import FloatArray, IntArray, LongArray
 from jamshape.contacts import NearPairs, unconverged_sentence
-from jamshape.packing import FloatArray, IntArray, LongArray, Packing
 from jamshape.landscape.adapter import PairArrays, shape_of
+from jamshape.packing import Packing
 
 # Pairs whose surfaces are closer than this fraction of the smallest radius are looked at; they are looked for among
 # those that are closer than so many times as much.

@@ -9,8 +9,8 @@ import numpy as np
 import scipy.sparse
 
 from jamshape import _contact
+from jamshape.arrays import FloatArray
 from jamshape.landscape import Landscape
-from jamshape.packing import FloatArray
 
 # The smallest shift, over the largest diagonal element.
 LEAST_SHIFT: float = _contact.LEAST_SHIFT

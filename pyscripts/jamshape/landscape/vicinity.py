@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from jamshape import _contact
+from jamshape.arrays import FloatArray
 from jamshape.landscape import Evaluation, Landscape, Pairs, State
-from jamshape.minima.minimise import LONGEST_STEP, WIDEST_TURN
-from jamshape.landscape.newton import Factorisation
-from jamshape.packing import FloatArray
 from jamshape.landscape.adapter import Coordinates
+from jamshape.landscape.newton import Factorisation
+from jamshape.minima.minimise import LONGEST_STEP, WIDEST_TURN
 
 # Force, energy and length in which errors of displacements are measured.
 Units = _contact.StageUnits

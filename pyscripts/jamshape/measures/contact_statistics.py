@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 
-from jamshape.contacts import BoolArray, ContactKind, ContactNetwork
-from jamshape.packing import FloatArray, Packing
+from jamshape.arrays import BoolArray, FloatArray
+from jamshape.contacts import ContactKind, ContactNetwork
+from jamshape.packing import Packing
 
 QUARTER = np.pi / 2  # contact angles are folded to [0, QUARTER]
 

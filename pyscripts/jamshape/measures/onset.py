@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jamshape.packing import FloatArray
+from jamshape.arrays import FloatArray
 
 # Up to this fraction of the largest pressure counts as none.
 _FLOOR = 1e-4

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jamshape.packing import UNIT_QUATERNION_TOLERANCE, FloatArray, IntArray
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.packing import UNIT_QUATERNION_TOLERANCE
 from jamshape.shapes.superellipsoid_size import director_axis
 
 # So many cosines are held at a time, 16 MB.

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from jamshape.landscape import State
 from jamshape.lammps.session import Session
+from jamshape.landscape import State
 
 if TYPE_CHECKING:
     from jamshape.landscape import Landscape
     from jamshape.minima.minimise import Descent, Outcome
-    from jamshape.packing import IntArray
+from jamshape.arrays import IntArray
 
 # Iterations between two looks at the residual, and how many looks without one end it.
 _ITERATIONS = 100

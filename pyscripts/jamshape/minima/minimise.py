@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.optimize
 
+from jamshape.arrays import FloatArray
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
 from jamshape.landscape.newton import Regularised
-from jamshape.packing import FloatArray
 
 # A Newton step moves no particle by more than this fraction of the smallest radius, and turns none
 # by more than this angle.

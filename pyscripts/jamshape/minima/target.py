@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from jamshape.arrays import FloatArray
 from jamshape.landscape import CrossingError, Landscape, State
+from jamshape.landscape.newton import Regularised
 from jamshape.minima.minimise import (
     Descent,
     History,
@@ -21,8 +23,6 @@ from jamshape.minima.minimise import (
     residual_of,
     search_along,
 )
-from jamshape.landscape.newton import Regularised
-from jamshape.packing import FloatArray
 
 # A minimum this good is jammed.
 _GOOD = 1e-2

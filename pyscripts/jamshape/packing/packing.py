@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-LongArray = NDArray[np.longdouble]
+from jamshape.arrays import FloatArray, IntArray, LongArray
 
 SHAPE_STYLES = ("spherocylinder", "superellipsoid")
 

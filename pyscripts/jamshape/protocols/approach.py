@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jamshape.flow.compression import Compression, CompressionRun, Sample
+from jamshape.flow.compression import Compression, CompressionRun, Row
 
 if TYPE_CHECKING:
-    from jamshape.packing import Packing
     from jamshape.lammps.session import Session
+    from jamshape.packing import Packing
 
 _NO_END = 1e3  # a packing fraction that is never reached
 
@@ -87,7 +87,7 @@ def resume_approach(session: Session, restart: Path, stored: Mapping[str, Any]) 
     return CompressionRun(session, flow, restart, time=stored["restart_time"])
 
 
-def approach(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
+def approach(run: CompressionRun, settings: Approach) -> Iterator[Row]:
     """Compress until the state is jammed, then open the box until the pressure is nearly gone.
 
     Parameters
@@ -98,7 +98,7 @@ def approach(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
 
     Yields
     ------
-    Sample
+    Row
         Observables after every `settings.strain`, or less; `kappa` is one of them, negative while
         the box is opened.
     """
@@ -107,7 +107,7 @@ def approach(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
     yield from _open(run, settings)
 
 
-def _compress(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
+def _compress(run: CompressionRun, settings: Approach) -> Iterator[Row]:
     while True:
         # Fast rates pass states that nobody looks at.
         finer = math.sqrt(settings.kappa / run.settings.kappa)
@@ -120,7 +120,7 @@ def _compress(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
             run.change(kappa=max(kappa / 2, settings.kappa))
 
 
-def _open(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
+def _open(run: CompressionRun, settings: Approach) -> Iterator[Row]:
     if run.settings.kappa > 0:
         run.change(kappa=-settings.kappa)
     pressure = run.measure()["p"]
@@ -131,7 +131,7 @@ def _open(run: CompressionRun, settings: Approach) -> Iterator[Sample]:
         pressure = sample.observables["p"]
 
 
-def _advance(run: CompressionRun, settings: Approach, strain: float) -> Sample:
+def _advance(run: CompressionRun, settings: Approach, strain: float) -> Row:
     step = abs(run.settings.kappa) * run.settings.dt
     run.advance(run.session.step + max(1, round(strain / step)))
     sample = run.sample()

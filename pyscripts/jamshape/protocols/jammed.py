@@ -15,17 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.protocols.approach import Approach, approach, begin_approach, resume_approach
-from jamshape.measures.contact_statistics import contact_scale, residuals
+from jamshape.arrays import FloatArray
 from jamshape.contacts import coordination, find_contacts, find_rattlers
-from jamshape.protocols.random_start import Mixture, random_packing
-from jamshape.measures.onset import OnsetFit, fit_onset
-from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import History, Minimum, Outcome, residual_of, rounding_floor
-from jamshape.packing import FloatArray, Packing
-from jamshape.flow.compression import CompressionRun
-from jamshape.flow.compression import Sample as Row
-from jamshape.lammps.session import Session
 from jamshape.files.h5md import (
     RunWriter,
     read_attributes,
@@ -34,7 +25,16 @@ from jamshape.files.h5md import (
     require_attributes,
     write_packing,
 )
+from jamshape.flow.compression import CompressionRun, Row
+from jamshape.lammps.session import Session
+from jamshape.landscape import Landscape, State
+from jamshape.measures.contact_statistics import contact_scale, residuals
+from jamshape.measures.onset import OnsetFit, fit_onset
+from jamshape.minima.minimise import History, Minimum, Outcome, residual_of, rounding_floor
 from jamshape.minima.target import Search, Target, direct, require_reachable
+from jamshape.packing import Packing
+from jamshape.protocols.approach import Approach, approach, begin_approach, resume_approach
+from jamshape.protocols.random_start import Mixture, random_packing
 
 # Rows of the convergence history that are kept in a packing's file.
 _REPORT_ROWS = 2000

@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.protocols import superellipsoid_jammed
 from jamshape.contacts import find_contacts, find_rattlers
-from jamshape.protocols.jammed import is_done, write_minimum
+from jamshape.files.h5md import read_attributes, read_packing, require_attributes
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import Outcome, Stop, minimise
-from jamshape.packing import Packing
-from jamshape.files.h5md import read_attributes, read_packing, require_attributes
 from jamshape.minima.target import Search, Target, TargetError, direct
+from jamshape.packing import Packing
+from jamshape.protocols import superellipsoid_jammed
+from jamshape.protocols.jammed import is_done, write_minimum
 
 # What must agree in the packing and in a rung that is there already.
 _IDENTITY = ("alpha", "n", "seed", "size_ratio")

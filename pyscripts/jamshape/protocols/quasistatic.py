@@ -60,7 +60,7 @@ class Quasistatic:
 
 
 @dataclass(eq=False)
-class Compression:
+class QuasistaticRun:
     """A compression between two minimisations: all that is needed to go on from here.
 
     Parameters
@@ -86,7 +86,7 @@ class Compression:
     history: History = field(default_factory=History)
 
     @classmethod
-    def of(cls, landscape: Landscape, state: State, protocol: Quasistatic) -> Compression:
+    def of(cls, landscape: Landscape, state: State, protocol: Quasistatic) -> QuasistaticRun:
         """Begin at a state."""
         return cls(state, _phi(landscape, state), protocol.step)
 
@@ -98,20 +98,20 @@ class Compression:
 
 
 def compress(
-    landscape: Landscape, compression: Compression, protocol: Quasistatic
-) -> Iterator[Compression]:
+    landscape: Landscape, compression: QuasistaticRun, protocol: Quasistatic
+) -> Iterator[QuasistaticRun]:
     """Compress to the first jammed packing.
 
     Parameters
     ----------
     landscape : Landscape
-    compression : Compression
+    compression : QuasistaticRun
         Where to begin, or to go on.
     protocol : Quasistatic
 
     Yields
     ------
-    Compression
+    QuasistaticRun
         The same object after each minimisation. The last one has a minimum.
 
     Raises
@@ -142,7 +142,7 @@ def compress(
         yield compression
 
 
-def _minimised(landscape: Landscape, compression: Compression, protocol: Quasistatic) -> Minimum:
+def _minimised(landscape: Landscape, compression: QuasistaticRun, protocol: Quasistatic) -> Minimum:
     """Minimise until forces balance, or until the state is seen to be unjammed."""
     state = compression.state
     lowest = protocol.energy * landscape.particles.n / state.volume

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape import _contact
-from jamshape.contacts import BoolArray, NearPairs, bodies, each_once, near_pairs, shifted
-from jamshape.packing import Box, FloatArray, IntArray, Packing
+from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.contacts import NearPairs, bodies, each_once, near_pairs, shifted
+from jamshape.packing import Box, Packing
 
 # Trials that are tested in one go, and pairs of bodies among them, which bounds the memory.
 _MOST_TRIALS = 4096

@@ -17,14 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from jamshape.arrays import FloatArray
 from jamshape.contacts import find_contacts
-from jamshape.protocols.thermal import Thermal, equilibrate, without_overlaps
-from jamshape.protocols.jammed import Progress, energy_onset, summary_of, thinned
-from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Minimum, residual_of, rounding_floor
-from jamshape.measures.order3d import cubatic_order, directors, nematic_order
-from jamshape.packing import Box, FloatArray, Packing, body_axes
-from jamshape.protocols.quasistatic import Compression, Quasistatic, compress
 from jamshape.files.h5md import (
     RunWriter,
     read_attributes,
@@ -32,13 +26,20 @@ from jamshape.files.h5md import (
     require_attributes,
     write_packing,
 )
+from jamshape.landscape import Landscape, State
+from jamshape.measures.order3d import cubatic_order, directors, nematic_order
+from jamshape.minima.minimise import Minimum, residual_of, rounding_floor
+from jamshape.minima.target import Search, Target, direct
+from jamshape.packing import Box, Packing, body_axes
+from jamshape.protocols.jammed import Progress, energy_onset, summary_of, thinned
+from jamshape.protocols.quasistatic import Quasistatic, QuasistaticRun, compress
+from jamshape.protocols.thermal import Thermal, equilibrate, without_overlaps
 from jamshape.shapes.superellipsoid_size import (
     asphericity,
     axes_from,
     reduced_aspect_ratio,
     volume,
 )
-from jamshape.minima.target import Search, Target, direct
 
 _PROTOCOLS = (1, 2)
 _STORE_SECONDS = 20.0
@@ -208,7 +209,7 @@ class _Path:
         self.sample, self.file = sample, _path_file(out)
         start = sample.start()
         self.landscape = Landscape(start)
-        self.compression = Compression.of(self.landscape, State.of(start), sample.compression)
+        self.compression = QuasistaticRun.of(self.landscape, State.of(start), sample.compression)
         self.thermal: Thermal | None = None
         self.is_thermalised = sample.protocol == 1
         self.minimum: Minimum | None = None
@@ -250,7 +251,7 @@ class _Path:
             self._store()
             yield Progress(f"sweep {at.n_done}", at.packing.phi, 0.0, at.acceptance)
         start = State.of(self.thermal.packing)
-        self.compression = Compression.of(self.landscape, start, self.sample.compression)
+        self.compression = QuasistaticRun.of(self.landscape, start, self.sample.compression)
         self.is_thermalised = True
 
     def _lead(self, target: Target) -> Iterator[Progress]:
@@ -291,7 +292,7 @@ class _Path:
         require_attributes(self.file, self.sample.attributes(), "the making of a packing")
         stored = read_attributes(self.file)
         loose_phi = float(stored["loose_phi"])
-        self.compression = Compression(
+        self.compression = QuasistaticRun(
             state=State.of(read_packing(self.file, 1)),
             phi=float(stored["phi"]),
             step=float(stored["step"]),

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jamshape.packing import FloatArray, IntArray
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.shapes.superellipsoid_size import OCTAHEDRON, checked
 
 

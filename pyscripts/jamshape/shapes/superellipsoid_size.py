@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import elliprg, gamma
 
-from jamshape.packing import FloatArray, IntArray
+from jamshape.arrays import FloatArray, IntArray
 
 OCTAHEDRON = 0.5  # the least p of a convex body
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jamshape.packing import FloatArray, IntArray
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.shapes.superellipsoid_size import checked
 
 # Newton's method on logarithms: steps below this are rounding, and it takes about ten.

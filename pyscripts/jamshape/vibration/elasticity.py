@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jamshape.arrays import FloatArray
 from jamshape.vibration.hessian import DynamicalMatrix, Strains
-from jamshape.vibration.spectrum import Spectrum
-from jamshape.packing import FloatArray
 from jamshape.vibration.sparse_modes import ShiftedInverse
+from jamshape.vibration.spectrum import Spectrum
 
 
 class Modulus(NamedTuple):

@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jamshape.vibration.hessian import Coordinates
+from jamshape.arrays import FloatArray
 from jamshape.landscape import CrossingError, Landscape, State
-from jamshape.packing import FloatArray, Packing
+from jamshape.packing import Packing
+from jamshape.vibration.hessian import Coordinates
 
 # A fit of the crossover is the longest that leaves no more than this, relative, of the force; it has at
 # least so many amplitudes, and the quartic force exceeds the other one by this factor at its end.

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jamshape.packing import FloatArray, IntArray, LongArray
+from jamshape.arrays import FloatArray, IntArray, LongArray
 
 EPS = float(np.finfo(np.longdouble).eps)
 

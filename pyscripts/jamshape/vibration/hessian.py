@@ -17,9 +17,9 @@ import scipy.sparse
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.landscape import Evaluation, Landscape, State
 from jamshape.minima.minimise import Residual, residual_of
-from jamshape.packing import FloatArray, IntArray
 
 # A state with a larger residual is no minimum, and has no modes.
 LARGEST_RESIDUAL = 1e-4

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from jamshape.arrays import FloatArray, LongArray
 from jamshape.vibration.extended import EPS as LONG_EPS
 from jamshape.vibration.extended import SparseRows
 from jamshape.vibration.hessian import DynamicalMatrix
-from jamshape.packing import FloatArray, LongArray
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -20,10 +20,10 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
+from jamshape.arrays import FloatArray
 from jamshape.vibration.hessian import DynamicalMatrix
-from jamshape.vibration.spectrum import Spectrum
-from jamshape.packing import FloatArray
 from jamshape.vibration.quotients import Products, isolated_error, norms
+from jamshape.vibration.spectrum import Spectrum
 
 # The shift for the lowest modes, over the square of the prestress that sliding modes come from.
 _BELOW = -4.0

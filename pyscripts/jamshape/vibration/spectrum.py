@@ -14,9 +14,9 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from jamshape.vibration.hessian import DynamicalMatrix, matrix_at
+from jamshape.arrays import FloatArray
 from jamshape.landscape import Landscape, State
-from jamshape.packing import FloatArray
+from jamshape.vibration.hessian import DynamicalMatrix, matrix_at
 from jamshape.vibration.quotients import Products
 from jamshape.vibration.two_levels import Found, rank_of, two_levels
 

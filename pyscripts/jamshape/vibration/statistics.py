@@ -11,9 +11,10 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse.csgraph import connected_components
 
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.packing import Packing
 from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum
-from jamshape.packing import FloatArray, IntArray, Packing
 from jamshape.vibration.two_levels import rank_of
 
 # The gap below the high band is the widest within this fraction of all modes (or so many modes) of

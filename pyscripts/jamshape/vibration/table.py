@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.files.h5md import FileFormatError, PathLike, replacing
+from jamshape.landscape import Landscape, State
 from jamshape.vibration.elasticity import moduli
 from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
-from jamshape.landscape import Landscape, State
-from jamshape.vibration.statistics import bands, components, count, participation
 from jamshape.vibration.spectrum import Spectrum, state_error
-from jamshape.packing import FloatArray, IntArray
-from jamshape.files.h5md import FileFormatError, PathLike, replacing
+from jamshape.vibration.statistics import bands, components, count, participation
 
 if TYPE_CHECKING:
     import h5py

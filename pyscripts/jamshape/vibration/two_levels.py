@@ -15,9 +15,9 @@ import scipy.linalg
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from jamshape.arrays import FloatArray, LongArray
 from jamshape.vibration.extended import dense_product
 from jamshape.vibration.hessian import DynamicalMatrix
-from jamshape.packing import FloatArray, LongArray
 from jamshape.vibration.quotients import (
     CLOSE,
     EPS,

@@ -13,8 +13,8 @@ from jamshape.contacts import (
     forces,
     sum_forces,
 )
-from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.packing import Box, Packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 SIDES = [1, 2]
 

@@ -4,10 +4,10 @@ from scipy.integrate import solve_ivp
 from test_minimise import squeezed
 
 from jamshape.flow import implicit as stiff_compression
+from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress, drag_coefficients
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.minima.minimise import minimise
 from jamshape.packing import Box, Packing
-from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress, drag_coefficients
 
 
 def packing_of(alpha, position, angle, L=10.0):

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from test_minimise import squeezed
 
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.flow import slow_run
 from jamshape.flow.implicit import Protocol
-from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,10 @@ import pytest
 from test_contact_statistics import rods
 from test_minimise import squeezed
 
-from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import minimise
 from jamshape.flow.implicit import drag_coefficients
+from jamshape.landscape import Landscape, State
 from jamshape.landscape.vicinity import Stage, Units, Vicinity
+from jamshape.minima.minimise import minimise
 
 STRAIN, ACCURACY = -1e-3, 1e-5
 

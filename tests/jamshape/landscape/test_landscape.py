@@ -6,8 +6,8 @@ from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellips
 from test_contacts import make, pressed, scaled
 
 from jamshape.contacts import find_contacts, find_rattlers, forces
-from jamshape.protocols.random_start import Mixture
 from jamshape.landscape import CrossingError, Landscape, State
+from jamshape.protocols.random_start import Mixture
 
 H = 1e-6  # of central differences: well below the 0.005 that rods of alpha 0.01 are long
 

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from jamshape.contacts import find_contacts, sum_forces
 from jamshape.measures.contact_statistics import (
     ContactScale,
     angle_density,
@@ -14,9 +15,8 @@ from jamshape.measures.contact_statistics import (
     held_contacts,
     residuals,
 )
-from jamshape.contacts import find_contacts, sum_forces
-from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.packing import Box, Packing
+from jamshape.protocols.random_start import Mixture, random_packing
 
 R_SPINE = 0.99  # distance of touching spines; the surfaces would touch at 1
 FORCE = 0.01  # of one bond at that distance, with k_e = 1

@@ -5,7 +5,6 @@ import pytest
 from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 from test_contacts import make
 
-from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.minima.minimise import (
     METHODS,
@@ -15,6 +14,7 @@ from jamshape.minima.minimise import (
     residual_of,
     rounding_floor,
 )
+from jamshape.protocols.random_start import Mixture, random_packing
 
 
 @cache

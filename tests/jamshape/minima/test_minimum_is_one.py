@@ -19,8 +19,8 @@ from test_minimise import squeezed
 
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import History, Minimum, Outcome, residual_of
-from jamshape.packing import Box, Packing
 from jamshape.minima.target import Target, find
+from jamshape.packing import Box, Packing
 
 # n, alpha, the packing fraction just below jamming where the search begins, u0
 FOUND = {

@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 from test_minimise import squeezed
 
-from jamshape.protocols.approach import Approach
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
-from jamshape.protocols.random_start import InsertionError, Mixture
+from jamshape.files.h5md import (
+    RunWriter,
+    read_attributes,
+    read_observables,
+    read_packing,
+    read_report,
+)
+from jamshape.landscape import Landscape, State
+from jamshape.minima.minimise import residual_of
+from jamshape.minima.target import Target, find
+from jamshape.protocols.approach import Approach
 from jamshape.protocols.jammed import (
     Files,
     Sample,
@@ -20,16 +29,7 @@ from jamshape.protocols.jammed import (
     summary,
     write_minimum,
 )
-from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import residual_of
-from jamshape.files.h5md import (
-    RunWriter,
-    read_attributes,
-    read_observables,
-    read_packing,
-    read_report,
-)
-from jamshape.minima.target import Target, find
+from jamshape.protocols.random_start import InsertionError, Mixture
 
 U0 = 1e-12
 SAMPLE = Sample(n=16, alpha=1.0, phi_start=0.5, target=Target(U0))

@@ -2,15 +2,15 @@ import numpy as np
 import pytest
 
 from jamshape.contacts import find_contacts
-from jamshape.vibration.hessian import dynamical_matrix
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import residual_of
-from jamshape.vibration.statistics import bands, count
-from jamshape.vibration.spectrum import spectrum
-from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
-from jamshape.protocols.superellipsoid_jammed import Sample, make, require_same, summary
 from jamshape.minima.target import Target, find
+from jamshape.protocols.quasistatic import Quasistatic
+from jamshape.protocols.superellipsoid_jammed import Sample, make, require_same, summary
+from jamshape.vibration.hessian import dynamical_matrix
+from jamshape.vibration.spectrum import spectrum
+from jamshape.vibration.statistics import bands, count
 
 COARSE = Quasistatic(step=1e-2)
 TIGHT = {"phi_start": 0.4, "quasistatic": COARSE, "target": Target(1e-12)}

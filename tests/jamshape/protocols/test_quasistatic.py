@@ -4,13 +4,13 @@ from superellipsoid_packings import scattered
 
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import residual_of
-from jamshape.protocols.quasistatic import Compression, Quasistatic, compress
+from jamshape.protocols.quasistatic import Quasistatic, QuasistaticRun, compress
 
 
 def begun(n=16, phi=0.5, protocol=None):
     packing = scattered(np.tile([1.0, 1.0, 1.5], (n, 1)), np.ones(n), phi)
     landscape, protocol = Landscape(packing), protocol or Quasistatic(step=5e-3, energy=1e-8)
-    return landscape, Compression.of(landscape, State.of(packing), protocol), protocol
+    return landscape, QuasistaticRun.of(landscape, State.of(packing), protocol), protocol
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_going_on_from_between_two_steps_gives_the_same_to_the_bit(ended):
     for k, _ in enumerate(compress(landscape, compression, protocol)):
         if k == 15:
             break
-    fresh = Compression(
+    fresh = QuasistaticRun(
         compression.state,
         compression.phi,
         compression.step,

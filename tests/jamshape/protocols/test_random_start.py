@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from jamshape import _contact
-from jamshape.protocols.random_start import InsertionError, Mixture, random_packing
+from jamshape.files.h5md import read_packing
 from jamshape.files.lammps_text import read_data
 from jamshape.measures.order import orientational_order
 from jamshape.packing import SHAPE_STYLES
-from jamshape.files.h5md import read_packing
+from jamshape.protocols.random_start import InsertionError, Mixture, random_packing
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_initial.py"
 

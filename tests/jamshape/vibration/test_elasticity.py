@@ -5,10 +5,10 @@ import pytest
 from small_packings import SMALL, jammed, matrix_of
 from test_hessian import discs
 
-from jamshape.vibration.elasticity import moduli
-from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import Stop, minimise
+from jamshape.vibration.elasticity import moduli
+from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 
 U0 = 1e-8

@@ -5,15 +5,20 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from small_packings import jammed, matrix_of
 
-from jamshape.vibration.energy_along import AlongModes, EnergyAlong, fit_crossover, quartic_crossover
-from jamshape.vibration.hessian import Coordinates, dynamical_matrix
+from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape, State
-from jamshape.vibration.spectrum import spectrum
+from jamshape.minima.target import Target
 from jamshape.packing import Box, Packing
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.files.h5md import read_packing
 from jamshape.protocols.superellipsoid_jammed import Sample, make
-from jamshape.minima.target import Target
+from jamshape.vibration.energy_along import (
+    AlongModes,
+    EnergyAlong,
+    fit_crossover,
+    quartic_crossover,
+)
+from jamshape.vibration.hessian import Coordinates, dynamical_matrix
+from jamshape.vibration.spectrum import spectrum
 
 D, OVERLAP = 1.0, 1e-8
 

@@ -9,6 +9,8 @@ from test_contacts import make, scaled
 from test_landscape import PRESSED, pressed_named
 
 from jamshape.contacts import ContactKind
+from jamshape.landscape import Landscape, State
+from jamshape.packing import Box
 from jamshape.vibration.hessian import (
     LARGEST_RESIDUAL,
     NotAtMinimumError,
@@ -16,9 +18,7 @@ from jamshape.vibration.hessian import (
     dynamical_matrix,
     matrix_at,
 )
-from jamshape.landscape import Landscape, State
 from jamshape.vibration.spectrum import spectrum
-from jamshape.packing import Box
 
 H = 1e-6
 

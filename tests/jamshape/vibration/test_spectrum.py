@@ -19,9 +19,9 @@ from small_packings import (
 
 from jamshape.vibration.extended import EPS, SparseRows, dense_product
 from jamshape.vibration.hessian import Scope, dynamical_matrix
-from jamshape.vibration.spectrum import METHODS, spectrum, state_error
 from jamshape.vibration.quotients import grouped_error, isolated_error
 from jamshape.vibration.sparse_modes import ShiftedInverse, lowest, near
+from jamshape.vibration.spectrum import METHODS, spectrum, state_error
 
 MATRICES = {"synthetic": synthetic, **{name: partial(matrix_of, name) for name in SMALL}}
 MATRICES["at u = 1e-18"] = partial(matrix_of, "rods of alpha 4", 1e-18)

@@ -5,8 +5,9 @@ import pytest
 from small_packings import SMALL, jammed, matrix_of
 from test_contacts import make
 
-from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.landscape import Landscape, State
+from jamshape.vibration.hessian import dynamical_matrix
+from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.statistics import (
     bands,
     components,
@@ -16,7 +17,6 @@ from jamshape.vibration.statistics import (
     participation,
     redundancies,
 )
-from jamshape.vibration.spectrum import spectrum
 
 
 def test_participation_of_the_extremes():

@@ -1,9 +1,9 @@
 #pragma once
 
 #include "contact/harmonic.hpp"
-#include "contact/segment_segment.hpp"
-#include "contact/smooth_step.hpp"
-#include "contact/vec.hpp"
+#include "contact/math/smooth_step.hpp"
+#include "contact/math/vec.hpp"
+#include "contact/spherocylinder/segment_segment.hpp"
 
 #include <algorithm>
 #include <cmath>

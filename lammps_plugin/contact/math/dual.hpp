@@ -1,6 +1,6 @@
 #pragma once
 
-#include "contact/scalar.hpp"
+#include "contact/math/scalar.hpp"
 
 #include <cmath>
 

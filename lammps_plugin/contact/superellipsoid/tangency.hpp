@@ -1,9 +1,9 @@
 #pragma once
 
-#include "contact/superellipsoid_barrier.hpp"
-#include "contact/superellipsoid_equations.hpp"
-#include "contact/superellipsoid_shape.hpp"
-#include "contact/vec.hpp"
+#include "contact/math/vec.hpp"
+#include "contact/superellipsoid/barrier.hpp"
+#include "contact/superellipsoid/equations.hpp"
+#include "contact/superellipsoid/shape.hpp"
 
 #include <algorithm>
 #include <cmath>

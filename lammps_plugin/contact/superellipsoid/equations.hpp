@@ -1,7 +1,7 @@
 #pragma once
 
-#include "contact/superellipsoid_shape.hpp"
-#include "contact/vec.hpp"
+#include "contact/math/vec.hpp"
+#include "contact/superellipsoid/shape.hpp"
 
 #include <algorithm>
 #include <cmath>

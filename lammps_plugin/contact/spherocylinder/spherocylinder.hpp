@@ -2,10 +2,10 @@
 
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
-#include "contact/rotation.hpp"
-#include "contact/segment_segment.hpp"
-#include "contact/side_to_side.hpp"
-#include "contact/vec.hpp"
+#include "contact/math/rotation.hpp"
+#include "contact/math/vec.hpp"
+#include "contact/spherocylinder/segment_segment.hpp"
+#include "contact/spherocylinder/side_to_side.hpp"
 
 #include <algorithm>
 #include <cmath>

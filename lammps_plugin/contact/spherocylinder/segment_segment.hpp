@@ -1,6 +1,6 @@
 #pragma once
 
-#include "contact/vec.hpp"
+#include "contact/math/vec.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,9 +2,9 @@
 
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
-#include "contact/superellipsoid_scale.hpp"
-#include "contact/superellipsoid_shape.hpp"
-#include "contact/vec.hpp"
+#include "contact/math/vec.hpp"
+#include "contact/superellipsoid/shape.hpp"
+#include "contact/superellipsoid/tangency.hpp"
 
 #include <algorithm>
 #include <cmath>
