@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Stop, minimise
+from jamshape.minima import Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.protocols.jammed import write_minimum
 from jamshape.protocols.random_start import Mixture, random_packing

@@ -12,7 +12,7 @@ import pytest
 
 from jamshape.files.h5md import FileFormatError, write_packing
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Stop, minimise
+from jamshape.minima import Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.protocols.random_start import Mixture, random_packing
 from jamshape.vibration.table import BANDS, read_modes

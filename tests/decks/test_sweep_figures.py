@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from jamshape.contacts import find_contacts
-from jamshape.files.h5md import RunWriter, read_packing, write_packing
+from jamshape.files.h5md import read_packing, write_packing
+from jamshape.files.run_writer import RunWriter
 from jamshape.measures.contact_statistics import class_fractions, contact_angles, flat_fraction
 from jamshape.packing import Box
 from jamshape.protocols.random_start import Mixture, random_packing

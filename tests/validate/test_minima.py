@@ -12,7 +12,7 @@ from minima import complaints, dense, probes, soft_directions, typical_overlap, 
 
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import History, Minimum, Outcome, residual_of
+from jamshape.minima import History, Minimum, Outcome, residual_of
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.jammed import Sample, make
 

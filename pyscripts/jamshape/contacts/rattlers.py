@@ -68,5 +68,3 @@ def coordination(packing: Packing, network: ContactNetwork) -> Coordination:
         n_bonds=n_bonds,
         n_contacts=n_contacts,
     )
-
-

@@ -7,17 +7,15 @@ components are alike; what no contact can turn, discs and spheres, has no rotati
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from jamshape.arrays import FloatArray, IntArray, LongArray
-from jamshape.contacts import CrossingError, PairArrays, Pairs
+from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.contacts import PairArrays, Pairs, find_contacts, find_rattlers
 from jamshape.contacts.near import near_particles, nearer
 from jamshape.contacts.network import refuse_crossing, refuse_unconverged
 from jamshape.packing import Packing, State
@@ -186,13 +184,20 @@ class Landscape:
         hessian = self._summed(blocks, places)
         return Curvature(hessian, coupling, strain_hessian)
 
+    def rattlers(self, state: State) -> BoolArray:
+        """(N,) particles that no contacts hold in place (`jamshape.contacts.find_rattlers`)."""
+        packing = state.packing(self.particles)
+        return find_rattlers(packing, find_contacts(packing, self.k_e, self.sides))
+
     def derivatives(self, state: State, *, extended: bool = False) -> dict[str, NDArray[Any]]:
         """Give second derivatives contact by contact, as the class of `jamshape._contact` does.
 
         Its rows `pair` are those of `particles`, an array (C, 2) that is added here.
         """
         pairs = self.pairs_at(state)
-        found: dict[str, NDArray[Any]] = self.bodies.derivatives(*self._arrays(state, pairs), extended)
+        found: dict[str, NDArray[Any]] = self.bodies.derivatives(
+            *self._arrays(state, pairs), extended
+        )
         found["particles"] = pairs.particles[found["pair"]]
         found["shift"] = pairs.shift[found["pair"]]
         return found

@@ -13,7 +13,6 @@ from jamshape.shapes.shape import Interaction
 if TYPE_CHECKING:
     from jamshape.landscape import Landscape
     from jamshape.minima.descent import Descent, Outcome
-from jamshape.arrays import IntArray
 
 # Iterations between two looks at the residual, and how many looks without one end it.
 _ITERATIONS = 100

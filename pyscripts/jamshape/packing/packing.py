@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray
 from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
@@ -21,7 +21,6 @@ _REST_OF = {
     "orientation": "orientation_rest",
     "box": "edges_rest",
 }
-
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from jamshape.arrays import FloatArray
 # Loose enough for the six digits of a text dump, tight enough to catch swapped columns.
 UNIT_QUATERNION_TOLERANCE = 1e-4
 
+
 def angle_from_quaternion(quaternion: ArrayLike) -> FloatArray:
     """Angle of a rotation about z, 2 atan2(k, w).
 

@@ -127,9 +127,7 @@ class Particles:
         if not kinds:
             msg = "a mixture has no kinds, expected at least one"
             raise ValueError(msg)
-        full = [
-            Kind(_with_defaults(its, k.parameters), k.size, k.share, k.spread) for k in kinds
-        ]
+        full = [Kind(_with_defaults(its, k.parameters), k.size, k.share, k.spread) for k in kinds]
         told = {"kinds": "; ".join(map(_text, full))}
         return cls(its, _draw_of(its, full), told)
 
@@ -207,9 +205,7 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, f
     return chosen
 
 
-def _draw_of(
-    shape: Shape, kinds: Sequence[Kind]
-) -> Callable[[int, np.random.Generator], Sizes]:
+def _draw_of(shape: Shape, kinds: Sequence[Kind]) -> Callable[[int, np.random.Generator], Sizes]:
     def draw(n: int, rng: np.random.Generator) -> Sizes:
         species = np.repeat(np.arange(1, len(kinds) + 1), _numbers(n, [k.share for k in kinds]))
         diameters, exponent = np.empty((n, 3)), np.empty(n)

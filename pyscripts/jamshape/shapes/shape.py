@@ -24,6 +24,8 @@ class Parameter(NamedTuple):
     name: str
     default: float
     meaning: str
+    option: str
+    """Its name on command lines and in names of files."""
 
 
 class Style(NamedTuple):
@@ -130,11 +132,16 @@ class Shape(ABC):
         told = [f"{texts.get(p.name, p.name)}={parameters[p.name]:g}" for p in self.parameters]
         return f"${', '.join(told)}$"
 
+    def stem(self, parameters: Mapping[str, float]) -> str:
+        """Name files of packings of such particles."""
+        numbers = [f"{p.option}{parameters[p.name]:g}" for p in self.parameters]
+        return "_".join([self.name, *numbers])
+
 
 class ElongatedShape(Shape):
     """A shape of half length A along the body's x and radius R: diameters (2(A+R), 2R, 2R)."""
 
-    parameters = (Parameter("alpha", 4.0, "aspect ratio A/R, 0 for discs"),)
+    parameters = (Parameter("alpha", 4.0, "aspect ratio A/R, 0 for discs", "alpha"),)
     unit = "2R"
     size_ratio = 1.4
 

@@ -5,6 +5,7 @@ Marschall & Teitel, Phys. Rev. E 97, 012905 (2018). Contacts: `lammps_plugin/con
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,10 @@ class Spherocylinder(ElongatedShape):
         sides = ("one", "two")[law.sides - 1]
         command = f"pair_style {self.name}/harmonic sides {sides}\npair_coeff * * {law.k_e!r}"
         return Style(packing.species, command)
+
+    def stem(self, parameters: Mapping[str, float]) -> str:
+        """As `Shape.stem`."""
+        return f"alpha{parameters['alpha']:g}"
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
         """As `Shape.outline`."""

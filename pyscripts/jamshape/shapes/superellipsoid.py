@@ -23,9 +23,9 @@ class Superellipsoid(Shape):
     name = "superellipsoid"
     compiled_name = "Superellipsoids"
     parameters = (
-        Parameter("exponent", 1.0, "p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1"),
-        Parameter("w1", 1.0, "a/b <= 1"),
-        Parameter("w2", 1.0, "c/b >= 1"),
+        Parameter("exponent", 1.0, "p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1", "p"),
+        Parameter("w1", 1.0, "a/b <= 1", "w1"),
+        Parameter("w2", 1.0, "c/b >= 1", "w2"),
     )
     unit = "a"
     dimension = 3
@@ -69,6 +69,10 @@ class Superellipsoid(Shape):
             "asphericity": float(asphericity(axes, exponent[0])),
             "beta": float(reduced_aspect_ratio(axes)),
         }
+
+    def stem(self, parameters: Mapping[str, float]) -> str:
+        """As `Shape.stem`."""
+        return "p{exponent:g}_w{w1:g}_{w2:g}".format(**parameters)
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
         """As `Shape.outline`."""

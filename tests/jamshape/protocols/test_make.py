@@ -7,15 +7,10 @@ import pytest
 from test_minimise import squeezed
 
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
-from jamshape.files.h5md import (
-    RunWriter,
-    read_attributes,
-    read_observables,
-    read_packing,
-    read_report,
-)
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
+from jamshape.files.run_writer import RunWriter
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import residual_of
+from jamshape.minima import residual_of
 from jamshape.minima.target import Target, find
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.jammed import (
