@@ -110,8 +110,9 @@ class Particles:
             msg = f"size_ratio is {ratio}, expected big over small, at least 1"
             raise ValueError(msg)
         chosen = _with_defaults(its, parameters)
-        sizes = [1.0] if its.size_ratio == 1 == ratio else [1.0, ratio]
-        told = chosen | ({"size_ratio": ratio} if len(sizes) == 2 else {})
+        sizes = [1.0] if ratio == 1 else [1.0, ratio]
+        is_plain = its.size_ratio == 1 == ratio
+        told = chosen | ({} if is_plain else {"size_ratio": ratio})
         return cls(its, _draw_of(its, [Kind(chosen, size) for size in sizes]), told)
 
     @classmethod
@@ -157,19 +158,19 @@ class Particles:
         if n < 1:
             msg = f"n is {n}, expected at least one particle"
             raise ValueError(msg)
-        sizes = Sizes(*map(np.asarray, self.draw(n, rng)))
+        sizes = self.draw(n, rng)
         expected = {"diameters": (n, 3), "exponent": (n,), "species": (n,)}
         for name, shape in expected.items():
-            found = getattr(sizes, name).shape
+            found = np.shape(getattr(sizes, name))
             if found != shape:
                 msg = f"{name} of the mixture has shape {found}, expected {shape}"
                 raise ValueError(msg)
-        d = sizes.diameters.astype(np.float64)
+        d = np.asarray(sizes.diameters, np.float64)
         valid = np.isfinite(d).all() and (d > 0).all() and self.shape.fits(d)
         if not valid:
             msg = f"a particle of the mixture is no {self.shape.name}, expected {self.shape.rule()}"
             raise ValueError(msg)
-        return Sizes(d, sizes.exponent.astype(np.float64), sizes.species.astype(np.int64))
+        return Sizes(d, np.asarray(sizes.exponent, np.float64), np.asarray(sizes.species, np.int64))
 
 
 def parse_kind(text: str) -> Kind:
@@ -223,7 +224,7 @@ def _draw_of(shape: Shape, kinds: Sequence[Kind]) -> Callable[[int, np.random.Ge
 def _numbers(n: int, shares: Sequence[float]) -> IntArray:
     """Divide n in shares: what is left over goes to the largest remainders, the first of equal ones."""
     exact = n * np.asarray(shares) / np.sum(shares)
-    whole = np.floor(exact).astype(np.int64)
+    whole: IntArray = np.floor(exact).astype(np.int64)
     left = n - int(whole.sum())
     order = np.argsort(-(exact - whole), kind="stable")
     whole[order[:left]] += 1

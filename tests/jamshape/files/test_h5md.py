@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from test_packing import assert_identical, nasty_packing, with_rests
 
-from jamshape.files.h5md import FileFormatError, count_frames, read_attributes, read_observables, read_packing, read_report, read_series, write_packing
+from jamshape.files.h5md import (
+    FileFormatError,
+    count_frames,
+    read_attributes,
+    read_observables,
+    read_packing,
+    read_report,
+    read_series,
+    write_packing,
+)
 from jamshape.files.run_writer import RunWriter
 
 h5py = pytest.importorskip("h5py")
