@@ -5,7 +5,7 @@ import h5py
 import numpy as np
 import pytest
 from mixtures import bidisperse, monodisperse
-from test_minimise import squeezed
+from squeezed import squeezed
 
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
