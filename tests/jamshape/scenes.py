@@ -1,18 +1,13 @@
 """Packings of rods that many tests look at."""
 
-import itertools
 from functools import cache, partial
+
 import numpy as np
 import pytest
 from mixtures import bidisperse, monodisperse
-from jamshape import _contact
+
 from jamshape.contacts import (
-    ContactKind,
-    coordination,
     find_contacts,
-    find_rattlers,
-    forces,
-    sum_forces,
 )
 from jamshape.packing import Box, Packing
 from jamshape.protocols.random_start import random_packing

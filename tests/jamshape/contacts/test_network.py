@@ -1,10 +1,9 @@
-from scenes import assert_same_forces, make, moved, packing, pressed_named, scaled, turned
 import itertools
-from functools import cache, partial
 
 import numpy as np
 import pytest
-from mixtures import bidisperse, monodisperse
+from mixtures import monodisperse
+from scenes import assert_same_forces, make, moved, pressed_named, scaled, turned
 
 from jamshape import _contact
 from jamshape.contacts import (
@@ -15,34 +14,14 @@ from jamshape.contacts import (
     forces,
     sum_forces,
 )
-from jamshape.packing import Box, Packing
+from jamshape.packing import Box
 from jamshape.protocols.random_start import random_packing
 
 SIDES = [1, 2]
 
 
-
-
-
-
-
-
-
-
-
-
-
-
 def slope(energy_of, h=1e-6):
     return (energy_of(h) - energy_of(-h)) / (2 * h)
-
-
-
-
-
-
-
-
 
 
 @pytest.mark.parametrize("sides", SIDES)
@@ -135,8 +114,6 @@ def test_point_of_contact_gives_the_torques(packing):
 
     np.testing.assert_allclose(torque(arm_i, force), network.torque_i, rtol=0, atol=1e-13)
     np.testing.assert_allclose(torque(arm_j, -force), network.torque_j, rtol=0, atol=1e-13)
-
-
 
 
 @pytest.mark.parametrize("sides", SIDES)

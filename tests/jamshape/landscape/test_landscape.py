@@ -1,22 +1,12 @@
-from pressed import PRESSED, pressed_named
-from functools import cache, partial
-
 import numpy as np
 import pytest
-from mixtures import bidisperse, of_arrays
-from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
-from scenes import make, pressed, scaled
+from pressed import PRESSED, pressed_named
+from scenes import make, scaled
 
 from jamshape.contacts import find_contacts, find_rattlers, forces
 from jamshape.landscape import CrossingError, Landscape, State
 
 H = 1e-6  # of central differences: well below the 0.005 that rods of alpha 0.01 are long
-
-
-
-
-
-
 
 
 @pytest.fixture(params=PRESSED)

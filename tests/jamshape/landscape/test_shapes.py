@@ -4,6 +4,8 @@ import itertools
 
 import numpy as np
 import pytest
+from body_rows import superellipsoid_rows
+from scenes import assert_same_forces, moved, turned
 from superellipsoid_packings import (
     ellipsoids,
     octahedra_and_boxes,
@@ -11,10 +13,8 @@ from superellipsoid_packings import (
     scattered,
     superellipses,
 )
-from scenes import assert_same_forces, moved, turned
 
 from jamshape import _contact
-from body_rows import superellipsoid_rows
 from jamshape.contacts import find_contacts, forces
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.shapes.superellipsoid_size import volume

@@ -1,11 +1,9 @@
-from squeezed import squeezed
-from functools import cache
-
 import numpy as np
 import pytest
 from mixtures import bidisperse
-from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 from scenes import make
+from squeezed import squeezed
+from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.minima.minimise import (
@@ -17,8 +15,6 @@ from jamshape.minima.minimise import (
     rounding_floor,
 )
 from jamshape.protocols.random_start import random_packing
-
-
 
 
 def shaken(n, alpha, phi, seed=1):

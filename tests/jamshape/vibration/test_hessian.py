@@ -1,13 +1,13 @@
 """The dynamical matrix against differences of forces, closed forms, and what it must leave alone."""
 
-from lattices import discs
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_packings import SMALL, jammed, matrix_of
-from scenes import make, scaled
+from lattices import discs
 from pressed import PRESSED, pressed_named
+from scenes import make, scaled
+from small_packings import SMALL, jammed, matrix_of
 
 from jamshape.contacts import ContactKind
 from jamshape.landscape import Landscape, State
@@ -50,8 +50,6 @@ def forced(packing, sides=2, **options):
         state,
         dynamical_matrix(landscape, state, Scope(backbone=everyone, force=True, **options)),
     )
-
-
 
 
 # --- derivatives -------------------------------------------------------------------------------
