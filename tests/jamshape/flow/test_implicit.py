@@ -136,7 +136,7 @@ def test_power_balances(jamming):
     for step in compress(landscape, flow, protocol):
         found = landscape.evaluate(flow.state)
         work = -kappa * found.strain_gradient  # 2 kappa p L^2
-        assert work == pytest.approx(2 * kappa * step.p * flow.state.volume, rel=1e-2)
+        assert work == pytest.approx(2 * kappa * step.pressure * flow.state.volume, rel=1e-2)
         energy.append(found.energy)
         power.append(work - float((found.gradient**2 / drag).sum()))
         times.append(step.time)
@@ -235,7 +235,7 @@ def test_senseless_numbers_are_refused(numbers, sentence):
 
 
 def test_steps_are_rows_of_numbers():
-    assert Step._fields[:6] == ("step", "time", "strain", "phi", "p", "u")
+    assert Step._fields[:6] == ("step", "time", "strain", "phi", "pressure", "u")
 
 
 def test_a_rate_that_drives_spines_across_each_other_is_refused():
