@@ -223,7 +223,7 @@ def test_side_to_side_counts_as_two_bonds(sides):
 
 
 def test_rods_that_are_pressed_by_tips_on_one_side_are_rattlers():
-    packing = make([[5, 5], [4.5, 6.9], [5.5, 6.9]], [0, np.pi / 2, np.pi / 2])
+    packing = make([[5, 5], [4.51, 6.9], [5.5, 6.9]], [0, np.pi / 2, np.pi / 2])
     network = find_contacts(packing)
     assert len(network.pairs) == 3
     assert find_rattlers(packing, network).all()

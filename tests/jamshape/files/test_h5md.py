@@ -93,7 +93,7 @@ def test_layout_is_h5md(path, dimension):
         for name in FRAME_ELEMENTS:
             assert particles[name]["step"] == particles["position/step"]  # one object, hard links
             assert particles[name]["time"] == particles["position/time"]
-        assert {*file["observables/p"]} == {"step", "time", "value"}
+        assert {*file["observables/pressure"]} == {"step", "time", "value"}
 
 
 def test_mdanalysis_opens_three_dimensional_runs(path):
@@ -255,7 +255,7 @@ def test_run_survives_the_sudden_end_of_its_process(path):
 def test_rows_of_an_interrupted_append_are_overwritten(path):
     writer = run_of_three(path)
     with h5py.File(path, "r+") as file:
-        for name in ("particles/all/position/value", "observables/p/value"):
+        for name in ("particles/all/position/value", "observables/pressure/value"):
             file[name].resize(len(file[name]) + 1, axis=0)
     assert count_frames(path) == 3
     assert len(read_observables(path)["pressure"]) == 5
@@ -290,7 +290,9 @@ def test_append_refuses_another_dimension(path):
 def test_append_refuses_observables_and_changes_nothing(path):
     writer = run_of_three(path)
     before = read_series(path, "pressure").step
-    with pytest.raises(ValueError, match="p is stored up to step 20, expected a step after it"):
+    with pytest.raises(
+        ValueError, match="pressure is stored up to step 20, expected a step after it"
+    ):
         writer.append_observables(20, 1, {"q": 1.0, "pressure": 1.0})
     with pytest.raises(ValueError, match=r"'pressure' is float64 \(2,\), expected float64 \(\) as"):
         writer.append(frame(30), {"pressure": np.zeros(2)})
@@ -499,7 +501,12 @@ def test_a_series_is_as_many_rows_one_by_one(path, tmp_path):
         ([21, 22], [1], [1, 2], r"rows of a series differ in length, expected \(2,\)"),
         ([22, 21], [1, 2], [1, 2], "the steps of a series do not ascend"),
         ([21, 21], [1, 2], [1, 2], "the steps of a series do not ascend"),
-        ([20, 21], [1, 2], [1, 2], "p is stored up to step 20, expected a step after it, found 20"),
+        (
+            [20, 21],
+            [1, 2],
+            [1, 2],
+            "pressure is stored up to step 20, expected a step after it, found 20",
+        ),
     ],
 )
 def test_series_is_refused_and_changes_nothing(path, steps, times, p, sentence):

@@ -14,7 +14,7 @@ def start():
 
 
 def test_a_run_that_was_cut_off_goes_on_to_the_same_bits(start, tmp_path, monkeypatch):
-    monkeypatch.setattr(slow_run, "STEPS_PER_FRAME", 4)
+    monkeypatch.setattr(slow_recording, "STEPS_PER_FRAME", 4)
     protocol = Protocol(((0.0, 1e-4), (0.801, 1e-5)), 0.803)
     paths = [tmp_path / name for name in ("whole.h5", "cut.h5")]
     for path in paths:

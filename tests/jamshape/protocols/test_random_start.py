@@ -17,7 +17,7 @@ from jamshape.protocols.random_start import InsertionError, random_packing
 from jamshape.shapes.particles import Particles, Sizes
 from jamshape.shapes.table import shape_named
 
-DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_initial.py"
+DRIVER = Path(__file__).parents[3] / "pyscripts" / "make_initial.py"
 
 IN_TINY_BOXES = [
     (1, 0.4, bidisperse(4), 2),

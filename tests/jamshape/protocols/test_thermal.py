@@ -122,11 +122,11 @@ def test_moves_without_a_size_are_refused(size):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_rods_move_and_keep_apart(dimension):
-    start = random_packing(40, 0.3, 1, bidisperse(2.0), dimension)
+    start = random_packing(100, 0.3, 1, bidisperse(1.0), dimension)
     thermal = Thermal(start)
     for _ in equilibrate(thermal, 30, 2):
         assert not len(find_contacts(thermal.packing).pairs)
-    assert 0.1 < thermal.acceptance < 0.9
+    assert 0.1 < thermal.acceptance < 1
     assert (np.abs(thermal.packing.position - start.position).max(axis=1) > 0).all()
 
 
