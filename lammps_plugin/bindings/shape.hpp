@@ -116,7 +116,7 @@ void def_in_precision(nb::class_<ShapeOf<Model>> of, const char *name, const Fun
                           : function(D, 0.0, self, arrays);
         });
       },
-      "extended"_a, text);
+      "extended"_a = false, text);
 }
 
 }  // namespace jamshape

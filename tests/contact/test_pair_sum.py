@@ -6,20 +6,22 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mixtures import bidisperse
 from pair_packings import LONG, LONG_EPS, PairPacking, rods, split
 from spherocylinder_pairs import EPS, concatenated, disc_to_disc, tip_to_side, tip_to_tip
 
-from jamshape.contacts import bodies, each_once, find_contacts, forces, near_pairs
+from jamshape.contacts import find_contacts, forces
+from jamshape.contacts.near import near_particles
 from jamshape.packing import Box
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 K_E = 1.7
 MIXTURES = {
-    "rods": Mixture.bidisperse(),
-    "short rods": Mixture.bidisperse(0.01),
-    "short rods side by side": Mixture.bidisperse(0.2),
-    "discs": Mixture.bidisperse(0),
-    "size ratio 5": Mixture.bidisperse(2, 5),
+    "rods": bidisperse(),
+    "short rods": bidisperse(0.01),
+    "short rods side by side": bidisperse(0.2),
+    "discs": bidisperse(0),
+    "size ratio 5": bidisperse(2, 5),
 }
 EVERY_PACKING = pytest.mark.parametrize(
     ("mixture", "dimension"), [(name, D) for name in MIXTURES for D in (2, 3)]
@@ -51,7 +53,7 @@ def compressed(mixture, dimension):
 
 
 def arguments(packing):
-    near = each_once(near_pairs(bodies(packing), bodies(packing), packing.box))
+    near = near_particles(packing, packing.compiled())
     position, orientation, edges = packing.poses()
     poses = (split(x) for x in (position, orientation.reshape(packing.n, -1), edges))
     return [*poses, np.column_stack([near.first, near.second]), near.shift]

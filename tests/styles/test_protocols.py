@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from mixtures import bidisperse
 
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 pytestmark = pytest.mark.lammps
 
@@ -12,7 +13,7 @@ ROWS, STEPS, ROWS_PER_RESTART = 400, 10, 5
 
 def compressed(path=None):
     """Compress fast, so that particles leave the box, writing restart files."""
-    start = random_packing(64, 0.35, 1, Mixture.bidisperse(4.0))
+    start = random_packing(64, 0.35, 1, bidisperse(4.0))
     rows = []
     with Session() as session:
         run = CompressionRun(session, Compression(1e-4, phi_end=1e3, dt=0.25), start)
@@ -30,6 +31,6 @@ def test_writing_restart_files_does_not_change_a_run(tmp_path):
     apart = np.abs(plain.position - written.position)
     apart = np.minimum(apart, plain.box.edges - apart)  # one may have crossed the border earlier
     assert apart.max() < 1e-9 * plain.box.edges.min()
-    for name in ("p", "u"):
+    for name in ("pressure", "u"):
         one, other = (np.array([row[name] for row in found]) for found in (rows, others))
         np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-15)

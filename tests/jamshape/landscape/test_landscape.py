@@ -1,43 +1,12 @@
-from functools import cache, partial
-
 import numpy as np
 import pytest
-from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
-from test_contacts import make, pressed, scaled
+from pressed import PRESSED, pressed_named
+from scenes import make, scaled
 
 from jamshape.contacts import find_contacts, find_rattlers, forces
 from jamshape.landscape import CrossingError, Landscape, State
-from jamshape.protocols.random_start import Mixture
 
 H = 1e-6  # of central differences: well below the 0.005 that rods of alpha 0.01 are long
-
-
-def half_of_them_discs(n):
-    """Rods of several lengths among discs."""
-    index = np.arange(n)
-    half_length = np.where(index % 2, 0.0, 0.5 + index / n)
-    radius = np.where(index % 3, 0.5, 0.7)
-    return Mixture.from_arrays(half_length, radius)
-
-
-PRESSED = {
-    "discs": partial(pressed, mixture=Mixture.bidisperse(0)),
-    "rods of alpha 0.01": partial(pressed, mixture=Mixture.bidisperse(0.01)),
-    "rods of alpha 4": pressed,
-    "discs and rods": partial(pressed, mixture=half_of_them_discs(24)),
-    "rods in space": partial(pressed, n=16, dimension=3),
-    "spheres and rods in space": partial(
-        pressed, n=16, dimension=3, mixture=half_of_them_discs(16), phi=0.15
-    ),
-    "ellipsoids": ellipsoids,
-    "octahedra and boxes": octahedra_and_boxes,
-    "superellipses": superellipses,
-}
-
-
-@cache
-def pressed_named(name):
-    return PRESSED[name]()
 
 
 @pytest.fixture(params=PRESSED)
@@ -144,10 +113,10 @@ def test_translations_cost_nothing(packing):
         assert moved == pytest.approx(energy, rel=1e-12)
 
 
-def test_curvature_knows_the_rattlers(packing):
+def test_rattlers_are_those_of_the_contacts(packing):
     opened = scaled(packing, 1.03)
     expected = find_rattlers(opened, find_contacts(opened, 1.0, 2))
-    found = Landscape(packing).curvature(State.of(opened)).rattlers
+    found = Landscape(packing).rattlers(State.of(opened))
     np.testing.assert_array_equal(found, expected)
 
 

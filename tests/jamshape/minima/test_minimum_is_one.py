@@ -15,10 +15,10 @@ from minima import (
     typical_overlap,
     unconstrained,
 )
-from test_minimise import squeezed
+from squeezed import squeezed
 
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import History, Minimum, Outcome, residual_of
+from jamshape.minima import History, Minimum, Outcome, residual_of
 from jamshape.minima.target import Target, find
 from jamshape.packing import Box, Packing
 

@@ -1,0 +1,75 @@
+"""Rattlers, and contact numbers without them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jamshape import _contact
+from jamshape.arrays import BoolArray
+from jamshape.contacts.network import ContactKind, ContactNetwork
+from jamshape.packing import Packing
+
+
+class Coordination(NamedTuple):
+    """Contact numbers without rattlers (Marschall & Teitel 2018, Sec. III C)."""
+
+    z: float
+    """Bonds per particle, a side-to-side contact of two rods in the plane counted as two."""
+    z_single: float
+    """Contacts per particle."""
+    n_rattlers: int
+    n_bonds: int
+    n_contacts: int
+
+
+def find_rattlers(packing: Packing, network: ContactNetwork) -> BoolArray:
+    """Flag the particles that no contacts hold in place.
+
+    Marschall & Teitel 2018, Sec. III C, for any shape and dimension D: fewer than two contacts, or fewer
+    than 3 in the plane that is not two on opposite flat sides; in space fewer than four, unless two of
+    them lie on opposite faces. Repeated until none is left.
+
+    Returns
+    -------
+    (N,) array of bool
+    """
+    bonds, n_contacts = network.bonds, len(network.pairs)
+    if network.bonds_are_contacts:
+        pairs, normal, on_face = network.pairs[bonds.contact], bonds.normal, bonds.on_face
+    else:
+        pairs = network.pairs
+        normal = bonds.normal[np.searchsorted(bonds.contact, np.arange(n_contacts))]
+        on_face = np.zeros((n_contacts, 2), dtype=np.bool_)
+        np.logical_or.at(on_face, bonds.contact, bonds.on_face)
+    normals = np.zeros((len(pairs), 3))
+    normals[:, : packing.dimension] = normal
+    return _contact.find_rattlers(packing.n, packing.dimension, pairs, normals, on_face)
+
+
+def coordination(packing: Packing, network: ContactNetwork) -> Coordination:
+    """Count bonds and contacts per particle, without rattlers and their contacts.
+
+    In the plane a side-to-side contact is two bonds, also where `find_contacts` was asked for one;
+    in 3D bonds are counted as they are, since skew rods touch side to side at one point.
+
+    Returns
+    -------
+    Coordination
+        With z = 0 where all particles are rattlers.
+    """
+    rattlers = find_rattlers(packing, network)
+    held = ~rattlers[network.pairs].any(axis=1)
+    bonds = network.n_bonds[held]
+    if packing.dimension == 2:
+        bonds = np.where(network.kind[held] == ContactKind.SIDE_TO_SIDE, 2, bonds)
+    n_particles, n_bonds, n_contacts = int((~rattlers).sum()), int(bonds.sum()), int(held.sum())
+    per_particle = 2 / max(n_particles, 1)
+    return Coordination(
+        z=per_particle * n_bonds,
+        z_single=per_particle * n_contacts,
+        n_rattlers=int(rattlers.sum()),
+        n_bonds=n_bonds,
+        n_contacts=n_contacts,
+    )
