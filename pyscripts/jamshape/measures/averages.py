@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,16 @@ from jamshape.arrays import FloatArray
 
 # Digits after the point that a number is written with, at least and at most.
 _DIGITS = (3, 9)
+
+
+_Group = TypeVar("_Group")
+
+
+class Measured(Protocol):
+    """A sample with numbers by name, such as `jamshape.files.sets.PackingFile`."""
+
+    def number(self, name: str) -> float:
+        """Look up a number."""
 
 
 class Mean(NamedTuple):
@@ -53,3 +64,15 @@ def standard_error(values: ArrayLike) -> FloatArray:
     """Return the standard error of the mean over the first axis; 0 for one sample."""
     array = np.asarray(values, np.float64)
     return np.asarray(array.std(axis=0) / np.sqrt(max(len(array) - 1, 1)))
+
+
+def averages(groups: Mapping[_Group, Sequence[Measured]], name: str) -> dict[_Group, Mean]:
+    """Average one number over the samples of each group."""
+    return {group: mean([s.number(name) for s in samples]) for group, samples in groups.items()}
+
+
+def exactly(
+    groups: Mapping[_Group, Sequence[Any]], value: Callable[[_Group], float]
+) -> dict[_Group, Mean]:
+    """Give each group a number that needs no average."""
+    return {group: Mean(value(group), math.nan, len(samples)) for group, samples in groups.items()}

@@ -1,0 +1,80 @@
+"""What figures say: numbers in TeX, names of systems, N and the number of samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any, Protocol
+
+from jamshape.files.sets import System
+from jamshape.shapes.table import shape_named
+
+
+class Described(Protocol):
+    """A packing or its modes, with what is said of it."""
+
+    @property
+    def attributes(self) -> Mapping[str, Any]:
+        """What its file says."""
+
+
+def scientific(value: float) -> str:
+    """Write a number from 0 as a power of ten in TeX, without dollars."""
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(value) + 1e-9)
+    factor = value / 10.0**exponent
+    power = f"10^{{{exponent}}}"
+    return power if abs(factor - 1) < 1e-6 else rf"{factor:.1f}\times {power}"
+
+
+def short(value: float) -> str:
+    """Write a number in TeX, as a power of ten where it is small."""
+    return f"{value:.2g}" if 0.01 <= value < 100 else scientific(value)
+
+
+def counted(count: int, thing: str) -> str:
+    """Write a number of things."""
+    return f"{count} {thing}{'s' * (count != 1)}"
+
+
+def range_text(counts: Iterable[int], thing: str) -> str:
+    """Write a number of things that may differ from place to place."""
+    known = sorted(set(counts))
+    return counted(known[0], thing) if len(known) == 1 else f"{known[0]} to {known[-1]} {thing}s"
+
+
+def samples_text(groups: Mapping[Any, Sequence[Described]]) -> str:
+    """Name N and the number of samples, for a legend."""
+    n = int(next(iter(groups.values()))[0].attributes["n"])
+    many = range_text((len(samples) for samples in groups.values()), "sample")
+    return rf"$N={n}$, {many}" + " each" * (len(groups) > 1)
+
+
+def system_text(system: System) -> str:
+    """Name a system by its parameters, or those that it has of them; a mixture by its kinds."""
+    if system.kinds:
+        return system.kinds
+    known = dict(system.parameters)
+    return shape_named(system.shape).label(known) if known else ""
+
+
+def system_labels(systems: Collection[System]) -> dict[System, str]:
+    """Name what tells systems apart, for a legend; their parameters in any case."""
+    shapes, dimensions, protocols = (
+        {getattr(system, name) for system in systems} for name in ("shape", "dimension", "protocol")
+    )
+    labels = {}
+    for system in systems:
+        parts = [f"{system.shape}s"] * (len(shapes) > 1)
+        parts += [f"{system.dimension}D"] * (len(dimensions) > 1)
+        parts += [system_text(system)]
+        parts += [protocol_text(system)] * (len(protocols) > 1)
+        labels[system] = ", ".join(part for part in parts if part)
+    return labels
+
+
+def protocol_text(system: System) -> str:
+    """Name the protocol of a system."""
+    sweeps = f", {system.n_sweeps} sweeps" * (system.n_sweeps > 0)
+    return f"protocol {system.protocol or 'as usual'}{sweeps}"
