@@ -6,21 +6,22 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mixtures import bidisperse
 from pair_packings import LONG, LONG_EPS, PairPacking, split
 from spherocylinder_pairs import EPS, concatenated, disc_to_disc, tip_to_side, tip_to_tip
 
 from jamshape import _contact
 from jamshape.contacts import bodies, each_once, find_contacts, forces, near_pairs
 from jamshape.packing import Box
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 K_E = 1.7
 MIXTURES = {
-    "rods": Mixture.bidisperse(),
-    "short rods": Mixture.bidisperse(0.01),
-    "short rods side by side": Mixture.bidisperse(0.2),
-    "discs": Mixture.bidisperse(0),
-    "size ratio 5": Mixture.bidisperse(2, 5),
+    "rods": bidisperse(),
+    "short rods": bidisperse(0.01),
+    "short rods side by side": bidisperse(0.2),
+    "discs": bidisperse(0),
+    "size ratio 5": bidisperse(2, 5),
 }
 EVERY_PACKING = pytest.mark.parametrize(
     ("mixture", "dimension"), [(name, D) for name in MIXTURES for D in (2, 3)]

@@ -27,7 +27,7 @@ from jamshape import _contact
 from jamshape.contacts import superellipsoid_bodies
 from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import minimise
+from jamshape.minima import minimise
 from jamshape.packing import Packing
 from jamshape.protocols.quasistatic import Quasistatic, QuasistaticRun
 from jamshape.protocols.quasistatic import compress as compress_quasistatically

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from jamshape.arrays import FloatArray, LongArray
 from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Stop, minimise
+from jamshape.minima import Stop, minimise
 from jamshape.packing import Box, Packing
 from jamshape.protocols.random_start import Mixture, random_packing
 

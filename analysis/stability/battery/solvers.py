@@ -24,7 +24,7 @@ from stability_scenes import (
 
 from jamshape.arrays import FloatArray
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Minimum, Outcome, Stop, minimise
+from jamshape.minima import Minimum, Outcome, Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.packing import Packing
 from jamshape.protocols.random_start import Mixture, random_packing

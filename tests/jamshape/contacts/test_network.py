@@ -3,6 +3,7 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
+from mixtures import bidisperse, monodisperse
 
 from jamshape import _contact
 from jamshape.contacts import (
@@ -14,7 +15,7 @@ from jamshape.contacts import (
     sum_forces,
 )
 from jamshape.packing import Box, Packing
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 SIDES = [1, 2]
 
@@ -91,13 +92,13 @@ def tiny_box():
 
 PRESSED = {
     "rods": pressed,
-    "short rods": partial(pressed, mixture=Mixture.bidisperse(0.01)),
-    "discs": partial(pressed, mixture=Mixture.bidisperse(0)),
-    "size ratio 5": partial(pressed, mixture=Mixture.bidisperse(2, 5)),
+    "short rods": partial(pressed, mixture=bidisperse(0.01)),
+    "discs": partial(pressed, mixture=bidisperse(0)),
+    "size ratio 5": partial(pressed, mixture=bidisperse(2, 5)),
     "rods in a tiny box": tiny_box,
-    "rod alone": partial(pressed, n=1, mixture=Mixture.monodisperse(20), phi=0.3),
+    "rod alone": partial(pressed, n=1, mixture=monodisperse(20), phi=0.3),
     "rods in space": partial(pressed, n=16, dimension=3),
-    "rods in a tiny cube": partial(pressed, n=2, dimension=3, mixture=Mixture.bidisperse(2)),
+    "rods in a tiny cube": partial(pressed, n=2, dimension=3, mixture=bidisperse(2)),
 }
 
 
@@ -316,7 +317,7 @@ def test_rods_that_are_pressed_by_tips_on_one_side_are_rattlers():
 
 
 def test_cubic_crystal_of_one_sphere():
-    unit = random_packing(1, 0.1, 1, Mixture.monodisperse(0), dimension=3)
+    unit = random_packing(1, 0.1, 1, monodisperse(0), dimension=3)
     packing = unit.with_(box=Box(lo=np.zeros(3), edges=np.full(3, 0.9)))
     network = find_contacts(packing)
     assert coordination(packing, network) == (6, 6, 0, 3, 3)

@@ -6,7 +6,7 @@ from test_minimise import squeezed
 from jamshape.flow.implicit import drag_coefficients
 from jamshape.landscape import Landscape, State
 from jamshape.landscape.vicinity import Stage, Units, Vicinity
-from jamshape.minima.minimise import minimise
+from jamshape.minima import minimise
 
 STRAIN, ACCURACY = -1e-3, 1e-5
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from mixtures import bidisperse
 
 from jamshape.contacts import find_contacts, sum_forces
 from jamshape.measures.contact_statistics import (
@@ -16,7 +17,7 @@ from jamshape.measures.contact_statistics import (
     residuals,
 )
 from jamshape.packing import Box, Packing
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 R_SPINE = 0.99  # distance of touching spines; the surfaces would touch at 1
 FORCE = 0.01  # of one bond at that distance, with k_e = 1
@@ -53,7 +54,7 @@ def none(packing):
 
 def squeezed(alpha, n=40, seed=3):
     """A random packing squeezed until there are more contacts than particles, with all classes."""
-    packing = random_packing(n, 0.45, seed, Mixture.bidisperse(alpha))
+    packing = random_packing(n, 0.45, seed, bidisperse(alpha))
     while len(find_contacts(packing, sides=2).pairs) <= n:
         box = Box(packing.box.lo, 0.99 * packing.box.edges)
         packing = packing.with_(position=0.99 * packing.position, box=box)

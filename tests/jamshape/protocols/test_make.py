@@ -4,20 +4,6 @@ from functools import cache
 import h5py
 import numpy as np
 import pytest
-from test_minimise import squeezed
-
-from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
-from jamshape.files.h5md import (
-    RunWriter,
-    read_attributes,
-    read_observables,
-    read_packing,
-    read_report,
-)
-from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import residual_of
-from jamshape.minima.target import Target, find
-from jamshape.protocols.approach import Approach
 from jamshape.protocols.jammed import (
     Files,
     Sample,
@@ -29,7 +15,17 @@ from jamshape.protocols.jammed import (
     summary,
     write_minimum,
 )
-from jamshape.protocols.random_start import InsertionError, Mixture
+from mixtures import monodisperse
+from test_minimise import squeezed
+
+from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
+from jamshape.files.run_writer import RunWriter
+from jamshape.landscape import Landscape, State
+from jamshape.minima import residual_of
+from jamshape.minima.target import Target, find
+from jamshape.protocols.approach import Approach
+from jamshape.protocols.random_start import InsertionError
 
 U0 = 1e-12
 SAMPLE = Sample(n=16, alpha=1.0, phi_start=0.5, target=Target(U0))
@@ -197,7 +193,7 @@ OTHERS = {
     "n = 16, expected 24": {"n": 24},
     "seed = 1, expected 9": {"seed": 9},
     "approach_kappa = 1e-07, expected 1e-05": {"approach": FAST},
-    "mixture = False, expected True": {"mixture": Mixture.monodisperse(1.0)},
+    "mixture = False, expected True": {"mixture": monodisperse(1.0)},
 }
 
 
@@ -224,7 +220,7 @@ def test_the_compression_of_another_sample_is_neither_taken_nor_replaced(tmp_pat
 
 
 def test_the_compression_of_another_mixture_is_refused(tmp_path):
-    sample = replace(SAMPLE, mixture=Mixture.monodisperse(1.0))
+    sample = replace(SAMPLE, mixture=monodisperse(1.0))
     out = tmp_path / "packing.h5"
     compressed(out)
     RunWriter.open(Files(out).run).set_attributes(sample.attributes())

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
+from jamshape.protocols.superellipsoid_jammed import Sample, make, require_same, summary
 
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import residual_of
+from jamshape.minima import residual_of
 from jamshape.minima.target import Target, find
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.protocols.superellipsoid_jammed import Sample, make, require_same, summary
 from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.statistics import bands, count
