@@ -16,6 +16,7 @@ NEEDS = ("exponent", "w1", "w2")
 """Numbers that files of such shapes have."""
 
 SPHERES = "spheres"
+THERMAL = 2  # protocol
 
 # beta this near to 1 is that of self-dual ellipsoids.
 _DUAL = 0.02
@@ -76,7 +77,7 @@ def family(system: System) -> str:
 
 def is_thermal(system: System) -> bool:
     """Whether it was made by protocol 2, from thermalised hard particles."""
-    return system.protocol.endswith("2")
+    return system.protocol == THERMAL
 
 
 def label(system: System) -> str:

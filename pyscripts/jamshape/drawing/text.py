@@ -75,6 +75,6 @@ def system_labels(systems: Collection[System]) -> dict[System, str]:
 
 
 def protocol_text(system: System) -> str:
-    """Name the protocol of a system."""
+    """Name how the packings of a system were made."""
     sweeps = f", {system.n_sweeps} sweeps" * (system.n_sweeps > 0)
-    return f"protocol {system.protocol or 'as usual'}{sweeps}"
+    return f"protocol {system.protocol}{sweeps}" if system.protocol else "dynamics"

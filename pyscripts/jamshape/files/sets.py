@@ -16,8 +16,8 @@ import numpy as np
 
 from jamshape.arrays import BoolArray
 from jamshape.contacts import ContactNetwork, find_contacts, find_rattlers
+from jamshape.files import layout
 from jamshape.files.h5md import read_attributes, read_observables, read_packing
-from jamshape.files.vocabulary import renamed
 from jamshape.packing import Packing
 from jamshape.shapes.table import shape_named
 
@@ -47,7 +47,8 @@ class System(NamedTuple):
     """Those of the shape, by name; none of a mixture."""
     kinds: str = ""
     """The particles of a mixture."""
-    protocol: str = ""
+    protocol: int = 0
+    """Of quasistatic steps: 1, or 2 with Monte Carlo on the way; 0 of compressions by dynamics."""
     n_sweeps: int = 0
     """Of Monte Carlo."""
 
@@ -76,7 +77,7 @@ class PackingFile:
     @classmethod
     def read(cls, path: Path) -> PackingFile:
         """Read what a file says; errors as `read_attributes`."""
-        return cls(path, renamed(read_attributes(path)))
+        return cls(path, read_attributes(path))
 
     @property
     def reached(self) -> bool:
@@ -99,8 +100,10 @@ class PackingFile:
 
     def system(self) -> System:
         """Tell what it is a sample of."""
-        packing = self.packing()
-        return system_of(self.attributes, packing.shape_style, packing.dimension)
+        with layout.opened(self.path) as file:
+            shape = layout.require_item(file, "particles/all").attrs["shape_style"]
+            dimension = int(layout.require_item(file, "particles/all/box").attrs["dimension"])
+        return system_of(self.attributes, shape, dimension)
 
     def contacts(self) -> Contacts:
         """Read the packing and find its contacts, with two bonds side to side, and its rattlers."""
@@ -142,8 +145,9 @@ def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> Syst
     """Tell what a packing is a sample of, by its attributes, shape style and dimension."""
     names = [parameter.name for parameter in shape_named(shape).parameters]
     known = tuple((name, float(attributes[name])) for name in names if name in attributes)
-    kinds, protocol = (str(attributes.get(name, "")) for name in ("kinds", "protocol"))
-    return System(shape, dimension, known, kinds, protocol, int(attributes.get("n_sweeps", 0)))
+    kinds = str(attributes.get("kinds", ""))
+    protocol, sweeps = (int(attributes.get(name, 0)) for name in ("protocol", "n_sweeps"))
+    return System(shape, dimension, known, kinds, protocol, sweeps)
 
 
 def read_groups(
