@@ -6,8 +6,11 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
-from jamshape.files.sets import System
+from jamshape.files.sets import PackingFile, System, conditions
 from jamshape.shapes.table import shape_named
+
+
+_SYMBOLS = {"u0": "u_0", "kappa": r"\kappa"}
 
 
 class Described(Protocol):
@@ -25,7 +28,7 @@ def scientific(value: float) -> str:
     exponent = math.floor(math.log10(value) + 1e-9)
     factor = value / 10.0**exponent
     power = f"10^{{{exponent}}}"
-    return power if abs(factor - 1) < 1e-6 else rf"{factor:.1f}\times {power}"
+    return power if abs(factor - 1) < 1e-6 else rf"{factor:.2g}\times {power}"
 
 
 def short(value: float) -> str:
@@ -49,6 +52,22 @@ def samples_text(groups: Mapping[Any, Sequence[Described]]) -> str:
     n = int(next(iter(groups.values()))[0].attributes["n"])
     many = range_text((len(samples) for samples in groups.values()), "sample")
     return rf"$N={n}$, {many}" + " each" * (len(groups) > 1)
+
+
+def conditions_text(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
+    """Name N, the number of samples, and the energy and compression rate that all packings share."""
+    return ", ".join([samples_text(groups), *_shared(groups)])
+
+
+def conditions_alone(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
+    """Say the same without the number of samples, for legends that tell it of each curve."""
+    n = int(next(iter(groups.values()))[0].number("n"))
+    return ", ".join([f"$N={n}$", *_shared(groups)])
+
+
+def _shared(groups: Mapping[Any, Sequence[PackingFile]]) -> list[str]:
+    known = conditions(groups)
+    return [rf"${_SYMBOLS[name]}={scientific(known[name])}$" for name in _SYMBOLS if name in known]
 
 
 def system_text(system: System) -> str:

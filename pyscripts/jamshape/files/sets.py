@@ -6,6 +6,7 @@ are of one system where shape, dimension, the shape's parameters, mixture, proto
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,14 +18,16 @@ import numpy as np
 from jamshape.arrays import BoolArray
 from jamshape.contacts import ContactNetwork, find_contacts, find_rattlers
 from jamshape.files import layout
-from jamshape.files.h5md import read_attributes, read_observables, read_packing
+from jamshape.files.h5md import FileFormatError, read_attributes, read_observables, read_packing
 from jamshape.packing import Packing
-from jamshape.shapes.table import shape_named
+from jamshape.shapes.table import DEFAULT, shape_named
 
 REACHED = ("converged", "sliding")  # outcomes with mechanical equilibrium; others stalled
 
 # Ends of the names of files that may lie beside a packing and are none.
 OTHERS = (".run.h5", ".search.h5", ".path.h5", ".modes.h5")
+
+CONDITIONS = ("n", "size_ratio", "u0", "kappa")
 
 # Parameters that are the same in this many digits are one.
 _SAME = 1e-9
@@ -213,8 +216,11 @@ def _files(path: Path) -> list[PackingFile]:
         return [file]
     # Runs and searches that lead to a packing may still be written, and are then locked.
     places = [place for place in sorted(path.glob("*.h5")) if not place.name.endswith(OTHERS)]
-    files = [PackingFile.read(place) for place in places]
-    return [file for file in files if "outcome" in file.attributes]
+    found = []
+    for place in places:
+        with contextlib.suppress(FileFormatError):  # files of other kinds
+            found.append(PackingFile.read(place))
+    return [file for file in found if "outcome" in file.attributes]
 
 
 def require_one_ensemble(attributes: Sequence[Mapping[str, Any]], same: Sequence[str]) -> None:
@@ -232,6 +238,18 @@ def require_one_ensemble(attributes: Sequence[Mapping[str, Any]], same: Sequence
             raise ValueError(msg)
 
 
+def conditions(groups: Mapping[Any, Sequence[PackingFile]]) -> dict[str, Any]:
+    """Return what all files share of N, size ratio, energy and compression rate, for JSON."""
+    every = [file.attributes for files in groups.values() for file in files]
+    values = {name: {known.get(name) for known in every} for name in CONDITIONS}
+    return {name: of.pop() for name, of in values.items() if len(of) == 1 and None not in of}
+
+
+def of_paper(system: System) -> bool:
+    """Whether it is what Marschall & Teitel, PRE 97, 012905, studied, whatever its parameters."""
+    return system._replace(parameters=(), protocol=0, n_sweeps=0) == System(DEFAULT, 2, ())
+
+
 def only(groups: Groups, chosen: Callable[[System], bool]) -> Groups:
     """Select systems."""
     return {system: files for system, files in groups.items() if chosen(system)}
@@ -243,6 +261,22 @@ def curves_over(groups: Groups, name: str) -> dict[System, Curve]:
     for system, files in groups.items():
         curves.setdefault(system.without(name), {})[system.number(name)] = files
     return curves
+
+
+def one_curve(groups: Groups, name: str) -> Curve:
+    """Take the only curve over a parameter.
+
+    Raises
+    ------
+    ValueError
+        If systems differ in something else, too.
+    """
+    curves = curves_over(groups, name)
+    if len(curves) > 1:
+        found = " and ".join(f"{s.shape}s in {s.dimension}D, protocol {s.protocol}" for s in curves)
+        msg = f"packings are {found}, expected systems that differ in {name} only; give such files"
+        raise ValueError(msg)
+    return next(iter(curves.values()))
 
 
 class Choice(NamedTuple):
