@@ -180,6 +180,9 @@ class _Vicinity:
         orientation: NDArray[np.float64],
         edges: NDArray[np.float64],
     ) -> None: ...
+    def move(
+        self, x: NDArray[np.float64], strain: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
     def take_pairs(
         self,
         position: NDArray[np.float64],

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import mpmath
 import numpy as np
 import scipy.sparse
-from test_minimise import squeezed
+from squeezed import squeezed
 
 from jamshape.landscape import Landscape
 from jamshape.minima import Residual

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from body_rows import superellipsoid_rows
 from lammps_scenes import (
     angle_between,
     dump,
@@ -32,7 +33,6 @@ from superellipsoid_scenes import (
 )
 
 from jamshape import _contact
-from jamshape.landscape.adapter import superellipsoid_bodies
 from jamshape.packing import body_axes
 
 pytestmark = pytest.mark.lammps
@@ -79,7 +79,7 @@ def rates_of(packing):
     """Velocities and angular velocities in space, from the bindings."""
     D = packing.dimension
     measure, moment = _contact.superellipsoid_drag(packing.diameters, packing.exponent, D)
-    rows = superellipsoid_bodies(packing)
+    rows = superellipsoid_rows(packing)
     contact = _contact.superellipsoid_contacts(rows[:1], rows[1:], EPSILON)
     force = np.concatenate([contact["force"], -contact["force"]])
     torque = np.concatenate([contact["torque_i"], contact["torque_j"]])

@@ -118,7 +118,7 @@ class BySteps:
             states.append(State.of(self.thermal.packing))
         attributes = self.recipe.attributes() | {
             "phi": compression.phi,
-            "step": compression.step,
+            "phi_step": compression.step,
             "loose_phi": compression.loose_phi,
             "is_thermalised": self.is_thermalised,
             "n_sweeps_done": self.thermal.n_done if self.thermal else -1,
@@ -133,7 +133,7 @@ class BySteps:
         self.compression = QuasistaticRun(
             state=State.of(read_packing(self.file, 1)),
             phi=float(stored["phi"]),
-            step=float(stored["step"]),
+            step=float(stored["phi_step"]),
             loose=None if math.isnan(loose_phi) else State.of(read_packing(self.file, 0)),
             loose_phi=loose_phi,
         )

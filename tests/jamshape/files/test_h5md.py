@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from test_packing import assert_identical, nasty_packing, with_rests
+from nasty import assert_identical, nasty_packing, with_rests
 
 from jamshape.files.h5md import (
     FileFormatError,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from test_contact_statistics import rods
-from test_minimise import squeezed
+from rods_at import rods
+from squeezed import squeezed
 
 from jamshape.flow.implicit import drag_coefficients
 from jamshape.landscape import Landscape, State

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mixtures import bidisperse, monodisperse, of_arrays
+from mixtures import ROD, bidisperse, monodisperse, of_arrays
 
 from jamshape import _contact
 from jamshape.files.h5md import read_packing
@@ -15,6 +15,8 @@ from jamshape.files.lammps_text import read_data
 from jamshape.measures.order import orientational_order
 from jamshape.packing import SHAPE_STYLES
 from jamshape.protocols.random_start import InsertionError, random_packing
+from jamshape.shapes.particles import Particles, Sizes
+from jamshape.shapes.table import shape_named
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_initial.py"
 
@@ -117,9 +119,10 @@ def test_any_distribution():
     assert smallest_gap(packing) >= 0
 
     def draw(n, rng):
-        return rng.uniform(0, 2, n), np.full(n, 0.5), np.ones(n, int)
+        long = 1 + 2 * rng.uniform(0, 2, n)
+        return Sizes(np.column_stack([long, np.ones((n, 2))]), np.ones(n), np.ones(n, int))
 
-    drawn = random_packing(40, 0.35, 5, Mixture(draw))
+    drawn = random_packing(40, 0.35, 5, Particles(shape_named(ROD), draw, {}))
     assert np.ptp(drawn.half_length) > 1
     assert smallest_gap(drawn) >= 0
 
@@ -133,13 +136,15 @@ def test_any_distribution():
         (64, bidisperse(2), 3),
     ],
 )
-def test_recommended_start_works(n, mixture, dimension):
+def test_recommended_start_works(n, mixture, dimension, monkeypatch):
+    monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS", 50_000)
+    monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS_PER_PARTICLE", 0)
     sentence = (
         rf"^random insertion of {n} particles stalled at phi = 0\.\d+ of the 0\.95 asked after"
         r" \d+ attempts: start at phi <= (0\.\d+) and compress from there$"
     )
     with pytest.raises(InsertionError, match=sentence) as error:
-        random_packing(n, 0.95, 1, mixture, dimension=dimension, max_attempts=50_000)
+        random_packing(n, 0.95, 1, mixture, dimension=dimension)
     phi = float(re.match(sentence, str(error.value))[1])
     assert random_packing(n, phi, 1, mixture, dimension=dimension).n == n
 
@@ -152,6 +157,9 @@ def test_box_too_short_for_the_longest(alpha, dimension):
     assert random_packing(1, phi, 1, monodisperse(alpha), dimension=dimension).n == 1
 
 
+NO_ROD = r"a particle of the mixture is no spherocylinder, expected \(2\(A\+R\), 2R, 2R\)"
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
@@ -162,27 +170,27 @@ def test_box_too_short_for_the_longest(alpha, dimension):
         ({"seed": -1}, "seed is -1, expected an integer from 0"),
         ({"dimension": 4}, "dimension is 4, expected 2 or 3"),
         (
-            {"mixture": of_arrays([1.0, -1.0], [1.0, 1.0])},
-            r"half_length of the mixture holds -1\.0, expected finite lengths from 0",
+            {"particles": of_arrays([1.0, -1.0], [1.0, 1.0])},
+            NO_ROD,
         ),
         (
-            {"mixture": of_arrays([1.0, np.nan], [1.0, 1.0])},
-            "half_length of the mixture holds nan, expected",
+            {"particles": of_arrays([1.0, np.nan], [1.0, 1.0])},
+            NO_ROD,
         ),
         (
-            {"mixture": of_arrays([1.0, 1.0], [0.0, 1.0])},
-            r"radius of the mixture holds 0\.0, expected finite lengths above 0",
+            {"particles": of_arrays([1.0, 1.0], [0.0, 1.0])},
+            NO_ROD,
         ),
         (
-            {"mixture": of_arrays([1.0, 1.0], [1.0, -1.0])},
-            r"radius of the mixture holds -1\.0, expected finite lengths above 0",
+            {"particles": of_arrays([1.0, 1.0], [1.0, -1.0])},
+            NO_ROD,
         ),
         (
-            {"mixture": of_arrays([1.0], [1.0])},
-            r"half_length of the mixture has shape \(1,\), expected \(2,\)",
+            {"particles": of_arrays([1.0], [1.0])},
+            r"diameters of the mixture has shape \(1, 3\), expected \(2, 3\)",
         ),
         (
-            {"mixture": of_arrays([1.0, 1.0], [1.0, 1.0], [0, 1])},
+            {"particles": of_arrays([1.0, 1.0], [1.0, 1.0], [0, 1])},
             "species holds 0, expected numbers from 1",
         ),
     ],
@@ -196,7 +204,9 @@ def test_mixture_refuses():
     with pytest.raises(ValueError, match=r"size_ratio is 0\.5, expected big over small"):
         bidisperse(4, 0.5)
     for mixture in (bidisperse, monodisperse):
-        with pytest.raises(ValueError, match=r"alpha is -1, expected A / R, 0 for discs or above"):
+        with pytest.raises(
+            ValueError, match=r"alpha is -1\.0, expected A / R, 0 for discs or above"
+        ):
             mixture(-1)
 
 

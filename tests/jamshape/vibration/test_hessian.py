@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lattices import discs
+from pressed import PRESSED, pressed_named
+from scenes import make, scaled
 from small_packings import SMALL, jammed, matrix_of
-from test_contacts import make, scaled
-from test_landscape import PRESSED, pressed_named
 
 from jamshape.contacts import ContactKind
 from jamshape.landscape import Landscape, State
@@ -49,11 +50,6 @@ def forced(packing, sides=2, **options):
         state,
         dynamical_matrix(landscape, state, Scope(backbone=everyone, force=True, **options)),
     )
-
-
-def discs(position, edges, radius=0.5):
-    packing = make(position, 0.0, half_length=0.0, edges=edges)
-    return packing.with_(diameters=np.full((packing.n, 3), 2 * radius))
 
 
 # --- derivatives -------------------------------------------------------------------------------
