@@ -14,8 +14,7 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.drawing.styles import color
-from jamshape.drawing.text import samples_text, scientific, short, system_labels
-from jamshape.shapes.table import shape_named
+from jamshape.drawing.text import samples_text, scientific, short, system_labels, unit_text
 from jamshape.vibration.sets import Key, Tables, every, pooled, sizes, stable, unstable
 from jamshape.vibration.statistics import mean_in_bins
 from jamshape.vibration.table import ModeTable
@@ -65,8 +64,7 @@ def legend_title(tables: Tables) -> str:
 
 def frequency_unit(keys: Iterable[Key]) -> str:
     """Write the unit of frequencies in TeX, without dollars."""
-    lengths = {shape_named(key.system.shape).unit for key in keys}
-    return rf"[\sqrt{{k_e}}\,/\,{lengths.pop() if len(lengths) == 1 else 'length'}]"
+    return rf"[\sqrt{{k_e}}\,/\,{unit_text(key.system for key in keys)}]"
 
 
 def bin_edges(tables: Iterable[ModeTable], per_decade: int = PER_DECADE) -> FloatArray:

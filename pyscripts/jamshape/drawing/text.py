@@ -7,9 +7,11 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from jamshape.files.sets import PackingFile, System, conditions
+from jamshape.measures.runs import Ensemble
 from jamshape.shapes.table import shape_named
 
 
+_NUMBERS = {"n": "$N={}$", "size_ratio": "$R_b/R_s={:g}$", "kappa": r"$\kappa={:g}$"}
 _SYMBOLS = {"u0": "u_0", "kappa": r"\kappa"}
 
 
@@ -91,6 +93,51 @@ def system_labels(systems: Collection[System]) -> dict[System, str]:
         parts += [protocol_text(system)] * (len(protocols) > 1)
         labels[system] = ", ".join(part for part in parts if part)
     return labels
+
+
+def ensemble_text(ensemble: Ensemble, names: Iterable[str] = ("n", "kappa")) -> str:
+    """Name an ensemble of compressions by its system and the numbers of these names."""
+    told = [_NUMBERS[name].format(getattr(ensemble, name)) for name in names]
+    return ", ".join(filter(None, [system_text(ensemble.system), *told]))
+
+
+def ensemble_labels(ensembles: Collection[Ensemble]) -> dict[Ensemble, str]:
+    """Name what tells ensembles of compressions apart, for a legend; N in any case."""
+    systems, differ = _differing(ensembles)
+    labels = {}
+    for e in ensembles:
+        told = [_NUMBERS[name].format(getattr(e, name)) for name in differ]
+        labels[e] = ", ".join([*told, *[systems[e.system]] * (len(systems) > 1)])
+    return labels
+
+
+def ensembles_title(ensembles: Collection[Ensemble]) -> str:
+    """Name what ensembles of compressions have in common."""
+    systems, differ = _differing(ensembles)
+    first = next(iter(ensembles))
+    told = [_NUMBERS[name].format(getattr(first, name)) for name in _NUMBERS if name not in differ]
+    return ", ".join([*[systems[first.system]] * (len(systems) == 1), *told])
+
+
+def _differing(ensembles: Collection[Ensemble]) -> tuple[dict[System, str], list[str]]:
+    """Labels of the systems, and names of the numbers that ensembles differ in, with N."""
+    systems = system_labels({e.system: None for e in ensembles})
+    return systems, [
+        k for k in _NUMBERS if k == "n" or len({getattr(e, k) for e in ensembles}) > 1
+    ]
+
+
+def unit_text(systems: Iterable[System]) -> str:
+    """Name the unit of length that systems share, in TeX without dollars."""
+    units = {shape_named(system.shape).unit for system in systems}
+    return f"({units.pop()})" if len(units) == 1 else r"\mathrm{length}"
+
+
+def pressure_unit(systems: Collection[System]) -> str:
+    """Write the unit of pressure and energy density in TeX, without dollars."""
+    dimensions = {system.dimension for system in systems}
+    power = dimensions.pop() if len(dimensions) == 1 else "D"
+    return rf"[k_e/{unit_text(systems)}^{power}]"
 
 
 def protocol_text(system: System) -> str:

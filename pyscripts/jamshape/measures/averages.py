@@ -34,6 +34,11 @@ class Mean(NamedTuple):
     samples: int = 0
     """0 where that is not known."""
 
+    @property
+    def tex(self) -> str:
+        """Write it in TeX, without dollars."""
+        return self.text(r"\pm")
+
     def text(self, plus_minus: str = "+-") -> str:
         """Write the digits that the error leaves; empty for NaN."""
         if not math.isfinite(self.value):
