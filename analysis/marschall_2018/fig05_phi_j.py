@@ -20,7 +20,15 @@ from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import discs_at, error_bars, label_alpha_axis
 from jamshape.drawing.styles import PAPER_STYLE, color
 from jamshape.drawing.text import conditions_text, system_labels
-from jamshape.files.sets import conditions, Curve, Groups, System, curves_over, of_paper, read_groups
+from jamshape.files.sets import (
+    conditions,
+    Curve,
+    Groups,
+    System,
+    curves_over,
+    of_paper,
+    read_groups,
+)
 from jamshape.measures.averages import Mean, mean
 
 # Secs. III A, B; the error is that of the average, where it is given.

@@ -7,15 +7,35 @@ others, at sqrt(-lambda) on an axis that runs the other way.
 from __future__ import annotations
 
 import math
+from argparse import ArgumentParser, Namespace
 from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from jamshape.arrays import FloatArray
+from jamshape.command import parser_of
 from jamshape.drawing.styles import color
-from jamshape.drawing.text import samples_text, scientific, short, system_labels, unit_text
-from jamshape.vibration.sets import Key, Tables, every, pooled, sizes, stable, unstable
+from jamshape.drawing.text import (
+    samples_text,
+    scientific,
+    short,
+    system_labels,
+    system_text,
+    unit_text,
+)
+from jamshape.files.sets import PackingFile
+from jamshape.vibration.sets import (
+    Key,
+    Tables,
+    every,
+    pooled,
+    read_tables,
+    selected,
+    sizes,
+    stable,
+    unstable,
+)
 from jamshape.vibration.statistics import mean_in_bins
 from jamshape.vibration.table import ModeTable
 
@@ -38,6 +58,21 @@ _ROWS, _MANY = 12, 100
 _ROOM = 0.25
 
 
+def modes_parser(doc: str | None, out: str) -> ArgumentParser:
+    """Make the parser of a figure of modes, of which alpha and u0 are selected."""
+    parser = parser_of(doc, out, "MODES")
+    for name in ("alpha", "u0"):
+        asked = {"type": float, "nargs": "+", "default": [], "help": "only these (all)"}
+        parser.add_argument(f"--{name}", **asked)
+    return parser
+
+
+def tables_asked(options: Namespace) -> Tables:
+    """Read the modes that a command line names; errors as `read_tables` and `selected`."""
+    tables = selected(read_tables(options.files), "alpha", options.alpha)
+    return selected(tables, "u0", options.u0)
+
+
 def key_labels(keys: Collection[Key]) -> dict[Key, str]:
     """Name what distinguishes curves, for a legend."""
     systems = {key.system: None for key in keys}
@@ -56,15 +91,25 @@ def energy_text(u0: float) -> str:
 
 
 def legend_title(tables: Tables) -> str:
-    """Name N, the number of samples and the system, if all curves have one and several energies."""
-    systems = {key.system: None for key in tables}
+    """Name N, the number of samples, and the system or the energy where all curves have one."""
+    systems, energies = {key.system: None for key in tables}, {key.u0 for key in tables}
     named = list(system_labels(systems).values()) * (len(systems) == 1 and len(tables) > 1)
+    named += [energy_text(energies.pop())] * (len(energies) == 1)
     return ", ".join([*named, samples_text(tables)])
 
 
 def frequency_unit(keys: Iterable[Key]) -> str:
     """Write the unit of frequencies in TeX, without dollars."""
     return rf"[\sqrt{{k_e}}\,/\,{unit_text(key.system for key in keys)}]"
+
+
+def packing_text(file: PackingFile) -> str:
+    """Name one packing by its system, N, energy and seed, as far as its file tells."""
+    known, shape = file.attributes, file.system()
+    told = [f"$N={known['n']}$"] if "n" in known else []
+    told += [energy_text(known["u0"])] if "u0" in known else []
+    told += [f"seed {known['seed']}"] if "seed" in known else []
+    return ", ".join(filter(None, [system_text(shape), *told]))
 
 
 def bin_edges(tables: Iterable[ModeTable], per_decade: int = PER_DECADE) -> FloatArray:

@@ -10,7 +10,6 @@ from jamshape.files.sets import PackingFile, System, conditions
 from jamshape.measures.runs import Ensemble
 from jamshape.shapes.table import shape_named
 
-
 _NUMBERS = {"n": "$N={}$", "size_ratio": "$R_b/R_s={:g}$", "kappa": r"$\kappa={:g}$"}
 _SYMBOLS = {"u0": "u_0", "kappa": r"\kappa"}
 
@@ -122,15 +121,14 @@ def ensembles_title(ensembles: Collection[Ensemble]) -> str:
 def _differing(ensembles: Collection[Ensemble]) -> tuple[dict[System, str], list[str]]:
     """Labels of the systems, and names of the numbers that ensembles differ in, with N."""
     systems = system_labels({e.system: None for e in ensembles})
-    return systems, [
-        k for k in _NUMBERS if k == "n" or len({getattr(e, k) for e in ensembles}) > 1
-    ]
+    return systems, [k for k in _NUMBERS if k == "n" or len({getattr(e, k) for e in ensembles}) > 1]
 
 
 def unit_text(systems: Iterable[System]) -> str:
     """Name the unit of length that systems share, in TeX without dollars."""
     units = {shape_named(system.shape).unit for system in systems}
-    return f"({units.pop()})" if len(units) == 1 else r"\mathrm{length}"
+    unit = units.pop() if len(units) == 1 else r"\mathrm{length}"
+    return unit if len(unit) == 1 else f"({unit})"
 
 
 def pressure_unit(systems: Collection[System]) -> str:

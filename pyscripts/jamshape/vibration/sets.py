@@ -13,6 +13,7 @@ from jamshape.files.h5md import FileFormatError
 from jamshape.files.sets import System, is_among, number, require_one_ensemble, system_of
 from jamshape.files.vocabulary import renamed
 from jamshape.landscape import Landscape, State
+from jamshape.measures.averages import Mean, mean
 from jamshape.packing import Packing
 from jamshape.shapes.table import SHAPES
 from jamshape.vibration.hessian import dynamical_matrix
@@ -21,6 +22,8 @@ from jamshape.vibration.table import ModeTable, read_modes, tabulate
 
 # All packings of a figure agree in these.
 ENSEMBLE = ("n", "size_ratio")
+
+TOLD = ("low", "middle", "high")  # bands
 
 _PREFIX = "packing_"  # of what the packing's file said
 
@@ -224,7 +227,7 @@ def pick_modes(table: ModeTable, wanted: Wanted) -> list[int]:
     if chosen:
         return chosen
     left = 0
-    for name in ("low", "middle", "high"):
+    for name in TOLD:
         rows, count = table.in_band(name), wanted.per_band.get(name, 0) + left
         left = count if not len(rows) else 0
         by_size = rows[np.argsort(sizes(table)[rows])]
@@ -241,3 +244,12 @@ def _nearest(table: ModeTable, omega: float) -> int:
         raise ValueError(msg)
     distance = np.abs(np.log(sizes(table)[rows] / abs(omega))) if omega else sizes(table)[rows]
     return int(rows[np.argmin(distance)])
+
+
+def band_means(samples: Sequence[ModeTable], name: str) -> dict[str, Mean]:
+    """Average a column over the modes of each band, then over samples; those without are left out."""
+    found = {}
+    for band in TOLD:
+        parts = [table[name][table.in_band(band)] for table in samples]
+        found[band] = mean([part.mean() for part in parts if len(part)])
+    return found
