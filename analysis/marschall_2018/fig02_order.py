@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -84,7 +84,7 @@ def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
         axes.tick_params(labelleft=True)
     panels[0].set_ylim(bottom=0)
     handles = panels[0].get_legend_handles_labels()
-    place = {"loc": "outside upper center", "ncols": 3, "frameon": False}
+    place: dict[str, Any] = {"loc": "outside upper center", "ncols": 3, "frameon": False}
     figure.legend(*handles, title=ensembles_title(curves), **SMALL_TEXT, **place)
     figure.savefig(options.out)
 

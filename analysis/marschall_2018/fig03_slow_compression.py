@@ -69,11 +69,11 @@ class Rate(NamedTuple):
     @property
     def onsets(self) -> dict[int, float]:
         """phi_J of each seed that has one."""
-        return {run.seed: run.fit.phi_J for run in self.runs if run.fit}
+        return {one.seed: one.fit.phi_J for one in self.runs if one.fit}
 
     def onset(self) -> Mean:
         """Mean phi_J; the error of the fit where there is one sample."""
-        fits = [run.fit for run in self.runs if run.fit]
+        fits = [one.fit for one in self.runs if one.fit]
         if len(fits) == 1:
             return Mean(fits[0].phi_J, fits[0].phi_J_error, 1)
         return mean([fit.phi_J for fit in fits])
@@ -87,19 +87,19 @@ class Rate(NamedTuple):
 def rates_of(runs: list[Run]) -> list[Rate]:
     """Group runs, the fastest of each system first."""
     found: dict[tuple[Place, float], list[Run]] = {}
-    for run in runs:
-        place = Place(run.ensemble.system, run.ensemble.n)
-        found.setdefault((place, -run.ensemble.kappa), []).append(run)
+    for one in runs:
+        place = Place(one.ensemble.system, one.ensemble.n)
+        found.setdefault((place, -one.ensemble.kappa), []).append(one)
     return [Rate(place, -kappa, of) for (place, kappa), of in sorted(found.items())]
 
 
-def cost_of(run: Run) -> Cost | None:
+def cost_of(one: Run) -> Cost | None:
     """Read what a run of slow_compress.py cost."""
-    attributes = read_attributes(run.path)
+    attributes = read_attributes(one.path)
     if "flow_evaluations" not in attributes:
         return None
     evaluations = float(attributes["flow_evaluations"])
-    heun = 2 * float(attributes["flow_strain"]) / (run.ensemble.kappa * HEUN_DT)
+    heun = 2 * float(attributes["flow_strain"]) / (one.ensemble.kappa * HEUN_DT)
     return Cost(evaluations, heun / evaluations, float(attributes["flow_wall_seconds"]))
 
 
@@ -126,8 +126,8 @@ def draw(rates: list[Rate], packings: dict[Place, list[float]], out: Path) -> No
 def draw_pressures(axis: Axes, of: Rate, color: str) -> None:
     """Draw the samples thin, their mean thick."""
     if len(of.runs) > 1:
-        for run in of.runs:
-            axis.plot(run.phi, run.pressure, "-", color=color, lw=0.4, alpha=0.5)
+        for one in of.runs:
+            axis.plot(one.phi, one.pressure, "-", color=color, lw=0.4, alpha=0.5)
     axis.plot(*of.pressure(), "-", color=color, lw=1.2, label=f"{of.kappa:g} ({len(of.runs)})")
 
 
@@ -153,12 +153,12 @@ def read_packings(paths: list[Path]) -> dict[Place, list[float]]:
     return found
 
 
-def pressures_above(run: Run, slowest: Run, phi_J: float) -> tuple[float, float]:
+def pressures_above(one: Run, slowest: Run, phi_J: float) -> tuple[float, float]:
     """Mean pressures above phi_J of a run and of the slowest one of the same sample."""
     phi = np.linspace(
-        max(phi_J, run.phi[0], slowest.phi[0]), min(run.phi[-1], slowest.phi[-1]), GRID
+        max(phi_J, one.phi[0], slowest.phi[0]), min(one.phi[-1], slowest.phi[-1]), GRID
     )
-    first, second = (np.interp(phi, of.phi, of.pressure).mean() for of in (run, slowest))
+    first, second = (np.interp(phi, of.phi, of.pressure).mean() for of in (one, slowest))
     return float(first), float(second)
 
 
@@ -171,17 +171,17 @@ def excess(pairs: list[tuple[float, float]]) -> Mean:
 def row(of: Rate, rates: list[Rate]) -> dict[str, Any]:
     """One row of the table."""
     slowest = [other for other in rates if other.place == of.place][-1]
-    twins = {run.seed: run for run in slowest.runs}
+    twins = {one.seed: one for one in slowest.runs}
     shifts = [phi - slowest.onsets[s] for s, phi in of.onsets.items() if s in slowest.onsets]
     onset = slowest.onset().value
     found = of.place.system.report() | {"n": of.place.n, "kappa": of.kappa}
     costs = [cost for cost in map(cost_of, of.runs) if cost]
     medians = np.median(costs, axis=0).tolist() if costs else [None] * len(Cost._fields)
     found |= dict(zip(Cost._fields, medians, strict=True))
-    found |= {"runs": [run.path for run in of.runs], "phi_J": of.onset()}
+    found |= {"runs": [one.path for one in of.runs], "phi_J": of.onset()}
     if of is slowest:
         return found | {"shift": None, "excess": None}
-    pairs = [(run, twins[run.seed]) for run in of.runs if run.seed in twins]
+    pairs = [(one, twins[one.seed]) for one in of.runs if one.seed in twins]
     above = [pressures_above(*pair, onset) for pair in pairs] if math.isfinite(onset) else []
     return found | {"shift": mean(shifts), "excess": excess(above)}
 

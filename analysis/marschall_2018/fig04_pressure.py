@@ -28,23 +28,23 @@ NAMED = 10  # runs, at most, that the legend names
 
 def mean_phi_J(runs: list[Run]) -> Mean | None:
     """Average over several runs of one ensemble, with the standard error; else None."""
-    found = [run.fit.phi_J for run in runs if run.fit]
-    if len(found) < 2 or len({run.ensemble for run in runs}) > 1:
+    found = [one.fit.phi_J for one in runs if one.fit]
+    if len(found) < 2 or len({one.ensemble for one in runs}) > 1:
         return None
     return mean(found)
 
 
-def label(run: Run) -> str:
+def label(one: Run) -> str:
     """Name a run and its onset."""
-    return f"{run.path.stem}: " + (f"${Mean(*run.fit[:2]).tex}$" if run.fit else "none")
+    return f"{one.path.stem}: " + (f"${Mean(*one.fit[:2]).tex}$" if one.fit else "none")
 
 
 def draw_onsets(axes: Axes, runs: list[Run]) -> None:
     """Draw the lines that lead to the onsets, and what is around them."""
-    fits = [(k, run, run.fit) for k, run in enumerate(runs) if run.fit]
-    for k, run, fit in fits:
-        rise = fit.slope * (run.phi[fit.last] - fit.phi_J)
-        axes.plot([fit.phi_J, run.phi[fit.last]], [0, rise], "k", lw=1, zorder=3)
+    fits = [(k, one, one.fit) for k, one in enumerate(runs) if one.fit]
+    for k, one, fit in fits:
+        rise = fit.slope * (one.phi[fit.last] - fit.phi_J)
+        axes.plot([fit.phi_J, one.phi[fit.last]], [0, rise], "k", lw=1, zorder=3)
         axes.plot(fit.phi_J, 0, "o", color=f"C{k}", mec="k", ms=5, zorder=4)
     if fits:
         axes.margins(x=0.3, y=0.3)
@@ -58,19 +58,19 @@ def draw(runs: list[Run], average: Mean | None, options: Namespace) -> None:
     figure = Figure(figsize=(8, 3.7), dpi=200, layout="constrained")
     whole, onset = figure.subplots(1, 2)
     draw_onsets(onset, runs)
-    for k, run in enumerate(runs):
-        text = label(run) if len(runs) <= NAMED else f"{len(runs)} runs" * (k == 0)
-        whole.semilogy(run.phi, run.pressure, color=f"C{k}", lw=1)
-        onset.plot(run.phi, run.pressure, ".-", color=f"C{k}", ms=3, lw=0.5, label=text)
-    systems = [run.ensemble.system for run in runs]
+    for k, one in enumerate(runs):
+        text = label(one) if len(runs) <= NAMED else f"{len(runs)} runs" * (k == 0)
+        whole.semilogy(one.phi, one.pressure, color=f"C{k}", lw=1)
+        onset.plot(one.phi, one.pressure, ".-", color=f"C{k}", ms=3, lw=0.5, label=text)
+    systems = [one.ensemble.system for one in runs]
     paper = {PAPER_PHI_J.get(s.number("alpha")) for s in systems if of_paper(s)} - {None}
     for axes in (whole, onset):
         for phi in paper:
             axes.axvline(phi, color="0.4", ls=":", lw=1, label=f"{phi} quasistatic (paper)")
         unit = pressure_unit(systems)
         axes.set(xlabel=r"packing fraction $\phi$", ylabel=rf"pressure $p$  ${unit}$")
-    whole.set_ylim(bottom=1e-6 * max(run.pressure.max() for run in runs) or None)
-    whole.set_title("; ".join(dict.fromkeys(ensemble_text(run.ensemble) for run in runs)), size=8)
+    whole.set_ylim(bottom=1e-6 * max(one.pressure.max() for one in runs) or None)
+    whole.set_title("; ".join(dict.fromkeys(ensemble_text(one.ensemble) for one in runs)), size=8)
     if average:
         title = rf"$\phi_J = {average.tex}$, mean of {average.samples}"
         onset.set_title(title, size=9)
@@ -84,10 +84,10 @@ def main(options: Namespace) -> None:
     average = mean_phi_J(runs)
     draw(runs, average, options)
     none = dict.fromkeys(OnsetFit._fields)
-    fits = [{"run": run.path, **(run.fit._asdict() if run.fit else none)} for run in runs]
+    fits = [{"run": one.path, **(one.fit._asdict() if one.fit else none)} for one in runs]
     phi_J, error, _ = average or (None, None, 0)
     report({"out": options.out, "runs": fits, "mean": phi_J, "error": error})
-    if problems := [run.problem for run in runs if run.problem]:
+    if problems := [one.problem for one in runs if one.problem]:
         raise ValueError(problems[0])
 
 

@@ -21,10 +21,10 @@ from jamshape.drawing.axes import discs_at, error_bars, label_alpha_axis
 from jamshape.drawing.styles import PAPER_STYLE, color
 from jamshape.drawing.text import conditions_text, system_labels
 from jamshape.files.sets import (
-    conditions,
     Curve,
     Groups,
     System,
+    conditions,
     curves_over,
     of_paper,
     read_groups,

@@ -112,7 +112,7 @@ def mark_paper(axes: Axes, tables: Tables) -> None:
     omega = [w for alpha in alphas for w in PAPER_OMEGA.get(alpha, ())]
     if omega:
         style = {name: PAPER_STYLE[name] for name in ("color", "mfc", "ms", "label")}
-        low = {"transform": axes.get_xaxis_transform(), "lw": 0}
+        low: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "lw": 0}
         axes.plot(omega, [0.03] * len(omega), "*", **style, **low)
 
 

@@ -25,7 +25,7 @@ from jamshape.drawing.mode_axes import (
 )
 from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED
 from jamshape.drawing.text import samples_text, system_labels
-from jamshape.vibration.sets import TOLD, Key, Tables, band_means, every
+from jamshape.vibration.sets import TOLD, Key, Tables, band_means, every, n_of
 from jamshape.vibration.table import ModeTable
 
 STYLES = {
@@ -66,15 +66,14 @@ def draw(tables: Tables, options: Namespace) -> None:
     edges, labels = bin_edges(every(tables)), system_labels({key.system for key in tables})
     thin: dict[str, Any] = {"mfc": "none", "ms": 4, "lw": 0.8, "elinewidth": 0.8, "capsize": 1.5}
     for row, (key, samples) in zip(rows, tables.items(), strict=True):
-        for name in STYLES:
+        for name, (marker, color, text) in STYLES.items():
             if any(table[name].any() for table in samples):
-                marker, color, text = STYLES[name]
                 style = {"fmt": marker, "color": color, "label": text}
                 draw_binned(row, samples, name, edges, **thin, **style)
         for axes in row.each():
             axes.set_ylim(-0.04, 1.04)
         row.first.set_ylabel("share of the motion")
-        title = f"{labels[key.system]}, {energy_text(key.u0)}, {samples_text({key: samples})}"
+        title = f"{labels[key.system]}, {energy_text(key.u0)}, {samples_text(n_of(tables), {key: samples})}"
         row.stable.set_title(title, fontsize=8, loc="right")
     draw_legend(rows[0].stable, next(iter(tables.values())))
     figure.savefig(options.out)

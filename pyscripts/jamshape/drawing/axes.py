@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.drawing.families import mark
+from jamshape.drawing.text import pressure_unit
 from jamshape.files.sets import System
 from jamshape.measures.averages import Mean
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 # On a logarithmic axis of alpha, discs stand this factor left of the smallest other alpha.
 DISCS_LEFT_BY = 4.0
 
-ENERGY = r"energy density  $u=U/L^2\;[k_e/(2R_s)^2]$"
 SMALL_TEXT: dict[str, Any] = {"fontsize": 8, "title_fontsize": 8}
 
 _BETA_TICKS = (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10)
@@ -45,6 +45,13 @@ def label_alpha_axis(axes: Axes, discs: float | None) -> None:
     axes.set_xticks(minor, [""] * len(minor), minor=True)
     axes.set_xlim(low, high)
     axes.axvline(discs * 2, color="0.8", lw=0.8, ls=":", zorder=0)
+
+
+def energy_label(systems: Collection[System]) -> str:
+    """Label an axis of the energy density."""
+    dimensions = {system.dimension for system in systems}
+    power = dimensions.pop() if len(dimensions) == 1 else "D"
+    return rf"energy density  $u=U/L^{power}\;{pressure_unit(systems)}$"
 
 
 def error_bars(axes: Axes, means: Mapping[float, Mean], discs: float | None, **style: Any) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +32,7 @@ def contact_angle_figure(curves: Mapping[str, AngleCurve], title: str) -> Figure
     axes.set_xticks(range(0, 181, 30))
     axes.set_xlabel(r"angle $\varphi$ from the spine  [degrees]")
     axes.set_ylabel(r"density of contacts $P(\varphi)$  [1/rad]")
-    place = {"alignment": "left", "loc": "upper left", "frameon": False}
+    place: dict[str, Any] = {"alignment": "left", "loc": "upper left", "frameon": False}
     axes.legend(title=title, title_fontsize=8, fontsize=8, **place)
     _draw_particle(axes.inset_axes((0.72, 0.72, 0.26, 0.26)))
     return figure
@@ -41,7 +41,7 @@ def contact_angle_figure(curves: Mapping[str, AngleCurve], title: str) -> Figure
 def _draw_curve(axes: Axes, found: AngleCurve, tint: str, label: str) -> None:
     axes.stairs(found.density, found.edges, color=tint, lw=1.1, label=label, baseline=None)
     low, high = found.density - found.error, found.density + found.error
-    band = {"fill": True, "color": tint, "alpha": 0.25, "lw": 0}
+    band: dict[str, Any] = {"fill": True, "color": tint, "alpha": 0.25, "lw": 0}
     axes.stairs(high, found.edges, baseline=np.maximum(low, 1e-9), **band)
 
 

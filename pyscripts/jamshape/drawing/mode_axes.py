@@ -29,6 +29,7 @@ from jamshape.vibration.sets import (
     Key,
     Tables,
     every,
+    n_of,
     pooled,
     read_tables,
     selected,
@@ -62,7 +63,7 @@ def modes_parser(doc: str | None, out: str) -> ArgumentParser:
     """Make the parser of a figure of modes, of which alpha and u0 are selected."""
     parser = parser_of(doc, out, "MODES")
     for name in ("alpha", "u0"):
-        asked = {"type": float, "nargs": "+", "default": [], "help": "only these (all)"}
+        asked: dict[str, Any] = {"type": float, "nargs": "+", "default": [], "help": "only these (all)"}
         parser.add_argument(f"--{name}", **asked)
     return parser
 
@@ -94,8 +95,8 @@ def legend_title(tables: Tables) -> str:
     """Name N, the number of samples, and the system or the energy where all curves have one."""
     systems, energies = {key.system: None for key in tables}, {key.u0 for key in tables}
     named = list(system_labels(systems).values()) * (len(systems) == 1 and len(tables) > 1)
-    named += [energy_text(energies.pop())] * (len(energies) == 1)
-    return ", ".join([*named, samples_text(tables)])
+    named += map(energy_text, energies if len(energies) == 1 else [])
+    return ", ".join([*named, samples_text(n_of(tables), tables)])
 
 
 def frequency_unit(keys: Iterable[Key]) -> str:
@@ -267,7 +268,7 @@ def draw_errors(axes: Axes, tables: Tables) -> None:
 def _errors(table: ModeTable) -> FloatArray:
     """(K, 3) sizes of unstable eigenvalues, how far from the minimum's, bounds of their errors."""
     columns = (table["eigenvalues"], np.nan_to_num(table["state_error"]), table.bound)
-    return np.abs(np.column_stack(columns)[unstable(table)])
+    return np.asarray(np.abs(np.column_stack(columns)[unstable(table)]))
 
 
 def draw_legend(axes: Axes, samples: Iterable[ModeTable], **style: Any) -> None:

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Collection, Iterable, Mapping, Sequence, Sized
+from typing import Any
 
-from jamshape.files.sets import PackingFile, System, conditions
+from jamshape.files.sets import PackingFile, System, conditions, n_of
 from jamshape.measures.runs import Ensemble
 from jamshape.shapes.table import shape_named
 
 _NUMBERS = {"n": "$N={}$", "size_ratio": "$R_b/R_s={:g}$", "kappa": r"$\kappa={:g}$"}
 _SYMBOLS = {"u0": "u_0", "kappa": r"\kappa"}
-
-
-class Described(Protocol):
-    """A packing or its modes, with what is said of it."""
-
-    @property
-    def attributes(self) -> Mapping[str, Any]:
-        """What its file says."""
 
 
 def scientific(value: float) -> str:
@@ -48,22 +40,20 @@ def range_text(counts: Iterable[int], thing: str) -> str:
     return counted(known[0], thing) if len(known) == 1 else f"{known[0]} to {known[-1]} {thing}s"
 
 
-def samples_text(groups: Mapping[Any, Sequence[Described]]) -> str:
+def samples_text(n: int, groups: Mapping[Any, Sized]) -> str:
     """Name N and the number of samples, for a legend."""
-    n = int(next(iter(groups.values()))[0].attributes["n"])
-    many = range_text((len(samples) for samples in groups.values()), "sample")
+    many = range_text(map(len, groups.values()), "sample")
     return rf"$N={n}$, {many}" + " each" * (len(groups) > 1)
 
 
 def conditions_text(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
     """Name N, the number of samples, and the energy and compression rate that all packings share."""
-    return ", ".join([samples_text(groups), *_shared(groups)])
+    return ", ".join([samples_text(n_of(groups), groups), *_shared(groups)])
 
 
 def conditions_alone(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
     """Say the same without the number of samples, for legends that tell it of each curve."""
-    n = int(next(iter(groups.values()))[0].number("n"))
-    return ", ".join([f"$N={n}$", *_shared(groups)])
+    return ", ".join([f"$N={n_of(groups)}$", *_shared(groups)])
 
 
 def _shared(groups: Mapping[Any, Sequence[PackingFile]]) -> list[str]:

@@ -238,6 +238,11 @@ def require_one_ensemble(attributes: Sequence[Mapping[str, Any]], same: Sequence
             raise ValueError(msg)
 
 
+def n_of(groups: Mapping[Any, Sequence[PackingFile]]) -> int:
+    """Return the number of particles of the packings, which is that of the first."""
+    return int(next(iter(groups.values()))[0].number("n"))
+
+
 def conditions(groups: Mapping[Any, Sequence[PackingFile]]) -> dict[str, Any]:
     """Return what all files share of N, size ratio, energy and compression rate, for JSON."""
     every = [file.attributes for files in groups.values() for file in files]

@@ -141,6 +141,11 @@ def selected(tables: Tables, name: str, asked: Sequence[float]) -> Tables:
     return {key: of for key, of in tables.items() if is_among(key.number(name), asked)}
 
 
+def n_of(tables: Tables) -> int:
+    """Return the number of particles of the packings."""
+    return every(tables)[0].coordinates.n_all
+
+
 def every(tables: Tables) -> list[ModeTable]:
     """All tables in one list."""
     return [table for samples in tables.values() for table in samples]
