@@ -3,7 +3,6 @@
 from functools import cache, partial
 
 import numpy as np
-import pytest
 from mixtures import bidisperse, monodisperse
 
 from jamshape.contacts import (
@@ -94,11 +93,6 @@ PRESSED = {
 @cache
 def pressed_named(name):
     return PRESSED[name]()
-
-
-@pytest.fixture(params=PRESSED)
-def packing(request):
-    return pressed_named(request.param)
 
 
 def assert_same_forces(a, b):

@@ -6,7 +6,7 @@ import numpy as np
 from mixtures import bidisperse
 
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import (
+from jamshape.minima import (
     Stop,
     minimise,
 )

@@ -113,10 +113,10 @@ def test_translations_cost_nothing(packing):
         assert moved == pytest.approx(energy, rel=1e-12)
 
 
-def test_curvature_knows_the_rattlers(packing):
+def test_rattlers_are_those_of_the_contacts(packing):
     opened = scaled(packing, 1.03)
     expected = find_rattlers(opened, find_contacts(opened, 1.0, 2))
-    found = Landscape(packing).curvature(State.of(opened)).rattlers
+    found = Landscape(packing).rattlers(State.of(opened))
     np.testing.assert_array_equal(found, expected)
 
 

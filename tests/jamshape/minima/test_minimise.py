@@ -6,7 +6,7 @@ from squeezed import squeezed
 from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 
 from jamshape.landscape import CrossingError, Landscape, State
-from jamshape.minima.minimise import (
+from jamshape.minima import (
     METHODS,
     Outcome,
     Stop,

@@ -8,7 +8,7 @@ from squeezed import squeezed
 
 from jamshape.contacts import coordination, find_contacts
 from jamshape.landscape import Landscape
-from jamshape.minima.minimise import History, Outcome, minimise, residual_of
+from jamshape.minima import History, Outcome, minimise, residual_of
 from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
 
 # n, alpha, and the packing fraction just below jamming where the search begins

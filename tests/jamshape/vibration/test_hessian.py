@@ -304,7 +304,7 @@ def test_one_particle_that_holds_itself_by_its_images():
 def test_coordinates_are_those_of_the_backbone(name):
     landscape, minimum = jammed(name)
     matrix = matrix_of(name)
-    rattlers = landscape.curvature(minimum.state).rattlers
+    rattlers = landscape.rattlers(minimum.state)
     assert matrix.n_particles == (~rattlers).sum()
     np.testing.assert_array_equal(matrix.coordinates.backbone, np.flatnonzero(~rattlers))
     per_particle = 2 if name == "discs" else 3
