@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.drawing.styles import BLACK, BLUE, GREEN, ORANGE, RED, SKY
 from jamshape.files.sets import System, is_among
+from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import SHAPES
 
 if TYPE_CHECKING:
@@ -42,6 +43,12 @@ _OTHERS = (
     ("d", "#e07b53"),
     ("H", "#7b8fc7"),
 )  # by place in the table
+
+
+def with_three_axes() -> Shape:
+    """Find the shape that has an exponent and two ratios of axes."""
+    names = (tuple(p.name for p in shape.parameters) for shape in SHAPES.values())
+    return next(shape for shape, own in zip(SHAPES.values(), names, strict=True) if own == NEEDS)
 
 
 def shape_of(system: System) -> tuple[float, float, float]:

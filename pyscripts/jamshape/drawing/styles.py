@@ -26,6 +26,12 @@ PAPER_LINE: dict[str, Any] = {"color": "0.5", "lw": 1, "ls": "--", "zorder": 0}
 RATTLER, CONTACT = "#cfcfcf", "#d7191c"
 KINDS = ("#86c98a", "#6ea6dc", "#e9b04d", "#c76f9b", "#9a7fc0", "#e07b53", "#4fa3a5", "#b5b04a")
 
+# Of single bodies.
+BODIES = (
+    *("#4fa3a5", "#e07b53", "#7b8fc7", "#c76f9b", "#8ab54a"),
+    *("#d9a832", "#5c9ad1", "#9a7fc0", "#d0685f"),
+)
+
 
 def color(k: int) -> str:
     """Colour of the curve with that number, from 0."""

@@ -25,6 +25,16 @@ class Measured(Protocol):
         """Look up a number."""
 
 
+class Reported(Protocol):
+    """A group that names itself in JSON, such as `jamshape.files.sets.System`."""
+
+    def report(self) -> dict[str, Any]:
+        """Name it."""
+
+
+_Named = TypeVar("_Named", bound=Reported)
+
+
 class Mean(NamedTuple):
     """An average over samples with its standard error."""
 
@@ -81,3 +91,13 @@ def exactly(
 ) -> dict[_Group, Mean]:
     """Give each group a number that needs no average."""
     return {group: Mean(value(group), math.nan, len(samples)) for group, samples in groups.items()}
+
+
+def rows(
+    groups: Mapping[_Named, Any], columns: Mapping[str, Mapping[_Named, Mean]]
+) -> list[dict[str, Any]]:
+    """Report averages for JSON, a row for each group."""
+    return [
+        group.report() | {name: values[group] for name, values in columns.items()}
+        for group in groups
+    ]

@@ -15,6 +15,8 @@ from jamshape.vibration.energy_along import AlongModes, EnergyAlong, quartic_cro
 from jamshape.vibration.sets import modes_of, of_packing, to_store
 from jamshape.vibration.table import ModeTable, read_modes, write_modes
 
+KEPT = "folder to keep spectra in (beside the packings)"
+
 # What tells a packing from others.
 _IDENTITY = ("phi", "u", "seed")
 
