@@ -15,6 +15,7 @@ from typing import Any
 
 from jamshape.command import report, run
 from jamshape.drawing.mode_axes import (
+    COMPONENTS,
     add_sides,
     bin_edges,
     draw_binned,
@@ -23,17 +24,10 @@ from jamshape.drawing.mode_axes import (
     modes_parser,
     tables_asked,
 )
-from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED
 from jamshape.drawing.text import samples_text, system_labels
 from jamshape.vibration.sets import TOLD, Key, Tables, band_means, every, n_of
 from jamshape.vibration.table import ModeTable
 
-STYLES = {
-    "rotation": ("o-", BLUE, r"$u_\theta^2$, rotation"),
-    "parallel": ("s-", RED, r"$u_\parallel^2$, along the axis"),
-    "perpendicular": ("D-", GREEN, r"$u_\perp^2$, across it"),
-    "of_round": ("^-", ORANGE, r"$u^2$ of particles without such an axis"),
-}
 MOST = 4  # panels
 
 
@@ -66,7 +60,7 @@ def draw(tables: Tables, options: Namespace) -> None:
     edges, labels = bin_edges(every(tables)), system_labels({key.system for key in tables})
     thin: dict[str, Any] = {"mfc": "none", "ms": 4, "lw": 0.8, "elinewidth": 0.8, "capsize": 1.5}
     for row, (key, samples) in zip(rows, tables.items(), strict=True):
-        for name, (marker, color, text) in STYLES.items():
+        for name, (marker, color, text) in COMPONENTS.items():
             if any(table[name].any() for table in samples):
                 style = {"fmt": marker, "color": color, "label": text}
                 draw_binned(row, samples, name, edges, **thin, **style)
@@ -81,7 +75,7 @@ def draw(tables: Tables, options: Namespace) -> None:
 
 def row_of(key: Key, samples: list[ModeTable]) -> dict[str, Any]:
     """Average over bands."""
-    parts = {name: band_means(samples, name) for name in STYLES}
+    parts = {name: band_means(samples, name) for name in COMPONENTS}
     bands = {band: {name: part[band] for name, part in parts.items()} for band in TOLD}
     return key.report() | {"samples": len(samples)} | bands
 

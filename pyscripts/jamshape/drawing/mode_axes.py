@@ -15,7 +15,7 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of
-from jamshape.drawing.styles import color
+from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED, color
 from jamshape.drawing.text import (
     samples_text,
     scientific,
@@ -46,6 +46,14 @@ if TYPE_CHECKING:
 
 PER_DECADE = 8  # bins
 
+# How kinds of motion are drawn, and what they are.
+COMPONENTS = {
+    "rotation": ("o-", BLUE, r"$u_\theta^2$, rotation"),
+    "parallel": ("s-", RED, r"$u_\parallel^2$, along the axis"),
+    "perpendicular": ("D-", GREEN, r"$u_\perp^2$, across it"),
+    "of_round": ("^-", ORANGE, r"$u^2$ of particles without such an axis"),
+}
+
 # Least width of the axes of unstable modes, over that of the others.
 _LEAST_WIDTH = 0.16
 
@@ -63,7 +71,12 @@ def modes_parser(doc: str | None, out: str) -> ArgumentParser:
     """Make the parser of a figure of modes, of which alpha and u0 are selected."""
     parser = parser_of(doc, out, "MODES")
     for name in ("alpha", "u0"):
-        asked: dict[str, Any] = {"type": float, "nargs": "+", "default": [], "help": "only these (all)"}
+        asked: dict[str, Any] = {
+            "type": float,
+            "nargs": "+",
+            "default": [],
+            "help": "only these (all)",
+        }
         parser.add_argument(f"--{name}", **asked)
     return parser
 
