@@ -160,7 +160,9 @@ def test_rates_are_compared_sample_by_sample(report, rates, tmp_path):
     fast, slow = report(SLOW, *rates, "--out", tmp_path / "slow.png")["rows"]
     assert (fast["kappa"], slow["kappa"]) == (1e-8, 1e-10)
     assert slow["phi_J"]["value"] == pytest.approx(PHI_J + 0.004, abs=2e-4)
-    assert slow["phi_J"]["error"] == pytest.approx(np.std([0, 2, 10], ddof=1) / 1e3 / 3**0.5, rel=0.05)
+    assert slow["phi_J"]["error"] == pytest.approx(
+        np.std([0, 2, 10], ddof=1) / 1e3 / 3**0.5, rel=0.05
+    )
     # Samples differ by more than the rates do, and that does not enter.
     assert fast["shift"]["value"] == pytest.approx(-0.002, abs=1e-4)
     assert fast["shift"]["error"] == pytest.approx(0.001 / np.sqrt(3), rel=0.1)
