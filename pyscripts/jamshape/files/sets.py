@@ -47,7 +47,7 @@ class System(NamedTuple):
     shape: str
     dimension: int
     parameters: tuple[tuple[str, float], ...]
-    """Those of the shape, by name; none of a mixture."""
+    """Those of the shape, by name; none of a mixture, and none where files do not tell all."""
     kinds: str = ""
     """The particles of a mixture."""
     protocol: int = 0
@@ -147,7 +147,8 @@ def number(attributes: Mapping[str, Any], name: str, who: str, expected: str) ->
 def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> System:
     """Tell what a packing is a sample of, by its attributes, shape style and dimension."""
     names = [parameter.name for parameter in shape_named(shape).parameters]
-    known = tuple((name, float(attributes[name])) for name in names if name in attributes)
+    told = set(names) <= attributes.keys()
+    known = tuple((name, float(attributes[name])) for name in names if told)
     kinds = str(attributes.get("kinds", ""))
     protocol, sweeps = (int(attributes.get(name, 0)) for name in ("protocol", "n_sweeps"))
     return System(shape, dimension, known, kinds, protocol, sweeps)
