@@ -1,70 +1,71 @@
 """The figures of superellipsoids, as their users run them, on a small sweep made here."""
 
-import json
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
+from mixtures import bidisperse, superellipsoids
+from pictures import image
 
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.minima.target import Target
-from jamshape.packing import Box, Packing
+from jamshape.protocols.make import Recipe, Steps, Thermalisation, make
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.protocols.superellipsoid_jammed import Sample, make
+from jamshape.protocols.random_start import random_packing
 
-ANALYSIS = Path(__file__).parents[2] / "analysis"
-OF_SWEEPS = (
-    *("phi_j_shapes", "global_order", "asphericity", "shape_map", "order_density"),
-    *("shape_plane", "local_order", "curvature", "eigenvalues", "quartic_modes", "quartic_energy"),
-)
-SCRIPTS = (*(f"fig_{name}.py" for name in OF_SWEEPS), "draw_superellipsoids.py")
+FOLDER = "yuan_2019"
+PHI_J, ORDER, ASPHERICITY, MAP, DENSITY, PLANE, LOCAL, CURVATURE, EIGENVALUES, MODES, ENERGY = (
+    SCRIPTS
+) = [
+    f"{FOLDER}/{name}.py"
+    for name in (
+        *("fig03_phi_j", "fig04_global_order", "fig05_asphericity", "fig07_shape_map"),
+        *("fig08_order_density", "fig12_shape_plane", "fig13_local_order", "fig14_curvature"),
+        *("fig09a_eigenvalues", "fig09b_quartic_modes", "fig10_quartic_energy"),
+    )
+]
+
+# What rods have no numbers for.
+NEED_AXES = (PHI_J, ORDER, ASPHERICITY, MAP, PLANE, CURVATURE)
 N = 20
 SHAPES = [(1.0, 1.0, 1.0), (1.0, 0.6, 1.0), (1.0, 1.0, 2.0), (1.0, 0.8, 1.25), (1.5, 1.0, 1.0)]
 
 
 @pytest.fixture
-def report(here, capsys, tmp_path):
+def drawn(report, tmp_path):
     """Run a script and read its last line; look at whether anything is drawn."""
 
     def reported(script, *arguments):
         out = tmp_path / "out.png"
-        assert here(script, *arguments, "--out", out) == 0
-        last = json.loads(capsys.readouterr().out.splitlines()[-1], parse_constant=pytest.fail)
+        last = report(script, *arguments, "--out", out)
         assert last["out"] == str(out)
-        look_at(out)
+        image(out)
         return last
 
     return reported
 
 
 @pytest.fixture
-def problem(here, tmp_path):
-    """Run a script that must end with one sentence."""
+def wrong(problem, tmp_path):
+    """Run a script that must end with one sentence and draw nothing."""
 
     def sentence(script, *arguments):
-        said = here(script, *arguments, "--out", tmp_path / "none.png")
-        assert isinstance(said, str)
-        assert "\n" not in said
-        assert said.startswith(f"{script}: ")
+        said = problem(script, *arguments, "--out", tmp_path / "none.png")
         assert not (tmp_path / "none.png").exists()
         return said
 
     return sentence
 
 
-def look_at(path):
-    from matplotlib.image import imread  # noqa: PLC0415 - the other helpers need none
-
-    pixels = imread(path)
-    assert min(pixels.shape[:2]) > 350
-    assert max(pixels.shape[:2]) < 3000
-    assert pixels[..., :3].std() > 0.02
-
-
-def made(path, **changes):
-    sample = Sample(n=N, phi_start=0.4, quasistatic=Quasistatic(step=0.01), target=Target(1e-12))
-    for _ in make(replace(sample, **changes), path):
+def made(path, shape=(1.0, 1.0, 1.0), thermal=None, seed=1):
+    recipe = Recipe(
+        particles=superellipsoids(*shape),
+        n=N,
+        dimension=3,
+        seed=seed,
+        phi_start=0.4,
+        way=Steps(Quasistatic(step=0.01), thermal),
+        target=Target(1e-12),
+    )
+    for _ in make(recipe, path):
         pass
     return path
 
@@ -74,8 +75,8 @@ def sweep(tmp_path_factory):
     """Five shapes, one with two samples; what is no packing is left out."""
     folder = tmp_path_factory.mktemp("sweep3d")
     for p, w1, w2 in SHAPES:
-        made(folder / f"p{p:g}_w{w1:g}_{w2:g}_seed1.h5", p=p, w1=w1, w2=w2)
-    made(folder / "p1_w0.6_1_seed2.h5", w1=0.6, seed=2)
+        made(folder / f"p{p:g}_w{w1:g}_{w2:g}_seed1.h5", (p, w1, w2))
+    made(folder / "p1_w0.6_1_seed2.h5", (1.0, 0.6, 1.0), seed=2)
     (folder / "p1_w1_3_seed1.h5.path.h5").write_text("still written\n")
     return folder
 
@@ -84,7 +85,7 @@ def sweep(tmp_path_factory):
 def thermal(tmp_path_factory):
     """One packing of protocol 2."""
     folder = tmp_path_factory.mktemp("sweep3d_thermal")
-    made(folder / "a.h5", p=1.5, protocol=2, n_sweeps=50, phi_thermal=0.45)
+    made(folder / "a.h5", (1.5, 1.0, 1.0), Thermalisation(phi=0.45, n_sweeps=50))
     return folder
 
 
@@ -94,42 +95,42 @@ def modes(tmp_path_factory):
 
 
 def rows_by_shape(rows):
-    return {(row["p"], row["w1"], row["w2"], row["protocol"]): row for row in rows}
+    return {(row["exponent"], row["w1"], row["w2"], row["protocol"]): row for row in rows}
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
-def test_help(here, capsys, script):
-    assert here(script, "--help") == 0
-    said = capsys.readouterr().out
+def test_help(help_of, script):
+    said = help_of(script)
     assert "Yuan, VanderWerf, Shattuck & O'Hern" in said
+    assert f"python analysis/{script}" in said
     assert "--out" in said
 
 
-@pytest.mark.parametrize("script", [f"fig_{name}.py" for name in OF_SWEEPS])
-def test_bad_input_is_one_sentence(problem, tmp_path, script):
-    assert "No such file" in problem(script, tmp_path / "none")
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_bad_input_is_one_sentence(wrong, tmp_path, script):
+    assert "No such file" in wrong(script, tmp_path / "none")
     (tmp_path / "empty").mkdir()
-    assert "empty: no finished packing" in problem(script, tmp_path / "empty")
-    rods = tmp_path / "rods.h5"
-    packing = Packing(
-        position=np.array([[1.0, 1.0]]),
-        orientation=np.zeros(1),
-        diameters=np.ones((1, 3)),
-        species=np.ones(1, int),
-        id=np.ones(1, int),
-        box=Box(np.zeros(2), np.full(2, 3.0)),
-    )
-    known = {"outcome": "converged", "alpha": 0.0, "n": 1, "seed": 1}
-    write_packing(rods, packing, known)
-    assert "has no number 'p'" in problem(script, rods)
+    assert "empty: no finished packing" in wrong(script, tmp_path / "empty")
+    packing = random_packing(2, 0.3, 1, bidisperse(0))
+    known = {"outcome": "converged", "alpha": 0.0, "seed": 1}
+    known |= dict.fromkeys(("S2", "C4", "z", "phi_J", "asphericity", "beta", "z_iso"), 0.5)
+    known |= {"n_rattlers": 0, "pressure": 0.0}
     sizes = [tmp_path / f"{n}.h5" for n in (1, 2)]
     for n, path in zip((1, 2), sizes, strict=True):
-        write_packing(path, packing, known | {"n": n, "p": 1.0, "w1": 1.0, "w2": 1.0})
-    assert "n is 1 and 2, expected one ensemble" in problem(script, *sizes)
+        write_packing(path, packing, known | {"n": n, "exponent": 1.0, "w1": 1.0, "w2": 1.0})
+    assert "n is 1 and 2, expected one ensemble" in wrong(script, *sizes)
 
 
-def test_phi_j_of_spheroids_and_superballs(report, problem, sweep):
-    rows = rows_by_shape(report("fig_phi_j_shapes.py", sweep)["phi_J"])
+@pytest.mark.parametrize("script", NEED_AXES)
+def test_shapes_without_three_axes_are_refused(wrong, tmp_path, script):
+    rods = tmp_path / "rods.h5"
+    known = {"outcome": "converged", "alpha": 0.0, "n": 2, "seed": 1}
+    write_packing(rods, random_packing(2, 0.3, 1, bidisperse(0)), known)
+    assert "has no number 'exponent'" in wrong(script, rods)
+
+
+def test_phi_j_of_spheroids_and_superballs(drawn, wrong, sweep):
+    rows = rows_by_shape(drawn(PHI_J, sweep)["phi_J"])
     assert (1.0, 0.8, 1.25, 1) not in rows
     stored = [read_attributes(sweep / f"p1_w0.6_1_seed{seed}.h5")["phi_J"] for seed in (1, 2)]
     phi = rows[1.0, 0.6, 1.0, 1]["phi_J"]
@@ -140,12 +141,12 @@ def test_phi_j_of_spheroids_and_superballs(report, problem, sweep):
         "error": None,
         "samples": 1,
     }
-    said = problem("fig_phi_j_shapes.py", sweep / "p1_w0.8_1.25_seed1.h5")
+    said = wrong(PHI_J, sweep / "p1_w0.8_1.25_seed1.h5")
     assert "expected one" in said
 
 
-def test_global_order(report, sweep, thermal):
-    found = report("fig_global_order.py", sweep, thermal)
+def test_global_order(drawn, sweep, thermal):
+    found = drawn(ORDER, sweep, thermal)
     assert found["one_over_sqrt_n"] == pytest.approx(1 / np.sqrt(N))
     assert found["random"]["S2"] == pytest.approx(0.19, abs=0.04)
     assert len(found["order"]) == 6
@@ -153,40 +154,40 @@ def test_global_order(report, sweep, thermal):
 
 
 @pytest.mark.parametrize("quantity", ["phi_J", "z"])
-def test_asphericity(report, sweep, quantity):
-    rows = rows_by_shape(report("fig_asphericity.py", sweep, "--quantity", quantity)["shapes"])
+def test_asphericity(drawn, sweep, quantity):
+    rows = rows_by_shape(drawn(ASPHERICITY, sweep, "--quantity", quantity)["shapes"])
     assert rows[1.0, 1.0, 1.0, 1]["asphericity"]["value"] == pytest.approx(0, abs=1e-12)
     assert rows[1.0, 1.0, 2.0, 1]["z_iso"]["value"] == 10
     assert rows[1.5, 1.0, 1.0, 1]["z_iso"]["value"] == 12
     assert rows[1.0, 0.6, 1.0, 1][quantity]["samples"] == 2
 
 
-def test_shape_map_and_plane(report, problem, sweep, thermal):
-    found = report("fig_shape_map.py", sweep)
+def test_shape_map_and_plane(drawn, wrong, sweep, thermal):
+    found = drawn(MAP, sweep)
     assert (found["contours"], len(found["shapes"])) == (False, 5)
-    assert "no packing is of protocol 2" in problem("fig_shape_map.py", sweep, "--protocol", 2)
-    assert len(report("fig_shape_map.py", sweep, thermal, "--protocol", 2)["shapes"]) == 1
-    rows = rows_by_shape(report("fig_shape_plane.py", sweep)["shapes"])
+    assert "no packing is of protocol 2" in wrong(MAP, sweep, "--protocol", 2)
+    assert len(drawn(MAP, sweep, thermal, "--protocol", 2)["shapes"]) == 1
+    rows = rows_by_shape(drawn(PLANE, sweep)["shapes"])
     assert rows[1.0, 0.8, 1.25, 1]["beta"]["value"] == pytest.approx(1)
 
 
-def test_order_and_density_of_both_protocols(report, sweep, thermal):
-    found = report("fig_order_density.py", sweep, thermal)
-    assert {(row["p"], row["protocol"]) for row in found["shapes"]} == {(1.5, 1), (1.5, 2)}
+def test_order_and_density_of_both_protocols(drawn, sweep, thermal):
+    found = drawn(DENSITY, sweep, thermal)
+    assert {(row["exponent"], row["protocol"]) for row in found["shapes"]} == {(1.5, 1), (1.5, 2)}
     (gain,) = found["gains"]
     of = [
         read_attributes(path)["phi_J"] for path in (sweep / "p1.5_w1_1_seed1.h5", thermal / "a.h5")
     ]
     assert gain["phi_J"] == pytest.approx(of[1] - of[0])
-    alone = report("fig_order_density.py", sweep)
+    alone = drawn(DENSITY, sweep)
     assert (len(alone["shapes"]), alone["gains"]) == (5, [])
 
 
-def test_local_order_and_curvature(report, sweep):
-    rows = rows_by_shape(report("fig_local_order.py", sweep)["order"])
+def test_local_order_and_curvature(drawn, sweep):
+    rows = rows_by_shape(drawn(LOCAL, sweep)["order"])
     assert 0 < rows[1.5, 1.0, 1.0, 1]["local_C4"]["value"] < 1
     assert rows[1.0, 1.0, 1.0, 1]["random_S2"]["value"] > 0.2
-    found = report("fig_curvature.py", sweep)
+    found = drawn(CURVATURE, sweep)
     assert found["with_z"]["shapes"] == 4
     rows = rows_by_shape(found["curvature"])
     assert rows[1.0, 1.0, 1.0, 1]["quantiles"]["0.5"] == pytest.approx(1)
@@ -195,9 +196,9 @@ def test_local_order_and_curvature(report, sweep):
     assert rows[1.5, 1.0, 1.0, 1]["sides"] >= network
 
 
-def test_eigenvalues(report, problem, sweep, modes):
+def test_eigenvalues(drawn, wrong, sweep, modes):
     asked = ("--modes", modes)
-    rows = rows_by_shape(report("fig_eigenvalues.py", sweep, *asked)["spectra"])
+    rows = rows_by_shape(drawn(EIGENVALUES, sweep, *asked)["spectra"])
     assert rows[1.0, 1.0, 1.0, 1]["regimes"][:2] == [0, 0], "spheres do not turn"
     quartic, turning, moving = rows[1.5, 1.0, 1.0, 1]["regimes"]
     assert min(quartic, turning, moving) > 0
@@ -205,16 +206,16 @@ def test_eigenvalues(report, problem, sweep, modes):
     assert len(kept) == 5
     before = kept[0].stat().st_mtime_ns
     shape = ("--shape", 1.5, 1, 1)
-    assert len(report("fig_eigenvalues.py", sweep, *asked, *shape)["spectra"]) == 1
+    assert len(drawn(EIGENVALUES, sweep, *asked, *shape)["spectra"]) == 1
     assert kept[0].stat().st_mtime_ns == before, "not found again"
-    assert "expected a shape of the sweep" in problem(
-        "fig_eigenvalues.py", sweep, "--shape", 3, 1, 1
-    )
+    assert "expected a shape of the sweep" in wrong(EIGENVALUES, sweep, "--shape", 3, 1, 1)
 
 
-def test_contacts_and_quartic_modes_are_on_the_unit_line(report, sweep, modes):
-    found = report("fig_quartic_modes.py", sweep, "--modes", modes)
-    spheres = [row for row in found["counts"] if (row["p"], row["w1"], row["w2"]) == (1, 1, 1)]
+def test_contacts_and_quartic_modes_are_on_the_unit_line(drawn, sweep, modes):
+    found = drawn(MODES, sweep, "--modes", modes)
+    spheres = [
+        row for row in found["counts"] if (row["exponent"], row["w1"], row["w2"]) == (1, 1, 1)
+    ]
     assert (found["packings"], len(spheres)) == (6, 1)
     # So few spheres crystallise, with contacts to spare.
     for row in found["counts"]:
@@ -223,71 +224,23 @@ def test_contacts_and_quartic_modes_are_on_the_unit_line(report, sweep, modes):
         assert row["n_contacts"] == read_attributes(row["packing"])["n_contacts"]
 
 
-def test_modes_below_the_gap_are_quartic_and_others_are_not(report, sweep, modes):
+def test_modes_below_the_gap_are_quartic_and_others_are_not(drawn, sweep, modes):
     one = sweep / "p1.5_w1_1_seed1.h5"
-    (row,) = report("fig_quartic_modes.py", one, "--modes", modes, "--follow", 2)["counts"]
+    (row,) = drawn(MODES, one, "--modes", modes, "--follow", 2)["counts"]
     assert (row["followed_below"], row["quartic_below"]) == (2, 2)
     assert (row["followed_above"], row["quartic_above"]) == (2, 0)
 
 
-def test_crossovers_fall_as_the_root_of_the_pressure(here, report, capsys, sweep, tmp_path):
+def test_crossovers_fall_as_the_root_of_the_pressure(report, drawn, sweep, tmp_path):
     one, ladder = sweep / "p1.5_w1_1_seed1.h5", tmp_path / "ladder"
-    assert here("energy_ladder.py", one, "--u0", 1e-14, "--out", ladder) == 0
-    capsys.readouterr()
+    report("energy_ladder.py", one, "--u0", 1e-14, "--out", ladder)
     (rung,) = ladder.glob("*.h5")
     assert read_attributes(rung)["z_iso"] == 12
     assert read_packing(rung).phi < read_packing(one).phi
-    found = report("fig_quartic_energy.py", one, ladder, "--modes", 2)
+    found = drawn(ENERGY, one, ladder, "--modes", 2)
     assert len(found["packings"]) == 2
     quartic = [m for row in found["packings"] for m in row["modes"] if m["quartic"]]
     assert len(quartic) == 4
     assert all(mode["crossover"] > 0 for mode in quartic)
     (slope,) = found["delta_of_pressure"]
     assert slope["exponent"] == slope["exponent_of_lowest"] == pytest.approx(0.5, abs=0.05)
-
-
-def test_pictures(report, problem, sweep, tmp_path):
-    paths = [sweep / f"p{p:g}_w{w1:g}_{w2:g}_seed1.h5" for p, w1, w2 in SHAPES[1:3]]
-    for color in ("S2", "C4", "orientation"):
-        found = report("draw_superellipsoids.py", *paths, "--color", color, "--level", 2)
-        assert [row["n"] for row in found["packings"]] == [N, N]
-        assert ("mean_local" in found["packings"][0]) == (color != "orientation")
-    assert found["packings"][0]["S2"] == pytest.approx(read_attributes(paths[0])["S2"])
-    assert "No such file" in problem("draw_superellipsoids.py", tmp_path / "none.h5")
-    flat = read_packing(paths[0])
-    rods = Packing(
-        position=np.zeros((1, 3)),
-        orientation=np.array([[1.0, 0, 0, 0]]),
-        diameters=np.array([[3.0, 1.0, 1.0]]),
-        species=np.ones(1, int),
-        id=np.ones(1, int),
-        box=flat.box,
-    )
-    write_packing(tmp_path / "rods.h5", rods)
-    said = problem("draw_superellipsoids.py", tmp_path / "rods.h5")
-    assert "expected 3D and of superellipsoids" in said
-
-
-def test_near_bodies_hide_far_ones(monkeypatch):
-    """Two spheres behind each other: where they meet on the screen, the nearer one is painted last."""
-    monkeypatch.syspath_prepend(ANALYSIS)
-    from shading import faces_of, painted, view  # noqa: PLC0415 - not on the path before
-
-    eye = view(20, 30)
-    center = np.full(3, 5.0)
-    packing = Packing(
-        position=np.array([center + 1.01 * eye.eye, center - 1.01 * eye.eye]),
-        orientation=np.tile([1.0, 0, 0, 0], (2, 1)),
-        diameters=np.full((2, 3), 2.0),
-        species=np.ones(2, int),
-        id=np.arange(1, 3),
-        box=Box(np.zeros(3), np.full(3, 10.0)),
-        shape_style="superellipsoid",
-        exponent=np.ones(2),
-    )
-    colors = np.array([[1.0, 0, 0], [0, 0, 1.0]])
-    polygons, shades = painted(faces_of(packing, 2, eye), colors, eye)
-    middle = np.abs(polygons.mean(axis=1) - eye.flat(center)).max(axis=1) < 0.3
-    assert (shades[middle][-1] * [1, 0, -1]).sum() > 0, "red is last"
-    far = np.flatnonzero(shades[:, 2] > shades[:, 0])
-    assert far.max() < np.flatnonzero(middle & (shades[:, 0] > shades[:, 2])).min()
