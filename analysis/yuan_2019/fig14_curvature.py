@@ -23,7 +23,7 @@ from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, PackingFile, System, conditions, read_groups
 from jamshape.measures.averages import averages
 from jamshape.packing import body_axes
-from jamshape.shapes.superellipsoid_curvature import contact_curvatures
+from jamshape.shapes.curvature import contact_curvatures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
