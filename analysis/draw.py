@@ -22,7 +22,7 @@ import numpy as np
 
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import coordination, find_contacts, find_rattlers
-from jamshape.drawing.colors import CHOICES, Coloring, Scale
+from jamshape.drawing.colors import CHOICES, ORDER, Coloring, Scale
 from jamshape.drawing.kinds import kinds_of
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.space import save_smooth
@@ -30,6 +30,7 @@ from jamshape.drawing.text import scientific
 from jamshape.files.h5md import FileFormatError, read_attributes
 from jamshape.files.lammps_text import read_any
 from jamshape.files.sets import Contacts
+from jamshape.measures.minimum import order
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,12 +63,16 @@ def picture(path: Path, options: Namespace) -> Picture:
     told = {"packing": path, "shape": packing.shape_style, "dimension": packing.dimension}
     told |= {"n": packing.n, "rattlers": counts.n_rattlers, "contacts": len(network.pairs)}
     told |= {"phi": packing.phi, "u": u, "z": counts.z}
+    known_order = order(packing) if options.color in ORDER else {}
     numbers = [rf"$N={packing.n}$", rf"$\phi={packing.phi:.5f}$"]
     numbers += [rf"$u={scientific(u)}$", f"$z={counts.z:.3f}$"]
     numbers += [f"step {packing.step}"] * (packing.step > 0)
+    numbers += [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
     if "protocol" in known:
         numbers.append(f"protocol {known['protocol']}")
-    return Picture(Contacts(packing, network, find_rattlers(packing, network)), numbers, told)
+    return Picture(
+        Contacts(packing, network, find_rattlers(packing, network)), numbers, told | known_order
+    )
 
 
 def draw(pictures: list[Picture], options: Namespace) -> list[Coloring]:

@@ -22,13 +22,19 @@ from jamshape.drawing.families import NEEDS, with_three_axes
 from jamshape.drawing.space import lit, mean_normals, view
 from jamshape.drawing.styles import BODIES
 from jamshape.shapes.mesh import SurfaceMesh
-from jamshape.shapes.shape import Interaction
+from jamshape.shapes.roundness import (
+    asphericity,
+    axes_from,
+    reduced_aspect_ratio,
+    surface_area,
+    volume,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Numbers = tuple[float, ...]
-"""p, w1, w2"""
+Numbers = tuple[float, float, float]
+"""p, w1 and w2."""
 
 PAPER_SHAPES: list[Numbers] = [
     (1, 0.3, 1), (1, 1, 3), (1, 0.8, 1.25), (1, 0.6, 2.36), (2, 1, 1),
@@ -47,22 +53,12 @@ LEVEL = 4
 VIEW = view(28, -55)
 
 
-def sizes(numbers: Numbers) -> tuple[FloatArray, FloatArray]:
-    """(1, 3) diameters and (1,) exponent of a body with a = 1."""
-    return with_three_axes().sizes(dict(zip(NEEDS, numbers, strict=True)), np.ones(1))
-
-
-def volume_of(numbers: Numbers) -> float:
-    """Volume of a body with a = 1."""
-    bodies = with_three_axes().compiled(sizes(numbers), 3, Interaction())
-    return float(bodies.measure[0])
-
-
 def body(numbers: Numbers) -> SurfaceMesh:
     """Cover a shape with the volume of a unit sphere; the longest axis is x, the shortest z."""
-    diameters, exponent = sizes(numbers)
-    scale = np.cbrt(4 * np.pi / 3 / volume_of(numbers))
-    return with_three_axes().surface(scale * diameters[0, ::-1], float(exponent[0]), LEVEL)
+    p, w1, w2 = numbers
+    axes = axes_from(w1, w2)
+    scale = np.cbrt(4 * np.pi / 3 / volume(axes, p))
+    return with_three_axes().surface(2 * scale * axes[::-1], p, LEVEL)
 
 
 def draw_body(axes: Axes, mesh: SurfaceMesh, color: FloatArray) -> None:
@@ -85,11 +81,14 @@ def draw_body(axes: Axes, mesh: SurfaceMesh, color: FloatArray) -> None:
 
 def measure(numbers: Numbers) -> dict[str, Any]:
     """Asphericity, reduced aspect ratio and, of a = 1, volume and surface area of a shape."""
-    known = with_three_axes().described(*sizes(numbers))
-    volume = volume_of(numbers)
-    # A is 1 less the surface of the sphere of that volume over the body's (Eq. 2).
-    area = np.cbrt(36 * np.pi * volume**2) / (1 - known["asphericity"])
-    return dict(zip(NEEDS, numbers, strict=True)) | known | {"volume": volume, "area": area}
+    p, w1, w2 = numbers
+    axes = axes_from(w1, w2)
+    return dict(zip(NEEDS, numbers, strict=True)) | {
+        "asphericity": float(asphericity(axes, p)),
+        "beta": float(reduced_aspect_ratio(axes)),
+        "volume": float(volume(axes, p)),
+        "area": float(surface_area(axes, p).area),
+    }
 
 
 def draw(shapes: list[Numbers], found: list[dict[str, Any]], options: Namespace) -> None:
@@ -115,7 +114,7 @@ def draw(shapes: list[Numbers], found: list[dict[str, Any]], options: Namespace)
 
 def main(options: Namespace) -> None:
     """Measure, draw and report."""
-    shapes = [tuple(numbers) for numbers in options.shape or PAPER_SHAPES]
+    shapes = [(p, w1, w2) for p, w1, w2 in options.shape or PAPER_SHAPES]
     found = [measure(numbers) for numbers in shapes]
     draw(shapes, found, options)
     report({"out": options.out, "shapes": found})

@@ -15,21 +15,15 @@ import numpy as np
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import beta_axis, points
-from jamshape.drawing.families import NEEDS, beta, family_legend, with_three_axes
+from jamshape.drawing.families import NEEDS, beta, family_legend
 from jamshape.drawing.styles import BLUE, RED
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, conditions, read_groups
 from jamshape.measures.averages import averages, exactly, rows
+from jamshape.shapes.roundness import asphericity, axes_from
 
 LARGEST, POINTS = 6.0, 40  # of beta, and of 1/beta
 BOX = 2.0  # exponent of the grey lines
-
-
-def asphericity(p: float, w1: float, w2: float) -> float:
-    """Asphericity of one shape."""
-    shape = with_three_axes()
-    parameters = dict(zip(NEEDS, (p, w1, w2), strict=True))
-    return shape.described(*shape.sizes(parameters, np.ones(1)))["asphericity"]
 
 
 def draw(groups: Groups, options: Namespace) -> None:
@@ -40,12 +34,13 @@ def draw(groups: Groups, options: Namespace) -> None:
     axes = figure.subplots()
     long = np.geomspace(1, LARGEST, POINTS)
     for p, style in ((1.0, "-"), (BOX, "--")):
-        flat = [asphericity(p, 1 / w, 1.0) for w in long]
-        tall = [asphericity(p, 1.0, w) for w in long]
-        curves = ((flat, 1 / long, BLUE, "oblate"), (tall, long, RED, "prolate"))
-        for A, values, color, name in curves:
+        for bodies, values, color, name in (
+            (axes_from(1 / long, np.ones_like(long)), 1 / long, BLUE, "oblate"),
+            (axes_from(np.ones_like(long), long), long, RED, "prolate"),
+        ):
             shown = color if p == 1 else "0.6"
             text = f"{name} ellipsoids" if p == 1 else f"{name}, $p={BOX:g}$"
+            A = asphericity(bodies, p)
             axes.plot(A, values, style, color=shown, lw=1, zorder=0, label=text)
     known = averages(groups, "asphericity")
     points(axes, known, exactly(groups, beta))

@@ -37,4 +37,4 @@ def test_what_is_no_shape_is_said(problem, tmp_path):
     assert "w1 = 2.0" in said
     assert "expected 0 < w1 <= 1 <= w2" in said
     said = problem(SCRIPT, "--shape", 0.3, 1, 1, "--out", out)
-    assert "the exponent is 0.3, expected p > 0.5" in said
+    assert "p is 0.3, expected at least 1/2" in said

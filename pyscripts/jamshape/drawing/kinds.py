@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.arrays import BoolArray, IntArray
 from jamshape.packing import Packing
-from jamshape.shapes.shape import Shape
 
 MOST = 8  # kinds that colours can tell apart
 
@@ -65,25 +64,9 @@ def kinds_of(packing: Packing) -> Kinds:
 def _named(packing: Packing, own: BoolArray) -> tuple[str, str]:
     """Name the parameters and the sizes of the particles of one kind."""
     shape, rows = packing.shape, zip(packing.diameters[own], packing.exponent[own], strict=True)
-    known = [described(shape, *row) for row in rows]
+    known = [shape.parameters_of(*row) for row in rows]
     sizes = np.array([size for _, size in known])
     low, high = sizes.min(), sizes.max()
     size = f"{low:.3g}" if np.isclose(low, high) else rf"{low:.3g}\dots {high:.3g}"
     parameters = {name: float(f"{value:.3g}") for name, value in known[0][0].items()}
     return shape.label(parameters), f"${shape.unit}={size}$"
-
-
-def described(
-    shape: Shape, diameters: FloatArray, exponent: float
-) -> tuple[dict[str, float], float]:
-    """Describe one particle by its parameters and its size in the shape's unit."""
-    a, b, c = np.sort(diameters)
-    every = {
-        "alpha": diameters[0] / diameters[1] - 1,
-        "exponent": exponent,
-        "w1": a / b,
-        "w2": c / b,
-    }
-    parameters = {p.name: float(every[p.name]) for p in shape.parameters}
-    unit, _ = shape.sizes(parameters, np.ones(1))
-    return parameters, float(a / unit.min())
