@@ -1,7 +1,7 @@
 """Every stiff and extreme case, with what is expected of it and what is measured: the stability battery.
 
-    python analysis/stability_report.py --out runs/stability
-    python analysis/stability_report.py --only "restart|coincident" --out runs/stability
+    python analysis/stability/stability_report.py --out runs/stability
+    python analysis/stability/stability_report.py --only "restart|coincident" --out runs/stability
 
 Writes report.md: a table of case, part, expected behaviour, measured error or sentence, verdict and seconds. A run
 that was killed goes on where it was when started again; --only takes a regular expression of the names of cases
@@ -26,7 +26,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from stability_cases import Case, Verdict, all_cases
+from battery.case import Case, Verdict
+from battery.cases import all_cases
 from tqdm import tqdm
 
 

@@ -1,0 +1,8 @@
+"""The shapes that the battery tries: the only list of them."""
+
+from battery.shapes.rods import RODS
+from battery.shapes.superellipsoids import SUPERELLIPSOIDS
+
+SHAPES = (RODS, SUPERELLIPSOIDS)
+
+__all__ = ["RODS", "SHAPES", "SUPERELLIPSOIDS"]
