@@ -14,4 +14,12 @@ inline std::string shown(double number)
   return text.str();
 }
 
+/// The words of a command, as they were given.
+inline std::string joined(int n_words, const char *const *words)
+{
+  std::string text;
+  for (int k = 0; k < n_words; ++k) text += std::string(k == 0 ? "" : " ") + words[k];
+  return text;
+}
+
 }  // namespace jamshape

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jamshape.minima.minimise import Outcome, rounding_floor
+from jamshape.minima import Outcome, rounding_floor
 
 EPS = np.finfo(float).eps
 LONG_EPS = float(np.finfo(np.longdouble).eps)

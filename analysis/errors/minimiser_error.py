@@ -30,7 +30,7 @@ from tqdm import tqdm
 
 from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import History, Stop, minimise
+from jamshape.minima import History, Stop, minimise
 from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
 from jamshape.packing import Packing
 from jamshape.protocols.approach import Approach

@@ -1,19 +1,23 @@
 #include "bindings/arrays.hpp"
 
 namespace jamshape {
-void export_spherocylinder(nanobind::module_ &m);
-void export_superellipsoid(nanobind::module_ &m);
-void export_rattlers(nanobind::module_ &m);
-void export_hard_particles(nanobind::module_ &m);
+void export_shapes(nanobind::module_ &m);
+void export_sums();
+void export_derivatives();
+void export_sweeps();
 void export_vicinity(nanobind::module_ &m);
+void export_rattlers(nanobind::module_ &m);
+void export_probes(nanobind::module_ &m);
 }  // namespace jamshape
 
 NB_MODULE(_contact, m)
 {
   m.doc() = "Contact geometry and energies: arrays in, arrays out, over lammps_plugin/contact/.";
-  jamshape::export_spherocylinder(m);
-  jamshape::export_superellipsoid(m);
-  jamshape::export_rattlers(m);
-  jamshape::export_hard_particles(m);
+  jamshape::export_shapes(m);
+  jamshape::export_sums();
+  jamshape::export_derivatives();
+  jamshape::export_sweeps();
   jamshape::export_vicinity(m);
+  jamshape::export_rattlers(m);
+  jamshape::export_probes(m);
 }

@@ -1,9 +1,5 @@
-#include "contact/spherocylinder/spherocylinder.hpp"
-#include "contact/superellipsoid/superellipsoid.hpp"
-
-#include "bindings/arrays.hpp"
-#include "bindings/laws.hpp"
-#include "bindings/pairs.hpp"
+#include "bindings/shape.hpp"
+#include "bindings/shapes.hpp"
 #include "landscape/stage.hpp"
 
 #include <nanobind/stl/shared_ptr.h>
@@ -40,8 +36,8 @@ struct CoordinateArrays {
 
   Coordinates read(std::size_t N) const
   {
-    require(column.shape(1) == 3, "the packing has three dimensions, expected two.");
-    require(column.shape(0) == N && rotation_length.shape(0) == N && turning_radius.shape(0) == N,
+    require(column.shape(0) == N && column.shape(1) == 3 && rotation_length.shape(0) == N &&
+                turning_radius.shape(0) == N,
             "column, rotation_length and turning_radius have no shapes (N, 3), (N,) and (N,).");
     const std::int64_t *const first = column.data(), *const last = first + column.size();
     const std::int64_t highest = first == last ? -1 : *std::max_element(first, last);
@@ -255,10 +251,11 @@ void make_factors(SymmetricFactors *place, const Array1<int> &start, const Array
   }
 }
 
-template <class Model> auto export_methods(nb::class_<Vicinity<Model>> class_)
+template <class Model> void export_vicinity_of(nb::module_ &m)
 {
   using namespace nb::literals;
-  class_
+  const std::string name = class_name<Model>() + "Vicinity";
+  nb::class_<Vicinity<Model>>(m, name.c_str())
       .def("move_to", &move_to<Model>, "position"_a, "orientation"_a, "edges"_a,
            "Count coordinates from these poses, doubles and their small rests.")
       .def("move", &move<Model>, "x"_a, "strain"_a,
@@ -310,38 +307,23 @@ void export_vicinity(nb::module_ &m)
   m.attr("LEAST_SHIFT") = LEAST_SHIFT;
   export_stages(m);
 
-  nb::class_<Vicinity<SpherocylinderModel>> rods(m, "SpherocylinderVicinity");
-  rods.def(
-      "__init__",
-      [](Vicinity<SpherocylinderModel> *place, const Array2<double> &diameters, double k_e,
-         int sides, const Array2<std::int64_t> &column, const Array1<double> &rotation_length,
-         const Array1<double> &turning_radius) {
-        auto shapes = shapes_of<SpherocylinderModel>(diameters, nullptr);
-        Coordinates names =
-            CoordinateArrays{column, rotation_length, turning_radius}.read(diameters.shape(0));
-        new (place) Vicinity<SpherocylinderModel>(std::move(shapes), std::move(names),
-                                                  spherocylinder_law(k_e, sides));
-      },
-      "diameters"_a, "k_e"_a, "sides"_a, "column"_a, "rotation_length"_a, "turning_radius"_a,
-      "Of particles in the plane; column (N, 3) numbers of the coordinates x, y, rotation, or -1.\n"
-      "Before anything else, move_to a base; pairs are asked for by what evaluate gives.");
-  export_methods(rods);
-
-  nb::class_<Vicinity<SuperellipsoidModel>> ellipses(m, "SuperellipsoidVicinity");
-  ellipses.def(
-      "__init__",
-      [](Vicinity<SuperellipsoidModel> *place, const Array2<double> &diameters,
-         const Array1<double> &exponent, double epsilon, const Array2<std::int64_t> &column,
-         const Array1<double> &rotation_length, const Array1<double> &turning_radius) {
-        auto shapes = shapes_of<SuperellipsoidModel>(diameters, &exponent);
-        Coordinates names =
-            CoordinateArrays{column, rotation_length, turning_radius}.read(diameters.shape(0));
-        new (place) Vicinity<SuperellipsoidModel>(std::move(shapes), std::move(names),
-                                                  superellipsoid_law(epsilon));
-      },
-      "diameters"_a, "exponent"_a, "epsilon"_a, "column"_a, "rotation_length"_a, "turning_radius"_a,
-      "As SpherocylinderVicinity.");
-  export_methods(ellipses);
+  Shapes::each([&](auto model) {
+    using Model = decltype(model);
+    export_vicinity_of<Model>(m);
+    class_of<Model>().def(
+        "vicinity",
+        [](const ShapeOf<Model> &of, const Array2<std::int64_t> &column,
+           const Array1<double> &rotation_length, const Array1<double> &turning_radius) {
+          require(of.dimension() == 2, "the packing has three dimensions, expected two.");
+          return Vicinity<Model>(
+              of.shapes(), CoordinateArrays{column, rotation_length, turning_radius}.read(of.n()),
+              of.law());
+        },
+        "column"_a, "rotation_length"_a, "turning_radius"_a,
+        "The energy about a base, of particles in the plane; column (N, 3) numbers of the\n"
+        "coordinates x, y, rotation, or -1. Before anything else, move_to a base; pairs are asked\n"
+        "for by what evaluate gives.");
+  });
 }
 
 }  // namespace jamshape

@@ -13,6 +13,11 @@ enum class ContactStatus { APART, TOUCHING, CROSSING, UNCONVERGED };
 /// `compute contact/local` and of the Python bindings.
 enum class ContactKind { TIP_TO_TIP = 0, TIP_TO_SIDE = 1, SIDE_TO_SIDE = 2 };
 
+/// Whether sides that lie on each other touch at one bond or at two, of shapes whose law knows both
+/// (Marschall & Teitel 2018: one in the dynamics, Fig. 1d; two for minima and the dynamical matrix,
+/// Fig. 6). Others take either.
+enum class Sides { ONE = 1, TWO = 2 };
+
 /// Shapes that are spared the search that contacts of others need, among themselves.
 enum class Shortcut { NONE, ROUND, ELLIPSOIDS };
 
@@ -33,13 +38,14 @@ template <int D, class S = double> struct Bond {
 };
 
 /// Energy of one pair with its exact derivatives: force on i (j carries the opposite) and the
-/// torques about the two centres. At most two bonds.
-template <int D, class S = double> struct Contact {
+/// torques about the two centres. How many bonds it has at most is the model's.
+template <int D, class S, int BONDS> struct Contact {
+  static constexpr int MOST_BONDS = BONDS;
   ContactStatus status;
   ContactKind kind;
   int n_bonds;
   double error;  // relative, of the overlap's distance where that comes from an iteration; else 0
-  Bond<D, S> bond[2];
+  Bond<D, S> bond[BONDS];
   S energy;
   Vec<D, S> force;
   Torque<D, S> torque_i;
@@ -47,9 +53,9 @@ template <int D, class S = double> struct Contact {
 };
 
 /// No bond yet; the bonds themselves stay unset, most pairs of a list being apart.
-template <int D, class S> Contact<D, S> without_bonds(ContactStatus status)
+template <int D, class S, int BONDS> Contact<D, S, BONDS> without_bonds(ContactStatus status)
 {
-  Contact<D, S> contact;
+  Contact<D, S, BONDS> contact;
   contact.status = status;
   contact.kind = ContactKind::TIP_TO_TIP;
   contact.n_bonds = 0;
@@ -59,6 +65,9 @@ template <int D, class S> Contact<D, S> without_bonds(ContactStatus status)
   contact.torque_i = contact.torque_j = {};
   return contact;
 }
+
+/// The contact of two particles of a model.
+template <class Model, int D, class S = double> using ContactOf = Contact<D, S, Model::MOST_BONDS>;
 
 /// What the drag on the substrate needs of a particle (Marschall & Teitel 2018, Eqs. 8-12): its
 /// area (volume in 3D) and, per body axis, the integral of the squared distance from that axis over

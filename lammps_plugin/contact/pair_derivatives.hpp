@@ -23,15 +23,16 @@ template <class Model, int D, class S> struct PosedPair {
 /// * gradient (x) gradient, and `curvature`, all that comes from the forces themselves (Marschall &
 /// Teitel 2018, Eqs. 38-40: H and -S). Kept apart since the second is smaller by the overlap and
 /// would drown in their sum.
-template <int D, class S> struct SecondDerivatives {
+template <int D, class S, int BONDS> struct SecondDerivatives {
   static constexpr int N = PAIR_VARIABLES<D>;
-  S gradient[2][N];  // of the distance of each bond
+  S gradient[BONDS][N];  // of the distance of each bond
   S curvature[N][N];
 };
 
 /// With the contact.
-template <int D, class S> struct ContactDerivatives : SecondDerivatives<D, S> {
-  Contact<D, S> contact;
+template <class Model, int D, class S>
+struct ContactDerivatives : SecondDerivatives<D, S, Model::MOST_BONDS> {
+  ContactOf<Model, D, S> contact;
 };
 
 namespace detail {
@@ -65,13 +66,16 @@ template <int D> Torque<D, int> variables_from(int first)
 }  // namespace detail
 
 /// The contact of a pair as its energy and forces alone.
-template <class Model, int D, class S> Contact<D, S> contact_at(const PosedPair<Model, D, S> &pair)
+template <class Model, int D, class S>
+ContactOf<Model, D, S> contact_at(const PosedPair<Model, D, S> &pair)
 {
   auto body_i = Model::template body<D, S>(pair.shape_i);
   auto body_j = Model::template body<D, S>(pair.shape_j);
   body_i.centre = pair.r;
-  if (Model::turns(pair.shape_i)) Model::template turn_to<D, S>(body_i, pair.orientation_i);
-  if (Model::turns(pair.shape_j)) Model::template turn_to<D, S>(body_j, pair.orientation_j);
+  if (Model::template turns<D>(pair.shape_i))
+    Model::template turn_to<D, S>(body_i, pair.orientation_i);
+  if (Model::template turns<D>(pair.shape_j))
+    Model::template turn_to<D, S>(body_j, pair.orientation_j);
   return contact_of(body_i, body_j, pair.law);
 }
 
@@ -102,9 +106,9 @@ template <int D, class S> Vec<D, Dual<PAIR_VARIABLES<D>, S>> as_variables(const 
 }
 
 /// Reads the second derivatives out of a contact that touches.
-template <int D, class S>
-void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>> &dual,
-                      SecondDerivatives<D, S> &result)
+template <int D, class S, int BONDS>
+void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
+                      SecondDerivatives<D, S, BONDS> &result)
 {
   constexpr int N = PAIR_VARIABLES<D>, M = ROTATIONS<D>;
   for (int b = 0; b < dual.n_bonds; ++b) {
@@ -130,15 +134,16 @@ void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>> &dual,
 
 /// Adds the second derivatives, by running the code of the forces on dual numbers.
 template <class Model, int D, class S>
-ContactDerivatives<D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
+ContactDerivatives<Model, D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
 {
   auto body_i = turned_body<Model, D, S>(pair.shape_i, pair.orientation_i, FIRST_OF_I<D>);
   const auto body_j = turned_body<Model, D, S>(pair.shape_j, pair.orientation_j, FIRST_OF_J<D>);
   body_i.centre = as_variables<D, S>(pair.r);
   const auto dual = contact_of(body_i, body_j, pair.law);
-  ContactDerivatives<D, S> result{};
+  ContactDerivatives<Model, D, S> result{};
   result.contact = contact_at(pair);
-  if (dual.status == ContactStatus::TOUCHING) read_derivatives<D, S>(dual, result);
+  if (dual.status == ContactStatus::TOUCHING)
+    read_derivatives<D, S, Model::MOST_BONDS>(dual, result);
   return result;
 }
 

@@ -169,6 +169,7 @@ template <class Model> class Vicinity {
 
  private:
   static constexpr int VARIABLES = PAIR_VARIABLES<2>;
+  using DualContact = ContactOf<Model, 2, Dual<VARIABLES>>;
 
   /// Doubles and their small rests.
   struct SplitArrays {
@@ -276,7 +277,7 @@ template <class Model> class Vicinity {
     const SplitArrays poses = displaced(at);
     const PosedPairs<Model, 2, double> posed(shapes, poses.view(), wide.list(), law);
     for (std::size_t p = 0; p < posed.size(); ++p) {
-      if (!are_closer(posed.at(p))) continue;
+      if (!posed.are_closer(p, skin)) continue;
       chosen.push_back(static_cast<std::int64_t>(p));
       for (int k = 0; k < 2; ++k) {
         pairs.particles.push_back(wide.particles[2 * p + k]);
@@ -286,16 +287,6 @@ template <class Model> class Vicinity {
     measure(pairs);
     pattern = nullptr;
     factors.clear();
-  }
-
-  bool are_closer(const PosedPair<Model, 2, double> &pair) const
-  {
-    auto body_i = Model::template body<2, double>(pair.shape_i);
-    auto body_j = Model::template body<2, double>(pair.shape_j);
-    body_i.centre = pair.r;
-    Model::template turn_to<2, double>(body_i, pair.orientation_i);
-    Model::template turn_to<2, double>(body_j, pair.orientation_j);
-    return Model::closer_than(skin, body_i, body_j);
   }
 
   double component(const Displacement &at, std::size_t i, int k) const
@@ -366,13 +357,12 @@ template <class Model> class Vicinity {
   void fill_hessian(const Displacement &at)
   {
     if (!pattern) find_blocks();
-    using Number = Dual<VARIABLES>;
     const SplitArrays poses = displaced(at);
     const PosedPairs<Model, 2, double> posed(shapes, poses.view(), pairs.list(), law);
     const TurnedBodies<Model, 2, double> turned(posed);
     clear_hessian();
     for (std::size_t p = 0; p < posed.size(); ++p) {
-      const Contact<2, Number> contact = turned.contact(p);
+      const DualContact contact = turned.contact(p);
       if (contact.status == ContactStatus::TOUCHING) add_blocks(p, contact, 1.0 + at.strain);
     }
   }
@@ -389,11 +379,10 @@ template <class Model> class Vicinity {
   }
 
   /// Second derivatives by the variables of a pair that touches.
-  static Eigen::Matrix<double, VARIABLES, VARIABLES>
-  by_variables(const Contact<2, Dual<VARIABLES>> &contact)
+  static Eigen::Matrix<double, VARIABLES, VARIABLES> by_variables(const DualContact &contact)
   {
-    SecondDerivatives<2, double> found;
-    read_derivatives<2, double>(contact, found);
+    SecondDerivatives<2, double, Model::MOST_BONDS> found{};
+    read_derivatives(contact, found);
     Eigen::Matrix<double, VARIABLES, VARIABLES> by;
     for (int a = 0; a < VARIABLES; ++a) {
       for (int b = 0; b < VARIABLES; ++b) {
@@ -407,7 +396,7 @@ template <class Model> class Vicinity {
     return by;
   }
 
-  void add_blocks(std::size_t p, const Contact<2, Dual<VARIABLES>> &contact, double stretch)
+  void add_blocks(std::size_t p, const DualContact &contact, double stretch)
   {
     const auto by = by_variables(contact);
     constexpr int variable[2][BLOCK] = {{0, 1, 2}, {0, 1, 3}};

@@ -36,12 +36,19 @@ struct Tally {
 template <class Model, int D> class HardParticles {
  public:
   using Body = typename Model::template Body<D>;
+  using Shape = typename Model::Shape;
 
-  HardParticles(std::vector<Body> bodies_at, std::vector<Quaternion> at, const Vec<D> &box_edges,
-                std::uint64_t seed) :
-      bodies(std::move(bodies_at)), orientation(std::move(at)), edges(box_edges), random(seed)
+  HardParticles(const std::vector<Shape> &shapes, const std::vector<Vec<D>> &centres,
+                std::vector<Quaternion> at, const Vec<D> &box_edges, std::uint64_t seed) :
+      orientation(std::move(at)), edges(box_edges), random(seed)
   {
-    for (const Body &body : bodies) reach = std::max(reach, 2.0 * body.bounding_radius);
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      bodies.push_back(Model::template body<D>(shapes[i]));
+      bodies[i].centre = centres[i];
+      Model::template turn_to<D>(bodies[i], orientation[i]);
+      radius.push_back(Model::template outer_radius<D>(shapes[i]));
+      reach = std::max(reach, 2.0 * radius[i]);
+    }
     std::size_t n_cells = 1;
     for (int k = 0; k < D; ++k) {
       count[k] = std::max<std::size_t>(1, static_cast<std::size_t>(edges[k] / reach));
@@ -88,6 +95,7 @@ template <class Model, int D> class HardParticles {
 
  private:
   std::vector<Body> bodies;
+  std::vector<double> radius;  // of the spheres around them
   std::vector<Quaternion> orientation;
   Vec<D> edges;
   std::mt19937_64 random;
@@ -154,7 +162,7 @@ template <class Model, int D> class HardParticles {
       if (j == i) continue;
       Vec<D> r = trial.centre - bodies[j].centre;
       for (int k = 0; k < D; ++k) r[k] -= edges[k] * std::nearbyint(r[k] / edges[k]);
-      const double bounding = trial.bounding_radius + bodies[j].bounding_radius;
+      const double bounding = radius[i] + radius[j];
       if (norm_sq(r) >= bounding * bounding) continue;
       Body near = bodies[j];
       near.centre = trial.centre - r;

@@ -41,7 +41,8 @@ template <class Model, int D, class S> class PosedPairs {
     for (std::size_t n = 0; n < shapes.size(); ++n) {
       orientation.push_back(orientation_of(n));
       body.push_back(Model::template body<D, S>(shapes[n]));
-      if (Model::turns(shapes[n])) Model::template turn_to<D, S>(body[n], orientation[n]);
+      if (Model::template turns<D>(shapes[n]))
+        Model::template turn_to<D, S>(body[n], orientation[n]);
     }
   }
 
@@ -70,23 +71,27 @@ template <class Model, int D, class S> class PosedPairs {
   }
 
   /// The contact of a pair of this separation.
-  Contact<D, S> contact(std::size_t p, const Vec<D, S> &r) const
+  ContactOf<Model, D, S> contact(std::size_t p, const Vec<D, S> &r) const
   {
-    typename Model::template Body<D, S> body_i = body[first(p)];
-    body_i.centre = r;
-    return contact_of(body_i, body[second(p)], law);
+    return contact_of(first_body(p, r), body[second(p)], law);
+  }
+
+  /// Whether surfaces may be closer than a margin.
+  bool are_closer(std::size_t p, double margin) const
+  {
+    return Model::template closer_than<D>(margin, first_body(p, separation(p)), body[second(p)]);
+  }
+
+  /// Whether the particles share more than a point.
+  bool overlap(std::size_t p) const
+  {
+    return are_overlapping(first_body(p, separation(p)), body[second(p)]);
   }
 
   /// A body that its rotation variables, from `first` on, turn.
   auto turned(std::size_t n, int first_variable) const
   {
     return turned_body<Model, D, S>(shapes[n], orientation[n], first_variable);
-  }
-
-  PosedPair<Model, D, S> at(std::size_t p) const
-  {
-    const std::size_t i = first(p), j = second(p);
-    return {shapes[i], shapes[j], separation(p), orientation[i], orientation[j], law};
   }
 
  private:
@@ -97,6 +102,13 @@ template <class Model, int D, class S> class PosedPairs {
   typename Model::Law law;
   std::vector<QuaternionOf<S>> orientation;
   std::vector<typename Model::template Body<D, S>> body;  // at the origin
+
+  typename Model::template Body<D, S> first_body(std::size_t p, const Vec<D, S> &r) const
+  {
+    auto body_i = body[first(p)];
+    body_i.centre = r;
+    return body_i;
+  }
 
   QuaternionOf<S> orientation_of(std::size_t n) const
   {
@@ -132,7 +144,7 @@ template <class Model, int D, class S> class TurnedBodies {
     }
   }
 
-  Contact<D, Dual<PAIR_VARIABLES<D>, S>> contact(std::size_t p) const
+  ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>> contact(std::size_t p) const
   {
     auto body_i = as_i[pairs.first(p)];
     body_i.centre = as_variables<D, S>(pairs.separation(p));
@@ -165,7 +177,7 @@ PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_part
   sums.torque.assign(n_particles, Torque<D, S>{});
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const Vec<D, S> r = pairs.separation(p);
-    const Contact<D, S> contact = pairs.contact(p, r);
+    const ContactOf<Model, D, S> contact = pairs.contact(p, r);
     if (contact.status == ContactStatus::APART) continue;
     if (contact.status != ContactStatus::TOUCHING) {
       const bool is_crossing = contact.status == ContactStatus::CROSSING;

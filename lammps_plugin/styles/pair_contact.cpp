@@ -48,6 +48,13 @@ void PairContact::allocate()
   allocated = 1;
 }
 
+void PairContact::settings(int narg, char **arg)
+{
+  if (narg == 0 || std::string(arg[0]) == "general") return read_general(narg, arg);
+  error->all(FLERR, "pair_style " + style_name() + " found '" + joined(narg, arg) + "', expected " +
+                        settings_rule() + ".");
+}
+
 void PairContact::coeff(int narg, char **arg)
 {
   require_arguments(narg == 3, narg);
@@ -174,9 +181,7 @@ void PairContact::read_general(int narg, char **arg)
     is_known = is_known && (what == "rotation" || what == "pairs" || what == "contact");
   }
   if (is_known) return;
-  std::string found;
-  for (int k = 0; k < narg; ++k) found += std::string(" ") + arg[k];
-  error->all(FLERR, "pair_style " + style_name() + " found '" + found.substr(1) +
+  error->all(FLERR, "pair_style " + style_name() + " found '" + joined(narg, arg) +
                         "', expected 'general' and any of rotation, pairs, contact: leave it out "
                         "but for tests and timings.");
 }

@@ -38,6 +38,7 @@ class PairContact : public LAMMPS_NS::Pair {
   explicit PairContact(LAMMPS_NS::LAMMPS *lmp);
   ~PairContact() override;
 
+  void settings(int narg, char **arg) override;
   void coeff(int narg, char **arg) override;
   void init_style() override;
   double init_one(int i, int j) override;
@@ -90,6 +91,7 @@ class PairContact : public LAMMPS_NS::Pair {
 
   /// Names the style, its energy and what has no contact force, in messages.
   virtual std::string style_name() const = 0;
+  virtual std::string settings_rule() const { return "no arguments: leave them out"; }
   virtual std::string energy_name() const { return "k_e"; }
   virtual std::string coeff_rule() const { return "'I J k_e'"; }
   virtual std::string without_force() const { return "crossing spines or coinciding centres"; }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "contact/contact.hpp"
+#include "contact/math/dimension.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/pair_derivatives.hpp"
@@ -66,7 +67,14 @@ template <class Model> class PairContactOf : public PairContact {
   SubstrateDrag drag(const Vec<3> &semi_axes, int type) const override
   {
     const auto shape = *shape_from(semi_axes, type);
-    return domain->dimension == 2 ? Model::template drag<2>(shape) : Model::template drag<3>(shape);
+    return in_dimension(domain->dimension, [&](auto D) { return Model::template drag<D>(shape); });
+  }
+
+  std::optional<int> director(const Vec<3> &semi_axes, int type) const override
+  {
+    const auto shape = *shape_from(semi_axes, type);
+    return in_dimension(domain->dimension,
+                        [&](auto D) { return Model::template director<D>(shape); });
   }
 
   double memory_usage() override
@@ -77,7 +85,7 @@ template <class Model> class PairContactOf : public PairContact {
   }
 
  protected:
-  typename Model::Options options{};
+  Sides sides = Sides::TWO;
 
   bool is_valid_shape(const Vec<3> &semi_axes, int type) const override
   {
@@ -86,24 +94,28 @@ template <class Model> class PairContactOf : public PairContact {
   std::string shape_rule() const override { return Model::SHAPE_RULE; }
   bool turns(const Vec<3> &semi_axes, int type) const override
   {
-    return Model::turns(*shape_from(semi_axes, type));
+    const auto shape = *shape_from(semi_axes, type);
+    return in_dimension(domain->dimension, [&](auto D) { return Model::template turns<D>(shape); });
   }
   Shortcut shortcut(const Vec<3> &semi_axes, int type) const override
   {
-    return Model::shortcut(*shape_from(semi_axes, type));
+    const auto shape = *shape_from(semi_axes, type);
+    return in_dimension(domain->dimension,
+                        [&](auto D) { return Model::template shortcut<D>(shape); });
   }
   double bounding_radius(const Vec<3> &semi_axes, int type) const override
   {
     const auto shape = *shape_from(semi_axes, type);
-    return domain->dimension == 2 ? shape.template bounding_radius<2>()
-                                  : shape.template bounding_radius<3>();
+    return in_dimension(domain->dimension,
+                        [&](auto D) { return Model::template outer_radius<D>(shape); });
   }
 
  private:
-  // A small margin keeps the list short, a large one keeps it longer; flat optimum near one half.
+  // A small margin keeps few pairs, a large one keeps them for longer.
   static constexpr double MARGIN_OVER_SKIN = 0.15;
 
   template <int D> using Body = typename Model::template Body<D>;
+  template <int D> using Touch = ContactOf<Model, D>;
 
   /// Whether a contact is found sooner from the normal that the pair had a moment before.
   template <int D, class = void> struct StartsFromNormal : std::false_type {};
@@ -121,7 +133,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   typename Model::Law law_of(int i, int j) const
   {
-    typename Model::Law law = Model::law(options, k_e[atom->type[i]][atom->type[j]]);
+    typename Model::Law law = Model::law(k_e[atom->type[i]][atom->type[j]], sides);
     law.shortcuts = !general.contact;
     return law;
   }
@@ -180,7 +192,7 @@ template <class Model> class PairContactOf : public PairContact {
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
         const Body<D> &other = bodies[j];
-        const Contact<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
+        const Touch<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
         if (contact.status == ContactStatus::APART) continue;
         if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
         if (contact.status == ContactStatus::UNCONVERGED) stop_at_unconverged(i, j);
@@ -199,14 +211,14 @@ template <class Model> class PairContactOf : public PairContact {
 
   /// Contact of the k-th close pair. Where it starts from is worth time only, so floats do.
   template <int D>
-  Contact<D> contact_of_pair(int k, const Body<D> &i, const Body<D> &j,
-                             const typename Model::Law &law)
+  Touch<D> contact_of_pair(int k, const Body<D> &i, const Body<D> &j,
+                           const typename Model::Law &law)
   {
     if constexpr (StartsFromNormal<D>::value) {
       float *const last = any_turns ? &last_normal[static_cast<std::size_t>(D) * k] : nullptr;
       Vec<D> normal{};
       for (int a = 0; last && a < D; ++a) normal[a] = last[a];
-      const Contact<D> contact = contact_of(i, j, law, normal);
+      const Touch<D> contact = contact_of(i, j, law, normal);
       for (int a = 0; last && a < D; ++a) last[a] = static_cast<float>(normal[a]);
       return contact;
     } else {
@@ -228,7 +240,7 @@ template <class Model> class PairContactOf : public PairContact {
     }
   }
 
-  template <int D> void tally(int i, int j, const Contact<D> &contact, const Vec<D> &r)
+  template <int D> void tally(int i, int j, const Touch<D> &contact, const Vec<D> &r)
   {
     const double fz = D == 2 ? 0.0 : contact.force[D - 1], z = D == 2 ? 0.0 : r[D - 1];
     ev_tally_xyz(i, j, atom->nlocal, force->newton_pair, contact.energy, 0.0, contact.force[0],
@@ -343,7 +355,7 @@ template <class Model> class PairContactOf : public PairContact {
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
         const Body<D> &other = bodies[j];
-        const Contact<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
+        const Touch<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
         if (contact.status != ContactStatus::TOUCHING) continue;
         const Vec<D> r = body.centre - other.centre;
         for (int b = 0; b < contact.n_bonds; ++b) {
@@ -363,7 +375,7 @@ template <class Model> class PairContactOf : public PairContact {
       const int i = list->ilist[n];
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
-        const ContactDerivatives<D, double> found =
+        const ContactDerivatives<Model, D, double> found =
             derivatives_at<Model, D, double>(posed_pair<D>(i, j));
         if (found.contact.status != ContactStatus::TOUCHING) continue;
         fill_triangle<D>(found, triangle);
@@ -385,7 +397,8 @@ template <class Model> class PairContactOf : public PairContact {
   }
 
   template <int D>
-  static void fill_triangle(const ContactDerivatives<D, double> &of, std::vector<double> &triangle)
+  static void fill_triangle(const ContactDerivatives<Model, D, double> &of,
+                            std::vector<double> &triangle)
   {
     triangle.clear();
     for (int row = 0; row < of.N; ++row) {

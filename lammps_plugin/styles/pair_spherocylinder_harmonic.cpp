@@ -2,6 +2,7 @@
 
 #include "comm.h"
 #include "error.h"
+#include "text.hpp"
 #include "utils.h"
 
 #include <mpi.h>
@@ -9,23 +10,18 @@
 
 namespace jamshape {
 
-std::optional<int> PairSpherocylinderHarmonic::director(const Vec<3> &semi_axes, int) const
-{
-  return semi_axes[0] != semi_axes[1] ? std::optional<int>(0) : std::nullopt;
-}
+template class PairContactOf<SpherocylinderModel>;
 
 void PairSpherocylinderHarmonic::settings(int narg, char **arg)
 {
   const std::string keyword = narg >= 2 ? arg[0] : "", value = narg >= 2 ? arg[1] : "";
   const bool is_longer = narg > 2 && std::string(arg[2]) != "general";
   if (keyword != "sides" || (value != "one" && value != "two") || is_longer) {
-    std::string found;
-    for (int k = 0; k < narg; ++k) found += std::string(" ") + arg[k];
-    error->all(FLERR, "pair_style spherocylinder/harmonic found '" + found +
+    error->all(FLERR, "pair_style spherocylinder/harmonic found '" + joined(narg, arg) +
                           "', expected 'sides one' (the dynamics' single bond) or 'sides two' (two "
                           "bonds for side-to-side contacts).");
   }
-  options = value == "one" ? Sides::ONE : Sides::TWO;
+  sides = value == "one" ? Sides::ONE : Sides::TWO;
   read_general(narg - 2, arg + 2);
 }
 
@@ -43,7 +39,7 @@ void PairSpherocylinderHarmonic::read_restart(FILE *fp)
 
 void PairSpherocylinderHarmonic::write_restart_settings(FILE *fp)
 {
-  const int value = static_cast<int>(options);
+  const int value = static_cast<int>(sides);
   fwrite(&value, sizeof(int), 1, fp);
 }
 
@@ -52,7 +48,7 @@ void PairSpherocylinderHarmonic::read_restart_settings(FILE *fp)
   int value = 0;
   if (comm->me == 0) LAMMPS_NS::utils::sfread(FLERR, &value, sizeof(int), 1, fp, nullptr, error);
   MPI_Bcast(&value, 1, MPI_INT, 0, world);
-  options = static_cast<Sides>(value);
+  sides = static_cast<Sides>(value);
 }
 
 }  // namespace jamshape

@@ -4,20 +4,19 @@
 
 #include "pair_contact_of.h"
 
-#include <optional>
 #include <string>
 
 namespace jamshape {
+
+extern template class PairContactOf<SpherocylinderModel>;  // compiled in the .cpp alone
 
 /// pair_style spherocylinder/harmonic sides one|two; pair_coeff I J k_e
 class PairSpherocylinderHarmonic : public PairContactOf<SpherocylinderModel> {
  public:
   using PairContactOf::PairContactOf;
 
-  std::optional<int> director(const Vec<3> &semi_axes, int type) const override;
-
   /// The lever arm of the one bond jumps from end to end of parallel rods.
-  bool has_smooth_forces() const override { return options == Sides::TWO; }
+  bool has_smooth_forces() const override { return sides == Sides::TWO; }
 
   void settings(int narg, char **arg) override;
   void write_restart(FILE *fp) override;

@@ -2,7 +2,6 @@
 
 #include "atom.h"
 #include "comm.h"
-#include "domain.h"
 #include "error.h"
 #include "utils.h"
 
@@ -13,46 +12,17 @@
 
 namespace jamshape {
 
+template class PairContactOf<SuperellipsoidModel>;
+
 namespace {
 
 constexpr double ELLIPSOID = 1.0;  // the exponent of types that were given none
-
-/// Shapes with b^2 = ac to this are neither long nor flat.
-constexpr double SELF_DUAL = 1e-9;
 
 }  // namespace
 
 double PairSuperellipsoidHarmonic::exponent(int type) const
 {
   return exponent_of.empty() ? ELLIPSOID : exponent_of[type];
-}
-
-/// The longest axis of long particles and the shortest of flat ones (Yuan et al. 2019, Sec. 2.4);
-/// the first where they are equal, as in cubes.
-std::optional<int> PairSuperellipsoidHarmonic::director(const Vec<3> &semi_axes, int type) const
-{
-  const double *const begin = semi_axes.c, *const end = begin + domain->dimension;
-  const auto range = std::minmax_element(begin, end);
-  const double shortest = *range.first, longest = *range.second;
-  if (shortest == longest) {
-    return exponent(type) != ELLIPSOID ? std::optional<int>(0) : std::nullopt;
-  }
-  bool is_long = true;
-  if (domain->dimension == 3) {
-    const double middle = semi_axes[0] + semi_axes[1] + semi_axes[2] - shortest - longest;
-    is_long = shortest * longest > (1.0 + SELF_DUAL) * middle * middle;
-  }
-  return static_cast<int>(std::find(begin, end, is_long ? longest : shortest) - begin);
-}
-
-void PairSuperellipsoidHarmonic::settings(int narg, char **arg)
-{
-  if (narg == 0 || std::string(arg[0]) == "general") return read_general(narg, arg);
-  std::string found;
-  for (int k = 0; k < narg; ++k) found += std::string(" ") + arg[k];
-  error->all(FLERR,
-             "pair_style superellipsoid/harmonic found '" + found +
-                 "', expected no arguments: give exponents with 'pair_coeff I I epsilon p'.");
 }
 
 void PairSuperellipsoidHarmonic::coeff(int narg, char **arg)

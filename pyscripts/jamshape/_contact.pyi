@@ -1,25 +1,101 @@
 """Contact geometry and energies: arrays in, arrays out, over lammps_plugin/contact/.
 
-Bodies are C-contiguous rows: of spherocylinders (M, 6) in 2D, (M, 8) in 3D: centre, unit axis,
+A class for each shape; functions that rest on single pairs are for tests and measurements of errors.
+Their bodies are C-contiguous rows: of spherocylinders (M, 6) in 2D, (M, 8) in 3D: centre, unit axis,
 half_length, radius; of superellipsoids (M, 6) in 2D, (M, 11) in 3D: centre, angle or quaternion
 w i j k, semi-axes, exponent p.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-def spherocylinder_contacts(
-    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64], k_e: float, sides: int
-) -> dict[str, NDArray[Any]]: ...
-def spine_distances(
-    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64]
-) -> NDArray[np.float64]: ...
-def spherocylinder_drag(
-    half_length: NDArray[np.float64], radius: NDArray[np.float64], dimension: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+class _Shape:
+    name: ClassVar[str]
+    core: ClassVar[str]
+    most_bonds: ClassVar[int]
+    has_sides: ClassVar[bool]
+    measure: NDArray[np.float64]
+    moment: NDArray[np.float64]
+    outer_radius: NDArray[np.float64]
+    inner_radius: NDArray[np.float64]
+    rotation_length: NDArray[np.float64]
+    turning_radius: NDArray[np.float64]
+    symmetry_axis: NDArray[np.int64]
+    director: NDArray[np.int64]
+    def __init__(
+        self,
+        diameters: NDArray[np.float64],
+        exponent: NDArray[np.float64],
+        dimension: int,
+        k_e: float,
+        sides: int,
+    ) -> None: ...
+    def near(
+        self,
+        position: NDArray[np.float64],
+        orientation: NDArray[np.float64],
+        edges: NDArray[np.float64],
+        pairs: NDArray[np.int64],
+        shift: NDArray[np.int64],
+        margin: float,
+    ) -> NDArray[np.bool_]: ...
+    def overlaps(
+        self,
+        position: NDArray[np.float64],
+        orientation: NDArray[np.float64],
+        edges: NDArray[np.float64],
+        pairs: NDArray[np.int64],
+        shift: NDArray[np.int64],
+    ) -> NDArray[np.bool_]: ...
+    def contacts(
+        self,
+        position: NDArray[np.float64],
+        orientation: NDArray[np.float64],
+        edges: NDArray[np.float64],
+        pairs: NDArray[np.int64],
+        shift: NDArray[np.int64],
+    ) -> dict[str, NDArray[Any]]: ...
+    def sums(
+        self,
+        position: NDArray[np.float64],
+        orientation: NDArray[np.float64],
+        edges: NDArray[np.float64],
+        pairs: NDArray[np.int64],
+        shift: NDArray[np.int64],
+        extended: bool,
+    ) -> dict[str, Any]: ...
+    def derivatives(
+        self,
+        position: NDArray[np.float64],
+        orientation: NDArray[np.float64],
+        edges: NDArray[np.float64],
+        pairs: NDArray[np.int64],
+        shift: NDArray[np.int64],
+        extended: bool,
+    ) -> dict[str, NDArray[Any]]: ...
+    def sweeps(
+        self,
+        position: NDArray[np.float64],
+        orientation: NDArray[np.float64],
+        edges: NDArray[np.float64],
+        shift: float,
+        turn: float,
+        n_sweeps: int,
+        seed: int,
+    ) -> dict[str, Any]: ...
+    def vicinity(
+        self,
+        column: NDArray[np.int64],
+        rotation_length: NDArray[np.float64],
+        turning_radius: NDArray[np.float64],
+    ) -> _Vicinity: ...
+
+class Spherocylinders(_Shape): ...
+class Superellipsoids(_Shape): ...
+
 def find_rattlers(
     n_particles: int,
     dimension: int,
@@ -27,28 +103,12 @@ def find_rattlers(
     normals: NDArray[np.float64],
     flat: NDArray[np.bool_],
 ) -> NDArray[np.bool_]: ...
-def spherocylinder_sums(
-    diameters: NDArray[np.float64],
-    position: NDArray[np.float64],
-    orientation: NDArray[np.float64],
-    edges: NDArray[np.float64],
-    pairs: NDArray[np.int64],
-    shift: NDArray[np.int64],
-    k_e: float,
-    sides: int,
-    extended: bool,
-) -> dict[str, Any]: ...
-def spherocylinder_derivatives(
-    diameters: NDArray[np.float64],
-    position: NDArray[np.float64],
-    orientation: NDArray[np.float64],
-    edges: NDArray[np.float64],
-    pairs: NDArray[np.int64],
-    shift: NDArray[np.int64],
-    k_e: float,
-    sides: int,
-    extended: bool,
+def spherocylinder_contacts(
+    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64], k_e: float, sides: int
 ) -> dict[str, NDArray[Any]]: ...
+def spine_distances(
+    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
 def superellipsoid_contacts(
     bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64], epsilon: float
 ) -> dict[str, NDArray[Any]]: ...
@@ -66,45 +126,6 @@ def superellipsoid_motion_sq(
 def superellipsoid_overlap(
     bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64]
 ) -> NDArray[np.bool_]: ...
-def superellipsoid_sums(
-    diameters: NDArray[np.float64],
-    exponent: NDArray[np.float64],
-    position: NDArray[np.float64],
-    orientation: NDArray[np.float64],
-    edges: NDArray[np.float64],
-    pairs: NDArray[np.int64],
-    shift: NDArray[np.int64],
-    epsilon: float,
-    extended: bool,
-) -> dict[str, Any]: ...
-def superellipsoid_derivatives(
-    diameters: NDArray[np.float64],
-    exponent: NDArray[np.float64],
-    position: NDArray[np.float64],
-    orientation: NDArray[np.float64],
-    edges: NDArray[np.float64],
-    pairs: NDArray[np.int64],
-    shift: NDArray[np.int64],
-    epsilon: float,
-    extended: bool,
-) -> dict[str, NDArray[Any]]: ...
-def superellipsoid_drag(
-    diameters: NDArray[np.float64], exponent: NDArray[np.float64], dimension: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def superellipsoid_bounding_radius(
-    diameters: NDArray[np.float64], exponent: NDArray[np.float64], dimension: int
-) -> NDArray[np.float64]: ...
-def superellipsoid_sweeps(
-    diameters: NDArray[np.float64],
-    exponent: NDArray[np.float64],
-    position: NDArray[np.float64],
-    orientation: NDArray[np.float64],
-    edges: NDArray[np.float64],
-    shift: float,
-    turn: float,
-    n_sweeps: int,
-    seed: int,
-) -> dict[str, Any]: ...
 
 LEAST_SHIFT: float
 
@@ -159,6 +180,9 @@ class _Vicinity:
         orientation: NDArray[np.float64],
         edges: NDArray[np.float64],
     ) -> None: ...
+    def move(
+        self, x: NDArray[np.float64], strain: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
     def take_pairs(
         self,
         position: NDArray[np.float64],
@@ -166,8 +190,9 @@ class _Vicinity:
         edges: NDArray[np.float64],
         pairs: NDArray[np.int64],
         shift: NDArray[np.int64],
-        skin: float,
+        wide: float,
         reach: float,
+        skin: float,
     ) -> None: ...
     def evaluate(
         self, x: NDArray[np.float64], strain: float, extended: bool
@@ -185,25 +210,3 @@ class _Vicinity:
         factors: SymmetricFactors | None,
         renew: Callable[[NDArray[np.float64], float], None],
     ) -> StageEnd: ...
-
-class SpherocylinderVicinity(_Vicinity):
-    def __init__(
-        self,
-        diameters: NDArray[np.float64],
-        k_e: float,
-        sides: int,
-        column: NDArray[np.int64],
-        rotation_length: NDArray[np.float64],
-        turning_radius: NDArray[np.float64],
-    ) -> None: ...
-
-class SuperellipsoidVicinity(_Vicinity):
-    def __init__(
-        self,
-        diameters: NDArray[np.float64],
-        exponent: NDArray[np.float64],
-        epsilon: float,
-        column: NDArray[np.int64],
-        rotation_length: NDArray[np.float64],
-        turning_radius: NDArray[np.float64],
-    ) -> None: ...

@@ -23,6 +23,10 @@ def split(x):
     return np.stack([double, (x - double).astype(float)])
 
 
+def rods(diameters, dimension, k_e=1.0, sides=1):
+    return _contact.Spherocylinders(diameters, np.ones(len(diameters)), dimension, k_e, sides)
+
+
 def quaternion_product(p, q):
     vector = p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] + np.cross(p[:, 1:], q[:, 1:])
     return np.column_stack([p[:, 0] * q[:, 0] - (p[:, 1:] * q[:, 1:]).sum(axis=1), vector])
@@ -95,13 +99,16 @@ class PairPacking:
 
     def arguments(self):
         poses = (split(x) for x in (self.position, self.orientation, self.edges))
-        return (self.diameters, *poses, np.arange(2 * len(self)).reshape(-1, 2), self.shift)
+        return (*poses, np.arange(2 * len(self)).reshape(-1, 2), self.shift)
+
+    def compiled(self, sides, k_e):
+        return rods(self.diameters, self.dimension, k_e, sides)
 
     def derivatives(self, sides, k_e, *, extended=True):
-        return _contact.spherocylinder_derivatives(*self.arguments(), k_e, sides, extended)
+        return self.compiled(sides, k_e).derivatives(*self.arguments(), extended)
 
     def sums(self, sides, k_e, *, extended=True):
-        return _contact.spherocylinder_sums(*self.arguments(), k_e, sides, extended)
+        return self.compiled(sides, k_e).sums(*self.arguments(), extended)
 
     def gradient(self, sides, k_e):
         """(M, n) of the energies, by the variables of the second derivatives."""

@@ -122,11 +122,18 @@ def in_body(v, bodies):
     return np.einsum("nba,nb->na", matrix_of(bodies.turn), v)
 
 
-def packed(i, j):
-    """Arguments of superellipsoid_sums and _derivatives: pair m is particles 2m and 2m + 1."""
+def shapes_of(i, j, epsilon=1.0):
+    """The compiled class of the particles of M pairs: pair m is particles 2m and 2m + 1."""
     n, dimension = i.centre.shape
     diameters = np.ones((2 * n, 3))
     diameters[:, :dimension] = 2.0 * np.stack([i.semi_axes, j.semi_axes], 1).reshape(2 * n, -1)
+    exponent = np.stack([i.p, j.p], 1).ravel()
+    return _contact.Superellipsoids(diameters, exponent, dimension, epsilon, 1)
+
+
+def packed(i, j):
+    """The same pairs' poses, as the methods of the class take them."""
+    n, dimension = i.centre.shape
 
     def split(x):
         return np.ascontiguousarray(np.stack([x, np.zeros_like(x)]))
@@ -134,8 +141,6 @@ def packed(i, j):
     position = np.stack([i.centre, j.centre], 1).reshape(2 * n, dimension)
     turn = np.stack([i.turn, j.turn], 1).reshape(2 * n, -1)
     return (
-        diameters,
-        np.stack([i.p, j.p], 1).ravel(),
         split(position),
         split(turn),
         split(np.full(dimension, 100.0)),

@@ -6,21 +6,22 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pair_packings import LONG, LONG_EPS, PairPacking, split
+from mixtures import bidisperse
+from pair_packings import LONG, LONG_EPS, PairPacking, rods, split
 from spherocylinder_pairs import EPS, concatenated, disc_to_disc, tip_to_side, tip_to_tip
 
-from jamshape import _contact
-from jamshape.contacts import bodies, each_once, find_contacts, forces, near_pairs
+from jamshape.contacts import find_contacts, forces
+from jamshape.contacts.near import near_particles
 from jamshape.packing import Box
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 K_E = 1.7
 MIXTURES = {
-    "rods": Mixture.bidisperse(),
-    "short rods": Mixture.bidisperse(0.01),
-    "short rods side by side": Mixture.bidisperse(0.2),
-    "discs": Mixture.bidisperse(0),
-    "size ratio 5": Mixture.bidisperse(2, 5),
+    "rods": bidisperse(),
+    "short rods": bidisperse(0.01),
+    "short rods side by side": bidisperse(0.2),
+    "discs": bidisperse(0),
+    "size ratio 5": bidisperse(2, 5),
 }
 EVERY_PACKING = pytest.mark.parametrize(
     ("mixture", "dimension"), [(name, D) for name in MIXTURES for D in (2, 3)]
@@ -52,10 +53,14 @@ def compressed(mixture, dimension):
 
 
 def arguments(packing):
-    near = each_once(near_pairs(bodies(packing), bodies(packing), packing.box))
+    near = near_particles(packing, packing.compiled())
     position, orientation, edges = packing.poses()
     poses = (split(x) for x in (position, orientation.reshape(packing.n, -1), edges))
-    return [packing.diameters, *poses, np.column_stack([near.first, near.second]), near.shift]
+    return [*poses, np.column_stack([near.first, near.second]), near.shift]
+
+
+def compiled(packing, sides):
+    return rods(packing.diameters, packing.dimension, K_E, sides)
 
 
 @EVERY_LAW
@@ -64,7 +69,7 @@ def arguments(packing):
 def test_sums_are_those_of_the_forces_of_the_packing(mixture, dimension, sides, extended, measured):
     packing = compressed(mixture, dimension)
     network, expected = find_contacts(packing, K_E, sides), forces(packing, K_E, sides)
-    found = _contact.spherocylinder_sums(*arguments(packing), K_E, sides, extended)
+    found = compiled(packing, sides).sums(*arguments(packing), extended)
     assert found["crossing"] == -1
     assert found["n_bonds"] == network.n_bonds.sum()
     bond_force = np.linalg.norm(network.bonds.force, axis=1).sum()
@@ -86,7 +91,7 @@ def test_sums_are_those_of_the_forces_of_the_packing(mixture, dimension, sides, 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_forces_and_torques_of_a_packing_balance(dimension, measured):
     packing = compressed("rods", dimension)
-    found = _contact.spherocylinder_sums(*arguments(packing), K_E, 2, True)
+    found = compiled(packing, 2).sums(*arguments(packing), True)
     net = np.abs(found["force"].sum(axis=0)).max() / found["bond_force"]
     # With the torques about the centres, the virial has no antisymmetric part left.
     twist = found["virial"] - found["virial"].T
@@ -102,13 +107,12 @@ def test_forces_and_torques_of_a_packing_balance(dimension, measured):
 @pytest.mark.parametrize("extended", [False, True])
 def test_a_particle_touches_its_own_image(extended):
     """A rod in a box lower than its width: two bonds with its image, which push on nothing."""
-    diameters = np.array([[5.0, 1.0, 1.0]])
+    rod = rods(np.array([[5.0, 1.0, 1.0]]), 2, K_E, 2)
     position, edges = np.zeros((2, 1, 2)), np.zeros((2, 2))
     position[0], edges[0] = (0.3, -7.1), (40.0, 0.9)
     orientation = np.zeros((2, 1, 1))
     pairs, shift = np.zeros((1, 2), np.int64), np.array([[0, -1]])
-    poses = (diameters, position, orientation, edges, pairs, shift)
-    found = _contact.spherocylinder_sums(*poses, K_E, 2, extended)
+    found = rod.sums(position, orientation, edges, pairs, shift, extended)
     overlap = 1.0 - 0.9
     assert found["n_bonds"] == 2
     np.testing.assert_allclose(found["energy"], K_E * overlap**2)
@@ -149,7 +153,7 @@ def with_other_digits(rng, parts, bits):
 def test_digits_may_stand_in_the_doubles_or_in_their_rests(dimension, sides, measured):
     rng = np.random.default_rng([52, dimension])
     packing = shallow_pairs(dimension)
-    diameters, position, orientation, edges, pairs, shift = packing.arguments()
+    position, orientation, edges, pairs, shift = packing.arguments()
     d = packing.plain().d.astype(float)
     found = packing.sums(sides, K_E)
     coordinate = np.abs(position[0]).max()
@@ -159,7 +163,7 @@ def test_digits_may_stand_in_the_doubles_or_in_their_rests(dimension, sides, mea
             with_other_digits(rng, orientation, bits),
             with_other_digits(rng, edges, bits),
         )
-        again = _contact.spherocylinder_sums(diameters, *other, pairs, shift, K_E, sides, True)
+        again = packing.compiled(sides, K_E).sums(*other, pairs, shift, True)
         force = np.abs(again["force"] - found["force"])[::2].max(axis=1) * d**2 / K_E
         lever = d * (packing.diameters[::2, 0] + packing.diameters[1::2, 0])
         torque = np.abs(again["torque"] - found["torque"]).max(axis=1).reshape(-1, 2).max(axis=1)
@@ -188,19 +192,20 @@ def test_overlaps_of_1e_12_far_from_the_origin_keep_six_digits(dimension, measur
     orientation[0, :, 0] = 1.0
     edges = np.stack([np.full(dimension, 3000.0), np.zeros(dimension)])
     pairs, shift = np.arange(2 * n).reshape(n, 2), np.zeros((n, dimension), np.int64)
-    poses = (np.ones((2 * n, 3)), position, orientation, edges, pairs, shift)
-    found = _contact.spherocylinder_sums(*poses, K_E, 2, True)
+    discs = rods(np.ones((2 * n, 3)), dimension, K_E, 2)
+    poses = (position, orientation, edges, pairs, shift)
+    found = discs.sums(*poses, True)
     assert found["n_bonds"] == n
     force = np.linalg.norm(found["force"][::2], axis=1) / K_E
     error = np.abs(force / overlap - 1.0).max()
     measured(worst=error, worst_of_energy=abs(found["energy"] / (0.5 * K_E * n * 1e-24) - 1.0))
     assert error < 1e-6
     assert abs(found["energy"] / (0.5 * K_E * n * 1e-24) - 1.0) < 1e-6
-    derivatives = _contact.spherocylinder_derivatives(*poses, K_E, 2, True)
+    derivatives = discs.derivatives(*poses, True)
     assert np.abs(derivatives["bond_force"][:, 0] / (K_E * overlap) - 1.0).max() < 1e-6
     # The same without the rests is noise.
-    poses = (poses[0], poses[1] * [[[1.0]], [[0.0]]], *poses[2:])
-    blurred = np.linalg.norm(_contact.spherocylinder_sums(*poses, K_E, 2, True)["force"], axis=1)
+    poses = (position * [[[1.0]], [[0.0]]], *poses[1:])
+    blurred = np.linalg.norm(discs.sums(*poses, True)["force"], axis=1)
     assert np.median(np.abs(blurred[::2] / (K_E * overlap) - 1.0)) > 1e-3
 
 
@@ -208,8 +213,7 @@ def test_overlaps_of_1e_12_far_from_the_origin_keep_six_digits(dimension, measur
 def test_precisions_agree_to_the_rounding_of_doubles(mixture, dimension, measured):
     packing = compressed(mixture, dimension)
     double, long = (
-        _contact.spherocylinder_sums(*arguments(packing), K_E, 2, extended)
-        for extended in (False, True)
+        compiled(packing, 2).sums(*arguments(packing), extended) for extended in (False, True)
     )
     worst = {
         name: np.abs(np.asarray(double[name]) - long[name]).max() / np.abs(long[name]).max()
@@ -223,9 +227,17 @@ def test_precisions_agree_to_the_rounding_of_doubles(mixture, dimension, measure
 
 # --- arguments ---------------------------------------------------------------------------------
 
-FUNCTIONS = pytest.mark.parametrize(
-    "function", [_contact.spherocylinder_sums, _contact.spherocylinder_derivatives]
-)
+
+def sums(*, diameters, k_e, sides, edges, **poses):
+    """Of new particles; the dimension is that of the edges."""
+    return rods(diameters, edges.shape[1], k_e, sides).sums(edges=edges, **poses)
+
+
+def derivatives(*, diameters, k_e, sides, edges, **poses):
+    return rods(diameters, edges.shape[1], k_e, sides).derivatives(edges=edges, **poses)
+
+
+FUNCTIONS = pytest.mark.parametrize("function", [sums, derivatives])
 
 
 def two_rods(dimension):
@@ -287,7 +299,7 @@ def test_quaternions_are_asked_for_in_space(function):
 @pytest.mark.parametrize("extended", [False, True])
 def test_no_pairs_have_no_energy(dimension, extended):
     none = {"pairs": np.zeros((0, 2), np.int64), "shift": np.zeros((0, dimension), np.int64)}
-    found = _contact.spherocylinder_sums(**(two_rods(dimension) | none | {"extended": extended}))
+    found = sums(**(two_rods(dimension) | none | {"extended": extended}))
     assert (found["energy"], found["bond_force"], found["n_bonds"]) == (0.0, 0.0, 0)
     assert found["crossing"] == -1
     assert found["force"].shape == (2, dimension)
@@ -295,7 +307,7 @@ def test_no_pairs_have_no_energy(dimension, extended):
     assert found["virial"].shape == (dimension, dimension)
     assert not any(np.any(found[name]) for name in ("force", "torque", "virial"))
     n = 4 if dimension == 2 else 9
-    found = _contact.spherocylinder_derivatives(**(two_rods(dimension) | none))
+    found = derivatives(**(two_rods(dimension) | none))
     assert found["curvature"].shape == (0, n, n)
 
 
@@ -303,12 +315,12 @@ def test_no_pairs_have_no_energy(dimension, extended):
 @pytest.mark.parametrize("extended", [False, True])
 def test_crossing_is_reported_with_the_first_row_of_its_pairs(sides, extended):
     """Three rods: the first two touch, the third crosses both."""
-    rods = two_rods(2)
+    two = two_rods(2)
     position = np.zeros((2, 3, 2))
     position[0] = [[0.0, 0.0], [0.0, 0.9], [0.5, 0.4]]
     orientation = np.zeros((2, 3, 1))
     orientation[0, 2] = 0.5 * np.pi
-    rods |= {
+    two |= {
         "diameters": np.tile([3.0, 1.0, 1.0], (3, 1)),
         "position": position,
         "orientation": orientation,
@@ -318,7 +330,7 @@ def test_crossing_is_reported_with_the_first_row_of_its_pairs(sides, extended):
 
     def crossing(*pairs):
         shift = np.zeros((len(pairs), 2), np.int64)
-        return _contact.spherocylinder_sums(**(rods | {"pairs": np.array(pairs), "shift": shift}))
+        return sums(**(two | {"pairs": np.array(pairs), "shift": shift}))
 
     assert crossing([0, 1])["crossing"] == -1
     assert crossing([0, 1], [1, 2])["crossing"] == 1
@@ -331,7 +343,7 @@ def test_crossing_is_reported_with_the_first_row_of_its_pairs(sides, extended):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_centres_on_each_other_are_crossing(dimension):
-    rods = two_rods(dimension) | {"diameters": np.ones((2, 3))}
-    rods["position"] = np.zeros((2, 2, dimension))
-    assert _contact.spherocylinder_sums(**rods)["crossing"] == 0
-    assert len(_contact.spherocylinder_derivatives(**rods)["pair"]) == 0
+    two = two_rods(dimension) | {"diameters": np.ones((2, 3))}
+    two["position"] = np.zeros((2, 2, dimension))
+    assert sums(**two)["crossing"] == 0
+    assert len(derivatives(**two)["pair"]) == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import nquad
 
-from jamshape._contact import spherocylinder_drag
+from jamshape._contact import Spherocylinders
 
 ALPHAS = [0.0, 1e-6, 0.01, 1.0, 4.0, 100.0]
 RADII = [0.5, 0.7, 13.0]
@@ -43,8 +43,15 @@ def over_space(weight, A, R):
     return total
 
 
+def drag_of(A, R, dimension):
+    """Of many; A and R as the diameters round them."""
+    diameters = 2 * np.column_stack([A + R, R, R])
+    found = Spherocylinders(diameters, np.ones(len(diameters)), dimension, 1.0, 1)
+    return found.measure, found.moment
+
+
 def drag(A, R, dimension):
-    measure, moment = spherocylinder_drag(np.array([A]), np.array([R]), dimension)
+    measure, moment = drag_of(np.array([A]), np.array([R]), dimension)
     return measure[0], moment[0]
 
 
@@ -80,7 +87,7 @@ def test_moment_is_equation_10_as_printed():
     """Marschall & Teitel 2018, Eq. 10: I = R^2 (3 pi + 24 a + 6 pi a^2 + 8 a^3) / (6 pi + 24 a)."""
     alpha = np.concatenate([ALPHAS, np.geomspace(1e-6, 100.0, 1000)])
     R = np.resize(RADII, alpha.size)
-    measure, moment = spherocylinder_drag(alpha * R, R, 2)
+    measure, moment = drag_of(alpha * R, R, 2)
     printed = (3.0 * np.pi + 24.0 * alpha + 6.0 * np.pi * alpha**2 + 8.0 * alpha**3) / (
         6.0 * np.pi + 24.0 * alpha
     )
@@ -90,9 +97,9 @@ def test_moment_is_equation_10_as_printed():
 
 def test_discs_and_balls():
     R = np.array(RADII)
-    area, plane = spherocylinder_drag(np.zeros(3), R, 2)
+    area, plane = drag_of(np.zeros(3), R, 2)
     np.testing.assert_allclose(area, np.pi * R**2, rtol=1e-15)
     np.testing.assert_allclose(plane[:, 2], 0.5 * R**2, rtol=1e-15)
-    volume, space = spherocylinder_drag(np.zeros(3), R, 3)
+    volume, space = drag_of(np.zeros(3), R, 3)
     np.testing.assert_allclose(volume, 4.0 / 3.0 * np.pi * R**3, rtol=1e-15)
     np.testing.assert_allclose(space, np.tile(0.4 * R[:, None] ** 2, 3), rtol=1e-15)

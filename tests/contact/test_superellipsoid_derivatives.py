@@ -11,9 +11,8 @@ from superellipsoid_pairs import (
     packed,
     quaternion_product,
     random_pairs,
+    shapes_of,
 )
-
-from jamshape import _contact
 
 STEP = 1e-6
 PAIRS = 300
@@ -84,7 +83,7 @@ def test_force_and_torques_are_derivatives_of_the_energy(p, dimension, measured)
 def test_second_derivatives_are_derivatives_of_the_forces(p, dimension, extended, measured):
     unequal = np.random.default_rng(2).choice(EXPONENTS, (2, PAIRS))
     i, j = pairs_of(3, dimension, *(unequal if p is None else (p, p)))
-    found = _contact.superellipsoid_derivatives(*packed(i, j), 1.0, extended)
+    found = shapes_of(i, j).derivatives(*packed(i, j), extended)
     assert np.array_equal(found["pair"], np.arange(PAIRS))
     gradient = found["gradient"][:, 0]
     along = found["stiffness"][:, 0, None, None] * gradient[:, :, None] * gradient[:, None, :]
@@ -99,9 +98,7 @@ def test_double_and_extended_agree(dimension, measured):
     """The whole error of doubles: what they round, amplified by how sharp the bodies are."""
     rng = np.random.default_rng(4)
     i, j = pairs_of(5, dimension, *rng.choice(EXPONENTS, (2, PAIRS)))
-    short, long = (
-        _contact.superellipsoid_derivatives(*packed(i, j), 1.0, e) for e in (False, True)
-    )
+    short, long = (shapes_of(i, j).derivatives(*packed(i, j), e) for e in (False, True))
     for name, tolerance in (("energy", 1e-12), ("force", 1e-10), ("curvature", 1e-7)):
         size = np.abs(long[name]).reshape(PAIRS, -1).max(1)
         error = np.abs(short[name] - long[name]).reshape(PAIRS, -1).max(1) / size
@@ -114,12 +111,13 @@ def test_the_bond_carries_the_gradient_and_the_overlap(dimension):
     rng = np.random.default_rng(6)
     i, j = pairs_of(7, dimension, *rng.choice(EXPONENTS, (2, PAIRS)))
     found = contacts(i, j, 3.0)
-    overlap = 1.0 - found["bond_distance"] / found["bond_reach"]
+    bond = {name: values[:, 0] for name, values in found.items() if name.startswith("bond_")}
+    overlap = 1.0 - bond["bond_distance"] / bond["bond_reach"]
     np.testing.assert_allclose(found["energy"], 1.5 * overlap**2, rtol=1e-10)
-    force = (3.0 * overlap / found["bond_reach"])[:, None] * found["bond_normal"]
+    force = (3.0 * overlap / bond["bond_reach"])[:, None] * bond["bond_normal"]
     np.testing.assert_allclose(found["force"], force, rtol=1e-10, atol=1e-14)
-    np.testing.assert_allclose(found["bond_stiffness"], 3.0 / found["bond_reach"] ** 2, rtol=1e-12)
-    torque = cross(found["bond_arm_i"], found["force"])
+    np.testing.assert_allclose(bond["bond_stiffness"], 3.0 / bond["bond_reach"] ** 2, rtol=1e-12)
+    torque = cross(bond["bond_arm_i"], found["force"])
     np.testing.assert_allclose(found["torque_i"], torque, rtol=1e-12, atol=1e-14)
 
 
@@ -175,7 +173,7 @@ def test_sums_are_those_of_the_contacts(dimension, extended):
     rng = np.random.default_rng(14)
     i, j = pairs_of(15, dimension, *rng.choice(EXPONENTS, (2, PAIRS)))
     found = contacts(i, j, 2.0)
-    sums = _contact.superellipsoid_sums(*packed(i, j), 2.0, extended)
+    sums = shapes_of(i, j, 2.0).sums(*packed(i, j), extended)
     assert sums["energy"] == pytest.approx(found["energy"].sum(), rel=1e-12)
     assert sums["n_bonds"] == PAIRS
     assert sums["crossing"] == -1
@@ -185,6 +183,6 @@ def test_sums_are_those_of_the_contacts(dimension, extended):
     np.testing.assert_allclose(sums["force"][1::2], -found["force"], atol=1e-11 * size)
     np.testing.assert_allclose(sums["torque"][1::2], found["torque_j"], atol=1e-10 * size)
     # U is a function of eta, of degree 1 in r: r.force = 2 eps eta^2 (1 - eta^2), pair by pair.
-    overlap = 1.0 - found["bond_distance"] / found["bond_reach"]
+    overlap = 1.0 - (found["bond_distance"] / found["bond_reach"])[:, 0]
     expected = (2.0 * 2.0 * (1.0 - overlap) * overlap).sum()
     assert np.trace(sums["virial"]) == pytest.approx(expected, rel=1e-10)

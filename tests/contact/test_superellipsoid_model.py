@@ -11,13 +11,17 @@ from superellipsoid_pairs import (
     contacts,
     gauge,
     matrix_of,
-    packed,
     random_bodies,
     random_pairs,
     scales,
 )
 
 from jamshape import _contact
+
+
+def drag(diameters, exponent, dimension):
+    found = _contact.Superellipsoids(diameters, exponent, dimension, 1.0, 1)
+    return found.measure, found.moment
 
 
 def integral(function):
@@ -46,11 +50,11 @@ def test_measure_and_moments_are_integrals_over_slices(p, axes, measured):
     mean_sq_3d = integral(lambda t: t**2 * smaller(t) ** 2) / slices
 
     diameters, exponent = 2.0 * np.array([axes]), np.array([p])
-    measure, moment = _contact.superellipsoid_drag(diameters, exponent, 2)
+    measure, moment = drag(diameters, exponent, 2)
     worst = abs(measure[0] / area - 1.0)
     np.testing.assert_allclose(measure[0], area, rtol=1e-10)
     np.testing.assert_allclose(moment[0], [0, 0, mean_sq_2d * (a**2 + b**2)], rtol=1e-9)
-    measure, moment = _contact.superellipsoid_drag(diameters, exponent, 3)
+    measure, moment = drag(diameters, exponent, 3)
     measured(area=worst, volume=abs(measure[0] / volume - 1.0))
     np.testing.assert_allclose(measure[0], volume, rtol=1e-10)
     expected = mean_sq_3d * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2])
@@ -59,11 +63,11 @@ def test_measure_and_moments_are_integrals_over_slices(p, axes, measured):
 
 def test_ellipsoids_have_their_volume_and_moments():
     diameters = np.array([[2.0, 3.0, 5.0]])
-    measure, moment = _contact.superellipsoid_drag(diameters, np.ones(1), 3)
+    measure, moment = drag(diameters, np.ones(1), 3)
     assert measure[0] == pytest.approx(np.pi / 6.0 * 30.0, rel=1e-14)
     squares = (0.5 * diameters[0]) ** 2
     np.testing.assert_allclose(moment[0], (squares.sum() - squares) / 5.0, rtol=1e-14)
-    measure, moment = _contact.superellipsoid_drag(diameters, np.ones(1), 2)
+    measure, moment = drag(diameters, np.ones(1), 2)
     assert measure[0] == pytest.approx(np.pi / 4.0 * 6.0, rel=1e-14)
     assert moment[0, 2] == pytest.approx((1.0 + 2.25) / 4.0, rel=1e-14)
 
@@ -162,16 +166,14 @@ def test_bad_input_is_refused_in_one_sentence():
         _contact.superellipsoid_contacts(i.rows, j.rows[:2], 1.0)
     with pytest.raises(ValueError, match="5 columns, expected 6"):
         _contact.superellipsoid_contacts(*2 * [np.ascontiguousarray(i.rows[:, :5])], 1.0)
-    with pytest.raises(ValueError, match="epsilon is"):
+    with pytest.raises(ValueError, match="k_e is"):
         contacts(i, j, 0.0)
     with pytest.raises(ValueError, match="normals have no shape"):
         scales(i, j, np.zeros((3, 2)))
-    arguments = list(packed(i, j))
-    arguments[1] = arguments[1][:-1]
-    with pytest.raises(ValueError, match="exponent has no shape"):
-        _contact.superellipsoid_sums(*arguments, 1.0, False)
-    arguments[1] = np.full(6, 0.4)
-    with pytest.raises(ValueError, match="particle 0 is no such shape"):
-        _contact.superellipsoid_sums(*arguments, 1.0, False)
+    diameters = np.ones((6, 3))
+    with pytest.raises(ValueError, match="diameters and exponent have no shapes"):
+        _contact.Superellipsoids(diameters, np.ones(5), 3, 1.0, 1)
+    with pytest.raises(ValueError, match="particle 4 is no such shape"):
+        _contact.Superellipsoids(diameters, np.array([1, 1, 1, 1, 0.4, 1.0]), 3, 1.0, 1)
     with pytest.raises(ValueError, match="dimension is 4"):
-        _contact.superellipsoid_drag(np.ones((1, 3)), np.ones(1), 4)
+        drag(diameters, np.ones(6), 4)

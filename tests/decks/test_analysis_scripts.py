@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jamshape.files.h5md import RunWriter, write_packing
+from jamshape.files.h5md import write_packing
 from jamshape.files.lammps_text import write_data
+from jamshape.files.run_writer import RunWriter
 from jamshape.measures.order import orientational_order
 from jamshape.packing import Box, Packing
 

@@ -11,7 +11,7 @@ import pytest
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import residual_of
+from jamshape.minima import residual_of
 
 pytestmark = pytest.mark.lammps
 

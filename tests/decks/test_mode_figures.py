@@ -10,14 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jamshape.protocols.jammed import write_minimum
+from mixtures import bidisperse
 from numpy.testing import assert_allclose
 
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Stop, minimise
+from jamshape.minima import Stop, minimise
 from jamshape.minima.target import Target, find
-from jamshape.protocols.jammed import write_minimum
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 from jamshape.vibration.hessian import Coordinates, dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.table import ModeTable, tabulate, write_modes
@@ -121,14 +122,14 @@ def modes(tmp_path_factory):
         for u in (1e-18, 1e-15, 1e-14, 1e-12):
             for seed in (1, 2):
                 write(folder, alpha, u, seed)
-    write_packing(folder / "packing.h5", random_packing(8, 0.3, 1, Mixture.bidisperse(1)))
+    write_packing(folder / "packing.h5", random_packing(8, 0.3, 1, bidisperse(1)))
     return folder
 
 
 @pytest.fixture(scope="module")
 def jammed(tmp_path_factory):
     """A small packing and its modes, as files."""
-    packing = random_packing(14, 0.4, 1, Mixture.bidisperse(1))
+    packing = random_packing(14, 0.4, 1, bidisperse(1))
     landscape, state = Landscape(packing), State.of(packing)
     while state.packing(packing).phi < 0.84:
         state = state.strained(-0.01)
@@ -211,7 +212,7 @@ def test_band_frequencies_and_exponents(report, modes, tmp_path):
 
 
 def test_jamming_distance(report, problem, tmp_path):
-    packing = random_packing(8, 0.3, 1, Mixture.bidisperse(4))
+    packing = random_packing(8, 0.3, 1, bidisperse(4))
     for seed, phi_J in ((1, 0.86), (2, 0.87)):
         for u in (1e-17, 1e-15, 1e-13):
             attributes = {"alpha": 4.0, "seed": seed, "u0": u, "outcome": "converged"}

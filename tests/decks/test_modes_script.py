@@ -9,12 +9,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from mixtures import bidisperse
 
 from jamshape.files.h5md import FileFormatError, write_packing
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Stop, minimise
+from jamshape.minima import Stop, minimise
 from jamshape.minima.target import Target, find
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 from jamshape.vibration.table import BANDS, read_modes
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
@@ -22,7 +23,7 @@ ANALYSIS = Path(__file__).parents[2] / "analysis"
 
 @cache
 def jammed():
-    packing = random_packing(16, 0.4, 1, Mixture.bidisperse(1))
+    packing = random_packing(16, 0.4, 1, bidisperse(1))
     landscape, state = Landscape(packing), State.of(packing)
     while state.packing(packing).phi < 0.86:
         state = state.strained(-0.01)
@@ -125,7 +126,7 @@ def test_a_state_that_is_no_minimum_needs_force(tmp_path):
 
 
 def test_problems_are_one_sentence(packing, tmp_path):
-    wide = random_packing(8, 0.1, 1, Mixture.bidisperse(1))
+    wide = random_packing(8, 0.1, 1, bidisperse(1))
     write_packing(tmp_path / "wide.h5", wide)
     (tmp_path / "text.h5").write_text("no")
     for path, words in (

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jamshape.protocols.jammed import write_minimum
+from mixtures import bidisperse
 
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Stop, minimise
+from jamshape.minima import Stop, minimise
 from jamshape.minima.target import Target, find
-from jamshape.protocols.jammed import write_minimum
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 SCRIPT = Path(__file__).parents[2] / "analysis" / "singular_limit.py"
 N, U0 = 16, 1e-14
@@ -52,7 +53,7 @@ def problem(monkeypatch, capsys):
 
 def write_jammed(path, alpha, seed):
     """A packing as make_packing.py writes it, without its compression in LAMMPS."""
-    packing = random_packing(N, 0.4, seed, Mixture.bidisperse(alpha))
+    packing = random_packing(N, 0.4, seed, bidisperse(alpha))
     landscape, state = Landscape(packing), State.of(packing)
     rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
     while state.packing(packing).phi < 0.8:
@@ -176,5 +177,5 @@ def test_rods_that_are_called_discs_are_refused(problem, tmp_path):
     path = tmp_path / "rods.h5"
     known = {"alpha": 0.0, "n": 4, "size_ratio": 1.4, "seed": 1, "u0": U0}
     known |= {"outcome": "converged", "phi": 0.3}
-    write_packing(path, random_packing(4, 0.3, 1, Mixture.bidisperse(1.0)), known)
+    write_packing(path, random_packing(4, 0.3, 1, bidisperse(1.0)), known)
     assert "half lengths up to 0.7, expected discs" in problem(path, "--out", tmp_path / "out")

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mixtures import bidisperse
 
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, write_packing
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "slow_compress.py"
 RATES = ("--kappa", "1e-6", "--phi-slow", "0.63", "--kappa-before", "1e-4")
@@ -20,7 +21,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def start(folder):
-    packing = random_packing(16, 0.6, 1, Mixture.bidisperse(1.0))
+    packing = random_packing(16, 0.6, 1, bidisperse(1.0))
     write_packing(folder / "start.h5", packing, {"alpha": 1.0})
     return folder / "start.h5"
 

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mixtures import bidisperse
 
 from jamshape.contacts import find_contacts
-from jamshape.files.h5md import RunWriter, read_packing, write_packing
+from jamshape.files.h5md import read_packing, write_packing
+from jamshape.files.run_writer import RunWriter
 from jamshape.measures.contact_statistics import class_fractions, contact_angles, flat_fraction
 from jamshape.packing import Box
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 SCRIPTS = ("phi_j", "snapshots", "contact_number", "contact_classes", "contact_angles", "residuals")
@@ -57,7 +59,7 @@ def image(path):
 
 def squeezed(alpha, seed):
     """A random packing squeezed until there are about as many contacts as particles."""
-    packing = random_packing(N, 0.45, seed, Mixture.bidisperse(alpha))
+    packing = random_packing(N, 0.45, seed, bidisperse(alpha))
     while len(find_contacts(packing, sides=2).pairs) <= N:
         box = Box(packing.box.lo, 0.99 * packing.box.edges)
         packing = packing.with_(position=0.99 * packing.position, box=box)

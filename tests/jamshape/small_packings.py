@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import mpmath
 import numpy as np
 import scipy.sparse
-from test_minimise import squeezed
+from squeezed import squeezed
 
 from jamshape.landscape import Landscape
-from jamshape.minima.minimise import Residual
+from jamshape.minima import Residual
 from jamshape.minima.target import Target, find
 from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum

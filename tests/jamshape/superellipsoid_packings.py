@@ -4,7 +4,7 @@ import numpy as np
 
 from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Outcome, Stop, minimise
+from jamshape.minima import Outcome, Stop, minimise
 from jamshape.packing import Box, Packing
 
 

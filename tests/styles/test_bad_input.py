@@ -82,9 +82,8 @@ def test_rate_must_be_finite(sentence_of):
 @pytest.mark.parametrize("words", ["sides three", "sides", "", "side one", "sides one two"])
 def test_sides_are_one_or_two(words, sentence_of):
     found = sentence_of(f"pair_style spherocylinder/harmonic {words}")
-    shown = f" {words}" if words else ""
     assert found == (
-        f"pair_style spherocylinder/harmonic found '{shown}', expected 'sides one' (the dynamics' "
+        f"pair_style spherocylinder/harmonic found '{words}', expected 'sides one' (the dynamics' "
         "single bond) or 'sides two' (two bonds for side-to-side contacts)."
     )
 

@@ -18,9 +18,10 @@ from lammps_scenes import (
     squeezed,
     state_of,
 )
+from mixtures import bidisperse
 
 from jamshape.contacts import network as contacts
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 pytestmark = pytest.mark.lammps
 
@@ -57,7 +58,7 @@ def stack(angle, dimension=2, n=6):
 
 
 def unequal(dimension, phi):
-    start = random_packing(60, phi, 1, Mixture.bidisperse(1.0, 10.0), dimension=dimension)
+    start = random_packing(60, phi, 1, bidisperse(1.0, 10.0), dimension=dimension)
     return squeezed(start, 0.9)
 
 

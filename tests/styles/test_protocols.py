@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from mixtures import bidisperse
 
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 pytestmark = pytest.mark.lammps
 
@@ -12,7 +13,7 @@ ROWS, STEPS, ROWS_PER_RESTART = 400, 10, 5
 
 def compressed(path=None):
     """Compress fast, so that particles leave the box, writing restart files."""
-    start = random_packing(64, 0.35, 1, Mixture.bidisperse(4.0))
+    start = random_packing(64, 0.35, 1, bidisperse(4.0))
     rows = []
     with Session() as session:
         run = CompressionRun(session, Compression(1e-4, phi_end=1e3, dt=0.25), start)

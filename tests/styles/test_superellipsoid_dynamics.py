@@ -32,7 +32,7 @@ from superellipsoid_scenes import (
 )
 
 from jamshape import _contact
-from jamshape.landscape.adapter import superellipsoid_bodies
+from body_rows import superellipsoid_rows
 from jamshape.packing import body_axes
 
 pytestmark = pytest.mark.lammps
@@ -79,7 +79,7 @@ def rates_of(packing):
     """Velocities and angular velocities in space, from the bindings."""
     D = packing.dimension
     measure, moment = _contact.superellipsoid_drag(packing.diameters, packing.exponent, D)
-    rows = superellipsoid_bodies(packing)
+    rows = superellipsoid_rows(packing)
     contact = _contact.superellipsoid_contacts(rows[:1], rows[1:], EPSILON)
     force = np.concatenate([contact["force"], -contact["force"]])
     torque = np.concatenate([contact["torque_i"], contact["torque_j"]])

@@ -32,7 +32,7 @@ def sentence_of(tmp_path):
 
 def test_pair_style_takes_no_arguments(sentence_of):
     assert sentence_of("pair_style superellipsoid/harmonic p 1.5") == (
-        "pair_style superellipsoid/harmonic found ' p 1.5', expected no arguments: give exponents "
+        "pair_style superellipsoid/harmonic found 'p 1.5', expected no arguments: give exponents "
         "with 'pair_coeff I I epsilon p'."
     )
 

@@ -6,11 +6,12 @@ the more so the faster. The bounds say in which direction and by how much at mos
 
 import numpy as np
 import pytest
+from mixtures import bidisperse
 
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.measures.onset import fit_onset
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 pytestmark = [pytest.mark.lammps, pytest.mark.validate]
 
@@ -19,7 +20,7 @@ PAPER = {0.0: 0.8412, 1.0: 0.8875, 4.0: 0.866}
 
 
 def compress(alpha, kappa, seed):
-    start = random_packing(N, 0.4, seed, Mixture.bidisperse(alpha))
+    start = random_packing(N, 0.4, seed, bidisperse(alpha))
     settings = Compression(kappa, phi_end=0.92, dt=0.3)
     with Session() as session:
         run = CompressionRun(session, settings, start)

@@ -8,13 +8,13 @@ modes go up.
 
 import numpy as np
 import pytest
+from jamshape.protocols.jammed import Sample, make
 from minima import complaints, dense, probes, soft_directions, typical_overlap, unconstrained
 
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import History, Minimum, Outcome, residual_of
+from jamshape.minima import History, Minimum, Outcome, residual_of
 from jamshape.protocols.approach import Approach
-from jamshape.protocols.jammed import Sample, make
 
 pytestmark = [pytest.mark.lammps, pytest.mark.validate]
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from jamshape.protocols.jammed import Sample, make
+from mixtures import of_arrays
 
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
-from jamshape.protocols.jammed import Sample, make
-from jamshape.protocols.random_start import Mixture
 
 pytestmark = [pytest.mark.lammps, pytest.mark.validate]
 
@@ -22,7 +22,7 @@ SMALL = Sample(n=32, approach=Approach(kappa=1e-5))
 def discs_and_rods(n):
     index = np.arange(n)
     radius = np.where(index % 2, 0.5, 0.7)
-    return Mixture.from_arrays(np.where(index // 2 % 2, 4 * radius, 0.0), radius, 1 + index % 2)
+    return of_arrays(np.where(index // 2 % 2, 4 * radius, 0.0), radius, 1 + index % 2)
 
 
 EXTREMES = {

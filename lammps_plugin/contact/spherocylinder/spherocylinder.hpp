@@ -19,8 +19,6 @@ namespace jamshape {
 struct Spherocylinder {
   double half_length;
   double radius;
-
-  template <int D> double bounding_radius() const { return half_length + radius; }
 };
 
 /// From the semi-axes that LAMMPS stores, (A + R, R, R); nothing when they are of another shape.
@@ -65,10 +63,6 @@ template <int D, class S = double> struct SpherocylinderBody {
   double half_length;
   double radius;
 };
-
-/// Whether nearly parallel rods touch at one bond or at two (Marschall & Teitel 2018: one in the
-/// dynamics, Fig. 1d; two for minima and the dynamical matrix, Fig. 6).
-enum class Sides { ONE = 1, TWO = 2 };
 
 struct SpherocylinderLaw {
   Harmonic harmonic;
@@ -144,6 +138,8 @@ template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Fe
 /// and is the same for i, j exchanged.
 template <int D, class S> class SpherocylinderContact {
  public:
+  using Found = Contact<D, S, 2>;
+
   SpherocylinderContact(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j,
                         const SpherocylinderLaw &contact_law) :
       pair(spine_pair(i, j)), radius_i(i.radius), reach(i.radius + j.radius),
@@ -151,14 +147,15 @@ template <int D, class S> class SpherocylinderContact {
   {
   }
 
-  Contact<D, S> evaluate() const
+  Found evaluate() const
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0 && law.shortcuts) return discs();
     const auto &values = values_of(pair);
     const auto closest = closest_feet(values);
-    if (!touches(closest.distance_sq)) return without_bonds<D, S>(ContactStatus::APART);
+    if (!touches(closest.distance_sq))
+      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
     if (is_coincident(closest) || spines_cross(values))
-      return without_bonds<D, S>(ContactStatus::CROSSING);
+      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
     if (law.sides == Sides::TWO) return two_bonds();
     if constexpr (std::is_same_v<S, ValueOf<S>>) {
       return one_bond(closest);
@@ -191,19 +188,21 @@ template <int D, class S> class SpherocylinderContact {
   }
 
   /// What the general path gives for two spines of no length, without the search for feet.
-  Contact<D, S> discs() const
+  Found discs() const
   {
     const Feet<D, S> centres{0.0, 0.0, pair.r, norm_sq(pair.r)};
-    if (!touches(centres.distance_sq)) return without_bonds<D, S>(ContactStatus::APART);
-    if (is_coincident(centres)) return without_bonds<D, S>(ContactStatus::CROSSING);
-    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
+    if (!touches(centres.distance_sq))
+      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
+    if (is_coincident(centres))
+      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
+    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
     add_bond(contact, centres, sqrt(centres.distance_sq), whole());
     return contact;
   }
 
-  Contact<D, S> one_bond(const Feet<D, S> &closest) const
+  Found one_bond(const Feet<D, S> &closest) const
   {
-    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
+    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
     const S distance = sqrt(closest.distance_sq);
     if (abs_sine(pair) < PARALLEL_SINE) {
       const EndFeet<D, S> ends(pair);
@@ -222,7 +221,7 @@ template <int D, class S> class SpherocylinderContact {
 
   S overlap_at(const S &distance) const { return (reach - distance) * inverse_reach; }
 
-  Contact<D, S> two_bonds() const
+  Found two_bonds() const
   {
     const EndFeet<D, S> ends(pair);
     const Feet<D, S> closest = closest_to_end(pair, ends.nearer());  // never the farther, at a tie
@@ -247,23 +246,23 @@ template <int D, class S> class SpherocylinderContact {
         }
       }
     }
-    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
+    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
     contact.kind = kind_of(pair, closest);
     add_bond(contact, closest, distance, whole());
     return contact;
   }
 
-  Contact<D, S> two_whole_bonds(const Feet<D, S> &closest, const Feet<D, S> &far_end) const
+  Found two_whole_bonds(const Feet<D, S> &closest, const Feet<D, S> &far_end) const
   {
-    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
+    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
     add_bond(contact, closest, sqrt(closest.distance_sq), whole());
     add_bond(contact, far_end, sqrt(far_end.distance_sq), whole());
     return contact;
   }
 
-  Contact<D, S> side_to_side(const Feet<D, S> &closest, const Feet<D, S> &far_end,
-                             const SideToSide<D, S> &side) const
+  Found side_to_side(const Feet<D, S> &closest, const Feet<D, S> &far_end,
+                     const SideToSide<D, S> &side) const
   {
     const auto &[overlap, depth, weight, mean_weight] = side;
     const Harmonic &harmonic = law.harmonic;
@@ -279,7 +278,7 @@ template <int D, class S> class SpherocylinderContact {
                two_bonds * (per_length + second.by_wide) * depth.wide_gradient +
                by_mean * harmonic.energy_gradient(overlap.mean));
 
-    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
+    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
     add_bond(contact, closest, sqrt(closest.distance_sq),
              {1.0 - by_mean, 0.0, through_mean + two_bonds * second.rest_by_a, 0.5 * by_mean});
@@ -300,8 +299,7 @@ template <int D, class S> class SpherocylinderContact {
 
   /// Adds a bond with the lever arms of `feet` and the overlap of `distance`. Any point on the line
   /// of `feet` gives the same torque; the one reported lies where the surfaces interpenetrate.
-  void add_bond(Contact<D, S> &contact, const Feet<D, S> &feet, const S &distance,
-                const Share &share) const
+  void add_bond(Found &contact, const Feet<D, S> &feet, const S &distance, const Share &share) const
   {
     const S overlap = overlap_at(distance);
     const Vec<D, S> normal = (1.0 / sqrt(feet.distance_sq)) * feet.delta;
@@ -337,30 +335,29 @@ template <int D, class S> class SpherocylinderContact {
 };
 
 template <int D, class S>
-Contact<D, S> contact_of(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j,
-                         const SpherocylinderLaw &law)
+Contact<D, S, 2> contact_of(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j,
+                            const SpherocylinderLaw &law)
 {
   return SpherocylinderContact<D, S>(i, j, law).evaluate();
 }
 
-/// What a pair style, its neighbour list and the drag need to know of a shape; every shape has one
+/// All that pair styles, Python and sums over pairs need to know of a shape; every shape has one
 /// such struct (see ARCHITECTURE.md, how to add a shape).
 struct SpherocylinderModel {
   using Shape = Spherocylinder;
   using Law = SpherocylinderLaw;
-  using Options = Sides;
   template <int D, class S = double> using Body = SpherocylinderBody<D, S>;
 
+  static constexpr const char *NAME = "spherocylinder";
   static constexpr const char *SHAPE_RULE =
       "a spherocylinder has diameters (2(A+R), 2R, 2R), its long axis the body's x";
+  /// What of two particles must not cross.
+  static constexpr const char *CORE = "spines";
+  /// Bonds of a contact, and whether `sides` changes the law.
+  static constexpr int MOST_BONDS = 2;
+  static constexpr bool HAS_SIDES = true;
 
-  static Law law(Options sides, double k_e) { return {{k_e}, sides}; }
-
-  /// Whose contacts need no search.
-  static Shortcut shortcut(const Shape &shape)
-  {
-    return shape.half_length > 0.0 ? Shortcut::NONE : Shortcut::ROUND;
-  }
+  static Law law(double k_e, Sides sides) { return {{k_e}, sides}; }
 
   /// Other shapes have an exponent.
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)
@@ -368,12 +365,38 @@ struct SpherocylinderModel {
     return spherocylinder_from(semi_axes);
   }
 
+  /// Whose contacts need no search.
+  template <int D> static Shortcut shortcut(const Shape &shape)
+  {
+    return shape.half_length > 0.0 ? Shortcut::NONE : Shortcut::ROUND;
+  }
+
   /// Particles that no contact can turn need no orientation.
-  static bool turns(const Shape &shape) { return shape.half_length > 0.0; }
+  template <int D> static bool turns(const Shape &shape) { return shape.half_length > 0.0; }
 
   template <int D> static SubstrateDrag drag(const Shape &shape)
   {
     return substrate_drag<D>(shape);
+  }
+
+  /// Of the sphere around a particle, and its smallest length.
+  template <int D> static double outer_radius(const Shape &shape)
+  {
+    return shape.half_length + shape.radius;
+  }
+  template <int D> static double inner_radius(const Shape &shape) { return shape.radius; }
+
+  /// The length that a radian counts for, 0 where no contact can turn the particle; and how much
+  /// closer to others a radian brings its surface at most.
+  template <int D> static double rotation_length(const Shape &shape) { return shape.half_length; }
+  template <int D> static double turning_radius(const Shape &shape) { return shape.half_length; }
+
+  /// The body axis (0, 1, 2) about which a turn changes nothing, and the one that tells a
+  /// particle's direction; nothing for particles that have none.
+  static std::optional<int> symmetry_axis(const Shape &shape) { return director<3>(shape); }
+  template <int D> static std::optional<int> director(const Shape &shape)
+  {
+    return shape.half_length > 0.0 ? std::optional<int>(0) : std::nullopt;
   }
 
   template <int D, class S = double> static Body<D, S> body(const Shape &shape)
@@ -412,5 +435,12 @@ struct SpherocylinderModel {
     return turned == 0.0 ? norm_sq(shift) : 2.0 * (norm_sq(shift) + turned);
   }
 };
+
+/// Whether two bodies share more than a point: for Monte Carlo of hard particles.
+template <int D>
+bool are_overlapping(const SpherocylinderBody<D> &i, const SpherocylinderBody<D> &j)
+{
+  return SpherocylinderModel::closer_than<D>(0.0, i, j);
+}
 
 }  // namespace jamshape

@@ -11,15 +11,48 @@
 
 namespace jamshape {
 
+/// Shapes with b^2 = ac to this are neither long nor flat.
+inline constexpr double SELF_DUAL = 1e-9;
+
 /// The surface |x/a|^2p + |y/b|^2p + |z/c|^2p = 1 (Yuan et al. 2019, Eq. 1); in 2D the first two
 /// axes alone. p = 1 is an ellipsoid, p > 1 tends to a box, p < 1 to an octahedron.
 struct Superellipsoid {
   Vec<3> semi_axes;
   double p;
 
-  bool is_round() const
+  /// A disc or a sphere: in 2D the third axis does not count.
+  template <int D> bool is_round() const
   {
-    return p == 1.0 && semi_axes[0] == semi_axes[1] && semi_axes[0] == semi_axes[2];
+    for (int k = 1; k < D; ++k) {
+      if (semi_axes[k] != semi_axes[0]) return false;
+    }
+    return p == 1.0;
+  }
+
+  /// Of spheroids the first axis whose two others are equal; other exponents have corners or edges
+  /// about every axis.
+  std::optional<int> symmetry_axis() const
+  {
+    for (int k = 0; k < 3; ++k) {
+      if (p == 1.0 && semi_axes[(k + 1) % 3] == semi_axes[(k + 2) % 3]) return k;
+    }
+    return std::nullopt;
+  }
+
+  /// The longest axis of long particles and the shortest of flat ones (Yuan et al. 2019, Sec. 2.4);
+  /// the first where they are equal, as in cubes.
+  template <int D> std::optional<int> director() const
+  {
+    if (is_round<D>()) return std::nullopt;
+    const double *const begin = semi_axes.c, *const end = begin + D;
+    const auto range = std::minmax_element(begin, end);
+    const double shortest = *range.first, longest = *range.second;
+    bool is_long = true;
+    if (D == 3 && shortest != longest) {
+      const double middle = semi_axes[0] + semi_axes[1] + semi_axes[2] - shortest - longest;
+      is_long = shortest * longest > (1.0 + SELF_DUAL) * middle * middle;
+    }
+    return static_cast<int>(std::find(begin, end, is_long ? longest : shortest) - begin);
   }
 
   /// Largest distance of a point of the surface from the centre: by Hoelder's inequality for p > 1,

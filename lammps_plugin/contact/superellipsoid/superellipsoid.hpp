@@ -36,6 +36,7 @@ inline constexpr double USELESS = 1e-6;
 /// contact distance d the distance is r / 2, and reach d / 2 where they touch.
 template <int D, class S> class SuperellipsoidContact {
  public:
+  using Found = Contact<D, S, 1>;
   using T = ValueOf<S>;
   using Body = SuperellipsoidBody<D, S>;
 
@@ -46,9 +47,9 @@ template <int D, class S> class SuperellipsoidContact {
   }
 
   /// Begins at a normal and leaves there the one it found, also where the bodies are apart.
-  Contact<D, S> evaluate_from(Vec<D, T> &last) { return evaluate_with(&last); }
+  Found evaluate_from(Vec<D, T> &last) { return evaluate_with(&last); }
 
-  Contact<D, S> evaluate() const { return evaluate_with(nullptr); }
+  Found evaluate() const { return evaluate_with(nullptr); }
 
  private:
   const Body &i, &j;
@@ -58,21 +59,23 @@ template <int D, class S> class SuperellipsoidContact {
 
   static constexpr bool IS_PLAIN = sizeof(S) == sizeof(T);  // no derivatives beside the value
 
-  Contact<D, S> evaluate_with(Vec<D, T> *last) const
+  Found evaluate_with(Vec<D, T> *last) const
   {
     const double reach = i.bounding_radius + j.bounding_radius;
     const T distance_sq = value_of(norm_sq(r));
-    if (!(distance_sq < T(reach) * reach)) return without_bonds<D, S>(ContactStatus::APART);
+    if (!(distance_sq < T(reach) * reach))
+      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
     if (distance_sq <= COINCIDENT_CENTRES * reach * COINCIDENT_CENTRES * reach) {
-      return without_bonds<D, S>(ContactStatus::CROSSING);
+      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
     }
     if (shortcuts && is_round(i) && is_round(j))
       return touching(spheres(), T(0));  // bounded by themselves
     const FoundTangency<D, T> found = find_tangency(last);
     if (last != nullptr) *last = found.at.normal;
-    if (found.is_apart) return without_bonds<D, S>(ContactStatus::APART);
-    if (!(found.gap < T(USELESS))) return without_bonds<D, S>(ContactStatus::UNCONVERGED);
-    if (!(found.at.scale < 1)) return without_bonds<D, S>(ContactStatus::APART);
+    if (found.is_apart) return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
+    if (!(found.gap < T(USELESS)))
+      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::UNCONVERGED);
+    if (!(found.at.scale < 1)) return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
     return touching(in_scalar(found.at), found.gap);
   }
 
@@ -112,14 +115,14 @@ template <int D, class S> class SuperellipsoidContact {
 
   /// In dual numbers the law's own slope is a constant: `own_stiffness` stands for what it leaves
   /// out (see ContactDerivatives).
-  Contact<D, S> touching(const Tangency<D, S> &at, const T &gap) const
+  Found touching(const Tangency<D, S> &at, const T &gap) const
   {
     const S x = at.scale * at.scale, overlap = (T(1) - at.scale) * (T(1) + at.scale);
     const Vec<D, S> gradient = (T(2) * x / dot(r, at.normal)) * at.normal;
     const S steepness = norm(gradient), reach = T(1) / steepness;
     const Vec<D, S> arm_i = -at.point_i, arm_j = at.point_j;
 
-    Contact<D, S> contact = without_bonds<D, S>(ContactStatus::TOUCHING);
+    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
     contact.n_bonds = 1;
     contact.error = static_cast<double>(gap);
     contact.energy = law.energy(overlap);
@@ -142,8 +145,8 @@ template <int D, class S> class SuperellipsoidContact {
 };
 
 template <int D, class S>
-Contact<D, S> contact_of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
-                         const SuperellipsoidLaw &law)
+Contact<D, S, 1> contact_of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
+                            const SuperellipsoidLaw &law)
 {
   return SuperellipsoidContact<D, S>(i, j, law).evaluate();
 }
@@ -151,41 +154,65 @@ Contact<D, S> contact_of(const SuperellipsoidBody<D, S> &i, const Superellipsoid
 /// The same, begun at the normal that this pair had a moment before (any vector at first), which is
 /// replaced by the present one: a step or two instead of ten.
 template <int D, class S>
-Contact<D, S> contact_of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
-                         const SuperellipsoidLaw &law, Vec<D, ValueOf<S>> &last_normal)
+Contact<D, S, 1> contact_of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
+                            const SuperellipsoidLaw &law, Vec<D, ValueOf<S>> &last_normal)
 {
   return SuperellipsoidContact<D, S>(i, j, law).evaluate_from(last_normal);
 }
 
-/// What a pair style, its neighbour list and the drag need to know of the shape (see
-/// SpherocylinderModel).
+/// What is asked of a shape (see SpherocylinderModel).
 struct SuperellipsoidModel {
   using Shape = Superellipsoid;
   using Law = SuperellipsoidLaw;
-  struct Options {};
   template <int D, class S = double> using Body = SuperellipsoidBody<D, S>;
 
+  static constexpr const char *NAME = "superellipsoid";
   static constexpr const char *SHAPE_RULE =
       "a superellipsoid has positive diameters (2a, 2b, 2c) and an exponent p above 0.5";
+  static constexpr const char *CORE = "centres";
+  static constexpr int MOST_BONDS = 1;
+  static constexpr bool HAS_SIDES = false;
 
-  static Law law(const Options &, double epsilon) { return {epsilon}; }
+  static Law law(double epsilon, Sides) { return {epsilon}; }
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double exponent)
   {
     return superellipsoid_from(semi_axes, exponent);
   }
 
-  static bool turns(const Shape &shape) { return !shape.is_round(); }
-
-  static Shortcut shortcut(const Shape &shape)
+  template <int D> static Shortcut shortcut(const Shape &shape)
   {
-    if (shape.is_round()) return Shortcut::ROUND;
+    if (shape.is_round<D>()) return Shortcut::ROUND;
     return shape.p == 1.0 ? Shortcut::ELLIPSOIDS : Shortcut::NONE;
   }
+
+  template <int D> static bool turns(const Shape &shape) { return !shape.is_round<D>(); }
 
   template <int D> static SubstrateDrag drag(const Shape &shape)
   {
     return substrate_drag<D>(shape);
+  }
+
+  template <int D> static double outer_radius(const Shape &shape)
+  {
+    return shape.bounding_radius<D>();
+  }
+  template <int D> static double inner_radius(const Shape &shape)
+  {
+    return *std::min_element(shape.semi_axes.c, shape.semi_axes.c + D);
+  }
+  template <int D> static double rotation_length(const Shape &shape)
+  {
+    return turns<D>(shape) ? shape.semi_axes[0] : 0.0;
+  }
+  template <int D> static double turning_radius(const Shape &shape)
+  {
+    return turns<D>(shape) ? outer_radius<D>(shape) : 0.0;
+  }
+  static std::optional<int> symmetry_axis(const Shape &shape) { return shape.symmetry_axis(); }
+  template <int D> static std::optional<int> director(const Shape &shape)
+  {
+    return shape.director<D>();
   }
 
   template <int D, class S = double> static Body<D, S> body(const Shape &shape)

@@ -1,68 +1,35 @@
 """Near pairs, contacts, forces and rattlers of a packing."""
 
+from jamshape.contacts.near import NearPairs, PairArrays, Spheres, each_once, near_pairs
 from jamshape.contacts.network import (
     Bonds,
     ContactKind,
     ContactNetwork,
-    Coordination,
+    CrossingError,
     Forces,
-    NearPairs,
-    bodies,
-    coordination,
-    each_once,
     find_contacts,
-    find_rattlers,
     forces,
-    near_pairs,
-    outer_radius,
-    shifted,
-    spheres,
     sum_forces,
-    superellipsoid_bodies,
-    unconverged_sentence,
 )
+from jamshape.contacts.pairs import Pairs
+from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers
 
 __all__ = [
     "Bonds",
     "ContactKind",
     "ContactNetwork",
     "Coordination",
+    "CrossingError",
     "Forces",
     "NearPairs",
-    "bodies",
+    "PairArrays",
+    "Pairs",
+    "Spheres",
     "coordination",
     "each_once",
     "find_contacts",
     "find_rattlers",
     "forces",
     "near_pairs",
-    "outer_radius",
-    "shifted",
-    "spheres",
     "sum_forces",
-    "superellipsoid_bodies",
-    "unconverged_sentence",
-]
-
-
-__all__ = [
-    "Bonds",
-    "ContactKind",
-    "ContactNetwork",
-    "Coordination",
-    "Forces",
-    "NearPairs",
-    "bodies",
-    "coordination",
-    "each_once",
-    "find_contacts",
-    "find_rattlers",
-    "forces",
-    "near_pairs",
-    "outer_radius",
-    "shifted",
-    "spheres",
-    "sum_forces",
-    "superellipsoid_bodies",
-    "unconverged_sentence",
 ]

@@ -1,4 +1,4 @@
-"""Contacts, forces and rattlers of a packing, without LAMMPS.
+"""Contacts and forces of a packing, without LAMMPS.
 
 The geometry and the energies are those of `lammps_plugin/contact/`; here they are only summed.
 """
@@ -7,21 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from jamshape import _contact
 from jamshape.arrays import BoolArray, FloatArray, IntArray
-from jamshape.packing import Box, Packing
+from jamshape.contacts.near import NearPairs, PairArrays, near_particles
+from jamshape.packing import Packing, State
+from jamshape.shapes.shape import Interaction
 
-_TOUCHING, _CROSSING, _UNCONVERGED = 1, 2, 3  # ContactStatus of contact/contact.hpp
-_CORE = {"spherocylinder": "spines", "superellipsoid": "centres"}  # what must not cross
+_CROSSING, _UNCONVERGED = 2, 3  # ContactStatus of contact/contact.hpp
 
-# Bounding spheres are larger by this fraction, so that rounding never drops a contact.
-_BOUNDING_MARGIN = 1e-9
+
+class CrossingError(ValueError):
+    """What must not cross of two particles does (spines, or centres): their contact has no energy."""
 
 
 class ContactKind(IntEnum):
@@ -47,7 +47,7 @@ class Bonds:
     point : (B, D) array of float64, [length]
         Where the surfaces interpenetrate, next to the position of i as the packing gives it.
     distance, reach : (B,) array of float64, [length]
-        r and d = R_i + R_j of the overlap 1 - r/d; of superellipsoids that is 1 - eta^2.
+        r and d of the overlap 1 - r/d: R_i + R_j, or such lengths that it is 1 - eta^2.
     energy : (B,) array of float64, [energy]
     on_side : (B, 2) array of bool
         Whether the point lies on the flat part of i, of j.
@@ -78,7 +78,7 @@ class ContactNetwork:
     kind : (M,) array of int64
         `ContactKind`.
     n_bonds : (M,) array of int64
-        1 or 2.
+        At least one.
     energy : (M,) array of float64, [energy]
     force : (M, D) array of float64, [energy / length]
         On i; j carries the opposite.
@@ -121,126 +121,6 @@ class Forces:
     pressure: float
 
 
-class Coordination(NamedTuple):
-    """Contact numbers without rattlers (Marschall & Teitel 2018, Sec. III C)."""
-
-    z: float
-    """Bonds per particle, a side-to-side contact of two rods in the plane counted as two."""
-    z_single: float
-    """Contacts per particle."""
-    n_rattlers: int
-    n_bonds: int
-    n_contacts: int
-
-
-class NearPairs(NamedTuple):
-    """Pairs of bodies, one row for each image of the second that is near enough."""
-
-    first: IntArray
-    second: IntArray
-    shift: IntArray
-    """(M, D) box edges to add to the second."""
-
-    def take(self, rows: NDArray[Any]) -> NearPairs:
-        """Select rows by index or mask."""
-        return NearPairs(self.first[rows], self.second[rows], self.shift[rows])
-
-
-def bodies(packing: Packing) -> FloatArray:
-    """Pack shapes and poses into the rows that `jamshape._contact` takes.
-
-    Parameters
-    ----------
-    packing : Packing
-        Spherocylinders.
-
-    Returns
-    -------
-    (N, 6) array in 2D, (N, 8) in 3D, of float64
-        Centre, unit axis, half length, radius.
-
-    Raises
-    ------
-    ValueError
-        If the shape style is another one.
-    """
-    if packing.shape_style != "spherocylinder":
-        msg = f"shape style is {packing.shape_style!r}, expected 'spherocylinder'"
-        raise ValueError(msg)
-    return np.column_stack([packing.position, packing.axes, packing.half_length, packing.radius])
-
-
-def superellipsoid_bodies(packing: Packing) -> FloatArray:
-    """Pack shapes and poses of superellipsoids into the rows that `jamshape._contact` takes.
-
-    Returns
-    -------
-    (N, 6) array in 2D, (N, 11) in 3D, of float64
-        Centre, angle or quaternion, D semi-axes, exponent.
-    """
-    axes = packing.diameters[:, : packing.dimension] / 2
-    return np.column_stack([packing.position, packing.orientation, axes, packing.exponent])
-
-
-def spheres(position: FloatArray, radius: FloatArray) -> FloatArray:
-    """(N, D + 2) rows for `near_pairs` that are spheres (discs) of these radii."""
-    return np.column_stack([position, np.zeros(len(radius)), radius])
-
-
-def near_pairs(first: FloatArray, second: FloatArray, box: Box) -> NearPairs:
-    """Find all pairs whose bounding spheres overlap, with all periodic images.
-
-    Parameters
-    ----------
-    first, second : (M, ...) array of float64
-        Rows of `bodies` or `spheres`, anywhere, in the box or not: the centre first, and last two lengths
-        whose sum is the radius of the bounding sphere.
-    box : Box
-        Of any size; a pair is there several times when it is shorter than the bodies.
-
-    Returns
-    -------
-    NearPairs
-        In no particular order; a row of `first` that also stands in `second` meets itself.
-    """
-    D, edges = box.dimension, box.edges
-    turns = [np.floor((rows[:, :D] - box.lo) / edges).astype(np.int64) for rows in (first, second)]
-    inside = [
-        rows[:, :D] - box.lo - turn * edges
-        for rows, turn in zip((first, second), turns, strict=True)
-    ]
-    bounds = [(1 + _BOUNDING_MARGIN) * rows[:, -2:].sum(axis=1) for rows in (first, second)]
-    reach = bounds[0].max(initial=0) + bounds[1].max(initial=0)
-    owner, shift = _images_near_box(inside[1], edges, reach)
-    near = cKDTree(inside[0]).sparse_distance_matrix(
-        cKDTree(inside[1][owner] + shift * edges), reach, output_type="ndarray"
-    )
-    i, j = near["i"], owner[near["j"]]
-    keep = near["v"] < bounds[0][i] + bounds[1][j]
-    i, j, shift = i[keep], j[keep], shift[near["j"][keep]]
-    return NearPairs(i, j, shift + turns[0][i] - turns[1][j])
-
-
-def each_once(near: NearPairs) -> NearPairs:
-    """Of the `near_pairs` of bodies among themselves, keep one of (i, j) and (j, i), and sort.
-
-    Returns
-    -------
-    NearPairs
-        i <= j, ascending; of a body and its own images one of each two that are opposite.
-    """
-    i, j, shift = near
-    leading = np.take_along_axis(shift, np.argmax(shift != 0, axis=1)[:, None], axis=1)[:, 0]
-    near = near.take((i < j) | ((i == j) & (leading > 0)))
-    return near.take(np.lexsort((*near.shift.T[::-1], near.second, near.first)))
-
-
-def shifted(rows: FloatArray, shift: IntArray, box: Box) -> FloatArray:
-    """Move rows (M, ...), whose first D columns are positions, by (M, D) box edges."""
-    D = box.dimension
-    return np.column_stack([rows[:, :D] + shift * box.edges, rows[:, D:]])
-
-
 def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> ContactNetwork:
     """Find all contacts, with all periodic images in reach.
 
@@ -249,9 +129,9 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
     packing : Packing
         Positions need not lie in the box.
     k_e : float, [energy]
-        The epsilon of superellipsoids.
     sides : {1, 2}
-        Bonds of a side-to-side contact of spherocylinders: one in the dynamics, two for minima and modes.
+        Bonds of a side-to-side contact, of shapes that have both laws: one in the dynamics, two for
+        minima and modes.
 
     Returns
     -------
@@ -259,38 +139,35 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
 
     Raises
     ------
+    CrossingError
+        If what must not cross of two particles does.
     ValueError
-        If two spines or centres cross, a contact did not converge, or an argument is out of its
-        range.
-    """
-    are_rods = packing.shape_style == "spherocylinder"
-    rows = bodies(packing) if are_rods else superellipsoid_bodies(packing)
-    bounds = rows if are_rods else spheres(packing.position, outer_radius(packing))
-    near = each_once(near_pairs(bounds, bounds, packing.box))
-    i, j = rows[near.first], shifted(rows[near.second], near.shift, packing.box)
-    if are_rods:
-        found = _contact.spherocylinder_contacts(i, j, k_e, sides)
-        found["bond_reach"] = np.repeat((i[:, -1] + j[:, -1])[:, None], 2, axis=1)
-    else:
-        found = _with_slots(_contact.superellipsoid_contacts(i, j, k_e))
-    _refuse_crossing(packing, near, found["status"])
-    _refuse_unconverged(packing, near, found["status"])
+        If a contact did not converge, or an argument is out of its range.
 
-    touching = found["status"] == _TOUCHING
-    i, j, near = i[touching], j[touching], near.take(touching)
-    found = {name: values[touching] for name, values in found.items()}
-    D = packing.dimension
+    Examples
+    --------
+    >>> from jamshape.contacts import find_contacts
+    >>> from jamshape.protocols.random_start import random_packing
+    >>> len(find_contacts(random_packing(n=10, phi=0.3, seed=1)).pairs)
+    0
+    """
+    bodies, state = packing.compiled(Interaction(k_e, sides)), State.of(packing)
+    near = near_particles(packing, bodies)
+    found = bodies.contacts(*PairArrays.of(state, near))
+    near = near.take(found["pair"])
+    refuse_crossing(packing, bodies.core, near.take(found["status"] == _CROSSING))
+    refuse_unconverged(packing, near.take(found["status"] == _UNCONVERGED))
     return ContactNetwork(
         pairs=np.column_stack([near.first, near.second]),
         shift=near.shift,
-        separation=i[:, :D] - j[:, :D],
+        separation=_separation(state, near),
         kind=found["kind"].astype(np.int64),
         n_bonds=found["n_bonds"].astype(np.int64),
         energy=found["energy"],
         force=found["force"],
         torque_i=_rotation(found["torque_i"]),
         torque_j=_rotation(found["torque_j"]),
-        bonds=_bonds(found, i),
+        bonds=_bonds(found, packing.position[near.first]),
     )
 
 
@@ -318,90 +195,43 @@ def sum_forces(packing: Packing, network: ContactNetwork) -> Forces:
     )
 
 
-def find_rattlers(packing: Packing, network: ContactNetwork) -> BoolArray:
-    """Flag the particles that no contacts hold in place.
+def refuse_crossing(packing: Packing, core: str, crossing: NearPairs) -> None:
+    """Refuse pairs of which there must be none, whose `core` crosses.
 
-    Marschall & Teitel 2018, Sec. III C: fewer than two contacts, or two unless on opposite flat
-    sides; repeated until none is left. In 3D fewer than four contacts.
-
-    Returns
-    -------
-    (N,) array of bool
+    Raises
+    ------
+    CrossingError
     """
-    bonds = network.bonds
-    normals = np.zeros((len(network.pairs), 3))
-    flat = np.repeat((network.kind == ContactKind.SIDE_TO_SIDE)[:, None], 2, axis=1)
-    first_bond = np.searchsorted(bonds.contact, np.arange(len(normals)))
-    normals[:, : packing.dimension] = bonds.normal[first_bond]
-    np.logical_or.at(flat, bonds.contact, bonds.on_side)
-    return _contact.find_rattlers(packing.n, packing.dimension, network.pairs, normals, flat)
-
-
-def coordination(packing: Packing, network: ContactNetwork) -> Coordination:
-    """Count bonds and contacts per particle, without rattlers and their contacts.
-
-    In the plane a side-to-side contact is two bonds, also where `find_contacts` was asked for one;
-    in 3D bonds are counted as they are, since skew rods touch side to side at one point.
-
-    Returns
-    -------
-    Coordination
-        With z = 0 where all particles are rattlers.
-    """
-    rattlers = find_rattlers(packing, network)
-    held = ~rattlers[network.pairs].any(axis=1)
-    bonds = network.n_bonds[held]
-    if packing.dimension == 2:
-        bonds = np.where(network.kind[held] == ContactKind.SIDE_TO_SIDE, 2, bonds)
-    n_particles, n_bonds, n_contacts = int((~rattlers).sum()), int(bonds.sum()), int(held.sum())
-    per_particle = 2 / max(n_particles, 1)
-    return Coordination(
-        z=per_particle * n_bonds,
-        z_single=per_particle * n_contacts,
-        n_rattlers=int(rattlers.sum()),
-        n_bonds=n_bonds,
-        n_contacts=n_contacts,
-    )
-
-
-def _images_near_box(
-    inside: FloatArray, edges: FloatArray, reach: float
-) -> tuple[IntArray, IntArray]:
-    """List all images of points in [0, edges) within `reach` of it: their owner, their shift."""
-    owner = np.arange(len(inside))
-    shift = np.zeros((len(inside), 0), dtype=np.int64)
-    for d, edge in enumerate(edges):
-        turns = np.arange(-np.ceil(reach / edge), np.ceil(reach / edge) + 1, dtype=np.int64)
-        coordinate = inside[owner, d, None] + turns * edge
-        row, column = np.nonzero((coordinate > -reach) & (coordinate < edge + reach))
-        owner, shift = owner[row], np.column_stack([shift[row], turns[column]])
-    return owner, shift
-
-
-def _refuse_crossing(packing: Packing, near: NearPairs, status: NDArray[np.int32]) -> None:
-    crossing = np.flatnonzero(status == _CROSSING)
-    if len(crossing):
-        first, second = packing.id[near.first[crossing[0]]], packing.id[near.second[crossing[0]]]
+    n = len(crossing.first)
+    if n:
+        first, second = packing.id[crossing.first[0]], packing.id[crossing.second[0]]
+        more = f" (1 of {n} such pairs)" if n > 1 else ""
         msg = (
-            f"the {_CORE[packing.shape_style]} of particles {first} and {second} cross (1 of {len(crossing)} such"
-            " pairs), expected overlaps smaller than the particles; take a packing without crossings"
+            f"the {core} of particles {first} and {second} cross{more}, expected overlaps smaller than"
+            " the particles; start from a state without crossings"
+        )
+        raise CrossingError(msg)
+
+
+def refuse_unconverged(packing: Packing, failed: NearPairs) -> None:
+    """Refuse pairs whose contact is ContactStatus::UNCONVERGED.
+
+    Raises
+    ------
+    ValueError
+    """
+    if len(failed.first):
+        first, second = packing.id[failed.first[0]], packing.id[failed.second[0]]
+        msg = (
+            f"the contact of particles {first} and {second} did not converge; use semi-axes within a"
+            " factor 100 and exponents from 0.55 to 10"
         )
         raise ValueError(msg)
 
 
-def _refuse_unconverged(packing: Packing, near: NearPairs, status: NDArray[np.int32]) -> None:
-    failed = np.flatnonzero(status == _UNCONVERGED)
-    if len(failed):
-        first, second = packing.id[near.first[failed[0]]], packing.id[near.second[failed[0]]]
-        raise ValueError(unconverged_sentence(first, second))
-
-
-def unconverged_sentence(first: int, second: int) -> str:
-    """Say what happened to two particles whose contact is ContactStatus::UNCONVERGED."""
-    return (
-        f"the contact of particles {first} and {second} did not converge; use semi-axes within a factor"
-        " 100 and exponents from 0.55 to 10"
-    )
+def _separation(state: State, near: NearPairs) -> FloatArray:
+    x, shift = state.position, near.shift * state.edges
+    return np.asarray(x[near.first] - x[near.second] - shift, np.float64)
 
 
 def _rotation(torque: FloatArray) -> FloatArray:
@@ -409,27 +239,7 @@ def _rotation(torque: FloatArray) -> FloatArray:
     return torque[:, 0] if torque.shape[1] == 1 else torque
 
 
-def outer_radius(packing: Packing) -> FloatArray:
-    """(N,) radii of the spheres around the particles, [length]."""
-    if packing.shape_style == "spherocylinder":
-        return packing.half_length + packing.radius
-    radius: FloatArray = _contact.superellipsoid_bounding_radius(
-        packing.diameters, packing.exponent, packing.dimension
-    )
-    return radius
-
-
-def _with_slots(found: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Give contacts of one bond the arrays (M, slots, ...) of those that may have more."""
-    one = {n: v[:, None] if n.startswith("bond_") else v for n, v in found.items()}
-    nowhere = np.zeros((len(found["status"]), 1), bool)
-    one |= {"bond_on_side_i": nowhere, "bond_on_side_j": nowhere}
-    one |= {"bond_force": found["force"][:, None], "bond_energy": found["energy"][:, None]}
-    n_bonds = (found["status"] == _TOUCHING).astype(np.int64)
-    return one | {"n_bonds": n_bonds, "kind": np.zeros_like(n_bonds)}
-
-
-def _bonds(found: dict[str, NDArray[Any]], i: FloatArray) -> Bonds:
+def _bonds(found: dict[str, NDArray[Any]], position: FloatArray) -> Bonds:
     slots = found["bond_distance"].shape[1]
     contact, slot = np.nonzero(np.arange(slots) < found["n_bonds"][:, None])
 
@@ -440,9 +250,9 @@ def _bonds(found: dict[str, NDArray[Any]], i: FloatArray) -> Bonds:
         contact=contact,
         normal=column("normal"),
         force=column("force"),
-        point=i[contact, : found["force"].shape[1]] + column("arm_i"),
+        point=position[contact] + column("arm_i"),
         distance=column("distance"),
         reach=column("reach"),
         energy=column("energy"),
-        on_side=np.column_stack([column("on_side_i"), column("on_side_j")]),
+        on_side=column("on_side"),
     )

@@ -5,8 +5,8 @@ Numbers are written with 17 significant digits and read back to the last bit. Tw
 goes through its quaternion, and an edge of the box, which goes through its upper end (and is
 exact where the lower corner is 0 or half an edge below it).
 
-Neither format names the shape style: diameters that can be those of spherocylinders are taken as
-such; use ``packing.with_(shape_style="superellipsoid")`` for superellipsoids.
+Neither format names the shape style: the first shape of `jamshape.shapes.table` that can have such
+diameters is taken; use ``packing.with_(shape_style=...)`` for another one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.h5md import HDF5_SIGNATURE, FileFormatError, PathLike, read_packing, replacing
-from jamshape.packing import Box, Packing, angle_from_quaternion, guess_shape_style
+from jamshape.packing import Box, Packing, angle_from_quaternion
+from jamshape.shapes.table import guess_shape_style
 
 _PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional file
 _POSITION = ("x", "y", "z")

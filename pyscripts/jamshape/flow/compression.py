@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from jamshape.files.h5md import RunWriter, read_attributes, read_observables, read_series
-from jamshape.measures.onset import fit_onset
 from jamshape.packing import Packing
+from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from jamshape.lammps.session import Session
 
 # Columns of `compute packing` and elements of `fix overdamped/affine`, as their doc comments list them.
 _PACKING = {
-    "phi": 0, "u": 1, "p": 2, "z": 3, "S_2": 4, "S_4": 5, "fmax": 6, "frms": 7,
+    "phi": 0, "u": 1, "pressure": 2, "z": 3, "S_2": 4, "S_4": 5, "fmax": 6, "frms": 7,
     "z_single": 8, "rattlers": 9, "bonds": 10, "overlap": 11, "tmax": 12,
 }  # fmt: skip
 _FLOW = {"strain": 1, "lambda_max": 2, "dt_max": 3, "evaluations": 5, "step_error": 7}
@@ -84,15 +83,15 @@ class Compression:
         """Whether the integrator divides the time step as accuracy asks."""
         return self.integrator != "heun"
 
-    def in_steps(self, phi: float, steps: int) -> Compression:
+    def in_steps(self, phi: float, steps: int, dimension: int = 2) -> Compression:
         """Return the same with a time step of which so many lead from `phi` to the end."""
-        strain = math.log(self.phi_end / phi) / 2
+        strain = math.log(self.phi_end / phi) / dimension
         return dataclasses.replace(self, dt=strain / (self.kappa * steps))
 
-    def steps(self, phi: float) -> int:
+    def steps(self, phi: float, dimension: int = 2) -> int:
         """Count the time steps from packing fraction `phi` to `phi_end`."""
         strain = math.log(self.phi_end / phi)
-        return max(0, math.ceil(strain / (2 * self.kappa * self.dt) - 1e-6))
+        return max(0, math.ceil(strain / (dimension * self.kappa * self.dt) - 1e-6))
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,9 @@ class CompressionRun:
         A fresh one.
     settings
     start
-        The state to begin with, or the path of a restart file of an earlier run.
+        The state to begin with; of an earlier run, any state of it.
+    restart
+        Restart file of an earlier run, to go on from.
     time
         Of that state; step times time step when left out.
 
@@ -128,30 +129,30 @@ class CompressionRun:
         self,
         session: Session,
         settings: Compression,
-        start: Packing | str | Path,
+        start: Packing,
+        restart: str | Path | None = None,
         time: float | None = None,
     ) -> None:
         self.session, self.settings = session, settings
         self._began = perf_counter()
         self._time, self._step_of_time = 0.0, 0
-        if isinstance(start, Packing):
+        if restart is None:
             session.load(start)
         else:
-            session.load_restart(start)
+            session.load_restart(restart, start)
         self._set_up()
         phi = self.measure()["phi"]
         if phi > settings.phi_end:
             msg = f"The state has phi = {phi:.6g}, expected one below phi_end = {settings.phi_end}."
             raise ValueError(msg)
-        self.last_step = session.step + settings.steps(phi)
+        self.last_step = session.step + settings.steps(phi, start.dimension)
         if time is not None:
             self._time, self._step_of_time = time, session.step
 
     def _set_up(self) -> None:
         s = self.settings
+        self.session.interact(Interaction(s.k_e, s.sides))
         self.session.commands(f"""
-            pair_style spherocylinder/harmonic sides {("one", "two")[s.sides - 1]}
-            pair_coeff * * {s.k_e!r}
             {self.session.neighbours()}
             {self._fix()}
             timestep {s.dt!r}
@@ -222,109 +223,3 @@ class CompressionRun:
     def packing(self) -> Packing:
         """Return the present state, sorted by ID."""
         return self.session.packing(self.time)
-
-
-@dataclass(frozen=True)
-class Recording:
-    """What a compression leaves in its H5MD file.
-
-    Parameters
-    ----------
-    path
-        The file; restart files lie beside it, as ``path.restart.a`` and ``.b``.
-    rows, frames
-        How many samples of the observables and how many snapshots, over the whole run.
-    attributes
-        Stored with the run, beside its settings: what made the initial state.
-    """
-
-    path: Path
-    rows: int = 400
-    frames: int = 20
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def restart_prefix(self) -> Path:
-        """Path of the restart files without their last letter."""
-        return self.path.with_name(self.path.name + ".restart")
-
-    def newest_restart(self) -> Path:
-        """Find the last restart file of a run that was killed.
-
-        Raises
-        ------
-        FileNotFoundError
-            When there is none.
-        """
-        paths = [Path(f"{self.restart_prefix}.{end}") for end in "ab"]
-        found = [path for path in paths if path.is_file()]
-        if not found:
-            msg = f"Found neither {paths[0]} nor {paths[1].name}, expected one: start anew."
-            raise FileNotFoundError(msg)
-        return max(found, key=lambda path: path.stat().st_mtime)
-
-
-def is_finished(path: Path) -> bool:
-    """Whether the file holds a compression that reached its end."""
-    return path.exists() and bool(read_attributes(path).get("finished"))
-
-
-def begin(session: Session, settings: Compression, start: Packing, to: Recording) -> CompressionRun:
-    """Start a compression and its file."""
-    run = CompressionRun(session, settings, start)
-    attributes = dataclasses.asdict(settings) | dict(to.attributes)
-    attributes |= {"phi_start": start.phi, "rows": to.rows, "frames": to.frames, "finished": False}
-    attributes["left_out"] = session.left_out()
-    RunWriter.create(to.path, run.packing(), attributes, run.measure())
-    return run
-
-
-def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
-    """Go on with a compression that was killed, from its last restart file, as it was set."""
-    stored = read_attributes(path)
-    names = {f.name for f in dataclasses.fields(Compression)} & set(stored)
-    settings = Compression(**{name: stored[name] for name in names})
-    to = Recording(path, int(stored["rows"]), int(stored["frames"]))
-    run = CompressionRun(session, settings, to.newest_restart())
-    RunWriter.open(path).truncate(session.step)
-    return run, to
-
-
-def record(run: CompressionRun, to: Recording) -> Iterator[Row]:
-    """Run to the end, writing each sample to the file before it is yielded."""
-    writer = RunWriter.open(to.path)
-    whole = run.settings.steps(float(read_attributes(to.path)["phi_start"]))
-    every = max(1, whole // to.rows)
-    per_frame = every * max(1, to.rows // to.frames)
-    name_of_error = "local_error" if run.settings.chooses_steps else "step_error"
-    run.keep_restarts(per_frame, to.restart_prefix)
-
-    def keep(sample: Row) -> Row:
-        if sample.step % per_frame == 0 or sample.step == run.last_step:
-            writer.append(run.packing(), sample.observables)
-        else:
-            writer.append_observables(sample.step, sample.time, sample.observables)
-        error = sample.observables[name_of_error]
-        writer.append_report(sample.step, sample.wall_seconds, error)
-        return sample
-
-    # A restart file is older than the row of its step, which a kill may have cut off.
-    if run.session.step > read_series(to.path, "p").step[-1]:
-        yield keep(run.sample())
-    for sample in run.samples(every):
-        yield keep(sample)
-    writer.set_attributes({"finished": True})
-
-
-def summary(path: Path) -> dict[str, object]:
-    """Summarise a run: its end and, where the pressure rises, the onset of jamming."""
-    observables = read_observables(path)
-    last: dict[str, object] = {
-        name: float(observables[name][-1]) for name in ("phi", "p", "z", "S_2", "S_4")
-    }
-    last["left_out"] = read_attributes(path).get("left_out", "")
-    try:
-        fit = fit_onset(observables["phi"], observables["p"])
-    except ValueError:  # the run ends below jamming
-        return {"out": str(path), **last, "phi_J": None}
-    return {"out": str(path), **last, "phi_J": fit.phi_J, "phi_J_error": fit.phi_J_error}

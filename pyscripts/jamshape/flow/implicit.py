@@ -17,12 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jamshape import _contact
 from jamshape.arrays import FloatArray
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
 from jamshape.landscape.newton import Factorisation
 from jamshape.landscape.vicinity import Stage, Units, Vicinity
-from jamshape.packing import Packing
 
 # Stages are solved to this fraction of the local error that is allowed. Ten times as much leaves velocities on kinks
 # that have the next steps rejected: packings of nearly round rods then cost ten times as many.
@@ -200,7 +198,7 @@ class Step(NamedTuple):
     time: float
     strain: float
     phi: float
-    p: float
+    pressure: float
     u: float
     dt: float
     error: float
@@ -266,16 +264,19 @@ def drag_coefficients(landscape: Landscape, k_d: float = 1.0) -> FloatArray:
     if packing.dimension != 2:
         msg = f"the packing has {packing.dimension} dimensions, expected 2"
         raise ValueError(msg)
-    measure, moment = _drag(packing)
+    measure, moment = landscape.bodies.measure, landscape.bodies.moment
     length = np.where(landscape.rotation_length > 0, landscape.rotation_length, 1.0)
     turning = measure * moment[:, 2] / length**2
     return k_d * landscape.coordinates(np.column_stack([measure, measure, turning]))
 
 
-def _drag(packing: Packing) -> tuple[FloatArray, FloatArray]:
-    if packing.shape_style == "spherocylinder":
-        return _contact.spherocylinder_drag(packing.half_length, packing.radius, 2)
-    return _contact.superellipsoid_drag(packing.diameters, packing.exponent, 2)
+class _Trial(NamedTuple):
+    """A step to be tried."""
+
+    dt: float
+    clipped: bool
+    """Whether it ends where the rate does."""
+    explicit: bool
 
 
 class _Attempt(NamedTuple):
@@ -319,54 +320,74 @@ class _Run:
             self._begin(here)
         longest = 0.5 * math.log(phi_end / self.phi) / self.kappa
         while True:
-            dt = min(flow.dt, self.protocol.largest_strain / self.kappa)
-            clipped = dt >= 0.999 * longest
-            dt = longest if clipped else dt
-            explicit = flow.explicit_left > 0 or dt < self._stable
-            if explicit:
-                dt, clipped = min(dt, self._stable), False
-            if explicit and here is flow._here:
+            trial = self._next_trial(longest)
+            if trial.explicit and here is flow._here:
                 here = self._evaluated()
-            attempt = self._tried(dt, explicit, here)
+            attempt = self._tried(trial.dt, trial.explicit, here)
             if attempt is None:
-                self._refuse_crossing(dt)
-                flow.rejected += 1
-                flow.held = _HELD
-                flow.dt = _RETREAT * dt
-                flow._factors = None
-                if flow.dt < self._stable:
-                    flow.explicit_left = _EXPLICIT_IN_A_ROW
-                continue
-            error = attempt.error
-            relative = error / self.protocol.tolerance
-            order = _HEUN_EULER.order_of_error if explicit else self._method.order_of_error
-            growth = _SAFETY * max(relative, 1e-10) ** (-1 / order)
-            growth = min(max(growth, _LEAST_GROWTH), _LARGEST_GROWTH)
-            is_least = explicit and dt <= _LEAST_STEP * self._stable
-            if not is_least and self._falls_too_far(attempt.evaluation, here):
-                flow.rejected += 1
-                flow.held = _HELD
-                flow.dt = _FALLING * dt
-                continue
-            if relative <= 1 or is_least:
+                self._retreat(trial.dt)
+            elif self._is_good(trial, attempt, here):
                 break
+        self._plan(trial, attempt.error)
+        self._accept(attempt, trial.dt)
+        return attempt.evaluation, attempt.error, trial.dt
+
+    def _next_trial(self, longest: float) -> _Trial:
+        """Choose the step to try, not beyond the end of this rate."""
+        flow = self.flow
+        dt = min(flow.dt, self.protocol.largest_strain / self.kappa)
+        clipped = dt >= 0.999 * longest
+        dt = longest if clipped else dt
+        explicit = flow.explicit_left > 0 or dt < self._stable
+        if explicit:
+            dt, clipped = min(dt, self._stable), False
+        return _Trial(dt, clipped, explicit)
+
+    def _retreat(self, dt: float) -> None:
+        """Shorten the step after one without a solution."""
+        self._refuse_crossing(dt)
+        flow = self.flow
+        flow.rejected += 1
+        flow.held = _HELD
+        flow.dt = _RETREAT * dt
+        flow._factors = None
+        if flow.dt < self._stable:
+            flow.explicit_left = _EXPLICIT_IN_A_ROW
+
+    def _is_good(self, trial: _Trial, attempt: _Attempt, here: Evaluation) -> bool:
+        """Whether to accept an attempt; if not, shorten the step."""
+        flow, relative = self.flow, attempt.error / self.protocol.tolerance
+        is_least = trial.explicit and trial.dt <= _LEAST_STEP * self._stable
+        if not is_least and self._falls_too_far(attempt.evaluation, here):
             flow.rejected += 1
-            # Contacts that open or close within the step leave errors of first order.
-            flow.dt = dt * max(_SAFETY / relative, _LEAST_GROWTH)
+            flow.held = _HELD
+            flow.dt = _FALLING * trial.dt
+            return False
+        if relative <= 1 or is_least:
+            return True
+        flow.rejected += 1
+        # Contacts that open or close within the step leave errors of first order.
+        flow.dt = trial.dt * max(_SAFETY / relative, _LEAST_GROWTH)
+        return False
+
+    def _plan(self, trial: _Trial, error: float) -> None:
+        """Choose the size of the next step."""
+        flow, relative = self.flow, error / self.protocol.tolerance
+        order = _HEUN_EULER.order_of_error if trial.explicit else self._method.order_of_error
+        growth = _SAFETY * max(relative, 1e-10) ** (-1 / order)
+        growth = min(max(growth, _LEAST_GROWTH), _LARGEST_GROWTH)
         if flow.held > 0:
             flow.held -= 1
             growth = min(growth, 1.0)
-        if explicit:
+        if trial.explicit:
             flow.explicit += 1
             flow.explicit_left = max(flow.explicit_left - 1, 0)
             if flow.explicit_left == 0 and growth > 1:
-                growth = max(growth, 4 * self._stable / dt)
-        if not (clipped and growth > 1):
-            flow.dt = dt * growth
+                growth = max(growth, 4 * self._stable / trial.dt)
+        if not (trial.clipped and growth > 1):
+            flow.dt = trial.dt * growth
         else:
-            flow.dt = max(flow.dt, dt)
-        self._accept(attempt, dt)
-        return attempt.evaluation, error, dt
+            flow.dt = max(flow.dt, trial.dt)
 
     def _evaluated(self) -> Evaluation:
         """Evaluate the present state."""

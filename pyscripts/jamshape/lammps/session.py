@@ -12,11 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jamshape.files.lammps_text import write_data
-from jamshape.packing import Box, Packing, angle_from_quaternion, guess_shape_style
+from jamshape.packing import Box, Packing, angle_from_quaternion
+from jamshape.shapes.shape import Interaction
+from jamshape.shapes.table import guess_shape_style
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import TracebackType
+
+    from jamshape.arrays import FloatArray, IntArray
 
 # Styles need a dimension and an atom style before the state; a restart file brings both.
 _ATOMS = "units lj\natom_style ellipsoid\natom_modify map array"
@@ -84,6 +88,7 @@ class Session:
                 "use a Python that sees system packages."
             )
             raise PluginError(msg) from error
+        self._like: Packing | None = None
         plugin = plugin_path()
         options = ["-nocite", "-log", str(log) if log else "none"]
         self._complaints: subprocess.Popen[bytes] | None = None
@@ -127,22 +132,37 @@ class Session:
         return str(function(self.lmp.lmp).decode())
 
     def load(self, packing: Packing) -> None:
-        """Read a packing into a fresh instance."""
+        """Read a packing into a fresh instance; LAMMPS types are those of `Shape.style`."""
         self.commands(f"{_ATOMS}\ndimension {packing.dimension}")
+        self._like = packing
+        types = packing.shape.style(packing, Interaction()).types
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "start.data"
-            write_data(path, packing)
+            write_data(path, packing.with_(species=types))
             self.commands(f"read_data {path}")
         self.commands(_POSES)
 
-    def load_restart(self, path: str | Path) -> None:
-        """Read a restart file into a fresh instance."""
+    def load_restart(self, path: str | Path, like: Packing | None = None) -> None:
+        """Read a restart file into a fresh instance, of the particles of a packing."""
+        self._like = like
         self.commands(f"{_ATOMS}\nread_restart {path}\n{_POSES}")
+
+    def interact(self, law: Interaction) -> None:
+        """Set the pair style of the particles that were loaded."""
+        self.commands(self._loaded.shape.style(self._loaded, law).commands)
+
+    @property
+    def _loaded(self) -> Packing:
+        if self._like is None:
+            msg = "no packing was loaded, expected one (Session.load) before this"
+            raise ValueError(msg)
+        return self._like
 
     def packing(self, time: float = 0.0) -> Packing:
         """Return the present state, sorted by ID, with the time that it is told.
 
-        Shapes are guessed from diameters, as of files, and exponents are not known.
+        Shapes, exponents and species are those of the packing that was loaded; without one, shapes are
+        guessed from diameters, as of files.
         """
         lmp = self.lmp
         n = lmp.get_natoms()
@@ -157,14 +177,21 @@ class Session:
             position=rows("x", 1, 3)[:, :d],
             orientation=angle_from_quaternion(quaternion) if d == 2 else quaternion,
             diameters=diameters,
-            shape_style=guess_shape_style(diameters),
-            species=rows("type", 0, 1)[:, 0],
+            **self._known(diameters, rows("type", 0, 1)[:, 0]),
             id=np.arange(1, n + 1),
             image=rows("image", 0, 3)[:, :d],
             box=Box(np.array(lo[:d]), np.array(hi[:d]) - np.array(lo[:d])),
             step=self.step,
             time=time,
         )
+
+    def _known(self, diameters: FloatArray, types: IntArray) -> dict[str, Any]:
+        """Give what LAMMPS does not know of its particles."""
+        if self._like is None:
+            return {"shape_style": guess_shape_style(diameters), "species": types}
+        like = self._like.sorted_by_id()
+        names = ("shape_style", "exponent", "species")
+        return {name: getattr(like, name) for name in names}
 
     def neighbours(self) -> str:
         """Input that sets the neighbour list up in the unit of length of the particles."""

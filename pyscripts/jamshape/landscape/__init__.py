@@ -1,29 +1,7 @@
 """Energy, gradient and Hessian of packings of any shape, and Newton steps on them."""
 
-from jamshape.landscape.landscape import (
-    CrossingError,
-    Curvature,
-    Evaluation,
-    Landscape,
-    Pairs,
-    State,
-)
+from jamshape.contacts import CrossingError
+from jamshape.landscape.landscape import Curvature, Evaluation, Landscape
+from jamshape.packing import State
 
-__all__ = [
-    "CrossingError",
-    "Curvature",
-    "Evaluation",
-    "Landscape",
-    "Pairs",
-    "State",
-]
-
-
-__all__ = [
-    "CrossingError",
-    "Curvature",
-    "Evaluation",
-    "Landscape",
-    "Pairs",
-    "State",
-]
+__all__ = ["CrossingError", "Curvature", "Evaluation", "Landscape", "State"]

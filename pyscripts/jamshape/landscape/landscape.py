@@ -1,103 +1,29 @@
 """The energy landscape of a packing: energy, forces and Hessian as functions of its coordinates.
 
-Coordinates are displacements and rotations of a `State`, in one vector. Angles enter it as lengths, A theta for
-spherocylinders (Marschall & Teitel 2018, Eq. 23), a times the three angles for superellipsoids (Yuan et
-al. 2019), so that all its components are alike; what no contact can turn, discs and spheres, has no
-rotation in it. Needs no LAMMPS.
+Coordinates are displacements and rotations of a `State`, in one vector. Angles enter it as lengths: A theta
+(Marschall & Teitel 2018, Eq. 23), or a times the three angles (Yuan et al. 2019), so that all its
+components are alike; what no contact can turn, discs and spheres, has no rotation in it. Needs no LAMMPS.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from jamshape import _contact
-from jamshape.arrays import FloatArray, IntArray, LongArray
-from jamshape.contacts import NearPairs, unconverged_sentence
-from jamshape.landscape.adapter import PairArrays, shape_of
-from jamshape.packing import Packing
+from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.contacts import PairArrays, Pairs, find_contacts, find_rattlers
+from jamshape.contacts.near import near_particles, nearer
+from jamshape.contacts.network import refuse_crossing, refuse_unconverged
+from jamshape.packing import Packing, State
+from jamshape.shapes.shape import Interaction
 
 # Pairs whose surfaces are closer than this fraction of the smallest radius are looked at; they are looked for among
 # those that are closer than so many times as much.
 _SKIN, _WIDE = 0.3, 5.0
-
-_TURN = 2 * np.arccos(np.longdouble(-1))
-
-
-class CrossingError(ValueError):
-    """Spines of two particles cross: their contact has no energy."""
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Poses of particles and the box, in extended precision.
-
-    A double has lost the last eight digits of an overlap of 1e-9 by the time it holds a position in a box
-    of 40; `numpy.longdouble` keeps them. Files hold each number as a double and its small rest.
-
-    Parameters
-    ----------
-    position : (N, D) array of longdouble, [length]
-    orientation : (N, 1) angles in 2D, (N, 4) quaternions w i j k in 3D, of longdouble
-    edges : (D,) array of longdouble, [length]
-    """
-
-    position: LongArray
-    orientation: LongArray
-    edges: LongArray
-
-    @classmethod
-    def of(cls, packing: Packing) -> State:
-        """Take the poses of a packing, its small rests included."""
-        position, orientation, edges = (np.asarray(x, np.longdouble) for x in packing.poses())
-        return cls(position, orientation.reshape(packing.n, -1), edges)
-
-    @cached_property
-    def split(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Position, orientation, edges, each (2, ...): doubles and their small rests."""
-        position, orientation, edges = map(_split, (self.position, self.orientation, self.edges))
-        return position, orientation, edges
-
-    @classmethod
-    def joined(cls, position: FloatArray, orientation: FloatArray, edges: FloatArray) -> State:
-        """Add doubles and their small rests, each array (2, ...) as `split` gives them."""
-        return cls(*(np.longdouble(x[0]) + x[1] for x in (position, orientation, edges)))
-
-    @property
-    def dimension(self) -> int:
-        """Number of dimensions, 2 or 3."""
-        return len(self.edges)
-
-    @property
-    def volume(self) -> float:
-        """Area in 2D, volume in 3D, [length^D]."""
-        return float(math.prod(self.edges))
-
-    def strained(self, strain: float) -> State:
-        """Scale box and positions by 1 + strain; rotations stay (Marschall & Teitel 2018, Eq. 20)."""
-        factor = 1 + np.longdouble(strain)
-        return replace(self, position=factor * self.position, edges=factor * self.edges)
-
-    def displaced(self, shift: FloatArray, turn: FloatArray) -> State:
-        """Add (N, D) displacements and (N, 1) or (N, 3) rotation vectors."""
-        if self.dimension == 2:
-            # Whole turns would cost digits: a nearly round particle may make thousands of them.
-            orientation = self.orientation + turn
-            orientation = orientation - _TURN * np.rint(orientation / _TURN)
-        else:
-            orientation = _turned(self.orientation, np.asarray(turn, np.longdouble))
-        return replace(self, position=self.position + shift, orientation=orientation)
-
-    def packing(self, like: Packing) -> Packing:
-        """Return the packing of these poses and of the particles of `like`."""
-        orientation = self.orientation[:, 0] if self.dimension == 2 else self.orientation
-        return like.with_poses(self.position, orientation, self.edges)
 
 
 class Evaluation(NamedTuple):
@@ -122,8 +48,6 @@ class Curvature(NamedTuple):
     """(n,) d(gradient)/d(strain)."""
     strain_hessian: float
     """Second derivative of the energy by the strain."""
-    rattlers: NDArray[np.bool_]
-    """(N,) particles that no contacts hold in place."""
 
 
 class Landscape:
@@ -134,9 +58,8 @@ class Landscape:
     packing : Packing
         Only the shapes of its particles are taken.
     k_e : float, [energy]
-        The epsilon of superellipsoids.
     sides : {1, 2}
-        Bonds of a side-to-side contact of spherocylinders; minima exist for 2 only.
+        Bonds of a side-to-side contact, of shapes that have both laws; minima exist for 2 only.
 
     Notes
     -----
@@ -145,20 +68,25 @@ class Landscape:
 
     def __init__(self, packing: Packing, k_e: float = 1.0, sides: int = 2) -> None:
         self.particles, self.k_e, self.sides = packing, k_e, sides
-        self.shape = shape_of(packing, k_e, sides)
+        self.bodies = packing.compiled(Interaction(k_e, sides))
         self.evaluations = 0
         self._pairs: Pairs | None = None
         self._wide: Pairs | None = None
 
-    @property
+    @cached_property
     def rotation_length(self) -> FloatArray:
         """(N,) lengths that a radian counts for: A, or a; 0 where nothing can turn."""
-        return self.shape.rotation_length
+        return np.asarray(self.bodies.rotation_length)
 
-    @property
+    @cached_property
     def inner_radius(self) -> FloatArray:
         """(N,) smallest lengths of the particles: R, or the shortest semi-axis."""
-        return self.shape.inner_radius
+        return np.asarray(self.bodies.inner_radius)
+
+    @cached_property
+    def turning_radius(self) -> FloatArray:
+        """(N,) how far a rotation by a radian moves a particle's surface at most."""
+        return np.asarray(self.bodies.turning_radius)
 
     @cached_property
     def length(self) -> float:
@@ -223,7 +151,7 @@ class Landscape:
         """
         self.evaluations += 1
         pairs = self.pairs_at(state)
-        found = self.shape.sums(self._arrays(state, pairs), extended=extended)
+        found = self.bodies.sums(*self._arrays(state, pairs), extended)
         self.refuse(pairs, found["crossing"], found["unconverged"])
         slope = -np.column_stack([found["force"], found["torque"] / self._length_or_1[:, None]])
         n_bonds = found["n_bonds"]
@@ -238,15 +166,9 @@ class Landscape:
     def refuse(self, pairs: Pairs, crossing: int, unconverged: int) -> None:
         """Raise as `evaluate` does for a pair that crosses or is unconverged, unless it is -1."""
         if crossing >= 0:
-            first, second = self.particles.id[pairs.particles[crossing]]
-            msg = (
-                f"the {self.shape.core} of particles {first} and {second} cross, expected overlaps smaller"
-                " than the particles; start from a state without crossings"
-            )
-            raise CrossingError(msg)
+            refuse_crossing(self.particles, self.bodies.core, pairs.near.take(np.array([crossing])))
         if unconverged >= 0:
-            first, second = self.particles.id[pairs.particles[unconverged]]
-            raise ValueError(unconverged_sentence(first, second))
+            refuse_unconverged(self.particles, pairs.near.take(np.array([unconverged])))
 
     def curvature(self, state: State, *, extended: bool = False) -> Curvature:
         """Evaluate all second derivatives; arguments and errors as `evaluate`."""
@@ -260,15 +182,22 @@ class Landscape:
         coupling = np.bincount(places.column[used], pulled[used], self.size).astype(np.float64)
         strain_hessian = float(np.einsum("ci,ci->", by_strain[:, :D], r))
         hessian = self._summed(blocks, places)
-        return Curvature(hessian, coupling, strain_hessian, self._rattlers(found))
+        return Curvature(hessian, coupling, strain_hessian)
+
+    def rattlers(self, state: State) -> BoolArray:
+        """(N,) particles that no contacts hold in place (`jamshape.contacts.find_rattlers`)."""
+        packing = state.packing(self.particles)
+        return find_rattlers(packing, find_contacts(packing, self.k_e, self.sides))
 
     def derivatives(self, state: State, *, extended: bool = False) -> dict[str, NDArray[Any]]:
-        """Give second derivatives contact by contact, as `Shape.derivatives`.
+        """Give second derivatives contact by contact, as the class of `jamshape._contact` does.
 
         Its rows `pair` are those of `particles`, an array (C, 2) that is added here.
         """
         pairs = self.pairs_at(state)
-        found = self.shape.derivatives(self._arrays(state, pairs), extended=extended)
+        found: dict[str, NDArray[Any]] = self.bodies.derivatives(
+            *self._arrays(state, pairs), extended
+        )
         found["particles"] = pairs.particles[found["pair"]]
         found["shift"] = pairs.shift[found["pair"]]
         return found
@@ -310,47 +239,40 @@ class Landscape:
         at = np.concatenate([row[used], diagonal]), np.concatenate([column[used], diagonal])
         return scipy.sparse.csc_matrix((values, at), shape=(n, n))
 
-    def _rattlers(self, found: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
-        n, D = self.particles.n, self.particles.dimension
-        normals = np.zeros((len(found["pair"]), 3))
-        normals[:, :D] = found["gradient"][:, 0, :D]
-        flat = found["on_side"].any(axis=1) | (found["n_bonds"] == 2)[:, None]
-        return _contact.find_rattlers(n, D, found["particles"], normals, flat)
-
     def _arrays(self, state: State, pairs: Pairs) -> PairArrays:
         return PairArrays(*state.split, pairs.particles, pairs.shift)
 
     def pairs_at(self, state: State) -> Pairs:
         """Give the pairs that may touch at a state: the list that there is, or a new one."""
-        if self._pairs is None or self._pairs.outrun_by(state, self.shape.turning_radius):
+        if self._pairs is None or self._pairs.outrun_by(state, self.turning_radius):
             return self.renewed_pairs(state)
         return self._pairs
 
     def renewed_pairs(self, state: State) -> Pairs:
         """Find the pairs that may touch at a state, among those of a wider skin, which hold for longer."""
-        wide, packing = self.wide_pairs(state), state.packing(self.particles)
-        near = self.shape.nearer(packing, wide.near, self.skin)
+        wide = self.wide_pairs(state)
+        near = nearer(state, self.bodies, wide.near, self.skin)
         self._pairs = Pairs.of(near, state, self.skin, self._reach)
         return self._pairs
 
     def wide_pairs(self, state: State) -> Pairs:
         """Give the pairs of a wider skin, as long as all that may touch at a state are among them."""
         wide = self._wide
-        if wide is None or wide.outrun_by(state, self.shape.turning_radius, self.skin):
+        if wide is None or wide.outrun_by(state, self.turning_radius, self.skin):
             skin = _WIDE * self.skin
-            near = self.shape.near(state.packing(self.particles), skin)
+            near = near_particles(state.packing(self.particles), self.bodies, skin)
             wide = self._wide = Pairs.of(near, state, skin, self._reach)
         return wide
 
     @cached_property
     def skin(self) -> float:
         """How close the surfaces of pairs are that may touch, [length]."""
-        return _SKIN * float(self.shape.inner_radius.min())
+        return _SKIN * float(self.inner_radius.min())
 
     @cached_property
     def _reach(self) -> float:
         """How far apart the centres of touching particles may be."""
-        return 2 * float(self.shape.outer_radius.max())
+        return 2 * float(self.bodies.outer_radius.max())
 
 
 class _Places(NamedTuple):
@@ -370,69 +292,3 @@ def _contracted(found: dict[str, NDArray[Any]]) -> FloatArray:
     bonds = np.einsum("cb,cbi,cbj->cij", found["stiffness"], gradient, gradient)
     total: FloatArray = bonds + found["curvature"]
     return total
-
-
-@dataclass(frozen=True, eq=False)
-class Pairs:
-    """Pairs of particles whose surfaces were closer than a skin at a state."""
-
-    particles: IntArray
-    """(M, 2)"""
-    shift: IntArray
-    """(M, D) box edges to add to the second."""
-    then: State
-    skin: float
-    reach: float
-    """How far apart their centres may be."""
-
-    @classmethod
-    def of(cls, near: NearPairs, state: State, skin: float, reach: float) -> Pairs:
-        """Of surfaces that are closer than a skin, and centres than a reach beside that skin."""
-        pairs = np.column_stack([near.first, near.second])
-        return cls(pairs, near.shift, state, skin, reach + skin)
-
-    @property
-    def near(self) -> NearPairs:
-        """As the functions of `contacts` take them."""
-        return NearPairs(self.particles[:, 0], self.particles[:, 1], self.shift)
-
-    def outrun_by(self, now: State, turning_radius: FloatArray, kept: float = 0.0) -> bool:
-        """Whether two surfaces may have come closer by `skin`, or by what is left of it."""
-        position, orientation, edges = (part[0] for part in now.split)
-        position_then, orientation_then, edges_then = (part[0] for part in self.then.split)
-        scale = edges / edges_then
-        left = self.skin - kept - float(np.abs(scale - 1).max()) * self.reach
-        moved = np.sqrt(((position - scale * position_then) ** 2).sum(axis=1))
-        turn = orientation - orientation_then
-        if now.dimension == 2:
-            turned = np.abs(turn - 2 * np.pi * np.rint(turn / (2 * np.pi)))[:, 0]
-        else:  # the chord of the quaternions is half of the angle, or a little less
-            turned = 2.3 * np.sqrt((turn**2).sum(axis=1))
-        return bool(2 * (moved + turning_radius * turned).max(initial=0.0) >= left)
-
-
-def _split(values: LongArray) -> FloatArray:
-    """(2, ...) a double and its small rest."""
-    double = values.astype(np.float64)
-    return np.stack([double, (values - double).astype(np.float64)])
-
-
-def _turned(quaternion: LongArray, vector: LongArray) -> LongArray:
-    """Turn (N, 4) quaternions by (N, 3) rotation vectors, in space coordinates."""
-    angle = np.sqrt((vector**2).sum(axis=1, keepdims=True))
-    axis = vector / np.where(angle > 0, angle, 1)
-    half = np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=1)
-    product = _product(half, quaternion)
-    unit: LongArray = product / np.sqrt((product**2).sum(axis=1, keepdims=True))
-    return unit
-
-
-def _product(p: ArrayLike, q: ArrayLike) -> LongArray:
-    pw, pi, pj, pk = np.asarray(p, np.longdouble).T
-    qw, qi, qj, qk = np.asarray(q, np.longdouble).T
-    return np.column_stack([
-        pw * qw - pi * qi - pj * qj - pk * qk,
-        pw * qi + pi * qw + pj * qk - pk * qj,
-        pw * qj - pi * qk + pj * qw + pk * qi,
-        pw * qk + pi * qj - pj * qi + pk * qw,
-    ])  # fmt: skip

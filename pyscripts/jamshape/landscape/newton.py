@@ -12,6 +12,11 @@ from jamshape import _contact
 from jamshape.arrays import FloatArray
 from jamshape.landscape import Landscape
 
+# A Newton step moves no particle by more than this fraction of the smallest radius, and turns none
+# by more than this angle.
+LONGEST_STEP = 0.1
+WIDEST_TURN = 0.2
+
 # The smallest shift, over the largest diagonal element.
 LEAST_SHIFT: float = _contact.LEAST_SHIFT
 

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 from jamshape import _contact
 from jamshape.arrays import FloatArray
-from jamshape.landscape import Evaluation, Landscape, Pairs, State
-from jamshape.landscape.adapter import Coordinates
-from jamshape.landscape.newton import Factorisation
-from jamshape.minima.minimise import LONGEST_STEP, WIDEST_TURN
+from jamshape.contacts import Pairs
+from jamshape.landscape.landscape import Evaluation, Landscape
+from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, Factorisation
+from jamshape.packing import State
 
 # Force, energy and length in which errors of displacements are measured.
 Units = _contact.StageUnits
@@ -70,8 +70,8 @@ class Vicinity:
 
     def __init__(self, landscape: Landscape, base: State) -> None:
         self.landscape = landscape
-        self._compiled = landscape.shape.vicinity(
-            Coordinates(landscape.column, landscape.rotation_length, landscape.shape.turning_radius)
+        self._compiled = landscape.bodies.vicinity(
+            landscape.column, landscape.rotation_length, landscape.turning_radius
         )
         self.move_to(base)
         self._take(landscape.wide_pairs(base))

@@ -110,6 +110,22 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
             " compress further"
         )
         raise ValueError(msg)
+    best = _first_best((x, y, weight), parts, min_rise)
+    if best is None:
+        msg = (
+            f"p rises after phi = {x[parts[0].start]:.6g} but nowhere in a line that leads to zero,"
+            " expected a linear stretch above the onset; compress further, or more slowly, or"
+            " take more rows"
+        )
+        raise ValueError(msg)
+    return best._replace(slope=scale * best.slope)
+
+
+def _first_best(
+    data: tuple[FloatArray, FloatArray, FloatArray], parts: Sequence[slice], min_rise: float
+) -> OnsetFit | None:
+    """Choose among the lines of the first part that has any; None if none has."""
+    x, y, weight = data
     chords = _Chords(x, y, [pair for part in parts for pair in _pairs(y, part)])
     for min_slope, part in itertools.product(_MIN_SLOPES, parts):
         lines = [
@@ -120,14 +136,8 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
             and line.slope >= min_slope * chords.steepest(_CHORD_END * y[last])
         ]
         if lines:
-            best = _best(lines)
-            return best._replace(slope=scale * best.slope)
-    msg = (
-        f"p rises after phi = {x[parts[0].start]:.6g} but nowhere in a line that leads to zero,"
-        " expected a linear stretch above the onset; compress further, or more slowly, or"
-        " take more rows"
-    )
-    raise ValueError(msg)
+            return _best(lines)
+    return None
 
 
 class _Chords:

@@ -1,1 +1,26 @@
 """Minimisers, and packings at a chosen energy."""
+
+from jamshape.minima.descent import (
+    Descent,
+    History,
+    Minimum,
+    Outcome,
+    Residual,
+    Stop,
+    residual_of,
+    rounding_floor,
+)
+from jamshape.minima.minimise import METHODS, minimise
+
+__all__ = [
+    "METHODS",
+    "Descent",
+    "History",
+    "Minimum",
+    "Outcome",
+    "Residual",
+    "Stop",
+    "minimise",
+    "residual_of",
+    "rounding_floor",
+]

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jamshape.lammps.session import Session
-from jamshape.landscape import State
+from jamshape.packing import State
+from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
     from jamshape.landscape import Landscape
-    from jamshape.minima.minimise import Descent, Outcome
-from jamshape.arrays import IntArray
+    from jamshape.minima.descent import Descent, Outcome
 
 # Iterations between two looks at the residual, and how many looks without one end it.
 _ITERATIONS = 100
@@ -43,26 +43,13 @@ def descend(descent: Descent) -> Outcome | None:
 
 def _set_up(session: Session, landscape: Landscape, state: State, factor: float) -> None:
     packing = state.packing(landscape.particles)
-    types, pair_style = _types_and_pair_style(landscape, landscape.k_e * factor)
+    law = Interaction(landscape.k_e * factor, landscape.sides)
     # Numbered so that they come back in order.
-    session.load(packing.with_(id=1 + np.arange(packing.n), species=types))
+    session.load(packing.with_(id=1 + np.arange(packing.n)))
+    session.interact(law)
     session.commands(f"""
-        {pair_style}
         {session.neighbours()}
         min_style cg
         min_modify dmax {0.1 * landscape.length!r}
         thermo_modify lost error
     """)
-
-
-def _types_and_pair_style(landscape: Landscape, energy: float) -> tuple[IntArray, str]:
-    """Give each exponent a type: exponents of superellipsoids are per type in LAMMPS."""
-    packing = landscape.particles
-    if packing.shape_style == "spherocylinder":
-        sides = ("one", "two")[landscape.sides - 1]
-        style = f"pair_style spherocylinder/harmonic sides {sides}\npair_coeff * * {energy!r}"
-        return packing.species, style
-    exponents, kind = np.unique(packing.exponent, return_inverse=True)
-    lines = ["pair_style superellipsoid/harmonic", f"pair_coeff * * {energy!r}"]
-    lines += [f"pair_coeff {k} {k} {energy!r} {float(p)!r}" for k, p in enumerate(exponents, 1)]
-    return 1 + kind, "\n".join(lines)

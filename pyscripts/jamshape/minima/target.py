@@ -10,19 +10,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.landscape import CrossingError, Landscape, State
+from jamshape.contacts import CrossingError
+from jamshape.landscape import Landscape
 from jamshape.landscape.newton import Regularised
-from jamshape.minima.minimise import (
-    Descent,
-    History,
-    Minimum,
-    Outcome,
-    Stop,
-    limited,
-    minimise,
-    residual_of,
-    search_along,
-)
+from jamshape.minima.descent import Descent, History, Minimum, Outcome, Stop, residual_of
+from jamshape.minima.line_search import limited, search_along
+from jamshape.minima.minimise import minimise
+from jamshape.packing import State
 
 # A minimum this good is jammed.
 _GOOD = 1e-2
@@ -133,6 +127,27 @@ class Search:
     minimum: Minimum | None = None
     history: History = field(default_factory=History)
 
+    def close_further(self, unjammed: State, fine: float, target: Target) -> None:
+        """Go on from an unjammed state, in finer steps if the last one opened the box too far."""
+        self.loose, self.loose_in_a_row = unjammed, self.loose_in_a_row + 1
+        if self.opening:
+            self.step /= 4
+        elif self.step < fine or self.loose_in_a_row % _GROW_AFTER == 0:
+            self.step = min(2 * self.step, target.step)
+        self.opening = False
+        self.state = unjammed.strained(-self.step)
+
+    def leave(self, jammed: State) -> None:
+        """Go on from a jammed state too far above: in a smaller step to it, or by opening the box."""
+        if self.loose is not None:
+            self.step /= 4
+            self.state = self.loose.strained(-self.step)
+            return
+        if self.opening:
+            self.step *= 2
+        self.opening = True
+        self.state = jammed.strained(self.step)
+
 
 def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Search]:
     """Find the packing by Newton's method on coordinates and box at once.
@@ -176,21 +191,9 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
             if lost and search.loose is not None:
                 search.step, search.loose_in_a_row = search.step / 4, 0
         if found.outcome is Outcome.UNJAMMED:
-            search.loose, search.loose_in_a_row = found.state, search.loose_in_a_row + 1
-            if search.opening:
-                search.step /= 4
-            elif search.step < fine or search.loose_in_a_row % _GROW_AFTER == 0:
-                search.step = min(2 * search.step, target.step)
-            search.opening = False
-            search.state = found.state.strained(-search.step)
-        elif search.loose is not None:  # jammed, but too far above: go there in a smaller step
-            search.step /= 4
-            search.state = search.loose.strained(-search.step)
+            search.close_further(found.state, fine, target)
         else:
-            if search.opening:
-                search.step *= 2
-            search.opening = True
-            search.state = found.state.strained(search.step)
+            search.leave(found.state)
         if search.step < _SMALLEST_STEP * fine:
             u = found.energy_density
             msg = (

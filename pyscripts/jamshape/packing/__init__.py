@@ -1,38 +1,14 @@
-"""The state of a packing, and rotations."""
+"""The state of a packing, its poses in extended precision, and rotations."""
 
-from jamshape.packing.packing import (
-    SHAPE_STYLES,
-    UNIT_QUATERNION_TOLERANCE,
-    Box,
-    FloatArray,
-    IntArray,
-    LongArray,
-    Packing,
-    angle_from_quaternion,
-    body_axes,
-    guess_shape_style,
-)
+from jamshape.packing.packing import Box, Packing
+from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, angle_from_quaternion, body_axes
+from jamshape.packing.state import State
 
 __all__ = [
-    "SHAPE_STYLES",
-    "UNIT_QUATERNION_TOLERANCE",
-    "Box",
-    "FloatArray",
-    "IntArray",
-    "LongArray",
-    "Packing",
-    "angle_from_quaternion",
-    "body_axes",
-    "guess_shape_style",
-]
-
-
-__all__ = [
-    "SHAPE_STYLES",
     "UNIT_QUATERNION_TOLERANCE",
     "Box",
     "Packing",
+    "State",
     "angle_from_quaternion",
     "body_axes",
-    "guess_shape_style",
 ]

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from jamshape.arrays import FloatArray, IntArray, LongArray
-
-SHAPE_STYLES = ("spherocylinder", "superellipsoid")
+from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray
+from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
+from jamshape.shapes.shape import Interaction, Shape
+from jamshape.shapes.table import DEFAULT, shape_named
 
 # What goes with each of these when it is replaced.
 _REST_OF = {
@@ -20,9 +21,6 @@ _REST_OF = {
     "orientation": "orientation_rest",
     "box": "edges_rest",
 }
-
-# Loose enough for the six digits of a text dump, tight enough to catch swapped columns.
-UNIT_QUATERNION_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +77,8 @@ class Packing:
     orientation : (N,) or (N, 4) array of float64
         Angle of the body's x axis in radians in 2D, unit quaternion w i j k in 3D.
     diameters : (N, 3) array of float64, [length]
-        Shape columns of LAMMPS: (2(A+R), 2R, 2R) for a spherocylinder, three equal for a disc,
-        (2a, 2b, 2c) for a superellipsoid.
+        Shape columns of LAMMPS: (2(A+R), 2R, 2R) for elongated particles, three equal ones for discs,
+        (2a, 2b, 2c) for bodies with semi-axes a, b, c.
     species : (N,) array of int64
         LAMMPS types, from 1.
     id : (N,) array of int64
@@ -89,9 +87,9 @@ class Packing:
     image : (N, D) array of int64, optional
         Periodic image counts; zeros when left out.
     shape_style : str
-        One of `SHAPE_STYLES`.
+        A name of `jamshape.shapes.table.SHAPES`.
     exponent : (N,) array of float64, optional
-        p of superellipsoids |x/a|^2p + |y/b|^2p + |z/c|^2p = 1; ones when left out.
+        p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1, of shapes that have one; ones when left out.
     step : int
     time : float, [time]
     position_rest, orientation_rest, edges_rest : arrays as above, of float64, optional
@@ -112,7 +110,7 @@ class Packing:
     id: IntArray
     box: Box
     image: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
-    shape_style: str = "spherocylinder"
+    shape_style: str = DEFAULT
     exponent: FloatArray = field(default_factory=lambda: np.empty(0))
     step: int = 0
     time: float = 0.0
@@ -155,18 +153,33 @@ class Packing:
         return self.box.dimension
 
     @property
+    def shape(self) -> Shape:
+        """What the library knows of the shape."""
+        return shape_named(self.shape_style)
+
+    def compiled(self, law: Interaction | None = None) -> Any:
+        """Make the compiled object that knows these particles' contacts; see `Shape.compiled`."""
+        sizes = (self.diameters, self.exponent)
+        return self.shape.compiled(sizes, self.dimension, law or Interaction())
+
+    @cached_property
+    def _bodies(self) -> Any:
+        """The particles, whatever their interaction."""
+        return self.compiled()
+
+    @property
     def half_length(self) -> FloatArray:
-        """(N,) half lengths A of the spines of spherocylinders, [length]."""
+        """(N,) half lengths A of elongated particles, [length]."""
         return (self.diameters[:, 0] - self.diameters[:, 1]) / 2
 
     @property
     def radius(self) -> FloatArray:
-        """(N,) radii R of spherocylinders, [length]."""
+        """(N,) radii R of elongated particles, [length]."""
         return self.diameters[:, 1] / 2
 
     @property
     def aspect_ratio(self) -> FloatArray:
-        """(N,) ratios alpha = A / R of spherocylinders."""
+        """(N,) ratios alpha = A / R of elongated particles."""
         return self.half_length / self.radius
 
     @property
@@ -193,31 +206,54 @@ class Packing:
 
     @property
     def symmetry_axis(self) -> IntArray:
-        """(N,) body axis about which superellipsoids are spheroids (0, 1, 2); -1 for others.
-
-        Those with p = 1 and two equal axes; other exponents have corners or edges about every axis.
-        """
-        a, b, c = self.diameters.T
-        equal = np.stack([b == c, c == a, a == b])
-        return np.where(equal.any(axis=0) & (self.exponent == 1), equal.argmax(axis=0), -1)
+        """(N,) body axis about which a particle may spin freely (0, 1, 2); -1 where there is none."""
+        return np.asarray(self._bodies.symmetry_axis)
 
     @property
-    def is_round(self) -> NDArray[np.bool_]:
+    def is_round(self) -> BoolArray:
         """(N,) whether the particle is a disc or a sphere, which no contact can turn."""
-        used = self.diameters[:, : self.dimension]
-        equal = (used == used[:, :1]).all(axis=1)
-        return np.asarray(equal & (self.exponent == 1))
+        return np.asarray(self._bodies.rotation_length == 0)
+
+    @property
+    def outer_radius(self) -> FloatArray:
+        """(N,) radii of the spheres around the particles, [length]."""
+        return np.asarray(self._bodies.outer_radius)
 
     @property
     def measures(self) -> FloatArray:
         """(N,) areas (volumes) of the particles, [length^D]."""
-        # Imported here so that reading and writing files needs no compiled module.
-        contact = importlib.import_module("jamshape._contact")
-        if self.shape_style == "spherocylinder":
-            found, _ = contact.spherocylinder_drag(self.half_length, self.radius, self.dimension)
-        else:
-            found, _ = contact.superellipsoid_drag(self.diameters, self.exponent, self.dimension)
-        return np.asarray(found)
+        return np.asarray(self._bodies.measure)
+
+    @property
+    def freedoms(self) -> IntArray:
+        """(N,) degrees of freedom that contacts can resist: free spins are left out."""
+        if self.dimension == 2:
+            return np.where(self.is_round, 2, 3)
+        return np.where(self.is_round, 3, np.where(self.symmetry_axis >= 0, 5, 6))
+
+    @property
+    def turning_axes(self) -> FloatArray:
+        """(N, T, T) orthogonal unit vectors that contacts can turn particles about, else zeros.
+
+        T is 1 in the plane, 3 in space, where a body with an axis of symmetry spins about it freely.
+        """
+        if self.dimension == 2:
+            return np.ones((self.n, 1, 1))
+        axes = np.tile(np.eye(3), (self.n, 1, 1))
+        for k in range(3):
+            own = self.symmetry_axis == k
+            axes[own, :2] = across(self.body_axes(k)[own])
+            axes[own, 2] = 0.0
+        return axes
+
+    @property
+    def directors(self) -> FloatArray:
+        """(N, D) unit vectors along the axis that tells each particle's direction; NaN without one."""
+        which = np.asarray(self._bodies.director)
+        found = np.full((self.n, self.dimension), np.nan)
+        for k in range(self.dimension):
+            found[which == k] = self.body_axes(k)[which == k]
+        return found
 
     @property
     def phi(self) -> float:
@@ -265,75 +301,6 @@ class Packing:
         return dataclasses.replace(self, **changes)
 
 
-def angle_from_quaternion(quaternion: ArrayLike) -> FloatArray:
-    """Angle of a rotation about z, 2 atan2(k, w).
-
-    Parameters
-    ----------
-    quaternion : (..., 4) array_like
-        w i j k; the length does not matter.
-
-    Returns
-    -------
-    (...) array of float64
-        Radians in (-pi, pi].
-    """
-    q = np.asarray(quaternion, dtype=np.float64)
-    # q and -q are one rotation; with w >= 0 no multiple of 2 pi is subtracted, so no bit is lost.
-    q = np.where(q[..., :1] < 0, -q, q)
-    angle = 2 * np.arctan2(q[..., 3], q[..., 0])
-    return np.where(angle <= -np.pi, np.pi, angle)
-
-
-def body_axes(quaternions: ArrayLike) -> FloatArray:
-    """Turn quaternions into unit vectors along the body's x, y and z axes.
-
-    Parameters
-    ----------
-    quaternions : (..., 4) array_like
-        w i j k; the length does not matter.
-
-    Returns
-    -------
-    (..., 3, 3) array of float64
-        Row k is the body's axis k in the coordinates of the box.
-
-    Raises
-    ------
-    ValueError
-        If the shape is another, or a quaternion is zero or not finite.
-    """
-    q = np.asarray(quaternions, np.float64)
-    if q.ndim < 1 or q.shape[-1] != 4:
-        msg = f"quaternions have shape {q.shape}, expected (..., 4)"
-        raise ValueError(msg)
-    length = np.linalg.norm(q, axis=-1, keepdims=True)
-    if not (np.isfinite(length) & (length > 0)).all():
-        msg = "quaternions hold zero, NaN or infinity, expected rotations"
-        raise ValueError(msg)
-    w, i, j, k = np.moveaxis(q / length, -1, 0)
-    x = [w * w + i * i - j * j - k * k, 2 * (i * j + w * k), 2 * (i * k - w * j)]
-    y = [2 * (i * j - w * k), w * w - i * i + j * j - k * k, 2 * (j * k + w * i)]
-    z = [2 * (i * k + w * j), 2 * (j * k - w * i), w * w - i * i - j * j + k * k]
-    return np.stack([np.stack(axis, axis=-1) for axis in (x, y, z)], axis=-2)
-
-
-def guess_shape_style(diameters: ArrayLike) -> str:
-    """Name the shape style of (N, 3) diameters that come without one.
-
-    ``spherocylinder`` wherever these can be spherocylinders; a prolate superellipsoid of
-    revolution has the same diameters, so its reader must say what it is.
-    """
-    d = np.asarray(diameters)
-    return "spherocylinder" if _are_spherocylinders(d).all() else "superellipsoid"
-
-
-def _are_spherocylinders(diameters: FloatArray) -> NDArray[np.bool_]:
-    long, short, other = diameters.T
-    fits: NDArray[np.bool_] = (short == other) & (long >= short)
-    return fits
-
-
 def _floats(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     array = np.array(values, dtype=np.float64, order="C")
     _check_shape(name, array.shape, shape)
@@ -369,9 +336,7 @@ def _check_labels(packing: Packing) -> None:
         if getattr(packing, name).min() < 1:
             msg = f"{name} holds {getattr(packing, name).min()}, expected numbers from 1"
             raise ValueError(msg)
-    if packing.shape_style not in SHAPE_STYLES:
-        msg = f"shape style is {packing.shape_style!r}, expected one of {SHAPE_STYLES}"
-        raise ValueError(msg)
+    shape_named(packing.shape_style)
     if not np.isfinite(packing.time):
         msg = f"time is {packing.time}, expected a finite number"
         raise ValueError(msg)
@@ -384,14 +349,11 @@ def _check_shapes(packing: Packing) -> None:
     if not (packing.exponent > 0.5).all():
         msg = f"exponents hold {packing.exponent.min()}, expected p > 0.5, for which bodies are convex"
         raise ValueError(msg)
-    if packing.shape_style == "spherocylinder":
-        wrong = ~_are_spherocylinders(packing.diameters)
-        if wrong.any():
-            found = packing.diameters[wrong][0].tolist()
-            msg = (
-                f"diameters of a spherocylinder are {found}, expected (2(A+R), 2R, 2R) with A >= 0"
-            )
-            raise ValueError(msg)
+    shape = packing.shape
+    if not shape.fits(packing.diameters):
+        wrong = next(d for d in packing.diameters if not shape.fits(d[None]))
+        msg = f"diameters of a {shape.name} are {wrong.tolist()}, expected {shape.rule()}"
+        raise ValueError(msg)
     if packing.dimension == 3:
         error = np.abs(np.linalg.norm(packing.orientation, axis=1) - 1).max()
         if error > UNIT_QUATERNION_TOLERANCE:

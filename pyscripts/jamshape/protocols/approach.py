@@ -11,13 +11,14 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jamshape.flow.compression import Compression, CompressionRun, Row
+from jamshape.lammps.session import Session
+from jamshape.packing import Packing
 
-if TYPE_CHECKING:
-    from jamshape.lammps.session import Session
-    from jamshape.packing import Packing
+# Of `compressed_start`.
+_KAPPA_FAST, _DT_FAST = 1e-4, 0.2
 
 _NO_END = 1e3  # a packing fraction that is never reached
 
@@ -75,16 +76,27 @@ class Approach:
             raise ValueError(msg)
 
 
+def compressed_start(start: Packing, phi: float) -> Packing:
+    """Compress a random packing fast, in LAMMPS, to where slow compressions begin."""
+    with Session() as session:
+        fast = Compression(_KAPPA_FAST, phi, _DT_FAST, sides=2)
+        run = CompressionRun(session, fast, start)
+        run.advance(run.last_step)
+        return run.packing()
+
+
 def begin_approach(session: Session, start: Packing, settings: Approach) -> CompressionRun:
     """Prepare a run in a fresh session."""
     flow = Compression(kappa=settings.kappa_start, phi_end=_NO_END, dt=settings.dt, sides=2)
     return CompressionRun(session, flow, start)
 
 
-def resume_approach(session: Session, restart: Path, stored: Mapping[str, Any]) -> CompressionRun:
-    """Go on from a LAMMPS restart file, with the stored `rate`, `dt` and `restart_time`."""
+def resume_approach(
+    session: Session, restart: Path, like: Packing, stored: Mapping[str, Any]
+) -> CompressionRun:
+    """Go on from a LAMMPS restart file of particles, with the stored `rate`, `dt` and `restart_time`."""
     flow = Compression(kappa=stored["rate"], phi_end=_NO_END, dt=stored["dt"], sides=2)
-    return CompressionRun(session, flow, restart, time=stored["restart_time"])
+    return CompressionRun(session, flow, like, restart, time=stored["restart_time"])
 
 
 def approach(run: CompressionRun, settings: Approach) -> Iterator[Row]:
@@ -113,7 +125,7 @@ def _compress(run: CompressionRun, settings: Approach) -> Iterator[Row]:
         finer = math.sqrt(settings.kappa / run.settings.kappa)
         sample = _advance(run, settings, min(settings.strain / finer, _LARGEST_STRAIN))
         yield sample
-        kappa, pressure = run.settings.kappa, sample.observables["p"]
+        kappa, pressure = run.settings.kappa, sample.observables["pressure"]
         if kappa == settings.kappa and pressure >= settings.p_end:
             return
         if kappa > settings.kappa and pressure >= settings.p_flow:
@@ -123,12 +135,12 @@ def _compress(run: CompressionRun, settings: Approach) -> Iterator[Row]:
 def _open(run: CompressionRun, settings: Approach) -> Iterator[Row]:
     if run.settings.kappa > 0:
         run.change(kappa=-settings.kappa)
-    pressure = run.measure()["p"]
+    pressure = run.measure()["pressure"]
     while pressure > settings.p_open:
         # Near jamming the pressure is about 0.3 (phi - phi_J): go a part of the way.
         sample = _advance(run, settings, min(settings.strain, _PART * pressure))
         yield sample
-        pressure = sample.observables["p"]
+        pressure = sample.observables["pressure"]
 
 
 def _advance(run: CompressionRun, settings: Approach, strain: float) -> Row:

@@ -18,15 +18,16 @@ import numpy as np
 from jamshape.contacts import find_contacts, find_rattlers
 from jamshape.files.h5md import read_attributes, read_packing, require_attributes
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Outcome, Stop, minimise
+from jamshape.measures.minimum import write_minimum
+from jamshape.minima import Outcome, Stop, minimise
 from jamshape.minima.target import Search, Target, TargetError, direct
 from jamshape.packing import Packing
-from jamshape.protocols import superellipsoid_jammed
-from jamshape.protocols.jammed import is_done, write_minimum
+from jamshape.protocols.make import is_done
 
 # What must agree in the packing and in a rung that is there already.
-_IDENTITY = ("alpha", "n", "seed", "size_ratio")
-_IDENTITY_3D = ("p", "w1", "w2", "n", "seed", "protocol", "n_sweeps")  # p of rods is the pressure
+_IDENTITY = (
+    *("alpha", "exponent", "w1", "w2", "kinds", "n", "seed", "size_ratio", "protocol", "n_sweeps"),
+)
 
 # A box that was opened has been opened too far below this fraction of u0; how long to look.
 _FALLEN = 1e-2
@@ -52,7 +53,7 @@ def climb(
     Parameters
     ----------
     source : Path
-        A finished packing of `jammed.make` or `superellipsoid_jammed.make`.
+        A finished packing of `protocols.make`.
     energies : iterable of float
         Energy densities u0, in any order, [energy / length^D].
     folder : Path
@@ -98,8 +99,7 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
     """Make one rung from the one before, unless it is there."""
     out = rung_path(source, goal.u0, folder)
     if is_done(out):
-        names = _IDENTITY_3D if "w1" in stored else _IDENTITY
-        identity = {name: stored[name] for name in names if name in stored}
+        identity = {name: stored[name] for name in _IDENTITY if name in stored}
         require_attributes(out, identity | {"u0": goal.u0})
         return Rung(out, goal.u0, made=False, failure="")
     began, start = time.perf_counter(), read_packing(last)
@@ -118,16 +118,14 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
         "evaluations": landscape.evaluations,
         "wall_seconds": time.perf_counter() - began,
     }
-    are_rods = start.shape_style == "spherocylinder"
-    write = write_minimum if are_rods else superellipsoid_jammed.write_minimum
-    write(out, landscape, search.minimum, attributes)
+    write_minimum(out, landscape, search.minimum, attributes)
     return Rung(out, goal.u0, made=True, failure="")
 
 
 def _opened(landscape: Landscape, state: State, goal: Target) -> State:
     """Open the box until u is about u0, which rods that slide would make slow in small steps.
 
-    By the law of `jammed.measure`: sqrt(u) is linear in phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
+    By the law of `measures.minimum.energy_onset`: sqrt(u) is linear in phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
     """
     evaluation, volume, D = landscape.evaluate(state), state.volume, state.dimension
     u, p = evaluation.energy / volume, -evaluation.strain_gradient / (D * volume)

@@ -11,8 +11,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import History, Minimum, Outcome, Stop, minimise
+from jamshape.landscape import Landscape
+from jamshape.minima import History, Minimum, Outcome, Stop, minimise
+from jamshape.packing import State
 
 # A step this small leads nowhere: the energy jumps there, by a rearrangement.
 _SMALLEST_STEP = 1e-9

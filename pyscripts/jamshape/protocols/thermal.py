@@ -1,4 +1,4 @@
-"""Monte Carlo of hard superellipsoids: the thermal part of protocol 2 of Yuan et al. (2019), Sec. 2.2.
+"""Monte Carlo of hard particles: the thermal part of protocol 2 of Yuan et al. (2019), Sec. 2.2.
 
 Translations and rotations together, no overlap ever. The moves' sizes are led to an acceptance between runs
 of a few sweeps.
@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jamshape import _contact
-from jamshape.landscape import Landscape, State
-from jamshape.packing import Box, Packing
+from jamshape.landscape import Landscape
+from jamshape.packing import Box, Packing, State
 
 # Share of the moves that are accepted, and what a block of sweeps changes of their size at most.
 _ACCEPTANCE = 0.35
@@ -37,7 +36,7 @@ class Thermal:
     n_done
         Sweeps so far.
     size
-        Of the moves: a shift of so many shortest semi-axes, and a turn by so many radians.
+        Of the moves: a shift of so many smallest radii, and a turn by so many radians.
     acceptance
         Of the last block.
     """
@@ -54,7 +53,7 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
     Parameters
     ----------
     thermal : Thermal
-        Where to begin, or to go on; packings of superellipsoids.
+        Where to begin, or to go on.
     n_sweeps : int
         N_s.
     seed : int
@@ -68,21 +67,19 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
     Raises
     ------
     ValueError
-        If particles overlap at the start, are no superellipsoids, the box is shorter than two of them,
-        or moves have no positive size.
+        If particles overlap at the start, the box is shorter than two of them, or moves have no positive
+        size.
     """
     _check(thermal)
     while thermal.n_done < n_sweeps:
         packing, n = thermal.packing, min(_SWEEPS, n_sweeps - thermal.n_done)
         block = np.random.SeedSequence([seed, thermal.n_done]).generate_state(1, np.uint64)[0]
-        shortest = float(packing.diameters[:, : packing.dimension].min()) / 2
-        found = _contact.superellipsoid_sweeps(
-            packing.diameters,
-            packing.exponent,
+        bodies = packing.compiled()
+        found = bodies.sweeps(
             packing.position - packing.box.lo,
             packing.orientation.reshape(packing.n, -1),
             packing.box.edges,
-            thermal.size * shortest,
+            thermal.size * float(bodies.inner_radius.min()),
             min(thermal.size, 1.0),
             n,
             int(block),
@@ -100,11 +97,8 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
 
 
 def _check(thermal: Thermal) -> None:
-    if thermal.packing.shape_style != "superellipsoid":
-        msg = f"particles are of style {thermal.packing.shape_style}, expected superellipsoids"
-        raise ValueError(msg)
     if not (math.isfinite(thermal.size) and thermal.size > 0):
-        msg = f"size is {thermal.size}, expected a positive number of semi-axes"
+        msg = f"size is {thermal.size}, expected a positive number of radii"
         raise ValueError(msg)
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.superellipsoid_size import checked
 
 # Newton's method on logarithms: steps below this are rounding, and it takes about ten.
@@ -20,17 +19,6 @@ _SHARP = 1.3
 
 # Stands for the logarithm of 0.
 _NOTHING = -600.0
-
-
-class SurfaceMesh(NamedTuple):
-    """Triangles on the surface of a body, in body coordinates."""
-
-    vertices: FloatArray
-    """(V, 3), [length], on the surface to rounding."""
-    triangles: IntArray
-    """(T, 3) rows of vertices, counter-clockwise seen from outside."""
-    normals: FloatArray
-    """(V, 3) outward unit normals of the surface at the vertices."""
 
 
 def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.landscape import Evaluation, Landscape, State
-from jamshape.minima.minimise import Residual, residual_of
+from jamshape.minima import Residual, residual_of
 
 # A state with a larger residual is no minimum, and has no modes.
 LARGEST_RESIDUAL = 1e-4
@@ -95,7 +95,7 @@ class Bonds(NamedTuple):
     contact: IntArray
     """(m,) row of `DynamicalMatrix.contacts`."""
     slot: IntArray
-    """(m,) 0 or 1: which bond of it; 2: the one that two deep bonds have become."""
+    """(m,) which bond of it, from 0; one more than there can be: the one that two deep bonds have become."""
     particles: IntArray
     """(m, 2) rows of the packing."""
     stiffness: FloatArray
@@ -223,8 +223,8 @@ class Scope:
     Parameters
     ----------
     rotation : str or (N,) array of float64, [length]
-        What a radian counts for: ``half_length`` (A theta, Marschall & Teitel 2018, Eq. 23; a theta of
-        superellipsoids), ``radius`` (R theta, or the shortest semi-axis) or lengths. What no contact can turn, discs, has no rotation in any case. Eigenvalues
+        What a radian counts for: ``half_length`` (A theta, Marschall & Teitel 2018, Eq. 23, or a theta),
+        ``radius`` (R theta, or the shortest semi-axis) or lengths. What no contact can turn, discs, has no rotation in any case. Eigenvalues
         of modes that rotate depend on this choice; their number, signs and zeros do not.
     least_force : float
         Leave out contacts whose force is below this fraction of the mean force of a bond: rods that slid
@@ -268,11 +268,7 @@ def dynamical_matrix(
     """
     scope = scope or Scope()
     evaluation = landscape.evaluate(state)
-    taken = (
-        ~landscape.curvature(state).rattlers
-        if scope.backbone is None
-        else np.asarray(scope.backbone)
-    )
+    taken = ~landscape.rattlers(state) if scope.backbone is None else np.asarray(scope.backbone)
     if not taken.any():
         msg = (
             f"all {len(taken)} particles are rattlers, so that there is no mode to find,"
@@ -335,7 +331,7 @@ def _coordinates(
 ) -> Coordinates:
     """List displacements and rotations of the particles that are held, particle by particle."""
     D = state.dimension
-    axes = landscape.shape.turning_axes(state.packing(landscape.particles))
+    axes = state.packing(landscape.particles).turning_axes
     n, n_turns, T = axes.shape
     direction = np.zeros((n, D + n_turns, D + T))
     direction[:, :D, :D] = np.eye(D)
@@ -392,7 +388,8 @@ def _bonds(contacts: dict[str, NDArray[Any]], lengths: FloatArray) -> tuple[Bond
         curvature = curvature.copy()
         curvature[stiff] -= value[:, None, None] * vector[:, :, None] * vector[:, None, :]
         contact = np.concatenate([contact, stiff])
-        slot = np.concatenate([slot, np.full(len(stiff), 2)])
+        most = contacts["stiffness"].shape[1]
+        slot = np.concatenate([slot, np.full(len(stiff), most)])
         stiffness = np.concatenate([stiffness, value])
         gradient = np.concatenate([gradient, vector])
     order = np.lexsort((slot, contact))
@@ -406,8 +403,8 @@ def _stiff_parts(
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Find contacts whose curvature holds a bond: which, its stiffness, its gradient.
 
-    Two bonds of nearly round particles that overlap deeply become one (`Sides::TWO` of
-    contact/spherocylinder.hpp), whose stiffness comes with the curvature.
+    Two bonds of nearly round particles that overlap deeply become one (`Sides::TWO`), whose stiffness
+    comes with the curvature.
     """
     curvature, v = contacts["curvature"], contacts["curvature"].shape[1]
     D = contacts["separation"].shape[1]

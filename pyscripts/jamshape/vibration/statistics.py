@@ -145,8 +145,7 @@ def components(coordinates: Coordinates, packing: Packing, vectors: FloatArray) 
     ----------
     coordinates : Coordinates
     packing : Packing
-        Spherocylinders or other bodies of revolution about their x axes; where the three diameters
-        are equal a particle is round.
+        What has no direction (`Packing.directors`) is round.
     vectors : (n, k) array of float64
         Unit columns.
 
@@ -155,13 +154,12 @@ def components(coordinates: Coordinates, packing: Packing, vectors: FloatArray) 
     Components
     """
     D = coordinates.dimension
-    diameters = packing.diameters[coordinates.backbone]
-    is_round = (diameters[:, 0] == diameters[:, 1]) & (diameters[:, 0] == diameters[:, 2])
-    axes = packing.axes[coordinates.backbone]
+    axes = packing.directors[coordinates.backbone]
+    is_round = np.isnan(axes[:, 0])
     moves = ~coordinates.is_rotation
     shift = vectors[moves].reshape(len(axes), D, -1)
     square = (shift**2).sum(axis=1)
-    along = np.einsum("id,idk->ik", axes, shift) ** 2
+    along = np.einsum("id,idk->ik", np.nan_to_num(axes), shift) ** 2
     return Components(
         parallel=along[~is_round].sum(axis=0),
         perpendicular=(square - along)[~is_round].sum(axis=0),

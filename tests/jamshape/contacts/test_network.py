@@ -1,8 +1,10 @@
+from scenes import assert_same_forces, make, moved, packing, pressed_named, scaled, turned
 import itertools
 from functools import cache, partial
 
 import numpy as np
 import pytest
+from mixtures import bidisperse, monodisperse
 
 from jamshape import _contact
 from jamshape.contacts import (
@@ -14,101 +16,33 @@ from jamshape.contacts import (
     sum_forces,
 )
 from jamshape.packing import Box, Packing
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 SIDES = [1, 2]
 
 
-def make(position, angle, half_length=1.0, edges=(20.0, 20.0), **changes):
-    """Rods (discs) of radius 0.5 in the plane."""
-    n = len(position)
-    width = np.ones(n)
-    fields = {
-        "position": np.array(position, float),
-        "orientation": np.broadcast_to(np.array(angle, float), n),
-        "diameters": np.column_stack([2 * half_length + width, width, width]),
-        "species": np.ones(n, int),
-        "id": np.arange(1, n + 1),
-        "box": Box(lo=np.zeros(2), edges=np.array(edges)),
-    }
-    return Packing(**(fields | changes))
 
 
-def scaled(packing, factors):
-    """Affine change of the box and of the positions at fixed orientations."""
-    box = packing.box
-    changed = Box(lo=box.lo * factors, edges=box.edges * factors)
-    return packing.with_(position=packing.position * factors, box=changed)
 
 
-def pressed(n=24, dimension=2, seed=3, mixture=None, phi=None):
-    """A random packing, squeezed until the deepest overlap is 20 %, away from the origin."""
-    packing = random_packing(
-        n, phi or {2: 0.4, 3: 0.2}[dimension], seed, mixture, dimension=dimension
-    )
-    packing = packing.with_(box=Box(lo=np.full(dimension, -1.3), edges=packing.box.edges))
-    for _ in range(200):
-        packing = scaled(packing, 0.995)
-        bonds = find_contacts(packing).bonds
-        if (1 - bonds.distance / bonds.reach).max(initial=0) > 0.2:
-            return packing
-    raise AssertionError
 
 
-def quaternion_product(p, q):
-    w = p[0] * q[0] - p[1:] @ q[1:]
-    return np.array([w, *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))])
 
 
-def turned(packing, particle, axis, angle):
-    orientation = np.array(packing.orientation)
-    if packing.dimension == 2:
-        orientation[particle] += angle
-    else:
-        turn = np.zeros(4)
-        turn[0], turn[1 + axis] = np.cos(angle / 2), np.sin(angle / 2)
-        orientation[particle] = quaternion_product(turn, orientation[particle])
-    return packing.with_(orientation=orientation)
 
 
-def moved(packing, particle, axis, step):
-    position = np.array(packing.position)
-    position[particle, axis] += step
-    return packing.with_(position=position)
 
 
 def slope(energy_of, h=1e-6):
     return (energy_of(h) - energy_of(-h)) / (2 * h)
 
 
-def tiny_box():
-    """Two rods that wind around a box half as long, side to side and tip to own tip."""
-    along, half_length = np.array([2, 1]) / np.sqrt(5), np.full(2, 4.05)
-    shift = 0.7 * along + 0.88 * np.array([-along[1], along[0]])
-    angle = np.arctan2(1, 2) + np.array([0.01, -0.015])
-    return make([[0, 0], shift], angle, half_length, edges=(4.02, 4.02))
 
 
-PRESSED = {
-    "rods": pressed,
-    "short rods": partial(pressed, mixture=Mixture.bidisperse(0.01)),
-    "discs": partial(pressed, mixture=Mixture.bidisperse(0)),
-    "size ratio 5": partial(pressed, mixture=Mixture.bidisperse(2, 5)),
-    "rods in a tiny box": tiny_box,
-    "rod alone": partial(pressed, n=1, mixture=Mixture.monodisperse(20), phi=0.3),
-    "rods in space": partial(pressed, n=16, dimension=3),
-    "rods in a tiny cube": partial(pressed, n=2, dimension=3, mixture=Mixture.bidisperse(2)),
-}
 
 
-@cache
-def pressed_named(name):
-    return PRESSED[name]()
 
 
-@pytest.fixture(params=PRESSED)
-def packing(request):
-    return pressed_named(request.param)
 
 
 @pytest.mark.parametrize("sides", SIDES)
@@ -203,9 +137,6 @@ def test_point_of_contact_gives_the_torques(packing):
     np.testing.assert_allclose(torque(arm_j, -force), network.torque_j, rtol=0, atol=1e-13)
 
 
-def assert_same_forces(a, b):
-    for name in ("energy", "force", "torque", "virial", "pressure"):
-        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("sides", SIDES)
@@ -316,7 +247,7 @@ def test_rods_that_are_pressed_by_tips_on_one_side_are_rattlers():
 
 
 def test_cubic_crystal_of_one_sphere():
-    unit = random_packing(1, 0.1, 1, Mixture.monodisperse(0), dimension=3)
+    unit = random_packing(1, 0.1, 1, monodisperse(0), dimension=3)
     packing = unit.with_(box=Box(lo=np.zeros(3), edges=np.full(3, 0.9)))
     network = find_contacts(packing)
     assert coordination(packing, network) == (6, 6, 0, 3, 3)

@@ -4,11 +4,10 @@ import warnings
 
 import numpy as np
 import pytest
-from test_packing import assert_identical, nasty_packing, with_rests
+from nasty import assert_identical, nasty_packing, with_rests
 
 from jamshape.files.h5md import (
     FileFormatError,
-    RunWriter,
     count_frames,
     read_attributes,
     read_observables,
@@ -17,6 +16,7 @@ from jamshape.files.h5md import (
     read_series,
     write_packing,
 )
+from jamshape.files.run_writer import RunWriter
 
 h5py = pytest.importorskip("h5py")
 

@@ -3,10 +3,11 @@ import subprocess
 
 import numpy as np
 import pytest
-from test_packing import NASTY, assert_identical, nasty_packing
+from nasty import NASTY, assert_identical, nasty_packing
 
-from jamshape.files.h5md import FileFormatError, RunWriter
+from jamshape.files.h5md import FileFormatError
 from jamshape.files.lammps_text import iter_dump, read_any, read_data, read_dump, write_data
+from jamshape.files.run_writer import RunWriter
 from jamshape.packing import Box
 
 COLUMNS = ["id", "type", "x", "y", "z"]

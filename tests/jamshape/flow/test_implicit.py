@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from test_minimise import squeezed
+from squeezed import squeezed
 
 from jamshape.flow import implicit as stiff_compression
 from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress, drag_coefficients
 from jamshape.landscape import CrossingError, Landscape, State
-from jamshape.minima.minimise import minimise
+from jamshape.minima import minimise
 from jamshape.packing import Box, Packing
 
 

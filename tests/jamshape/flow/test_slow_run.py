@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from test_minimise import squeezed
+from squeezed import squeezed
 
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.flow import slow_run

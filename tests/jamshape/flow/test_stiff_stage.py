@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
-from test_contact_statistics import rods
-from test_minimise import squeezed
+from rods_at import rods
+from squeezed import squeezed
 
 from jamshape.flow.implicit import drag_coefficients
 from jamshape.landscape import Landscape, State
 from jamshape.landscape.vicinity import Stage, Units, Vicinity
-from jamshape.minima.minimise import minimise
+from jamshape.minima import minimise
 
 STRAIN, ACCURACY = -1e-3, 1e-5
 

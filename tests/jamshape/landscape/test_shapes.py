@@ -11,10 +11,11 @@ from superellipsoid_packings import (
     scattered,
     superellipses,
 )
-from test_contacts import assert_same_forces, moved, turned
+from scenes import assert_same_forces, moved, turned
 
 from jamshape import _contact
-from jamshape.contacts import find_contacts, forces, superellipsoid_bodies
+from body_rows import superellipsoid_rows
+from jamshape.contacts import find_contacts, forces
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.shapes.superellipsoid_size import volume
 
@@ -47,7 +48,7 @@ def packing(request):
 
 def every_pair(packing):
     """Rows of all pairs and images that bounding spheres could let touch, and their labels."""
-    D, rows, edges = packing.dimension, superellipsoid_bodies(packing), packing.box.edges
+    D, rows, edges = packing.dimension, superellipsoid_rows(packing), packing.box.edges
     reach = 2 * packing.diameters.max() * D**0.5
     turns = [range(-m, m + 1) for m in np.ceil(reach / edges).astype(int)]
     labels, first, second = [], [], []

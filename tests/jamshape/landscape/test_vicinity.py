@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from test_landscape import pressed_named
-from test_minimise import squeezed
+from pressed import pressed_named
+from squeezed import squeezed
 
 from jamshape.contacts import find_contacts
 from jamshape.landscape import CrossingError, Landscape, State

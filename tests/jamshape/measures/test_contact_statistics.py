@@ -1,5 +1,7 @@
+from rods_at import rods
 import numpy as np
 import pytest
+from mixtures import bidisperse
 
 from jamshape.contacts import find_contacts, sum_forces
 from jamshape.measures.contact_statistics import (
@@ -16,24 +18,13 @@ from jamshape.measures.contact_statistics import (
     residuals,
 )
 from jamshape.packing import Box, Packing
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 R_SPINE = 0.99  # distance of touching spines; the surfaces would touch at 1
 FORCE = 0.01  # of one bond at that distance, with k_e = 1
 SURFACE = R_SPINE / 2  # where the point of contact is, from the spine
 
 
-def rods(position, angle, half_length=1.0):
-    """Rods (discs) of radius 0.5 in a large box."""
-    n = len(position)
-    return Packing(
-        position=np.array(position, float),
-        orientation=np.broadcast_to(np.array(angle, float), n),
-        diameters=np.tile([2 * half_length + 1, 1.0, 1.0], (n, 1)),
-        species=np.ones(n, int),
-        id=np.arange(1, n + 1),
-        box=Box(lo=np.zeros(2), edges=np.array([60.0, 60.0])),
-    )
 
 
 # Each a pair: the tip of a rod on the side of another, 0.4 off its middle; two tips; two sides, one
@@ -53,7 +44,7 @@ def none(packing):
 
 def squeezed(alpha, n=40, seed=3):
     """A random packing squeezed until there are more contacts than particles, with all classes."""
-    packing = random_packing(n, 0.45, seed, Mixture.bidisperse(alpha))
+    packing = random_packing(n, 0.45, seed, bidisperse(alpha))
     while len(find_contacts(packing, sides=2).pairs) <= n:
         box = Box(packing.box.lo, 0.99 * packing.box.edges)
         packing = packing.with_(position=0.99 * packing.position, box=box)

@@ -1,9 +1,11 @@
+from squeezed import squeezed
 from functools import cache
 
 import numpy as np
 import pytest
+from mixtures import bidisperse
 from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
-from test_contacts import make
+from scenes import make
 
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.minima.minimise import (
@@ -14,19 +16,9 @@ from jamshape.minima.minimise import (
     residual_of,
     rounding_floor,
 )
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
 
 
-@cache
-def squeezed(n, alpha, phi, seed=1):
-    """A random packing, brought to phi in steps, each followed by a rough minimisation."""
-    packing = random_packing(n, 0.4, seed, Mixture.bidisperse(alpha))
-    landscape, state = Landscape(packing), State.of(packing)
-    while (now := state.packing(packing).phi) < phi * (1 - 1e-12):
-        state = state.strained(max(-0.01, np.sqrt(now / phi) - 1))
-        rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
-        state = minimise(landscape, state, "lbfgs", rough).state
-    return packing, state
 
 
 def shaken(n, alpha, phi, seed=1):
@@ -171,7 +163,7 @@ def test_lammps_minimises_superellipsoids(packing_of):
 @pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])
 @pytest.mark.parametrize("alpha", [0, 1])
 def test_packings_below_jamming_are_called_unjammed(method, alpha):
-    packing = random_packing(24, 0.5, 2, Mixture.bidisperse(alpha))
+    packing = random_packing(24, 0.5, 2, bidisperse(alpha))
     landscape, start = Landscape(packing), State.of(packing).strained(-0.02)
     assert landscape.evaluate(start).energy > 1e-4  # it overlaps to begin with
     found = minimise(landscape, start, method, Stop(lowest=1e-20, evaluations=20_000))

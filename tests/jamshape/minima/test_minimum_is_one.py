@@ -15,7 +15,7 @@ from minima import (
     typical_overlap,
     unconstrained,
 )
-from test_minimise import squeezed
+from squeezed import squeezed
 
 from jamshape.landscape import Landscape, State
 from jamshape.minima.minimise import History, Minimum, Outcome, residual_of

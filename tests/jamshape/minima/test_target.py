@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from test_minimise import squeezed
+from squeezed import squeezed
 
 from jamshape.contacts import coordination, find_contacts
 from jamshape.landscape import Landscape

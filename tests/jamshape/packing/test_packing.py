@@ -1,3 +1,4 @@
+from nasty import ARRAYS, nasty_packing, with_rests
 import math
 
 import numpy as np
@@ -5,42 +6,10 @@ import pytest
 
 from jamshape.packing import Box, Packing, angle_from_quaternion, guess_shape_style
 
-NASTY = [0.1 + 0.2, 1 / 3, -0.0, np.finfo(float).tiny, np.nextafter(1, 2), -np.finfo(float).max]
-ARRAYS = ("position", "orientation", "diameters", "species", "id", "image")
 
 
-def nasty_packing(dimension, **changes):
-    """Six particles, two of them discs, with doubles that short decimals do not hold."""
-    rng = np.random.default_rng(dimension)
-    n = len(NASTY)
-    half_length, radius = rng.random(n) * (np.arange(n) > 1), 1 / rng.uniform(1, 2, n)
-    position = rng.normal(size=(n, dimension))
-    position[:, 0] = NASTY
-    quaternion = rng.normal(size=(n, 4))
-    fields = {
-        "position": position,
-        "orientation": rng.uniform(-np.pi, np.pi, n)
-        if dimension == 2
-        else quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
-        "diameters": np.column_stack([2 * (half_length + radius), 2 * radius, 2 * radius]),
-        "species": np.arange(n) % 2 + 1,
-        "id": rng.permutation(n) + 1,
-        "image": rng.integers(-3, 4, (n, dimension)),
-        "box": Box(lo=np.full(dimension, -1 / 3), edges=np.full(dimension, np.nextafter(7, 8))),
-        "step": 12345678901,
-        "time": 1 / 7,
-    }
-    return Packing(**(fields | changes))
 
 
-def assert_identical(a, b):
-    """Compare bit for bit, so that -0.0 differs from 0.0."""
-    for name in ARRAYS:
-        x, y = getattr(a, name), getattr(b, name)
-        assert (x.dtype, x.shape, x.tobytes()) == (y.dtype, y.shape, y.tobytes()), name
-    assert a.box.lo.tobytes() == b.box.lo.tobytes()
-    assert a.box.edges.tobytes() == b.box.edges.tobytes()
-    assert (a.shape_style, a.step, a.time) == (b.shape_style, b.step, b.time)
 
 
 def rotate_x_axis(quaternion):
@@ -176,14 +145,6 @@ def test_shape_style_is_guessed_from_the_diameters():
     assert guess_shape_style([[1, 1, 1], [1, 3, 3]]) == "superellipsoid"
 
 
-def with_rests(dimension):
-    """A packing whose poses are known to more digits than doubles hold."""
-    packing = nasty_packing(dimension).with_(position=nasty_packing(dimension).position.clip(-9, 9))
-    finer = [
-        x + np.longdouble(1) / 3 * np.spacing(np.longdouble(1) * 1e-3) for x in packing.poses()
-    ]
-    finer = [x + np.spacing(np.abs(x).astype(float)) / np.longdouble(7) for x in finer]
-    return packing.with_poses(*finer)
 
 
 RESTS = ("position_rest", "orientation_rest", "edges_rest")

@@ -4,36 +4,32 @@ from functools import cache
 import h5py
 import numpy as np
 import pytest
-from test_minimise import squeezed
+from mixtures import bidisperse, monodisperse
+from squeezed import squeezed
 
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
-from jamshape.files.h5md import (
-    RunWriter,
-    read_attributes,
-    read_observables,
-    read_packing,
-    read_report,
-)
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
+from jamshape.files.run_writer import RunWriter
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import residual_of
+from jamshape.measures.minimum import measure, summary_of, write_minimum
+from jamshape.minima import residual_of
 from jamshape.minima.target import Target, find
 from jamshape.protocols.approach import Approach
-from jamshape.protocols.jammed import (
-    Files,
-    Sample,
-    is_compressed,
-    is_done,
-    make,
-    measure,
-    require_same,
-    summary,
-    write_minimum,
-)
-from jamshape.protocols.random_start import InsertionError, Mixture
+from jamshape.protocols.by_dynamics import is_compressed
+from jamshape.protocols.make import Dynamics, Recipe, is_done, make, require_same
+from jamshape.protocols.random_start import InsertionError
 
 U0 = 1e-12
-SAMPLE = Sample(n=16, alpha=1.0, phi_start=0.5, target=Target(U0))
-FAST = Approach(kappa=1e-5, p_end=3e-4)
+RECIPE = Recipe(bidisperse(1.0), n=16, phi_start=0.5, target=Target(U0))
+FAST = Dynamics(Approach(kappa=1e-5, p_end=3e-4))
+
+
+def run_of(out):
+    return out.with_name(out.name + ".run.h5")
+
+
+def search_of(out):
+    return out.with_name(out.name + ".search.h5")
 
 
 @cache
@@ -51,19 +47,21 @@ def minimum():
 
 def compressed(out, packing=None):
     """What a compression leaves that has reached its end."""
-    writer = RunWriter.create(Files(out).run, packing or start(), {"finished": False})
+    writer = RunWriter.create(run_of(out), packing or start(), {"finished": False})
     phi = np.linspace(0.80, 0.88, 60)
     p = 0.3 * np.clip(phi - 0.85, 0, None)
     kappa = np.where(np.arange(60) < 50, 1e-6, -1e-6)
-    writer.append_series(np.arange(60), np.arange(60.0), {"phi": phi, "p": p, "kappa": kappa})
-    writer.set_attributes(SAMPLE.attributes() | {"finished": True})
+    writer.append_series(
+        np.arange(60), np.arange(60.0), {"phi": phi, "pressure": p, "kappa": kappa}
+    )
+    writer.set_attributes(RECIPE.attributes() | {"finished": True})
 
 
 def assert_same_result(out, expected):
     for one, other in zip(read_packing(out).poses(), read_packing(expected).poses(), strict=True):
         np.testing.assert_array_equal(one, other)
     mine, others = read_attributes(out), read_attributes(expected)
-    for name in ("u", "p", "phi", "phi_J", "outcome", "residual", "n_contacts"):
+    for name in ("u", "pressure", "phi", "phi_J", "outcome", "residual", "n_contacts"):
         assert mine.get(name) == others.get(name), name
 
 
@@ -99,7 +97,7 @@ def test_measured_numbers_are_those_of_the_contacts():
     assert attributes["u"] == pytest.approx(U0, rel=1e-7, abs=0)
     # Doubles have an overlap of 1e-6 to nine digits.
     assert attributes["u"] == pytest.approx(forces.energy / packing.box.volume, rel=1e-6, abs=0)
-    assert attributes["p"] == pytest.approx(forces.pressure, rel=1e-6, abs=0)
+    assert attributes["pressure"] == pytest.approx(forces.pressure, rel=1e-6, abs=0)
     assert attributes["phi"] == packing.phi
     counts = coordination(packing, network)
     assert {k: attributes[k] for k in counts._fields} == counts._asdict()
@@ -112,7 +110,7 @@ def test_measured_numbers_are_those_of_the_contacts():
 
 def test_jamming_density_is_where_the_energy_vanishes():
     landscape, found = minimum()
-    phi_J = measure(landscape, found)[0]["phi_J"]
+    phi_J = measure(landscape, found).attributes["phi_J"]
     finer = find(landscape, State.of(start()), Target(1e-16))
     phi = finer.state.packing(landscape.particles).phi
     assert phi_J == pytest.approx(phi, abs=1e-6)
@@ -123,17 +121,17 @@ def test_jamming_density_is_where_the_energy_vanishes():
 def whole(tmp_path_factory):
     out = tmp_path_factory.mktemp("whole") / "packing.h5"
     compressed(out)
-    return out, list(make(SAMPLE, out))
+    return out, list(make(RECIPE, out))
 
 
 def test_a_compression_that_is_there_is_taken_and_searched_from(whole):
     out, progress = whole
     assert {at.stage for at in progress} == {"search"}
     assert is_done(out)
-    assert is_compressed(Files(out).run)
-    assert not Files(out).search.exists()
+    assert is_compressed(run_of(out))
+    assert not search_of(out).exists()
     assert progress[-1].energy_density == pytest.approx(U0, rel=1e-7, abs=0)
-    found, stored = summary(out), read_attributes(out)
+    found, stored = summary_of(out), read_attributes(out)
     assert found["reached"] is True
     assert found["u"] == stored["u"] == pytest.approx(U0, rel=1e-7, abs=0)
     assert found["phi"] == pytest.approx(progress[-1].phi, rel=1e-12)
@@ -150,17 +148,17 @@ def test_a_search_that_was_killed_goes_on_to_the_same_bits(whole, tmp_path, afte
     compressed(out)
     assert len(whole[1]) > after + 1
     for _ in range(2):  # twice, further on the second time
-        going = make(SAMPLE, out)
+        going = make(RECIPE, out)
         for _ in range(after):
             last = next(going)
         going.close()
         assert not is_done(out)
-        assert Files(out).search.exists()
-    rest = list(make(SAMPLE, out))
+        assert search_of(out).exists()
+    rest = list(make(RECIPE, out))
     assert last == whole[1][2 * after - 1]
     assert len(rest) == len(whole[1]) - 2 * after
     assert_same_result(out, whole[0])
-    assert not Files(out).search.exists()
+    assert not search_of(out).exists()
 
 
 def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_path):
@@ -172,32 +170,32 @@ def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_pat
     unbroken, out = tmp_path / "unbroken.h5", tmp_path / "packing.h5"
     for path in (unbroken, out):
         compressed(path, apart)
-    list(make(SAMPLE, unbroken))
-    going = make(SAMPLE, out)
+    list(make(RECIPE, unbroken))
+    going = make(RECIPE, out)
     next(going)
     going.close()
-    list(make(SAMPLE, out))
+    list(make(RECIPE, out))
     assert_same_result(out, unbroken)
 
 
 def test_the_search_of_another_target_is_not_gone_on_with(tmp_path):
     out = tmp_path / "packing.h5"
     compressed(out)
-    going = make(SAMPLE, out)
+    going = make(RECIPE, out)
     for _ in range(3):
         next(going)
     going.close()
-    other = Sample(n=16, alpha=1.0, phi_start=0.5, target=Target(1e-8))
+    other = replace(RECIPE, target=Target(1e-8))
     list(make(other, out))
     assert read_attributes(out)["u"] == pytest.approx(1e-8, rel=1e-7, abs=0)
 
 
 OTHERS = {
-    "alpha = 1.0, expected 0.5": {"alpha": 0.5},
+    "alpha = 1.0, expected 0.5": {"particles": bidisperse(0.5)},
     "n = 16, expected 24": {"n": 24},
     "seed = 1, expected 9": {"seed": 9},
-    "approach_kappa = 1e-07, expected 1e-05": {"approach": FAST},
-    "mixture = False, expected True": {"mixture": Mixture.monodisperse(1.0)},
+    "approach_kappa = 1e-07, expected 1e-05": {"way": FAST},
+    "size_ratio = 1.4, expected 1.0": {"particles": monodisperse(1.0)},
 }
 
 
@@ -217,17 +215,17 @@ def refused(sample, out):
 def test_the_compression_of_another_sample_is_neither_taken_nor_replaced(tmp_path, words):
     out = tmp_path / "packing.h5"
     compressed(out)
-    sentence = refused(replace(SAMPLE, **OTHERS[words]), out)
+    sentence = refused(replace(RECIPE, **OTHERS[words]), out)
     assert "run.h5 holds the compression of a packing with " in sentence
     assert words in sentence
     assert sentence.endswith("; write to another file, or make it again")
 
 
 def test_the_compression_of_another_mixture_is_refused(tmp_path):
-    sample = replace(SAMPLE, mixture=Mixture.monodisperse(1.0))
+    sample = replace(RECIPE, particles=monodisperse(1.0))
     out = tmp_path / "packing.h5"
     compressed(out)
-    RunWriter.open(Files(out).run).set_attributes(sample.attributes())
+    RunWriter.open(run_of(out)).set_attributes(sample.attributes())
     assert "expected those of another mixture" in refused(sample, out)
 
 
@@ -237,11 +235,11 @@ def test_the_compression_of_another_sample_is_replaced_where_that_is_asked_for(t
     for damaged in (False, True):
         compressed(out)
         if damaged:
-            cut(Files(out).run)
-        going = make(replace(SAMPLE, alpha=0.0, approach=FAST), out, again=True)
+            cut(run_of(out))
+        going = make(replace(RECIPE, particles=bidisperse(0.0), way=FAST), out, again=True)
         assert next(going).stage == "compression"
         going.close()
-        assert read_attributes(Files(out).run)["alpha"] == 0
+        assert read_attributes(run_of(out))["alpha"] == 0
 
 
 def cut(path):
@@ -284,12 +282,12 @@ def test_damaged_files_are_refused_and_kept(tmp_path, words, stage):
     out = tmp_path / "packing.h5"
     compressed(out)
     if stage == "search":
-        going = make(SAMPLE, out)
+        going = make(RECIPE, out)
         next(going)
         going.close()
-    path = getattr(Files(out), stage)
+    path = {"run": run_of, "search": search_of}[stage](out)
     DAMAGE[words](path)
-    sentence = refused(SAMPLE, out)
+    sentence = refused(RECIPE, out)
     assert sentence.startswith(f"{path}: ")
     assert words in sentence
 
@@ -297,24 +295,24 @@ def test_damaged_files_are_refused_and_kept(tmp_path, words, stage):
 def test_the_compression_of_another_shape_is_refused(tmp_path):
     out = tmp_path / "packing.h5"
     compressed(out)
-    renamed_shape(Files(out).run)
+    renamed_shape(run_of(out))
     words = "holds 16 particles of shape 'superellipsoid', expected 16 of 'spherocylinder'"
-    assert words in refused(SAMPLE, out)
+    assert words in refused(RECIPE, out)
 
 
 def test_a_finished_packing_of_another_sample_or_shape_is_refused(tmp_path):
     out = tmp_path / "packing.h5"
     landscape, found = minimum()
-    write_minimum(out, landscape, found, SAMPLE.attributes())
-    require_same(out, SAMPLE)
+    write_minimum(out, landscape, found, RECIPE.attributes())
+    require_same(out, RECIPE)
     for words, changes in OTHERS.items():
         with pytest.raises(ValueError, match=f"holds a packing with {words}; write to another"):
-            require_same(out, replace(SAMPLE, **changes))
+            require_same(out, replace(RECIPE, **changes))
     with pytest.raises(ValueError, match="with u0 = 1e-12, expected 1e-10; write to another file"):
-        require_same(out, replace(SAMPLE, target=Target(1e-10)))
+        require_same(out, replace(RECIPE, target=Target(1e-10)))
     renamed_shape(out)
     with pytest.raises(ValueError, match="of shape 'superellipsoid', expected 16 of 'sphero"):
-        require_same(out, SAMPLE)
+        require_same(out, RECIPE)
 
 
 def test_a_file_that_is_no_finished_packing_is_neither_done_nor_replaced(tmp_path):
@@ -339,7 +337,7 @@ def test_a_run_without_its_end_is_not_compressed(tmp_path):
 
 @pytest.mark.lammps
 def test_a_compression_that_was_killed_goes_on_to_a_result(tmp_path):
-    sample = Sample(n=16, alpha=0.0, phi_start=0.5, target=Target(1e-6), approach=FAST)
+    sample = Recipe(bidisperse(0.0), n=16, phi_start=0.5, target=Target(1e-6), way=FAST)
     unbroken, out = make(sample, tmp_path / "unbroken.h5"), tmp_path / "packing.h5"
     rows = [next(unbroken) for _ in range(150)]
     unbroken.close()
@@ -348,22 +346,22 @@ def test_a_compression_that_was_killed_goes_on_to_a_result(tmp_path):
         next(going)
     going.close()
     assert list(tmp_path.glob("packing*restart*"))
-    assert not is_compressed(Files(out).run)
+    assert not is_compressed(run_of(out))
     progress = list(make(sample, out))
     assert {at.stage for at in progress} == {"compression", "search"}
     for found, expected in zip(progress[:100], rows[50:], strict=True):
         assert found.phi == pytest.approx(expected.phi, rel=1e-12)
         assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-6, abs=1e-20)
-    phi = read_observables(Files(out).run)["phi"]
+    phi = read_observables(run_of(out))["phi"]
     np.testing.assert_allclose(phi[:150], [at.phi for at in rows], rtol=1e-12)
-    assert is_compressed(Files(out).run)
-    assert summary(out)["reached"]
+    assert is_compressed(run_of(out))
+    assert summary_of(out)["reached"]
     assert not list(tmp_path.glob("packing*restart*"))
 
 
 @pytest.mark.lammps
 def test_a_start_that_cannot_be_placed_leaves_no_file(tmp_path):
-    sample = Sample(n=16, alpha=4.0, phi_start=0.95)
+    sample = Recipe(bidisperse(4.0), n=16, phi_start=0.95)
     with pytest.raises((ValueError, InsertionError)):
         next(make(sample, tmp_path / "packing.h5"))
     assert not list(tmp_path.iterdir())

@@ -1,25 +1,33 @@
 import numpy as np
 import pytest
+from mixtures import superellipsoids
 
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import residual_of
+from jamshape.measures.minimum import summary_of
+from jamshape.minima import residual_of
 from jamshape.minima.target import Target, find
+from jamshape.protocols.make import Recipe, Steps, Thermalisation, make, require_same
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.protocols.superellipsoid_jammed import Sample, make, require_same, summary
 from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.statistics import bands, count
 
-COARSE = Quasistatic(step=1e-2)
-TIGHT = {"phi_start": 0.4, "quasistatic": COARSE, "target": Target(1e-12)}
-SAMPLES = {
-    "spheres": Sample(n=24, **TIGHT),
-    "spheroids": Sample(n=24, w1=0.7, **TIGHT),
-    "general ellipsoids": Sample(n=24, w1=0.8, w2=1.25, **TIGHT),
-    "boxes": Sample(n=24, p=1.5, **TIGHT),
-    "octahedra": Sample(n=24, p=0.85, **TIGHT),
+COARSE = Steps(Quasistatic(step=1e-2))
+
+
+def recipe(target=None, way=COARSE, **shape):
+    return Recipe(superellipsoids(**shape), 24, 3, phi_start=0.4, way=way, target=target)
+
+
+TIGHT = Target(1e-12)
+RECIPES = {
+    "spheres": recipe(TIGHT),
+    "spheroids": recipe(TIGHT, w1=0.7),
+    "general ellipsoids": recipe(TIGHT, w1=0.8, w2=1.25),
+    "boxes": recipe(TIGHT, p=1.5),
+    "octahedra": recipe(TIGHT, p=0.85),
 }
 FREEDOM = {"spheres": 3, "spheroids": 5}
 
@@ -31,14 +39,14 @@ def packings(tmp_path_factory):
     def get(name):
         if name not in made:
             made[name] = folder / f"{name}.h5"
-            for _ in make(SAMPLES[name], made[name]):
+            for _ in make(RECIPES[name], made[name]):
                 pass
         return made[name]
 
     return get
 
 
-@pytest.mark.parametrize("name", SAMPLES)
+@pytest.mark.parametrize("name", RECIPES)
 def test_a_packing_is_at_its_energy_and_in_balance(packings, name):
     packing, stored = read_packing(packings(name)), read_attributes(packings(name))
     landscape, state = Landscape(packing), State.of(packing)
@@ -50,7 +58,7 @@ def test_a_packing_is_at_its_energy_and_in_balance(packings, name):
     network = find_contacts(packing)
     held = ~np.isin(packing.id[network.pairs], stored_rattlers(packings(name))).any(axis=1)
     assert stored["n_contacts"] == held.sum()
-    assert summary(packings(name))["reached"]
+    assert summary_of(packings(name))["reached"]
     assert len(read_report(packings(name)).error) > 10
 
 
@@ -58,7 +66,7 @@ def stored_rattlers(path):
     return read_observables(path)["rattler_ids"][-1]
 
 
-@pytest.mark.parametrize("name", SAMPLES)
+@pytest.mark.parametrize("name", RECIPES)
 def test_missing_contacts_are_quartic_modes(packings, name):
     # N_c = d_f (N - N_r) - 2 - N_q (Yuan et al. 2019, Sec. 3.2), that is rank(H) = N_c - 1.
     packing = read_packing(packings(name))
@@ -76,7 +84,7 @@ def test_missing_contacts_are_quartic_modes(packings, name):
 
 
 def test_protocol_1_ends_just_above_the_jamming_that_the_direct_search_finds(tmp_path):
-    sample = Sample(n=24, w1=0.7, phi_start=0.4, quasistatic=COARSE)
+    sample = recipe(w1=0.7)
     for _ in make(sample, tmp_path / "bisected.h5"):
         pass
     packing, bisected = (read(tmp_path / "bisected.h5") for read in (read_packing, read_attributes))
@@ -90,17 +98,9 @@ def test_protocol_1_ends_just_above_the_jamming_that_the_direct_search_finds(tmp
 
 
 def test_protocol_2_thermalises_and_goes_on_from_where_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr("jamshape.protocols.superellipsoid_jammed._STORE_SECONDS", 0.0)
-    sample = Sample(
-        n=40,
-        p=1.5,
-        protocol=2,
-        n_sweeps=200,
-        phi_thermal=0.4,
-        phi_start=0.3,
-        quasistatic=COARSE,
-        target=Target(1e-10),
-    )
+    monkeypatch.setattr("jamshape.protocols.by_steps._STORE_SECONDS", 0.0)
+    way = Steps(COARSE.quasistatic, Thermalisation(0.4, 200))
+    sample = Recipe(superellipsoids(1.5), 40, 3, phi_start=0.3, way=way, target=Target(1e-10))
     stages = [at.stage.split()[0] for at in make(sample, tmp_path / "whole.h5")]
     first, last = stages.index("sweep"), len(stages) - stages[::-1].index("sweep")
     assert set(stages[:first]) == set(stages[last:]) - {"search"} == {"compression"}
@@ -119,29 +119,37 @@ def test_protocol_2_thermalises_and_goes_on_from_where_it_was(tmp_path, monkeypa
 
 def test_another_sample_is_refused(tmp_path, packings, monkeypatch):
     with pytest.raises(ValueError, match=r"a packing with w1 = 0\.7, expected 1"):
-        require_same(packings("spheroids"), SAMPLES["spheres"])
-    monkeypatch.setattr("jamshape.protocols.superellipsoid_jammed._STORE_SECONDS", 0.0)
+        require_same(packings("spheroids"), RECIPES["spheres"])
+    monkeypatch.setattr("jamshape.protocols.by_steps._STORE_SECONDS", 0.0)
     out = tmp_path / "packing.h5"
-    next(make(SAMPLES["boxes"], out))
-    with pytest.raises(ValueError, match=r"the making of a packing with p = 1\.5, expected 0\.85"):
-        next(make(SAMPLES["octahedra"], out))
-    next(make(SAMPLES["octahedra"], out, again=True))
+    next(make(RECIPES["boxes"], out))
+    with pytest.raises(
+        ValueError, match=r"the making of a packing with exponent = 1\.5, expected 0\.85"
+    ):
+        next(make(RECIPES["octahedra"], out))
+    next(make(RECIPES["octahedra"], out, again=True))
 
 
 @pytest.mark.parametrize(
     ("numbers", "sentence"),
     [
         ({"n": 0}, "n is 0, expected at least one particle"),
-        ({"protocol": 3}, "protocol is 3, expected 1 or 2"),
-        ({"phi_start": 1.5}, "expected 0 < phi < 1"),
+        ({"dimension": 4}, "dimension is 4, expected 2 or 3"),
+        ({"phi_start": 1.5}, "phi_start is 1.5, expected a packing fraction between 0 and 1"),
+        ({"target": None}, "there is no energy to reach, expected one after a compression by dy"),
     ],
 )
-def test_senseless_samples_are_refused(numbers, sentence):
+def test_senseless_recipes_are_refused(numbers, sentence):
     with pytest.raises(ValueError, match=sentence):
-        Sample(**numbers)
+        Recipe(**numbers)
+
+
+def test_senseless_monte_carlo_is_refused():
+    with pytest.raises(ValueError, match="expected 0 < phi < 1"):
+        Thermalisation(1.5)
 
 
 @pytest.mark.parametrize(("p", "w1", "w2"), [(0.5, 1, 1), (1, 1.5, 1), (1, 1, 0.5)])
 def test_senseless_shapes_are_refused(p, w1, w2):
     with pytest.raises(ValueError, match="expected"):
-        Sample(p=p, w1=w1, w2=w2).start()
+        superellipsoids(p, w1, w2)

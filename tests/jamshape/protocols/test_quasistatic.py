@@ -3,7 +3,7 @@ import pytest
 from superellipsoid_packings import scattered
 
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import residual_of
+from jamshape.minima import residual_of
 from jamshape.protocols.quasistatic import Quasistatic, QuasistaticRun, compress
 
 

@@ -7,32 +7,35 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mixtures import ROD, bidisperse, monodisperse, of_arrays
 
 from jamshape import _contact
 from jamshape.files.h5md import read_packing
 from jamshape.files.lammps_text import read_data
 from jamshape.measures.order import orientational_order
 from jamshape.packing import SHAPE_STYLES
-from jamshape.protocols.random_start import InsertionError, Mixture, random_packing
+from jamshape.protocols.random_start import InsertionError, random_packing
+from jamshape.shapes.particles import Particles, Sizes
+from jamshape.shapes.table import shape_named
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_initial.py"
 
 IN_TINY_BOXES = [
-    (1, 0.4, Mixture.bidisperse(4), 2),
-    (2, 0.5, Mixture.bidisperse(4), 2),
-    (3, 0.4, Mixture.bidisperse(20), 2),
-    (1, 0.1, Mixture.monodisperse(100), 2),
-    (8, 0.2, Mixture.bidisperse(4), 3),
-    (1, 0.3, Mixture.bidisperse(4), 3),
+    (1, 0.4, bidisperse(4), 2),
+    (2, 0.5, bidisperse(4), 2),
+    (3, 0.4, bidisperse(20), 2),
+    (1, 0.1, monodisperse(100), 2),
+    (8, 0.2, bidisperse(4), 3),
+    (1, 0.3, bidisperse(4), 3),
 ]
 IN_LARGE_BOXES = [
-    (200, 0.4, Mixture.bidisperse(4), 2),
-    (101, 0.5, Mixture.bidisperse(0), 2),
-    (100, 0.5, Mixture.bidisperse(1e-6), 2),
-    (60, 0.05, Mixture.monodisperse(100), 2),
-    (200, 0.4, Mixture.bidisperse(4, size_ratio=10), 2),
-    (100, 0.2, Mixture.bidisperse(4), 3),
-    (100, 0.3, Mixture.bidisperse(0), 3),
+    (200, 0.4, bidisperse(4), 2),
+    (101, 0.5, bidisperse(0), 2),
+    (100, 0.5, bidisperse(1e-6), 2),
+    (60, 0.05, monodisperse(100), 2),
+    (200, 0.4, bidisperse(4, size_ratio=10), 2),
+    (100, 0.2, bidisperse(4), 3),
+    (100, 0.3, bidisperse(0), 3),
 ]
 
 
@@ -79,7 +82,7 @@ def test_same_seed_same_packing():
 
 @pytest.mark.parametrize("n", [64, 65])
 def test_bidisperse_is_one_to_one_and_shuffled(n):
-    packing = random_packing(n, 0.3, 2, Mixture.bidisperse(3, 1.4))
+    packing = random_packing(n, 0.3, 2, bidisperse(3, 1.4))
     small = packing.species == 1
     assert (small.sum(), (packing.species == 2).sum()) == (n - n // 2, n // 2)
     assert np.all(packing.radius[small] == 0.5)
@@ -109,16 +112,17 @@ def test_orientations_are_uniform_on_the_sphere():
 def test_any_distribution():
     rng = np.random.default_rng(5)
     A, R = rng.uniform(0, 3, 40), rng.lognormal(0, 0.3, 40)
-    packing = random_packing(40, 0.35, 5, Mixture.from_arrays(A, R, np.arange(1, 41)))
+    packing = random_packing(40, 0.35, 5, of_arrays(A, R, np.arange(1, 41)))
     order = packing.species - 1
     np.testing.assert_allclose(packing.half_length, A[order], rtol=0, atol=1e-15)
     np.testing.assert_array_equal(packing.radius, R[order])
     assert smallest_gap(packing) >= 0
 
     def draw(n, rng):
-        return rng.uniform(0, 2, n), np.full(n, 0.5), np.ones(n, int)
+        long = 1 + 2 * rng.uniform(0, 2, n)
+        return Sizes(np.column_stack([long, np.ones((n, 2))]), np.ones(n), np.ones(n, int))
 
-    drawn = random_packing(40, 0.35, 5, Mixture(draw))
+    drawn = random_packing(40, 0.35, 5, Particles(shape_named(ROD), draw, {}))
     assert np.ptp(drawn.half_length) > 1
     assert smallest_gap(drawn) >= 0
 
@@ -126,19 +130,21 @@ def test_any_distribution():
 @pytest.mark.parametrize(
     ("n", "mixture", "dimension"),
     [
-        (256, Mixture.bidisperse(4), 2),
-        (200, Mixture.bidisperse(0, 10), 2),
-        (2, Mixture.bidisperse(4), 2),
-        (64, Mixture.bidisperse(2), 3),
+        (256, bidisperse(4), 2),
+        (200, bidisperse(0, 10), 2),
+        (2, bidisperse(4), 2),
+        (64, bidisperse(2), 3),
     ],
 )
-def test_recommended_start_works(n, mixture, dimension):
+def test_recommended_start_works(n, mixture, dimension, monkeypatch):
+    monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS", 50_000)
+    monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS_PER_PARTICLE", 0)
     sentence = (
         rf"^random insertion of {n} particles stalled at phi = 0\.\d+ of the 0\.95 asked after"
         r" \d+ attempts: start at phi <= (0\.\d+) and compress from there$"
     )
     with pytest.raises(InsertionError, match=sentence) as error:
-        random_packing(n, 0.95, 1, mixture, dimension=dimension, max_attempts=50_000)
+        random_packing(n, 0.95, 1, mixture, dimension=dimension)
     phi = float(re.match(sentence, str(error.value))[1])
     assert random_packing(n, phi, 1, mixture, dimension=dimension).n == n
 
@@ -146,9 +152,12 @@ def test_recommended_start_works(n, mixture, dimension):
 @pytest.mark.parametrize(("alpha", "dimension"), [(2, 2), (1e8, 2), (1, 3)])
 def test_box_too_short_for_the_longest(alpha, dimension):
     with pytest.raises(InsertionError, match="off its own periodic images in a box of") as error:
-        random_packing(1, 0.95, 1, Mixture.monodisperse(alpha), dimension=dimension)
+        random_packing(1, 0.95, 1, monodisperse(alpha), dimension=dimension)
     phi = float(re.search("start at phi <= (.*) and", str(error.value))[1])
-    assert random_packing(1, phi, 1, Mixture.monodisperse(alpha), dimension=dimension).n == 1
+    assert random_packing(1, phi, 1, monodisperse(alpha), dimension=dimension).n == 1
+
+
+NO_ROD = r"a particle of the mixture is no spherocylinder, expected \(2\(A\+R\), 2R, 2R\)"
 
 
 @pytest.mark.parametrize(
@@ -161,27 +170,27 @@ def test_box_too_short_for_the_longest(alpha, dimension):
         ({"seed": -1}, "seed is -1, expected an integer from 0"),
         ({"dimension": 4}, "dimension is 4, expected 2 or 3"),
         (
-            {"mixture": Mixture.from_arrays([1.0, -1.0], [1.0, 1.0])},
-            r"half_length of the mixture holds -1\.0, expected finite lengths from 0",
+            {"particles": of_arrays([1.0, -1.0], [1.0, 1.0])},
+            NO_ROD,
         ),
         (
-            {"mixture": Mixture.from_arrays([1.0, np.nan], [1.0, 1.0])},
-            "half_length of the mixture holds nan, expected",
+            {"particles": of_arrays([1.0, np.nan], [1.0, 1.0])},
+            NO_ROD,
         ),
         (
-            {"mixture": Mixture.from_arrays([1.0, 1.0], [0.0, 1.0])},
-            r"radius of the mixture holds 0\.0, expected finite lengths above 0",
+            {"particles": of_arrays([1.0, 1.0], [0.0, 1.0])},
+            NO_ROD,
         ),
         (
-            {"mixture": Mixture.from_arrays([1.0, 1.0], [1.0, -1.0])},
-            r"radius of the mixture holds -1\.0, expected finite lengths above 0",
+            {"particles": of_arrays([1.0, 1.0], [1.0, -1.0])},
+            NO_ROD,
         ),
         (
-            {"mixture": Mixture.from_arrays([1.0], [1.0])},
-            r"half_length of the mixture has shape \(1,\), expected \(2,\)",
+            {"particles": of_arrays([1.0], [1.0])},
+            r"diameters of the mixture has shape \(1, 3\), expected \(2, 3\)",
         ),
         (
-            {"mixture": Mixture.from_arrays([1.0, 1.0], [1.0, 1.0], [0, 1])},
+            {"particles": of_arrays([1.0, 1.0], [1.0, 1.0], [0, 1])},
             "species holds 0, expected numbers from 1",
         ),
     ],
@@ -193,9 +202,11 @@ def test_refuses(arguments, sentence):
 
 def test_mixture_refuses():
     with pytest.raises(ValueError, match=r"size_ratio is 0\.5, expected big over small"):
-        Mixture.bidisperse(4, 0.5)
-    for mixture in (Mixture.bidisperse, Mixture.monodisperse):
-        with pytest.raises(ValueError, match=r"alpha is -1, expected A / R, 0 for discs or above"):
+        bidisperse(4, 0.5)
+    for mixture in (bidisperse, monodisperse):
+        with pytest.raises(
+            ValueError, match=r"alpha is -1\.0, expected A / R, 0 for discs or above"
+        ):
             mixture(-1)
 
 
@@ -212,7 +223,7 @@ def test_driver_writes_what_it_says(tmp_path, name, reader, dimension):
     options = f"--alpha 2 --n 33 --phi 0.2 --seed 4 --size-ratio 1.2 --dimension {dimension}"
     run = run_driver(*options.split(), "--out", out)
     assert (run.returncode, run.stderr) == (0, "")
-    expected = random_packing(33, 0.2, 4, Mixture.bidisperse(2, 1.2), dimension=dimension)
+    expected = random_packing(33, 0.2, 4, bidisperse(2, 1.2), dimension=dimension)
     result = json.loads(run.stdout.splitlines()[-1])
     edges = expected.box.edges.tolist()
     assert result == {"out": str(out), "n": 33, "phi": expected.phi, "box": edges}

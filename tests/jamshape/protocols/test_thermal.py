@@ -5,7 +5,7 @@ from superellipsoid_packings import scattered
 from jamshape import _contact
 from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Stop, minimise
+from jamshape.minima import Stop, minimise
 from jamshape.packing import Box
 from jamshape.protocols.thermal import Thermal, equilibrate, without_overlaps
 

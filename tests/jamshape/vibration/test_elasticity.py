@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from small_packings import SMALL, jammed, matrix_of
-from test_hessian import discs
+from lattices import discs
 
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Stop, minimise
+from jamshape.minima import Stop, minimise
 from jamshape.vibration.elasticity import moduli
 from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum

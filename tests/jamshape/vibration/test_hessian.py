@@ -1,12 +1,13 @@
 """The dynamical matrix against differences of forces, closed forms, and what it must leave alone."""
 
+from lattices import discs
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from small_packings import SMALL, jammed, matrix_of
-from test_contacts import make, scaled
-from test_landscape import PRESSED, pressed_named
+from scenes import make, scaled
+from pressed import PRESSED, pressed_named
 
 from jamshape.contacts import ContactKind
 from jamshape.landscape import Landscape, State
@@ -51,9 +52,6 @@ def forced(packing, sides=2, **options):
     )
 
 
-def discs(position, edges, radius=0.5):
-    packing = make(position, 0.0, half_length=0.0, edges=edges)
-    return packing.with_(diameters=np.full((packing.n, 3), 2 * radius))
 
 
 # --- derivatives -------------------------------------------------------------------------------

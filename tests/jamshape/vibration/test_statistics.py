@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from small_packings import SMALL, jammed, matrix_of
-from test_contacts import make
+from scenes import make
 
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.hessian import dynamical_matrix

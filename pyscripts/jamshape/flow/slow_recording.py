@@ -1,4 +1,4 @@
-"""Slow compressions in files: a run of `stiff_compression` recorded in H5MD, which goes on after a kill."""
+"""Slow compressions in files: a run of `jamshape.flow.implicit` recorded in H5MD, which goes on after a kill."""
 
 from __future__ import annotations
 
@@ -9,30 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.files.h5md import (
-    RunWriter,
-    read_attributes,
-    read_observables,
-    read_packing,
-    require_attributes,
-)
-from jamshape.flow.compression import Compression, CompressionRun
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, require_attributes
+from jamshape.files.run_writer import RunWriter
 from jamshape.flow.implicit import Flow, Protocol, Step, compress
-from jamshape.lammps.session import Session
 from jamshape.landscape import Landscape, State
 from jamshape.measures.onset import fit_onset
 from jamshape.packing import Packing
-from jamshape.protocols.random_start import Mixture, random_packing
 
 # Steps between two frames, from which a run goes on.
 STEPS_PER_FRAME = 100
 
-# The fast compression that makes a start.
-_PHI_RANDOM, _KAPPA_FAST, _DT_FAST = 0.4, 1e-4, 0.2
-
 _ROW = (
     "phi",
-    "p",
+    "pressure",
     "u",
     "strain",
     "dt",
@@ -45,15 +34,6 @@ _ROW = (
 
 _COUNTS = ("dt", "time", "strain", "steps", "rejected", "explicit", "evaluations", "factorisations",
            "wall_seconds", "explicit_left", "held")  # fmt: skip
-
-
-def make_start(alpha: float, n: int, seed: int, phi: float) -> Packing:
-    """Compress a random packing fast, in LAMMPS; errors as `initial.random_packing`."""
-    packing = random_packing(n, _PHI_RANDOM, seed, Mixture.bidisperse(alpha))
-    with Session() as session:
-        run = CompressionRun(session, Compression(_KAPPA_FAST, phi, _DT_FAST, 2), packing)
-        run.advance(run.last_step)
-        return run.packing()
 
 
 def begin(
@@ -82,15 +62,15 @@ def is_finished(path: Path) -> bool:
     return path.exists() and bool(read_attributes(path).get("finished"))
 
 
-def summary(path: Path) -> dict[str, object]:
+def summary_of(path: Path) -> dict[str, object]:
     """Summarise a run: its end, its cost and, where the pressure rises, the onset of jamming."""
     observables, stored = read_observables(path), read_attributes(path)
     found: dict[str, object] = {"out": str(path)}
-    found |= {name: float(observables[name][-1]) for name in ("phi", "p", "u")}
+    found |= {name: float(observables[name][-1]) for name in ("phi", "pressure", "u")}
     cost = ("steps", "rejected", "explicit", "evaluations", "factorisations", "wall_seconds")
     found |= {name: float(stored[f"flow_{name}"]) for name in cost}
     try:
-        fit = fit_onset(observables["phi"], observables["p"])
+        fit = fit_onset(observables["phi"], observables["pressure"])
     except ValueError:  # the run ends below jamming
         return found | {"phi_J": None}
     return found | {"phi_J": fit.phi_J, "phi_J_error": fit.phi_J_error}

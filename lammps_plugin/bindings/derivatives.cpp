@@ -1,0 +1,132 @@
+#include "contact/pair_derivatives.hpp"
+
+#include "bindings/shape.hpp"
+#include "bindings/shapes.hpp"
+
+#include <vector>
+
+namespace jamshape {
+
+namespace {
+
+/// What Python sees of the second derivatives of n contacts, of their bonds (n, BONDS, ...).
+template <class Model, int D, class S> class DerivativeArrays {
+ public:
+  explicit DerivativeArrays(std::size_t n) :
+      pair({n}), n_bonds({n}), kind({n}), energy({n}), separation({n, D}), force({n, D}),
+      stiffness({n, BONDS}), distance({n, BONDS}), bond_force({n, BONDS}), gradient({n, BONDS, N}),
+      curvature({n, N, N}), on_side({n, BONDS, 2})
+  {
+  }
+
+  void set(std::size_t c, std::size_t p, const Vec<D, S> &r,
+           const ContactDerivatives<Model, D, S> &found)
+  {
+    const ContactOf<Model, D, S> &contact = found.contact;
+    pair[c] = static_cast<std::int64_t>(p);
+    n_bonds[c] = contact.n_bonds;
+    kind[c] = static_cast<int>(contact.kind);
+    energy[c] = static_cast<double>(contact.energy);
+    write_vec(r, separation.row(c));
+    write_vec(contact.force, force.row(c));
+    for (int b = 0; b < contact.n_bonds; ++b) {
+      const Bond<D, S> &bond = contact.bond[b];
+      stiffness.row(c)[b] = static_cast<double>(bond.own_stiffness);
+      distance.row(c)[b] = static_cast<double>(bond.distance);
+      on_side.row(c)[2 * b] = bond.on_side_i;
+      on_side.row(c)[2 * b + 1] = bond.on_side_j;
+      bond_force.row(c)[b] = static_cast<double>(norm(bond.force));
+      for (int k = 0; k < N; ++k) {
+        gradient.row(c)[b * N + k] = static_cast<double>(found.gradient[b][k]);
+      }
+    }
+    for (int k = 0; k < N * N; ++k) {
+      curvature.row(c)[k] = static_cast<double>(found.curvature[k / N][k % N]);
+    }
+  }
+
+  nb::dict release()
+  {
+    nb::dict result;
+    result["pair"] = pair.release();
+    result["n_bonds"] = n_bonds.release();
+    result["kind"] = kind.release();
+    result["energy"] = energy.release();
+    result["separation"] = separation.release();
+    result["force"] = force.release();
+    result["stiffness"] = stiffness.release();
+    result["distance"] = distance.release();
+    result["bond_force"] = bond_force.release();
+    result["on_side"] = on_side.release();
+    result["gradient"] = gradient.release();
+    result["curvature"] = curvature.release();
+    return result;
+  }
+
+ private:
+  static constexpr int N = PAIR_VARIABLES<D>, BONDS = Model::MOST_BONDS;
+
+  NewArray<std::int64_t> pair;
+  NewArray<int> n_bonds, kind;
+  NewArray<double> energy, separation, force, stiffness, distance, bond_force, gradient, curvature;
+  NewArray<bool> on_side;
+};
+
+template <class Model, int D, class S>
+nb::dict derivatives_in(const ShapeOf<Model> &of, const PairArrays &arrays)
+{
+  const PosedPairs<Model, D, S> pairs = of.template posed<D, S>(arrays);
+  const TurnedBodies<Model, D, S> turned(pairs);
+  std::vector<std::size_t> touching;
+  std::vector<ContactDerivatives<Model, D, S>> found;
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const ContactOf<Model, D, S> contact = pairs.contact(p, pairs.separation(p));
+    if (contact.status != ContactStatus::TOUCHING) continue;
+    touching.push_back(p);
+    found.emplace_back();
+    found.back().contact = contact;
+    const auto dual = turned.contact(p);
+    if (dual.status == ContactStatus::TOUCHING) {
+      read_derivatives<D, S, Model::MOST_BONDS>(dual, found.back());
+    }
+  }
+  DerivativeArrays<Model, D, S> derivatives(found.size());
+  for (std::size_t c = 0; c < found.size(); ++c) {
+    derivatives.set(c, touching[c], pairs.separation(touching[c]), found[c]);
+  }
+  return derivatives.release();
+}
+
+template <class Model>
+nb::dict derivatives(const ShapeOf<Model> &of, const PairArrays &arrays, bool extended)
+{
+  return of.in_space([&](auto D) {
+    return in_precision(extended,
+                        [&](auto s) { return derivatives_in<Model, D, decltype(s)>(of, arrays); });
+  });
+}
+
+}  // namespace
+
+void export_derivatives()
+{
+  using namespace nb::literals;
+  Shapes::each([](auto model) {
+    using Model = decltype(model);
+    class_of<Model>().def(
+        "derivatives",
+        [](const ShapeOf<Model> &of, const Array3<double> &position,
+           const Array3<double> &orientation, const Array2<double> &edges,
+           const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift, bool extended) {
+          return derivatives(of, {position, orientation, edges, pairs, shift}, extended);
+        },
+        "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "extended"_a,
+        "Second derivatives of the C touching pairs, arguments as in `sums`. The variables are\n"
+        "r_i - r_j and the rotations of i and j, n = 4 in 2D, 9 in 3D. Returns a dict: pair (C,)\n"
+        "rows of pairs; n_bonds, kind, energy (C,); separation, force (C, D); of up to most_bonds\n"
+        "bonds B stiffness, distance, bond_force (C, B), on_side (C, B, 2) and gradient (C, B, n)\n"
+        "of the distance; curvature (C, n, n), all but stiffness gradient (x) gradient.");
+  });
+}
+
+}  // namespace jamshape

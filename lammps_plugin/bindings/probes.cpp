@@ -1,0 +1,236 @@
+// Contact geometry of single pairs, row by row: what only tests and measurements of errors call.
+
+#include "contact/spherocylinder/spherocylinder.hpp"
+#include "contact/superellipsoid/superellipsoid.hpp"
+
+#include "bindings/arrays.hpp"
+#include "bindings/contact_arrays.hpp"
+#include "bindings/shape.hpp"
+
+#include <nanobind/stl/optional.h>
+#include <optional>
+#include <string>
+
+namespace jamshape {
+
+namespace {
+
+using Bodies = Array2<double>;
+
+/// Rows of spherocylinders: shape and pose as they are, also where no quaternion gives such an
+/// axis.
+struct SpherocylinderRows {
+  using Model = SpherocylinderModel;
+  static constexpr std::size_t COLUMNS_2D = 6, COLUMNS_3D = 8;
+  static constexpr const char *RULE = "6 (2D) or 8 (3D): centre, axis, half_length, radius.";
+
+  template <int D> static SpherocylinderBody<D> read(const double *row, std::size_t)
+  {
+    return {read_vec<D>(row), read_vec<D>(row + D), row[2 * D], row[2 * D + 1]};
+  }
+};
+
+struct SuperellipsoidRows {
+  using Model = SuperellipsoidModel;
+  static constexpr std::size_t COLUMNS_2D = 6, COLUMNS_3D = 11;
+  static constexpr const char *RULE =
+      "6 (2D: centre, angle, semi-axes, p) or 11 (3D: centre, quaternion, semi-axes, p).";
+
+  template <int D> static SuperellipsoidBody<D> read(const double *row, std::size_t n)
+  {
+    const double *turn = row + D, *axes = turn + (D == 2 ? 1 : 4);
+    const Vec<3> semi_axes{{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}};
+    const auto shape = Model::shape_from(semi_axes, axes[D]);
+    require(shape.has_value(), "body " + std::to_string(n) +
+                                   " is no such shape: a superellipsoid has positive semi-axes "
+                                   "and an exponent p above 0.5.");
+    auto body = Model::body<D>(*shape);
+    body.centre = read_vec<D>(row);
+    Model::turn_to<D>(body, orientation<D>(turn));
+    return body;
+  }
+
+ private:
+  template <int D> static Quaternion orientation(const double *turn)
+  {
+    if (D == 2) return {std::cos(0.5 * turn[0]), 0.0, 0.0, std::sin(0.5 * turn[0])};
+    return normalized(Quaternion{turn[0], turn[1], turn[2], turn[3]});
+  }
+};
+
+/// M pairs of bodies, or of a body then and now.
+template <class Rows> class BodyPairs {
+ public:
+  BodyPairs(const Bodies &bodies_i, const Bodies &bodies_j) : i(bodies_i), j(bodies_j)
+  {
+    require(i.shape(0) == j.shape(0) && i.shape(1) == j.shape(1),
+            "bodies_i and bodies_j differ in shape, expected one row each a pair.");
+    const std::size_t columns = i.shape(1);
+    require(columns == Rows::COLUMNS_2D || columns == Rows::COLUMNS_3D,
+            "bodies have " + std::to_string(columns) + " columns, expected " + Rows::RULE);
+  }
+
+  int dimension() const { return i.shape(1) == Rows::COLUMNS_2D ? 2 : 3; }
+  std::size_t size() const { return i.shape(0); }
+  template <int D> auto first(std::size_t n) const { return at<D>(i, n); }
+  template <int D> auto second(std::size_t n) const { return at<D>(j, n); }
+
+ private:
+  const Bodies &i, &j;
+
+  template <int D> static auto at(const Bodies &bodies, std::size_t n)
+  {
+    return Rows::template read<D>(bodies.data() + n * bodies.shape(1), n);
+  }
+};
+
+/// (M,) of what `ask(i, j)` gives for each pair.
+template <class T, class Rows, class Ask>
+nb::object each(const BodyPairs<Rows> &pairs, const Ask &ask)
+{
+  NewArray<T> answer({pairs.size()});
+  in_dimension(pairs.dimension(), [&](auto D) {
+    for (std::size_t n = 0; n < pairs.size(); ++n) {
+      answer[n] = ask(pairs.template first<D>(n), pairs.template second<D>(n));
+    }
+  });
+  return answer.release();
+}
+
+template <class Rows>
+nb::dict contacts(const BodyPairs<Rows> &pairs, const typename Rows::Model::Law &law)
+{
+  nb::dict result;
+  in_dimension(pairs.dimension(), [&](auto D) {
+    ContactArrays<D, Rows::Model::MOST_BONDS> found(pairs.size());
+    for (std::size_t n = 0; n < pairs.size(); ++n) {
+      found.set(n, contact_of(pairs.template first<D>(n), pairs.template second<D>(n), law));
+    }
+    found.release_to(result);
+  });
+  return result;
+}
+
+nb::dict spherocylinder_contacts(const Bodies &bodies_i, const Bodies &bodies_j, double k_e,
+                                 int sides)
+{
+  return contacts(BodyPairs<SpherocylinderRows>(bodies_i, bodies_j),
+                  law_of<SpherocylinderModel>(k_e, sides));
+}
+
+nb::object spine_distances(const Bodies &bodies_i, const Bodies &bodies_j)
+{
+  return each<double>(
+      BodyPairs<SpherocylinderRows>(bodies_i, bodies_j),
+      [](const auto &i, const auto &j) { return std::sqrt(spine_distance_sq(spine_pair(i, j))); });
+}
+
+nb::dict superellipsoid_contacts(const Bodies &bodies_i, const Bodies &bodies_j, double epsilon)
+{
+  return contacts(BodyPairs<SuperellipsoidRows>(bodies_i, bodies_j),
+                  law_of<SuperellipsoidModel>(epsilon, 1));
+}
+
+template <int D>
+nb::dict scales(const BodyPairs<SuperellipsoidRows> &pairs,
+                const std::optional<Array2<double>> &normals)
+{
+  NewArray<double> eta({pairs.size()}), gap({pairs.size()});
+  NewArray<double> normal({pairs.size(), D}), point_i({pairs.size(), D});
+  NewArray<int> iterations({pairs.size()});
+  NewArray<bool> fallback({pairs.size()});
+  for (std::size_t n = 0; n < pairs.size(); ++n) {
+    const auto i = pairs.first<D>(n), j = pairs.second<D>(n);
+    TangencyWish<D, double> wish{i.centre - j.centre, false, nullptr};
+    require(norm_sq(wish.r) > 0.0,
+            "the bodies of pair " + std::to_string(n) + " have the same centre.");
+    Vec<D> last;
+    if (normals.has_value()) {
+      last = read_vec<D>(normals->data() + D * n);
+      wish.last = &last;
+    }
+    const FoundTangency<D, double> found = tangency_of(i, j, wish);
+    eta[n] = found.at.scale;
+    gap[n] = found.gap;
+    iterations[n] = found.iterations;
+    fallback[n] = found.is_fallback;
+    write_vec((1.0 / norm(found.at.normal)) * found.at.normal, normal.row(n));
+    write_vec(-found.at.point_i, point_i.row(n));
+  }
+  nb::dict result;
+  result["eta"] = eta.release();
+  result["gap"] = gap.release();
+  result["iterations"] = iterations.release();
+  result["fallback"] = fallback.release();
+  result["normal"] = normal.release();
+  result["point_i"] = point_i.release();
+  return result;
+}
+
+nb::dict superellipsoid_scales(const Bodies &bodies_i, const Bodies &bodies_j,
+                               const std::optional<Array2<double>> &normals)
+{
+  const BodyPairs<SuperellipsoidRows> pairs(bodies_i, bodies_j);
+  require(!normals.has_value() ||
+              (normals->shape(0) == pairs.size() &&
+               normals->shape(1) == static_cast<std::size_t>(pairs.dimension())),
+          "normals have no shape (M, D).");
+  return in_dimension(pairs.dimension(), [&](auto D) { return scales<D>(pairs, normals); });
+}
+
+nb::object superellipsoid_near(const Bodies &bodies_i, const Bodies &bodies_j, double margin)
+{
+  return each<bool>(
+      BodyPairs<SuperellipsoidRows>(bodies_i, bodies_j),
+      [&](const auto &i, const auto &j) { return SuperellipsoidModel::closer_than(margin, i, j); });
+}
+
+nb::object superellipsoid_motion_sq(const Bodies &then, const Bodies &now)
+{
+  return each<double>(BodyPairs<SuperellipsoidRows>(then, now),
+                      [](const auto &before, const auto &body) {
+                        return SuperellipsoidModel::motion_sq(body.centre - before.centre, body,
+                                                              SuperellipsoidModel::pose(before));
+                      });
+}
+
+nb::object superellipsoid_overlap(const Bodies &bodies_i, const Bodies &bodies_j)
+{
+  return each<bool>(BodyPairs<SuperellipsoidRows>(bodies_i, bodies_j),
+                    [](const auto &i, const auto &j) { return are_overlapping(i, j); });
+}
+
+}  // namespace
+
+void export_probes(nb::module_ &m)
+{
+  using namespace nb::literals;
+  m.def("spherocylinder_contacts", &spherocylinder_contacts, "bodies_i"_a, "bodies_j"_a, "k_e"_a,
+        "sides"_a,
+        "Contacts of M pairs. Bodies are (M, 6) in 2D, (M, 8) in 3D: centre, unit axis,\n"
+        "half_length, radius. Returns the arrays of Spherocylinders.contacts, of all M pairs\n"
+        "(status 0: apart).");
+  m.def("spine_distances", &spine_distances, "bodies_i"_a, "bodies_j"_a,
+        "Shortest distances (M,) of the spines of M pairs, 0 where they cross.");
+  m.def("superellipsoid_contacts", &superellipsoid_contacts, "bodies_i"_a, "bodies_j"_a,
+        "epsilon"_a,
+        "Contacts of M pairs. Bodies are (M, 6) in 2D: centre, angle, two semi-axes, p; (M, 11)\n"
+        "in 3D: centre, quaternion w i j k, three semi-axes, p. Returns the arrays of\n"
+        "Superellipsoids.contacts, of all M pairs (status 0: apart). Of a bond 1 -\n"
+        "distance/reach is 1 - eta^2.");
+  m.def(
+      "superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
+      "normals"_a.none() = nb::none(),
+      "The scale at which both bodies of M pairs touch, whether above 1 or below, begun at\n"
+      "`normals` (M, D) where given. Returns a dict: eta, gap (relative bound of its error),\n"
+      "iterations, fallback (the first attempt failed), normal (into i, unit), point_i (from the\n"
+      "centre of i to the tangency of the scaled bodies).");
+  m.def("superellipsoid_near", &superellipsoid_near, "bodies_i"_a, "bodies_j"_a, "margin"_a,
+        "Whether surfaces may be closer than `margin` (M,): false only where they are not.");
+  m.def("superellipsoid_motion_sq", &superellipsoid_motion_sq, "then"_a, "now"_a,
+        "Upper bound of the squared distance that any point of a body moved (M,).");
+  m.def("superellipsoid_overlap", &superellipsoid_overlap, "bodies_i"_a, "bodies_j"_a,
+        "Whether bodies share more than a point (M,).");
+}
+
+}  // namespace jamshape

@@ -1,0 +1,92 @@
+#pragma once
+
+#include "contact/contact.hpp"
+#include "contact/math/dimension.hpp"
+
+#include "bindings/arrays.hpp"
+#include "bindings/pairs.hpp"
+#include "text.hpp"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace jamshape {
+
+/// The law of contacts from what Python gives.
+template <class Model> typename Model::Law law_of(double k_e, int sides)
+{
+  require(k_e > 0.0, "k_e is " + shown(k_e) + ", expected a positive energy.");
+  require(sides == 1 || sides == 2, "sides is " + std::to_string(sides) + ", expected 1 or 2.");
+  return Model::law(k_e, static_cast<Sides>(sides));
+}
+
+/// N particles of one shape, each of its own size, with the law of their contacts: the class that
+/// Python knows a shape by. Its methods are bound where they are written, in shapes.cpp, sums.cpp,
+/// derivatives.cpp, sweeps.cpp and vicinity.cpp, for every shape of shapes.hpp.
+template <class Model> class ShapeOf {
+ public:
+  using Shape = typename Model::Shape;
+  using Law = typename Model::Law;
+
+  ShapeOf(const Array2<double> &diameters, const Array1<double> &exponent, int dimension,
+          double k_e, int sides) : space(dimension), contact_law(law_of<Model>(k_e, sides))
+  {
+    require(dimension == 2 || dimension == 3,
+            "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
+    require(diameters.shape(1) == 3 && exponent.shape(0) == diameters.shape(0),
+            "diameters and exponent have no shapes (N, 3) and (N,).");
+    particles.reserve(diameters.shape(0));
+    for (std::size_t i = 0; i < diameters.shape(0); ++i) {
+      const auto shape =
+          Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), exponent.data()[i]);
+      require(shape.has_value(),
+              "particle " + std::to_string(i) + " is no such shape: " + Model::SHAPE_RULE + ".");
+      particles.push_back(*shape);
+    }
+  }
+
+  std::size_t n() const { return particles.size(); }
+  int dimension() const { return space; }
+  const std::vector<Shape> &shapes() const { return particles; }
+  const Law &law() const { return contact_law; }
+
+  /// `visit(D)` for the dimension of the particles.
+  template <class Visit> auto in_space(const Visit &visit) const
+  {
+    return in_dimension(space, visit);
+  }
+
+  template <int D, class S> PosedPairs<Model, D, S> posed(const PairArrays &arrays) const
+  {
+    arrays.check(n(), D);
+    return {particles, arrays.poses(), arrays.list(), contact_law};
+  }
+
+ private:
+  int space;
+  Law contact_law;
+  std::vector<Shape> particles;
+};
+
+/// The name of a shape's class: its own, in the plural.
+template <class Model> std::string class_name()
+{
+  std::string name = std::string(Model::NAME) + "s";
+  name[0] = static_cast<char>(name[0] - 'a' + 'A');
+  return name;
+}
+
+/// The class of a shape, once shapes.cpp has made it.
+template <class Model> nb::class_<ShapeOf<Model>> class_of()
+{
+  return nb::borrow<nb::class_<ShapeOf<Model>>>(nb::type<ShapeOf<Model>>());
+}
+
+/// `visit(S())` for doubles or for long doubles.
+template <class Visit> auto in_precision(bool extended, const Visit &visit)
+{
+  return extended ? visit(static_cast<long double>(0)) : visit(0.0);
+}
+
+}  // namespace jamshape

@@ -1,0 +1,176 @@
+#include "bindings/shapes.hpp"
+
+#include "bindings/contact_arrays.hpp"
+#include "bindings/shape.hpp"
+
+#include <optional>
+#include <vector>
+
+namespace jamshape {
+
+namespace {
+
+/// (N,) of what `value(D, shape)` gives for each particle.
+template <class T, class Model, class Value>
+nb::object each(const ShapeOf<Model> &of, const Value &value)
+{
+  NewArray<T> values({of.n()});
+  of.in_space([&](auto D) {
+    for (std::size_t i = 0; i < of.n(); ++i) values[i] = value(D, of.shapes()[i]);
+  });
+  return values.release();
+}
+
+std::int64_t axis_or_none(const std::optional<int> &axis) { return axis.value_or(-1); }
+
+template <class Model> nb::object moments(const ShapeOf<Model> &of)
+{
+  NewArray<double> moment({of.n(), 3});
+  of.in_space([&](auto D) {
+    for (std::size_t i = 0; i < of.n(); ++i) {
+      write_vec(Model::template drag<D>(of.shapes()[i]).moment, moment.row(i));
+    }
+  });
+  return moment.release();
+}
+
+template <class Model> void export_sizes(nb::class_<ShapeOf<Model>> &of)
+{
+  using Self = const ShapeOf<Model> &;
+  using Shape = const typename Model::Shape &;
+  const auto length = [&](const char *name, const auto &value, const char *text) {
+    of.def_prop_ro(name, [value](Self self) { return each<double>(self, value); }, text);
+  };
+  const auto axis = [&](const char *name, const auto &value, const char *text) {
+    of.def_prop_ro(name, [value](Self self) { return each<std::int64_t>(self, value); }, text);
+  };
+  length(
+      "measure", [](auto D, Shape s) { return Model::template drag<D>(s).measure; },
+      "(N,) areas in 2D, volumes in 3D.");
+  of.def_prop_ro("moment", &moments<Model>,
+                 "(N, 3) mean squared distances from the body's axes, in 2D from z alone.");
+  length(
+      "outer_radius", [](auto D, Shape s) { return Model::template outer_radius<D>(s); },
+      "(N,) radii of the spheres around the particles.");
+  length(
+      "inner_radius", [](auto D, Shape s) { return Model::template inner_radius<D>(s); },
+      "(N,) smallest lengths of the particles.");
+  length(
+      "rotation_length", [](auto D, Shape s) { return Model::template rotation_length<D>(s); },
+      "(N,) lengths that a radian counts for; 0 where no contact can turn a particle.");
+  length(
+      "turning_radius", [](auto D, Shape s) { return Model::template turning_radius<D>(s); },
+      "(N,) how far a radian moves a surface towards others at most.");
+  axis(
+      "symmetry_axis", [](auto, Shape s) { return axis_or_none(Model::symmetry_axis(s)); },
+      "(N,) body axis (0, 1, 2) about which a turn changes nothing in space, or -1.");
+  axis(
+      "director", [](auto D, Shape s) { return axis_or_none(Model::template director<D>(s)); },
+      "(N,) body axis (0, 1, 2) that tells the direction, or -1.");
+}
+
+/// (M,) of what is asked of each pair.
+template <class Model, class Ask>
+nb::object each_pair(const ShapeOf<Model> &of, const PairArrays &arrays, const Ask &ask)
+{
+  NewArray<bool> answer({arrays.pairs.shape(0)});
+  of.in_space([&](auto D) {
+    const auto pairs = of.template posed<D, double>(arrays);
+    for (std::size_t p = 0; p < pairs.size(); ++p) answer[p] = ask(pairs, p);
+  });
+  return answer.release();
+}
+
+template <class Model, int D>
+nb::dict contacts_in(const ShapeOf<Model> &of, const PairArrays &arrays)
+{
+  const PosedPairs<Model, D, double> pairs = of.template posed<D, double>(arrays);
+  std::vector<std::size_t> at;
+  std::vector<ContactOf<Model, D>> found;
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const ContactOf<Model, D> contact = pairs.contact(p, pairs.separation(p));
+    if (contact.status == ContactStatus::APART) continue;
+    at.push_back(p);
+    found.push_back(contact);
+  }
+  NewArray<std::int64_t> pair({at.size()});
+  NewArray<double> separation({at.size(), D});
+  ContactArrays<D, Model::MOST_BONDS> contacts(at.size());
+  for (std::size_t c = 0; c < at.size(); ++c) {
+    pair[c] = static_cast<std::int64_t>(at[c]);
+    write_vec(pairs.separation(at[c]), separation.row(c));
+    contacts.set(c, found[c]);
+  }
+  nb::dict result;
+  result["pair"] = pair.release();
+  result["separation"] = separation.release();
+  contacts.release_to(result);
+  return result;
+}
+
+template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
+{
+  using namespace nb::literals;
+  using Self = const ShapeOf<Model> &;
+  using Numbers = const Array3<double> &;
+  using Edges = const Array2<double> &;
+  using Integers = const Array2<std::int64_t> &;
+  of.def(
+      "near",
+      [](Self self, Numbers position, Numbers orientation, Edges edges, Integers pairs,
+         Integers shift, double margin) {
+        return each_pair(self, {position, orientation, edges, pairs, shift},
+                         [&](const auto &of, std::size_t p) { return of.are_closer(p, margin); });
+      },
+      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "margin"_a,
+      "Whether surfaces of M pairs may be closer than `margin` (M,): false only where they are\n"
+      "not. Poses and pairs as `sums` takes them.");
+  of.def(
+      "overlaps",
+      [](Self self, Numbers position, Numbers orientation, Edges edges, Integers pairs,
+         Integers shift) {
+        return each_pair(self, {position, orientation, edges, pairs, shift},
+                         [](const auto &of, std::size_t p) { return of.overlap(p); });
+      },
+      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a,
+      "Whether the particles of M pairs share more than a point (M,).");
+  of.def(
+      "contacts",
+      [](Self self, Numbers position, Numbers orientation, Edges edges, Integers pairs,
+         Integers shift) {
+        const PairArrays arrays{position, orientation, edges, pairs, shift};
+        return self.in_space([&](auto D) { return contacts_in<Model, D>(self, arrays); });
+      },
+      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a,
+      "The C of M pairs that are not apart. Returns a dict: pair (C,) rows of pairs; status (1\n"
+      "touching, 2 crossing, 3 unconverged), kind, n_bonds, error (relative, of an iteration),\n"
+      "energy (C,); separation, force (on i) (C, D); torque_i, torque_j (C, 1 or 3) and, of up to\n"
+      "most_bonds bonds B, bond_normal (into i), bond_force, bond_arm_i (C, B, D), bond_distance,\n"
+      "bond_reach, bond_energy, bond_stiffness (C, B), bond_on_side (C, B, 2).");
+}
+
+template <class Model> void export_shape(nb::module_ &m)
+{
+  using namespace nb::literals;
+  using Self = ShapeOf<Model>;
+  nb::class_<Self> of(m, class_name<Model>().c_str(), Model::SHAPE_RULE);
+  of.def(nb::init<const Array2<double> &, const Array1<double> &, int, double, int>(),
+         "diameters"_a, "exponent"_a, "dimension"_a, "k_e"_a, "sides"_a,
+         "Of diameters (N, 3) and exponents (N,), which not all shapes have; sides 1 or 2 bonds\n"
+         "where sides lie on each other, of shapes whose law knows both.");
+  of.attr("name") = Model::NAME;
+  of.attr("core") = Model::CORE;
+  of.attr("most_bonds") = Model::MOST_BONDS;
+  of.attr("has_sides") = Model::HAS_SIDES;
+  export_sizes(of);
+  export_pairs(of);
+}
+
+}  // namespace
+
+void export_shapes(nb::module_ &m)
+{
+  Shapes::each([&](auto model) { export_shape<decltype(model)>(m); });
+}
+
+}  // namespace jamshape

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "contact/spherocylinder/spherocylinder.hpp"
+#include "contact/superellipsoid/superellipsoid.hpp"
+
+namespace jamshape {
+
+template <class... Models> struct ShapeList {
+  /// Shows each model, as an empty object of its type.
+  template <class Visit> static void each(const Visit &visit) { (visit(Models{}), ...); }
+};
+
+/// Every shape that Python knows.
+using Shapes = ShapeList<SpherocylinderModel, SuperellipsoidModel>;
+
+}  // namespace jamshape

@@ -1,0 +1,65 @@
+#include "bindings/shape.hpp"
+#include "bindings/shapes.hpp"
+
+namespace jamshape {
+
+namespace {
+
+template <class Model, int D, class S>
+nb::dict sums_in(const ShapeOf<Model> &of, const PairArrays &arrays)
+{
+  const PairSums<D, S> sums = sum_over(of.template posed<D, S>(arrays), of.n());
+  NewArray<double> force({of.n(), D}), torque({of.n(), ROTATIONS<D>});
+  for (std::size_t n = 0; n < of.n(); ++n) {
+    write_vec(sums.force[n], force.row(n));
+    write_vec(sums.torque[n], torque.row(n));
+  }
+  NewArray<double> virial({D, D});
+  write_vec(sums.virial, virial.row(0));
+  nb::dict result;
+  result["energy"] = static_cast<double>(sums.energy);
+  result["force"] = force.release();
+  result["torque"] = torque.release();
+  result["virial"] = virial.release();
+  result["bond_force"] = static_cast<double>(sums.bond_force);
+  result["n_bonds"] = sums.n_bonds;
+  result["error"] = sums.error;
+  result["crossing"] = sums.crossing;
+  result["unconverged"] = sums.unconverged;
+  return result;
+}
+
+template <class Model>
+nb::dict sums(const ShapeOf<Model> &of, const PairArrays &arrays, bool extended)
+{
+  return of.in_space([&](auto D) {
+    return in_precision(extended,
+                        [&](auto s) { return sums_in<Model, D, decltype(s)>(of, arrays); });
+  });
+}
+
+}  // namespace
+
+void export_sums()
+{
+  using namespace nb::literals;
+  Shapes::each([](auto model) {
+    using Model = decltype(model);
+    class_of<Model>().def(
+        "sums",
+        [](const ShapeOf<Model> &of, const Array3<double> &position,
+           const Array3<double> &orientation, const Array2<double> &edges,
+           const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift, bool extended) {
+          return sums(of, {position, orientation, edges, pairs, shift}, extended);
+        },
+        "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "extended"_a,
+        "Sums over M pairs. Position (2, N, D), orientation (2, N, 1) angles or (2, N, 4)\n"
+        "quaternions and edges (2, D) as a double and its small rest; pairs (M, 2), shift (M, D)\n"
+        "box edges to add to the second; extended: in long double. Returns a dict: energy, force\n"
+        "(N, D), torque (N, 1 or 3), virial (D, D), bond_force (sum of magnitudes), n_bonds,\n"
+        "error (the largest of a contact), crossing and unconverged (a pair of this status, or\n"
+        "-1).");
+  });
+}
+
+}  // namespace jamshape

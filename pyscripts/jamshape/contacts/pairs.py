@@ -1,0 +1,50 @@
+"""A list of pairs that may touch, which holds until particles have moved too far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.contacts.near import NearPairs
+from jamshape.packing import State
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Pairs of particles whose surfaces were closer than a skin at a state."""
+
+    particles: IntArray
+    """(M, 2)"""
+    shift: IntArray
+    """(M, D) box edges to add to the second."""
+    then: State
+    skin: float
+    reach: float
+    """How far apart their centres may be."""
+
+    @classmethod
+    def of(cls, near: NearPairs, state: State, skin: float, reach: float) -> Pairs:
+        """Of surfaces that are closer than a skin, and centres than a reach beside that skin."""
+        pairs = np.column_stack([near.first, near.second])
+        return cls(pairs, near.shift, state, skin, reach + skin)
+
+    @property
+    def near(self) -> NearPairs:
+        """As the functions of `contacts` take them."""
+        return NearPairs(self.particles[:, 0], self.particles[:, 1], self.shift)
+
+    def outrun_by(self, now: State, turning_radius: FloatArray, kept: float = 0.0) -> bool:
+        """Whether two surfaces may have come closer by `skin`, or by what is left of it."""
+        position, orientation, edges = (part[0] for part in now.split)
+        position_then, orientation_then, edges_then = (part[0] for part in self.then.split)
+        scale = edges / edges_then
+        left = self.skin - kept - float(np.abs(scale - 1).max()) * self.reach
+        moved = np.sqrt(((position - scale * position_then) ** 2).sum(axis=1))
+        turn = orientation - orientation_then
+        if now.dimension == 2:
+            turned = np.abs(turn - 2 * np.pi * np.rint(turn / (2 * np.pi)))[:, 0]
+        else:  # the chord of the quaternions is half of the angle, or a little less
+            turned = 2.3 * np.sqrt((turn**2).sum(axis=1))
+        return bool(2 * (moved + turning_radius * turned).max(initial=0.0) >= left)

@@ -1,0 +1,125 @@
+"""Compressions in files: a run of `jamshape.flow.compression` recorded in H5MD, which goes on after a kill."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_series
+from jamshape.files.run_writer import RunWriter
+from jamshape.flow.compression import Compression, CompressionRun, Row
+from jamshape.measures.onset import fit_onset
+from jamshape.packing import Packing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from jamshape.lammps.session import Session
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a compression leaves in its H5MD file.
+
+    Parameters
+    ----------
+    path
+        The file; restart files lie beside it, as ``path.restart.a`` and ``.b``.
+    rows, frames
+        How many samples of the observables and how many snapshots, over the whole run.
+    attributes
+        Stored with the run, beside its settings: what made the initial state.
+    """
+
+    path: Path
+    rows: int = 400
+    frames: int = 20
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def restart_prefix(self) -> Path:
+        """Path of the restart files without their last letter."""
+        return self.path.with_name(self.path.name + ".restart")
+
+    def newest_restart(self) -> Path:
+        """Find the last restart file of a run that was killed.
+
+        Raises
+        ------
+        FileNotFoundError
+            When there is none.
+        """
+        paths = [Path(f"{self.restart_prefix}.{end}") for end in "ab"]
+        found = [path for path in paths if path.is_file()]
+        if not found:
+            msg = f"Found neither {paths[0]} nor {paths[1].name}, expected one: start anew."
+            raise FileNotFoundError(msg)
+        return max(found, key=lambda path: path.stat().st_mtime)
+
+
+def is_finished(path: Path) -> bool:
+    """Whether the file holds a compression that reached its end."""
+    return path.exists() and bool(read_attributes(path).get("finished"))
+
+
+def begin(session: Session, settings: Compression, start: Packing, to: Recording) -> CompressionRun:
+    """Start a compression and its file."""
+    run = CompressionRun(session, settings, start)
+    attributes = dataclasses.asdict(settings) | dict(to.attributes)
+    attributes |= {"phi_start": start.phi, "rows": to.rows, "frames": to.frames, "finished": False}
+    attributes["left_out"] = session.left_out()
+    RunWriter.create(to.path, run.packing(), attributes, run.measure())
+    return run
+
+
+def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
+    """Go on with a compression that was killed, from its last restart file, as it was set."""
+    stored = read_attributes(path)
+    names = {f.name for f in dataclasses.fields(Compression)} & set(stored)
+    settings = Compression(**{name: stored[name] for name in names})
+    to = Recording(path, int(stored["rows"]), int(stored["frames"]))
+    run = CompressionRun(session, settings, read_packing(path, 0), to.newest_restart())
+    RunWriter.open(path).truncate(session.step)
+    return run, to
+
+
+def record(run: CompressionRun, to: Recording) -> Iterator[Row]:
+    """Run to the end, writing each sample to the file before it is yielded."""
+    writer = RunWriter.open(to.path)
+    whole = run.settings.steps(float(read_attributes(to.path)["phi_start"]), writer.first.dimension)
+    every = max(1, whole // to.rows)
+    per_frame = every * max(1, to.rows // to.frames)
+    name_of_error = "local_error" if run.settings.chooses_steps else "step_error"
+    run.keep_restarts(per_frame, to.restart_prefix)
+
+    def keep(sample: Row) -> Row:
+        if sample.step % per_frame == 0 or sample.step == run.last_step:
+            writer.append(run.packing(), sample.observables)
+        else:
+            writer.append_observables(sample.step, sample.time, sample.observables)
+        error = sample.observables[name_of_error]
+        writer.append_report(sample.step, sample.wall_seconds, error)
+        return sample
+
+    # A restart file is older than the row of its step, which a kill may have cut off.
+    if run.session.step > read_series(to.path, "pressure").step[-1]:
+        yield keep(run.sample())
+    for sample in run.samples(every):
+        yield keep(sample)
+    writer.set_attributes({"finished": True})
+
+
+def summary_of(path: Path) -> dict[str, object]:
+    """Summarise a run: its end and, where the pressure rises, the onset of jamming."""
+    observables = read_observables(path)
+    last: dict[str, object] = {
+        name: float(observables[name][-1]) for name in ("phi", "pressure", "z", "S_2", "S_4")
+    }
+    last["left_out"] = read_attributes(path).get("left_out", "")
+    try:
+        fit = fit_onset(observables["phi"], observables["pressure"])
+    except ValueError:  # the run ends below jamming
+        return {"out": str(path), **last, "phi_J": None}
+    return {"out": str(path), **last, "phi_J": fit.phi_J, "phi_J_error": fit.phi_J_error}

@@ -1,0 +1,177 @@
+"""What is written about a minimum, of any shape and dimension: the attributes of a packing's file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import BoolArray, FloatArray
+from jamshape.contacts import ContactNetwork, coordination, find_contacts, find_rattlers
+from jamshape.files.h5md import read_attributes, write_packing
+from jamshape.files.run_writer import RunWriter
+from jamshape.landscape import Landscape
+from jamshape.measures.contact_statistics import contact_scale, residuals
+from jamshape.measures.order import orientational_order
+from jamshape.measures.order3d import cubatic_order, nematic_order
+from jamshape.minima import History, Minimum, Outcome, residual_of, rounding_floor
+from jamshape.packing import Packing, body_axes
+
+# Rows of the convergence history that are kept in a packing's file.
+_REPORT_ROWS = 2000
+
+_REACHED = (Outcome.CONVERGED, Outcome.SLIDING)
+
+_SUMMARY = (
+    *("alpha", "exponent", "w1", "w2", "kinds", "n", "protocol", "seed", "outcome", "phi", "phi_J"),
+    *(
+        "phi_J_compression",
+        "phi_J_opening",
+        "u",
+        "energy_per_particle",
+        "pressure",
+        "z",
+        "z_single",
+    ),
+    *("z_iso", "n_contacts", "n_bonds", "n_rattlers", "S2", "S4", "C4", "asphericity", "beta"),
+    *("residual_force", "residual_torque", "rounding_floor", "evaluations", "wall_seconds"),
+)
+
+
+class Measured(NamedTuple):
+    """Of a minimum: numbers, and arrays over particles."""
+
+    attributes: dict[str, float | str]
+    observables: dict[str, FloatArray]
+
+
+class _Contacts(NamedTuple):
+    network: ContactNetwork
+    rattlers: BoolArray
+
+
+def write_minimum(
+    path: Path, landscape: Landscape, minimum: Minimum, attributes: Mapping[str, Any]
+) -> None:
+    """Write a packing with everything that was measured on it."""
+    packing = minimum.state.packing(landscape.particles)
+    measured = measure(landscape, minimum)
+    write_packing(path, packing, dict(attributes) | measured.attributes, measured.observables)
+    steps, seconds, errors = thinned(minimum.history)
+    RunWriter.open(path).append_report(steps, seconds, errors)
+
+
+def measure(landscape: Landscape, minimum: Minimum) -> Measured:
+    """Measure a minimum.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    minimum : Minimum
+
+    Returns
+    -------
+    Measured
+        `residual_force` and `residual_torque` are the largest of a particle that is no rattler over the
+        mean force of a bond (torques over the length that counts for a radian, too); `residual` is the
+        largest of all particles. z counts bonds, z_single contacts.
+    """
+    packing = minimum.state.packing(landscape.particles)
+    network = find_contacts(packing, landscape.k_e, landscape.sides)
+    found = _Contacts(network, find_rattlers(packing, network))
+    u, D = minimum.energy_density, packing.dimension
+    pressure = -minimum.evaluation.strain_gradient / (D * minimum.state.volume)
+    attributes: dict[str, float | str] = {
+        "outcome": minimum.outcome.value,
+        "phi": packing.phi,
+        "phi_J": energy_onset(packing.phi, u, pressure),
+        "u": u,
+        "energy_per_particle": minimum.evaluation.energy / packing.n,
+        "pressure": pressure,
+        **_residuals(landscape, minimum, found.rattlers),
+        **coordination(packing, network)._asdict(),
+        "z_iso": 2 * float(packing.freedoms.mean()),
+        **order(packing),
+    }
+    if D == 3:
+        attributes |= packing.shape.described(packing.diameters, packing.exponent)
+    rattler_ids = packing.id[found.rattlers].astype(np.float64)
+    return Measured(attributes, {"rattler_ids": rattler_ids} | _net(landscape, minimum, found))
+
+
+def _residuals(
+    landscape: Landscape, minimum: Minimum, rattlers: BoolArray
+) -> dict[str, float | str]:
+    evaluation = minimum.evaluation
+    held = landscape.components(evaluation.gradient)
+    held[rattlers] = 0.0
+    residual = residual_of(landscape, evaluation._replace(gradient=landscape.coordinates(held)))
+    return {
+        "residual_force": residual.force,
+        "residual_torque": residual.torque,
+        "residual": minimum.residual.largest,
+        "rounding_floor": rounding_floor(evaluation, landscape),
+    }
+
+
+def _net(landscape: Landscape, minimum: Minimum, found: _Contacts) -> dict[str, FloatArray]:
+    """Net force and torque of each particle over their averages, in two dimensions."""
+    packing, D = landscape.particles, minimum.state.dimension
+    held = ~found.rattlers[found.network.pairs].any(axis=1)
+    if D != 2 or not held.any():
+        return {}
+    at = minimum.state.packing(packing)
+    gradient = landscape.components(minimum.evaluation.gradient)
+    torque = gradient[:, D] * landscape.rotation_length
+    scale = contact_scale(at, found.network, found.rattlers)
+    net = residuals(gradient[:, :D], torque, scale, found.rattlers)
+    return {"net_force": net.force, "net_torque": net.torque}
+
+
+def order(packing: Packing) -> dict[str, float]:
+    """Orientational order of the particles that have a direction; NaN without any.
+
+    S2 and S4 in two dimensions (Marschall & Teitel 2018, Eq. 16), S2 and C4 in three (Yuan et al. 2019,
+    Eqs. 6 and 7).
+    """
+    directors = packing.directors
+    directors = directors[~np.isnan(directors[:, 0])]
+    if not len(directors):
+        return {"S2": math.nan, ("S4" if packing.dimension == 2 else "C4"): math.nan}
+    if packing.dimension == 2:
+        angles = np.arctan2(directors[:, 1], directors[:, 0])
+        return {f"S{n}": orientational_order(angles, n).S_n for n in (2, 4)}
+    return {
+        "S2": float(nematic_order(directors).magnitude),
+        "C4": float(cubatic_order(body_axes(packing.quaternions)).magnitude),
+    }
+
+
+def energy_onset(phi: float, u: float, pressure: float) -> float:
+    """Phi where sqrt(u), linear in phi, vanishes: du/dphi = p / phi - u / phi at fixed particles.
+
+    u = U / V and dU/dV = -p; with V = const / phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
+    """
+    return phi - 2 * phi * u / (pressure + u) if u > 0 else math.nan
+
+
+def thinned(history: History) -> tuple[list[int], list[float], list[float]]:
+    """Pick rows of a history for a report: evaluations, seconds, residuals."""
+    rows = np.unique(np.linspace(0, len(history.residual) - 1, _REPORT_ROWS).astype(int))
+    picked = zip(
+        *((history.evaluations[r], history.wall_seconds[r], history.residual[r]) for r in rows),
+        strict=True,
+    )
+    steps, seconds, errors = map(list, picked)
+    return steps, seconds, errors
+
+
+def summary_of(out: Path, names: Iterable[str] = _SUMMARY) -> dict[str, Any]:
+    """Pick attributes of a finished packing, None for NaN, and say whether it is in equilibrium."""
+    stored = read_attributes(out)
+    found = {name: stored[name] for name in names if name in stored}
+    tidy = {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in found.items()}
+    return {"out": str(out), **tidy, "reached": stored["outcome"] in {o.value for o in _REACHED}}

@@ -1,0 +1,195 @@
+"""What all minimisers share: how a minimisation ends, its history, and the state so far."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from jamshape.landscape import Evaluation, Landscape
+from jamshape.packing import State
+
+# A method no longer gains if residual times energy did not fall by this factor in so many evaluations.
+_GAIN = 0.7
+
+# In units of k_e and `Landscape.length`.
+_LOWEST = 1e-24
+
+
+class Outcome(Enum):
+    """How a minimisation ended.
+
+    SLIDING: what is left of the forces lies along modes softer than the prestress, rods that slide
+    along flat sides, and does not fall any more; all the rest is below the tolerance.
+    STALLED: no progress, such as a cycle about a kink of the energy.
+    """
+
+    CONVERGED = "converged"
+    UNJAMMED = "unjammed"
+    SLIDING = "sliding"
+    STALLED = "stalled"
+    EXHAUSTED = "exhausted"
+
+
+class Residual(NamedTuple):
+    """Largest net force and torque of a particle, over the mean force of a bond.
+
+    Torques are divided by the length that counts for a radian, the half length A of a spherocylinder.
+    """
+
+    force: float
+    torque: float
+
+    @property
+    def largest(self) -> float:
+        """The larger of the two."""
+        return max(self.force, self.torque)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """When a minimisation ends.
+
+    Parameters
+    ----------
+    tolerance
+        Converged when the residual is below.
+    lowest
+        Unjammed when the energy density is below, [energy / length^D]; when left out 1e-24 in units of
+        k_e and `Landscape.length`.
+    evaluations
+        Exhausted after so many evaluations of all forces.
+    seconds
+        Exhausted after so much time.
+    """
+
+    tolerance: float = 1e-8
+    lowest: float | None = None
+    evaluations: int = 200_000
+    seconds: float = np.inf
+
+
+@dataclass
+class History:
+    """Convergence: one row for each evaluation that was accepted or tried."""
+
+    began: float = field(default_factory=time.perf_counter)
+    wall_seconds: list[float] = field(default_factory=list)
+    evaluations: list[int] = field(default_factory=list)
+    residual: list[float] = field(default_factory=list)
+    energy_density: list[float] = field(default_factory=list)
+
+    def add(self, evaluations: int, residual: float, energy_density: float) -> None:
+        """Append a row, now."""
+        self.wall_seconds.append(time.perf_counter() - self.began)
+        self.evaluations.append(evaluations)
+        self.residual.append(residual)
+        self.energy_density.append(energy_density)
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Where a minimisation ended."""
+
+    state: State
+    evaluation: Evaluation
+    outcome: Outcome
+    residual: Residual
+    history: History
+
+    @property
+    def energy_density(self) -> float:
+        """U / L^D."""
+        return self.evaluation.energy / self.state.volume
+
+
+def residual_of(landscape: Landscape, evaluation: Evaluation) -> Residual:
+    """Measure how far from mechanical equilibrium a state is (Marschall & Teitel 2018, App. A)."""
+    if evaluation.bond_force == 0.0:
+        return Residual(0.0, 0.0)
+    components = landscape.components(evaluation.gradient) / evaluation.bond_force
+    D = landscape.particles.dimension
+    force, torque = (np.sqrt((part**2).sum(axis=1)).max() for part in np.split(components, [D], 1))
+    return Residual(float(force), float(torque))
+
+
+def rounding_floor(evaluation: Evaluation, landscape: Landscape, *, extended: bool = True) -> float:
+    """Residual that rounding of the coordinates alone leaves: about eps / overlap."""
+    eps = float(np.finfo(np.longdouble if extended else np.float64).eps)
+    size = float(landscape.inner_radius.max())
+    return 8 * eps * landscape.k_e / (size * max(evaluation.bond_force, 1e-300))
+
+
+class Descent:
+    """What the methods share: counts, history, the best state so far, and when to stop."""
+
+    def __init__(
+        self, landscape: Landscape, start: State, stop: Stop, history: History | None = None
+    ) -> None:
+        self.landscape, self.stop = landscape, stop
+        unit = landscape.k_e / landscape.length**start.dimension
+        self._lowest = _LOWEST * unit if stop.lowest is None else stop.lowest
+        self.history = history or History()
+        self.state = start
+        self._first_evaluation, self._began = landscape.evaluations, time.perf_counter()
+        self._patience = 0
+        self._last_gain = 0
+        self._gained = np.inf
+        self.evaluation = landscape.evaluate(start)
+        self.record(self.evaluation)
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of all forces so far."""
+        return self.landscape.evaluations - self._first_evaluation
+
+    @property
+    def residual(self) -> float:
+        """Residual of the present state."""
+        return residual_of(self.landscape, self.evaluation).largest
+
+    @property
+    def extended(self) -> bool:
+        """Whether doubles are too short for the tolerance."""
+        floor = rounding_floor(self.evaluation, self.landscape, extended=False)
+        return floor > 0.1 * self.stop.tolerance
+
+    def be_patient(self, evaluations: int) -> None:
+        """From now on call it a stall if so many evaluations in a row gain nothing."""
+        self._patience, self._last_gain, self._gained = evaluations, self.evaluations, np.inf
+
+    def move_to(self, state: State, evaluation: Evaluation) -> None:
+        """Accept a state."""
+        self.state, self.evaluation = state, evaluation
+        self.record(evaluation)
+
+    def record(self, evaluation: Evaluation) -> None:
+        """Add a row to the history."""
+        residual = residual_of(self.landscape, evaluation).largest
+        density = evaluation.energy / self.state.volume
+        self.history.add(self.landscape.evaluations, residual, density)
+        # Either of the two may fall for long while the other does not.
+        gain = residual * density
+        if gain < _GAIN * self._gained:
+            self._gained, self._last_gain = gain, self.evaluations
+
+    def outcome(self) -> Outcome | None:
+        """Say whether it ends here, and how."""
+        if self.evaluation.energy <= self._lowest * self.state.volume:
+            return Outcome.UNJAMMED
+        if self.residual <= self.stop.tolerance:
+            return Outcome.CONVERGED
+        used_up = self.evaluations >= self.stop.evaluations
+        if used_up or time.perf_counter() - self._began >= self.stop.seconds:
+            return Outcome.EXHAUSTED
+        if self._patience and self.evaluations - self._last_gain > self._patience:
+            return Outcome.STALLED
+        return None
+
+    def minimum(self, outcome: Outcome) -> Minimum:
+        """Return the present state."""
+        residual = residual_of(self.landscape, self.evaluation)
+        return Minimum(self.state, self.evaluation, outcome, residual, self.history)

@@ -1,0 +1,70 @@
+"""L-BFGS."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+
+import numpy as np
+import scipy.optimize
+
+from jamshape.arrays import FloatArray
+from jamshape.contacts import CrossingError
+from jamshape.minima.descent import Descent, Outcome
+
+# A stall after so many evaluations without a gain; what it needs to unjam a packing grows with it.
+_PATIENCE = 1000
+_PATIENCE_PER_PARTICLE = 4
+
+# It begins anew when it gives up; not more often than this within so few evaluations.
+_STUCK, _SOON = 3, 30
+
+
+class _LeaveError(Exception):
+    """Ends SciPy's minimiser from within."""
+
+
+def lbfgs(descent: Descent, below: float = 0.0) -> Outcome:
+    """SciPy's L-BFGS, in doubles, on displacements from the present state."""
+    particles = descent.landscape.particles
+    descent.be_patient(max(_PATIENCE, _PATIENCE_PER_PARTICLE * particles.n))
+    # Its first step is of unit length in its own coordinates.
+    unit = 0.01 * float(descent.landscape.inner_radius.min()) * math.sqrt(particles.n)
+    stuck = 0
+    while not (outcome := descent.outcome()) and descent.residual > below and stuck < _STUCK:
+        evaluations = descent.evaluations
+        with contextlib.suppress(_LeaveError):
+            scipy.optimize.minimize(
+                _Objective(descent, unit, below),
+                np.zeros(descent.landscape.size),
+                jac=True,
+                method="L-BFGS-B",
+                options={"maxiter": 10**8, "maxfun": 10**8, "maxcor": 20, "ftol": 0.0, "gtol": 0.0},
+            )
+        # It gives up where its line search does, at kinks or in rounding: begin again from there.
+        stuck = stuck + 1 if descent.evaluations - evaluations < _SOON else 0
+        unit *= 0.1 if stuck else 1.0
+    return outcome or Outcome.STALLED
+
+
+class _Objective:
+    """The energy as SciPy sees it: of displacements in units, over the energy at the start."""
+
+    def __init__(self, descent: Descent, unit: float, below: float) -> None:
+        self.descent, self.unit, self.below = descent, unit, below
+        self.base, self.scale = descent.state, descent.evaluation.energy
+
+    def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
+        descent = self.descent
+        state = descent.landscape.displaced(self.base, self.unit * x)
+        try:
+            found = descent.landscape.evaluate(state, extended=False)
+        except CrossingError:
+            raise _LeaveError from None
+        if found.energy <= descent.evaluation.energy:
+            descent.move_to(state, found)
+            if descent.outcome() or descent.residual <= self.below:
+                raise _LeaveError
+        elif descent.evaluations >= descent.stop.evaluations:
+            raise _LeaveError
+        return found.energy / self.scale, self.unit / self.scale * found.gradient

@@ -1,0 +1,108 @@
+"""Poses of a packing in extended precision."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jamshape.arrays import FloatArray, LongArray
+from jamshape.packing.packing import Packing
+
+_TURN = 2 * np.arccos(np.longdouble(-1))
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Poses of particles and the box, in extended precision.
+
+    A double has lost the last eight digits of an overlap of 1e-9 by the time it holds a position in a box
+    of 40; `numpy.longdouble` keeps them. Files hold each number as a double and its small rest.
+
+    Parameters
+    ----------
+    position : (N, D) array of longdouble, [length]
+    orientation : (N, 1) angles in 2D, (N, 4) quaternions w i j k in 3D, of longdouble
+    edges : (D,) array of longdouble, [length]
+    """
+
+    position: LongArray
+    orientation: LongArray
+    edges: LongArray
+
+    @classmethod
+    def of(cls, packing: Packing) -> State:
+        """Take the poses of a packing, its small rests included."""
+        position, orientation, edges = (np.asarray(x, np.longdouble) for x in packing.poses())
+        return cls(position, orientation.reshape(packing.n, -1), edges)
+
+    @cached_property
+    def split(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Position, orientation, edges, each (2, ...): doubles and their small rests."""
+        position, orientation, edges = map(_split, (self.position, self.orientation, self.edges))
+        return position, orientation, edges
+
+    @classmethod
+    def joined(cls, position: FloatArray, orientation: FloatArray, edges: FloatArray) -> State:
+        """Add doubles and their small rests, each array (2, ...) as `split` gives them."""
+        return cls(*(np.longdouble(x[0]) + x[1] for x in (position, orientation, edges)))
+
+    @property
+    def dimension(self) -> int:
+        """Number of dimensions, 2 or 3."""
+        return len(self.edges)
+
+    @property
+    def volume(self) -> float:
+        """Area in 2D, volume in 3D, [length^D]."""
+        return float(math.prod(self.edges))
+
+    def strained(self, strain: float) -> State:
+        """Scale box and positions by 1 + strain; rotations stay (Marschall & Teitel 2018, Eq. 20)."""
+        factor = 1 + np.longdouble(strain)
+        return replace(self, position=factor * self.position, edges=factor * self.edges)
+
+    def displaced(self, shift: FloatArray, turn: FloatArray) -> State:
+        """Add (N, D) displacements and (N, 1) or (N, 3) rotation vectors."""
+        if self.dimension == 2:
+            # Whole turns would cost digits: a nearly round particle may make thousands of them.
+            orientation = self.orientation + turn
+            orientation = orientation - _TURN * np.rint(orientation / _TURN)
+        else:
+            orientation = _turned(self.orientation, np.asarray(turn, np.longdouble))
+        return replace(self, position=self.position + shift, orientation=orientation)
+
+    def packing(self, like: Packing) -> Packing:
+        """Return the packing of these poses and of the particles of `like`."""
+        orientation = self.orientation[:, 0] if self.dimension == 2 else self.orientation
+        return like.with_poses(self.position, orientation, self.edges)
+
+
+def _split(values: LongArray) -> FloatArray:
+    """(2, ...) a double and its small rest."""
+    double = values.astype(np.float64)
+    return np.stack([double, (values - double).astype(np.float64)])
+
+
+def _turned(quaternion: LongArray, vector: LongArray) -> LongArray:
+    """Turn (N, 4) quaternions by (N, 3) rotation vectors, in space coordinates."""
+    angle = np.sqrt((vector**2).sum(axis=1, keepdims=True))
+    axis = vector / np.where(angle > 0, angle, 1)
+    half = np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=1)
+    product = _product(half, quaternion)
+    unit: LongArray = product / np.sqrt((product**2).sum(axis=1, keepdims=True))
+    return unit
+
+
+def _product(p: ArrayLike, q: ArrayLike) -> LongArray:
+    pw, pi, pj, pk = np.asarray(p, np.longdouble).T
+    qw, qi, qj, qk = np.asarray(q, np.longdouble).T
+    return np.column_stack([
+        pw * qw - pi * qi - pj * qj - pk * qk,
+        pw * qi + pi * qw + pj * qk - pk * qj,
+        pw * qj - pi * qk + pj * qw + pk * qi,
+        pw * qk + pi * qj - pj * qi + pk * qw,
+    ])  # fmt: skip

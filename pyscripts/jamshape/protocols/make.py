@@ -1,0 +1,107 @@
+"""The one path of a packing, of any shape and dimension.
+
+A random start; a way from there to jamming, by dynamics or by quasistatic steps; the energy it is led to, if one
+is asked for; everything that is measured on it; and the file. Between its steps everything is in files
+beside the result, so that a path that was cut off goes on where it was.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from jamshape.files.h5md import read_attributes, require_attributes
+from jamshape.measures.minimum import summary_of, write_minimum
+from jamshape.protocols.by_dynamics import ByDynamics
+from jamshape.protocols.by_steps import BySteps
+from jamshape.protocols.making import Progress, SearchFile, lead
+from jamshape.protocols.recipe import Dynamics, Recipe, Steps, Thermalisation
+
+__all__ = [
+    "Dynamics",
+    "Progress",
+    "Recipe",
+    "Steps",
+    "Thermalisation",
+    "is_done",
+    "make",
+    "require_same",
+    "summary_of",
+]
+
+
+def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress]:
+    """Make a packing and write it to `out`, going on with what an earlier call has left.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    out : Path
+        Replaced when the packing is found.
+    again : bool
+        Begin anew where files of another recipe, or damaged ones, are in the way.
+
+    Yields
+    ------
+    Progress
+        After every row of a compression, every minimisation and every block of sweeps.
+
+    Raises
+    ------
+    TargetError
+        As `target.direct`.
+    ValueError
+        As `Recipe.start` and `target.direct`, or if another packing was being made there.
+    """
+    began = time.perf_counter()
+    way = ByDynamics(recipe, out) if isinstance(recipe.way, Dynamics) else BySteps(recipe, out)
+    try:
+        way.require_own()
+    except ValueError:
+        if not again:
+            raise
+        way.forget()
+    yield from way.steps()
+    landscape, minimum = way.landscape(), way.minimum
+    search = SearchFile(out.with_name(out.name + ".search.h5"), recipe)
+    if recipe.target:
+        minimum = yield from lead(landscape, way.state(), recipe.target, search)
+    assert minimum is not None
+    attributes: dict[str, Any] = recipe.attributes() | way.measured()
+    seconds = attributes.pop("seconds_before", 0.0) + time.perf_counter() - began
+    attributes |= {"wall_seconds": seconds, "evaluations": landscape.evaluations}
+    write_minimum(out, landscape, minimum, attributes)
+    search.forget()
+    way.done()
+
+
+def is_done(out: Path) -> bool:
+    """Whether the file is there, with a finished packing.
+
+    Raises
+    ------
+    ValueError
+        If it is there with anything else.
+    """
+    if not out.exists():
+        return False
+    if "outcome" not in read_attributes(out):
+        msg = (
+            f"{out} holds no finished packing, expected one of make_packing.py;"
+            " write to another file, or remove this one"
+        )
+        raise ValueError(msg)
+    return True
+
+
+def require_same(out: Path, recipe: Recipe) -> None:
+    """Refuse a finished packing that is another one than asked for.
+
+    Raises
+    ------
+    ValueError
+    """
+    require_attributes(out, recipe.attributes())
+    recipe.require_particles(out)

@@ -1,0 +1,85 @@
+"""Options that say which particles: the same for every driver, whatever the shape."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+
+from jamshape.shapes.particles import Kind, Particles, parse_kind
+from jamshape.shapes.shape import Parameter, Shape
+from jamshape.shapes.table import DEFAULT, SHAPES, shape_named
+
+
+def add_particle_options(parser: ArgumentParser) -> None:
+    """Add --shape, the parameters of all shapes, --size-ratio and --kind."""
+    group = parser.add_argument_group("particles")
+    group.add_argument("--shape", choices=SHAPES, default=DEFAULT, help="(%(default)s)")
+    for parameter, shapes in _parameters().items():
+        usual = ", ".join(f"{shape.name} {_default(shape, parameter):g}" for shape in shapes)
+        group.add_argument(
+            f"--{parameter.option}", type=float, help=f"{parameter.meaning} ({usual})"
+        )
+    usual = ", ".join(f"{shape.name} {shape.size_ratio:g}" for shape in SHAPES.values())
+    group.add_argument("--size-ratio", type=float, help=f"big over small, mixed 1:1 ({usual})")
+    group.add_argument(
+        "--kind",
+        type=_kind,
+        action="append",
+        default=[],
+        metavar="NAME=NUMBER,...",
+        help="one of the kinds of a mixture, such as alpha=0,size=1.4,share=0.3,spread=0.1 "
+        "(spread: standard deviation of the logarithm of the size); may be given several times",
+    )
+
+
+def particles_of(options: Namespace) -> Particles:
+    """Read the particles from the options.
+
+    Raises
+    ------
+    ValueError
+        If an option is none of the shape, or out of its range.
+    """
+    shape, given = shape_named(options.shape), _given(options)
+    if options.kind:
+        if given or options.size_ratio is not None:
+            msg = "kinds and other sizes were given, expected a mixture's numbers in --kind alone"
+            raise ValueError(msg)
+        return Particles.mixture(shape, options.kind)
+    return Particles.of(shape, options.size_ratio, **given)
+
+
+def _given(options: Namespace) -> dict[str, float]:
+    """Collect the parameters that were given, all of them the shape's."""
+    shape, found = shape_named(options.shape), {}
+    own = {parameter.option: parameter.name for parameter in shape.parameters}
+    for parameter in _parameters():
+        value = getattr(options, parameter.option)
+        if value is None:
+            continue
+        if parameter.option not in own:
+            options_of_it = ", ".join(f"--{name}" for name in own)
+            msg = f"--{parameter.option} is no option of {shape.name}s, expected {options_of_it}"
+            raise ValueError(msg)
+        found[own[parameter.option]] = value
+    return found
+
+
+def _parameters() -> dict[Parameter, list[Shape]]:
+    """List all parameters with the shapes that have them; those of one option once."""
+    found: dict[Parameter, list[Shape]] = {}
+    for shape in SHAPES.values():
+        for parameter in shape.parameters:
+            known = next((p for p in found if p.option == parameter.option), parameter)
+            found.setdefault(known, []).append(shape)
+    return found
+
+
+def _default(shape: Shape, parameter: Parameter) -> float:
+    return next(p.default for p in shape.parameters if p.option == parameter.option)
+
+
+def _kind(text: str) -> Kind:
+    try:
+        return parse_kind(text)
+    except ValueError as error:
+        raise ArgumentTypeError(str(error)) from None

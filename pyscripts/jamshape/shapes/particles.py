@@ -1,0 +1,231 @@
+"""Which particles a packing is made of: kinds of one shape, in any mixture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.shapes.shape import Shape
+from jamshape.shapes.table import DEFAULT, shape_named
+
+
+class Sizes(NamedTuple):
+    """Shapes of n particles."""
+
+    diameters: FloatArray
+    """(n, 3), [length], as LAMMPS has them."""
+    exponent: FloatArray
+    """(n,); ones for shapes without."""
+    species: IntArray
+    """(n,) kinds, LAMMPS types, from 1."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Particles of a mixture that are alike.
+
+    Parameters
+    ----------
+    parameters : mapping of str to float
+        Those of the shape, such as alpha; the shape's defaults where left out.
+    size : float
+        Over that of the unit of length (2R, or the shortest semi-axis a).
+    share : float
+        Part of the number of particles, over the sum of all shares.
+    spread : float
+        Standard deviation of the logarithm of the size; 0 for equal particles.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range.
+    """
+
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    size: float = 1.0
+    share: float = 1.0
+    spread: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0 < self.size < math.inf and 0 < self.share < math.inf and 0 <= self.spread < 10):
+            found = f"size, share and spread of a kind are {self.size}, {self.share}, {self.spread}"
+            msg = f"{found}, expected sizes and shares above 0 and spreads from 0 to 10"
+            raise ValueError(msg)
+
+
+@dataclass(frozen=True)
+class Particles:
+    """A distribution of particles of one shape.
+
+    Parameters
+    ----------
+    shape : Shape
+    draw : callable
+        ``draw(n, rng)`` returns the `Sizes` of n particles in any order; what is random in it comes
+        from the `numpy.random.Generator`.
+    told : mapping
+        What files say of it.
+
+    Examples
+    --------
+    >>> from jamshape.shapes.particles import Particles
+    >>> rods = Particles.of("spherocylinder", alpha=4.0)
+    >>> rods.told
+    {'alpha': 4.0, 'size_ratio': 1.4}
+    """
+
+    shape: Shape
+    draw: Callable[[int, np.random.Generator], Sizes]
+    told: Mapping[str, Any]
+
+    @classmethod
+    def of(
+        cls, shape: str | Shape = DEFAULT, size_ratio: float | None = None, **parameters: float
+    ) -> Particles:
+        """Equal particles, or small and big ones 1:1 of the same parameters.
+
+        Parameters
+        ----------
+        shape : str or Shape
+        size_ratio : float, optional
+            Big over small, at least 1; what is usual for the shape when left out (1.4 for rods,
+            Marschall & Teitel 2018, Sec. II; 1, equal particles, for superellipsoids).
+        **parameters : float
+            Of the shape; its defaults when left out.
+
+        Raises
+        ------
+        ValueError
+            If there is no such shape or parameter, or a number is out of its range.
+        """
+        its = shape_named(shape) if isinstance(shape, str) else shape
+        ratio = its.size_ratio if size_ratio is None else size_ratio
+        if not ratio >= 1:
+            msg = f"size_ratio is {ratio}, expected big over small, at least 1"
+            raise ValueError(msg)
+        chosen = _with_defaults(its, parameters)
+        sizes = [1.0] if ratio == 1 else [1.0, ratio]
+        is_plain = its.size_ratio == 1 == ratio
+        told = chosen | ({} if is_plain else {"size_ratio": ratio})
+        return cls(its, _draw_of(its, [Kind(chosen, size) for size in sizes]), told)
+
+    @classmethod
+    def mixture(cls, shape: str | Shape, kinds: Sequence[Kind]) -> Particles:
+        """Mix kinds that may differ in everything but the shape, such as discs among rods.
+
+        Raises
+        ------
+        ValueError
+            If there is no kind, or a number is out of its range.
+        """
+        its = shape_named(shape) if isinstance(shape, str) else shape
+        if not kinds:
+            msg = "a mixture has no kinds, expected at least one"
+            raise ValueError(msg)
+        full = [Kind(_with_defaults(its, k.parameters), k.size, k.share, k.spread) for k in kinds]
+        told = {"kinds": "; ".join(map(_text, full))}
+        return cls(its, _draw_of(its, full), told)
+
+    @classmethod
+    def given(
+        cls,
+        shape: str | Shape,
+        diameters: ArrayLike,
+        exponent: ArrayLike | None = None,
+        species: ArrayLike | None = None,
+    ) -> Particles:
+        """Particles one by one: (n, 3) diameters, (n,) exponents and species from 1."""
+        its = shape_named(shape) if isinstance(shape, str) else shape
+        d = np.atleast_2d(np.asarray(diameters, np.float64))
+        p = np.ones(len(d)) if exponent is None else np.asarray(exponent, np.float64)
+        kinds = np.ones(len(d), np.int64) if species is None else np.asarray(species, np.int64)
+        return cls(its, lambda _n, _rng: Sizes(d, p, kinds), {"kinds": "given one by one"})
+
+    def sample(self, n: int, rng: np.random.Generator) -> Sizes:
+        """Draw n particles.
+
+        Raises
+        ------
+        ValueError
+            If n < 1, or the draw is not n particles of the shape.
+        """
+        if n < 1:
+            msg = f"n is {n}, expected at least one particle"
+            raise ValueError(msg)
+        sizes = self.draw(n, rng)
+        expected = {"diameters": (n, 3), "exponent": (n,), "species": (n,)}
+        for name, shape in expected.items():
+            found = np.shape(getattr(sizes, name))
+            if found != shape:
+                msg = f"{name} of the mixture has shape {found}, expected {shape}"
+                raise ValueError(msg)
+        d = np.asarray(sizes.diameters, np.float64)
+        valid = np.isfinite(d).all() and (d > 0).all() and self.shape.fits(d)
+        if not valid:
+            msg = f"a particle of the mixture is no {self.shape.name}, expected {self.shape.rule()}"
+            raise ValueError(msg)
+        return Sizes(d, np.asarray(sizes.exponent, np.float64), np.asarray(sizes.species, np.int64))
+
+
+def parse_kind(text: str) -> Kind:
+    """Read a kind as command lines have it, such as ``alpha=4,size=1.4,share=0.5``.
+
+    Raises
+    ------
+    ValueError
+        If it is not such a text.
+    """
+    try:
+        numbers = {k.strip(): float(v) for k, v in (part.split("=") for part in text.split(","))}
+    except ValueError:
+        msg = f"a kind is {text!r}, expected numbers by name such as alpha=4,size=1.4,share=0.5"
+        raise ValueError(msg) from None
+    own = {name: numbers.pop(name) for name in ("size", "share", "spread") if name in numbers}
+    return Kind(numbers, **own)
+
+
+def _text(kind: Kind) -> str:
+    own = {"size": kind.size, "share": kind.share, "spread": kind.spread}
+    return ",".join(f"{name}={value!r}" for name, value in (dict(kind.parameters) | own).items())
+
+
+def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, float]:
+    known = {p.name: p.default for p in shape.parameters}
+    for name in parameters:
+        if name not in known:
+            msg = f"{name} is no parameter of {shape.name}s, expected {', '.join(known)}"
+            raise ValueError(msg)
+    chosen = known | {name: float(value) for name, value in parameters.items()}
+    shape.sizes(chosen, np.ones(1))  # refuses what is out of range
+    return chosen
+
+
+def _draw_of(shape: Shape, kinds: Sequence[Kind]) -> Callable[[int, np.random.Generator], Sizes]:
+    def draw(n: int, rng: np.random.Generator) -> Sizes:
+        species = np.repeat(np.arange(1, len(kinds) + 1), _numbers(n, [k.share for k in kinds]))
+        diameters, exponent = np.empty((n, 3)), np.empty(n)
+        for number, kind in enumerate(kinds, 1):
+            own = species == number
+            size = np.full(int(own.sum()), kind.size)
+            if kind.spread:
+                size *= np.exp(kind.spread * rng.standard_normal(len(size)))
+            diameters[own], exponent[own] = shape.sizes(kind.parameters, size)
+        return Sizes(diameters, exponent, species)
+
+    return draw
+
+
+def _numbers(n: int, shares: Sequence[float]) -> IntArray:
+    """Divide n in shares: what is left over goes to the largest remainders, the first of equal ones."""
+    exact = n * np.asarray(shares) / np.sum(shares)
+    whole: IntArray = np.floor(exact).astype(np.int64)
+    left = n - int(whole.sum())
+    order = np.argsort(-(exact - whole), kind="stable")
+    whole[order[:left]] += 1
+    return whole

@@ -1,0 +1,172 @@
+"""What the library knows of a shape: one object for each, listed in `jamshape.shapes.table`.
+
+Geometry and energies are those of `lammps_plugin/contact/`; what stands here names them, says which numbers
+describe a particle, and draws it.
+"""
+
+from __future__ import annotations
+
+import importlib
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from jamshape.arrays import FloatArray, IntArray
+    from jamshape.shapes.mesh import SurfaceMesh
+
+
+class Parameter(NamedTuple):
+    """A number that describes a particle beside its size, such as an aspect ratio."""
+
+    name: str
+    default: float
+    meaning: str
+    option: str
+    """Its name on command lines and in names of files."""
+
+
+class Style(NamedTuple):
+    """How LAMMPS is told of a packing's interactions."""
+
+    types: IntArray
+    """(N,) LAMMPS types of the particles."""
+    commands: str
+    """`pair_style` and `pair_coeff`, one a line."""
+
+
+class Interaction(NamedTuple):
+    """The constants of the contacts."""
+
+    k_e: float = 1.0
+    """[energy]"""
+    sides: int = 2
+    """Bonds of a side-to-side contact, 1 or 2, of shapes that have both laws."""
+
+
+class Shape(ABC):
+    """A shape of particles."""
+
+    name: ClassVar[str]
+    """As files and command lines have it."""
+    compiled_name: ClassVar[str]
+    """Its class in `jamshape._contact`."""
+    parameters: ClassVar[tuple[Parameter, ...]]
+    unit: ClassVar[str]
+    """The length that is 1 for a particle of size 1."""
+    dimension: ClassVar[int] = 2
+    """Of packings, when nobody says."""
+    size_ratio: ClassVar[float] = 1.0
+    """Of mixtures, when nobody says; 1 for equal particles."""
+    has_exponent: ClassVar[bool] = False
+
+    def compiled(
+        self, particles: tuple[FloatArray, FloatArray], dimension: int, law: Interaction
+    ) -> Any:
+        """Make the object of `jamshape._contact` that knows the contacts of some particles.
+
+        Parameters
+        ----------
+        particles : (N, 3) and (N,) arrays of float64
+            Diameters, [length], and exponents.
+        dimension : {2, 3}
+        law : Interaction
+
+        Raises
+        ------
+        ValueError
+            If one of them is no such shape.
+        """
+        # Imported here so that reading and writing files needs no compiled module.
+        contact = importlib.import_module("jamshape._contact")
+        return getattr(contact, self.compiled_name)(*particles, dimension, law.k_e, law.sides)
+
+    @abstractmethod
+    def fits(self, diameters: FloatArray) -> bool:
+        """Whether (N, 3) diameters can be those of this shape."""
+
+    @abstractmethod
+    def rule(self) -> str:
+        """Say what its diameters are."""
+
+    @abstractmethod
+    def sizes(
+        self, parameters: Mapping[str, float], size: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Turn parameters and (n,) sizes into (n, 3) diameters and (n,) exponents.
+
+        Raises
+        ------
+        ValueError
+            If a parameter is out of its range.
+        """
+
+    def style(self, packing: Any, law: Interaction) -> Style:
+        """Tell LAMMPS of a packing of this shape."""
+        command = f"pair_style {self.name}/harmonic\npair_coeff * * {law.k_e!r}"
+        return Style(packing.species, command)
+
+    def described(self, diameters: FloatArray, exponent: FloatArray) -> dict[str, float]:
+        """Give numbers that describe the first of (N, 3) diameters and (N,) exponents."""
+        del diameters, exponent
+        return {}
+
+    @abstractmethod
+    def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
+        """(K, 2) corners of a polygon around a particle in the plane, in body coordinates."""
+
+    @abstractmethod
+    def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
+        """Cover a particle in space with triangles, in body coordinates."""
+
+    def spine(self, diameters: FloatArray) -> float:
+        """Half length of the line along the body's x that tells its direction; 0 for none."""
+        del diameters
+        return 0.0
+
+    def label(self, parameters: Mapping[str, float]) -> str:
+        """Write parameters in TeX, for a legend."""
+        texts = {"alpha": r"\alpha", "exponent": "p", "w1": "w_1", "w2": "w_2"}
+        told = [f"{texts.get(p.name, p.name)}={parameters[p.name]:g}" for p in self.parameters]
+        return f"${', '.join(told)}$"
+
+    def stem(self, parameters: Mapping[str, float]) -> str:
+        """Name files of packings of such particles."""
+        numbers = [f"{p.option}{parameters[p.name]:g}" for p in self.parameters]
+        return "_".join([self.name, *numbers])
+
+
+class ElongatedShape(Shape):
+    """A shape of half length A along the body's x and radius R: diameters (2(A+R), 2R, 2R)."""
+
+    parameters = (Parameter("alpha", 4.0, "aspect ratio A/R, 0 for discs", "alpha"),)
+    unit = "2R"
+    size_ratio = 1.4
+
+    def fits(self, diameters: FloatArray) -> bool:
+        """As `Shape.fits`."""
+        long, short, other = diameters.T
+        return bool(((short == other) & (long >= short)).all())
+
+    def rule(self) -> str:
+        """As `Shape.rule`."""
+        return "(2(A+R), 2R, 2R) with A >= 0"
+
+    def sizes(
+        self, parameters: Mapping[str, float], size: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """As `Shape.sizes`."""
+        alpha = parameters["alpha"]
+        if not 0 <= alpha < np.inf:
+            msg = f"alpha is {alpha}, expected A / R, 0 for discs or above"
+            raise ValueError(msg)
+        radius = 0.5 * size
+        half_length = alpha * radius
+        long = 2 * (half_length + radius)
+        return np.column_stack([long, 2 * radius, 2 * radius]), np.ones(len(size))
+
+    def spine(self, diameters: FloatArray) -> float:
+        """As `Shape.spine`."""
+        return float(diameters[0] - diameters[1]) / 2

@@ -1,0 +1,48 @@
+"""Spherocylinders: segments of length 2A thickened by R; discs (spheres) where A is 0.
+
+Marschall & Teitel, Phys. Rev. E 97, 012905 (2018). Contacts: `lammps_plugin/contact/spherocylinder/`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.shapes.mesh import SurfaceMesh, arc, revolved
+from jamshape.shapes.shape import ElongatedShape, Interaction, Style
+
+
+class Spherocylinder(ElongatedShape):
+    """Spherocylinders with the harmonic law of the overlap 1 - r/d (Eqs. 3 and 22)."""
+
+    name = "spherocylinder"
+    compiled_name = "Spherocylinders"
+
+    def style(self, packing: Any, law: Interaction) -> Style:
+        """As `Shape.style`; `sides` says how many bonds a side-to-side contact has."""
+        sides = ("one", "two")[law.sides - 1]
+        command = f"pair_style {self.name}/harmonic sides {sides}\npair_coeff * * {law.k_e!r}"
+        return Style(packing.species, command)
+
+    def stem(self, parameters: Mapping[str, float]) -> str:
+        """As `Shape.stem`."""
+        return f"alpha{parameters['alpha']:g}"
+
+    def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
+        """As `Shape.outline`."""
+        del exponent
+        radius, A = diameters[1] / 2, self.spine(diameters)
+        right = radius * arc(-np.pi / 2, np.pi / 2, points // 2) + [A, 0.0]
+        return np.concatenate([right, -right])
+
+    def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
+        """As `Shape.surface`."""
+        del exponent
+        radius, A = diameters[1] / 2, self.spine(diameters)
+        cap = arc(0, np.pi / 2, 2 + 2**level)
+        normal = np.concatenate([cap * [-1, 1], cap[::-1]])
+        ends = np.repeat([[-A, 0.0], [A, 0.0]], len(cap), axis=0)
+        return revolved(radius * normal + ends, normal, 8 * 2**level)

@@ -1,0 +1,85 @@
+"""Superellipsoids: |x/a|^2p + |y/b|^2p + |z/c|^2p = 1.
+
+Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019). Contacts: `lammps_plugin/contact/superellipsoid/`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.shapes.mesh import SurfaceMesh, arc
+from jamshape.shapes.shape import Interaction, Parameter, Shape, Style
+from jamshape.shapes.superellipsoid_size import asphericity, axes_from, reduced_aspect_ratio
+from jamshape.shapes.superellipsoid_surface import surface_mesh
+
+
+class Superellipsoid(Shape):
+    """Superellipsoids with U = epsilon/2 (eta^2 - 1)^2 (Eq. 3)."""
+
+    name = "superellipsoid"
+    compiled_name = "Superellipsoids"
+    parameters = (
+        Parameter("exponent", 1.0, "p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1", "p"),
+        Parameter("w1", 1.0, "a/b <= 1", "w1"),
+        Parameter("w2", 1.0, "c/b >= 1", "w2"),
+    )
+    unit = "a"
+    dimension = 3
+    has_exponent = True
+
+    def fits(self, diameters: FloatArray) -> bool:
+        """As `Shape.fits`."""
+        return bool((diameters > 0).all())
+
+    def rule(self) -> str:
+        """As `Shape.rule`."""
+        return "(2a, 2b, 2c), all positive"
+
+    def sizes(
+        self, parameters: Mapping[str, float], size: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """As `Shape.sizes`."""
+        axes = axes_from(parameters["w1"], parameters["w2"])
+        p = float(parameters["exponent"])
+        if not (np.isfinite(p) and p > 0.5):
+            msg = f"the exponent is {p}, expected p > 0.5, for which bodies are convex"
+            raise ValueError(msg)
+        return size[:, None] * (2 * axes), np.full(len(size), p)
+
+    def style(self, packing: Any, law: Interaction) -> Style:
+        """As `Shape.style`; exponents are per type in LAMMPS."""
+        types = packing.species
+        exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
+        if any((own != own[0]).any() for own in exponents.values()):
+            # Species hold particles of several exponents: each exponent gets a type.
+            types = 1 + np.unique(packing.exponent, return_inverse=True)[1].astype(np.int64)
+            exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
+        lines = [f"pair_style {self.name}/harmonic", f"pair_coeff * * {law.k_e!r}"]
+        lines += [f"pair_coeff {k} {k} {law.k_e!r} {float(p[0])!r}" for k, p in exponents.items()]
+        return Style(types, "\n".join(lines))
+
+    def described(self, diameters: FloatArray, exponent: FloatArray) -> dict[str, float]:
+        """Asphericity and beta (Yuan et al. 2019, Eq. 2 and Sec. 2.1)."""
+        axes = diameters[0] / 2
+        return {
+            "asphericity": float(asphericity(axes, exponent[0])),
+            "beta": float(reduced_aspect_ratio(axes)),
+        }
+
+    def stem(self, parameters: Mapping[str, float]) -> str:
+        """As `Shape.stem`."""
+        return "p{exponent:g}_w{w1:g}_{w2:g}".format(**parameters)
+
+    def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
+        """As `Shape.outline`."""
+        turn = arc(0, 2 * np.pi, points + 1)[:-1]
+        scaled: FloatArray = np.sign(turn) * np.abs(turn) ** (1 / exponent) * diameters[:2] / 2
+        return scaled
+
+    def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
+        """As `Shape.surface`."""
+        return surface_mesh(diameters / 2, exponent, level)

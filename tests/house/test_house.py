@@ -1,0 +1,124 @@
+"""The rules of the house that no linter knows: shape is one place, functions are short, scripts stand alone."""
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+from statistics import median, quantiles
+
+import pytest
+
+from jamshape.shapes.table import SHAPES
+
+ROOT = Path(__file__).parents[2]
+LIBRARY, PLUGIN, ANALYSIS = ROOT / "pyscripts", ROOT / "lammps_plugin", ROOT / "analysis"
+
+NAMES = re.compile("|".join(SHAPES), re.IGNORECASE)
+
+# The places that may know which shapes there are.
+OF_A_SHAPE = re.compile(
+    rf"jamshape/shapes/|_contact\.pyi$|contact/({'|'.join(SHAPES)})/|/pair_({'|'.join(SHAPES)})_"
+    r"|styles/register\.cpp$|bindings/(shapes|probes)\.cpp$"
+)
+
+LONGEST, MOST_PARAMETERS = 60, 5
+
+
+@cache
+def tree_of(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def python_files(*folders):
+    return sorted(path for folder in folders for path in folder.rglob("*.py"))
+
+
+def docstrings(tree):
+    owners = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    for node in ast.walk(tree):
+        if isinstance(node, owners) and ast.get_docstring(node, clean=False) is not None:
+            yield id(node.body[0].value)
+        # Texts behind fields describe them.
+        for statement in getattr(node, "body", []) if isinstance(node, ast.ClassDef) else []:
+            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
+                yield id(statement.value)
+
+
+def words_of_python(path):
+    """Names and texts of the code, without comments and docstrings."""
+    tree, described = tree_of(path), None
+    described = set(docstrings(tree))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if id(node) not in described:
+                yield node.value
+        for field in ("id", "attr", "name", "arg", "module"):
+            if isinstance(value := getattr(node, field, None), str):
+                yield value
+
+
+def words_of_cpp(path):
+    code = re.sub(r"//[^\n]*|/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return code.split()
+
+
+def knowing(paths, words_of):
+    return [
+        path.relative_to(ROOT)
+        for path in paths
+        if not OF_A_SHAPE.search(path.as_posix()) and any(map(NAMES.search, words_of(path)))
+    ]
+
+
+def test_no_file_outside_the_places_of_shapes_knows_which_there_are(measured):
+    sources = [p for p in sorted(PLUGIN.rglob("*.*pp")) + sorted(PLUGIN.rglob("*.h"))]
+    found = knowing(python_files(LIBRARY), words_of_python) + knowing(sources, words_of_cpp)
+    measured(files_that_know_a_shape=len(found))
+    assert found == []
+
+
+def functions(*folders):
+    for path in python_files(*folders):
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield f"{path.relative_to(ROOT)}:{node.name}", node
+
+
+def parameters(node):
+    a = node.args
+    return [x.arg for x in (*a.posonlyargs, *a.args, *a.kwonlyargs) if x.arg not in {"self", "cls"}]
+
+
+def test_functions_are_short(measured):
+    lengths = {name: n.end_lineno - n.lineno + 1 for name, n in functions(LIBRARY, ANALYSIS)}
+    values = list(lengths.values())
+    measured(median_lines=median(values), p90_lines=quantiles(values, n=10)[-1])
+    assert {name: n for name, n in lengths.items() if n > LONGEST} == {}
+
+
+def test_functions_have_few_parameters():
+    found = {name: parameters(node) for name, node in functions(LIBRARY, ANALYSIS)}
+    assert {name: p for name, p in found.items() if len(p) > MOST_PARAMETERS} == {}
+
+
+def imported(path):
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        if isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def is_script(path):
+    return '__name__ == "__main__"' in path.read_text(encoding="utf-8")
+
+
+SCRIPTS = [p for p in (*python_files(ANALYSIS), *LIBRARY.glob("*.py")) if is_script(p)]
+
+
+@pytest.mark.parametrize("path", python_files(ANALYSIS), ids=lambda p: p.stem)
+def test_no_script_is_imported_and_none_knows_the_compiled_module(path):
+    names = set(imported(path))
+    assert not names & {script.stem for script in SCRIPTS}
+    assert not any("_contact" in name.split(".") for name in names)

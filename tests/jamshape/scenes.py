@@ -1,0 +1,111 @@
+"""Packings of rods that many tests look at."""
+
+import itertools
+from functools import cache, partial
+import numpy as np
+import pytest
+from mixtures import bidisperse, monodisperse
+from jamshape import _contact
+from jamshape.contacts import (
+    ContactKind,
+    coordination,
+    find_contacts,
+    find_rattlers,
+    forces,
+    sum_forces,
+)
+from jamshape.packing import Box, Packing
+from jamshape.protocols.random_start import random_packing
+
+
+def make(position, angle, half_length=1.0, edges=(20.0, 20.0), **changes):
+    """Rods (discs) of radius 0.5 in the plane."""
+    n = len(position)
+    width = np.ones(n)
+    fields = {
+        "position": np.array(position, float),
+        "orientation": np.broadcast_to(np.array(angle, float), n),
+        "diameters": np.column_stack([2 * half_length + width, width, width]),
+        "species": np.ones(n, int),
+        "id": np.arange(1, n + 1),
+        "box": Box(lo=np.zeros(2), edges=np.array(edges)),
+    }
+    return Packing(**(fields | changes))
+
+
+def scaled(packing, factors):
+    """Affine change of the box and of the positions at fixed orientations."""
+    box = packing.box
+    changed = Box(lo=box.lo * factors, edges=box.edges * factors)
+    return packing.with_(position=packing.position * factors, box=changed)
+
+
+def pressed(n=24, dimension=2, seed=3, mixture=None, phi=None):
+    """A random packing, squeezed until the deepest overlap is 20 %, away from the origin."""
+    packing = random_packing(
+        n, phi or {2: 0.4, 3: 0.2}[dimension], seed, mixture, dimension=dimension
+    )
+    packing = packing.with_(box=Box(lo=np.full(dimension, -1.3), edges=packing.box.edges))
+    for _ in range(200):
+        packing = scaled(packing, 0.995)
+        bonds = find_contacts(packing).bonds
+        if (1 - bonds.distance / bonds.reach).max(initial=0) > 0.2:
+            return packing
+    raise AssertionError
+
+
+def quaternion_product(p, q):
+    w = p[0] * q[0] - p[1:] @ q[1:]
+    return np.array([w, *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))])
+
+
+def turned(packing, particle, axis, angle):
+    orientation = np.array(packing.orientation)
+    if packing.dimension == 2:
+        orientation[particle] += angle
+    else:
+        turn = np.zeros(4)
+        turn[0], turn[1 + axis] = np.cos(angle / 2), np.sin(angle / 2)
+        orientation[particle] = quaternion_product(turn, orientation[particle])
+    return packing.with_(orientation=orientation)
+
+
+def moved(packing, particle, axis, step):
+    position = np.array(packing.position)
+    position[particle, axis] += step
+    return packing.with_(position=position)
+
+
+def tiny_box():
+    """Two rods that wind around a box half as long, side to side and tip to own tip."""
+    along, half_length = np.array([2, 1]) / np.sqrt(5), np.full(2, 4.05)
+    shift = 0.7 * along + 0.88 * np.array([-along[1], along[0]])
+    angle = np.arctan2(1, 2) + np.array([0.01, -0.015])
+    return make([[0, 0], shift], angle, half_length, edges=(4.02, 4.02))
+
+
+PRESSED = {
+    "rods": pressed,
+    "short rods": partial(pressed, mixture=bidisperse(0.01)),
+    "discs": partial(pressed, mixture=bidisperse(0)),
+    "size ratio 5": partial(pressed, mixture=bidisperse(2, 5)),
+    "rods in a tiny box": tiny_box,
+    "rod alone": partial(pressed, n=1, mixture=monodisperse(20), phi=0.3),
+    "rods in space": partial(pressed, n=16, dimension=3),
+    "rods in a tiny cube": partial(pressed, n=2, dimension=3, mixture=bidisperse(2)),
+}
+
+
+@cache
+def pressed_named(name):
+    return PRESSED[name]()
+
+
+@pytest.fixture(params=PRESSED)
+def packing(request):
+    return pressed_named(request.param)
+
+
+def assert_same_forces(a, b):
+    for name in ("energy", "force", "torque", "virial", "pressure"):
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-9, atol=1e-12)

@@ -1,0 +1,30 @@
+"""Packings just below jamming."""
+
+from functools import cache
+import numpy as np
+import pytest
+from mixtures import bidisperse
+from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
+from scenes import make
+from jamshape.landscape import CrossingError, Landscape, State
+from jamshape.minima.minimise import (
+    METHODS,
+    Outcome,
+    Stop,
+    minimise,
+    residual_of,
+    rounding_floor,
+)
+from jamshape.protocols.random_start import random_packing
+
+
+@cache
+def squeezed(n, alpha, phi, seed=1):
+    """A random packing, brought to phi in steps, each followed by a rough minimisation."""
+    packing = random_packing(n, 0.4, seed, bidisperse(alpha))
+    landscape, state = Landscape(packing), State.of(packing)
+    while (now := state.packing(packing).phi) < phi * (1 - 1e-12):
+        state = state.strained(max(-0.01, np.sqrt(now / phi) - 1))
+        rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
+        state = minimise(landscape, state, "lbfgs", rough).state
+    return packing, state
