@@ -20,6 +20,7 @@ from jamshape.arrays import FloatArray
 from jamshape.files.lammps_text import write_data
 from jamshape.lammps.session import Session, plugin_path
 from jamshape.packing import Packing
+from jamshape.shapes.shape import Interaction
 
 ROOT = Path(__file__).resolve().parents[3]
 SKIN = 0.3
@@ -48,27 +49,8 @@ USUAL = Setting()
 
 def set_up(packing: Packing, setting: Setting = USUAL) -> str:
     """Input after the data file: pair style and neighbour list."""
-    return f"{interactions(packing, setting)}\n{neighbours(setting.skin)}"
-
-
-def interactions(packing: Packing, setting: Setting) -> str:
-    """Input of the pair style, with the exponent of each type where it has one."""
-    k_e = setting.k_e
-    if packing.shape_style == "spherocylinder":
-        sides = ("one", "two")[setting.sides - 1]
-        return f"pair_style spherocylinder/harmonic sides {sides}\npair_coeff * * {k_e!r}"
-    lines = [f"pair_coeff * * {k_e!r}"]
-    lines += [
-        f"pair_coeff {k} {k} {k_e!r} {p:.17g}" for k, p in enumerate(exponents_of(packing), 1)
-    ]
-    return "pair_style superellipsoid/harmonic\n" + "\n".join(lines)
-
-
-def exponents_of(packing: Packing) -> FloatArray:
-    """Give them by type."""
-    table = np.ones(packing.species.max())
-    table[packing.species - 1] = packing.exponent
-    return table
+    law = Interaction(setting.k_e, setting.sides)
+    return f"{packing.shape.style(packing, law).commands}\n{neighbours(setting.skin)}"
 
 
 def neighbours(skin: float = SKIN) -> str:
@@ -119,7 +101,7 @@ class Frame(NamedTuple):
 
 
 def frame(session: Session, like: Packing) -> Frame:
-    """Read the present state of these particles, whose shapes LAMMPS does not know in full."""
+    """Read the present state of a packing that was loaded."""
     D, has_fix = like.dimension, session.lmp.has_id("fix", "flow")
 
     def rows(name: str, width: int) -> FloatArray:
@@ -127,7 +109,7 @@ def frame(session: Session, like: Packing) -> Frame:
 
     torque = rows("torque", 3)
     return Frame(
-        packing=session.packing().with_(shape_style=like.shape_style, exponent=like.exponent),
+        packing=session.packing(),
         quaternion=rows("c_orient", 4),
         force=rows("f", 3)[:, :D],
         torque=torque if D == 3 else torque[:, 2:],
@@ -158,7 +140,8 @@ def run_alone(packing: Packing, text: str, folder: Path, ranks: int = 1) -> str:
         With its sentence, if it stops with one.
     """
     data, deck = folder / "start.data", folder / "case.in"
-    write_data(data, packing)
+    types = packing.shape.style(packing, Interaction()).types
+    write_data(data, packing.with_(species=types))
     lines = f"""
         include {ROOT / "inputs" / "load_plugin.lmp"}
         units lj

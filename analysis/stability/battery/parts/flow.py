@@ -234,7 +234,7 @@ def _restarted_at(drive: Drive, law: Law, middle: int, rest: int) -> float:
             session.commands(f"run {middle + rest}")
             whole = frame(session, packing)
         with Session() as session:
-            session.load_restart(path)
+            session.load_restart(path, packing)
             flow = fix(drive.kappa, drive.dt)
             session.commands(f"{neighbours()}\n{flow}{OUTPUT}\nrun {rest}")
             again = frame(session, packing)

@@ -17,7 +17,7 @@ from battery.scenes.rods import crossed, deep, jammed, own_images, rods
 from battery.shapes.table import SHAPES
 from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import minimise
+from jamshape.minima import minimise
 from jamshape.packing import Packing
 
 PART = "implicit compression"
@@ -107,7 +107,7 @@ def implicit_in_units(length: float, k_e: float, k_d: float) -> float:
     a, b = (found.steps for found in (_reference(), _in_units(length, k_e, k_d)))
     if len(a) != len(b):
         return np.inf
-    p, there = (np.array([step.p for step in steps]) for steps in (a, b))
+    p, there = (np.array([step.pressure for step in steps]) for steps in (a, b))
     return float(np.abs(there * length**2 / k_e / p - 1).max())
 
 

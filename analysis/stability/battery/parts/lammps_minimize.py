@@ -40,7 +40,7 @@ def compression_in_units(length: float, k_e: float) -> float:
             run = CompressionRun(session, settings, packing)
             run.advance(run.last_step)
             at = run.measure()
-            found.append((at["phi"], at["p"] * unit**2 / energy))
+            found.append((at["phi"], at["pressure"] * unit**2 / energy))
     (phi, p), (phi_there, p_there) = found
     return max(abs(phi_there / phi - 1), abs(p_there / p - 1))
 

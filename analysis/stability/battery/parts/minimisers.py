@@ -15,7 +15,7 @@ from battery.scenes.making import Scene, scaled
 from battery.scenes.rods import crossed, deep, jammed, rods
 from battery.shapes.table import SHAPES
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Minimum, Outcome, Stop, minimise
+from jamshape.minima import Minimum, Outcome, Stop, minimise
 
 PART = "minimisers"
 

@@ -7,22 +7,23 @@ from typing import Any
 
 from battery.case import Case
 from jamshape.landscape import Landscape, State
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Particles
 
 PART = "random start"
 
 
 def start_error(alpha: float, size_ratio: float, phi: float, dimension: int) -> float:
     """Energy of a random start, which must be 0, and the error of its packing fraction."""
-    mixture = Mixture.bidisperse(alpha, size_ratio)
-    packing = random_packing(12, phi, 1, mixture, dimension=dimension)
+    particles = Particles.of("spherocylinder", size_ratio, alpha=alpha)
+    packing = random_packing(12, phi, 1, particles, dimension)
     energy = Landscape(packing).evaluate(State.of(packing)).energy
     return max(energy, abs(packing.phi / phi - 1))
 
 
 def too_dense(alpha: float, phi: float) -> str:
     """Ask for what random insertion cannot reach."""
-    random_packing(12, phi, 1, Mixture.bidisperse(alpha), max_attempts=20_000)
+    random_packing(12, phi, 1, Particles.of("spherocylinder", alpha=alpha))
     return "no sentence"
 
 

@@ -12,7 +12,7 @@ from battery.parts.landscape import UNITS
 from battery.scenes.making import scaled
 from battery.shapes.table import SHAPES
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Minimum, Outcome
+from jamshape.minima import Minimum, Outcome
 from jamshape.minima.target import Target, find
 
 PART = "energy target"

@@ -12,7 +12,6 @@ from battery.images import contacts_of
 from battery.pairs import TOUCHING
 from battery.parts.implicit import UNITS
 from battery.scenes.making import Scene, every_image, scaled
-from battery.scenes.rods import rods
 from battery.scenes.superellipsoids import hard
 from battery.shapes.table import SHAPES
 from jamshape.protocols.thermal import Thermal, equilibrate
@@ -59,8 +58,6 @@ def _refused(change: str) -> str:
         x = packing.position.copy()
         x[1] = x[0]
         thermal.packing = packing.with_(position=x)
-    elif change == "rods":
-        thermal.packing = rods([[0.0, 0.0], [3.0, 0.0]], 0.0, 0.5, 0.5, [12.0, 12.0])
     else:
         thermal.size = float(change.removeprefix("size "))
     next(equilibrate(thermal, 10, 1))
@@ -90,7 +87,7 @@ def cases() -> list[Case]:
         "size is .*, expected",
     )
     sentences = {
-        "overlapping start": overlap, "coincident centres": overlap, "rods": "expected superellipsoids",
+        "overlapping start": overlap, "coincident centres": overlap,
         "size 0": no_size, "size -1": no_size, "size nan": no_size,
     }  # fmt: skip
     for name, words in sentences.items():

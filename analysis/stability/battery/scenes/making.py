@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Minimum, Stop, minimise
+from jamshape.minima import Minimum, Stop, minimise
 from jamshape.packing import Box, Packing
+from jamshape.protocols.thermal import without_overlaps
 
 EPS = float(np.finfo(np.float64).eps)
 LONG_EPS = float(np.finfo(np.longdouble).eps)
@@ -130,6 +131,13 @@ def at_a_minimum(scene: Scene) -> Packing:
     packing = scene()
     found = minimise(Landscape(packing), State.of(packing), "auto")
     return found.state.packing(packing)
+
+
+def hardened(packing: Packing, wider: float = 0.0) -> Packing:
+    """Open a box until no particles overlap, and it is twice as wide as they are long."""
+    longest = 2 * float(packing.outer_radius.max())
+    strain = max(wider, 2.001 * longest / float(packing.box.edges.min()) - 1)
+    return without_overlaps(widened(packing, strain))
 
 
 # --- images --------------------------------------------------------------------------------------

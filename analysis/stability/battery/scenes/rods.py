@@ -9,15 +9,20 @@ from numpy.typing import ArrayLike
 
 from battery.scenes.making import (
     deepest,
+    hardened,
     in_doubles,
     packing_of,
     pressed,
     squeezed,
     squeezed_to,
+    widened,
 )
 from jamshape.arrays import FloatArray
 from jamshape.packing import Packing
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Particles
+
+STYLE = "spherocylinder"
 
 
 def rods(
@@ -27,11 +32,19 @@ def rods(
     radius: ArrayLike,
     edges: ArrayLike,
 ) -> Packing:
-    """Spherocylinders from arrays."""
+    """Rods from arrays."""
     n = len(np.asarray(position))
-    A, R = np.broadcast_to(half_length, n), np.broadcast_to(radius, n)
-    diameters = 2 * np.column_stack([A + R, R, R])
-    return packing_of(position, orientation, diameters, edges)
+    diameters = _diameters(np.broadcast_to(half_length, n), np.broadcast_to(radius, n))
+    return packing_of(position, orientation, diameters, edges, shape_style=STYLE)
+
+
+def given(half_length: FloatArray, radius: FloatArray) -> Particles:
+    """Rods of these sizes, to be placed."""
+    return Particles.given(STYLE, _diameters(half_length, radius))
+
+
+def _diameters(half_length: FloatArray, radius: FloatArray) -> FloatArray:
+    return 2 * np.column_stack([half_length + radius, radius, radius])
 
 
 # --- in one box ----------------------------------------------------------------------------------
@@ -43,8 +56,7 @@ def all_aspect_ratios(dimension: int, largest: float = 100.0) -> Packing:
     alpha = np.append(np.geomspace(1e-6, largest, 9), np.tile([0.0, 1e-6, 0.01, 1.0], 4))
     phi = 0.3 if dimension == 2 else 0.5 / largest
     radius = np.where(np.arange(len(alpha)) % 2, 0.5, 0.7)
-    mixture = Mixture.from_arrays(alpha * radius, radius)
-    start = random_packing(len(alpha), phi, 1, mixture, dimension=dimension)
+    start = random_packing(len(alpha), phi, 1, given(alpha * radius, radius), dimension)
     return in_doubles(pressed(start, 0.1))
 
 
@@ -52,8 +64,8 @@ def all_aspect_ratios(dimension: int, largest: float = 100.0) -> Packing:
 def all_sizes(dimension: int) -> Packing:
     """Rods of alpha 1 with radii from 0.5 to 5."""
     radius = np.append(np.geomspace(0.5, 5.0, 5), np.full(40, 0.5))
-    mixture = Mixture.from_arrays(radius, radius)
-    start = random_packing(45, 0.45 if dimension == 2 else 0.2, 1, mixture, dimension=dimension)
+    phi = 0.45 if dimension == 2 else 0.2
+    start = random_packing(len(radius), phi, 1, given(radius, radius), dimension)
     return in_doubles(pressed(start, 0.1))
 
 
@@ -101,14 +113,28 @@ def deep(dimension: int, alpha: float = 1.0, n: int = 16) -> Packing:
     In 3D some samples end on a kink of twisted rods; that of this seed does not.
     """
     phi, seed = (0.4, 1) if dimension == 2 else (0.2, 4)
-    packing = random_packing(n, phi, seed, Mixture.bidisperse(alpha), dimension=dimension)
+    packing = random_packing(n, phi, seed, Particles.of(STYLE, alpha=alpha), dimension)
     return squeezed(packing, 0.02, 60, lambda found: deepest(found.state.packing(packing)) > 1 / 3)
 
 
 @cache
 def jammed(alpha: float, n: int = 16, phi: float = 0.9) -> Packing:
     """Make a random packing of the plane, squeezed to phi and roughly minimised on the way."""
-    return squeezed_to(random_packing(n, 0.4, 1, Mixture.bidisperse(alpha)), phi)
+    return squeezed_to(random_packing(n, 0.4, 1, Particles.of(STYLE, alpha=alpha)), phi)
+
+
+@cache
+def loose(dimension: int, alpha: float, n: int = 8) -> Packing:
+    """Rods of one aspect ratio in a box that leaves them room."""
+    phi = 0.2 if dimension == 2 else min(0.2, 0.4 / (1 + alpha))
+    start = random_packing(n, phi, 1, Particles.of(STYLE, alpha=alpha), dimension)
+    return widened(pressed(start, 1e-3), 0.02)
+
+
+@cache
+def hard(dimension: int, alpha: float) -> Packing:
+    """Rods without overlaps in a box twice as wide as they are long."""
+    return hardened(loose(dimension, alpha, 12))
 
 
 @cache

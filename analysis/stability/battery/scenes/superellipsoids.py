@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from battery.scenes.making import (
+    hardened,
     in_doubles,
     packing_of,
     pressed,
@@ -18,11 +19,9 @@ from battery.scenes.making import (
     widened,
 )
 from jamshape.arrays import FloatArray
-from jamshape.contacts import outer_radius
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import Stop, minimise
+from jamshape.minima import Stop, minimise
 from jamshape.packing import Box, Packing
-from jamshape.protocols.thermal import without_overlaps
 from jamshape.shapes.single_pairs import superellipsoid_scales
 
 EXPONENTS = (0.55, 0.75, 1.0, 1.5, 2.0, 5.0, 10.0)
@@ -90,10 +89,7 @@ def loose(dimension: int, p: float, w: float, n: int = 8) -> Packing:
 def hard(dimension: int, p: float, w: float, wider: float = 0.0) -> Packing:
     """Particles without overlaps in a box twice as wide as they are long; touching unless `wider`."""
     n = 12 if dimension == 3 else int(np.clip(8 * max(w, 1 / w), 12, 60))
-    packing = loose(dimension, p, w, n)
-    longest = 2 * float(outer_radius(packing).max())
-    strain = max(wider, 2.001 * longest / float(packing.box.edges.min()) - 1)
-    return without_overlaps(widened(packing, strain))
+    return hardened(loose(dimension, p, w, n), wider)
 
 
 def needles() -> Packing:

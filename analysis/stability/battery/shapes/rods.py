@@ -57,6 +57,8 @@ PAIRS_OF_ALL_CLASSES = {
     for overlap in OVERLAPS
 }
 
+OF_ONE_ALPHA = [(D, alpha) for D in (2, 3) for alpha in (0.0, 0.01, 1.0, 10.0)]
+
 JAMMED = partial(scenes.jammed, 1.0)
 
 RODS = Shape(
@@ -147,8 +149,8 @@ RODS = Shape(
             "overlaps of a third": PLANE["overlaps of a third"],
             **stacks(1e-6, 1e-14),
         },
-        quasistatic={},
-        quick=(),
-        hard={},
+        quasistatic={f"{D}D, alpha {a:g}": partial(scenes.loose, D, a) for D, a in OF_ONE_ALPHA},
+        quick=("2D, alpha 0", "2D, alpha 1"),
+        hard={f"{D}D, alpha {a:g}": partial(scenes.hard, D, a) for D, a in OF_ONE_ALPHA},
     ),
 )

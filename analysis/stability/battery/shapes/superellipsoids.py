@@ -98,7 +98,9 @@ SUPERELLIPSOIDS = Shape(
         must_relax=True,
         heavy=("all shapes",),
     ),
-    minimized={},
+    minimized={
+        name: CROWDS[name] for name in ("plane, all shapes", "own images", "plane, own images")
+    },
     two_ranks={
         "own images": Drive(CROWDS["own images"], 0.0, 0.0),
         "p 0.55 and 10, w 0.1 and 10": Drive(CROWDS["all shapes"], 0.0, 0.0),
@@ -112,10 +114,10 @@ SUPERELLIPSOIDS = Shape(
         jammed={"spheroids": scenes.jammed_spheroids},
         quick=(),
         in_units=("spheroids",),
-        spectra=(),
+        spectra=("spheroids",),
     ),
     compressed=Compressed(
-        implicit={},
+        implicit={name: SCATTERED[name] for name in ("2D, p 0.55 to 10, w to 10",)},
         quasistatic={_name(*x): partial(scenes.loose, *x) for x in SHAPES_OF_ONE},
         quick=(_name(2, 1.0, 1.0),),
         hard={_name(*x): partial(scenes.hard, *x) for x in SHAPES_OF_ONE},
