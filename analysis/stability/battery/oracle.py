@@ -186,5 +186,6 @@ def of_rods(packing: Packing, k_e: float = 1.0, quaternion: FloatArray | None = 
     normal = delta / np.maximum(np.sqrt(dot(delta, delta)), np.longdouble(1e-300))[:, None]
     overlap = np.where(touching, 1 - distance / s.d, 0)
     force = (k_e * overlap / s.d)[:, None] * normal
-    pulls = Pulls(pairs, arms, force, 0.5 * k_e * overlap**2, touching)
+    energy = np.asarray(0.5 * k_e * overlap**2, np.longdouble)
+    pulls = Pulls(pairs, arms, force, energy, touching)
     return summed(packing, pulls, int(touching.sum()))

@@ -28,7 +28,7 @@ CROSS = r"(spines|centres) of particles \d+ and \d+ cross"
 @cache
 def expected_of(scene: Scene, oracle: Oracle) -> Found:
     """Ask what the oracle says of a scene."""
-    return oracle(scene())
+    return oracle(scene(), 1.0, None)
 
 
 def against_oracle(scene: Scene, oracle: Oracle) -> float:

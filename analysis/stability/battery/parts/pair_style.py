@@ -16,15 +16,15 @@ from battery.scenes.superellipsoids import all_sizes
 from battery.session import SKIN, Frame, Setting, bonds_in, frame, loaded, sentence, set_up
 from battery.shapes.shape import Law, Shape, is_long
 from battery.shapes.table import RODS, SHAPES, SUPERELLIPSOIDS
-from jamshape.arrays import FloatArray
+from jamshape.arrays import LongArray
 from jamshape.contacts import find_contacts, sum_forces
 
 
 class Expected(NamedTuple):
     """What another evaluation says of a state in LAMMPS."""
 
-    force: FloatArray
-    torque: FloatArray
+    force: LongArray
+    torque: LongArray
     n_bonds: int
 
 
@@ -35,8 +35,9 @@ def expected_of(at: Frame, shape: Shape, law: Law, k_e: float = 1.0) -> Expected
         return Expected(seen.force, seen.torque, seen.n_bonds)
     network = find_contacts(at.packing, k_e, law.sides)
     found = sum_forces(at.packing, network)
-    torque = found.torque.reshape(at.packing.n, -1)
-    return Expected(found.force, torque, int(network.n_bonds.sum()))
+    force = np.asarray(found.force, np.longdouble)
+    torque = np.asarray(found.torque, np.longdouble).reshape(at.packing.n, -1)
+    return Expected(force, torque, int(network.n_bonds.sum()))
 
 
 def difference(at: Frame, shape: Shape, expected: Expected, k_e: float = 1.0) -> float:

@@ -74,6 +74,10 @@ def _units(rng: np.random.Generator, n: int, D: int) -> FloatArray:
     return np.asarray(u / np.linalg.norm(u, axis=1, keepdims=True))
 
 
+def _log_uniform(rng: np.random.Generator, bounds: tuple[float, float], n: int) -> FloatArray:
+    return np.asarray(np.exp(rng.uniform(np.log(bounds[0]), np.log(bounds[1]), (2, n))))
+
+
 def _across(v: FloatArray, u: FloatArray) -> FloatArray:
     """Make unit vectors along the parts of v across u."""
     rest = v - (v * u).sum(axis=1, keepdims=True) * u
@@ -83,8 +87,8 @@ def _across(v: FloatArray, u: FloatArray) -> FloatArray:
 def random_rods(D: int, drawn: Drawn) -> Rods:
     """Pairs that overlap as asked for."""
     rng, n, angle = np.random.default_rng(1), drawn.n, drawn.angle
-    R = np.exp(rng.uniform(*np.log(drawn.size), (2, n)))
-    A = R * np.exp(rng.uniform(*np.log(drawn.alpha), (2, n)))
+    R = _log_uniform(rng, drawn.size, n)
+    A = R * _log_uniform(rng, drawn.alpha, n)
     u_i, u_j = _units(rng, n, D), _units(rng, n, D)
     if angle is not None:
         across = _across(u_j, u_i)
@@ -176,7 +180,8 @@ def rod_error(
     found, s = pairs.contacts(1.0, sides), pairs.spines
     if len(pairs.i) < 50 or not (found["status"] == TOUCHING).all():
         return np.inf
-    wanted, worst = expected(s), [np.abs(found["force"] - expected(s).force).max(axis=1) * s.d]
+    wanted = expected(s)
+    worst = [np.abs(found["force"] - wanted.force).max(axis=1) * s.d]
     for name, torque, body in (
         ("torque_i", wanted.torque_i, pairs.i),
         ("torque_j", wanted.torque_j, pairs.j),
@@ -219,7 +224,7 @@ def upside_down(D: int, sides: int, angle: float) -> float:
 def missed_crossings(depth: float) -> float:
     """Share of crossing spines, by at least this fraction of a radius, that are not called that."""
     rng, n = np.random.default_rng(2), 2000
-    A, R = np.exp(rng.uniform(np.log(0.01), np.log(100), (2, n))), np.ones((2, n))
+    A, R = _log_uniform(rng, (0.01, 100.0), n), np.ones((2, n))
     u_i, u_j = _units(rng, n, 2), _units(rng, n, 2)
     # The tip of i is past spine j, or both cross anywhere.
     sine_ij = np.abs(u_i[:, 0] * u_j[:, 1] - u_i[:, 1] * u_j[:, 0])

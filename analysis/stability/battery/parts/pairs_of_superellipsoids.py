@@ -138,7 +138,7 @@ def aligned(p: float, tilt: float) -> Couples:
 def _scale_if_aligned(pairs: Couples) -> LongArray:
     """Scale of contact in closed form, of bodies of the same exponent along the same axes."""
     ratio = np.abs(np.asarray(pairs.r, np.longdouble)) / (pairs.i.axes + pairs.j.axes)
-    return _norm(ratio, np.asarray(2 * pairs.i.p, np.longdouble))
+    return _norm(np.asarray(ratio, np.longdouble), np.asarray(2 * pairs.i.p, np.longdouble))
 
 
 def _norm(ratio: LongArray, order: LongArray) -> LongArray:

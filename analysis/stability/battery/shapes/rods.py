@@ -18,18 +18,19 @@ from battery.shapes.shape import (
     Law,
     Limits,
     OnLandscape,
+    Scenes,
     Shape,
     Touch,
 )
 
-PLANE = {
+PLANE: Scenes = {
     "alpha 1e-6 to 100 in one box": partial(scenes.all_aspect_ratios, 2),
     "sizes 1 to 10": partial(scenes.all_sizes, 2),
     "longer than the box": scenes.longer_than_the_box,
     "own images": partial(scenes.own_images, 2),
     "overlaps of a third": partial(scenes.deep, 2),
 }
-SPACE = {
+SPACE: Scenes = {
     "3D, alpha 1e-6 to 10 in one box": partial(scenes.all_aspect_ratios, 3, 10.0),
     "3D, alpha 1e-6 to 100 in one box": partial(scenes.all_aspect_ratios, 3),
     "3D, sizes 1 to 10": partial(scenes.all_sizes, 3),
@@ -38,12 +39,12 @@ SPACE = {
 }
 
 
-def stacks(*angles: float) -> dict[str, partial[scenes.Packing]]:
+def stacks(*angles: float) -> Scenes:
     """Nearly parallel ones, in the plane."""
     return {f"stack to {a:g}": partial(scenes.stack, a, 2) for a in angles}
 
 
-def stacks_in_space(*angles: float) -> dict[str, partial[scenes.Packing]]:
+def stacks_in_space(*angles: float) -> Scenes:
     """Nearly parallel ones, in space."""
     return {f"3D, stack to {a:g}": partial(scenes.stack, a, 3) for a in angles}
 
@@ -51,7 +52,7 @@ def stacks_in_space(*angles: float) -> dict[str, partial[scenes.Packing]]:
 # A stack at 1e-6 and below is within 1e-6 of kinks of the one-bond energy.
 KINKED = stacks(1e-6, 1e-10, 1e-14) | stacks_in_space(1e-6, 1e-10, 1e-14)
 
-PAIRS_OF_ALL_CLASSES = {
+PAIRS_OF_ALL_CLASSES: Scenes = {
     f"{dimension}D, overlap {overlap:.2g}": partial(scenes.overlaps, dimension, overlap)
     for dimension in (2, 3)
     for overlap in OVERLAPS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,17 +13,12 @@ from battery.scenes.making import Scene
 from jamshape.arrays import FloatArray
 from jamshape.packing import Packing
 
-Scenes = Mapping[str, Scene]
+Scenes = dict[str, Scene]
 """Under the names that labels of cases have."""
 
 
-class Oracle(Protocol):
-    """A second evaluation of one-bond contacts, which shares nothing with the compiled one."""
-
-    def __call__(
-        self, packing: Packing, k_e: float = 1.0, quaternion: FloatArray | None = None
-    ) -> Found:
-        """Evaluate a packing, with quaternions as LAMMPS holds them."""
+Oracle = Callable[[Packing, float, FloatArray | None], Found]
+"""A second evaluation of one-bond contacts, from a packing, k_e and quaternions as LAMMPS holds them."""
 
 
 class Law(NamedTuple):

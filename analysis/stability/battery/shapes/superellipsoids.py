@@ -17,11 +17,12 @@ from battery.shapes.shape import (
     Law,
     Limits,
     OnLandscape,
+    Scenes,
     Shape,
     Touch,
 )
 
-SCATTERED = {
+SCATTERED: Scenes = {
     "p 0.55 to 10 in one box": partial(scenes.scattered, EXPONENTS, (1.0,)),
     "w 0.1 to 10 in one box": partial(scenes.scattered, (1.0, 1.5), (0.1, 1.0, 10.0)),
     "2D, p 0.55 to 10, w to 10": partial(scenes.scattered, (0.55, 1.0, 10.0), (10.0, 1.0), 2),
@@ -30,7 +31,7 @@ SCATTERED = {
 }
 
 # For the pair style, and its tests.
-CROWDS = {
+CROWDS: Scenes = {
     **{f"p {p} {w}": partial(scenes.of_one_shape, p, axes) for p in P for w, axes in W.items()},
     "all shapes": partial(scenes.of_all_shapes, 3),
     "plane, all shapes": partial(scenes.of_all_shapes, 2),
