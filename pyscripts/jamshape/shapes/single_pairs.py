@@ -7,11 +7,13 @@ angle or quaternion, semi-axes and exponent. Packings are evaluated by the class
 from jamshape._contact import (
     spherocylinder_contacts,
     superellipsoid_contacts,
+    superellipsoid_overlap,
     superellipsoid_scales,
 )
 
 __all__ = [
     "spherocylinder_contacts",
     "superellipsoid_contacts",
+    "superellipsoid_overlap",
     "superellipsoid_scales",
 ]

@@ -116,7 +116,7 @@ def cases() -> list[Case]:
                     (name, u0) != ("discs", 1e-15),
                 )
                 found.append(Case(PART, f"{name}, u0 {u0:g}", what, 0.0, run, heavy))
-        for name in own.in_units:
+        for name in own.modes_in_units:
             for length, k_e in UNITS:
                 run, label = (
                     partial(in_units, name, length, k_e),

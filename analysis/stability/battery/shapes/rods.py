@@ -142,6 +142,7 @@ RODS = Shape(
         },
         quick=("rods of alpha 1",),
         in_units=("discs", "rods of alpha 1"),
+        modes_in_units=("discs", "rods of alpha 1"),
         spectra=("discs", "rods of alpha 0.01", "rods of alpha 4"),
     ),
     compressed=Compressed(
@@ -151,7 +152,7 @@ RODS = Shape(
             **stacks(1e-6, 1e-14),
         },
         quasistatic={f"{D}D, alpha {a:g}": partial(scenes.loose, D, a) for D, a in OF_ONE_ALPHA},
-        quick=("2D, alpha 0", "2D, alpha 1"),
+        quick=("2D, alpha 0", "2D, alpha 1", "3D, alpha 0"),
         hard={f"{D}D, alpha {a:g}": partial(scenes.hard, D, a) for D, a in OF_ONE_ALPHA},
     ),
 )

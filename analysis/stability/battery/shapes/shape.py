@@ -179,6 +179,8 @@ class InSolvers:
     """Those of them that are led to u0 = 1e-15 in a few seconds."""
     in_units: tuple[str, ...]
     """Those of them that are given in other units."""
+    modes_in_units: tuple[str, ...]
+    """Those of them whose modes are compared with those in other units."""
     spectra: tuple[str, ...]
     """Those of them whose bounds of eigenvalues are counted."""
 

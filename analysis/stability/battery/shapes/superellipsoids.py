@@ -113,8 +113,10 @@ SUPERELLIPSOIDS = Shape(
         },
         to_the_end=(),
         jammed={"spheroids": scenes.jammed_spheroids},
-        quick=(),
+        quick=("spheroids",),
         in_units=("spheroids",),
+        # Semi-axes, rounded to doubles in another unit, change quartic modes by more than their bounds.
+        modes_in_units=(),
         spectra=("spheroids",),
     ),
     compressed=Compressed(
