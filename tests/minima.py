@@ -56,7 +56,7 @@ def dense(landscape, state):
 
 def _held(landscape, state):
     """Which particles are no rattlers, and all contacts and which of them are between these."""
-    rattlers = landscape.curvature(state, extended=True).rattlers
+    rattlers = landscape.rattlers(state)
     found = landscape.derivatives(state, extended=True)
     return ~rattlers, found, ~rattlers[found["particles"]].any(axis=1)
 
@@ -115,7 +115,7 @@ def count_sliders(landscape, state):
     curvature = landscape.curvature(state, extended=True)
     hessian, particles = curvature.hessian, landscape.particles
     count = 0
-    for i in np.flatnonzero((particles.half_length > 0) & ~curvature.rattlers):
+    for i in np.flatnonzero((particles.half_length > 0) & ~landscape.rattlers(state)):
         shift = np.zeros((particles.n, 3))
         shift[i, :2] = (
             np.cos(float(state.orientation[i, 0])),
@@ -188,7 +188,7 @@ def random_directions(landscape, number, seed=1):
 def soft_directions(landscape, state, number):
     """Find the softest modes of the backbone, translations left out."""
     curvature = landscape.curvature(state, extended=True)
-    kept = ~curvature.rattlers[landscape.particle_of_coordinate()]
+    kept = ~landscape.rattlers(state)[landscape.particle_of_coordinate()]
     hessian = curvature.hessian.toarray()[np.ix_(kept, kept)]
     shifts = np.eye(3)[:2, None, :].repeat(landscape.particles.n, axis=1)
     free = landscape.components(np.ones(landscape.size)) > 0
@@ -204,7 +204,7 @@ def complaints(landscape, minimum, n_random=10, n_soft=20):
     """Say all that speaks against a minimum with no other zero modes than those that are known."""
     said = []
     state = minimum.state
-    if landscape.curvature(state, extended=True).rattlers.all():
+    if landscape.rattlers(state).all():
         return ["nothing is held"]
     if (force := force_on_rattlers(landscape, state)) > _TOUCH:
         said.append(f"force {force:.2g} on a rattler")

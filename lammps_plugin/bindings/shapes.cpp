@@ -95,11 +95,12 @@ nb::dict contacts_in(const ShapeOf<Model> &of, const PairArrays &arrays)
   }
   NewArray<std::int64_t> pair({at.size()});
   NewArray<double> separation({at.size(), D});
-  ContactArrays<D, Model::MOST_BONDS> contacts(at.size());
+  ContactArrays<Model, D> contacts(at.size());
   for (std::size_t c = 0; c < at.size(); ++c) {
     pair[c] = static_cast<std::int64_t>(at[c]);
-    write_vec(pairs.separation(at[c]), separation.row(c));
-    contacts.set(c, found[c]);
+    const Vec<D> r = pairs.separation(at[c]);
+    write_vec(r, separation.row(c));
+    contacts.set(c, found[c], pairs.first_body(at[c], r), pairs.second_body(at[c]));
   }
   nb::dict result;
   result["pair"] = pair.release();
@@ -146,7 +147,8 @@ template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
       "touching, 2 crossing, 3 unconverged), kind, n_bonds, error (relative, of an iteration),\n"
       "energy (C,); separation, force (on i) (C, D); torque_i, torque_j (C, 1 or 3) and, of up to\n"
       "most_bonds bonds B, bond_normal (into i), bond_force, bond_arm_i (C, B, D), bond_distance,\n"
-      "bond_reach, bond_energy, bond_stiffness (C, B), bond_on_side (C, B, 2).");
+      "bond_reach, bond_energy, bond_stiffness (C, B), bond_on_side and\n"
+      "bond_on_face (flat in all D - 1 directions) of i and j (C, B, 2).");
 }
 
 template <class Model> void export_shape(nb::module_ &m)
@@ -162,6 +164,7 @@ template <class Model> void export_shape(nb::module_ &m)
   of.attr("core") = Model::CORE;
   of.attr("most_bonds") = Model::MOST_BONDS;
   of.attr("has_sides") = Model::HAS_SIDES;
+  of.attr("bonds_are_contacts") = Model::BONDS_ARE_CONTACTS;
   export_sizes(of);
   export_pairs(of);
 }

@@ -33,8 +33,14 @@ template <int D, class S = double> struct Bond {
   S energy;              // this bond's share of the contact's energy
   S stiffness;           // of the energy along the bond, at most: its second derivative by distance
   S own_stiffness;       // what of it comes from this bond's overlap alone
-  bool on_side_i;        // the foot lies strictly inside the flat part of i
+  bool on_side_i;        // the foot lies strictly inside the straight part of i
   bool on_side_j;
+};
+
+/// Whether a bond lies on a face of i, of j: a part of the surface that is flat in all D - 1
+/// directions, so that a particle cannot roll over it (the side of a rod is one in 2D only).
+struct OnFaces {
+  bool i, j;
 };
 
 /// Energy of one pair with its exact derivatives: force on i (j carries the opposite) and the

@@ -77,6 +77,8 @@ template <class Model> class PairContactOf : public PairContact {
                         [&](auto D) { return Model::template director<D>(shape); });
   }
 
+  bool bonds_are_contacts() const override { return Model::BONDS_ARE_CONTACTS; }
+
   double memory_usage() override
   {
     return PairContact::memory_usage() + in_2d.memory_usage() + in_3d.memory_usage() +
@@ -360,9 +362,10 @@ template <class Model> class PairContactOf : public PairContact {
         const Vec<D> r = body.centre - other.centre;
         for (int b = 0; b < contact.n_bonds; ++b) {
           const Bond<D> &bond = contact.bond[b];
-          visit({i, j, contact.kind, b == 0, in_space<D>(bond.normal), in_space<D>(bond.force),
+          visit({i, j, contact.kind, b, in_space<D>(bond.normal), in_space<D>(bond.force),
                  in_space<D>(bond.arm_i), in_space<D>(bond.arm_i + r), bond.distance, bond.reach,
-                 bond.energy, bond.stiffness, bond.on_side_i, bond.on_side_j});
+                 bond.energy, bond.stiffness, bond.on_side_i, bond.on_side_j,
+                 Model::on_faces(contact, b, body, other)});
         }
       }
     }

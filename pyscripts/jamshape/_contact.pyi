@@ -17,6 +17,7 @@ class _Shape:
     core: ClassVar[str]
     most_bonds: ClassVar[int]
     has_sides: ClassVar[bool]
+    bonds_are_contacts: ClassVar[bool]
     measure: NDArray[np.float64]
     moment: NDArray[np.float64]
     outer_radius: NDArray[np.float64]

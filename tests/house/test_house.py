@@ -46,12 +46,12 @@ def docstrings(tree):
 
 def words_of_python(path):
     """Names and texts of the code, without comments and docstrings."""
-    tree, described = tree_of(path), None
+    tree = tree_of(path)
     described = set(docstrings(tree))
     for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            if id(node) not in described:
-                yield node.value
+        is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if is_text and id(node) not in described:
+            yield node.value
         for field in ("id", "attr", "name", "arg", "module"):
             if isinstance(value := getattr(node, field, None), str):
                 yield value
@@ -71,7 +71,7 @@ def knowing(paths, words_of):
 
 
 def test_no_file_outside_the_places_of_shapes_knows_which_there_are(measured):
-    sources = [p for p in sorted(PLUGIN.rglob("*.*pp")) + sorted(PLUGIN.rglob("*.h"))]
+    sources = list(sorted(PLUGIN.rglob("*.*pp")) + sorted(PLUGIN.rglob("*.h")))
     found = knowing(python_files(LIBRARY), words_of_python) + knowing(sources, words_of_cpp)
     measured(files_that_know_a_shape=len(found))
     assert found == []

@@ -1,10 +1,8 @@
 """Packings whose numbers have no short decimals, and how to compare them."""
 
-import math
 import numpy as np
-import pytest
-from jamshape.packing import Box, Packing, angle_from_quaternion, guess_shape_style
 
+from jamshape.packing import Box, Packing
 
 NASTY = [0.1 + 0.2, 1 / 3, -0.0, np.finfo(float).tiny, np.nextafter(1, 2), -np.finfo(float).max]
 

@@ -1,13 +1,11 @@
 """Packings that are pressed together, by name."""
 
 from functools import cache, partial
+
 import numpy as np
-import pytest
 from mixtures import bidisperse, of_arrays
+from scenes import pressed
 from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
-from scenes import make, pressed, scaled
-from jamshape.contacts import find_contacts, find_rattlers, forces
-from jamshape.landscape import CrossingError, Landscape, State
 
 
 def half_of_them_discs(n):

@@ -1,24 +1,8 @@
 """Rods at given places."""
 
 import numpy as np
-import pytest
-from mixtures import bidisperse
-from jamshape.contacts import find_contacts, sum_forces
-from jamshape.measures.contact_statistics import (
-    ContactScale,
-    angle_density,
-    angle_edges,
-    class_fractions,
-    contact_angles,
-    contact_scale,
-    fit_offset_power_law,
-    flat_contacts,
-    flat_fraction,
-    held_contacts,
-    residuals,
-)
+
 from jamshape.packing import Box, Packing
-from jamshape.protocols.random_start import random_packing
 
 
 def rods(position, angle, half_length=1.0):

@@ -1,18 +1,12 @@
 """Packings of rods that many tests look at."""
 
-import itertools
 from functools import cache, partial
+
 import numpy as np
-import pytest
 from mixtures import bidisperse, monodisperse
-from jamshape import _contact
+
 from jamshape.contacts import (
-    ContactKind,
-    coordination,
     find_contacts,
-    find_rattlers,
-    forces,
-    sum_forces,
 )
 from jamshape.packing import Box, Packing
 from jamshape.protocols.random_start import random_packing
@@ -99,11 +93,6 @@ PRESSED = {
 @cache
 def pressed_named(name):
     return PRESSED[name]()
-
-
-@pytest.fixture(params=PRESSED)
-def packing(request):
-    return pressed_named(request.param)
 
 
 def assert_same_forces(a, b):

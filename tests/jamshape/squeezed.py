@@ -1,19 +1,14 @@
 """Packings just below jamming."""
 
 from functools import cache
+
 import numpy as np
-import pytest
 from mixtures import bidisperse
-from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
-from scenes import make
-from jamshape.landscape import CrossingError, Landscape, State
-from jamshape.minima.minimise import (
-    METHODS,
-    Outcome,
+
+from jamshape.landscape import Landscape, State
+from jamshape.minima import (
     Stop,
     minimise,
-    residual_of,
-    rounding_floor,
 )
 from jamshape.protocols.random_start import random_packing
 

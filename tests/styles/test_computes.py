@@ -305,7 +305,9 @@ def test_order_in_space(n, tmp_path):
     assert tensor_order(rods_3d(4.0 * cells, spread, 1.0, 0.5, [32.0] * 3).axes)[0] < 3 / n**0.5
 
 
-NO_PAIR_STYLE = " found no pair style of this plugin, expected one such as 'pair_style spherocylinder/harmonic'."
+NO_PAIR_STYLE = (
+    " found pair_style zero, expected one of jamshape's: use 'pair_style SHAPE/harmonic'."
+)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from body_rows import superellipsoid_rows
 from lammps_scenes import (
     angle_between,
     dump,
@@ -32,7 +33,6 @@ from superellipsoid_scenes import (
 )
 
 from jamshape import _contact
-from body_rows import superellipsoid_rows
 from jamshape.packing import body_axes
 
 pytestmark = pytest.mark.lammps

@@ -356,6 +356,8 @@ struct SpherocylinderModel {
   /// Bonds of a contact, and whether `sides` changes the law.
   static constexpr int MOST_BONDS = 2;
   static constexpr bool HAS_SIDES = true;
+  /// Whether each bond holds a particle like a contact; two bonds side to side are one contact.
+  static constexpr bool BONDS_ARE_CONTACTS = false;
 
   static Law law(double k_e, Sides sides) { return {{k_e}, sides}; }
 
@@ -409,6 +411,16 @@ struct SpherocylinderModel {
   template <int D, class S> static void turn_to(Body<D, S> &body, const QuaternionOf<S> &q)
   {
     body.axis = long_axis<D, S>(q);
+  }
+
+  /// Of bond b of a contact.
+  template <int D, class S>
+  static OnFaces on_faces(const Contact<D, S, MOST_BONDS> &contact, int b, const Body<D, S> &,
+                          const Body<D, S> &)
+  {
+    if (D == 3) return {false, false};
+    const bool is_between = contact.kind == ContactKind::SIDE_TO_SIDE;
+    return {is_between || contact.bond[b].on_side_i, is_between || contact.bond[b].on_side_j};
   }
 
   /// Whether the surfaces of i and j are closer than `margin`.

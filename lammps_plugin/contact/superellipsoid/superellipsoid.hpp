@@ -172,6 +172,7 @@ struct SuperellipsoidModel {
   static constexpr const char *CORE = "centres";
   static constexpr int MOST_BONDS = 1;
   static constexpr bool HAS_SIDES = false;
+  static constexpr bool BONDS_ARE_CONTACTS = false;
 
   static Law law(double epsilon, Sides) { return {epsilon}; }
 
@@ -235,6 +236,14 @@ struct SuperellipsoidModel {
     } else {
       for (int k = 0; k < D; ++k) body.axis[k] = body_axis(q, k);
     }
+  }
+
+  template <int D, class S>
+  static OnFaces on_faces(const Contact<D, S, MOST_BONDS> &contact, int b, const Body<D, S> &i,
+                          const Body<D, S> &j)
+  {
+    const Vec<D, S> &arm_i = contact.bond[b].arm_i;
+    return {is_flat_at(i, arm_i), is_flat_at(j, arm_i + (i.centre - j.centre))};
   }
 
   /// Whether the surfaces of i and j may be closer than `margin`: false where the gap between two

@@ -116,7 +116,8 @@ def near_particles(packing: Packing, bodies: Any, margin: float = 0.0) -> NearPa
     """
     around = Spheres(packing.position, bodies.outer_radius + 0.5 * margin)
     near = each_once(near_pairs(around, around, packing.box))
-    return nearer(State.of(packing), bodies, near, margin)
+    rounding = _BOUNDING_MARGIN * float(bodies.inner_radius.min())
+    return nearer(State.of(packing), bodies, near, margin + rounding)
 
 
 def nearer(state: State, bodies: Any, near: NearPairs, margin: float) -> NearPairs:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
@@ -71,7 +73,8 @@ def random_packing(
     0.3
     """
     unplaced, rng = _unplaced(n, phi, seed, (particles or Particles.of(), dimension))
-    insertion = _Insertion(unplaced, rng)
+    ordered = _longest_first(unplaced)
+    insertion = _Insertion(_boxed(ordered, ordered.phi, phi), rng)
     insertion.run(_ATTEMPTS + _ATTEMPTS_PER_PARTICLE * n)
     return insertion.shuffled()
 
@@ -85,15 +88,16 @@ def dilute_packing(
     are few and small, and the first minimisation undoes them.
     """
     unplaced, rng = _unplaced(n, phi, seed, (particles or Particles.of(), dimension))
+    boxed = _boxed(unplaced, math.fsum(unplaced.measures), phi)
     orientation = _random_orientations(n, dimension, rng)
-    position = rng.uniform(0, unplaced.box.edges[0], (n, dimension))
-    return unplaced.with_(position=position, orientation=orientation)
+    position = rng.uniform(0, boxed.box.edges[0], (n, dimension))
+    return boxed.with_(position=position, orientation=orientation)
 
 
 def _unplaced(
     n: int, phi: float, seed: int, of: tuple[Particles, int]
 ) -> tuple[Packing, np.random.Generator]:
-    """Draw particles, still without poses, in a box for phi."""
+    """Draw particles, still without poses, in a box of one unit."""
     particles, dimension = of
     if not 0 < phi < 1:
         msg = f"phi is {phi}, expected a packing fraction between 0 and 1"
@@ -117,8 +121,20 @@ def _unplaced(
         box=Box(lo=np.zeros(dimension), edges=np.ones(dimension)),
         shape_style=particles.shape.name,
     )
-    edge = (unplaced.phi / phi) ** (1 / dimension)
-    return unplaced.with_(box=Box(np.zeros(dimension), np.full(dimension, edge))), rng
+    return unplaced, rng
+
+
+def _boxed(packing: Packing, area: float, phi: float) -> Packing:
+    """Take the box in which particles of that area (volume) have the packing fraction phi."""
+    edge = (area / phi) ** (1 / packing.dimension)
+    return packing.with_(box=Box(np.zeros(packing.dimension), np.full(packing.dimension, edge)))
+
+
+def _longest_first(packing: Packing) -> Packing:
+    """Order for insertion: early there is room for the long ones, the short ones fit into gaps."""
+    order = np.argsort(-packing.outer_radius, kind="stable")
+    names = ("diameters", "exponent", "species")
+    return packing.with_(**{k: getattr(packing, k)[order] for k in names})
 
 
 class _Insertion:
@@ -127,15 +143,12 @@ class _Insertion:
     Parameters
     ----------
     particles : Packing
-        Shapes, and the box; their poses do not matter.
+        Shapes in the order of insertion, and the box; their poses do not matter.
     rng : numpy.random.Generator
     """
 
     def __init__(self, particles: Packing, rng: np.random.Generator) -> None:
-        # Early there is room for the long ones; the short ones fit into the gaps that are left.
-        order = np.argsort(-particles.outer_radius, kind="stable")
-        names = ("diameters", "exponent", "species")
-        self.particles = particles.with_(**{k: getattr(particles, k)[order] for k in names})
+        self.particles = particles
         self.rng = rng
         self.radius = self.particles.outer_radius
         self.waiting = np.arange(particles.n)  # poses of all others are final

@@ -35,10 +35,10 @@ def frame(step, dimension=2):
 
 
 def run_of_three(path):
-    writer = RunWriter.create(path, frame(0), observables={"p": 0.0})
+    writer = RunWriter.create(path, frame(0), observables={"pressure": 0.0})
     for step in (10, 20):
-        writer.append_observables(step - 5, (step - 5) / 3, {"p": step / 7 - 1})
-        writer.append(frame(step), {"p": step / 7})
+        writer.append_observables(step - 5, (step - 5) / 3, {"pressure": step / 7 - 1})
+        writer.append(frame(step), {"pressure": step / 7})
         writer.append_report(step, step / 11, 1 / step)
     return writer
 
@@ -63,7 +63,12 @@ def test_attributes_come_back_as_plain_types(path):
 
 
 def test_observables_come_back_with_a_first_axis_for_time(path):
-    given = {"p": 1 / 3, "z": np.nan, "stress": np.eye(2) / 3, "bonds": np.zeros((0, 14), np.int64)}
+    given = {
+        "pressure": 1 / 3,
+        "z": np.nan,
+        "stress": np.eye(2) / 3,
+        "bonds": np.zeros((0, 14), np.int64),
+    }
     write_packing(path, nasty_packing(2), observables=given)
     found = read_observables(path)
     assert found.keys() == given.keys()
@@ -74,7 +79,7 @@ def test_observables_come_back_with_a_first_axis_for_time(path):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_layout_is_h5md(path, dimension):
-    write_packing(path, nasty_packing(dimension), observables={"p": 1.0})
+    write_packing(path, nasty_packing(dimension), observables={"pressure": 1.0})
     with h5py.File(path) as file:
         assert file["h5md"].attrs["version"].tolist() == [1, 1]
         assert file["h5md/author"].attrs["name"]
@@ -88,7 +93,7 @@ def test_layout_is_h5md(path, dimension):
         for name in FRAME_ELEMENTS:
             assert particles[name]["step"] == particles["position/step"]  # one object, hard links
             assert particles[name]["time"] == particles["position/time"]
-        assert {*file["observables/p"]} == {"step", "time", "value"}
+        assert {*file["observables/pressure"]} == {"step", "time", "value"}
 
 
 def test_mdanalysis_opens_three_dimensional_runs(path):
@@ -96,15 +101,15 @@ def test_mdanalysis_opens_three_dimensional_runs(path):
         warnings.simplefilter("ignore")  # its imports warn of their own dependencies
         h5md = pytest.importorskip("MDAnalysis.coordinates.H5MD")
     frames = [frame(step, 3).with_(position=np.full((6, 3), step / 4)) for step in (0, 10)]
-    writer = RunWriter.create(path, frames[0], {"kappa": 1e-6}, {"p": 0.5})
-    writer.append(frames[1], {"p": 0.75})
+    writer = RunWriter.create(path, frames[0], {"kappa": 1e-6}, {"pressure": 0.5})
+    writer.append(frames[1], {"pressure": 0.75})
     with h5md.H5MDReader(str(path), convert_units=False) as reader:
         assert (reader.n_frames, reader.n_atoms) == (2, 6)
         for packing, ts in zip(frames, reader, strict=True):
             np.testing.assert_array_equal(ts.positions, packing.position)
             np.testing.assert_array_equal(ts.dimensions[:3], np.float32(packing.box.edges))
             assert (ts.data["step"], ts.time) == (packing.step, packing.time)
-        assert [ts.data["p"] for ts in reader] == [0.5, 0.75]
+        assert [ts.data["pressure"] for ts in reader] == [0.5, 0.75]
 
 
 def test_mdanalysis_refuses_two_dimensions(path):
@@ -120,7 +125,7 @@ def test_failing_write_leaves_the_old_file(path):
     old = nasty_packing(2)
     write_packing(path, old)
     with pytest.raises(ValueError, match="observable 'name' has dtype <U3, expected numbers"):
-        write_packing(path, frame(1), observables={"p": 1.0, "name": "rod"})
+        write_packing(path, frame(1), observables={"pressure": 1.0, "name": "rod"})
     assert_identical(read_packing(path), old)
     assert [entry.name for entry in path.parent.iterdir()] == [path.name]
 
@@ -156,17 +161,17 @@ def test_run_comes_back_to_the_last_bit(path):
 
 def test_observables_are_sampled_between_frames(path):
     run_of_three(path)
-    p = read_series(path, "p")
+    p = read_series(path, "pressure")
     np.testing.assert_array_equal(p.step, [0, 5, 10, 15, 20])
     np.testing.assert_array_equal(p.time, np.array([0, 5, 10, 15, 20]) / 3)
     np.testing.assert_array_equal(p.value, [0, 10 / 7 - 1, 10 / 7, 20 / 7 - 1, 20 / 7])
-    np.testing.assert_array_equal(read_observables(path)["p"], p.value)
+    np.testing.assert_array_equal(read_observables(path)["pressure"], p.value)
 
 
 def test_first_value_that_is_an_integer_makes_no_integer_series(path):
-    writer = RunWriter.create(path, frame(0), observables={"p": 0})
-    writer.append_observables(1, 1, {"p": 0.5})
-    np.testing.assert_array_equal(read_observables(path)["p"], [0, 0.5])
+    writer = RunWriter.create(path, frame(0), observables={"pressure": 0})
+    writer.append_observables(1, 1, {"pressure": 0.5})
+    np.testing.assert_array_equal(read_observables(path)["pressure"], [0, 0.5])
 
 
 def test_report_takes_one_row_or_many(path):
@@ -189,10 +194,10 @@ def test_resumed_run_equals_an_unbroken_one(path, tmp_path):
     writer = RunWriter.open(path)
     writer.truncate(12)
     assert count_frames(path) == 2
-    np.testing.assert_array_equal(read_series(path, "p").step, [0, 5, 10])
+    np.testing.assert_array_equal(read_series(path, "pressure").step, [0, 5, 10])
     np.testing.assert_array_equal(read_report(path).step, [10])
-    writer.append_observables(15, 5, {"p": 20 / 7 - 1})
-    writer.append(frame(20), {"p": 20 / 7})
+    writer.append_observables(15, 5, {"pressure": 20 / 7 - 1})
+    writer.append(frame(20), {"pressure": 20 / 7})
     writer.append_report(20, 20 / 11, 1 / 20)
 
     unbroken = tmp_path / "unbroken.h5"
@@ -200,7 +205,7 @@ def test_resumed_run_equals_an_unbroken_one(path, tmp_path):
     for index in range(3):
         assert_identical(read_packing(path, index), read_packing(unbroken, index))
     for resumed, expected in (
-        (read_series(path, "p"), read_series(unbroken, "p")),
+        (read_series(path, "pressure"), read_series(unbroken, "pressure")),
         (read_report(path), read_report(unbroken)),
     ):
         for a, b in zip(resumed, expected, strict=True):
@@ -238,7 +243,7 @@ def test_run_survives_the_sudden_end_of_its_process(path):
     # os._exit as when LAMMPS's error->all ends the process
     script = (
         "import os, sys; path, *sys.path = sys.argv[1:]\n"
-        "from test_storage import run_of_three; run_of_three(path); os._exit(3)"
+        "from test_h5md import run_of_three; run_of_three(path); os._exit(3)"
     )
     command = [sys.executable, "-c", script, str(path), *sys.path]
     assert subprocess.run(command, check=False).returncode == 3
@@ -250,13 +255,13 @@ def test_run_survives_the_sudden_end_of_its_process(path):
 def test_rows_of_an_interrupted_append_are_overwritten(path):
     writer = run_of_three(path)
     with h5py.File(path, "r+") as file:
-        for name in ("particles/all/position/value", "observables/p/value"):
+        for name in ("particles/all/position/value", "observables/pressure/value"):
             file[name].resize(len(file[name]) + 1, axis=0)
     assert count_frames(path) == 3
-    assert len(read_observables(path)["p"]) == 5
-    writer.append(frame(30), {"p": 1.0})
+    assert len(read_observables(path)["pressure"]) == 5
+    writer.append(frame(30), {"pressure": 1.0})
     assert_identical(read_packing(path), frame(30))
-    assert read_observables(path)["p"][-1] == 1
+    assert read_observables(path)["pressure"][-1] == 1
 
 
 @pytest.mark.parametrize(
@@ -273,7 +278,7 @@ def test_append_refuses_and_changes_nothing(path, changes, sentence):
     writer = run_of_three(path)
     before = path.read_bytes()
     with pytest.raises(ValueError, match=sentence):
-        writer.append(frame(30).with_(**changes), {"p": 1.0})
+        writer.append(frame(30).with_(**changes), {"pressure": 1.0})
     assert path.read_bytes() == before
 
 
@@ -284,13 +289,15 @@ def test_append_refuses_another_dimension(path):
 
 def test_append_refuses_observables_and_changes_nothing(path):
     writer = run_of_three(path)
-    before = read_series(path, "p").step
-    with pytest.raises(ValueError, match="p is stored up to step 20, expected a step after it"):
-        writer.append_observables(20, 1, {"q": 1.0, "p": 1.0})
-    with pytest.raises(ValueError, match=r"'p' is float64 \(2,\), expected float64 \(\) as"):
-        writer.append(frame(30), {"p": np.zeros(2)})
-    assert read_observables(path).keys() == {"p"}
-    np.testing.assert_array_equal(read_series(path, "p").step, before)
+    before = read_series(path, "pressure").step
+    with pytest.raises(
+        ValueError, match="pressure is stored up to step 20, expected a step after it"
+    ):
+        writer.append_observables(20, 1, {"q": 1.0, "pressure": 1.0})
+    with pytest.raises(ValueError, match=r"'pressure' is float64 \(2,\), expected float64 \(\) as"):
+        writer.append(frame(30), {"pressure": np.zeros(2)})
+    assert read_observables(path).keys() == {"pressure"}
+    np.testing.assert_array_equal(read_series(path, "pressure").step, before)
     assert count_frames(path) == 3
 
 
@@ -474,11 +481,11 @@ def test_rests_that_come_with_a_later_frame_are_not_lost(path):
 
 def test_a_series_is_as_many_rows_one_by_one(path, tmp_path):
     steps, times = np.array([5, 7, 20]), np.array([5, 7, 20]) / 3
-    columns = {"p": np.array([1 / 3, np.nan, -0.0]), "u": np.array([1e-300, 2, 3])}
+    columns = {"pressure": np.array([1 / 3, np.nan, -0.0]), "u": np.array([1e-300, 2, 3])}
     together, single = (RunWriter.create(p, frame(0)) for p in (path, tmp_path / "single.h5"))
     together.append_series(steps[:2], times[:2], {k: v[:2] for k, v in columns.items()})
     together.append_series(steps[2:], times[2:], {k: v[2:] for k, v in columns.items()})
-    together.append_series([], [], {"p": []})
+    together.append_series([], [], {"pressure": []})
     for row, (step, time) in enumerate(zip(steps, times, strict=True)):
         single.append_observables(step, time, {k: v[row] for k, v in columns.items()})
     for name in columns:
@@ -494,12 +501,17 @@ def test_a_series_is_as_many_rows_one_by_one(path, tmp_path):
         ([21, 22], [1], [1, 2], r"rows of a series differ in length, expected \(2,\)"),
         ([22, 21], [1, 2], [1, 2], "the steps of a series do not ascend"),
         ([21, 21], [1, 2], [1, 2], "the steps of a series do not ascend"),
-        ([20, 21], [1, 2], [1, 2], "p is stored up to step 20, expected a step after it, found 20"),
+        (
+            [20, 21],
+            [1, 2],
+            [1, 2],
+            "pressure is stored up to step 20, expected a step after it, found 20",
+        ),
     ],
 )
 def test_series_is_refused_and_changes_nothing(path, steps, times, p, sentence):
     writer = run_of_three(path)
     before = path.read_bytes()
     with pytest.raises(ValueError, match=sentence):
-        writer.append_series(steps, times, {"p": p})
+        writer.append_series(steps, times, {"pressure": p})
     assert path.read_bytes() == before

@@ -115,7 +115,7 @@ def test_lone_particles_follow_the_box_exactly():
     np.testing.assert_allclose(np.float64(flow.state.position / scale), position, rtol=1e-14)
     np.testing.assert_array_equal(np.float64(flow.state.orientation[:, 0]), packing.orientation)
     assert steps[-1].phi == pytest.approx(packing.phi * 1.2, rel=1e-12)
-    assert steps[-1].p == 0.0
+    assert steps[-1].pressure == 0.0
     assert flow.evaluations < 20 * len(steps)
 
 
@@ -136,7 +136,7 @@ def test_power_balances(jamming):
     for step in compress(landscape, flow, protocol):
         found = landscape.evaluate(flow.state)
         work = -kappa * found.strain_gradient  # 2 kappa p L^2
-        assert work == pytest.approx(2 * kappa * step.p * flow.state.volume, rel=1e-2)
+        assert work == pytest.approx(2 * kappa * step.pressure * flow.state.volume, rel=1e-2)
         energy.append(found.energy)
         power.append(work - float((found.gradient**2 / drag).sum()))
         times.append(step.time)
@@ -155,7 +155,7 @@ def test_pressure_is_that_of_radau_through_contacts_that_open_and_close(alpha, p
     for tolerance in (1e-2, 1e-4):
         landscape, flow, steps = ended(start, Protocol(kappa, phi_end, tolerance=tolerance))
         found = pressure(landscape.evaluate(flow.state), phi_end, start)
-        assert steps[-1].p == pytest.approx(found, rel=10 * tolerance)
+        assert steps[-1].pressure == pytest.approx(found, rel=10 * tolerance)
         errors.append(abs(found / exact - 1))
     assert errors[0] < 3e-2
     assert errors[1] < 3e-4
@@ -192,7 +192,7 @@ def test_plastic_events_are_resolved_in_time_where_asked(jamming):
     # A row's energy is that of the last evaluation, a correction away from the step's end.
     assert largest_drop(resolved) < 0.0505
     assert len(resolved) > len(whole)
-    assert resolved[-1].p == pytest.approx(whole[-1].p, rel=1e-2)
+    assert resolved[-1].pressure == pytest.approx(whole[-1].pressure, rel=1e-2)
 
 
 def test_going_on_from_between_two_steps_gives_the_same_to_the_bit(jamming):
@@ -213,7 +213,7 @@ def test_rates_change_at_their_packing_fractions_and_it_ends_at_a_pressure(jammi
     protocol = Protocol(((0.0, 1e-4), (0.803, 1e-5)), 1.2, p_end=1e-3)
     _, _, steps = ended(jamming, protocol)
     assert any(abs(step.phi - 0.803) < 1e-12 for step in steps)
-    assert steps[-1].p >= 1e-3 > steps[-2].p
+    assert steps[-1].pressure >= 1e-3 > steps[-2].pressure
     strain, time = (np.array([getattr(s, k) for s in steps]) for k in ("strain", "time"))
     rates = np.diff(strain) / np.diff(time)
     phi = np.array([step.phi for step in steps])[1:]
@@ -235,7 +235,7 @@ def test_senseless_numbers_are_refused(numbers, sentence):
 
 
 def test_steps_are_rows_of_numbers():
-    assert Step._fields[:6] == ("step", "time", "strain", "phi", "p", "u")
+    assert Step._fields[:6] == ("step", "time", "strain", "phi", "pressure", "u")
 
 
 def test_a_rate_that_drives_spines_across_each_other_is_refused():

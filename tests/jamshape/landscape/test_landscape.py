@@ -1,22 +1,12 @@
-from pressed import PRESSED, pressed_named
-from functools import cache, partial
-
 import numpy as np
 import pytest
-from mixtures import bidisperse, of_arrays
-from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
-from scenes import make, pressed, scaled
+from pressed import PRESSED, pressed_named
+from scenes import make, scaled
 
 from jamshape.contacts import find_contacts, find_rattlers, forces
 from jamshape.landscape import CrossingError, Landscape, State
 
 H = 1e-6  # of central differences: well below the 0.005 that rods of alpha 0.01 are long
-
-
-
-
-
-
 
 
 @pytest.fixture(params=PRESSED)
@@ -123,10 +113,10 @@ def test_translations_cost_nothing(packing):
         assert moved == pytest.approx(energy, rel=1e-12)
 
 
-def test_curvature_knows_the_rattlers(packing):
+def test_rattlers_are_those_of_the_contacts(packing):
     opened = scaled(packing, 1.03)
     expected = find_rattlers(opened, find_contacts(opened, 1.0, 2))
-    found = Landscape(packing).curvature(State.of(opened)).rattlers
+    found = Landscape(packing).rattlers(State.of(opened))
     np.testing.assert_array_equal(found, expected)
 
 

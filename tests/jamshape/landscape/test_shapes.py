@@ -4,6 +4,8 @@ import itertools
 
 import numpy as np
 import pytest
+from body_rows import superellipsoid_rows
+from scenes import assert_same_forces, moved, turned
 from superellipsoid_packings import (
     ellipsoids,
     octahedra_and_boxes,
@@ -11,11 +13,10 @@ from superellipsoid_packings import (
     scattered,
     superellipses,
 )
-from scenes import assert_same_forces, moved, turned
 
 from jamshape import _contact
-from body_rows import superellipsoid_rows
 from jamshape.contacts import find_contacts, forces
+from jamshape.contacts.near import near_particles
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.shapes.superellipsoid_size import volume
 
@@ -74,7 +75,7 @@ def test_contacts_are_those_of_all_pairs_and_images(packing):
 def test_pairs_within_a_margin_are_all_found(packing):
     labels, first, second = every_pair(packing)
     larger = second.copy()
-    near = Landscape(packing).shape.near(packing, 0.1)
+    near = near_particles(packing, packing.compiled(), 0.1)
     found = set(map(tuple, np.column_stack([near.first, near.second, near.shift]).tolist()))
     # Grown by 0.04 each, they overlap only if their surfaces are closer than 0.1.
     D = packing.dimension
@@ -159,7 +160,7 @@ def test_spheroids_have_an_axis_that_nothing_turns_them_about():
     assert packing.symmetry_axis.tolist()[:4] == [2, 0, 1, -1]
     assert packing.symmetry_axis[5] == -1  # its section is no circle
     assert packing.is_round.tolist() == [False] * 4 + [True, False]
-    axes = Landscape(packing).shape.turning_axes(packing)
+    axes = packing.turning_axes
     assert (axes != 0).any(axis=2).sum(axis=1).tolist() == [2, 2, 2, 3, 2, 3]
     own = np.stack([packing.body_axes(k)[m] for m, k in enumerate((2, 0, 1))])
     np.testing.assert_allclose(np.einsum("nrt,nt->nr", axes[:3], own), 0, atol=1e-14)

@@ -1,7 +1,7 @@
-from rods_at import rods
 import numpy as np
 import pytest
 from mixtures import bidisperse
+from rods_at import rods
 
 from jamshape.contacts import find_contacts, sum_forces
 from jamshape.measures.contact_statistics import (
@@ -17,14 +17,12 @@ from jamshape.measures.contact_statistics import (
     held_contacts,
     residuals,
 )
-from jamshape.packing import Box, Packing
+from jamshape.packing import Box
 from jamshape.protocols.random_start import random_packing
 
 R_SPINE = 0.99  # distance of touching spines; the surfaces would touch at 1
 FORCE = 0.01  # of one bond at that distance, with k_e = 1
 SURFACE = R_SPINE / 2  # where the point of contact is, from the spine
-
-
 
 
 # Each a pair: the tip of a rod on the side of another, 0.4 off its middle; two tips; two sides, one

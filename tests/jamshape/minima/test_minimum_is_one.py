@@ -18,7 +18,7 @@ from minima import (
 from squeezed import squeezed
 
 from jamshape.landscape import Landscape, State
-from jamshape.minima.minimise import History, Minimum, Outcome, residual_of
+from jamshape.minima import History, Minimum, Outcome, residual_of
 from jamshape.minima.target import Target, find
 from jamshape.packing import Box, Packing
 

@@ -8,7 +8,7 @@ from squeezed import squeezed
 
 from jamshape.contacts import coordination, find_contacts
 from jamshape.landscape import Landscape
-from jamshape.minima.minimise import History, Outcome, minimise, residual_of
+from jamshape.minima import History, Outcome, minimise, residual_of
 from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
 
 # n, alpha, and the packing fraction just below jamming where the search begins
@@ -106,7 +106,7 @@ def test_halving_comes_back_to_the_packing_of_the_direct_search(name):
     np.testing.assert_allclose(
         search.minimum.state.edges.astype(float), expected.state.edges.astype(float), rtol=1e-10
     )
-    held = ~landscape.curvature(expected.state).rattlers
+    held = ~landscape.rattlers(expected.state)
     moved = (search.minimum.state.position - expected.state.position)[held].astype(float)
     assert np.abs(moved - moved.mean(axis=0)).max() < 1e-7
 

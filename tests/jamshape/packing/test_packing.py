@@ -1,15 +1,11 @@
-from nasty import ARRAYS, nasty_packing, with_rests
 import math
 
 import numpy as np
 import pytest
+from nasty import ARRAYS, nasty_packing, with_rests
 
-from jamshape.packing import Box, Packing, angle_from_quaternion, guess_shape_style
-
-
-
-
-
+from jamshape.packing import Box, angle_from_quaternion
+from jamshape.shapes.table import guess_shape_style
 
 
 def rotate_x_axis(quaternion):
@@ -141,10 +137,8 @@ def test_phi_is_the_sum_of_the_measures_over_the_box(dimension, measure):
 
 
 def test_shape_style_is_guessed_from_the_diameters():
-    assert guess_shape_style([[1, 1, 1], [3, 1, 1]]) == "spherocylinder"
-    assert guess_shape_style([[1, 1, 1], [1, 3, 3]]) == "superellipsoid"
-
-
+    assert guess_shape_style(np.array([[1, 1, 1], [3, 1, 1]])) == "spherocylinder"
+    assert guess_shape_style(np.array([[1, 1, 1], [1, 3, 3]])) == "superellipsoid"
 
 
 RESTS = ("position_rest", "orientation_rest", "edges_rest")

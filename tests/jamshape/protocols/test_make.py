@@ -296,7 +296,7 @@ def test_the_compression_of_another_shape_is_refused(tmp_path):
     out = tmp_path / "packing.h5"
     compressed(out)
     renamed_shape(run_of(out))
-    words = "holds 16 particles of shape 'superellipsoid', expected 16 of 'spherocylinder'"
+    words = "of shape 'superellipsoid' in 2 dimensions, expected 16 of 'spherocylinder' in 2"
     assert words in refused(RECIPE, out)
 
 
@@ -311,7 +311,7 @@ def test_a_finished_packing_of_another_sample_or_shape_is_refused(tmp_path):
     with pytest.raises(ValueError, match="with u0 = 1e-12, expected 1e-10; write to another file"):
         require_same(out, replace(RECIPE, target=Target(1e-10)))
     renamed_shape(out)
-    with pytest.raises(ValueError, match="of shape 'superellipsoid', expected 16 of 'sphero"):
+    with pytest.raises(ValueError, match="of shape 'superellipsoid' in 2 dimensions, expected"):
         require_same(out, RECIPE)
 
 

@@ -13,12 +13,11 @@ from jamshape import _contact
 from jamshape.files.h5md import read_packing
 from jamshape.files.lammps_text import read_data
 from jamshape.measures.order import orientational_order
-from jamshape.packing import SHAPE_STYLES
 from jamshape.protocols.random_start import InsertionError, random_packing
 from jamshape.shapes.particles import Particles, Sizes
 from jamshape.shapes.table import shape_named
 
-DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_initial.py"
+DRIVER = Path(__file__).parents[3] / "pyscripts" / "make_initial.py"
 
 IN_TINY_BOXES = [
     (1, 0.4, bidisperse(4), 2),
@@ -62,7 +61,7 @@ def test_no_overlap_at_the_packing_fraction_asked(n, phi, mixture, dimension):
     assert np.all(packing.box.edges == packing.box.edges[0])
     assert np.all((packing.position >= 0) & (packing.position <= packing.box.edges))
     assert sorted(packing.id) == list(range(1, n + 1))
-    assert packing.shape_style == SHAPE_STYLES[0]
+    assert packing.shape_style == ROD
     assert smallest_gap(packing) >= 0
 
 

@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
+from mixtures import bidisperse
 from superellipsoid_packings import scattered
 
-from jamshape import _contact
 from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Stop, minimise
 from jamshape.packing import Box
+from jamshape.protocols.random_start import random_packing
 from jamshape.protocols.thermal import Thermal, equilibrate, without_overlaps
 
 
@@ -66,10 +67,9 @@ def test_two_spheres_have_the_distribution_of_free_places():
     )
     distance = []
     for k in range(n):
-        found = _contact.superellipsoid_sweeps(
-            packing.diameters, packing.exponent, packing.position, packing.orientation,
-            packing.box.edges, 2.0, 0.5, 3, k,
-        )  # fmt: skip
+        found = packing.compiled().sweeps(
+            packing.position, packing.orientation, packing.box.edges, 2.0, 0.5, 3, k
+        )
         packing = packing.with_(position=found["position"])
         r = packing.position[0] - packing.position[1]
         distance.append(np.linalg.norm(r - edge * np.round(r / edge)))
@@ -87,10 +87,9 @@ def test_orientations_of_a_lone_particle_become_uniform():
     packing = packing.with_(position=np.array([[0.0, 0, 0], [1, 1, 1]]) * packing.box.edges / 2)
     axis = []
     for k in range(3000):
-        found = _contact.superellipsoid_sweeps(
-            packing.diameters, packing.exponent, packing.position, packing.orientation,
-            packing.box.edges, 0.1, 1.0, 3, k,
-        )  # fmt: skip
+        found = packing.compiled().sweeps(
+            packing.position, packing.orientation, packing.box.edges, 0.1, 1.0, 3, k
+        )
         packing = packing.with_(position=found["position"], orientation=found["orientation"])
         axis.append(packing.body_axes(2)[0])
     mean = np.mean([np.outer(a, a) for a in axis], axis=0)
@@ -121,11 +120,14 @@ def test_moves_without_a_size_are_refused(size):
         next(equilibrate(Thermal(spheroids(), size=size), 10, 1))
 
 
-def test_other_particles_are_refused():
-    rods = scattered(np.tile([2.0, 1.0, 1.0], (4, 1)), np.ones(4), 0.1)
-    rods = rods.with_(shape_style="spherocylinder")
-    with pytest.raises(ValueError, match="style spherocylinder, expected superellipsoids"):
-        next(equilibrate(Thermal(rods), 10, 1))
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_rods_move_and_keep_apart(dimension):
+    start = random_packing(100, 0.3, 1, bidisperse(1.0), dimension)
+    thermal = Thermal(start)
+    for _ in equilibrate(thermal, 30, 2):
+        assert not len(find_contacts(thermal.packing).pairs)
+    assert 0.1 < thermal.acceptance < 1
+    assert (np.abs(thermal.packing.position - start.position).max(axis=1) > 0).all()
 
 
 def test_opening_the_box_removes_the_last_overlaps():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mixtures import superellipsoids
 from numpy.testing import assert_allclose, assert_array_equal
 from small_packings import jammed, matrix_of
 
@@ -9,8 +10,8 @@ from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima.target import Target
 from jamshape.packing import Box, Packing
+from jamshape.protocols.make import Recipe, Steps, make
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.protocols.superellipsoid_jammed import Sample, make
 from jamshape.vibration.energy_along import (
     AlongModes,
     EnergyAlong,
@@ -200,11 +201,9 @@ def test_what_opens_bonds_or_stays_quadratic_has_no_quartic_crossover():
 
 def test_force_along_modes_of_superellipsoids_is_their_eigenvalue(tmp_path):
     """Rotations in space, about all three axes."""
-    compression = Quasistatic(step=0.01)
-    sample = Sample(
-        n=10, p=1.5, w1=0.8, phi_start=0.4, quasistatic=compression, target=Target(1e-10)
-    )
-    for _ in make(sample, tmp_path / "a.h5"):
+    shape, way = superellipsoids(1.5, 0.8), Steps(Quasistatic(step=0.01))
+    recipe = Recipe(shape, 10, 3, phi_start=0.4, way=way, target=Target(1e-10))
+    for _ in make(recipe, tmp_path / "a.h5"):
         pass
     packing = read_packing(tmp_path / "a.h5")
     matrix = dynamical_matrix(Landscape(packing), State.of(packing))

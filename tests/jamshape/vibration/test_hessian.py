@@ -1,13 +1,13 @@
 """The dynamical matrix against differences of forces, closed forms, and what it must leave alone."""
 
-from lattices import discs
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_packings import SMALL, jammed, matrix_of
-from scenes import make, scaled
+from lattices import discs
 from pressed import PRESSED, pressed_named
+from scenes import make, scaled
+from small_packings import SMALL, jammed, matrix_of
 
 from jamshape.contacts import ContactKind
 from jamshape.landscape import Landscape, State
@@ -50,8 +50,6 @@ def forced(packing, sides=2, **options):
         state,
         dynamical_matrix(landscape, state, Scope(backbone=everyone, force=True, **options)),
     )
-
-
 
 
 # --- derivatives -------------------------------------------------------------------------------
@@ -306,7 +304,7 @@ def test_one_particle_that_holds_itself_by_its_images():
 def test_coordinates_are_those_of_the_backbone(name):
     landscape, minimum = jammed(name)
     matrix = matrix_of(name)
-    rattlers = landscape.curvature(minimum.state).rattlers
+    rattlers = landscape.rattlers(minimum.state)
     assert matrix.n_particles == (~rattlers).sum()
     np.testing.assert_array_equal(matrix.coordinates.backbone, np.flatnonzero(~rattlers))
     per_particle = 2 if name == "discs" else 3

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_packings import SMALL, jammed, matrix_of
 from scenes import make
+from small_packings import SMALL, jammed, matrix_of
 
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.hessian import dynamical_matrix
