@@ -16,7 +16,7 @@ def here(monkeypatch):
     def run_here(script, *arguments):
         path = ANALYSIS / script
         monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
-        monkeypatch.syspath_prepend(ANALYSIS)
+        monkeypatch.syspath_prepend(str(path.parent))
         try:
             runpy.run_path(str(path), run_name="__main__")
         except SystemExit as ended:
