@@ -48,7 +48,7 @@ from jamshape.lammps.session import plugin_path
 Row = dict[str, Any]
 
 CALIBRATION = 50
-LIGHT = "bytes each (< 400)"
+LIGHT = "bytes each"
 
 
 class At(NamedTuple):

@@ -168,11 +168,12 @@ def study(options: Namespace) -> dict[str, Row]:
             *(("minimisers", m, run_minimiser, options.seconds) for m in MINIMISERS),
             *(("targets", t, run_target, LONGER * options.seconds) for t in TARGETS),
         ]
+        packing = state_of(name, options)
         for group, method, measure, seconds in runs:
             if method not in found[group]:
-                found[group][method] = measure(method, state_of(name, options), seconds)
+                found[group][method] = measure(method, packing, seconds)
                 path.write_text(json.dumps(found))
-        results[name] = found
+        results[name] = found | {"n": packing.n}
     return results
 
 
@@ -185,7 +186,8 @@ def draw(results: dict[str, Row], path: Path) -> None:
             axis.loglog(row["seconds"], row["residual"], label=method)
         number = name.replace(".", "", 1).isdecimal()
         label = rf"$\alpha = {name}$" if number else Path(name).stem
-        axis.set(xlabel=f"seconds, {label}", ylim=(1e-11, None))
+        axis.set(xlabel="seconds", ylim=(1e-11, None))
+        axis.set_title(f"{label}, $N$ = {result['n']}", fontsize=9)
     axes[0].set_ylabel("largest net force / mean bond force")
     axes[0].legend(fontsize="small")
     figure.savefig(path)
