@@ -106,8 +106,8 @@ class Particles:
         """
         its = shape_named(shape) if isinstance(shape, str) else shape
         ratio = its.size_ratio if size_ratio is None else size_ratio
-        if not ratio >= 1:
-            msg = f"size_ratio is {ratio}, expected big over small, at least 1"
+        if not 1 <= ratio < math.inf:
+            msg = f"size_ratio is {ratio}, expected big over small, finite and at least 1"
             raise ValueError(msg)
         chosen = _with_defaults(its, parameters)
         sizes = [1.0] if ratio == 1 else [1.0, ratio]
