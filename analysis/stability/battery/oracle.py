@@ -1,6 +1,6 @@
-"""A second evaluation of rods, in NumPy's long double, over all images one by one.
+"""A second evaluation of rods and dimers, in NumPy's long double, over all images one by one.
 
-From the definitions of Marschall & Teitel 2018; it shares nothing with `lammps_plugin/contact/`.
+Rods from the definitions of Marschall & Teitel 2018; it shares nothing with `lammps_plugin/contact/`.
 """
 
 from __future__ import annotations
@@ -189,3 +189,23 @@ def of_rods(packing: Packing, k_e: float = 1.0, quaternion: FloatArray | None = 
     energy = np.asarray(0.5 * k_e * overlap**2, np.longdouble)
     pulls = Pulls(pairs, arms, force, energy, touching)
     return summed(packing, pulls, int(touching.sum()))
+
+
+def of_dimers(packing: Packing, k_e: float = 1.0, quaternion: FloatArray | None = None) -> Found:
+    """Energy, forces and torques of the up to four bonds of each contact of dimers."""
+    pairs, s = spines_of(packing, quaternion)
+    bonds = [_of_discs(s, a, b, k_e) for a in (-1, 1) for b in (-1, 1)]
+    arms_i, arms_j, force, energy, touching = (np.concatenate(x) for x in zip(*bonds, strict=True))
+    pulls = Pulls(np.tile(pairs, (4, 1)), (arms_i, arms_j), force, energy, touching)
+    n_contacts = int(touching.reshape(4, -1).any(axis=0).sum())
+    return summed(packing, pulls, n_contacts)
+
+
+def _of_discs(s: Spines, a: int, b: int, k_e: float) -> tuple[LongArray, ...]:
+    """Arms, force, energy and whether they touch, of one disc of each: at the ends a and b of the spines."""
+    arms = (a * s.A_i[:, None] * s.u_i, b * s.A_j[:, None] * s.u_j)
+    delta = s.r + arms[0] - arms[1]
+    distance = np.sqrt(dot(delta, delta))
+    overlap = np.maximum(1 - distance / s.d, 0)
+    force = (k_e * overlap / s.d / np.maximum(distance, np.longdouble(1e-300)))[:, None] * delta
+    return (*arms, force, np.asarray(0.5 * k_e * overlap**2), np.asarray(distance < s.d))

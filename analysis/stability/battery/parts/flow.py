@@ -13,7 +13,7 @@ import numpy as np
 from battery.case import Case
 from battery.parts.pair_style import difference, expected_of
 from battery.scenes.making import EPS, Scene, scaled, wrapped
-from battery.scenes.rods import jammed, jammed_off_kinks
+from battery.scenes.elongated import jammed, jammed_off_kinks
 from battery.session import (
     OUTPUT,
     SKIN,
@@ -124,7 +124,8 @@ def relaxation_error(shape: Shape, fraction: float, steps: int) -> float:
         x = frame(session, packing).packing.position
     # Past half of the limit the first stage parts the spheres, and the second has no force.
     a_step = 1 - h + h**2 / 2 if h < 1 else 1 - h / 2
-    error = abs(1 - abs(float(x[1, 0] - x[0, 0])) - touch.overlap * a_step**steps)
+    overlap = touch.length - abs(float(x[1, 0] - x[0, 0]))
+    error = abs(overlap - touch.overlap * a_step**steps)
     # The second order of the law acts over at most h steps.
     return error / (steps * EPS + touch.second * touch.overlap**2 * min(h * steps, 2.0))
 

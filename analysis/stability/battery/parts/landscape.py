@@ -11,7 +11,7 @@ from battery.case import Case
 from battery.images import overlapping
 from battery.oracle import Found
 from battery.scenes.making import LONG_EPS, Scene, every_image, scaled
-from battery.scenes.rods import rods
+from battery.scenes.elongated import rods
 from battery.shapes.shape import Oracle, Shape, is_long
 from battery.shapes.table import RODS, SHAPES
 from jamshape.contacts import find_contacts

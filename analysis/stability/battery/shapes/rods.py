@@ -6,7 +6,7 @@ from functools import partial
 
 from battery.oracle import of_rods
 from battery.pairs import OVERLAPS
-from battery.scenes import rods as scenes
+from battery.scenes import elongated as scenes
 from battery.session import fix
 from battery.shapes.shape import (
     IN_OVERLAPS,
@@ -104,7 +104,7 @@ RODS = Shape(
             "alpha 1e-6 to 100": Drive(PLANE["alpha 1e-6 to 100 in one box"], 1e-3, 0.02),
         },
         restarted={"jammed": Drive(JAMMED, 1e-3, 0.02, 100)},
-        touch=Touch(scenes.two_discs, 0.1, scenes.RATE_OF_TWO_DISCS, 0.0),
+        touch=Touch(scenes.two_discs, 0.1, scenes.RATE_OF_TWO_DISCS, 1.0, 0.0),
         lone=scenes.lone,
         extreme={
             **{name: scene for name, scene in PLANE.items() if name != "sizes 1 to 10"},

@@ -132,12 +132,14 @@ class Drive(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """Two discs or spheres of diameter 1, whose overlap s relaxes as ds/dt = -rate s."""
+    """Two particles of diameter 1 along x, whose overlap s relaxes as ds/dt = -rate s."""
 
     scene: Callable[[float], Packing]
     overlap: float
     rate: float
     """In units of k_e / (k_d d^(D + 2))."""
+    length: float
+    """Distance of their centres when they touch."""
     second: float
     """Largest part of s that the next order of the law changes while it relaxes, over s."""
 

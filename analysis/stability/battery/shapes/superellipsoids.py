@@ -87,7 +87,7 @@ SUPERELLIPSOIDS = Shape(
         invariant={f"{D}D, ": Drive(partial(scenes.dense, D), 1e-3, 0.01, 100) for D in (2, 3)},
         changed={f"{D}D": Drive(partial(scenes.dense, D), 1e-2, 0.01) for D in (2, 3)},
         restarted={f"{D}D": Drive(partial(scenes.dense, D), 1e-3, 0.02, 100) for D in (2, 3)},
-        touch=Touch(scenes.two_spheres, 1e-6, scenes.RATE_OF_TWO_SPHERES, 3.0),
+        touch=Touch(scenes.two_spheres, 1e-6, scenes.RATE_OF_TWO_SPHERES, 1.0, 3.0),
         lone=scenes.lone,
         extreme={
             name: CROWDS[name]

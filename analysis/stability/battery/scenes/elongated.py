@@ -1,4 +1,7 @@
-"""Extreme packings of rods and discs."""
+"""Extreme packings of shapes with a half length A and a radius R: rods, dimers, discs.
+
+Rods unless another style is asked for.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from battery.scenes.making import (
+    Scene,
     deepest,
     hardened,
     in_doubles,
@@ -22,7 +26,7 @@ from jamshape.packing import Packing
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
 
-STYLE = "spherocylinder"
+RODS, DIMERS = "spherocylinder", "dimer"
 
 
 def rods(
@@ -35,12 +39,17 @@ def rods(
     """Rods from arrays."""
     n = len(np.asarray(position))
     diameters = _diameters(np.broadcast_to(half_length, n), np.broadcast_to(radius, n))
-    return packing_of(position, orientation, diameters, edges, shape_style=STYLE)
+    return packing_of(position, orientation, diameters, edges, shape_style=RODS)
 
 
-def given(half_length: FloatArray, radius: FloatArray) -> Particles:
-    """Rods of these sizes, to be placed."""
-    return Particles.given(STYLE, _diameters(half_length, radius))
+def as_dimers(scene: Scene) -> Packing:
+    """Give dimers of the sizes and poses of rods."""
+    return scene().with_(shape_style=DIMERS)
+
+
+def given(half_length: FloatArray, radius: FloatArray, style: str) -> Particles:
+    """Give particles of these sizes, to be placed."""
+    return Particles.given(style, _diameters(half_length, radius))
 
 
 def _diameters(half_length: FloatArray, radius: FloatArray) -> FloatArray:
@@ -51,21 +60,21 @@ def _diameters(half_length: FloatArray, radius: FloatArray) -> FloatArray:
 
 
 @cache
-def all_aspect_ratios(dimension: int, largest: float = 100.0) -> Packing:
-    """Alpha from 1e-6 to the largest in the same box; the longest rods are longer than it."""
+def all_aspect_ratios(dimension: int, largest: float = 100.0, style: str = RODS) -> Packing:
+    """Alpha from 1e-6 to the largest in the same box; the longest are longer than it."""
     alpha = np.append(np.geomspace(1e-6, largest, 9), np.tile([0.0, 1e-6, 0.01, 1.0], 4))
     phi = 0.3 if dimension == 2 else 0.5 / largest
     radius = np.where(np.arange(len(alpha)) % 2, 0.5, 0.7)
-    start = random_packing(len(alpha), phi, 1, given(alpha * radius, radius), dimension)
+    start = random_packing(len(alpha), phi, 1, given(alpha * radius, radius, style), dimension)
     return in_doubles(pressed(start, 0.1))
 
 
 @cache
-def all_sizes(dimension: int) -> Packing:
-    """Rods of alpha 1 with radii from 0.5 to 5."""
+def all_sizes(dimension: int, style: str = RODS) -> Packing:
+    """Alpha 1, with radii from 0.5 to 5."""
     radius = np.append(np.geomspace(0.5, 5.0, 5), np.full(40, 0.5))
     phi = 0.45 if dimension == 2 else 0.2
-    start = random_packing(len(radius), phi, 1, given(radius, radius), dimension)
+    start = random_packing(len(radius), phi, 1, given(radius, radius, style), dimension)
     return in_doubles(pressed(start, 0.1))
 
 
@@ -107,34 +116,34 @@ def own_images(dimension: int) -> Packing:
 
 
 @cache
-def deep(dimension: int, alpha: float = 1.0, n: int = 16) -> Packing:
+def deep(dimension: int, alpha: float = 1.0, n: int = 16, style: str = RODS) -> Packing:
     """Far beyond jamming: minimised while it is compressed, to overlaps of a third.
 
     In 3D some samples end on a kink of twisted rods; that of this seed does not.
     """
     phi, seed = (0.4, 1) if dimension == 2 else (0.2, 4)
-    packing = random_packing(n, phi, seed, Particles.of(STYLE, alpha=alpha), dimension)
+    packing = random_packing(n, phi, seed, Particles.of(style, alpha=alpha), dimension)
     return squeezed(packing, 0.02, 60, lambda found: deepest(found.state.packing(packing)) > 1 / 3)
 
 
 @cache
-def jammed(alpha: float, n: int = 16, phi: float = 0.9) -> Packing:
+def jammed(alpha: float, n: int = 16, phi: float = 0.9, style: str = RODS) -> Packing:
     """Make a random packing of the plane, squeezed to phi and roughly minimised on the way."""
-    return squeezed_to(random_packing(n, 0.4, 1, Particles.of(STYLE, alpha=alpha)), phi)
+    return squeezed_to(random_packing(n, 0.4, 1, Particles.of(style, alpha=alpha)), phi)
 
 
 @cache
-def loose(dimension: int, alpha: float, n: int = 8) -> Packing:
-    """Rods of one aspect ratio in a box that leaves them room."""
+def loose(dimension: int, alpha: float, n: int = 8, style: str = RODS) -> Packing:
+    """Particles of one aspect ratio in a box that leaves them room."""
     phi = 0.2 if dimension == 2 else min(0.2, 0.4 / (1 + alpha))
-    start = random_packing(n, phi, 1, Particles.of(STYLE, alpha=alpha), dimension)
+    start = random_packing(n, phi, 1, Particles.of(style, alpha=alpha), dimension)
     return widened(pressed(start, 1e-3), 0.02)
 
 
 @cache
-def hard(dimension: int, alpha: float) -> Packing:
-    """Rods without overlaps in a box twice as wide as they are long."""
-    return hardened(loose(dimension, alpha, 12))
+def hard(dimension: int, alpha: float, style: str = RODS) -> Packing:
+    """Particles without overlaps in a box twice as wide as they are long."""
+    return hardened(loose(dimension, alpha, 12, style))
 
 
 @cache
@@ -172,9 +181,9 @@ def _direction(angle: float) -> FloatArray:
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def of_two_types(alpha: float) -> Packing:
-    """Jammed rods of alternate types."""
-    packing = jammed(alpha)
+def of_two_types(alpha: float, style: str = RODS) -> Packing:
+    """Jammed ones of alternate types."""
+    packing = jammed(alpha, style=style)
     return packing.with_(species=1 + np.arange(packing.n) % 2)
 
 
@@ -198,6 +207,35 @@ def two_discs(overlap: float = 0.1) -> Packing:
     return rods([[0.0, 0.0], [1.0 - overlap, 0.0]], 0.0, 0.0, 0.5, [20.0, 20.0])
 
 
+def two_dimers(overlap: float = 0.1) -> Packing:
+    """Two in a line, of whose discs two overlap by this part of their diameter, which is 1."""
+    along = rods([[0.0, 0.0], [2.0 - overlap, 0.0]], 0.0, 0.5, 0.5, [20.0, 20.0])
+    return along.with_(shape_style=DIMERS)
+
+
+def interlocked(dimension: int, overlap: float) -> Packing:
+    """Pairs of dimers with one to four bonds, of which the deepest has this overlap."""
+    d, half = 1 - overlap, 0.5
+    short = np.array([half, half, half, 0.1])
+    rise = [d, np.sqrt(d**2 - half**2), np.sqrt(d**2 - half**2), d]
+    across = [2 * half, 0.0, half, 0.0]
+    angle = [0.0, np.pi / 2, 0.0, 0.0]
+    lift = [0.0, half, 0.0, 0.0]  # upright ones stand on their lower disc
+    centres = np.array([[8.0 * k - 12.0, 0.0] for k in range(4)])
+    other = centres + np.column_stack([across, np.add(rise, lift)])
+    position = np.stack([centres, other], axis=1).reshape(-1, 2)
+    turn = np.column_stack([np.zeros(4), angle]).ravel()
+    lengths = np.repeat(short, 2)
+    if dimension == 3:
+        zero = np.zeros(8)
+        q = np.column_stack([np.cos(turn / 2), zero, zero, np.sin(turn / 2)])
+        there = rods(np.pad(position, ((0, 0), (0, 1))), q, lengths, 0.5, [32.0, 8.0, 8.0])
+    else:
+        there = rods(position, turn, lengths, 0.5, [32.0, 8.0])
+    return there.with_(shape_style=DIMERS)
+
+
+RATE_OF_TWO_DIMERS = 2 / (2 * np.pi / 4)
 RATE_OF_TWO_DISCS = 2 / (np.pi / 4)
 """Of their overlap: both move, each with the drag k_d times its area; in units of k_e and k_d."""
 
