@@ -23,7 +23,6 @@ from lammps_scenes import (
     with_odd_ids,
 )
 
-from jamshape import _contact
 from jamshape import contacts
 from jamshape.measures.order import orientational_order
 

@@ -34,7 +34,6 @@ from lammps_scenes import (
     wrapped,
 )
 
-from jamshape import _contact
 from jamshape import contacts
 
 pytestmark = pytest.mark.lammps

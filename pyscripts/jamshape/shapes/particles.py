@@ -197,11 +197,13 @@ def _text(kind: Kind) -> str:
 
 def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, float]:
     known = {p.name: p.default for p in shape.parameters}
-    for name in parameters:
+    by_option = {p.option: p.name for p in shape.parameters}
+    given = {by_option.get(name, name): float(value) for name, value in parameters.items()}
+    for name in given:
         if name not in known:
             msg = f"{name} is no parameter of {shape.name}s, expected {', '.join(known)}"
             raise ValueError(msg)
-    chosen = known | {name: float(value) for name, value in parameters.items()}
+    chosen = known | given
     shape.sizes(chosen, np.ones(1))  # refuses what is out of range
     return chosen
 
