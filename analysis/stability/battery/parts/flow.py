@@ -12,8 +12,8 @@ import numpy as np
 
 from battery.case import Case
 from battery.parts.pair_style import difference, expected_of
-from battery.scenes.making import EPS, Scene, scaled, wrapped
 from battery.scenes.elongated import jammed, jammed_off_kinks
+from battery.scenes.making import EPS, Scene, scaled, wrapped
 from battery.session import (
     OUTPUT,
     SKIN,

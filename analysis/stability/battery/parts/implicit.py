@@ -12,8 +12,8 @@ import numpy as np
 
 from battery.case import Case
 from battery.parts.landscape import CROSS
-from battery.scenes.making import Scene, in_doubles, scaled
 from battery.scenes.elongated import crossed, deep, jammed, own_images, rods
+from battery.scenes.making import Scene, in_doubles, scaled
 from battery.shapes.table import SHAPES
 from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress
 from jamshape.landscape import Landscape, State

@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 
 from battery.case import Case
-from battery.scenes.making import Scene, scaled
 from battery.scenes.elongated import jammed
+from battery.scenes.making import Scene, scaled
 from battery.session import Setting, frame, loaded, measured, set_up
 from battery.shapes.table import SHAPES
 from jamshape.flow.compression import Compression, CompressionRun

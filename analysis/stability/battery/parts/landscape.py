@@ -10,8 +10,8 @@ import numpy as np
 from battery.case import Case
 from battery.images import overlapping
 from battery.oracle import Found
-from battery.scenes.making import LONG_EPS, Scene, every_image, scaled
 from battery.scenes.elongated import rods
+from battery.scenes.making import LONG_EPS, Scene, every_image, scaled
 from battery.shapes.shape import Oracle, Shape, is_long
 from battery.shapes.table import RODS, SHAPES
 from jamshape.contacts import find_contacts

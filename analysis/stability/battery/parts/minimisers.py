@@ -11,8 +11,8 @@ import numpy as np
 from battery.case import Case
 from battery.parts.landscape import UNITS
 from battery.parts.targets import ENDED, led
-from battery.scenes.making import Scene, scaled
 from battery.scenes.elongated import crossed, deep, jammed, rods
+from battery.scenes.making import Scene, scaled
 from battery.shapes.table import SHAPES
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Minimum, Outcome, Stop, minimise

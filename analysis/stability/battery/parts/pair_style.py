@@ -10,8 +10,8 @@ import numpy as np
 
 from battery.case import Case
 from battery.images import contacts_of
-from battery.scenes.making import EPS, Scene, scaled
 from battery.scenes.elongated import jammed
+from battery.scenes.making import EPS, Scene, scaled
 from battery.scenes.superellipsoids import all_sizes
 from battery.session import SKIN, Frame, Setting, bonds_in, frame, loaded, sentence, set_up
 from battery.shapes.shape import Law, Shape, is_long

@@ -9,8 +9,8 @@ import numpy as np
 
 from battery.case import Case
 from battery.parts.implicit import UNITS
-from battery.scenes.making import Scene, scaled
 from battery.scenes.elongated import deep
+from battery.scenes.making import Scene, scaled
 from battery.scenes.superellipsoids import loose
 from battery.shapes.table import SHAPES
 from jamshape.landscape import Landscape, State

@@ -43,12 +43,13 @@ INTERLOCKED: Scenes = {
     for overlap in OVERLAPS
 }
 
+
+def _pair(*positions: list[float], angle: float = 0.0) -> partial[scenes.Packing]:
+    return partial(scenes.as_dimers, partial(scenes.two, list(positions), angle))
+
+
 JAMMED = partial(scenes.jammed, 1.0, style=STYLE)
 OF_ONE_ALPHA = [(D, alpha) for D in (2, 3) for alpha in (0.01, 1.0, 10.0)]
-
-
-def _coinciding(*positions: list[float], angle: float = 0.0) -> partial[scenes.Packing]:
-    return partial(scenes.as_dimers, partial(scenes.two, list(positions), angle))
 
 
 def _named(names: Scenes) -> Scenes:
@@ -67,7 +68,7 @@ DIMERS = Shape(
         rounding=1e-13,
         bent=("alpha 1e-6 to 100 in one box", "sizes 1 to 10", "overlaps of a third"),
         bend=1e-9,
-        same_place=("coincident dimers", PLANE["own images"]),
+        same_place=("coincident dimers", _pair([1.0, 1.0], [5.0, 1.0], angle=0.3)),
     ),
     style=InPairStyle(
         scenes=PLANE | SPACE | INTERLOCKED,
@@ -76,8 +77,8 @@ DIMERS = Shape(
         mixed=partial(scenes.of_two_types, 1.0, STYLE),
         limits=Limits(force=2e-14, mixed=1e-14, units=1e-13),
         stops={
-            "coincident centres": _coinciding([1.0, 1.0], [1.0, 1.0], angle=0.3),
-            "coincident discs": _coinciding([0.0, 0.0], [2.0, 0.0]),
+            "coincident centres": _pair([1.0, 1.0], [1.0, 1.0], angle=0.3),
+            "coincident discs": _pair([0.0, 0.0], [2.0, 0.0]),
         },
         sentence="coinciding discs, where no contact force exists",
     ),
@@ -121,8 +122,7 @@ DIMERS = Shape(
         },
         quick=("dimers, 2D, alpha 1",),
         hard={
-            f"dimers, {D}D, alpha {a:g}": partial(scenes.hard, D, a, STYLE)
-            for D, a in OF_ONE_ALPHA
+            f"dimers, {D}D, alpha {a:g}": partial(scenes.hard, D, a, STYLE) for D, a in OF_ONE_ALPHA
         },
     ),
 )
