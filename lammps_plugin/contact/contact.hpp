@@ -21,6 +21,10 @@ enum class Sides { ONE = 1, TWO = 2 };
 /// Shapes that are spared the search that contacts of others need, among themselves.
 enum class Shortcut { NONE, ROUND, ELLIPSOIDS };
 
+/// Points closer than this times the distance at which they begin to touch are one: no direction is
+/// left to push along.
+inline constexpr double COINCIDENT = 1e-14;
+
 /// One point of contact that carries one force. Vectors are in space coordinates.
 template <int D, class S = double> struct Bond {
   Vec<D, S> normal;      // unit, into i

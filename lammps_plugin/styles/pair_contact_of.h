@@ -135,9 +135,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   typename Model::Law law_of(int i, int j) const
   {
-    typename Model::Law law = Model::law(k_e[atom->type[i]][atom->type[j]], sides);
-    law.shortcuts = !general.contact;
-    return law;
+    return Model::law(k_e[atom->type[i]][atom->type[j]], sides, !general.contact);
   }
 
   template <int D> struct Bodies {

@@ -58,6 +58,7 @@ class _Shape:
         edges: NDArray[np.float64],
         pairs: NDArray[np.int64],
         shift: NDArray[np.int64],
+        extended: bool,
     ) -> dict[str, NDArray[Any]]: ...
     def sums(
         self,
@@ -96,6 +97,7 @@ class _Shape:
 
 class Spherocylinders(_Shape): ...
 class Superellipsoids(_Shape): ...
+class Dimers(_Shape): ...
 
 def find_rattlers(
     n_particles: int,

@@ -23,8 +23,7 @@ from lammps_scenes import (
     with_odd_ids,
 )
 
-from jamshape import _contact
-from jamshape.contacts import network as contacts
+from jamshape import contacts
 from jamshape.measures.order import orientational_order
 
 pytestmark = pytest.mark.lammps
@@ -229,7 +228,7 @@ def expected_vector(state, sides):
         side_bonds = network.n_bonds.sum()
     bond_force = np.linalg.norm(network.bonds.force, axis=1).mean()
     net = np.linalg.norm(found.force, axis=1) / bond_force
-    moment = _contact.spherocylinder_drag(packing.half_length, packing.radius, packing.dimension)[1]
+    moment = packing.compiled().moment
     torque = np.linalg.norm(found.torque.reshape(packing.n, -1), axis=1)
     return {
         "phi": packing.phi,
