@@ -21,7 +21,7 @@ from scipy.spatial import ConvexHull
 from shading import lit, mean_normals, view
 
 from jamshape.arrays import FloatArray
-from jamshape.shapes.superellipsoid_size import (
+from jamshape.shapes.roundness import (
     asphericity,
     axes_from,
     reduced_aspect_ratio,

@@ -28,7 +28,7 @@ from superellipsoid_files import (
 )
 from sweep_files import BLUE, RED
 
-from jamshape.shapes.superellipsoid_size import asphericity, axes_from
+from jamshape.shapes.roundness import asphericity, axes_from
 
 LARGEST = 6.0  # of beta, and of 1/beta
 BOX = 2.0  # exponent of the grey lines

@@ -32,7 +32,7 @@ from sweep_files import Sample, plain
 from jamshape.arrays import FloatArray
 from jamshape.contacts import find_contacts
 from jamshape.packing import body_axes
-from jamshape.shapes.superellipsoid_curvature import contact_curvatures
+from jamshape.shapes.curvature import contact_curvatures
 
 PER_DECADE = 6
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -7,28 +7,36 @@
 namespace jamshape {
 
 /// What Python sees of n contacts: arrays (n, ...), of their bonds (n, BONDS, ...).
-template <int D, int BONDS> class ContactArrays {
+template <class Model, int D> class ContactArrays {
  public:
   explicit ContactArrays(std::size_t n) :
       status({n}), kind({n}), n_bonds({n}), error({n}), energy({n}), force({n, D}),
       torque_i({n, ROTATIONS<D>}), torque_j({n, ROTATIONS<D>}), bond_normal({n, BONDS, D}),
       bond_force({n, BONDS, D}), bond_arm_i({n, BONDS, D}), bond_distance({n, BONDS}),
       bond_reach({n, BONDS}), bond_energy({n, BONDS}), bond_stiffness({n, BONDS}),
-      bond_on_side({n, BONDS, 2})
+      bond_on_side({n, BONDS, 2}), bond_on_face({n, BONDS, 2})
   {
   }
 
-  void set(std::size_t n, const Contact<D, double, BONDS> &contact)
+  template <class S>
+  void set(std::size_t n, const ContactOf<Model, D, S> &contact,
+           const typename Model::template Body<D, S> &i,
+           const typename Model::template Body<D, S> &j)
   {
     status[n] = static_cast<int>(contact.status);
     kind[n] = static_cast<int>(contact.kind);
     n_bonds[n] = contact.n_bonds;
     error[n] = contact.error;
-    energy[n] = contact.energy;
+    energy[n] = static_cast<double>(contact.energy);
     write_vec(contact.force, force.row(n));
     write_vec(contact.torque_i, torque_i.row(n));
     write_vec(contact.torque_j, torque_j.row(n));
-    for (int b = 0; b < contact.n_bonds; ++b) set_bond(n, b, contact.bond[b]);
+    for (int b = 0; b < contact.n_bonds; ++b) {
+      set_bond(n, b, contact.bond[b]);
+      const OnFaces on = Model::on_faces(contact, b, i, j);
+      bond_on_face.row(n)[2 * b] = on.i;
+      bond_on_face.row(n)[2 * b + 1] = on.j;
+    }
   }
 
   void release_to(nb::dict &result)
@@ -49,23 +57,26 @@ template <int D, int BONDS> class ContactArrays {
     result["bond_energy"] = bond_energy.release();
     result["bond_stiffness"] = bond_stiffness.release();
     result["bond_on_side"] = bond_on_side.release();
+    result["bond_on_face"] = bond_on_face.release();
   }
 
  private:
+  static constexpr int BONDS = Model::MOST_BONDS;
+
   NewArray<int> status, kind, n_bonds;
   NewArray<double> error, energy, force, torque_i, torque_j, bond_normal, bond_force, bond_arm_i;
   NewArray<double> bond_distance, bond_reach, bond_energy, bond_stiffness;
-  NewArray<bool> bond_on_side;
+  NewArray<bool> bond_on_side, bond_on_face;
 
-  void set_bond(std::size_t n, int b, const Bond<D> &bond)
+  template <class S> void set_bond(std::size_t n, int b, const Bond<D, S> &bond)
   {
     write_vec(bond.normal, bond_normal.row(n) + b * D);
     write_vec(bond.force, bond_force.row(n) + b * D);
     write_vec(bond.arm_i, bond_arm_i.row(n) + b * D);
-    bond_distance.row(n)[b] = bond.distance;
-    bond_reach.row(n)[b] = bond.reach;
-    bond_energy.row(n)[b] = bond.energy;
-    bond_stiffness.row(n)[b] = bond.stiffness;
+    bond_distance.row(n)[b] = static_cast<double>(bond.distance);
+    bond_reach.row(n)[b] = static_cast<double>(bond.reach);
+    bond_energy.row(n)[b] = static_cast<double>(bond.energy);
+    bond_stiffness.row(n)[b] = static_cast<double>(bond.stiffness);
     bond_on_side.row(n)[2 * b] = bond.on_side_i;
     bond_on_side.row(n)[2 * b + 1] = bond.on_side_j;
   }

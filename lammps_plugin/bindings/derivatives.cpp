@@ -15,13 +15,14 @@ template <class Model, int D, class S> class DerivativeArrays {
   explicit DerivativeArrays(std::size_t n) :
       pair({n}), n_bonds({n}), kind({n}), energy({n}), separation({n, D}), force({n, D}),
       stiffness({n, BONDS}), distance({n, BONDS}), bond_force({n, BONDS}), gradient({n, BONDS, N}),
-      curvature({n, N, N}), on_side({n, BONDS, 2})
+      curvature({n, N, N}), on_side({n, BONDS, 2}), on_face({n, BONDS, 2})
   {
   }
 
-  void set(std::size_t c, std::size_t p, const Vec<D, S> &r,
+  void set(std::size_t c, const PosedPairs<Model, D, S> &pairs, std::size_t p,
            const ContactDerivatives<Model, D, S> &found)
   {
+    const Vec<D, S> r = pairs.separation(p);
     const ContactOf<Model, D, S> &contact = found.contact;
     pair[c] = static_cast<std::int64_t>(p);
     n_bonds[c] = contact.n_bonds;
@@ -35,6 +36,9 @@ template <class Model, int D, class S> class DerivativeArrays {
       distance.row(c)[b] = static_cast<double>(bond.distance);
       on_side.row(c)[2 * b] = bond.on_side_i;
       on_side.row(c)[2 * b + 1] = bond.on_side_j;
+      const OnFaces on = Model::on_faces(contact, b, pairs.first_body(p, r), pairs.second_body(p));
+      on_face.row(c)[2 * b] = on.i;
+      on_face.row(c)[2 * b + 1] = on.j;
       bond_force.row(c)[b] = static_cast<double>(norm(bond.force));
       for (int k = 0; k < N; ++k) {
         gradient.row(c)[b * N + k] = static_cast<double>(found.gradient[b][k]);
@@ -58,6 +62,7 @@ template <class Model, int D, class S> class DerivativeArrays {
     result["distance"] = distance.release();
     result["bond_force"] = bond_force.release();
     result["on_side"] = on_side.release();
+    result["on_face"] = on_face.release();
     result["gradient"] = gradient.release();
     result["curvature"] = curvature.release();
     return result;
@@ -69,7 +74,7 @@ template <class Model, int D, class S> class DerivativeArrays {
   NewArray<std::int64_t> pair;
   NewArray<int> n_bonds, kind;
   NewArray<double> energy, separation, force, stiffness, distance, bond_force, gradient, curvature;
-  NewArray<bool> on_side;
+  NewArray<bool> on_side, on_face;
 };
 
 template <class Model, int D, class S>
@@ -92,7 +97,7 @@ nb::dict derivatives_in(const ShapeOf<Model> &of, const PairArrays &arrays)
   }
   DerivativeArrays<Model, D, S> derivatives(found.size());
   for (std::size_t c = 0; c < found.size(); ++c) {
-    derivatives.set(c, touching[c], pairs.separation(touching[c]), found[c]);
+    derivatives.set(c, pairs, touching[c], found[c]);
   }
   return derivatives.release();
 }
@@ -124,8 +129,8 @@ void export_derivatives()
         "Second derivatives of the C touching pairs, arguments as in `sums`. The variables are\n"
         "r_i - r_j and the rotations of i and j, n = 4 in 2D, 9 in 3D. Returns a dict: pair (C,)\n"
         "rows of pairs; n_bonds, kind, energy (C,); separation, force (C, D); of up to most_bonds\n"
-        "bonds B stiffness, distance, bond_force (C, B), on_side (C, B, 2) and gradient (C, B, n)\n"
-        "of the distance; curvature (C, n, n), all but stiffness gradient (x) gradient.");
+        "bonds B stiffness, distance, bond_force (C, B), on_side, on_face (C, B, 2) and gradient\n"
+        "(C, B, n) of the distance; curvature (C, n, n), all but stiffness gradient (x) gradient.");
   });
 }
 

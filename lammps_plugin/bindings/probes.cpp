@@ -102,9 +102,10 @@ nb::dict contacts(const BodyPairs<Rows> &pairs, const typename Rows::Model::Law 
 {
   nb::dict result;
   in_dimension(pairs.dimension(), [&](auto D) {
-    ContactArrays<D, Rows::Model::MOST_BONDS> found(pairs.size());
+    ContactArrays<typename Rows::Model, D> found(pairs.size());
     for (std::size_t n = 0; n < pairs.size(); ++n) {
-      found.set(n, contact_of(pairs.template first<D>(n), pairs.template second<D>(n), law));
+      const auto i = pairs.template first<D>(n), j = pairs.template second<D>(n);
+      found.set(n, contact_of(i, j, law), i, j);
     }
     found.release_to(result);
   });

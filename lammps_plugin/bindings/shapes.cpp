@@ -81,25 +81,26 @@ nb::object each_pair(const ShapeOf<Model> &of, const PairArrays &arrays, const A
   return answer.release();
 }
 
-template <class Model, int D>
+template <class Model, int D, class S>
 nb::dict contacts_in(const ShapeOf<Model> &of, const PairArrays &arrays)
 {
-  const PosedPairs<Model, D, double> pairs = of.template posed<D, double>(arrays);
+  const PosedPairs<Model, D, S> pairs = of.template posed<D, S>(arrays);
   std::vector<std::size_t> at;
-  std::vector<ContactOf<Model, D>> found;
+  std::vector<ContactOf<Model, D, S>> found;
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const ContactOf<Model, D> contact = pairs.contact(p, pairs.separation(p));
+    const ContactOf<Model, D, S> contact = pairs.contact(p, pairs.separation(p));
     if (contact.status == ContactStatus::APART) continue;
     at.push_back(p);
     found.push_back(contact);
   }
   NewArray<std::int64_t> pair({at.size()});
   NewArray<double> separation({at.size(), D});
-  ContactArrays<D, Model::MOST_BONDS> contacts(at.size());
+  ContactArrays<Model, D> contacts(at.size());
   for (std::size_t c = 0; c < at.size(); ++c) {
     pair[c] = static_cast<std::int64_t>(at[c]);
-    write_vec(pairs.separation(at[c]), separation.row(c));
-    contacts.set(c, found[c]);
+    const Vec<D, S> r = pairs.separation(at[c]);
+    write_vec(r, separation.row(c));
+    contacts.set(c, found[c], pairs.first_body(at[c], r), pairs.second_body(at[c]));
   }
   nb::dict result;
   result["pair"] = pair.release();
@@ -137,16 +138,21 @@ template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
   of.def(
       "contacts",
       [](Self self, Numbers position, Numbers orientation, Edges edges, Integers pairs,
-         Integers shift) {
+         Integers shift, bool extended) {
         const PairArrays arrays{position, orientation, edges, pairs, shift};
-        return self.in_space([&](auto D) { return contacts_in<Model, D>(self, arrays); });
+        return self.in_space([&](auto D) {
+          return extended ? contacts_in<Model, D, long double>(self, arrays)
+                          : contacts_in<Model, D, double>(self, arrays);
+        });
       },
-      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a,
-      "The C of M pairs that are not apart. Returns a dict: pair (C,) rows of pairs; status (1\n"
+      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "extended"_a,
+      "The C of M pairs that are not apart, found in long double if extended. Returns a dict: pair "
+      "(C,) rows of pairs; status (1\n"
       "touching, 2 crossing, 3 unconverged), kind, n_bonds, error (relative, of an iteration),\n"
       "energy (C,); separation, force (on i) (C, D); torque_i, torque_j (C, 1 or 3) and, of up to\n"
       "most_bonds bonds B, bond_normal (into i), bond_force, bond_arm_i (C, B, D), bond_distance,\n"
-      "bond_reach, bond_energy, bond_stiffness (C, B), bond_on_side (C, B, 2).");
+      "bond_reach, bond_energy, bond_stiffness (C, B), bond_on_side and\n"
+      "bond_on_face (flat in all D - 1 directions) of i and j (C, B, 2).");
 }
 
 template <class Model> void export_shape(nb::module_ &m)
@@ -162,6 +168,7 @@ template <class Model> void export_shape(nb::module_ &m)
   of.attr("core") = Model::CORE;
   of.attr("most_bonds") = Model::MOST_BONDS;
   of.attr("has_sides") = Model::HAS_SIDES;
+  of.attr("bonds_are_contacts") = Model::BONDS_ARE_CONTACTS;
   export_sizes(of);
   export_pairs(of);
 }

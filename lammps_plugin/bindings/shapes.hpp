@@ -1,5 +1,6 @@
 #pragma once
 
+#include "contact/dimer/dimer.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
 #include "contact/superellipsoid/superellipsoid.hpp"
 
@@ -11,6 +12,6 @@ template <class... Models> struct ShapeList {
 };
 
 /// Every shape that Python knows.
-using Shapes = ShapeList<SpherocylinderModel, SuperellipsoidModel>;
+using Shapes = ShapeList<SpherocylinderModel, SuperellipsoidModel, DimerModel>;
 
 }  // namespace jamshape

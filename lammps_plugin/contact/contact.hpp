@@ -21,6 +21,10 @@ enum class Sides { ONE = 1, TWO = 2 };
 /// Shapes that are spared the search that contacts of others need, among themselves.
 enum class Shortcut { NONE, ROUND, ELLIPSOIDS };
 
+/// Points closer than this times the distance at which they begin to touch are one: no direction is
+/// left to push along.
+inline constexpr double COINCIDENT = 1e-14;
+
 /// One point of contact that carries one force. Vectors are in space coordinates.
 template <int D, class S = double> struct Bond {
   Vec<D, S> normal;      // unit, into i
@@ -33,8 +37,14 @@ template <int D, class S = double> struct Bond {
   S energy;              // this bond's share of the contact's energy
   S stiffness;           // of the energy along the bond, at most: its second derivative by distance
   S own_stiffness;       // what of it comes from this bond's overlap alone
-  bool on_side_i;        // the foot lies strictly inside the flat part of i
+  bool on_side_i;        // the foot lies strictly inside the straight part of i
   bool on_side_j;
+};
+
+/// Whether a bond lies on a face of i, of j: a part of the surface that is flat in all D - 1
+/// directions, so that a particle cannot roll over it (the side of a rod is one in 2D only).
+struct OnFaces {
+  bool i, j;
 };
 
 /// Energy of one pair with its exact derivatives: force on i (j carries the opposite) and the

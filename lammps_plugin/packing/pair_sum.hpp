@@ -70,22 +70,34 @@ template <class Model, int D, class S> class PosedPairs {
     return r;
   }
 
+  /// The bodies of a pair of this separation, the second at the origin.
+  typename Model::template Body<D, S> first_body(std::size_t p, const Vec<D, S> &r) const
+  {
+    auto body_i = body[first(p)];
+    body_i.centre = r;
+    return body_i;
+  }
+  const typename Model::template Body<D, S> &second_body(std::size_t p) const
+  {
+    return body[second(p)];
+  }
+
   /// The contact of a pair of this separation.
   ContactOf<Model, D, S> contact(std::size_t p, const Vec<D, S> &r) const
   {
-    return contact_of(first_body(p, r), body[second(p)], law);
+    return contact_of(first_body(p, r), second_body(p), law);
   }
 
   /// Whether surfaces may be closer than a margin.
   bool are_closer(std::size_t p, double margin) const
   {
-    return Model::template closer_than<D>(margin, first_body(p, separation(p)), body[second(p)]);
+    return Model::template closer_than<D>(margin, first_body(p, separation(p)), second_body(p));
   }
 
   /// Whether the particles share more than a point.
   bool overlap(std::size_t p) const
   {
-    return are_overlapping(first_body(p, separation(p)), body[second(p)]);
+    return are_overlapping(first_body(p, separation(p)), second_body(p));
   }
 
   /// A body that its rotation variables, from `first` on, turn.
@@ -102,13 +114,6 @@ template <class Model, int D, class S> class PosedPairs {
   typename Model::Law law;
   std::vector<QuaternionOf<S>> orientation;
   std::vector<typename Model::template Body<D, S>> body;  // at the origin
-
-  typename Model::template Body<D, S> first_body(std::size_t p, const Vec<D, S> &r) const
-  {
-    auto body_i = body[first(p)];
-    body_i.centre = r;
-    return body_i;
-  }
 
   QuaternionOf<S> orientation_of(std::size_t n) const
   {

@@ -8,16 +8,19 @@
 namespace jamshape {
 
 /// One contact of the network: two particles (indices), the normal into i, and whether the contact
-/// lies on the flat part of i, of j. A side-to-side contact is one edge.
+/// lies on a face of i, of j. A side-to-side contact of rods is one edge; where the bonds of a
+/// contact are contacts of their own (Model::BONDS_ARE_CONTACTS), each is an edge.
 struct ContactEdge {
   std::size_t i, j;
   Vec<3> normal;
   bool flat_i, flat_j;
 };
 
-/// Rattlers by the rule of Marschall & Teitel 2018, Sec. III C: particles with fewer than two
-/// contacts, and those with two unless these sit on opposite flat sides; removed with their
-/// contacts until none is left. In 3D a particle with fewer than four contacts is one.
+/// Rattlers: particles with at most D contacts, unless two of these lie on faces of it with
+/// opposite normals, so that neither a shift nor a turn parts them; removed with their contacts
+/// until none is left. In 2D, where the straight sides of rods are faces, it is the rule of
+/// Marschall & Teitel 2018, Sec. III C. One contact on a face holds against D motions, and still
+/// not against being lifted off.
 class RattlerSearch {
  public:
   RattlerSearch(std::size_t n_particles, const std::vector<ContactEdge> &contacts, int space) :
@@ -72,10 +75,17 @@ class RattlerSearch {
         supports.push_back({-edge.normal, edge.flat_j});
       }
     }
-    if (dimension == 3) return supports.size() < 4;
-    if (supports.size() != 2) return supports.size() < 2;
-    return !(supports[0].flat && supports[1].flat &&
-             dot(supports[0].normal, supports[1].normal) < 0.0);
+    return supports.size() <= static_cast<std::size_t>(dimension) && !is_between_faces(supports);
+  }
+
+  static bool is_between_faces(const std::vector<Support> &supports)
+  {
+    for (const Support &one : supports) {
+      for (const Support &other : supports) {
+        if (one.flat && other.flat && dot(one.normal, other.normal) < 0.0) return true;
+      }
+    }
+    return false;
   }
 };
 

@@ -2,7 +2,6 @@
 
 #include "atom.h"
 #include "error.h"
-#include "force.h"
 #include "update.h"
 
 #include <cstddef>
@@ -20,7 +19,7 @@ const std::map<std::string, Column> COLUMNS = {
     {"itag", [](const LocalBond &b, const Atom &a) { return static_cast<double>(a.tag[b.i]); }},
     {"jtag", [](const LocalBond &b, const Atom &a) { return static_cast<double>(a.tag[b.j]); }},
     {"kind", [](const LocalBond &b, const Atom &) { return static_cast<double>(b.kind); }},
-    {"bond", [](const LocalBond &b, const Atom &) { return b.first_of_contact ? 0.0 : 1.0; }},
+    {"bond", [](const LocalBond &b, const Atom &) { return static_cast<double>(b.number); }},
     {"dist", [](const LocalBond &b, const Atom &) { return b.distance; }},
     {"sumrad", [](const LocalBond &b, const Atom &) { return b.reach; }},
     {"overlap", [](const LocalBond &b, const Atom &) { return (b.reach - b.distance) / b.reach; }},
@@ -65,16 +64,7 @@ ComputeContactLocal::ComputeContactLocal(LAMMPS_NS::LAMMPS *lmp, int narg, char 
   size_local_cols = columns.size() == 1 ? 0 : static_cast<int>(columns.size());
 }
 
-void ComputeContactLocal::init()
-{
-  pair = dynamic_cast<PairContact *>(force->pair);
-  if (!pair) {
-    error->all(FLERR,
-               std::string(
-                   "compute contact/local found no pair style of this plugin, expected one such as "
-                   "'pair_style spherocylinder/harmonic'."));
-  }
-}
+void ComputeContactLocal::init() { pair = &PairContact::of(lmp, "compute contact/local"); }
 
 void ComputeContactLocal::compute_local()
 {

@@ -12,7 +12,7 @@ namespace jamshape {
 /// One row a bond, columns in the order asked for:
 ///   itag jtag             IDs, itag <= jtag
 ///   kind                  0 tip-to-tip, 1 tip-to-side, 2 side-to-side
-///   bond                  0 or 1: the second bond of a side-to-side contact is 1
+///   bond                  number in its contact, from 0
 ///   dist sumrad overlap   r, d and 1 - r/d
 ///   fx fy fz              force on i
 ///   nx ny nz              unit normal into i

@@ -6,7 +6,6 @@
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
-#include "force.h"
 #include "packing/rattlers.hpp"
 #include "update.h"
 
@@ -26,24 +25,35 @@ enum Value { PHI, U, P, Z, S_2, S_4, F_MAX, F_RMS, Z_SINGLE, RATTLERS, BONDS, OV
 /// Directions that the cubatic order tries are the axes of at most so many particles.
 constexpr LAMMPS_NS::bigint MOST_TRIED = 512;
 
-/// A contact as ranks exchange it; bytes over MPI, all ranks being the same program.
-struct SharedContact {
+/// An edge of the contact network as ranks exchange it; bytes over MPI, all ranks being the same
+/// program.
+struct SharedEdge {
   LAMMPS_NS::tagint itag, jtag;
   Vec<3> normal;
-  int n_bonds;
-  bool flat_i, flat_j;
+  int n_bonds, n_contacts;
+  OnFaces on_faces;
 };
 
-/// A contact by its first bond. A side-to-side contact lies on the flat parts of both.
-SharedContact shared(const LocalBond &bond, const LAMMPS_NS::tagint *tag)
+/// The contacts of this rank, from their bonds, which come one contact after another: an edge each,
+/// or one for each bond where those are contacts of their own.
+std::vector<SharedEdge> edges_of(const std::vector<LocalBond> &bonds, const LAMMPS_NS::tagint *tag,
+                                 const PairContact &pair, bool is_plane)
 {
-  const bool side_to_side = bond.kind == ContactKind::SIDE_TO_SIDE;
-  return {tag[bond.i],
-          tag[bond.j],
-          bond.normal,
-          1,
-          side_to_side || bond.on_side_i,
-          side_to_side || bond.on_side_j};
+  std::vector<SharedEdge> edges;
+  for (const LocalBond &bond : bonds) {
+    const bool is_first = bond.number == 0;
+    if (is_first || pair.bonds_are_contacts()) {
+      edges.push_back({tag[bond.i], tag[bond.j], bond.normal, 1, is_first ? 1 : 0, bond.on_faces});
+    } else {
+      ++edges.back().n_bonds;
+      edges.back().on_faces.i |= bond.on_faces.i;
+      edges.back().on_faces.j |= bond.on_faces.j;
+    }
+    // In the plane such a contact counts as two also where it carries one force (`sides one`); in
+    // space skew rods touch side to side at one point.
+    if (is_plane && bond.kind == ContactKind::SIDE_TO_SIDE) edges.back().n_bonds = 2;
+  }
+  return edges;
 }
 
 template <class T> std::vector<T> gather(const std::vector<T> &mine, MPI_Comm world)
@@ -76,16 +86,7 @@ ComputePacking::ComputePacking(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
 
 ComputePacking::~ComputePacking() { delete[] vector; }
 
-void ComputePacking::init()
-{
-  pair = dynamic_cast<PairContact *>(force->pair);
-  if (!pair) {
-    error->all(
-        FLERR,
-        std::string("compute packing found no pair style of this plugin, expected one such as "
-                    "'pair_style spherocylinder/harmonic'."));
-  }
-}
+void ComputePacking::init() { pair = &PairContact::of(lmp, "compute packing"); }
 
 double ComputePacking::sum(double mine) const
 {
@@ -207,44 +208,40 @@ void ComputePacking::compute_cubatic_order()
 void ComputePacking::compute_contacts()
 {
   const std::vector<LocalBond> bonds = pair->reported_bonds();
-  std::vector<SharedContact> mine;
   double force_sum = 0.0, overlap = 0.0;
   for (const LocalBond &bond : bonds) {
     force_sum += norm(bond.force);
     overlap = std::max(overlap, (bond.reach - bond.distance) / bond.reach);
-    if (bond.first_of_contact) {
-      mine.push_back(shared(bond, atom->tag));
-    } else {
-      ++mine.back().n_bonds;
-    }
-    // In the plane such a contact counts as two also where it carries one force (`sides one`); in
-    // space skew rods touch side to side at one point.
-    if (domain->dimension == 2 && bond.kind == ContactKind::SIDE_TO_SIDE) mine.back().n_bonds = 2;
   }
   const double n_forces = sum(static_cast<double>(bonds.size()));
   const double mean_force = n_forces > 0.0 ? sum(force_sum) / n_forces : 0.0;
   vector[OVERLAP] = largest(overlap);
   compute_residuals(mean_force);
+  count_contacts(bonds);
+}
 
+void ComputePacking::count_contacts(const std::vector<LocalBond> &bonds)
+{
+  const int d = domain->dimension;
+  const std::vector<SharedEdge> shared = gather(edges_of(bonds, atom->tag, *pair, d == 2), world);
   // IDs need not be consecutive; particles without a contact are rattlers by definition.
-  const std::vector<SharedContact> contacts = gather(mine, world);
   std::unordered_map<LAMMPS_NS::tagint, std::size_t> index;
   std::vector<ContactEdge> edges;
-  for (const SharedContact &c : contacts) {
+  for (const SharedEdge &c : shared) {
     const std::size_t i = index.emplace(c.itag, index.size()).first->second;
     const std::size_t j = index.emplace(c.jtag, index.size()).first->second;
-    edges.push_back({i, j, c.normal, c.flat_i, c.flat_j});
+    edges.push_back({i, j, c.normal, c.on_faces.i, c.on_faces.j});
   }
-  const std::vector<char> is_rattler = RattlerSearch(index.size(), edges, domain->dimension).find();
+  const std::vector<char> is_rattler = RattlerSearch(index.size(), edges, d).find();
   const double backbone =
       static_cast<double>(std::count(is_rattler.begin(), is_rattler.end(), char(0)));
   double held_bonds = 0.0, held_contacts = 0.0;
   vector[BONDS] = 0.0;
   for (std::size_t e = 0; e < edges.size(); ++e) {
-    vector[BONDS] += contacts[e].n_bonds;
+    vector[BONDS] += shared[e].n_bonds;
     if (is_rattler[edges[e].i] || is_rattler[edges[e].j]) continue;
-    held_bonds += contacts[e].n_bonds;
-    held_contacts += 1.0;
+    held_bonds += shared[e].n_bonds;
+    held_contacts += shared[e].n_contacts;
   }
   vector[Z] = backbone > 0.0 ? 2.0 * held_bonds / backbone : 0.0;
   vector[Z_SINGLE] = backbone > 0.0 ? 2.0 * held_contacts / backbone : 0.0;

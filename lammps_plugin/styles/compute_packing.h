@@ -14,17 +14,17 @@ namespace jamshape {
 ///    1 phi       packing fraction
 ///    2 u         energy density U / L^d
 ///    3 p         pressure, trace of the virial / (d L^d)
-///    4 z         bonds per non-rattler, a side-to-side contact counted as two
+///    4 z         bonds per non-rattler, in the plane a side-to-side contact counted as two
 ///    5 S_2       nematic order (2D: Marschall & Teitel Eq. 16; 3D: largest eigenvalue of Q)
 ///    6 S_4       tetratic order (2D: Eq. 16; 3D: mean P_4 about the nematic director)
 ///    7 fmax      largest net force on a particle over the mean bond force
 ///    8 frms      root mean square of the same
-///    9 z_single  contacts per non-rattler, a side-to-side contact counted as one
+///    9 z_single  contacts per non-rattler, one however many bonds it has
 ///   10 rattlers  their number
-///   11 bonds     the number of all bonds, a side-to-side contact counted as two
+///   11 bonds     the number of all bonds, counted as in z
 ///   12 overlap   largest overlap 1 - r/d
 ///   13 tmax      largest net torque over mean bond force times the particle's radius of gyration
-///   14 C_4       cubatic order (Yuan et al. 2019, Eq. 7) of superellipsoids in 3D, 0 for others;
+///   14 C_4       cubatic order (Yuan et al. 2019, Eq. 7) of shapes with three axes, in 3D, else 0;
 ///                directions tried are the axes of all particles, or of about 512 of many
 class ComputePacking : public LAMMPS_NS::Compute {
  public:
@@ -44,6 +44,7 @@ class ComputePacking : public LAMMPS_NS::Compute {
   void compute_order();
   void compute_cubatic_order();
   void compute_contacts();
+  void count_contacts(const std::vector<LocalBond> &bonds);
   void compute_residuals(double mean_bond_force);
 };
 

@@ -5,19 +5,13 @@
 
 #include "affine_box.h"
 #include "fix.h"
+#include "mobility.h"
+#include "relaxation_rate.h"
 
-#include <functional>
 #include <string>
 #include <vector>
 
 namespace jamshape {
-
-class PairContact;
-
-/// Velocity and angular velocity of a particle relative to the affine motion, in space coordinates.
-struct Rate {
-  Vec<3> shift, turn;
-};
 
 /// The equations of motion (Marschall & Teitel 2018, Eqs. 11-14): what an integrator can ask of the
 /// particles. Positions are held in coordinates of the box of strain 0, in which the affine motion
@@ -35,8 +29,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /// Strain of a step that pushes touching particles into each other by half their radius, as far
   /// as forces may move them in a step; over all particles, after `begin_run`.
   double largest_strain() const;
-  /// Drag coefficients of own atoms; after every exchange of atoms.
-  void measure_particles();
+  /// Sizes of own atoms; after every exchange of atoms.
+  void measure_particles() { mobilities.measure(*pair); }
 
   /* stages of a step, for integrators: from `hold_start` to `finish_step`, coordinates at the start
      of the step, rates stored with `store_rates` and registers stay with their atoms on whatever
@@ -78,15 +72,9 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
 
   /* numbers about the flow */
 
-  /// Largest relaxation rate: the largest eigenvalue of mobility times stiffness, by Lanczos'
-  /// method, from below. Needs the place of the stored rates. Of the bonds: without the prestress,
-  /// so that kinks of the energy, where second derivatives blow up, do not enter; but for long
-  /// nearly parallel rods in 3D the true rate may be twice, for nearly round ones in the plane
-  /// several times this one.
-  double largest_rate_of_bonds();
-  /// Of the whole second derivative, where forces have no jumps, else of the bonds. Ends when an
-  /// iteration adds less than this fraction.
-  double largest_rate(double tolerance);
+  /// Largest relaxation rates, as RelaxationRate estimates them.
+  double largest_rate_of_bonds() { return relaxation.of_bonds(*pair); }
+  double largest_rate(double tolerance) { return relaxation.largest(*pair, tolerance); }
   /// Means over all bonds.
   struct Touching {
     double bonds;    // how many
@@ -104,7 +92,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /// the order of the local error of Euler's method, a bound of Heun's.
   double stage_difference() const;
   /// Passes over all contacts: forces, and what estimates need.
-  LAMMPS_NS::bigint n_evaluations() const { return evaluations; }
+  LAMMPS_NS::bigint n_evaluations() const { return evaluations + relaxation.n_evaluations(); }
   LAMMPS_NS::bigint n_rebuilds() const { return rebuilds; }
 
   /* storage that travels with the atoms; the fix hands LAMMPS's calls on */
@@ -119,13 +107,18 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   int width() const { return dimension + n_rates + n_turns + n_registers * n_rates; }
   double memory_usage() const;
 
-  /* the direction of the Lanczos iteration, sent to ghosts */
+  /* what the estimate of rates sends to ghosts */
 
-  int pack_direction(int n, const int *list, double *buf) const;
-  void unpack_direction(int n, int first, const double *buf);
+  int pack_direction(int n, const int *list, double *buf) const
+  {
+    return relaxation.pack_direction(n, list, buf);
+  }
+  void unpack_direction(int n, int first, const double *buf)
+  {
+    relaxation.unpack_direction(n, first, buf);
+  }
 
  private:
-  const double drag;
   const AffineBox &box;
   const int dimension, n_rates, n_turns, n_registers;
   PairContact *pair;
@@ -137,31 +130,14 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   double seen;
   double largest_difference;
   LAMMPS_NS::bigint evaluations, rebuilds;
-  LAMMPS_NS::Fix *fix;
-
-  struct Mobility {
-    double shift;
-    Vec<3> turn;        // per body axis
-    double step_limit;  // no particle may move farther in one step than this
-    double longest;     // semi-axis: what a turn moves at most
-    double gyration;    // length that a radian stands for
-  };
-  std::vector<Mobility> mobilities;  // of each kind of particle
-  std::vector<int> kind;             // of own atoms
-  std::vector<double> directions;    // of own and ghost atoms, while the Lanczos iteration runs
+  Mobilities mobilities;
+  RelaxationRate relaxation;
 
   double *row(int i) const { return values + static_cast<std::size_t>(width()) * i; }
 
-  Mobility mobility_of(const Vec<3> &semi_axes, int type) const;
-  /// Force and torque (in the places of a rate) that move a particle at a rate.
-  Rate resistance_times(int i, const Rate &rate) const;
-  Rate mobility_times(int i, const Vec<3> &force, const Vec<3> &torque) const;
-  Rate present_rate(int i) const;
   Rate stored_rate(int i) const;
   Rate register_of(int i, int which) const;
   void store_rate(int i, const Rate &rate);
-  Rate direction(int i) const;
-  void write_rate(double *to, const Rate &rate) const;
   Rate sum_of(int i, const Move &move) const;
   double length_of(int i, const Rate &of, double scale) const;
   void require_small(int i, const Rate &moved, double scale);
@@ -169,24 +145,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   Quaternion orientation_at_start(int i) const;
   double place(int i, const Move &move, bool is_last);
   void move(const Move &move, bool is_last);
-  void clear_forces(int first);
-  void set_force(int i, double factor, const Rate &rate);
-  void add_force(int i, double factor, const Rate &rate);
+  void clear_forces();
   double sum(double mine) const;
-  void pack_force(int i, double *to) const;
-  void unpack_force(int i, const double *from);
-  double largest_eigenvalue_of(const std::function<void()> &add_stiffness_times, double tolerance);
-  void send_direction();
-  void add_load(int i, const Vec<3> &force_on, const Vec<3> &torque_on);
-  void add_bonds_times_direction();
-  /// Second derivatives of all contacts, to be applied many times.
-  struct Curvatures {
-    std::vector<int> i, j;
-    std::vector<double> triangles;
-  };
-  Curvatures curvatures();
-  void add_curvatures_times_direction(const Curvatures &of);
-  template <int D> void add_curvatures_times(const Curvatures &of);
   void rebuild_lists();
 };
 

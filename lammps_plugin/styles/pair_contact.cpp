@@ -38,6 +38,17 @@ PairContact::~PairContact()
   memory->destroy(k_e);
 }
 
+PairContact &PairContact::of(LAMMPS_NS::LAMMPS *lmp, const std::string &who)
+{
+  auto *const pair = dynamic_cast<PairContact *>(lmp->force->pair);
+  if (!pair) {
+    const char *const style = lmp->force->pair_style;
+    lmp->error->all(FLERR, who + " found pair_style " + (style ? style : "none") +
+                               ", expected one of jamshape's: use 'pair_style SHAPE/harmonic'.");
+  }
+  return *pair;
+}
+
 void PairContact::allocate()
 {
   const int n = atom->ntypes + 1;
@@ -286,9 +297,21 @@ std::vector<LocalBond> PairContact::reported_bonds()
       reported.push_back(b);
     } else {
       const Vec<3> zero{};  // 0 - 0 is 0; -0 would be written as such
-      reported.push_back({b.j, b.i, b.kind, b.first_of_contact, zero - b.normal, zero - b.force,
-                          b.arm_j, b.arm_i, b.distance, b.reach, b.energy, b.stiffness, b.on_side_j,
-                          b.on_side_i});
+      reported.push_back({b.j,
+                          b.i,
+                          b.kind,
+                          b.number,
+                          zero - b.normal,
+                          zero - b.force,
+                          b.arm_j,
+                          b.arm_i,
+                          b.distance,
+                          b.reach,
+                          b.energy,
+                          b.stiffness,
+                          b.on_side_j,
+                          b.on_side_i,
+                          {b.on_faces.j, b.on_faces.i}});
     }
   });
   return reported;

@@ -17,10 +17,11 @@ namespace jamshape {
 struct LocalBond {
   int i, j;
   ContactKind kind;
-  bool first_of_contact;
+  int number;  // 0 for the first of a contact
   Vec<3> normal, force, arm_i, arm_j;
   double distance, reach, energy, stiffness;
   bool on_side_i, on_side_j;
+  OnFaces on_faces;
 };
 
 /// Second derivatives of a contact's energy by x_i - x_j and by the rotations of i and of j (in 2D
@@ -37,6 +38,9 @@ class PairContact : public LAMMPS_NS::Pair {
  public:
   explicit PairContact(LAMMPS_NS::LAMMPS *lmp);
   ~PairContact() override;
+
+  /// The pair style in use; ends the run with a sentence about `who` asks if it is none of ours.
+  static PairContact &of(LAMMPS_NS::LAMMPS *lmp, const std::string &who);
 
   void settings(int narg, char **arg) override;
   void coeff(int narg, char **arg) override;
@@ -63,6 +67,9 @@ class PairContact : public LAMMPS_NS::Pair {
   virtual std::optional<int> director(const Vec<3> &semi_axes, int type) const = 0;
   /// Whether all three axes of the bodies count, as for the cubatic order.
   virtual bool has_three_axes() const { return false; }
+
+  /// Whether each bond holds a particle like a contact, as far as rattlers go.
+  virtual bool bonds_are_contacts() const = 0;
 
   /// Shows every bond of this rank's pairs, at the current positions, to `visit`.
   virtual void for_each_bond(const std::function<void(const LocalBond &)> &visit) = 0;

@@ -77,6 +77,8 @@ template <class Model> class PairContactOf : public PairContact {
                         [&](auto D) { return Model::template director<D>(shape); });
   }
 
+  bool bonds_are_contacts() const override { return Model::BONDS_ARE_CONTACTS; }
+
   double memory_usage() override
   {
     return PairContact::memory_usage() + in_2d.memory_usage() + in_3d.memory_usage() +
@@ -133,9 +135,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   typename Model::Law law_of(int i, int j) const
   {
-    typename Model::Law law = Model::law(k_e[atom->type[i]][atom->type[j]], sides);
-    law.shortcuts = !general.contact;
-    return law;
+    return Model::law(k_e[atom->type[i]][atom->type[j]], sides, !general.contact);
   }
 
   template <int D> struct Bodies {
@@ -360,9 +360,10 @@ template <class Model> class PairContactOf : public PairContact {
         const Vec<D> r = body.centre - other.centre;
         for (int b = 0; b < contact.n_bonds; ++b) {
           const Bond<D> &bond = contact.bond[b];
-          visit({i, j, contact.kind, b == 0, in_space<D>(bond.normal), in_space<D>(bond.force),
+          visit({i, j, contact.kind, b, in_space<D>(bond.normal), in_space<D>(bond.force),
                  in_space<D>(bond.arm_i), in_space<D>(bond.arm_i + r), bond.distance, bond.reach,
-                 bond.energy, bond.stiffness, bond.on_side_i, bond.on_side_j});
+                 bond.energy, bond.stiffness, bond.on_side_i, bond.on_side_j,
+                 Model::on_faces(contact, b, body, other)});
         }
       }
     }

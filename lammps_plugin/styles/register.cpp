@@ -7,6 +7,7 @@
 #include "fix_overdamped_affine.h"
 #include "force.h"
 #include "modify.h"
+#include "pair_dimer_harmonic.h"
 #include "pair_spherocylinder_harmonic.h"
 #include "pair_superellipsoid_harmonic.h"
 
@@ -29,6 +30,7 @@ template <class T> LAMMPS_NS::Compute *compute(LAMMPS *lmp, int narg, char **arg
 void add_styles(LAMMPS *lmp)
 {
   using namespace jamshape;
+  (*lmp->force->pair_map)["dimer/harmonic"] = pair<PairDimerHarmonic>;
   (*lmp->force->pair_map)["spherocylinder/harmonic"] = pair<PairSpherocylinderHarmonic>;
   (*lmp->force->pair_map)["superellipsoid/harmonic"] = pair<PairSuperellipsoidHarmonic>;
   (*lmp->modify->fix_map)["overdamped/affine"] = fix<FixOverdampedAffine>;

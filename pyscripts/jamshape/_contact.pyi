@@ -17,6 +17,7 @@ class _Shape:
     core: ClassVar[str]
     most_bonds: ClassVar[int]
     has_sides: ClassVar[bool]
+    bonds_are_contacts: ClassVar[bool]
     measure: NDArray[np.float64]
     moment: NDArray[np.float64]
     outer_radius: NDArray[np.float64]
@@ -57,6 +58,7 @@ class _Shape:
         edges: NDArray[np.float64],
         pairs: NDArray[np.int64],
         shift: NDArray[np.int64],
+        extended: bool,
     ) -> dict[str, NDArray[Any]]: ...
     def sums(
         self,
@@ -95,6 +97,7 @@ class _Shape:
 
 class Spherocylinders(_Shape): ...
 class Superellipsoids(_Shape): ...
+class Dimers(_Shape): ...
 
 def find_rattlers(
     n_particles: int,

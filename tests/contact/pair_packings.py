@@ -23,8 +23,8 @@ def split(x):
     return np.stack([double, (x - double).astype(float)])
 
 
-def rods(diameters, dimension, k_e=1.0, sides=1):
-    return _contact.Spherocylinders(diameters, np.ones(len(diameters)), dimension, k_e, sides)
+def rods(diameters, dimension, k_e=1.0, sides=1, shape=_contact.Spherocylinders):
+    return shape(diameters, np.ones(len(diameters)), dimension, k_e, sides)
 
 
 def quaternion_product(p, q):
@@ -52,9 +52,10 @@ class PairPacking:
     orientation: np.ndarray
     edges: np.ndarray
     shift: np.ndarray
+    shape: type = _contact.Spherocylinders  # or another one of these diameters
 
     @classmethod
-    def of(cls, rng, pairs):
+    def of(cls, rng, pairs, shape=_contact.Spherocylinders):
         n, dimension = pairs.r.shape
         edges = LONG(1) * rng.uniform(5.0, 50.0, dimension)
         shift = rng.integers(1, 3, (n, dimension)) * rng.choice([-1, 1], (n, dimension))
@@ -74,6 +75,7 @@ class PairPacking:
             orientation,
             edges,
             shift,
+            shape,
         )
 
     def __len__(self):
@@ -87,6 +89,7 @@ class PairPacking:
             self.orientation[particles],
             self.edges,
             self.shift[which],
+            self.shape,
         )
 
     @property
@@ -102,7 +105,7 @@ class PairPacking:
         return (*poses, np.arange(2 * len(self)).reshape(-1, 2), self.shift)
 
     def compiled(self, sides, k_e):
-        return rods(self.diameters, self.dimension, k_e, sides)
+        return rods(self.diameters, self.dimension, k_e, sides, self.shape)
 
     def derivatives(self, sides, k_e, *, extended=True):
         return self.compiled(sides, k_e).derivatives(*self.arguments(), extended)

@@ -1,13 +1,15 @@
 """The pair energies written a second time, in NumPy, from the formula and not from the C++.
 
 With overlaps a of the shortest distance and b of the far end of the overlap of the spines (b of any
-sign), m = (a + b) / 2, E(x) = x^2 / 2, S the quintic step, l the distance between the two ends:
+sign), m = (a + b) / 2, E(x) = x^2 / 2, S the quintic step and l how much of the spines lies opposite
+the other one (`opposite_parts`; its feet slow down over a quarter of the length it is taken over):
 
     sides one   V = E(a)
-    sides two   V = E(a) + W_b D E(b)_+ + W_m (1 - D) (E(m) - E(a))
-    W_b = S(l / (0.05 A_min)) S((|cos| - 0.5) / 0.35)
+    sides two   V = E(a) + D F + W_m (1 - D) (E(m) - E(a))
+    F   = W_b E(a) (b / a)^(2 + B (1 / W_b - 1)) for b > 0, which is W_b E(b) where B = 0
+    W_b = S(l / (A_min (0.05 + 0.95 B))) S((|cos| - 0.5) / 0.35)
     W_m = S(l / (0.05 A_min)) (1 - S((|sin| / (0.1 A_min / d))^2))
-    D = 1 - S(ln y / ln 16),  y = m / (A_min / d)^2
+    B   = S(1 - ln y / ln 0.01),  D = 1 - S(ln y / ln 16),  y = m / (A_min / d)^2
 
 Every formula is analytic between its branches and branches look at real parts only, so that a step
 along the imaginary axis gives derivatives to rounding, without a step size.

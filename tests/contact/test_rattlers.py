@@ -73,12 +73,19 @@ def test_triangle_held_at_a_third_contact_each_stays():
     assert rattlers(7, [*backbone(0), *triangle, *held[:2]]) == [False] * 4 + [True] * 3
 
 
-def squeezed(normal_above, normal_below, flats_above, flats_below):
-    """Particle 4 between 0 and 1 of a backbone: is it a rattler?"""
-    contacts = [*backbone(0), (4, 0, normal_above, flats_above), (4, 1, normal_below, flats_below)]
-    *others, it = rattlers(5, contacts)
-    assert others == [False] * 4
+def squeezed(normal_above, normal_below, flats_above, flats_below, dimension=2):
+    """A particle between 0 and 1 of a backbone: is it a rattler?"""
+    held = backbone(0) if dimension == 2 else everyone()
+    n = 4 if dimension == 2 else 5
+    contacts = [*held, (n, 0, normal_above, flats_above), (n, 1, normal_below, flats_below)]
+    *others, it = rattlers(n + 1, contacts, dimension)
+    assert others == [False] * n
     return it
+
+
+def everyone():
+    """Five particles, every two in contact at tips: four contacts each."""
+    return [(a, b, UP, TIPS) for a in range(5) for b in range(a)]
 
 
 def test_rod_between_opposite_flats_stays():
@@ -121,14 +128,43 @@ def test_own_periodic_image_holds_from_both_sides():
 
 
 def test_in_space_fewer_than_four_contacts_rattle():
-    everyone = [(a, b, UP, TIPS) for a in range(5) for b in range(a)]  # four contacts each
-    assert rattlers(5, everyone, dimension=3) == [False] * 5
+    assert rattlers(5, everyone(), dimension=3) == [False] * 5
     three_more = [(5, b, UP, FLATS) for b in range(3)]
-    assert rattlers(6, [*everyone, *three_more], dimension=3) == [False] * 5 + [True]
+    assert rattlers(6, [*everyone(), *three_more], dimension=3) == [False] * 5 + [True]
     four_more = [(5, b, UP, TIPS) for b in range(4)]
-    assert rattlers(6, [*everyone, *four_more], dimension=3) == [False] * 6
+    assert rattlers(6, [*everyone(), *four_more], dimension=3) == [False] * 6
     # Three contacts each: all of them go, which in the plane stay.
     assert rattlers(4, backbone(0), dimension=3) == [True] * 4
+
+
+def test_in_space_a_particle_between_two_faces_stays():
+    assert not squeezed(DOWN, UP, FLAT_OF_I, FLATS, dimension=3)
+    third = [(5, 2, LEFT, TIPS)]
+    faces = [(5, 0, DOWN, FLATS), (5, 1, UP, FLAT_OF_I)]
+    assert rattlers(6, [*everyone(), *faces, *third], dimension=3) == [False] * 6
+    # The same with the faces of the others, or of one alone, holds nothing.
+    loose = [(5, 0, DOWN, FLATS), (5, 1, UP, FLAT_OF_J)]
+    assert rattlers(6, [*everyone(), *loose, *third], dimension=3) == [False] * 5 + [True]
+
+
+@pytest.mark.parametrize(
+    "held",
+    [
+        (UP, UP, FLATS, FLATS),
+        (DOWN, UP, TIPS, TIPS),
+        (DOWN, UP, TIPS, FLATS),
+        (UP, LEFT, FLATS, FLATS),
+    ],
+)
+def test_in_space_other_pairs_of_contacts_hold_nothing(held):
+    assert squeezed(*held, dimension=3)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_stack_of_faces_around_the_box_stays_in_any_dimension(dimension):
+    stack = [(0, 1, DOWN, FLATS), (1, 2, DOWN, FLATS), (2, 0, DOWN, FLATS)]
+    assert rattlers(3, stack, dimension) == [False] * 3
+    assert rattlers(1, [(0, 0, UP, FLATS)], dimension) == [False]
 
 
 def test_particles_that_do_not_exist_are_refused():

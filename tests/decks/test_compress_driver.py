@@ -41,7 +41,7 @@ def test_a_run_reaches_its_end_and_reports_it(whole):
     assert report["left_out"].startswith("energy and virial of steps without output, the third")
     assert read_packing(out).phi == pytest.approx(report["phi"], rel=1e-12)
     observables, history = read_observables(out), read_report(out)
-    assert 60 <= len(observables["p"]) <= 63
+    assert 60 <= len(observables["pressure"]) <= 63
     assert np.all(np.diff(observables["phi"]) > 0)
     assert np.all(np.diff(history.wall_seconds) > 0)
     assert read_attributes(out)["finished"]
@@ -53,7 +53,7 @@ def test_integrators_that_choose_their_steps_take_rows_as_steps(tmp_path):
     finished = run(out, *options)
     assert finished.returncode == 0, finished.stderr
     observables, history = read_observables(out), read_report(out)
-    assert len(observables["p"]) == 61
+    assert len(observables["pressure"]) == 61
     assert observables["phi"][-1] == pytest.approx(0.86, rel=1e-12)
     assert (observables["local_error"] <= tolerance).all()
     np.testing.assert_array_equal(history.error, observables["local_error"][1:])
@@ -103,7 +103,7 @@ def test_a_step_past_the_stability_limit_fails_with_a_sentence_and_a_readable_fi
     assert len(sentences) == 1
     assert "use a " in sentences[0]
     assert "timestep" in sentences[0]
-    assert len(read_observables(out)["p"]) >= 1
+    assert len(read_observables(out)["pressure"]) >= 1
     assert np.all(np.isfinite(read_packing(out).position))
     assert not read_attributes(out)["finished"]
 

@@ -102,16 +102,25 @@ def assert_one_sentence(failed, words):
     ("options", "words"),
     [
         (("--u0", "-1"), "u0 is -1.0, expected a positive number"),
-        (("--u0", "0"), "u0 is 0.0, expected a positive number"),
+        (
+            ("--u0", "0"),
+            "there is no energy to reach, expected one after a compression by dynamics (u0)",
+        ),
         (("--u0", "nan"), "u0 is nan, expected a positive number"),
         (("--n", "0"), "n is 0, expected at least one particle"),
         (("--n", "-5"), "n is -5, expected at least one particle"),
         (("--alpha", "-1"), "alpha is -1.0"),
         (("--alpha", "nan"), "alpha is nan"),
-        (("--size-ratio", "-1.4"), "size_ratio is -1.4, expected big over small, at least 1"),
-        (("--size-ratio", "inf"), "of the mixture holds inf, expected finite lengths"),
+        (
+            ("--size-ratio", "-1.4"),
+            "size_ratio is -1.4, expected big over small, finite and at least 1",
+        ),
+        (
+            ("--size-ratio", "inf"),
+            "size_ratio is inf, expected big over small, finite and at least 1",
+        ),
         (("--kappa", "1"), "kappa is 1.0, expected at most"),
-        (("--phi-start", "nan"), "phi is nan, expected a packing fraction between 0 and 1"),
+        (("--phi-start", "nan"), "phi_start is nan, expected a packing fraction between 0 and 1"),
     ],
 )
 def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path):
@@ -143,7 +152,11 @@ def forget_the_outcome(path):
     ("damage", "options", "words"),
     [
         (cut, (), "is truncated or damaged, expected a complete HDF5 file; write it again"),
-        (rename_shape, (), "of shape 'superellipsoid', expected 16 of 'spherocylinder'"),
+        (
+            rename_shape,
+            (),
+            "of shape 'superellipsoid' in 2 dimensions, expected 16 of 'spherocylinder' in 2",
+        ),
         (lose_a_position, (), "position holds NaN or infinity, expected finite numbers"),
         (forget_the_outcome, (), "holds no finished packing, expected one of make_packing.py"),
         (lambda _: None, ("--seed", "2"), "with seed = 1, expected 2; write to another file"),

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jamshape.contacts import network as contacts
+from jamshape import contacts
 from jamshape.files.lammps_text import write_data
 from jamshape.lammps.session import Session, plugin_path
 from jamshape.packing import Box, Packing, angle_from_quaternion

@@ -161,12 +161,12 @@ def test_steps_that_cannot_be_divided(dt, strain, sentence_of):
 
 def test_fix_needs_a_pair_style_of_ours(sentence_of):
     assert sentence_of(f"pair_style zero 1.0\npair_coeff * *\n{FIX}\nrun 1") == (
-        "fix overdamped/affine found pair_style zero, expected one of this plugin's: use "
-        "'pair_style spherocylinder/harmonic'."
+        "fix overdamped/affine found pair_style zero, expected one of jamshape's: use "
+        "'pair_style SHAPE/harmonic'."
     )
     assert sentence_of(f"pair_style none\n{FIX}\nrun 1") == (
-        "fix overdamped/affine found pair_style none, expected one of this plugin's: use "
-        "'pair_style spherocylinder/harmonic'."
+        "fix overdamped/affine found pair_style none, expected one of jamshape's: use "
+        "'pair_style SHAPE/harmonic'."
     )
 
 

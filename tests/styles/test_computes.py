@@ -23,8 +23,7 @@ from lammps_scenes import (
     with_odd_ids,
 )
 
-from jamshape import _contact
-from jamshape.contacts import network as contacts
+from jamshape import contacts
 from jamshape.measures.order import orientational_order
 
 pytestmark = pytest.mark.lammps
@@ -229,7 +228,7 @@ def expected_vector(state, sides):
         side_bonds = network.n_bonds.sum()
     bond_force = np.linalg.norm(network.bonds.force, axis=1).mean()
     net = np.linalg.norm(found.force, axis=1) / bond_force
-    moment = _contact.spherocylinder_drag(packing.half_length, packing.radius, packing.dimension)[1]
+    moment = packing.compiled().moment
     torque = np.linalg.norm(found.torque.reshape(packing.n, -1), axis=1)
     return {
         "phi": packing.phi,
@@ -305,7 +304,9 @@ def test_order_in_space(n, tmp_path):
     assert tensor_order(rods_3d(4.0 * cells, spread, 1.0, 0.5, [32.0] * 3).axes)[0] < 3 / n**0.5
 
 
-NO_PAIR_STYLE = " found no pair style of this plugin, expected one such as 'pair_style spherocylinder/harmonic'."
+NO_PAIR_STYLE = (
+    " found pair_style zero, expected one of jamshape's: use 'pair_style SHAPE/harmonic'."
+)
 
 
 @pytest.mark.parametrize(

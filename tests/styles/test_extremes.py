@@ -20,7 +20,7 @@ from lammps_scenes import (
 )
 from mixtures import bidisperse
 
-from jamshape.contacts import network as contacts
+from jamshape import contacts
 from jamshape.protocols.random_start import random_packing
 
 pytestmark = pytest.mark.lammps

@@ -38,7 +38,7 @@ from lammps_scenes import (
 )
 from scipy.spatial import cKDTree
 
-from jamshape.contacts import network as contacts
+from jamshape import contacts
 from jamshape.files.lammps_text import write_data
 
 pytestmark = pytest.mark.lammps

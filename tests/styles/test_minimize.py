@@ -22,7 +22,7 @@ from lammps_scenes import (
     states_from_dump,
 )
 
-from jamshape.contacts import network as contacts
+from jamshape import contacts
 
 pytestmark = pytest.mark.lammps
 

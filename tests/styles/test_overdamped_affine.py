@@ -34,17 +34,14 @@ from lammps_scenes import (
     wrapped,
 )
 
-from jamshape import _contact
-from jamshape.contacts import network as contacts
+from jamshape import contacts
 
 pytestmark = pytest.mark.lammps
 
 
 def drag_of(packing, k_d=1.0):
     """Drag coefficients of translation (N,) and of rotation about the long axis and across (N, 3)."""
-    measure, moment = _contact.spherocylinder_drag(
-        packing.half_length, packing.radius, packing.dimension
-    )
+    measure, moment = packing.compiled().measure, packing.compiled().moment
     return k_d * measure, k_d * measure[:, None] * moment
 
 

@@ -31,6 +31,6 @@ def test_writing_restart_files_does_not_change_a_run(tmp_path):
     apart = np.abs(plain.position - written.position)
     apart = np.minimum(apart, plain.box.edges - apart)  # one may have crossed the border earlier
     assert apart.max() < 1e-9 * plain.box.edges.min()
-    for name in ("p", "u"):
+    for name in ("pressure", "u"):
         one, other = (np.array([row[name] for row in found]) for found in (rows, others))
         np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-15)

@@ -78,7 +78,7 @@ def two(dimension):
 def rates_of(packing):
     """Velocities and angular velocities in space, from the bindings."""
     D = packing.dimension
-    measure, moment = _contact.superellipsoid_drag(packing.diameters, packing.exponent, D)
+    measure, moment = (packing.compiled().measure, packing.compiled().moment)
     rows = superellipsoid_rows(packing)
     contact = _contact.superellipsoid_contacts(rows[:1], rows[1:], EPSILON)
     force = np.concatenate([contact["force"], -contact["force"]])

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from jamshape.protocols.jammed import Sample, make
 
 from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
-from jamshape.protocols.jammed import Sample, make
 from jamshape.vibration.hessian import Scope, dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.statistics import bands, components, count, participation, redundancies

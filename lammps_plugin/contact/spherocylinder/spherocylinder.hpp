@@ -67,15 +67,12 @@ template <int D, class S = double> struct SpherocylinderBody {
 struct SpherocylinderLaw {
   Harmonic harmonic;
   Sides sides;
-  bool shortcuts = true;  // false: discs by the search for feet, too
+  bool shortcuts;  // false: discs by the search for feet, too
 };
 
 /// Below this |sin| of the angle between them two spines are parallel: their one bond sits in the
 /// middle of the overlap of the spines (Marschall & Teitel 2018, Sec. II, taken modulo pi).
 inline constexpr double PARALLEL_SINE = 1e-8;
-
-/// Feet closer than this times R_i + R_j are one point: no direction is left to push along.
-inline constexpr double COINCIDENT = 1e-14;
 
 template <int D, class S>
 SpinePair<D, S> spine_pair(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j)
@@ -356,8 +353,14 @@ struct SpherocylinderModel {
   /// Bonds of a contact, and whether `sides` changes the law.
   static constexpr int MOST_BONDS = 2;
   static constexpr bool HAS_SIDES = true;
+  /// Whether each bond holds a particle like a contact; two bonds side to side are one contact.
+  static constexpr bool BONDS_ARE_CONTACTS = false;
 
-  static Law law(double k_e, Sides sides) { return {{k_e}, sides}; }
+  /// Without shortcuts particles whose contacts need no search are searched, too.
+  static Law law(double k_e, Sides sides, bool shortcuts = true)
+  {
+    return {{k_e}, sides, shortcuts};
+  }
 
   /// Other shapes have an exponent.
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)
@@ -409,6 +412,16 @@ struct SpherocylinderModel {
   template <int D, class S> static void turn_to(Body<D, S> &body, const QuaternionOf<S> &q)
   {
     body.axis = long_axis<D, S>(q);
+  }
+
+  /// Of bond b of a contact.
+  template <int D, class S>
+  static OnFaces on_faces(const Contact<D, S, MOST_BONDS> &contact, int b, const Body<D, S> &,
+                          const Body<D, S> &)
+  {
+    if (D == 3) return {false, false};
+    const bool is_between = contact.kind == ContactKind::SIDE_TO_SIDE;
+    return {is_between || contact.bond[b].on_side_i, is_between || contact.bond[b].on_side_j};
   }
 
   /// Whether the surfaces of i and j are closer than `margin`.

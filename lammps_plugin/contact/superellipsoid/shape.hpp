@@ -103,6 +103,31 @@ template <int D, class S = double> struct SuperellipsoidBody {
   double bounding_radius;
 };
 
+/// Where the surface bends by less than this part of what the ellipsoid of the same axes does, it
+/// is a face: the point of contact then moves ten times as far as on that when the particle turns.
+inline constexpr double FACE_CURVATURE = 0.1;
+
+/// Whether the surface is flat in all directions at a point, from the centre, or at that of a
+/// scaled body. Near the end of axis k it bends along axis l by (2p-1) |x_l/a_l|^(2p-2) times the
+/// ellipsoid's a_k / a_l^2.
+template <int D, class S>
+bool is_flat_at(const SuperellipsoidBody<D, S> &body, const Vec<D, S> &point)
+{
+  if (!(body.p > 1.0)) return false;
+  double along[D];  // coordinates over semi-axes
+  int facing = 0;
+  for (int k = 0; k < D; ++k) {
+    along[k] = std::abs(static_cast<double>(dot(body.axis[k], point))) / body.semi_axes[k];
+    if (along[k] > along[facing]) facing = k;
+  }
+  for (int k = 0; k < D; ++k) {
+    const double bend =
+        (2.0 * body.p - 1.0) * std::pow(along[k] / along[facing], 2.0 * body.p - 2.0);
+    if (k != facing && !(bend < FACE_CURVATURE)) return false;
+  }
+  return true;
+}
+
 /// x^e of x >= 0. Small integer powers, all that the usual shapes need, are products.
 template <class T> class Exponent {
  public:

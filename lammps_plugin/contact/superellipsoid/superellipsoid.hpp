@@ -17,11 +17,8 @@ namespace jamshape {
 /// overlap 1 - eta^2.
 struct SuperellipsoidLaw {
   double epsilon;
-  bool shortcuts = true;  // false: spheres and ellipsoids by the search of all exponents, too
+  bool shortcuts;  // false: spheres and ellipsoids by the search of all exponents, too
 };
-
-/// Centres closer than this times the sum of the bounding radii are one point: no normal exists.
-inline constexpr double COINCIDENT_CENTRES = 1e-14;
 
 /// A scale with a larger relative error bar is no contact that could be computed: it is reported as
 /// such (UNCONVERGED), not dropped. None has been seen.
@@ -65,7 +62,7 @@ template <int D, class S> class SuperellipsoidContact {
     const T distance_sq = value_of(norm_sq(r));
     if (!(distance_sq < T(reach) * reach))
       return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
-    if (distance_sq <= COINCIDENT_CENTRES * reach * COINCIDENT_CENTRES * reach) {
+    if (distance_sq <= COINCIDENT * reach * COINCIDENT * reach) {
       return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
     }
     if (shortcuts && is_round(i) && is_round(j))
@@ -172,8 +169,9 @@ struct SuperellipsoidModel {
   static constexpr const char *CORE = "centres";
   static constexpr int MOST_BONDS = 1;
   static constexpr bool HAS_SIDES = false;
+  static constexpr bool BONDS_ARE_CONTACTS = false;
 
-  static Law law(double epsilon, Sides) { return {epsilon}; }
+  static Law law(double epsilon, Sides, bool shortcuts = true) { return {epsilon, shortcuts}; }
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double exponent)
   {
@@ -237,6 +235,14 @@ struct SuperellipsoidModel {
     }
   }
 
+  template <int D, class S>
+  static OnFaces on_faces(const Contact<D, S, MOST_BONDS> &contact, int b, const Body<D, S> &i,
+                          const Body<D, S> &j)
+  {
+    const Vec<D, S> &arm_i = contact.bond[b].arm_i;
+    return {is_flat_at(i, arm_i), is_flat_at(j, arm_i + (i.centre - j.centre))};
+  }
+
   /// Whether the surfaces of i and j may be closer than `margin`: false where the gap between two
   /// parallel planes says no. Tried are the planes across the line of centres, those of the bodies'
   /// axes and nearly that of two ellipsoids.
@@ -290,7 +296,7 @@ bool are_overlapping(const SuperellipsoidBody<D> &i, const SuperellipsoidBody<D>
   const Vec<D> r = i.centre - j.centre;
   const double distance_sq = norm_sq(r), bounding = i.bounding_radius + j.bounding_radius;
   if (distance_sq >= bounding * bounding) return false;
-  if (distance_sq <= COINCIDENT_CENTRES * bounding * COINCIDENT_CENTRES * bounding) return true;
+  if (distance_sq <= COINCIDENT * bounding * COINCIDENT * bounding) return true;
   return TangencySearch<D, double>(i, j, {r, true, nullptr}).is_overlap();
 }
 

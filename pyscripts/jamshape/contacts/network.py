@@ -51,6 +51,9 @@ class Bonds:
     energy : (B,) array of float64, [energy]
     on_side : (B, 2) array of bool
         Whether the point lies on the flat part of i, of j.
+    on_face : (B, 2) array of bool
+        Whether the surface of i, of j, is flat there in all directions: the side of a rod in the plane,
+        a side of a box in space.
     """
 
     contact: IntArray
@@ -61,6 +64,7 @@ class Bonds:
     reach: FloatArray
     energy: FloatArray
     on_side: BoolArray
+    on_face: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +88,9 @@ class ContactNetwork:
         On i; j carries the opposite.
     torque_i, torque_j : (M,) array in 2D, (M, 3) in 3D, of float64, [energy]
     bonds : Bonds
+    bonds_are_contacts : bool
+        Whether each bond holds a particle by itself, as a contact of its own: where particles are made of
+        several round parts.
     """
 
     pairs: IntArray
@@ -96,6 +103,7 @@ class ContactNetwork:
     torque_i: FloatArray
     torque_j: FloatArray
     bonds: Bonds
+    bonds_are_contacts: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +161,7 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
     """
     bodies, state = packing.compiled(Interaction(k_e, sides)), State.of(packing)
     near = near_particles(packing, bodies)
-    found = bodies.contacts(*PairArrays.of(state, near))
+    found = bodies.contacts(*PairArrays.of(state, near), packing.has_rests)
     near = near.take(found["pair"])
     refuse_crossing(packing, bodies.core, near.take(found["status"] == _CROSSING))
     refuse_unconverged(packing, near.take(found["status"] == _UNCONVERGED))
@@ -168,6 +176,7 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
         torque_i=_rotation(found["torque_i"]),
         torque_j=_rotation(found["torque_j"]),
         bonds=_bonds(found, packing.position[near.first]),
+        bonds_are_contacts=bodies.bonds_are_contacts,
     )
 
 
@@ -255,4 +264,5 @@ def _bonds(found: dict[str, NDArray[Any]], position: FloatArray) -> Bonds:
         reach=column("reach"),
         energy=column("energy"),
         on_side=column("on_side"),
+        on_face=column("on_face"),
     )

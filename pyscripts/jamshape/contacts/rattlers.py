@@ -27,20 +27,25 @@ class Coordination(NamedTuple):
 def find_rattlers(packing: Packing, network: ContactNetwork) -> BoolArray:
     """Flag the particles that no contacts hold in place.
 
-    Marschall & Teitel 2018, Sec. III C: fewer than two contacts, or two unless on opposite flat
-    sides; repeated until none is left. In 3D fewer than four contacts.
+    Marschall & Teitel 2018, Sec. III C, for any shape and dimension D: fewer than two contacts, or fewer
+    than 3 in the plane that is not two on opposite flat sides; in space fewer than four, unless two of
+    them lie on opposite faces. Repeated until none is left.
 
     Returns
     -------
     (N,) array of bool
     """
-    bonds = network.bonds
-    normals = np.zeros((len(network.pairs), 3))
-    flat = np.repeat((network.kind == ContactKind.SIDE_TO_SIDE)[:, None], 2, axis=1)
-    first_bond = np.searchsorted(bonds.contact, np.arange(len(normals)))
-    normals[:, : packing.dimension] = bonds.normal[first_bond]
-    np.logical_or.at(flat, bonds.contact, bonds.on_side)
-    return _contact.find_rattlers(packing.n, packing.dimension, network.pairs, normals, flat)
+    bonds, n_contacts = network.bonds, len(network.pairs)
+    if network.bonds_are_contacts:
+        pairs, normal, on_face = network.pairs[bonds.contact], bonds.normal, bonds.on_face
+    else:
+        pairs = network.pairs
+        normal = bonds.normal[np.searchsorted(bonds.contact, np.arange(n_contacts))]
+        on_face = np.zeros((n_contacts, 2), dtype=np.bool_)
+        np.logical_or.at(on_face, bonds.contact, bonds.on_face)
+    normals = np.zeros((len(pairs), 3))
+    normals[:, : packing.dimension] = normal
+    return _contact.find_rattlers(packing.n, packing.dimension, pairs, normals, on_face)
 
 
 def coordination(packing: Packing, network: ContactNetwork) -> Coordination:

@@ -54,6 +54,7 @@ from jamshape.files.layout import (
 )
 from jamshape.files.vocabulary import FORMAT_VERSION, renamed
 from jamshape.packing import Packing
+from jamshape.shapes.table import DEFAULT
 
 __all__ = [
     "HDF5_SIGNATURE",
@@ -68,6 +69,7 @@ __all__ = [
     "read_packing",
     "read_report",
     "read_series",
+    "read_style",
     "replacing",
     "require_attributes",
     "write_packing",
@@ -166,6 +168,13 @@ def require_attributes(out: Path, expected: Mapping[str, Any], what: str = "a pa
                 " write to another file, or make it again"
             )
             raise ValueError(msg)
+
+
+def read_style(path: PathLike) -> tuple[str, int]:
+    """Read the name of the shape and the dimension, without the arrays; errors as `read_packing`."""
+    with layout.opened(path) as file:
+        style = layout.require_item(file, "particles/all").attrs.get("shape_style", DEFAULT)
+        return str(style), int(layout.require_item(file, "particles/all/box").attrs["dimension"])
 
 
 def read_format_version(path: PathLike) -> int:

@@ -206,7 +206,7 @@ def create_particles(group: h5py.Group, packing: Packing) -> None:
         group[name] = getattr(packing, name)
     if packing.shape.has_exponent:
         group["exponent"] = packing.exponent
-    for name, value in frame_values(packing, rests=has_rests(packing)).items():
+    for name, value in frame_values(packing, rests=packing.has_rests).items():
         element = group.create_group(name)
         create_rows(element, "value", value)
         if name == "position":
@@ -215,11 +215,6 @@ def create_particles(group: h5py.Group, packing: Packing) -> None:
             element["step"], element["time"] = group["position/step"], group["position/time"]
     group["box"].attrs["dimension"] = packing.dimension
     group["box"].attrs["boundary"] = np.array([b"periodic"] * packing.dimension)
-
-
-def has_rests(packing: Packing) -> bool:
-    """Whether coordinates are known to more digits than doubles hold."""
-    return any(getattr(packing, name).any() for name in RESTS)
 
 
 def create_rests(group: h5py.Group, packing: Packing, n: int) -> None:
@@ -254,7 +249,7 @@ def append_frame(group: h5py.Group, packing: Packing) -> None:
     """Write a frame after the last one."""
     position = group["position"]
     n = len(position["step"])
-    if has_rests(packing) and "position_rest" not in group:
+    if packing.has_rests and "position_rest" not in group:
         create_rests(group, packing, n)
     for name, value in frame_values(packing, rests="position_rest" in group).items():
         put(group[name]["value"], n, value)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import UNIT_QUATERNION_TOLERANCE
-from jamshape.shapes.superellipsoid_size import director_axis
+from jamshape.shapes.roundness import director_axis
 
 # So many cosines are held at a time, 16 MB.
 _BLOCK = 2_000_000
@@ -39,7 +39,7 @@ def directors(axes: ArrayLike, semi_axes: ArrayLike) -> FloatArray:
     axes : (N, 3, 3) array_like
         From `jamshape.packing.body_axes`.
     semi_axes : (3,) or (N, 3) array_like, [length]
-        Of all particles or of each; `jamshape.shapes.superellipsoid_size.director_axis` says which axis.
+        Of all particles or of each; `jamshape.shapes.roundness.director_axis` says which axis.
 
     Returns
     -------

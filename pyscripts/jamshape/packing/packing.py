@@ -260,6 +260,11 @@ class Packing:
         """Packing fraction: sum of areas (volumes) over that of the box."""
         return float(np.sum(self.measures)) / self.box.volume
 
+    @property
+    def has_rests(self) -> bool:
+        """Whether coordinates are known to more digits than doubles hold."""
+        return any(getattr(self, rest).any() for rest in _REST_OF.values())
+
     def poses(self) -> tuple[LongArray, LongArray, LongArray]:
         """Position, orientation and box edges to all digits that are known, as longdouble."""
         pairs = (

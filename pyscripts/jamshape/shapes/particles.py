@@ -106,8 +106,8 @@ class Particles:
         """
         its = shape_named(shape) if isinstance(shape, str) else shape
         ratio = its.size_ratio if size_ratio is None else size_ratio
-        if not ratio >= 1:
-            msg = f"size_ratio is {ratio}, expected big over small, at least 1"
+        if not 1 <= ratio < math.inf:
+            msg = f"size_ratio is {ratio}, expected big over small, finite and at least 1"
             raise ValueError(msg)
         chosen = _with_defaults(its, parameters)
         sizes = [1.0] if ratio == 1 else [1.0, ratio]
@@ -197,11 +197,13 @@ def _text(kind: Kind) -> str:
 
 def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, float]:
     known = {p.name: p.default for p in shape.parameters}
-    for name in parameters:
+    by_option = {p.option: p.name for p in shape.parameters}
+    given = {by_option.get(name, name): float(value) for name, value in parameters.items()}
+    for name in given:
         if name not in known:
             msg = f"{name} is no parameter of {shape.name}s, expected {', '.join(known)}"
             raise ValueError(msg)
-    chosen = known | {name: float(value) for name, value in parameters.items()}
+    chosen = known | given
     shape.sizes(chosen, np.ones(1))  # refuses what is out of range
     return chosen
 

@@ -56,6 +56,8 @@ class Shape(ABC):
     parameters: ClassVar[tuple[Parameter, ...]]
     unit: ClassVar[str]
     """The length that is 1 for a particle of size 1."""
+    examples: ClassVar[tuple[Mapping[str, float], ...]]
+    """Parameters that take all paths of its contacts between them, the most typical ones first: to test with."""
     dimension: ClassVar[int] = 2
     """Of packings, when nobody says."""
     size_ratio: ClassVar[float] = 1.0
@@ -102,6 +104,12 @@ class Shape(ABC):
         ValueError
             If a parameter is out of its range.
         """
+
+    @abstractmethod
+    def parameters_of(
+        self, diameters: FloatArray, exponent: float
+    ) -> tuple[dict[str, float], float]:
+        """Tell the parameters and the size of one particle, of (3,) diameters: the inverse of `sizes`."""
 
     def style(self, packing: Any, law: Interaction) -> Style:
         """Tell LAMMPS of a packing of this shape."""
@@ -166,6 +174,14 @@ class ElongatedShape(Shape):
         half_length = alpha * radius
         long = 2 * (half_length + radius)
         return np.column_stack([long, 2 * radius, 2 * radius]), np.ones(len(size))
+
+    def parameters_of(
+        self, diameters: FloatArray, exponent: float
+    ) -> tuple[dict[str, float], float]:
+        """As `Shape.parameters_of`."""
+        del exponent
+        width = float(diameters[1])
+        return {"alpha": float(diameters[0] - width) / width}, width
 
     def spine(self, diameters: FloatArray) -> float:
         """As `Shape.spine`."""

@@ -20,6 +20,7 @@ class Spherocylinder(ElongatedShape):
 
     name = "spherocylinder"
     compiled_name = "Spherocylinders"
+    examples = ({"alpha": 4.0}, {"alpha": 0.01}, {"alpha": 0.0})
 
     def style(self, packing: Any, law: Interaction) -> Style:
         """As `Shape.style`; `sides` says how many bonds a side-to-side contact has."""

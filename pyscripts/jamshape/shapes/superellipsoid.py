@@ -12,8 +12,8 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.shapes.mesh import SurfaceMesh, arc
+from jamshape.shapes.roundness import asphericity, axes_from, reduced_aspect_ratio
 from jamshape.shapes.shape import Interaction, Parameter, Shape, Style
-from jamshape.shapes.superellipsoid_size import asphericity, axes_from, reduced_aspect_ratio
 from jamshape.shapes.superellipsoid_surface import surface_mesh
 
 
@@ -29,6 +29,12 @@ class Superellipsoid(Shape):
     )
     unit = "a"
     dimension = 3
+    examples = (
+        {"exponent": 1.5, "w1": 0.8, "w2": 1.3},
+        {"exponent": 0.75, "w1": 0.8, "w2": 1.3},
+        {"exponent": 1.0, "w1": 0.7, "w2": 1.4},
+        {"exponent": 1.0, "w1": 1.0, "w2": 1.0},
+    )
     has_exponent = True
 
     def fits(self, diameters: FloatArray) -> bool:
@@ -49,6 +55,13 @@ class Superellipsoid(Shape):
             msg = f"the exponent is {p}, expected p > 0.5, for which bodies are convex"
             raise ValueError(msg)
         return size[:, None] * (2 * axes), np.full(len(size), p)
+
+    def parameters_of(
+        self, diameters: FloatArray, exponent: float
+    ) -> tuple[dict[str, float], float]:
+        """As `Shape.parameters_of`; in units of a, the shortest of the semi-axes."""
+        a, b, c = (float(axis) for axis in np.sort(diameters) / 2)
+        return {"exponent": float(exponent), "w1": a / b, "w2": c / b}, a
 
     def style(self, packing: Any, law: Interaction) -> Style:
         """As `Shape.style`; exponents are per type in LAMMPS."""

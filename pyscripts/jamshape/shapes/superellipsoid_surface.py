@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.shapes.mesh import SurfaceMesh
-from jamshape.shapes.superellipsoid_size import checked
+from jamshape.shapes.roundness import checked
 
 # Newton's method on logarithms: steps below this are rounding, and it takes about ten.
 _STILL = 1e-12

@@ -18,7 +18,7 @@ from jamshape import _contact
 from jamshape.contacts import find_contacts, forces
 from jamshape.contacts.near import near_particles
 from jamshape.landscape import CrossingError, Landscape, State
-from jamshape.shapes.superellipsoid_size import volume
+from jamshape.shapes.roundness import volume
 
 
 def two_in_a_tiny_box():

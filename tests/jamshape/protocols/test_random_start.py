@@ -200,7 +200,7 @@ def test_refuses(arguments, sentence):
 
 
 def test_mixture_refuses():
-    with pytest.raises(ValueError, match=r"size_ratio is 0\.5, expected big over small"):
+    with pytest.raises(ValueError, match=r"size_ratio is 0\.5, expected big over small, finite"):
         bidisperse(4, 0.5)
     for mixture in (bidisperse, monodisperse):
         with pytest.raises(

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from jamshape.shapes.superellipsoid_size import surface_area, volume
+from jamshape.shapes.roundness import surface_area, volume
 from jamshape.shapes.superellipsoid_surface import surface_mesh
 
 EXPONENTS = [0.5, 0.55, 0.75, 1.0, 1.5, 2.0, 10.0, 20.0]

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from jamshape.packing import body_axes
-from jamshape.shapes.superellipsoid_curvature import (
+from jamshape.shapes.curvature import (
     contact_curvatures,
     curvature_at_normals,
     curvature_at_points,

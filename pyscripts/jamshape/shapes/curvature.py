@@ -7,7 +7,7 @@ With u, v, w = :math:`|x/a|^{2p}, |y/b|^{2p}, |z/c|^{2p}` at a point of the surf
 
 It is 1 on a sphere. Where one of u, v, w is 0, at the three planes of symmetry that are square to the
 axes, it is 0 for p > 1 (flat in one direction, at the six points on the axes in both) and infinite for
-p < 1 (an edge, at the axes a tip). Shapes are those of `jamshape.shapes.superellipsoid_size`.
+p < 1 (an edge, at the axes a tip). Shapes are those of `jamshape.shapes.roundness`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray, IntArray
-from jamshape.shapes.superellipsoid_size import OCTAHEDRON, checked
+from jamshape.shapes.roundness import OCTAHEDRON, checked
 
 
 def curvature_at_normals(semi_axes: ArrayLike, p: ArrayLike, normals: ArrayLike) -> FloatArray:

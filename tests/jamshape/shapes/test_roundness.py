@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from jamshape.shapes.superellipsoid_size import (
+from jamshape.shapes.roundness import (
     asphericity,
     axes_from,
     director_axis,

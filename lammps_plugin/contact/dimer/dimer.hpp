@@ -1,0 +1,243 @@
+#pragma once
+
+#include "contact/contact.hpp"
+#include "contact/harmonic.hpp"
+#include "contact/math/rotation.hpp"
+#include "contact/math/vec.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace jamshape {
+
+/// Two equal discs (balls in 3D) of radius R with centres at +-A on the body's x, joined rigidly;
+/// for A < R they run into each other.
+struct Dimer {
+  double half_length;
+  double radius;
+};
+
+/// From the semi-axes that LAMMPS stores, (A + R, R, R); nothing when they are of another shape.
+inline std::optional<Dimer> dimer_from(const Vec<3> &semi_axes)
+{
+  const double A = semi_axes[0] - semi_axes[1], R = semi_axes[1];
+  if (!(A >= 0.0) || !(R > 0.0) || R != semi_axes[2] || !std::isfinite(A)) return std::nullopt;
+  return Dimer{A, R};
+}
+
+/// Area (volume in 3D) and moments of the union: twice the part of one disc that lies on its side
+/// of the middle. With x from that disc's centre, it ends at x = -h, h = min(A, R).
+template <int D> SubstrateDrag substrate_drag(const Dimer &shape);
+
+template <> inline SubstrateDrag substrate_drag<2>(const Dimer &shape)
+{
+  const double A = shape.half_length, R = shape.radius;
+  const double c = std::min(A / R, 1.0), s = std::sqrt((1.0 - c) * (1.0 + c)), cs = c * s;
+  const double angle = M_PI - std::acos(c), by_angle = cs * (2.0 * c * c - 1.0);
+  const double area = R * R * (angle + cs);
+  const double x = 2.0 / 3.0 * R * R * R * s * s * s;  // integrals of x, x^2 and y^2 over the part
+  const double xx = 0.25 * R * R * R * R * (angle + by_angle);
+  const double yy = R * R * R * R * (0.25 * angle + cs / 3.0 - by_angle / 12.0);
+  return {2.0 * area, {{0.0, 0.0, A * A + (2.0 * A * x + xx + yy) / area}}};
+}
+
+template <> inline SubstrateDrag substrate_drag<3>(const Dimer &shape)
+{
+  const double A = shape.half_length, R = shape.radius, h = std::min(A, R);
+  const double R2 = R * R, R3 = R2 * R, R5 = R3 * R2, h2 = h * h, h3 = h2 * h, h5 = h3 * h2;
+  const double volume = M_PI * (2.0 / 3.0 * R3 + R2 * h - h3 / 3.0);
+  const double x = 0.25 * M_PI * (R2 - h2) * (R2 - h2);  // of x, x^2 and y^2 + z^2
+  const double xx = M_PI * (2.0 / 15.0 * R5 + R2 * h3 / 3.0 - 0.2 * h5);
+  const double across =
+      0.5 * M_PI * (8.0 / 15.0 * R5 + R2 * R2 * h - 2.0 / 3.0 * R2 * h3 + 0.2 * h5);
+  const double about_y = A * A + (2.0 * A * x + xx + 0.5 * across) / volume;
+  return {2.0 * volume, {{across / volume, about_y, about_y}}};
+}
+
+/// Shape and pose of one particle, as the pair loops read it.
+template <int D, class S = double> struct DimerBody {
+  Vec<D, S> centre;
+  Vec<D, S> axis;
+  double half_length;
+  double radius;
+
+  /// From the centre to that of the first or the second disc.
+  Vec<D, S> to_disc(int which) const { return S(which == 0 ? half_length : -half_length) * axis; }
+};
+
+struct DimerLaw {
+  Harmonic harmonic;
+};
+
+/// Contact of two dimers: V is the sum over the up to four pairs of discs of the harmonic law of
+/// their overlaps 1 - r/d, each a bond that acts along the line of their centres.
+template <int D, class S> class DimerContact {
+ public:
+  using Found = Contact<D, S, 4>;
+
+  DimerContact(const DimerBody<D, S> &body_i, const DimerBody<D, S> &body_j, const DimerLaw &of) :
+      i(body_i), j(body_j), r(body_i.centre - body_j.centre), law(of.harmonic),
+      reach(body_i.radius + body_j.radius)
+  {
+  }
+
+  Found evaluate() const
+  {
+    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
+    for (int a = 0; a < 2; ++a) {
+      const Vec<D, S> arm_i = i.to_disc(a);
+      for (int b = 0; b < 2; ++b) add_bond(contact, arm_i, j.to_disc(b));
+    }
+    return contact;
+  }
+
+ private:
+  const DimerBody<D, S> &i, &j;
+  Vec<D, S> r;
+  Harmonic law;
+  double reach;
+
+  /// Of the discs at these arms, if they touch; where their centres lie on each other there is
+  /// none.
+  void add_bond(Found &contact, const Vec<D, S> &arm_i, const Vec<D, S> &arm_j) const
+  {
+    if (contact.status == ContactStatus::CROSSING) return;
+    const Vec<D, S> apart = r + arm_i - arm_j;
+    const ValueOf<S> square = norm_sq(values_of(apart)), d = reach;
+    if (!(square < d * d)) return;
+    if (square <= COINCIDENT * d * COINCIDENT * d) {
+      contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
+      return;
+    }
+    contact.status = ContactStatus::TOUCHING;
+    fill(contact.bond[contact.n_bonds++], arm_i, arm_j, apart);
+    const Bond<D, S> &bond = contact.bond[contact.n_bonds - 1];
+    contact.energy += bond.energy;
+    contact.force += bond.force;
+    contact.torque_i += cross(arm_i, bond.force);
+    contact.torque_j -= cross(arm_j, bond.force);
+  }
+
+  void fill(Bond<D, S> &bond, const Vec<D, S> &arm_i, const Vec<D, S> &arm_j,
+            const Vec<D, S> &apart) const
+  {
+    const S distance = norm(apart), overlap = (reach - distance) / reach;
+    bond.normal = (1.0 / distance) * apart;
+    // In dual numbers the law's slope is a constant: `own_stiffness` stands for what it leaves out.
+    bond.force = (law.energy_gradient(constant(overlap)) / reach) * bond.normal;
+    bond.arm_i = arm_i - (i.radius / reach * distance) * bond.normal;  // where surfaces overlap
+    bond.lever_i = cross(arm_i, bond.normal);
+    bond.lever_j = -cross(arm_j, bond.normal);
+    bond.distance = distance;
+    bond.reach = reach;
+    bond.energy = law.energy(overlap);
+    bond.stiffness = bond.own_stiffness = law.energy_hessian(overlap) / (reach * reach);
+    bond.on_side_i = bond.on_side_j = false;
+  }
+};
+
+template <int D, class S>
+Contact<D, S, 4> contact_of(const DimerBody<D, S> &i, const DimerBody<D, S> &j, const DimerLaw &law)
+{
+  return DimerContact<D, S>(i, j, law).evaluate();
+}
+
+/// What is asked of a shape (see SpherocylinderModel).
+struct DimerModel {
+  using Shape = Dimer;
+  using Law = DimerLaw;
+  template <int D, class S = double> using Body = DimerBody<D, S>;
+
+  static constexpr const char *NAME = "dimer";
+  static constexpr const char *SHAPE_RULE =
+      "a dimer has diameters (2(A+R), 2R, 2R), its two discs on the body's x";
+  static constexpr const char *CORE = "centres";
+  static constexpr int MOST_BONDS = 4;
+  static constexpr bool HAS_SIDES = false;
+  /// Each pair of discs holds like one, whatever others the two dimers share.
+  static constexpr bool BONDS_ARE_CONTACTS = true;
+
+  static Law law(double k_e, Sides, bool /*shortcuts*/ = true) { return {{k_e}}; }
+
+  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)
+  {
+    return dimer_from(semi_axes);
+  }
+
+  template <int D> static Shortcut shortcut(const Shape &) { return Shortcut::NONE; }
+  template <int D> static bool turns(const Shape &shape) { return shape.half_length > 0.0; }
+
+  template <int D> static SubstrateDrag drag(const Shape &shape)
+  {
+    return substrate_drag<D>(shape);
+  }
+  template <int D> static double outer_radius(const Shape &shape)
+  {
+    return shape.half_length + shape.radius;
+  }
+  template <int D> static double inner_radius(const Shape &shape) { return shape.radius; }
+  template <int D> static double rotation_length(const Shape &shape) { return shape.half_length; }
+  template <int D> static double turning_radius(const Shape &shape) { return shape.half_length; }
+  static std::optional<int> symmetry_axis(const Shape &shape) { return director<3>(shape); }
+  template <int D> static std::optional<int> director(const Shape &shape)
+  {
+    return turns<D>(shape) ? std::optional<int>(0) : std::nullopt;
+  }
+
+  template <int D, class S = double> static Body<D, S> body(const Shape &shape)
+  {
+    Vec<D, S> along_x{};
+    along_x[0] = 1.0;
+    return {{}, along_x, shape.half_length, shape.radius};
+  }
+
+  template <int D, class S> static void turn_to(Body<D, S> &body, const QuaternionOf<S> &q)
+  {
+    body.axis = long_axis<D, S>(q);
+  }
+
+  /// Discs have no faces.
+  template <int D, class S>
+  static OnFaces on_faces(const Contact<D, S, MOST_BONDS> &, int, const Body<D, S> &,
+                          const Body<D, S> &)
+  {
+    return {false, false};
+  }
+
+  /// Whether the surfaces of i and j are closer than `margin`.
+  template <int D> static bool closer_than(double margin, const Body<D> &i, const Body<D> &j)
+  {
+    const Vec<D> r = i.centre - j.centre;
+    const double reach = i.radius + j.radius + margin;
+    const double bounding = reach + i.half_length + j.half_length;
+    if (!(norm_sq(r) < bounding * bounding)) return false;
+    for (int a = 0; a < 2; ++a) {
+      for (int b = 0; b < 2; ++b) {
+        if (norm_sq(r + i.to_disc(a) - j.to_disc(b)) < reach * reach) return true;
+      }
+    }
+    return false;
+  }
+
+  template <int D> struct Pose {
+    Vec<D> centre, axis;
+  };
+  template <int D> static Pose<D> pose(const Body<D> &body) { return {body.centre, body.axis}; }
+
+  /// The larger of the squared distances |dx +- A du| that the two centres moved.
+  template <int D>
+  static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
+  {
+    const Vec<D> turned = now.half_length * (now.axis - then.axis);
+    return norm_sq(shift) + norm_sq(turned) + 2.0 * std::abs(dot(shift, turned));
+  }
+};
+
+/// Whether two bodies share more than a point: for Monte Carlo of hard particles.
+template <int D> bool are_overlapping(const DimerBody<D> &i, const DimerBody<D> &j)
+{
+  return DimerModel::closer_than<D>(0.0, i, j);
+}
+
+}  // namespace jamshape

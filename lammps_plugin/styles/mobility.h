@@ -1,0 +1,76 @@
+#pragma once
+
+#include "contact/math/vec.hpp"
+
+#include "atom.h"
+#include "domain.h"
+#include "pointers.h"
+
+#include <vector>
+
+namespace jamshape {
+
+class PairContact;
+
+/// Velocity and angular velocity of a particle relative to the affine motion, in space coordinates.
+struct Rate {
+  Vec<3> shift, turn;
+};
+
+/// Rates as rows of 3 numbers in the plane, 6 in space, without the components that are zero.
+inline int rate_width(int dimension) { return dimension == 2 ? 3 : 6; }
+Rate read_rate(const double *from, int dimension);
+void write_rate(double *to, const Rate &rate, int dimension);
+
+/// What forces do to the particles of this rank against the drag of the substrate (Marschall &
+/// Teitel 2018, Eqs. 8-12).
+class Mobilities : protected LAMMPS_NS::Pointers {
+ public:
+  Mobilities(LAMMPS_NS::LAMMPS *lmp, double k_d) :
+      Pointers(lmp), drag(k_d), is_plane(domain->dimension == 2), pair(nullptr)
+  {
+  }
+
+  /// Of one kind of particle.
+  struct Mobility {
+    double shift;
+    Vec<3> turn;      // per body axis
+    double shortest;  // semi-axis
+    double longest;   // what a turn moves at most
+    double gyration;  // length that a radian stands for
+  };
+
+  /// Reads sizes of own atoms; after every exchange of atoms.
+  void measure(const PairContact &of);
+  const Mobility &operator[](int i) const { return kinds[kind[i]]; }
+  const std::vector<Mobility> &all_kinds() const { return kinds; }
+
+  /// The rate that a force and torque give, that of the present ones, and the force and torque (in
+  /// the places of a rate) that a rate takes.
+  Rate times(int i, const Vec<3> &force, const Vec<3> &torque) const
+  {
+    const Mobility &m = (*this)[i];
+    if (is_plane) return {m.shift * force, {{0.0, 0.0, m.turn[2] * torque[2]}}};
+    return {m.shift * force, turn_in_space(i, torque)};
+  }
+  Rate present_rate(int i) const
+  {
+    const double *const f = atom->f[i], *const t = atom->torque[i];
+    return times(i, {{f[0], f[1], f[2]}}, {{t[0], t[1], t[2]}});
+  }
+  Rate resistance_times(int i, const Rate &rate) const;
+
+  double memory_usage() const;
+
+ private:
+  const double drag;
+  const bool is_plane;
+  const PairContact *pair;
+  std::vector<Mobility> kinds;
+  std::vector<int> kind;  // of own atoms
+
+  Vec<3> turn_in_space(int i, const Vec<3> &torque) const;
+  Mobility mobility_of(const Vec<3> &semi_axes, int type) const;
+};
+
+}  // namespace jamshape

@@ -1,0 +1,43 @@
+"""Dimers: two equal discs (spheres) of radius R joined rigidly, their centres A from the middle along x.
+
+They overlap where A < R. Contacts: `lammps_plugin/contact/dimer/`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.shapes.mesh import SurfaceMesh, arc, revolved
+from jamshape.shapes.shape import ElongatedShape, Parameter
+
+
+class Dimer(ElongatedShape):
+    """Dimers with the harmonic law of the overlap 1 - r/d of every pair of discs."""
+
+    name = "dimer"
+    compiled_name = "Dimers"
+    parameters = (Parameter("alpha", 1.0, "A/R: 1 where the discs just touch", "alpha"),)
+    examples = ({"alpha": 1.0}, {"alpha": 0.4}, {"alpha": 1.3}, {"alpha": 0.0})
+
+    def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
+        """As `Shape.outline`."""
+        del exponent
+        radius, A = diameters[1] / 2, self.spine(diameters)
+        waist = self._waist(radius, A)
+        right = radius * arc(waist - np.pi, np.pi - waist, points // 2) + [A, 0.0]
+        return np.concatenate([right, -right])
+
+    def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
+        """As `Shape.surface`."""
+        del exponent
+        radius, A = diameters[1] / 2, self.spine(diameters)
+        part = arc(np.pi, self._waist(radius, A), 2 + 2 * 2**level)  # of the left sphere
+        normal = np.concatenate([part, part[::-1] * [-1, 1]])
+        centre = np.repeat([[-A, 0.0], [A, 0.0]], len(part), axis=0)
+        return revolved(radius * normal + centre, normal, 8 * 2**level)
+
+    @staticmethod
+    def _waist(radius: float, A: float) -> float:
+        """Angle, seen from a disc's centre, between the line to the other one and where they meet."""
+        return float(np.arccos(min(A / radius, 1.0)))

@@ -1,0 +1,101 @@
+"""Distributions of particles, and the options that name them."""
+
+import re
+from argparse import ArgumentParser
+
+import numpy as np
+import pytest
+
+from jamshape.shapes.command_line import add_particle_options, particles_of
+from jamshape.shapes.particles import Kind, Particles, parse_kind
+from jamshape.shapes.table import SHAPES, guess_shape_style, shape_named
+
+
+def drawn(particles, n=100, seed=1):
+    return particles.sample(n, np.random.default_rng(seed))
+
+
+def from_options(*options):
+    parser = ArgumentParser()
+    add_particle_options(parser)
+    return particles_of(parser.parse_args(options))
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_sizes_and_parameters_are_inverse(name):
+    shape = shape_named(name)
+    for parameters in shape.examples:
+        diameters, exponent = shape.sizes(parameters, np.array([1.0, 2.5]))
+        assert shape.fits(diameters)
+        for k, size in enumerate((1.0, 2.5)):
+            found, its_size = shape.parameters_of(diameters[k], exponent[k])
+            assert its_size == pytest.approx(size, rel=1e-15)
+            assert found == pytest.approx(dict(parameters), rel=1e-14)
+
+
+def test_small_and_big_ones_are_of_the_same_number_and_one_more_small():
+    sizes = drawn(Particles.of(alpha=3.0, size_ratio=2.0), 101)
+    assert np.bincount(sizes.species).tolist() == [0, 51, 50]
+    np.testing.assert_array_equal(sizes.diameters[:, 1], np.where(sizes.species == 1, 1.0, 2.0))
+    np.testing.assert_allclose(sizes.diameters[:, 0] / sizes.diameters[:, 1], 4.0, rtol=1e-15)
+
+
+def test_equal_particles_are_of_one_kind():
+    assert set(drawn(Particles.of(size_ratio=1.0)).species) == {1}
+    assert set(drawn(Particles.of("superellipsoid", exponent=2.0)).species) == {1}
+
+
+def test_shares_are_kept_to_a_particle():
+    kinds = [Kind({"alpha": 0.0}, share=2), Kind({"alpha": 1.0}, share=1), Kind(share=0.5)]
+    sizes = drawn(Particles.mixture("spherocylinder", kinds), 70)
+    assert np.bincount(sizes.species)[1:].tolist() == [40, 20, 10]
+    alpha = sizes.diameters[:, 0] / sizes.diameters[:, 1] - 1
+    np.testing.assert_allclose(alpha, np.array([0.0, 1.0, 4.0])[sizes.species - 1], atol=1e-15)
+
+
+def test_spread_is_that_of_the_logarithm_of_the_size():
+    sizes = drawn(Particles.mixture("spherocylinder", [Kind(size=2.0, spread=0.2)]), 20_000)
+    logs = np.log(sizes.diameters[:, 1])
+    assert logs.std() == pytest.approx(0.2, rel=0.03)
+    assert logs.mean() == pytest.approx(np.log(2.0), abs=0.01)
+
+
+def test_options_name_particles_as_python_does():
+    assert from_options().told == Particles.of().told
+    assert from_options("--alpha", "1", "--size-ratio", "2").told == {"alpha": 1, "size_ratio": 2}
+    boxes = from_options("--shape", "superellipsoid", "--p", "2", "--w1", "0.5")
+    assert boxes.told == {"exponent": 2.0, "w1": 0.5, "w2": 1.0}
+    kinds = ("--shape", "superellipsoid", "--kind", "p=2,share=3", "--kind", "w1=0.5,size=2")
+    sizes = drawn(from_options(*kinds), 8)
+    assert sizes.exponent.tolist() == [2.0] * 6 + [1.0] * 2
+    assert parse_kind("alpha=4, size=1.4") == Kind({"alpha": 4.0}, 1.4)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--p", "2"), "--p is no option of spherocylinders, expected --alpha"),
+        (("--kind", "beta=2"), "beta is no parameter of spherocylinders, expected alpha"),
+        (("--kind", "alpha=2", "--alpha", "3"), "kinds and other sizes were given, expected"),
+        (("--kind", "alpha=2,share=0"), "expected sizes and shares above 0"),
+        (("--kind", "alpha=2,spread=-1"), "and spreads from 0 to 10"),
+        (("--alpha", "-1"), r"alpha is -1\.0, expected A / R"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options, sentence, capsys):
+    with pytest.raises((ValueError, SystemExit)) as error:
+        from_options(*options)
+    said = str(error.value) if error.type is ValueError else capsys.readouterr().err
+    assert re.search(sentence, said)
+
+
+def test_an_empty_mixture_is_refused():
+    with pytest.raises(ValueError, match="has no kinds, expected at least one"):
+        Particles.mixture("spherocylinder", [])
+
+
+def test_unknown_shapes_are_refused():
+    with pytest.raises(ValueError, match="shape style is 'cube', expected one of spherocylinder"):
+        Particles.of("cube")
+    with pytest.raises(ValueError, match="are those of no shape, expected positive lengths"):
+        guess_shape_style(np.array([[1.0, -1.0, 2.0]]))
