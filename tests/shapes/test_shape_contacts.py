@@ -65,9 +65,9 @@ def directions(landscape, number=3, seed=5):
 
 
 def step_of(landscape):
-    """Of differences: 1e-5 of the smallest length, on which energies and bonds' ends depend."""
+    """Of differences: so little of the smallest length on which energies depend."""
     turning = landscape.rotation_length[landscape.rotation_length > 0]
-    return 1e-5 * float(np.min([landscape.inner_radius.min(), *turning]))
+    return 2e-6 * float(np.min([landscape.inner_radius.min(), *turning]))
 
 
 # --- slopes --------------------------------------------------------------------------------------
@@ -233,7 +233,7 @@ def test_exchange_of_both_particles_turns_the_force_about(packing, network):
     bodies, state = packing.compiled(Interaction(1.0, SIDES)), State.of(packing)
     (i, j), shift = network.pairs.T, network.shift
     ahead, back = (
-        bodies.contacts(*PairArrays.of(state, NearPairs(*near)))
+        bodies.contacts(*PairArrays.of(state, NearPairs(*near)), False)
         for near in ((i, j, shift), (j, i, -shift))
     )
     np.testing.assert_array_equal(ahead["pair"], back["pair"])
@@ -356,7 +356,7 @@ def test_pairs_of_bounding_spheres_are_those_of_all_images(packing):
 
 def contacts_among(packing, near):
     bodies, state = packing.compiled(Interaction(1.0, SIDES)), State.of(packing)
-    return near.take(bodies.contacts(*PairArrays.of(state, near))["pair"])
+    return near.take(bodies.contacts(*PairArrays.of(state, near), False)["pair"])
 
 
 def test_contacts_are_those_of_all_pairs_and_hard_particles_overlap_there(packing, network):
@@ -396,7 +396,7 @@ def test_pairs_that_are_not_near_do_not_touch_when_moved_by_the_margin(packing):
             if far.first[k] == far.second[k]:
                 continue
             arrays = PairArrays.of(State.joined(moved, orientation, edges), far.take(np.array([k])))
-            assert not len(bodies.contacts(*arrays)["pair"])
+            assert not len(bodies.contacts(*arrays, False)["pair"])
 
 
 # --- what is refused -----------------------------------------------------------------------------
