@@ -1,4 +1,4 @@
-"""The cases of analysis/stability_report.py, one test each, and the report itself."""
+"""The cases of analysis/stability/stability_report.py, one test each, and the report itself."""
 
 import argparse
 import json
@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "analysis"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "analysis" / "stability"))
 
 import stability_report
-from stability_cases import Case, all_cases
+from battery.case import Case
+from battery.cases import all_cases
 
 pytestmark = pytest.mark.lammps
 
@@ -34,7 +35,7 @@ KNOWN = {
     },
     **{f"contact of superellipsoids: aligned to 1e-12, p {p}": _ROUNDING for p in ("0.55", "10")},
     **{
-        f"LAMMPS minimize: alpha 1e-6 to 100 in one box, {style}, line quadratic": _LINE_SEARCH
+        f"LAMMPS minimize, spherocylinders: alpha 1e-6 to 100 in one box, {style}, line quadratic": _LINE_SEARCH
         for style in ("cg", "sd")
     },
 }

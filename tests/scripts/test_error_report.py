@@ -6,14 +6,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+ERRORS = ROOT / "analysis" / "errors"
 
 
 @pytest.fixture
 def error_report(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "analysis"))
+    monkeypatch.syspath_prepend(str(ERRORS))
     module = __import__("error_report")
-    few = module.STUDIES["contact"]._replace(short=["analysis/contact_error.py --pairs 3 --out ."])
-    bad = few._replace(title="Fails", short=["analysis/spectrum_error.py none.h5"])
+    command = "analysis/errors/contact_error.py --pairs 3 --out ."
+    few = module.STUDIES["contact"]._replace(short=[command])
+    bad = few._replace(title="Fails", short=["analysis/errors/spectrum_error.py none.h5"])
     monkeypatch.setattr(module, "STUDIES", {"contact": few, "bad": bad})
     return module
 
@@ -28,7 +30,7 @@ def test_a_study_is_run_once_and_its_page_regenerates_it(error_report, tmp_path,
     report = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert report["studies"] == ["contact"]
     page = (tmp_path / "report.md").read_text()
-    assert "    .venv/bin/python analysis/contact_error.py --pairs 3 --out ." in page
+    assert "    .venv/bin/python analysis/errors/contact_error.py --pairs 3 --out ." in page
     assert "| p | w | largest gap |" in page
     assert "numpy" in page
     assert "](overview.png)" in page
@@ -60,7 +62,7 @@ def test_a_study_that_fails_does_not_stop_the_others(error_report, tmp_path, cap
 
 
 def test_scripts_of_all_studies_exist(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "analysis"))
+    monkeypatch.syspath_prepend(str(ERRORS))
     sys.modules.pop("error_report", None)
     for study in __import__("error_report").STUDIES.values():
         for command in (*study.short, *study.full):
