@@ -9,7 +9,8 @@ from typing import Any
 from jamshape.files.sets import PackingFile, System, conditions, n_of
 from jamshape.measures.runs import Ensemble
 from jamshape.shapes.particles import parse_kind
-from jamshape.shapes.table import shape_named
+from jamshape.shapes.shape import Shape
+from jamshape.shapes.table import SHAPES, shape_named
 
 _NUMBERS = {"n": "N", "size_ratio": "R_b/R_s", "kappa": r"\kappa"}
 _SYMBOLS = {"u0": "u_0", "kappa": r"\kappa"}
@@ -70,6 +71,13 @@ def system_text(system: System) -> str:
     return shape_named(system.shape).label(known) if known else ""
 
 
+def is_told_by_parameters(shape: Shape) -> bool:
+    """Whether it is what is meant where nothing but parameters is told: the first shape with these."""
+    names = [p.name for p in shape.parameters]
+    alike = (s for s in SHAPES.values() if [p.name for p in s.parameters] == names)
+    return next(alike).name == shape.name
+
+
 def mixture_text(system: System) -> str:
     """Name the kinds of a mixture, as far as its file does, by parameters, size and share."""
     shape = shape_named(system.shape)
@@ -85,14 +93,17 @@ def mixture_text(system: System) -> str:
 
 
 def system_labels(systems: Collection[System]) -> dict[System, str]:
-    """Name what tells systems apart, for a legend; their parameters in any case."""
+    """Name what tells systems apart, for a legend; their parameters, and what is unusual, in any case."""
     shapes, dimensions, protocols = (
         {getattr(system, name) for system in systems} for name in ("shape", "dimension", "protocol")
     )
     labels = {}
     for system in systems:
-        parts = [f"{system.shape}s"] * (len(shapes) > 1)
-        parts += [f"{system.dimension}D"] * (len(dimensions) > 1)
+        shape = shape_named(system.shape)
+        parts = [f"{shape.name}s"] * (len(shapes) > 1 or not is_told_by_parameters(shape))
+        parts += [f"{system.dimension}D"] * (
+            len(dimensions) > 1 or system.dimension != shape.dimension
+        )
         parts += [system_text(system)]
         parts += [protocol_text(system)] * (len(protocols) > 1)
         labels[system] = ", ".join(part for part in parts if part)

@@ -50,6 +50,15 @@ def test_labels_tell_what_differs():
     assert unit_text([RODS, BALLS]) == r"(\mathrm{length})"
 
 
+def test_what_is_unusual_is_named():
+    dimer = System("dimer", 2, (("alpha", 1.0),))
+    assert system_labels([dimer]) == {dimer: r"dimers, $\alpha=1$"}
+    assert system_labels([dimer.without("alpha")]) == {dimer.without("alpha"): "dimers"}
+    space = RODS._replace(dimension=3)
+    assert system_labels([space]) == {space: r"3D, $\alpha=4$"}
+    assert system_labels([BALLS]) == {BALLS: "$p=1.5, w_1=1, w_2=1$"}
+
+
 def test_mixtures_are_named_by_their_kinds():
     kinds = [Kind({"alpha": 4.0}), Kind({"alpha": 0.0}, 1.4, 3.0)]
     told = Particles.mixture(ROD, kinds).told["kinds"]
