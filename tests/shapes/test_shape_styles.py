@@ -16,7 +16,6 @@ from every_shape import (
     squeezed,
 )
 from in_lammps import fix_value, forces_of, holding, law_of, on_ranks, vector_of
-
 from slopes import EPS
 
 from jamshape.contacts import coordination, find_contacts, forces, sum_forces
