@@ -77,8 +77,9 @@ template <class Model, int D, class S> class DerivativeArrays {
   NewArray<bool> on_side, on_face;
 };
 
+/// A function of its own: how much is inlined into one is limited by its size.
 template <class Model, int D, class S>
-nb::dict derivatives_in(const ShapeOf<Model> &of, const PairArrays &arrays)
+[[gnu::noinline]] nb::dict derivatives_in(const ShapeOf<Model> &of, const PairArrays &arrays)
 {
   const PosedPairs<Model, D, S> pairs = of.template posed<D, S>(arrays);
   const TurnedBodies<Model, D, S> turned(pairs);

@@ -5,8 +5,9 @@ namespace jamshape {
 
 namespace {
 
+/// A function of its own: how much is inlined into one is limited by its size.
 template <class Model, int D, class S>
-nb::dict sums_in(const ShapeOf<Model> &of, const PairArrays &arrays)
+[[gnu::noinline]] nb::dict sums_in(const ShapeOf<Model> &of, const PairArrays &arrays)
 {
   const PairSums<D, S> sums = sum_over(of.template posed<D, S>(arrays), of.n());
   NewArray<double> force({of.n(), D}), torque({of.n(), ROTATIONS<D>});
