@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from every_shape import (
     ALL,
+    EPS,
     MIXTURES,
     SIDES,
     TYPICAL,
@@ -20,7 +21,7 @@ from every_shape import (
     taken,
     turned_as_a_whole,
 )
-from slopes import EPS, assert_is_slope
+from slopes import assert_is_slope
 
 from jamshape.contacts import CrossingError, PairArrays, find_contacts, forces, near_pairs, sum_forces
 from jamshape.contacts.near import NearPairs, Spheres, each_once, near_particles

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from every_shape import (
     ALL,
+    EPS,
     MIXTURES,
     SIDES,
     TYPICAL,
@@ -17,7 +18,6 @@ from every_shape import (
 )
 from in_lammps import fix_value, forces_of, holding, law_of, on_ranks, vector_of
 
-from slopes import EPS
 
 from jamshape.contacts import coordination, find_contacts, forces, sum_forces
 from jamshape.files.lammps_text import read_data, read_dump, write_data
