@@ -1,7 +1,7 @@
 """What a scene leaves out, and what that saves: each turned back on, by paired timings.
 
-    python analysis/scene_savings.py --out runs/scene_savings
-    python analysis/scene_savings.py --quick
+    python analysis/benchmarks/scene_savings.py --out runs/scene_savings
+    python analysis/benchmarks/scene_savings.py --quick
 
 Two instances of LAMMPS hold the same state, one as it is, one with something turned back on that the scene
 does not need (`pair_style ... general WHAT`, a fix that asks for energy and virial every step, the plane in
@@ -16,13 +16,12 @@ only if all differences are rounding.
 
 from __future__ import annotations
 
-import argparse
 import csv
-import json
-import sys
 import time
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,15 +29,16 @@ import numpy as np
 from tqdm import tqdm
 
 from jamshape.arrays import FloatArray
-from jamshape.files.lammps_text import read_data, write_data
+from jamshape.command import parser_of, report, run
+from jamshape.files.h5md import read_packing, write_packing
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
-from jamshape.landscape import Landscape, State
-from jamshape.packing import Box, Packing
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.landscape import Landscape
+from jamshape.packing import Box, Packing, State
+from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Particles
+from jamshape.shapes.shape import Interaction
 
-PHI_START, PHI = 0.4, 0.86
-PHI_3D = {1.0: 0.66, 1.5: 0.72}  # under the semi-axis w
 KEPT, CHECKED = "delay 2000000000 every 1 check no", "delay 0 every 1 check yes"
 TALLY = """compute virial all pressure NULL virial
            fix tally all ave/time 1 1 1 c_thermo_pe c_virial"""
@@ -47,12 +47,23 @@ ROUNDING = 1e-11
 
 
 class Scene(NamedTuple):
-    """A state on disk and its pair style."""
+    """How a state is made: particles, compressed from a dilute start."""
 
-    path: Path
+    particles: Particles
     dimension: int
-    pair: str
-    step: str
+    phi_start: float
+    settings: Compression
+
+
+FLOW = "fix flow all overdamped/affine drag 1 compress 1e-4\ntimestep 0.05"
+SCENES = {
+    "discs": Scene(Particles.of(alpha=0.0), 2, 0.4, Compression(1e-3, 0.86, 0.1)),
+    "rods": Scene(Particles.of(alpha=4.0), 2, 0.4, Compression(1e-3, 0.86, 0.1)),
+    "spheres": Scene(Particles.of("superellipsoid"), 3, 0.3, Compression(2e-3, 0.66, 0.5)),
+    "spheroids": Scene(
+        Particles.of("superellipsoid", w2=1.5), 3, 0.3, Compression(2e-3, 0.72, 0.5)
+    ),
+}
 
 
 class Case(NamedTuple):
@@ -98,100 +109,57 @@ CASES = [
 ]
 
 
-def compressed(path: Path, alpha: float, n: int) -> Path:
-    """Compress rods or discs to beyond jamming, once."""
+def compressed(path: Path, scene: Scene, n: int) -> Packing:
+    """Compress to beyond jamming, once."""
     if not path.exists():
-        settings = Compression(1e-3, PHI, 0.1)
+        start = random_packing(n, scene.phi_start, 1, scene.particles, scene.dimension)
         with Session() as session:
-            start = random_packing(n, PHI_START, 1, Mixture.bidisperse(alpha))
-            run = CompressionRun(session, settings, start)
-            run.advance(run.last_step)
-            write_data(path, run.packing())
-    return path
+            compression = CompressionRun(session, scene.settings, start)
+            compression.advance(compression.last_step)
+            write_packing(path, compression.packing())
+    return read_packing(path)
 
 
-def squeezed(path: Path, w: float, n: int) -> Path:
-    """Compress spheroids of semi-axes 1, 1, w to beyond jamming, once."""
-    if path.exists():
-        return path
-    half = 0.5 * (4 * np.pi * w * n / (3 * PHI_START)) ** (1 / 3)
-    kappa, dt = 2e-3, 0.5
-    steps = int(np.log(PHI_3D[w] / PHI_START) / (3 * kappa * dt))
-    with Session() as session:
-        session.commands(f"""
-            units lj
-            atom_style ellipsoid
-            atom_modify map array
-            region box block -{half} {half} -{half} {half} -{half} {half}
-            create_box 1 box
-            create_atoms 1 random {n} 1 NULL
-            set type 1 shape 2 2 {2 * w}
-            set type 1 quat/random 1
-            pair_style superellipsoid/harmonic
-            pair_coeff * * 1
-            neighbor 0.3 bin
-            neigh_modify every 1 delay 0 check yes one 10000 page 1000000
-            min_style cg
-            min_modify dmax 0.1 line backtrack
-            minimize 0 1e-9 1000 10000
-            reset_timestep 0
-            fix flow all overdamped/affine drag 1 compress {kappa}
-            timestep {dt}
-            run {steps}
-            write_data {path} nocoeff""")
-    return path
-
-
-def lifted(scene: Scene) -> Scene:
+def lifted(flat: Packing) -> Packing:
     """Return the same state in space: a plane of a box so thick that images are out of reach."""
-    path = scene.path.with_name(f"{scene.path.stem}_3d.data")
-    flat = read_data(scene.path, 2)
     edges = np.append(flat.box.edges, 8 * flat.diameters.max())
-    half = flat.orientation / 2
     zero = np.zeros(flat.n)
-    packing = Packing(
+    return Packing(
         position=np.column_stack([flat.position, zero]),
-        orientation=np.column_stack([np.cos(half), zero, zero, np.sin(half)]),
+        orientation=flat.quaternions,
         diameters=flat.diameters,
+        exponent=flat.exponent,
         species=flat.species,
         id=flat.id,
         box=Box(np.append(flat.box.lo, -edges[2] / 2), edges),
+        shape_style=flat.shape_style,
     )
-    write_data(path, packing)
-    return scene._replace(path=path, dimension=3)
 
 
-def scenes(folder: Path, n: int) -> dict[str, Scene]:
-    """Make the states."""
-    rods = "spherocylinder/harmonic sides one"
-    flat = "fix flow all overdamped/affine drag 1 compress 1e-4\ntimestep 0.05"
-    found = {
-        name: Scene(compressed(folder / f"{name}_{n}.data", alpha, n), 2, rods, flat)
-        for name, alpha in (("discs", 0.0), ("rods", 4.0))
-    }
-    for name, w in (("spheres", 1.0), ("spheroids", 1.5)):
-        path = squeezed(folder / f"{name}_{n // 2}.data", w, n // 2)
-        found[name] = Scene(path, 3, "superellipsoid/harmonic", flat)
+def states(folder: Path, n: int) -> dict[str, Packing]:
+    """Make the states; half as many particles in space."""
+    found = {}
+    for name, scene in SCENES.items():
+        size = n if scene.dimension == 2 else n // 2
+        found[name] = compressed(folder / f"{name}_{size}.h5", scene, size)
     return found
 
 
-def opened(stack: ExitStack, scene: Scene, case: Case, *, is_general: bool) -> Session:
+def opened(stack: ExitStack, packing: Packing, case: Case, *, is_general: bool) -> Session:
     """Open an instance of LAMMPS that holds the state, as it is or with something turned back on."""
     if is_general and case.is_lifted:
-        scene = lifted(scene)
+        packing = lifted(packing)
     session = stack.enter_context(Session())
-    general = f"general {case.general}" if is_general and case.general else ""
+    session.load(packing)
+    general = f" general {case.general}" if is_general and case.general else ""
+    style = packing.shape.style(packing, Interaction(1.0, 1)).commands.replace(
+        "\n", f"{general}\n", 1
+    )
     session.commands(f"""
-        units lj
-        dimension {scene.dimension}
-        atom_style ellipsoid
-        atom_modify map array
-        read_data {scene.path}
-        pair_style {scene.pair} {general}
-        pair_coeff * * 1
+        {style}
         neighbor 0.3 bin
         neigh_modify {KEPT if case.measure == "force" else CHECKED} one 10000 page 1000000
-        {scene.step if case.measure == "step" else ""}
+        {FLOW if case.measure == "step" else ""}
         thermo_style custom step
         thermo_modify norm no lost error
         {case.more if is_general else ""}
@@ -228,28 +196,29 @@ def ratios(
     return float(middle), float(low), float(high)
 
 
-def measured(scene: Scene, case: Case, options: argparse.Namespace) -> Row:
+def advance(session: Session, steps: int) -> None:
+    """Take some steps without setting up anew."""
+    session.commands(f"run {steps} pre no post no")
+
+
+def measured(packing: Packing, case: Case, options: Namespace) -> Row:
     """Turn one thing back on."""
     with ExitStack() as stack:
-        plain = opened(stack, scene, case, is_general=False)
-        general = opened(stack, scene, case, is_general=True)
-
-        def run(session: Session, steps: int) -> None:
-            session.commands(f"run {steps} pre no post no")
-
-        trial, steps = seconds(lambda: run(plain, 20)) / 20, 20
+        plain, general = (opened(stack, packing, case, is_general=x) for x in (False, True))
+        trial = seconds(partial(advance, plain, 20)) / 20
         steps = max(1, int(options.seconds / trial))
-        run(general, 20)
-        cost = ratios(lambda: run(plain, steps), lambda: run(general, steps), options.rounds)
+        advance(general, 20)
+        cost = ratios(
+            partial(advance, plain, steps), partial(advance, general, steps), options.rounds
+        )
         a, b = forces(plain), forces(general)
         share = [x for x in plain.left_out().split(", ") if "listed pairs" in x]
     what = f"{case.what} ({share[0]})" if case.what == PAIRS and share else case.what
     return Row(case.scene, what, case.measure, *cost, float(np.abs(a - b).max() / np.abs(a).max()))
 
 
-def second_derivatives(scene: Scene, options: argparse.Namespace) -> Row:
+def second_derivatives(packing: Packing, options: Namespace) -> Row:
     """Evaluate all second derivatives beside the forces, in Python."""
-    packing = read_data(scene.path, 2)
     landscape, state = Landscape(packing, sides=1), State.of(packing)
 
     def plain() -> FloatArray:
@@ -289,39 +258,34 @@ def write(rows: list[Row], folder: Path) -> None:
         writer.writerows([Row._fields, *rows])
 
 
-def parse() -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("runs/scene_savings"), help="folder")
-    parser.add_argument("--n", type=int, default=1024, help="particles; half of them in 3D (1024)")
-    parser.add_argument("--rounds", type=int, default=11, help="turns of each (11)")
-    parser.add_argument("--seconds", type=float, default=0.15, help="of a turn (0.15)")
-    parser.add_argument("--quick", action="store_true", help="200 particles, 3 turns of 0.02 s")
-    options = parser.parse_args()
+def parser() -> ArgumentParser:
+    """Make the parser of the command line."""
+    found = parser_of(__doc__, "runs/scene_savings")
+    add = found.add_argument
+    add("--n", type=int, default=1024, help="particles; half of them in 3D (1024)")
+    add("--rounds", type=int, default=11, help="turns of each (11)")
+    add("--seconds", type=float, default=0.15, help="of a turn (0.15)")
+    add("--quick", action="store_true", help="200 particles, 3 turns of 0.02 s")
+    return found
+
+
+def main(options: Namespace) -> int:
+    """Measure all, write, report."""
     if options.quick:
         options.n, options.rounds, options.seconds = 200, 3, 0.02
-    return options
-
-
-def main() -> int:
-    """Measure all, write, report."""
-    options = parse()
     options.out.mkdir(parents=True, exist_ok=True)
-    states = scenes(options.out, options.n)
+    packings = states(options.out, options.n)
     rows: list[Row] = []
     for case in tqdm(CASES, unit="case"):
-        rows.append(measured(states[case.scene], case, options))
+        rows.append(measured(packings[case.scene], case, options))
         write(rows, options.out)
-    rows.append(second_derivatives(states["rods"], options))
+    rows.append(second_derivatives(packings["rods"], options))
     write(rows, options.out)
     print(table(rows))
     differ = [r.left_out for r in rows if not r.difference <= ROUNDING]
-    found = [r._asdict() for r in rows]
-    print(json.dumps({"out": str(options.out), "rows": found, "differ": differ}))
+    report({"out": options.out, "n": options.n, "rows": rows, "differ": differ})
     return 1 if differ else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run(parser(), main)

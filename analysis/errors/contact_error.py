@@ -1,6 +1,6 @@
 """Error, iterations and time of superellipsoid contacts over exponents and axis ratios.
 
-    python analysis/contact_error.py --out runs/contact_error
+    python analysis/errors/contact_error.py --out runs/contact_error
 
 Random pairs of random orientation, semi-axes within a factor w of each other, sizes within ten, are
 moved to just below contact. Of each exponent p (the same for both, and one row of random unequal
@@ -13,17 +13,23 @@ output is one JSON object.
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from studies.shown import Point, curves, figure_of, markdown
 from tqdm import tqdm
 
-from jamshape import _contact
+from jamshape.arrays import FloatArray
+from jamshape.command import parser_of, report, run
+from jamshape.shapes.single_pairs import (
+    superellipsoid_contacts,
+    superellipsoid_overlap,
+    superellipsoid_scales,
+)
 
 EXPONENTS = (0.55, 0.65, 0.75, 0.85, 1.0, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0)
 AXIS_RATIOS = (1.0, 3.0, 10.0)
@@ -32,10 +38,13 @@ SCALE = 0.98  # of the pairs that are timed: a small overlap
 APART = 1.1
 CERTAIN = 2e-14
 
-Array = NDArray[np.float64]
+HEADS = ("p", "w", "largest gap", "uncertain", "fallbacks, of", "iterations, most", "warm",
+         "us contact", "us warm", "us apart", "us overlap")  # fmt: skip
 
 
-def bodies(rng: np.random.Generator, p: Array, axis_ratio: float, size_ratio: float) -> Array:
+def bodies(
+    rng: np.random.Generator, p: FloatArray, axis_ratio: float, size_ratio: float
+) -> FloatArray:
     """Rows of superellipsoid bodies in 3D."""
     n = len(p)
     half, size = 0.5 * np.log(axis_ratio), 0.5 * np.log(size_ratio)
@@ -45,7 +54,7 @@ def bodies(rng: np.random.Generator, p: Array, axis_ratio: float, size_ratio: fl
     return np.hstack([rng.normal(size=(n, 3)), turn, axes, p[:, None]])
 
 
-def moved(i: Array, j: Array, factor: Array) -> Array:
+def moved(i: FloatArray, j: FloatArray, factor: FloatArray) -> FloatArray:
     """Bodies i with their distances from j multiplied."""
     result = i.copy()
     result[:, :3] = j[:, :3] + factor[:, None] * (i[:, :3] - j[:, :3])
@@ -67,56 +76,56 @@ def measure(rng: np.random.Generator, p: float | None, axis_ratio: float, n: int
     exponents = rng.choice(EXPONENTS, (2, n)) if p is None else np.full((2, n), p)
     i = bodies(rng, exponents[0], axis_ratio, 1.0)
     j = bodies(rng, exponents[1], axis_ratio, SIZE_RATIO)
-    anywhere = _contact.superellipsoid_scales(i, j)
+    anywhere = superellipsoid_scales(i, j)
     i = moved(i, j, SCALE / anywhere["eta"])
-    cold = _contact.superellipsoid_scales(i, j)
+    cold = superellipsoid_scales(i, j)
     beside = i.copy()
     beside[:, :3] += 1e-4 * i[:, 7:10].min(axis=1)[:, None] * rng.normal(size=(n, 3))
-    warm = _contact.superellipsoid_scales(beside, j, cold["normal"])
-    apart = moved(i, j, np.full(n, APART / SCALE))
+    warm = superellipsoid_scales(beside, j, cold["normal"])
+    found = (anywhere, cold, warm)
     return {
-        "p": p,
+        "exponent": p,
         "axis_ratio": axis_ratio,
         "pairs": 3 * n,
-        "largest_gap": float(max(s["gap"].max() for s in (anywhere, cold, warm))),
+        "largest_gap": float(max(s["gap"].max() for s in found)),
         "scale_error": float(np.abs(cold["eta"] / SCALE - 1.0).max()),
-        "uncertain": int(sum(np.sum(~(s["gap"] < CERTAIN)) for s in (anywhere, cold, warm))),
-        "fallbacks": int(sum(s["fallback"].sum() for s in (anywhere, cold, warm))),
+        "uncertain": int(sum(np.sum(~(s["gap"] < CERTAIN)) for s in found)),
+        "fallbacks": int(sum(s["fallback"].sum() for s in found)),
         "iterations": float(cold["iterations"].mean()),
         "iterations_most": int(cold["iterations"].max()),
         "iterations_warm": float(warm["iterations"].mean()),
-        "microseconds": shortest_time(_contact.superellipsoid_contacts, i, j, 1.0),
-        "microseconds_warm": shortest_time(
-            _contact.superellipsoid_scales, beside, j, cold["normal"]
-        ),
-        "microseconds_apart": shortest_time(_contact.superellipsoid_contacts, apart, j, 1.0),
-        "microseconds_overlap": shortest_time(_contact.superellipsoid_overlap, i, j),
+        "microseconds_warm": shortest_time(superellipsoid_scales, beside, j, cold["normal"]),
+        **times(i, j),
+    }
+
+
+def times(i: FloatArray, j: FloatArray) -> dict[str, float]:
+    """Microseconds of a contact, of a pair that is apart, and of the question whether two overlap."""
+    apart = moved(i, j, np.full(len(i), APART / SCALE))
+    return {
+        "microseconds": shortest_time(superellipsoid_contacts, i, j, 1.0),
+        "microseconds_apart": shortest_time(superellipsoid_contacts, apart, j, 1.0),
+        "microseconds_overlap": shortest_time(superellipsoid_overlap, i, j),
     }
 
 
 def table(rows: list[dict[str, Any]]) -> str:
     """Write the rows as Markdown."""
-    head = "| p | w | largest gap | uncertain | fallbacks, of | iterations, most | warm | "
-    head += "us contact | us warm | us apart | us overlap |"
-    lines = [head, "|" + 11 * " --- |"]
-    lines += [
-        f"| {r['p'] or 'any'} | {r['axis_ratio']:g} | {r['largest_gap']:.1e} | {r['uncertain']} | "
-        f"{r['fallbacks']}, {r['pairs']} | {r['iterations']:.1f}, {r['iterations_most']} | "
-        f"{r['iterations_warm']:.1f} | {r['microseconds']:.2f} | {r['microseconds_warm']:.2f} | "
-        f"{r['microseconds_apart']:.2f} | {r['microseconds_overlap']:.2f} |"
+    cells = [
+        (str(r["exponent"] or "any"), f"{r['axis_ratio']:g}", f"{r['largest_gap']:.1e}",
+         str(r["uncertain"]), f"{r['fallbacks']}, {r['pairs']}",
+         f"{r['iterations']:.1f}, {r['iterations_most']}", f"{r['iterations_warm']:.1f}",
+         f"{r['microseconds']:.2f}", f"{r['microseconds_warm']:.2f}",
+         f"{r['microseconds_apart']:.2f}", f"{r['microseconds_overlap']:.2f}")
         for r in rows
-    ]
-    return "\n".join(lines) + "\n"
+    ]  # fmt: skip
+    return markdown(HEADS, cells)
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
     """Gap, iterations and time against p, one line per axis ratio."""
-    import matplotlib as mpl  # noqa: PLC0415 - plotting only where a picture is made
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt  # noqa: PLC0415
-
-    figure, axes = plt.subplots(1, 3, figsize=(12, 4), layout="constrained")
+    figure = figure_of(12, 4.2, "contacts of two superellipsoids in space, sizes within ten")
+    axes = figure.subplots(1, 3)
     panels = (
         ("largest_gap", None, "largest relative error bar"),
         ("iterations", "iterations_warm", "iterations"),
@@ -124,27 +133,28 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     )
     for axis, (cold, warm, label) in zip(axes, panels, strict=True):
         for k, ratio in enumerate(AXIS_RATIOS):
-            of = [r for r in rows if r["axis_ratio"] == ratio and r["p"] is not None]
-            p = [r["p"] for r in of]
+            of = [r for r in rows if r["axis_ratio"] == ratio and r["exponent"] is not None]
+            p = [r["exponent"] for r in of]
             axis.plot(p, [r[cold] for r in of], "o-", color=f"C{k}", label=f"w = {ratio:g}")
             if warm:
                 axis.plot(p, [r[warm] for r in of], "s--", color=f"C{k}", mfc="none")
-        axis.set(xscale="log", yscale="log", xlabel="p", ylabel=label)
+        axis.set(xscale="log", yscale="log", xlabel="exponent $p$", ylabel=label)
         axis.grid(visible=True, alpha=0.3)
     axes[1].plot([], [], "s--", color="grey", mfc="none", label="warm start")
     axes[1].legend()
-    figure.savefig(path, dpi=150)
+    figure.savefig(path)
 
 
-def main() -> None:
-    """Command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("runs/contact_error"))
-    parser.add_argument("--pairs", type=int, default=20000, help="of each p and w")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+def parser() -> ArgumentParser:
+    """Make the parser of the command line."""
+    found = parser_of(__doc__, "runs/contact_error")
+    found.add_argument("--pairs", type=int, default=20000, help="of each p and w")
+    found.add_argument("--seed", type=int, default=1)
+    return found
+
+
+def main(options: Namespace) -> None:
+    """Measure, draw, report."""
     options.out.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(options.seed)
     cases = [(p, w) for w in AXIS_RATIOS for p in (*EXPONENTS, None)]
@@ -155,13 +165,16 @@ def main() -> None:
     draw(rows, options.out / "contact_error.png")
     print(text)
     totals = {key: sum(r[key] for r in rows) for key in ("pairs", "uncertain", "fallbacks")}
-    curves = [
-        {"name": f"w = {r['axis_ratio']:g}, p = {r['p']}", "seconds": [1e-6 * r["microseconds"]],
-         "error": [r["largest_gap"]]}
+    points = [
+        Point(
+            f"w = {r['axis_ratio']:g}, p = {r['exponent']}",
+            1e-6 * r["microseconds"],
+            r["largest_gap"],
+        )
         for r in rows
-    ]  # fmt: skip
-    print(json.dumps({"out": str(options.out), **totals, "curves": curves}))
+    ]
+    report({"out": options.out, **totals, "curves": curves(points)})
 
 
 if __name__ == "__main__":
-    main()
+    run(parser(), main)

@@ -1,7 +1,7 @@
 """Error against run time of every part of jamshape, in one page.
 
-    python analysis/error_report.py --out runs/error_report
-    python analysis/error_report.py --full --out runs/error_report_full
+    python analysis/errors/error_report.py --out runs/error_report
+    python analysis/errors/error_report.py --full --out runs/error_report_full
 
 Runs the work-precision study of each part, or takes what is there of an earlier call, and writes report.md: the
 command of each study, how long it took, its tables and its picture, the machine and the versions. The short
@@ -12,7 +12,6 @@ JSON object; the exit code is 0 only if no study failed.
 
 from __future__ import annotations
 
-import argparse
 import importlib.metadata
 import json
 import os
@@ -21,12 +20,16 @@ import shutil
 import subprocess
 import sys
 import time
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from studies.shown import figure_of
 from tqdm import tqdm
 
-ROOT = Path(__file__).resolve().parents[1]
+from jamshape.command import parser_of, report, run
+
+ROOT = Path(__file__).resolve().parents[2]
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 OVERVIEW, LEAST_DRAWN = "overview.png", 1e-20
 PACKAGES = ("jamshape", "numpy", "scipy", "h5py", "matplotlib")
@@ -55,23 +58,23 @@ def spheroids(n: int) -> str:
 
 
 SHORT_STIFF = (
-    "analysis/stiff_error.py --n 32 --kappas 1e-6 1e-8 --tolerances 1e-2 3e-3 1e-3 3e-4 1e-4"
+    "analysis/errors/stiff_error.py --n 32 --kappas 1e-6 1e-8 --tolerances 1e-2 3e-3 1e-3 3e-4 1e-4"
 )
-STIFF = "analysis/stiff_error.py --n 128 --tolerances 1e-2 3e-3 1e-3 3e-4 --out ."
+STIFF = "analysis/errors/stiff_error.py --n 128 --tolerances 1e-2 3e-3 1e-3 3e-4 --out ."
 
 STUDIES = {
     "heun": Study(
         "Heun's method: the time step",
         "p, median relative error",
-        ["analysis/heun_error.py --n 64 --out ."],
-        ["analysis/heun_error.py --out ."],
+        ["analysis/errors/heun_error.py --n 64 --out ."],
+        ["analysis/errors/heun_error.py --out ."],
         ["heun_error.png"],
     ),
     "integrators": Study(
         "Integrators of the fix",
         "p, median relative error",
-        ["analysis/integrator_error.py --quick --out ."],
-        ["analysis/integrator_error.py --out ."],
+        ["analysis/errors/integrator_error.py --quick --out ."],
+        ["analysis/errors/integrator_error.py --out ."],
         ["integrator_error.png"],
     ),
     "implicit": Study(
@@ -90,8 +93,8 @@ STUDIES = {
     "minimisers": Study(
         "Minimisers and energy targets, rods",
         "largest net force / mean bond force",
-        ["analysis/minimiser_error.py --n 48 --seconds 2 --states 1 4 --out ."],
-        ["analysis/minimiser_error.py --n 256 --seconds 10 --out ."],
+        ["analysis/errors/minimiser_error.py --n 48 --seconds 2 --states 1 4 --out ."],
+        ["analysis/errors/minimiser_error.py --n 256 --seconds 10 --out ."],
         ["minimisers.png"],
     ),
     "minimisers3d": Study(
@@ -99,19 +102,19 @@ STUDIES = {
         "largest net force / mean bond force",
         [
             spheroids(40),
-            "analysis/minimiser_error.py --seconds 2 --states spheroids_40.h5 --out .",
+            "analysis/errors/minimiser_error.py --seconds 2 --states spheroids_40.h5 --out .",
         ],
         [
             spheroids(400),
-            "analysis/minimiser_error.py --seconds 60 --states spheroids_400.h5 --out .",
+            "analysis/errors/minimiser_error.py --seconds 60 --states spheroids_400.h5 --out .",
         ],
         ["minimisers.png"],
     ),
     "contact": Study(
         "Contacts of superellipsoids",
         "scale, largest bound of its relative error",
-        ["analysis/contact_error.py --pairs 1000 --out ."],
-        ["analysis/contact_error.py --out ."],
+        ["analysis/errors/contact_error.py --pairs 1000 --out ."],
+        ["analysis/errors/contact_error.py --out ."],
         ["contact_error.png"],
     ),
     "spectra": Study(
@@ -120,30 +123,27 @@ STUDIES = {
         [
             rods(32),
             rods(64),
-            "analysis/spectrum_error.py rods_32.h5 rods_64.h5 --tiles 2 4 --out spectrum_error.png",
+            "analysis/errors/spectrum_error.py rods_32.h5 rods_64.h5 --tiles 2 4 --out spectrum_error.png",
         ],
         [
             *(rods(n, 4) for n in (64, 256, 1024)),
-            "analysis/spectrum_error.py rods_64.h5 rods_256.h5 rods_1024.h5 --tiles 2 6 13 --out spectrum_error.png",
+            "analysis/errors/spectrum_error.py rods_64.h5 rods_256.h5 rods_1024.h5 --tiles 2 6 13 --out spectrum_error.png",
         ],
         ["spectrum_error.png"],
     ),
 }
 
 
-def parse() -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("runs/error_report"), help="folder")
-    parser.add_argument("--full", action="store_true", help="the real studies, for hours")
-    parser.add_argument("--only", nargs="+", choices=STUDIES, default=list(STUDIES))
-    parser.add_argument("--again", action="store_true", help="repeat what is there")
-    return parser.parse_args()
+def parser() -> ArgumentParser:
+    """Make the parser of the command line."""
+    found = parser_of(__doc__, "runs/error_report")
+    found.add_argument("--full", action="store_true", help="the real studies, for hours")
+    found.add_argument("--only", nargs="+", choices=STUDIES, default=list(STUDIES))
+    found.add_argument("--again", action="store_true", help="repeat what is there")
+    return found
 
 
-def run(name: str, options: argparse.Namespace) -> dict[str, Any]:
+def found_by(name: str, options: Namespace) -> dict[str, Any]:
     """Run a study unless its result is there; return its record."""
     folder: Path = options.out / name
     if options.again and folder.exists():
@@ -154,10 +154,17 @@ def run(name: str, options: argparse.Namespace) -> dict[str, Any]:
         found: dict[str, Any] = json.loads(record.read_text())
         if found["full"] == options.full and not found["failed"]:
             return found
+    commands = STUDIES[name].full if options.full else STUDIES[name].short
+    found = {"full": options.full, "commands": commands, **run_all(commands, folder)}
+    record.write_text(json.dumps(found, indent=1))
+    return found
+
+
+def run_all(commands: list[str], folder: Path) -> dict[str, Any]:
+    """Run the commands of a study up to the first that fails."""
     began, failed = time.perf_counter(), ""
     printed: list[str] = []
     curves: list[dict[str, Any]] = []
-    commands = STUDIES[name].full if options.full else STUDIES[name].short
     for command in commands:
         text, failed = printed_by(command, folder)
         if failed:
@@ -165,16 +172,12 @@ def run(name: str, options: argparse.Namespace) -> dict[str, Any]:
         *tables, numbers = text.strip().splitlines()
         printed += ["\n".join(tables)]
         curves += json.loads(numbers).get("curves", [])
-    found = {
-        "full": options.full,
-        "commands": [f".venv/bin/python {command}" for command in commands],
+    return {
         "seconds": time.perf_counter() - began,
         "printed": "\n\n".join(filter(None, printed)),
         "curves": curves,
         "failed": failed,
     }
-    record.write_text(json.dumps(found, indent=1))
-    return found
 
 
 def printed_by(command: str, folder: Path) -> tuple[str, str]:
@@ -216,14 +219,12 @@ def draw_curves(axis: Any, curves: list[dict[str, Any]]) -> None:
 
 def draw(records: dict[str, dict[str, Any]], path: Path) -> bool:
     """Draw a panel of error against seconds for each study; whether there is one."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help
-
     drawn = {name: found["curves"] for name, found in records.items() if found["curves"]}
     if not drawn:
         return False
     columns = min(len(drawn), 4)
     lines = -(-len(drawn) // columns)
-    figure = Figure(figsize=(4 * columns, 3.4 * lines), dpi=100, layout="constrained")
+    figure = figure_of(4 * columns, 3.4 * lines)
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
     for axis in axes[len(drawn) :]:
         axis.set_visible(False)
@@ -247,39 +248,37 @@ def page(records: dict[str, dict[str, Any]], out: Path) -> str:
     if draw(records, out / OVERVIEW):
         lines += [f"![error against run time of every part]({OVERVIEW})", ""]
     for name, found in records.items():
-        lines += [f"## {STUDIES[name].title}", ""]
-        lines += [f"    {command}" for command in found["commands"]]
-        lines += ["", f"{found['seconds']:.0f} s; run in the folder `{name}`.", ""]
-        if found["failed"]:
-            lines += [f"**Failed:** {found['failed']}", ""]
-            continue
-        drawn = [
-            p for pattern in STUDIES[name].pictures for p in sorted((out / name).glob(pattern))
-        ]
-        lines += [f"![{STUDIES[name].title}]({picture.relative_to(out)})" for picture in drawn]
-        table = found["printed"].lstrip().startswith("|")
-        lines += ["", found["printed"] if table else f"```\n{found['printed']}\n```", ""]
+        lines += section(name, found, out)
     return "\n".join(lines)
 
 
-def main(options: argparse.Namespace) -> int:
+def section(name: str, found: dict[str, Any], out: Path) -> list[str]:
+    """Write what one study did."""
+    study = STUDIES[name]
+    lines = [f"## {study.title}", ""]
+    lines += [f"    .venv/bin/python {command}" for command in found["commands"]]
+    lines += ["", f"{found['seconds']:.0f} s; run in the folder `{name}`.", ""]
+    if found["failed"]:
+        return [*lines, f"**Failed:** {found['failed']}", ""]
+    drawn = [path for pattern in study.pictures for path in sorted((out / name).glob(pattern))]
+    lines += [f"![{study.title}]({picture.relative_to(out)})" for picture in drawn]
+    is_table = found["printed"].lstrip().startswith("|")
+    return [*lines, "", found["printed"] if is_table else f"```\n{found['printed']}\n```", ""]
+
+
+def main(options: Namespace) -> int:
     """Run the studies one after another; return the exit code."""
     options.out.mkdir(parents=True, exist_ok=True)
     records: dict[str, dict[str, Any]] = {}
     for name in tqdm(options.only, unit="study"):
-        records[name] = run(name, options)
+        records[name] = found_by(name, options)
         (options.out / "report.md").write_text(page(records, options.out))
     failed = {name: found["failed"] for name, found in records.items() if found["failed"]}
     seconds = sum(found["seconds"] for found in records.values())
-    report = str(options.out / "report.md")
-    print(
-        json.dumps({"out": report, "studies": list(records), "failed": failed, "seconds": seconds})
-    )
+    done = {"out": options.out / "report.md", "studies": list(records)}
+    report(done | {"failed": failed, "seconds": seconds})
     return 1 if failed else 0
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main(parse()))
-    except (ValueError, OSError) as error:
-        sys.exit(f"error_report.py: {error}")
+    run(parser(), main)

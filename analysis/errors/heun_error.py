@@ -1,6 +1,6 @@
 """Error of Heun's method against run time: the time step from 1e-3 to the stability limit.
 
-    python analysis/heun_error.py --out runs/heun_error
+    python analysis/errors/heun_error.py --out runs/heun_error
 
 One state of N = 256 rods (alpha = 4) just below jamming is compressed at kappa = 1e-4 through jamming
 with each time step; errors are against a run with a far smaller one. Writes a table (Markdown), a
@@ -10,39 +10,56 @@ output is one JSON object.
 
 from __future__ import annotations
 
-import argparse
 import json
+import subprocess
 import sys
 import time
+from argparse import SUPPRESS, ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from studies.kept import compressed, kept, kept_packing
+from studies.shown import Point, curves, figure_of, markdown
 from tqdm import tqdm
 
-from jamshape.files.h5md import read_packing, write_packing
+from jamshape.command import parser_of, report, run
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Particles
 
-KAPPA = 1e-4
+ALPHA, KAPPA = 4.0, 1e-4
 PHI_START, PHI_FROM, PHI_TO = 0.4, 0.84, 0.88
 INTERVAL = 6.0  # time between samples, a multiple of every time step below
 STEPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 1.0)
 REFERENCE = 0.00025
+SIDES = {1: "one", 2: "two"}
+NAMED = (0.001, 0.01, 0.1, 0.6)  # time steps that the picture names
+
+
+class Row(NamedTuple):
+    """Relative errors of the pressure, and of positions over the largest overlap."""
+
+    dt: float
+    sides: int
+    evaluations: float
+    wall_seconds: float
+    median: float
+    largest: float
+    position: float
+    dt_limit: float
 
 
 def start_state(folder: Path, n: int) -> Packing:
     """Make the state that every run starts from, once."""
-    path = folder / f"start_{n}.h5"
-    if not path.exists():
-        packing = random_packing(n, PHI_START, 1, Mixture.bidisperse(4.0))
-        with Session() as session:
-            run = CompressionRun(session, Compression(KAPPA, PHI_FROM), packing)
-            run.advance(run.last_step)
-            write_packing(path, run.packing())
-    return read_packing(path)
+
+    def make() -> Packing:
+        start = random_packing(n, PHI_START, 1, Particles.of(alpha=ALPHA))
+        return compressed(start, Compression(KAPPA, PHI_FROM))
+
+    return kept_packing(folder / f"start_{n}.h5", make)
 
 
 def run_with(start: Packing, dt: float, sides: int) -> dict[str, Any]:
@@ -50,134 +67,132 @@ def run_with(start: Packing, dt: float, sides: int) -> dict[str, Any]:
     every = round(INTERVAL / dt)
     pressures, limits = [], []
     with Session() as session:
-        run = CompressionRun(session, Compression(KAPPA, PHI_TO, dt, sides), start)
+        compression = CompressionRun(session, Compression(KAPPA, PHI_TO, dt, sides), start)
         began = time.perf_counter()
-        for k in range(1, round(run.last_step * dt / INTERVAL) + 1):
-            run.advance(k * every)
-            sample = run.measure()
-            pressures.append(sample["p"])
+        for k in range(1, round(compression.last_step * dt / INTERVAL) + 1):
+            compression.advance(k * every)
+            sample = compression.measure()
+            pressures.append(sample["pressure"])
             limits.append(sample["dt_max"])
         wall = time.perf_counter() - began
         return {
-            "dt": dt, "sides": sides, "wall_seconds": wall, "p": pressures,
+            "dt": dt, "sides": sides, "wall_seconds": wall, "pressure": pressures,
             "evaluations": sample["evaluations"], "dt_limit": min(limits),
-            "overlap": sample["overlap"], "position": run.packing().position.tolist(),
+            "overlap": sample["overlap"], "position": compression.packing().position.tolist(),
         }  # fmt: skip
 
 
-def kept(folder: Path, start: Packing, dt: float, sides: int) -> dict[str, Any] | None:
-    """Return the run of before, or make it in a process of its own; None if the fix refused it."""
-    path = folder / f"sides{sides}_dt{dt:g}_n{start.n}.json"
-    if not path.exists():
-        from subprocess import run  # noqa: PLC0415 - Debian's LAMMPS ends the process on an error
-
-        command = [sys.executable, __file__, "--one", str(dt), str(sides), "--n", str(start.n)]
-        finished = run(
-            [*command, "--out", str(folder)], capture_output=True, text=True, check=False
-        )
-        if finished.returncode:
-            return None
-        path.write_text(finished.stdout.splitlines()[-1])
-    return dict(json.loads(path.read_text()))
+class RefusedError(Exception):
+    """The fix refused the time step."""
 
 
-def errors(run: dict[str, Any], reference: dict[str, Any]) -> dict[str, float]:
-    """Relative errors of the pressure, and of positions over the largest overlap."""
-    p, exact = np.array(run["p"]), np.array(reference["p"])
+def run_alone(folder: Path, n: int, dt: float, sides: int) -> dict[str, Any]:
+    """Run in a process of its own, which Debian's LAMMPS ends on an error."""
+    command = [sys.executable, __file__, "--one", str(dt), str(sides), "--n", str(n)]
+    done = subprocess.run(
+        [*command, "--out", str(folder)], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise RefusedError
+    return dict(json.loads(done.stdout.splitlines()[-1]))
+
+
+def errors(found: dict[str, Any], reference: dict[str, Any]) -> Row:
+    """Compare a run with the reference."""
+    p, exact = np.array(found["pressure"]), np.array(reference["pressure"])
     relative = np.abs(p - exact)[exact > 0] / exact[exact > 0]
-    moved = np.array(run["position"]) - np.array(reference["position"])
+    moved = np.array(found["position"]) - np.array(reference["position"])
     moved -= np.median(moved, axis=0)
     size = float(np.median(np.linalg.norm(moved, axis=1)))
-    return {
-        "dt": run["dt"],
-        "sides": run["sides"],
-        "evaluations": run["evaluations"],
-        "wall_seconds": run["wall_seconds"],
-        "p_median": float(np.median(relative)),
-        "p_largest": float(relative.max()),
-        "position": size / reference["overlap"],
-        "dt_limit": run["dt_limit"],
-    }
+    same = {name: found[name] for name in ("dt", "sides", "evaluations", "wall_seconds")}
+    return Row(
+        **same,
+        median=float(np.median(relative)),
+        largest=float(relative.max()),
+        position=size / reference["overlap"],
+        dt_limit=found["dt_limit"],
+    )
 
 
-def table(rows: list[dict[str, float]], refused: list[tuple[float, int]]) -> str:
+def table(rows: list[Row], refused: list[tuple[float, int]]) -> str:
     """Write the rows as Markdown."""
-    lines = [
-        "| sides | dt | evaluations | seconds | p: median error | p: largest error | positions |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    lines += [
-        f"| {('one', 'two')[int(r['sides']) - 1]} | {r['dt']:g} | {r['evaluations']:.3g} | "
-        f"{r['wall_seconds']:.2g} | {r['p_median']:.1e} | {r['p_largest']:.1e} | {r['position']:.1e} |"
+    heads = ("sides", "dt", "evaluations", "seconds", "p: median error", "p: largest error", "positions")  # fmt: skip
+    cells = [
+        (SIDES[r.sides], f"{r.dt:g}", f"{r.evaluations:.3g}", f"{r.wall_seconds:.2g}",
+         f"{r.median:.1e}", f"{r.largest:.1e}", f"{r.position:.1e}")
         for r in rows
-    ]
-    lines += [f"| {('one', 'two')[sides - 1]} | {dt:g} | refused: past the stability limit |||||"
-              for dt, sides in refused]  # fmt: skip
-    return "\n".join(lines) + "\n"
+    ]  # fmt: skip
+    past = "refused: past the stability limit"
+    cells += [(SIDES[sides], f"{dt:g}", past, "", "", "", "") for dt, sides in refused]
+    return markdown(heads, cells)
 
 
-def draw(rows: list[dict[str, float]], path: Path) -> None:
+def draw(rows: list[Row], n: int, path: Path) -> None:
     """Errors against wall time."""
-    import matplotlib as mpl  # noqa: PLC0415 - plotting only where a picture is made
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt  # noqa: PLC0415
-
-    figure, axes = plt.subplots(1, 2, figsize=(9, 4), sharey=True, layout="constrained")
-    for sides, axis in zip((1, 2), axes, strict=True):
-        of = [r for r in rows if r["sides"] == sides]
-        wall = [r["wall_seconds"] for r in of]
-        axis.loglog(wall, [r["p_median"] for r in of], "o-", label="pressure, median")
-        axis.loglog(wall, [r["p_largest"] for r in of], "s--", label="pressure, largest")
+    title = rf"rods, $\alpha$ = {ALPHA:g}, $N$ = {n}, $\kappa$ = {KAPPA:g}"
+    figure = figure_of(9, 4.2, title)
+    axes = figure.subplots(1, 2, sharey=True)
+    for (sides, word), axis in zip(SIDES.items(), axes, strict=True):
+        of = [r for r in rows if r.sides == sides]
+        wall = [r.wall_seconds for r in of]
+        axis.loglog(wall, [r.median for r in of], "o-", label="pressure, median")
+        axis.loglog(wall, [r.largest for r in of], "s--", label="pressure, largest")
         for r in of:
-            if r["dt"] not in (0.001, 0.01, 0.1, 0.6):
-                continue
-            axis.annotate(f"dt = {r['dt']:g}", (r["wall_seconds"], r["p_median"]), fontsize=7,
-                          textcoords="offset points", xytext=(-4, -14), ha="right")  # fmt: skip
-        axis.set(xlabel="run time (s)", title=f"sides {('one', 'two')[sides - 1]}")
+            if r.dt in NAMED:
+                axis.annotate(f"dt = {r.dt:g}", (r.wall_seconds, r.median), fontsize=7,
+                              textcoords="offset points", xytext=(-4, -14), ha="right")  # fmt: skip
+        axis.set(xlabel="run time (s)", title=f"sides {word}")
         axis.grid(visible=True, alpha=0.3)
     axes[0].set_ylabel("relative error of p")
     axes[1].legend(loc="center right")
-    figure.savefig(path, dpi=150)
+    figure.savefig(path)
 
 
-def main() -> None:
-    """Command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("runs/heun_error"))
-    parser.add_argument("--n", type=int, default=256)
-    parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
-    options = parser.parse_args()
+def measured(folder: Path, n: int) -> tuple[list[Row], list[tuple[float, int]]]:
+    """Run what is not there; errors, and time steps that were refused."""
+    rows, refused = [], []
+
+    def of(dt: float, sides: int) -> dict[str, Any]:
+        path = folder / f"sides{sides}_dt{dt:g}_n{n}.json"
+        return kept(path, run_alone, folder, n, dt, sides)
+
+    for sides, word in SIDES.items():
+        reference = of(REFERENCE, sides)
+        for dt in tqdm(STEPS, desc=f"sides {word}", unit="run"):
+            try:
+                rows.append(errors(of(dt, sides), reference))
+            except RefusedError:
+                refused.append((dt, sides))
+    return rows, refused
+
+
+def parser() -> ArgumentParser:
+    """Make the parser of the command line."""
+    found = parser_of(__doc__, "runs/heun_error")
+    found.add_argument("--n", type=int, default=256, help="particles (256)")
+    found.add_argument("--one", nargs=2, help=SUPPRESS)
+    return found
+
+
+def main(options: Namespace) -> None:
+    """Measure, draw, report."""
     options.out.mkdir(parents=True, exist_ok=True)
     start = start_state(options.out, options.n)
     if options.one:
-        print(json.dumps(run_with(start, float(options.one[0]), int(options.one[1]))))
+        report(run_with(start, float(options.one[0]), int(options.one[1])))
         return
-    rows, refused = [], []
-    for sides in (1, 2):
-        reference = kept(options.out, start, REFERENCE, sides)
-        assert reference is not None
-        for dt in tqdm(STEPS, desc=f"sides {sides}", unit="run"):
-            run = kept(options.out, start, dt, sides)
-            if run is None:
-                refused.append((dt, sides))
-            else:
-                rows.append(errors(run, reference))
+    rows, refused = measured(options.out, options.n)
     text = table(rows, refused)
     (options.out / "heun_error.md").write_text(text)
-    draw(rows, options.out / "heun_error.png")
+    draw(rows, options.n, options.out / "heun_error.png")
     print(text)
-    limit = min(r["dt_limit"] for r in rows)
-    curves = []
-    for sides, name in ((1, "one"), (2, "two")):
-        of = [r for r in rows if r["sides"] == sides]
-        curves += [{"name": f"sides {name}", "seconds": [r["wall_seconds"] for r in of],
-                    "error": [r["p_median"] for r in of]}]  # fmt: skip
-    found = {"out": str(options.out), "dt_limit": limit, "refused": refused, "curves": curves}
-    print(json.dumps(found))
+    points = [Point(f"sides {SIDES[r.sides]}", r.wall_seconds, r.median) for r in rows]
+    of = {"alpha": ALPHA, "n": options.n, "kappa": KAPPA}
+    limit = min(r.dt_limit for r in rows)
+    report(
+        {"out": options.out, **of, "dt_limit": limit, "refused": refused, "curves": curves(points)}
+    )
 
 
 if __name__ == "__main__":
-    main()
+    run(parser(), main)

@@ -1,6 +1,6 @@
 """Error against cost of the integrators of `fix overdamped/affine`, at slow rates through jamming.
 
-    python analysis/integrator_error.py --out runs/integrator_error
+    python analysis/errors/integrator_error.py --out runs/integrator_error
 
 Rods (alpha = 4) and nearly round ones (alpha = 0.01), `sides two`, are compressed from a little below
 jamming to beyond it with each integrator and tolerance; errors of the pressure are against a run with
@@ -12,23 +12,24 @@ not repeated. Seconds are of the processor. The last line of standard output is 
 
 from __future__ import annotations
 
-import argparse
 import itertools
-import json
 import time
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from studies.kept import compressed, kept, kept_packing
+from studies.shown import Point, curves, figure_of, markdown
 from tqdm import tqdm
 
-from jamshape.files.h5md import read_packing, write_packing
+from jamshape.command import parser_of, report, run
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
-from jamshape.protocols.random_start import Mixture, random_packing
+from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Particles
 
 PHI_START, KAPPA_START = 0.4, 1e-4
 PHI = {4.0: (0.84, 0.88), 0.01: (0.83, 0.86)}  # from and to, under alpha
@@ -40,10 +41,10 @@ METHODS = (
     ("rkc2", 1e-3), ("rkc2", 1e-4), ("rkc2", 1e-5),
 )  # fmt: skip
 HEUN_DT, HEUN_STEPS = 0.01, 4000
+COLOURS = {"heun": "0.4", "heun/adaptive": "tab:blue", "rkc2": "tab:red"}
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """One compression, which all methods repeat."""
 
     n: int
@@ -62,31 +63,49 @@ class Case:
         return told.in_steps(phi_from, ROWS)
 
 
+class Row(NamedTuple):
+    """Cost of a method, and its relative errors of the pressure."""
+
+    n: int
+    alpha: float
+    kappa: float
+    method: str
+    tolerance: float | None
+    evaluations: float
+    seconds: float
+    rejected: float | None
+    median: float
+    largest: float | None
+    """None for Heun's method, of which a stretch alone is run."""
+
+    @property
+    def case(self) -> Case:
+        """Its compression."""
+        return Case(self.n, self.alpha, self.kappa)
+
+
 def start_state(folder: Path, case: Case) -> Packing:
     """Make the state that every run starts from, once."""
-    path = folder / f"start_n{case.n}_alpha{case.alpha:g}.h5"
-    if not path.exists():
-        packing = random_packing(case.n, PHI_START, 1, Mixture.bidisperse(case.alpha))
-        settings = Compression(KAPPA_START, PHI[case.alpha][0], 0.1, sides=2)
-        with Session() as session:
-            run = CompressionRun(session, settings, packing)
-            run.advance(run.last_step)
-            write_packing(path, run.packing())
-    return read_packing(path)
+
+    def make() -> Packing:
+        start = random_packing(case.n, PHI_START, 1, Particles.of(alpha=case.alpha))
+        return compressed(start, Compression(KAPPA_START, PHI[case.alpha][0], 0.1, sides=2))
+
+    return kept_packing(folder / f"start_n{case.n}_alpha{case.alpha:g}.h5", make)
 
 
 def run_with(start: Packing, settings: Compression, steps: int) -> dict[str, Any]:
     """Pressures at the rows, and the cost."""
     with Session() as session:
-        run = CompressionRun(session, settings, start)
+        compression = CompressionRun(session, settings, start)
         began, p = time.process_time(), []
         for k in range(1, steps + 1):
-            run.advance(k)
-            p.append(run.measure()["p"])
+            compression.advance(k)
+            p.append(compression.measure()["pressure"])
         seconds = time.process_time() - began
-        last = run.measure()
+        last = compression.measure()
     names = ("evaluations", "substeps", "rejected", "forced")
-    return {"p": p, "seconds": seconds} | {name: last.get(name, 0.0) for name in names}
+    return {"pressure": p, "seconds": seconds} | {name: last.get(name, 0.0) for name in names}
 
 
 def heun_stretch(start: Packing, case: Case) -> dict[str, Any]:
@@ -94,133 +113,109 @@ def heun_stretch(start: Packing, case: Case) -> dict[str, Any]:
     whole = case.settings("heun", 1.0)
     fine = Compression(case.kappa, whole.phi_end, HEUN_STEPS * HEUN_DT, sides=2,
                        integrator=REFERENCE[0], tolerance=REFERENCE[1])  # fmt: skip
-    exact = run_with(start, fine, 1)["p"][-1]
+    exact = run_with(start, fine, 1)["pressure"][-1]
     settings = Compression(case.kappa, whole.phi_end, HEUN_DT, sides=2)
     with Session() as session:
-        run = CompressionRun(session, settings, start)
+        compression = CompressionRun(session, settings, start)
         began = time.process_time()
-        run.advance(HEUN_STEPS)
+        compression.advance(HEUN_STEPS)
         seconds = time.process_time() - began
-        error = abs(run.measure()["p"] / exact - 1)
+        error = abs(compression.measure()["pressure"] / exact - 1)
     times = ROWS * whole.dt / (HEUN_STEPS * HEUN_DT)
     return {"seconds": seconds * times, "evaluations": 2 * HEUN_STEPS * times, "error": error}
 
 
-def kept(path: Path, case: Case, method: str, tolerance: float) -> dict[str, Any]:
+def found_by(folder: Path, case: Case, method: str, tolerance: float) -> dict[str, Any]:
     """Return the run of before, or make it."""
-    file = path / f"{case.name}_{method.replace('/', '-')}_{tolerance:g}.json"
-    if not file.exists():
-        start = start_state(path, case)
-        found = (
-            heun_stretch(start, case)
-            if method == "heun"
-            else run_with(start, case.settings(method, tolerance), ROWS)
-        )
-        file.write_text(json.dumps(found))
-    return dict(json.loads(file.read_text()))
+
+    def make() -> dict[str, Any]:
+        start = start_state(folder, case)
+        if method == "heun":
+            return heun_stretch(start, case)
+        return run_with(start, case.settings(method, tolerance), ROWS)
+
+    return kept(folder / f"{case.name}_{method.replace('/', '-')}_{tolerance:g}.json", make)
 
 
-def rows_of(path: Path, case: Case, reference: float) -> Iterator[dict[str, Any]]:
+def rows_of(folder: Path, case: Case, reference: float) -> Iterator[Row]:
     """Rows of the table for one compression."""
-    exact = np.array(kept(path, case, REFERENCE[0], reference)["p"])
-    of_case = {"n": case.n, "alpha": case.alpha, "kappa": case.kappa}
-    heun = kept(path, case, "heun", HEUN_DT)
-    yield of_case | {"method": "heun", "tolerance": None, "evaluations": heun["evaluations"],
-                     "seconds": heun["seconds"], "median": heun["error"],
-                     "largest": None}  # fmt: skip
+    exact = np.array(found_by(folder, case, REFERENCE[0], reference)["pressure"])
+    heun = found_by(folder, case, "heun", HEUN_DT)
+    cost = (heun["evaluations"], heun["seconds"], None)
+    yield Row(*case, "heun", None, *cost, heun["error"], None)
     for method, tolerance in METHODS:
-        run = kept(path, case, method, tolerance)
-        error = np.abs(np.array(run["p"]) - exact) / exact
-        yield of_case | {"method": method, "tolerance": tolerance,
-                         "evaluations": run["evaluations"], "seconds": run["seconds"],
-                         "rejected": run["rejected"] / run["substeps"],
-                         "median": float(np.median(error)), "largest": float(error.max())}  # fmt: skip
+        of = found_by(folder, case, method, tolerance)
+        error = np.abs(np.array(of["pressure"]) - exact) / exact
+        cost = (of["evaluations"], of["seconds"], of["rejected"] / of["substeps"])
+        yield Row(*case, method, tolerance, *cost, float(np.median(error)), float(error.max()))
 
 
-def table(rows: list[dict[str, Any]]) -> str:
+def table(rows: list[Row]) -> str:
     """Write the rows as Markdown."""
-    lines = [
-        "| N | alpha | kappa | integrator | tolerance | evaluations | seconds | p: median error | largest |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    for r in rows:
-        is_heun = r["method"] == "heun"
-        lines.append(
-            f"| {r['n']} | {r['alpha']:g} | {r['kappa']:g} | {r['method']} | "
-            f"{f'dt = {HEUN_DT}, extrapolated' if is_heun else format(r['tolerance'], 'g')} | "
-            f"{r['evaluations']:.2g} | {r['seconds']:.2g} | {r['median']:.1e} | "
-            f"{'' if is_heun else format(r['largest'], '.1e')} |"
-        )
-    return "\n".join(lines) + "\n"
+    heads = ("N", "alpha", "kappa", "integrator", "tolerance", "evaluations", "seconds",
+             "p: median error", "largest")  # fmt: skip
+    extrapolated = f"dt = {HEUN_DT}, extrapolated"
+    cells = [
+        (str(r.n), f"{r.alpha:g}", f"{r.kappa:g}", r.method,
+         extrapolated if r.tolerance is None else f"{r.tolerance:g}",
+         f"{r.evaluations:.2g}", f"{r.seconds:.2g}", f"{r.median:.1e}",
+         "" if r.largest is None else f"{r.largest:.1e}")
+        for r in rows
+    ]  # fmt: skip
+    return markdown(heads, cells)
 
 
-def draw(rows: list[dict[str, Any]], path: Path) -> None:
+def draw(rows: list[Row], path: Path) -> None:
     """Errors against evaluations, a panel for each compression."""
-    import matplotlib as mpl  # noqa: PLC0415 - plotting only where a picture is made
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt  # noqa: PLC0415
-
-    cases = sorted(
-        {(r["n"], r["alpha"], r["kappa"]) for r in rows}, key=lambda c: (c[1], c[0], -c[2])
-    )
+    cases = sorted({r.case for r in rows}, key=lambda c: (c.alpha, c.n, -c.kappa))
     columns = min(len(cases), 4)
     lines = -(-len(cases) // columns)
-    figure, axes = plt.subplots(lines, columns, figsize=(3.2 * columns, 3 * lines), squeeze=False,
-                                sharex=True, sharey=True, layout="constrained")  # fmt: skip
-    colours = {"heun": "0.4", "heun/adaptive": "tab:blue", "rkc2": "tab:red"}
+    figure = figure_of(3.2 * columns, 3 * lines)
+    axes = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
     for axis, case in itertools.zip_longest(axes.flat, cases):
         if case is None:
             axis.set_visible(False)
-            continue
-        of_case = [r for r in rows if (r["n"], r["alpha"], r["kappa"]) == case]
-        for method, colour in colours.items():
-            of = [r for r in of_case if r["method"] == method]
-            cost = [r["evaluations"] for r in of]
-            axis.loglog(cost, [r["median"] for r in of], "o-", color=colour, label=method)
-            if method != "heun":
-                axis.loglog(cost, [r["largest"] for r in of], "s--", color=colour, mfc="none")
-        axis.set_title(
-            rf"$N$ = {case[0]}, $\alpha$ = {case[1]:g}, $\kappa$ = {case[2]:g}", fontsize=9
-        )
-        axis.grid(visible=True, alpha=0.3)
+        else:
+            draw_case(axis, case, [r for r in rows if r.case == case])
     for axis in axes[:, 0]:
         axis.set_ylabel("relative error of p")
     for axis in axes[-1]:
         axis.set_xlabel("force evaluations")
     axes[0, 0].legend(title="filled: median, open: largest", fontsize=7, title_fontsize=7)
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
+    figure.savefig(path)
 
 
-def curves(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Median errors against seconds, one curve for each integrator and compression."""
-    found: dict[str, dict[str, Any]] = {}
-    for r in rows:
-        name = f"{r['method']}, N = {r['n']}, alpha = {r['alpha']:g}, kappa = {r['kappa']:g}"
-        curve = found.setdefault(name, {"name": name, "seconds": [], "error": []})
-        curve["seconds"].append(r["seconds"])
-        curve["error"].append(r["median"])
-    return list(found.values())
+def draw_case(axis: Any, case: Case, rows: list[Row]) -> None:
+    """Draw one panel."""
+    for method, colour in COLOURS.items():
+        of = [r for r in rows if r.method == method]
+        cost = [r.evaluations for r in of]
+        axis.loglog(cost, [r.median for r in of], "o-", color=colour, label=method)
+        if method != "heun":
+            axis.loglog(cost, [r.largest for r in of], "s--", color=colour, mfc="none")
+    title = rf"$N$ = {case.n}, $\alpha$ = {case.alpha:g}, $\kappa$ = {case.kappa:g}"
+    axis.set_title(title, fontsize=9)
+    axis.grid(visible=True, alpha=0.3)
 
 
-def main() -> None:
-    """Command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("runs/integrator_error"))
-    parser.add_argument("--n", type=int, nargs="+", default=[128, 256])
-    parser.add_argument("--alpha", type=float, nargs="+", default=list(PHI), choices=list(PHI))
-    parser.add_argument("--kappa", type=float, nargs="+", default=[1e-5, 1e-6])
-    parser.add_argument("--quick", action="store_true", help="N = 32, kappa = 1e-4")
-    options = parser.parse_args()
+def parser() -> ArgumentParser:
+    """Make the parser of the command line."""
+    found = parser_of(__doc__, "runs/integrator_error")
+    found.add_argument("--n", type=int, nargs="+", default=[128, 256])
+    found.add_argument("--alpha", type=float, nargs="+", default=list(PHI), choices=list(PHI))
+    found.add_argument("--kappa", type=float, nargs="+", default=[1e-5, 1e-6])
+    found.add_argument("--quick", action="store_true", help="N = 32, kappa = 1e-4")
+    return found
+
+
+def main(options: Namespace) -> None:
+    """Measure, draw, report."""
     options.out.mkdir(parents=True, exist_ok=True)
     reference = REFERENCE[1]
     if options.quick:
         options.n, options.kappa, reference = [32], [1e-4], 1e-6
     cases = [Case(*c) for c in itertools.product(options.n, options.alpha, options.kappa)]
-    rows: list[dict[str, Any]] = []
+    rows: list[Row] = []
     with tqdm(cases, unit="case") as bar:
         for case in bar:
             bar.set_postfix_str(case.name)
@@ -229,8 +224,14 @@ def main() -> None:
             (options.out / "integrator_error.md").write_text(text)
             draw(rows, options.out / "integrator_error.png")
     print(text)
-    print(json.dumps({"out": str(options.out), "rows": rows, "curves": curves(rows)}))
+    points = [
+        Point(
+            f"{r.method}, N = {r.n}, alpha = {r.alpha:g}, kappa = {r.kappa:g}", r.seconds, r.median
+        )
+        for r in rows
+    ]
+    report({"out": options.out, "rows": rows, "curves": curves(points)})
 
 
 if __name__ == "__main__":
-    main()
+    run(parser(), main)

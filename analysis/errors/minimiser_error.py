@@ -1,7 +1,7 @@
 """Residual force against run time of every minimiser, and of both energy targets, on the same states.
 
-    python analysis/minimiser_error.py --n 256 --seconds 60 --out runs/minimisers
-    python analysis/minimiser_error.py --states runs/sweep3d/p1_w0.6_1_seed1.h5 --out runs/minimisers3d
+    python analysis/errors/minimiser_error.py --n 256 --seconds 60 --out runs/minimisers
+    python analysis/errors/minimiser_error.py --states runs/sweep3d/p1_w0.6_1_seed1.h5 --out runs/minimisers3d
 
 States may also be packings of make_packing.py, superellipsoids as well. For every other state a packing at u0 = 1e-15 is made first (kept in the folder, and taken from there the next
 time); nearly round rods start from jammed discs, given spines of random directions. All minimisers then start from it, each particle displaced at random by 1e-6 of its radius, which
@@ -12,30 +12,29 @@ as long as the direct search the paper's takes, with our minimiser and as publis
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 import time
-from collections.abc import Callable
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
-from singular_limit import with_spines
+from studies.shown import figure_of, markdown
 from tqdm import tqdm
 
+from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_packing
-from jamshape.landscape import Landscape, State
+from jamshape.landscape import Landscape
+from jamshape.measures.minimum import write_minimum
 from jamshape.minima import History, Stop, minimise
 from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
-from jamshape.packing import Packing
+from jamshape.packing import Packing, State
+from jamshape.packing.spines import with_spines
 from jamshape.protocols.approach import Approach
-from jamshape.protocols.jammed import Sample, is_done, make, write_minimum
-from jamshape.protocols.random_start import Mixture
+from jamshape.protocols.make import Dynamics, Recipe, is_done, make
+from jamshape.shapes.particles import Kind, Particles
+from jamshape.shapes.table import DEFAULT
 
 MINIMISERS = ("auto", "newton", "lbfgs", "lammps", "paper")
 LEVELS = (1e-4, 1e-6, 1e-8)
@@ -56,49 +55,46 @@ LONGER = 20.0
 Row = dict[str, Any]
 
 
-def parse() -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--n", type=int, default=256, help="particles (256)")
-    parser.add_argument("--seconds", type=float, default=60.0, help="for each curve (60)")
-    parser.add_argument("--kappa", type=float, default=4e-6, help="slowest compression rate (4e-6)")
-    parser.add_argument(
-        "--states",
-        nargs="+",
-        default=["0.01", "1", "4", "20", "mixture"],
-        help="aspect ratios, 'mixture', or packings, *.h5 (0.01 1 4 20 mixture)",
-    )
-    parser.add_argument("--out", type=Path, required=True, help="folder")
-    return parser.parse_args()
+def parser() -> ArgumentParser:
+    """Make the parser of the command line."""
+    found = parser_of(__doc__, "runs/minimisers")
+    add = found.add_argument
+    add("--n", type=int, default=256, help="particles (256)")
+    add("--seconds", type=float, default=60.0, help="for each curve (60)")
+    add("--kappa", type=float, default=4e-6, help="slowest compression rate (4e-6)")
+    add("--states", nargs="+", default=["0.01", "1", "4", "20", "mixture"],
+        help="aspect ratios, 'mixture', or packings, *.h5 (0.01 1 4 20 mixture)")  # fmt: skip
+    return found
 
 
-def mixture(n: int) -> Mixture:
+def mixture() -> Particles:
     """Discs and rods up to alpha = 8, in two sizes."""
-    radius = np.where(np.arange(n) % 2, 0.5, 0.7)
-    alpha = np.array([0, 0.3, 1, 2, 4, 8])[np.arange(n) // 2 % 6]
-    return Mixture.from_arrays(alpha * radius, radius, 1 + (np.arange(n) + 1) % 2)
+    sizes = [(alpha, size) for alpha in (0.0, 0.3, 1.0, 2.0, 4.0, 8.0) for size in (1.0, 1.4)]
+    return Particles.mixture(DEFAULT, [Kind({"alpha": alpha}, size) for alpha, size in sizes])
 
 
-def state_of(name: str, options: argparse.Namespace) -> Packing:
+def recipe_of(name: str, options: Namespace) -> Recipe:
+    """Say what a state is made of."""
+    is_mixture = name == "mixture"
+    return Recipe(
+        particles=mixture() if is_mixture else Particles.of(alpha=float(name)),
+        n=options.n,
+        phi_start=0.2 if not is_mixture and float(name) > 10 else 0.35,
+        way=Dynamics(Approach(kappa=options.kappa)),
+        target=Target(tolerance=1e-7),
+    )
+
+
+def state_of(name: str, options: Namespace) -> Packing:
     """Make the packing at u0, or read it."""
     if name.endswith(".h5"):
         return read_packing(name)
     path: Path = options.out / f"state_{name}.h5"
     if name != "mixture" and 0 < float(name) < NEARLY_ROUND:
         return from_discs(state_of("0", options), float(name), path)
-    rods = name != "mixture" and float(name) > 10
-    sample = Sample(
-        n=options.n,
-        alpha=8.0 if name == "mixture" else float(name),
-        phi_start=0.2 if rods else 0.35,
-        approach=Approach(kappa=options.kappa),
-        target=Target(tolerance=1e-7),
-        mixture=mixture(options.n) if name == "mixture" else None,
-    )
     if not is_done(path):
-        for _ in tqdm(make(sample, path), desc=f"state {name}", unit="row", mininterval=5):
+        steps = make(recipe_of(name, options), path)
+        for _ in tqdm(steps, desc=f"state {name}", unit="row", mininterval=5):
             pass
     return read_packing(path)
 
@@ -106,9 +102,9 @@ def state_of(name: str, options: argparse.Namespace) -> Packing:
 def from_discs(discs: Packing, alpha: float, path: Path) -> Packing:
     """Make the packing of nearly round rods, or read it."""
     if not is_done(path):
-        rods, start = with_spines(discs, alpha, seed=1)
+        rods = with_spines(discs, alpha, seed=1)
         landscape = Landscape(rods)
-        write_minimum(path, landscape, find(landscape, start, Target(tolerance=1e-7)), {})
+        write_minimum(path, landscape, find(landscape, State.of(rods), Target(tolerance=1e-7)), {})
     return read_packing(path)
 
 
@@ -142,25 +138,25 @@ def run_target(name: str, packing: Packing, seconds: float) -> Row:
     u0 = landscape.evaluate(state).energy / state.volume
     target = Target(u0=float(f"{u0:.3g}"), tolerance=tolerance, method=method)
     step = 1e-6 if search is halving else target.step
-    run = Search(state.strained(-STRAIN), step)
+    at = Search(state.strained(-STRAIN), step)
     began, outcome = time.perf_counter(), "out of time"
     try:
-        for _ in search(landscape, run, target):
-            if run.minimum is not None:
+        for _ in search(landscape, at, target):
+            if at.minimum is not None:
                 outcome = "found"
             elif time.perf_counter() - began > seconds:
                 break
     except TargetError as error:
         outcome = str(error)
     seconds = time.perf_counter() - began
-    u, residual = run.history.energy_density[-1], run.history.residual[-1]
-    if run.minimum is not None:  # the best one, not the last one
-        u, residual = run.minimum.energy_density, run.minimum.residual.largest
+    u, residual = at.history.energy_density[-1], at.history.residual[-1]
+    if at.minimum is not None:  # the best one, not the last one
+        u, residual = at.minimum.energy_density, at.minimum.residual.largest
     off = abs(u / target.u0 - 1)
     return {"outcome": outcome, "seconds": seconds, "off": off, "residual": residual}
 
 
-def study(options: argparse.Namespace) -> dict[str, Row]:
+def study(options: Namespace) -> dict[str, Row]:
     """Run everything; results of each state are kept in the folder as they come."""
     results: dict[str, Row] = {}
     for name in options.states:
@@ -172,56 +168,51 @@ def study(options: argparse.Namespace) -> dict[str, Row]:
             *(("minimisers", m, run_minimiser, options.seconds) for m in MINIMISERS),
             *(("targets", t, run_target, LONGER * options.seconds) for t in TARGETS),
         ]
-        for group, method, run, seconds in runs:
+        packing = state_of(name, options)
+        for group, method, measure, seconds in runs:
             if method not in found[group]:
-                found[group][method] = run(method, state_of(name, options), seconds)
+                found[group][method] = measure(method, packing, seconds)
                 path.write_text(json.dumps(found))
-        results[name] = found
+        results[name] = found | {"n": packing.n}
     return results
 
 
 def draw(results: dict[str, Row], path: Path) -> None:
     """One panel a state, one curve a minimiser."""
-    figure, axes = plt.subplots(1, len(results), figsize=(3 * len(results), 3), squeeze=False)
-    for axis, (name, result) in zip(axes[0], results.items(), strict=True):
+    figure = figure_of(3 * len(results), 3)
+    axes = figure.subplots(1, len(results), squeeze=False)[0]
+    for axis, (name, result) in zip(axes, results.items(), strict=True):
         for method, row in result["minimisers"].items():
             axis.loglog(row["seconds"], row["residual"], label=method)
         number = name.replace(".", "", 1).isdecimal()
         label = rf"$\alpha = {name}$" if number else Path(name).stem
-        axis.set(xlabel=f"seconds, {label}", ylim=(1e-11, None))
-    axes[0][0].set_ylabel("largest net force / mean bond force")
-    axes[0][0].legend(fontsize="small")
-    figure.tight_layout()
-    figure.savefig(path, dpi=120)
+        axis.set(xlabel="seconds", ylim=(1e-11, None))
+        axis.set_title(f"{label}, $N$ = {result['n']}", fontsize=9)
+    axes[0].set_ylabel("largest net force / mean bond force")
+    axes[0].legend(fontsize="small")
+    figure.savefig(path)
 
 
-def table(results: dict[str, Row]) -> str:
-    """Seconds to each level, as Markdown."""
-    heads = [f"to {level:g}" for level in LEVELS]
-    lines = [
-        f"| state | method | {' | '.join(heads)} | reached |",
-        "| --- " * (3 + len(heads)) + "|",
-    ]
-    for name, result in results.items():
-        for method, row in result["minimisers"].items():
-            times = [f"{t:.3g} s" if t is not None else "-" for t in row["to"].values()]
-            lines.append(f"| {name} | {method} | {' | '.join(times)} | {row['reached']:.1e} |")
-        direct_seconds = result["targets"]["direct to 1e-4"]["seconds"]
-        for method, row in result["targets"].items():
-            ratio = f"{row['seconds'] / direct_seconds:.3g} times direct to 1e-4"
-            off = f"u off by {row['off']:.1e}"
-            cells = (f"{row['seconds']:.3g} s", ratio, f"{row['outcome']}, {off}")
-            line = " | ".join((name, f"target, {method}", *cells, f"{row['residual']:.1e}"))
-            lines.append(f"| {line} |")
-    return "\n".join(lines)
+def cells(name: str, result: Row) -> Iterator[tuple[str, ...]]:
+    """Rows of the table for one state: seconds to each level, or what was reached."""
+    for method, row in result["minimisers"].items():
+        times = [f"{t:.3g} s" if t is not None else "-" for t in row["to"].values()]
+        yield (name, method, *times, f"{row['reached']:.1e}")
+    direct_seconds = result["targets"]["direct to 1e-4"]["seconds"]
+    for method, row in result["targets"].items():
+        ratio = f"{row['seconds'] / direct_seconds:.3g} times direct to 1e-4"
+        outcome = f"{row['outcome']}, u off by {row['off']:.1e}"
+        numbers = (f"{row['seconds']:.3g} s", ratio, outcome, f"{row['residual']:.1e}")
+        yield (name, f"target, {method}", *numbers)
 
 
-def main(options: argparse.Namespace) -> None:
+def main(options: Namespace) -> None:
     """Study, draw, print."""
     options.out.mkdir(parents=True, exist_ok=True)
     results = study(options)
     draw(results, options.out / "minimisers.png")
-    print(table(results))
+    heads = ("state", "method", *(f"to {level:g}" for level in LEVELS), "reached")
+    print(markdown(heads, [row for name, found in results.items() for row in cells(name, found)]))
     curves = [
         {
             "name": f"{method}, {Path(name).stem}",
@@ -231,12 +222,9 @@ def main(options: argparse.Namespace) -> None:
         for name, result in results.items()
         for method, row in result["minimisers"].items()
     ]
-    found = {"out": str(options.out / "minimisers.png"), "n": options.n, "curves": curves}
-    print(json.dumps(found))
+    of = {"n": options.n, "states": options.states}
+    report({"out": options.out / "minimisers.png", **of, "curves": curves})
 
 
 if __name__ == "__main__":
-    try:
-        main(parse())
-    except (ValueError, OSError, RuntimeError) as error:
-        sys.exit(f"minimiser_error.py: {error}")
+    run(parser(), main)

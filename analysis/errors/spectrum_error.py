@@ -1,6 +1,6 @@
 """Error against run time of every way to find modes, and how run time grows with the packing.
 
-    python analysis/spectrum_error.py SMALL.h5 [LARGER.h5 ...] --tiles 2 6 --out spectrum_error.png
+    python analysis/errors/spectrum_error.py SMALL.h5 [LARGER.h5 ...] --tiles 2 6 --out spectrum_error.png
 
 Packings as make_packing.py writes them. On the left, for each packing and method, the relative error of every
 mode against the refined spectrum (or the bound of that one, where it is larger), medians and largest in each
@@ -11,11 +11,9 @@ are of the processor. The last line of standard output is one JSON object.
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
 import time
-from collections.abc import Callable
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,11 +21,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
+from studies.shown import Point, curves, figure_of
 
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_packing
-from jamshape.landscape import Landscape, State
-from jamshape.packing import Box, Packing
+from jamshape.landscape import Landscape
+from jamshape.packing import Box, Packing, State
 from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix
 from jamshape.vibration.sparse_modes import lowest
 from jamshape.vibration.spectrum import Spectrum, spectrum
@@ -80,9 +80,9 @@ def measure(path: Path) -> dict[str, Any]:
     n_below = sum(band.n_modes for band in parts if band.name != "high")
     runs["sparse"] = timed(lambda: lowest(matrix, n_below + BEYOND))
     rows: dict[str, Any] = {}
-    for method, run in runs.items():
-        which, relative = errors(run.found, reference)
-        rows[method] = {"seconds": run.seconds, "bands": {}}
+    for method, done in runs.items():
+        which, relative = errors(done.found, reference)
+        rows[method] = {"seconds": done.seconds, "bands": {}}
         for band in parts:
             own = relative[np.isin(which, band.modes)]
             if len(own):
@@ -92,18 +92,22 @@ def measure(path: Path) -> dict[str, Any]:
 
 
 def tiled(packing: Packing, k: int) -> tuple[Packing, State]:
-    """Put k x k copies beside each other."""
+    """Put k copies beside each other along each edge."""
     position, orientation, edges = packing.poses()
-    shifts = np.array(list(np.ndindex(k, k)))
+    shifts = np.array(list(np.ndindex(*(k,) * packing.dimension)))
     where = np.concatenate([position + shift * edges for shift in shifts])
-    turned = np.tile(orientation, k * k)
+    turned, diameters = (
+        np.concatenate([x] * len(shifts)) for x in (orientation, packing.diameters)
+    )
     large = Packing(
         position=where.astype(np.float64),
         orientation=turned.astype(np.float64),
-        diameters=np.tile(packing.diameters, (k * k, 1)),
-        species=np.tile(packing.species, k * k),
-        id=np.arange(1, packing.n * k * k + 1),
+        diameters=diameters,
+        exponent=np.tile(packing.exponent, len(shifts)),
+        species=np.tile(packing.species, len(shifts)),
+        id=np.arange(1, packing.n * len(shifts) + 1),
         box=Box(packing.box.lo, k * packing.box.edges),
+        shape_style=packing.shape_style,
     ).with_poses(where, turned, k * edges)
     return large, State.of(large)
 
@@ -120,12 +124,12 @@ def measure_tiles(path: Path, k: int) -> dict[str, Any]:
     began = time.process_time()
     matrix = dynamical_matrix(Landscape(packing), state)
     assembly = time.process_time() - began
-    run = timed(lambda: lowest(varied(matrix), SOFTEST))
-    real = np.abs(run.found.eigenvalues) > run.found.bound
-    relative = (run.found.bound / np.abs(run.found.eigenvalues))[real]
+    found, seconds = timed(lambda: lowest(varied(matrix), SOFTEST))
+    real = np.abs(found.eigenvalues) > found.bound
+    relative = (found.bound / np.abs(found.eigenvalues))[real]
     return {
         "n": packing.n,
-        "seconds": run.seconds,
+        "seconds": seconds,
         "assembly_seconds": assembly,
         "relative_bound": float(relative.max()) if len(relative) else None,
     }
@@ -145,70 +149,70 @@ def show(rows: list[dict[str, Any]], tiles: list[dict[str, Any]]) -> None:
 
 def draw(rows: list[dict[str, Any]], tiles: list[dict[str, Any]], out: Path) -> None:
     """Draw errors and growth."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(11, 4.5), dpi=150, layout="constrained")
+    figure = figure_of(11, 4.5)
     left, right = figure.subplots(1, 2)
+    draw_errors(left, rows)
+    draw_growth(right, rows, tiles)
+    figure.savefig(out)
+
+
+def draw_errors(axis: Any, rows: list[dict[str, Any]]) -> None:
+    """Draw a line from the median to the largest error of each band."""
     for row in rows:
         for method, of in row["methods"].items():
             for band, e in of["bands"].items():
                 values = [max(e[key], 1e-20) for key in ("median", "largest")]
                 style: dict[str, Any] = {"color": COLORS[method], "marker": MARKERS[band]}
-                left.loglog([of["seconds"]] * 2, values, **style, mfc="none", lw=0.8)
+                axis.loglog([of["seconds"]] * 2, values, **style, mfc="none", lw=0.8)
     for band, marker in MARKERS.items():
-        left.plot([], [], marker, color="0.3", mfc="none", label=f"{band} band")
-    left.set_xlabel("seconds")
-    left.set_ylabel("relative error of eigenvalues, median and largest")
+        axis.plot([], [], marker, color="0.3", mfc="none", label=f"{band} band")
+    axis.set_xlabel("seconds")
+    axis.set_ylabel("relative error of eigenvalues, median and largest")
     # Errors fill the whole panel, so that no corner is free.
-    left.legend(fontsize=8, ncols=len(MARKERS), loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    axis.legend(fontsize=8, ncols=len(MARKERS), loc="lower center", bbox_to_anchor=(0.5, 1.0))
+
+
+def draw_growth(axis: Any, rows: list[dict[str, Any]], tiles: list[dict[str, Any]]) -> None:
+    """Draw seconds against the number of particles."""
+    n = [row["n"] for row in rows]
     for method in METHODS:
-        n = [row["n"] for row in rows]
         seconds = [row["methods"][method]["seconds"] for row in rows]
-        right.loglog(n, seconds, "o-", color=COLORS[method], label=method.replace("_", " "))
+        axis.loglog(n, seconds, "o-", color=COLORS[method], label=method.replace("_", " "))
     if tiles:
         label = f"sparse, {SOFTEST} softest of copies"
         x, y = [t["n"] for t in tiles], [t["seconds"] for t in tiles]
-        right.loglog(x, y, "D--", color=COLORS["sparse"], mfc="none", label=label)
-    right.set_xlabel("particles")
-    right.set_ylabel("seconds")
-    right.legend(fontsize=8)
-    figure.savefig(out)
+        axis.loglog(x, y, "D--", color=COLORS["sparse"], mfc="none", label=label)
+    axis.set_xlabel("particles")
+    axis.set_ylabel("seconds")
+    axis.legend(fontsize=8)
 
 
-def curves(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def points(rows: list[dict[str, Any]]) -> Iterator[Point]:
     """Largest relative errors of each band against seconds, one curve for each method and band."""
-    found: dict[str, dict[str, Any]] = {}
     for row in rows:
         for method, of in row["methods"].items():
             for band, errors_of in of["bands"].items():
                 name = f"{method.replace('_', ' ')}, {band} band"
-                curve = found.setdefault(name, {"name": name, "seconds": [], "error": []})
-                curve["seconds"].append(of["seconds"])
-                curve["error"].append(errors_of["largest"])
-    return list(found.values())
+                yield Point(name, of["seconds"], errors_of["largest"])
 
 
-def main() -> None:
+def parser() -> ArgumentParser:
+    """Make the parser of the command line."""
+    found = parser_of(__doc__, "spectrum_error.png")
+    found.add_argument("packings", type=Path, nargs="+", metavar="PACKING.h5")
+    found.add_argument("--tiles", type=int, nargs="*", default=[], help="copies along each edge")
+    return found
+
+
+def main(options: Namespace) -> None:
     """Measure, draw, report."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("packings", type=Path, nargs="+", metavar="PACKING.h5")
-    parser.add_argument("--tiles", type=int, nargs="*", default=[], help="copies along each edge")
-    parser.add_argument(
-        "--out", type=Path, default=Path("spectrum_error.png"), help="(%(default)s)"
-    )
-    options = parser.parse_args()
     rows = [measure(path) for path in options.packings]
     tiles = [measure_tiles(options.packings[0], k) for k in options.tiles]
     show(rows, tiles)
     draw(rows, tiles, options.out)
-    found = {"out": str(options.out), "packings": rows, "tiles": tiles}
-    print(json.dumps(found | {"curves": curves(rows)}))
+    found = {"out": options.out, "packings": rows, "tiles": tiles}
+    report(found | {"curves": curves(points(rows))})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"spectrum_error.py: {error}")
+    run(parser(), main)

@@ -1,7 +1,7 @@
 """Every stiff and extreme case, with what is expected of it and what is measured: the stability battery.
 
-    python analysis/stability_report.py --out runs/stability
-    python analysis/stability_report.py --only "restart|coincident" --out runs/stability
+    python analysis/stability/stability_report.py --out runs/stability
+    python analysis/stability/stability_report.py --only "restart|coincident" --out runs/stability
 
 Writes report.md: a table of case, part, expected behaviour, measured error or sentence, verdict and seconds. A run
 that was killed goes on where it was when started again; --only takes a regular expression of the names of cases
@@ -17,7 +17,6 @@ import multiprocessing
 import os
 import platform
 import re
-import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -26,20 +25,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from stability_cases import Case, Verdict, all_cases
+from battery.case import Case, Verdict
+from battery.cases import all_cases
 from tqdm import tqdm
 
+from jamshape.command import parser_of, report, run
 
-def parse() -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--out", type=Path, default=Path("runs/stability"), help="folder")
-    parser.add_argument("--only", default="", help="regular expression of names of cases")
-    parser.add_argument("--quick", action="store_true", help="without cases of many seconds")
-    parser.add_argument("--again", action="store_true", help="repeat what is there")
-    return parser.parse_args()
+
+def parser() -> argparse.ArgumentParser:
+    """Make the parser of the command line."""
+    found = parser_of(__doc__, "runs/stability")
+    found.add_argument("--only", default="", help="regular expression of names of cases")
+    found.add_argument("--quick", action="store_true", help="without cases of many seconds")
+    found.add_argument("--again", action="store_true", help="repeat what is there")
+    return found
 
 
 @cache
@@ -123,38 +122,44 @@ def page(records: dict[str, dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def main(options: argparse.Namespace) -> int:
-    """Run what is asked for and not there; return the exit code."""
-    options.out.mkdir(parents=True, exist_ok=True)
-    path = options.out / "verdicts.json"
-    records: dict[str, dict[str, Any]] = json.loads(path.read_text()) if path.exists() else {}
-    asked = [
+def asked(options: argparse.Namespace) -> list[str]:
+    """List the names of the cases that are asked for.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    found = [
         label
         for label, case in _cases().items()
         if re.search(options.only, label) and not (options.quick and case.heavy)
     ]
-    if not asked:
+    if not found:
         msg = f"no case is called {options.only!r}, expected part of a name such as 'own images'"
         raise ValueError(msg)
+    return found
+
+
+def main(options: argparse.Namespace) -> int:
+    """Run what is asked for and not there; return the exit code."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    path, out = options.out / "verdicts.json", options.out / "report.md"
+    records: dict[str, dict[str, Any]] = json.loads(path.read_text()) if path.exists() else {}
+    labels = asked(options)
     # What failed is looked at again: it may have been mended.
-    todo = [x for x in asked if options.again or not records.get(x, {}).get("holds")]
-    report = options.out / "report.md"
+    todo = [x for x in labels if options.again or not records.get(x, {}).get("holds")]
     found = verdicts(todo, options.out / "lammps.log")
     for label, verdict in zip(todo, tqdm(found, total=len(todo), unit="case"), strict=True):
         records[label] = verdict._asdict()
         path.write_text(json.dumps(records, indent=1))
-        report.write_text(page({x: records[x] for x in asked if x in records}))
-    report.write_text(page({label: records[label] for label in asked}))
-    failed = [label for label in asked if not records[label]["holds"]]
-    seconds = sum(records[label]["seconds"] for label in asked)
-    print(
-        json.dumps({"out": str(report), "cases": len(asked), "failed": failed, "seconds": seconds})
-    )
+        out.write_text(page({x: records[x] for x in labels if x in records}))
+    out.write_text(page({label: records[label] for label in labels}))
+    failed = [label for label in labels if not records[label]["holds"]]
+    seconds = sum(records[label]["seconds"] for label in labels)
+    report({"out": out, "cases": len(labels), "failed": failed, "seconds": seconds})
     return 1 if failed else 0
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main(parse()))
-    except (ValueError, OSError) as error:
-        sys.exit(f"stability_report.py: {error}")
+    run(parser(), main)

@@ -7,15 +7,20 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import lammps_scenes
+import numpy as np
 from lammps_scenes import after_restart, before_box
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "analysis"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "analysis" / "stability"))
 
-import stability_shapes
-from stability_shapes import SCENES, crowd, exponents_of, far_apart, particles, tiny_box
+from battery.scenes import superellipsoids
+from battery.scenes.superellipsoids import KINDS, far_apart, particles, tiny_box
+from battery.shapes.shape import RELATIVE
+from battery.shapes.superellipsoids import CROWDS as SCENES
 
+from jamshape.contacts import find_contacts, sum_forces
 from jamshape.files.lammps_text import write_data
 from jamshape.lammps.session import Session
+from jamshape.shapes.shape import Interaction
 
 __all__ = ["SCENES", "crowd", "exponents_of", "far_apart", "particles", "tiny_box"]
 
@@ -25,8 +30,19 @@ EPSILON = 1.7
 # --- input ---------------------------------------------------------------------------------------
 
 
+def crowd(dimension=3, kinds=(0, 1, 2, 3), **named):
+    return superellipsoids.crowd(dimension, [KINDS[k] for k in kinds], **named)
+
+
+def exponents_of(packing):
+    """Give them by type."""
+    table = np.ones(packing.species.max())
+    table[packing.species - 1] = packing.exponent
+    return table
+
+
 def pair_commands(packing, epsilon=EPSILON):
-    return stability_shapes.pair_commands(packing, epsilon)
+    return packing.shape.style(packing, Interaction(epsilon)).commands
 
 
 def scene(packing, data, *, newton="on", skin=0.3, extra=""):
@@ -54,10 +70,19 @@ def state_of(session, packing):
 
 
 def sums(packing, epsilon=EPSILON):
-    """Energy, forces and torques from the bindings, rows as the packing's."""
-    return stability_shapes.sums(packing, epsilon)
+    """Energy, forces, torques, virial and the number of bonds from the bindings, rows as the packing's."""
+    network = find_contacts(packing, epsilon)
+    found = sum_forces(packing, network)
+    torque = found.torque.reshape(packing.n, -1)
+    both = {"force": found.force, "torque": torque, "energy": found.energy}
+    return both | {"virial": found.virial, "n_bonds": int(network.n_bonds.sum())}
 
 
 def difference_from_bindings(state, epsilon=EPSILON):
     """Largest difference of forces and of torques, relative to the largest."""
-    return stability_shapes.difference(state.packing, state.force, state.torque, epsilon)
+    packing, expected = state.packing, sums(state.packing, epsilon)
+    force = RELATIVE.force(packing, expected["force"], epsilon)
+    torque = RELATIVE.torque(packing, expected["torque"], force)
+    by_force = np.abs(state.force - expected["force"]).max() / force
+    wrong = state.torque.reshape(packing.n, -1) - expected["torque"]
+    return max(by_force, np.abs(wrong).max() / torque)

@@ -1,93 +1,52 @@
-"""All cases of the stability battery, for `stability_report.py` and the tests.
-
-A case has an expectation: the largest error that is allowed, or the sentence with which it must stop.
-"""
+"""All cases of the stability battery, for `stability_report.py` and the tests."""
 
 from __future__ import annotations
 
-import re
-import time
-import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import replace
 
+from battery.case import Case
+from battery.parts import (
+    flow,
+    implicit,
+    lammps_minimize,
+    landscape,
+    minimisers,
+    pair_style,
+    pairs_of_rods,
+    pairs_of_superellipsoids,
+    quasistatic,
+    spectra,
+    starts,
+    targets,
+    thermal,
+    two_ranks,
+)
 
-class Verdict(NamedTuple):
-    """What a case came to."""
+PARTS = (
+    pairs_of_rods,
+    pairs_of_superellipsoids,
+    landscape,
+    pair_style,
+    flow,
+    lammps_minimize,
+    two_ranks,
+    minimisers,
+    targets,
+    spectra,
+    starts,
+    implicit,
+    quasistatic,
+    thermal,
+)
 
-    measured: float | str
-    holds: bool
-    seconds: float
-
-
-@dataclass(frozen=True)
-class Case:
-    """One stiff or extreme situation.
-
-    Parameters
-    ----------
-    part
-        Of jamshape that is tried.
-    name
-        The situation.
-    measure
-        What the error is, or what stops.
-    expected
-        Largest error allowed, or a regular expression of the sentence.
-    run
-        Returns the error, or the sentence; may raise `ValueError` or `RuntimeError` for that.
-    heavy
-        Takes many seconds.
-    """
-
-    part: str
-    name: str
-    measure: str
-    expected: float | str
-    run: Callable[[], float | str]
-    heavy: bool = False
-
-    @property
-    def label(self) -> str:
-        """Name of the case that no other has."""
-        return f"{self.part}: {self.name}"
-
-    def judge(self) -> Verdict:
-        """Run it; NaN, a warning of NumPy and a wrong sentence do not hold."""
-        began = time.perf_counter()
-        measured: float | str
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", RuntimeWarning)
-                found = self.run()
-                measured = found if isinstance(found, str) else float(found)
-        except (ValueError, RuntimeError, RuntimeWarning) as error:
-            measured = f"{error}" or type(error).__name__
-        if isinstance(self.expected, str):
-            holds = isinstance(measured, str) and bool(re.search(self.expected, measured))
-        else:
-            holds = not isinstance(measured, str) and bool(measured <= self.expected)
-        return Verdict(measured, holds, time.perf_counter() - began)
+# Ten thousand images for each of its pairs.
+HEAVY = "3D, alpha 1e-6 to 100"
 
 
 def all_cases() -> list[Case]:
     """List all cases, part by part."""
-    # Imported here, since these modules take `Case` from this one.
-    import stability_compression  # noqa: PLC0415
-    import stability_contacts  # noqa: PLC0415
-    import stability_lammps  # noqa: PLC0415
-    import stability_solvers  # noqa: PLC0415
-    import stability_superellipsoids  # noqa: PLC0415
-
-    modules = (
-        stability_contacts,
-        stability_lammps,
-        stability_superellipsoids,
-        stability_solvers,
-        stability_compression,
-    )
-    cases = [case for module in modules for case in module.cases()]
+    cases = [case for part in PARTS for case in part.cases()]
+    cases = [replace(case, heavy=case.heavy or HEAVY in case.name) for case in cases]
     labels = [case.label for case in cases]
     assert len(set(labels)) == len(labels), "a case is there twice"
     return cases

@@ -1,0 +1,37 @@
+"""What a study has finished is kept in its folder, and taken from there the next time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from jamshape.command import plain
+from jamshape.files.h5md import read_packing, write_packing
+from jamshape.files.vocabulary import renamed
+from jamshape.flow.compression import Compression, CompressionRun
+from jamshape.lammps.session import Session
+from jamshape.packing import Packing
+
+
+def kept(path: Path, make: Callable[..., dict[str, Any]], *arguments: Any) -> dict[str, Any]:
+    """Return what was found before, or find it."""
+    if not path.exists():
+        path.write_text(json.dumps(plain(make(*arguments))))
+    return renamed(json.loads(path.read_text()))
+
+
+def kept_packing(path: Path, make: Callable[[], Packing]) -> Packing:
+    """Return the packing of before, or make it."""
+    if not path.exists():
+        write_packing(path, make())
+    return read_packing(path)
+
+
+def compressed(start: Packing, settings: Compression) -> Packing:
+    """Compress in LAMMPS to the end."""
+    with Session() as session:
+        run = CompressionRun(session, settings, start)
+        run.advance(run.last_step)
+        return run.packing()

@@ -1,0 +1,1 @@
+"""Cases of each part of jamshape, for all shapes of the table."""
