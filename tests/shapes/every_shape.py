@@ -10,7 +10,7 @@ import numpy as np
 from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape
 from jamshape.minima import Outcome, Stop, minimise
-from jamshape.packing import Box, Packing, State
+from jamshape.packing import Box, State
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Kind, Particles
 from jamshape.shapes.table import SHAPES
@@ -116,7 +116,11 @@ def in_a_small_box(case):
         state = minimise(landscape, state, "lbfgs", Stop(tolerance=0.03, evaluations=200)).state
         found = in_doubles(state.packing(packing))
         i, j = find_contacts(found, sides=SIDES).pairs.T
-        if (i == j).any() and (i != j).any() and found.box.edges.min() < 2 * found.outer_radius.max():
+        if (
+            (i == j).any()
+            and (i != j).any()
+            and found.box.edges.min() < 2 * found.outer_radius.max()
+        ):
             return kicked(found, 0.01)
         state = state.strained(-0.01)
     raise AssertionError

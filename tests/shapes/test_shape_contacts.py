@@ -23,7 +23,14 @@ from every_shape import (
 )
 from slopes import assert_is_slope
 
-from jamshape.contacts import CrossingError, PairArrays, find_contacts, forces, near_pairs, sum_forces
+from jamshape.contacts import (
+    CrossingError,
+    PairArrays,
+    find_contacts,
+    forces,
+    near_pairs,
+    sum_forces,
+)
 from jamshape.contacts.near import NearPairs, Spheres, each_once, near_particles
 from jamshape.landscape import Landscape
 from jamshape.packing import State
@@ -125,9 +132,7 @@ def test_strain_derivatives_are_slopes(packing):
     scale = abs(here.strain_gradient)
     assert_is_slope(here.strain_gradient, lambda s: at(s).energy, h, scale)
     stiff = abs(curvature.strain_hessian)
-    assert_is_slope(
-        curvature.strain_hessian, lambda s: at(s).strain_gradient / (1 + s), h, stiff
-    )
+    assert_is_slope(curvature.strain_hessian, lambda s: at(s).strain_gradient / (1 + s), h, stiff)
     scale = np.abs(curvature.coupling).max()
     assert_is_slope(curvature.coupling, lambda s: at(s).gradient, h, scale)
 
@@ -299,7 +304,10 @@ def test_particles_may_turn_about_their_axes_of_symmetry(packing):
         if packing.dimension == 3:
             turn[own] = packing.body_axes(k)[own] * rng.uniform(1, 2, (own.sum(), 1))
     turn[packing.is_round] = rng.uniform(1, 2, (packing.is_round.sum(), 3))
-    turned = state.displaced(np.zeros_like(packing.position), turn[:, -state.orientation.shape[1] :][:, : 1 if packing.dimension == 2 else 3])
+    turned = state.displaced(
+        np.zeros_like(packing.position),
+        turn if packing.dimension == 3 else turn[:, 2:],
+    )
     one, other = landscape.evaluate(state), Landscape(packing).evaluate(turned)
     assert other.energy == pytest.approx(one.energy, rel=ROUNDING)
     D, size = packing.dimension, 10 * ROUNDING * one.bond_force
@@ -319,7 +327,8 @@ def test_boxes_side_by_side_are_one_packing(packing, network):
     size = 10 * ROUNDING * max(force, torque)
     np.testing.assert_allclose(many.force, np.tile(one.force, (copies, 1)), rtol=0, atol=size)
     alone = np.isin(np.arange(packing.n), network.pairs[network.pairs[:, 0] == network.pairs[:, 1]])
-    other = np.tile(~alone, copies)  # images of the particle itself are at the kink of a bond that fades
+    # Images of the particle itself are at the kink of a bond that fades.
+    other = np.tile(~alone, copies)
     expected = np.tile(as_vectors(one.torque), (copies, 1))
     np.testing.assert_allclose(as_vectors(many.torque)[other], expected[other], rtol=0, atol=size)
     np.testing.assert_allclose(many.pressure, one.pressure, rtol=10 * ROUNDING)

@@ -30,7 +30,9 @@ NAMES = (*ClassFractions._fields, *(f"flat_{name}" for name in FlatFraction._fie
 def class_numbers(found: Contacts) -> dict[str, float]:
     """Count classes of contact and flat contacts of one packing, by `NAMES`."""
     fractions = class_fractions(found.network, found.rattlers)
-    return dict(zip(NAMES, (*fractions, *flat_fraction(found.network, found.rattlers)), strict=True))
+    return dict(
+        zip(NAMES, (*fractions, *flat_fraction(found.network, found.rattlers)), strict=True)
+    )
 
 
 def angles_of(file: PackingFile) -> FloatArray:
