@@ -105,7 +105,7 @@ DIMERS = Shape(
     },
     solvers=InSolvers(
         minimised=_named(PLANE | {"3D, own images": SPACE["3D, own images"]}),
-        to_the_end=("dimers, overlaps of a third", "dimers, own images"),
+        to_the_end=("dimers, overlaps of a third",),
         jammed={"dimers of alpha 1": partial(scenes.jammed, 1.0, 16, 0.87, STYLE)},
         quick=("dimers of alpha 1",),
         in_units=("dimers of alpha 1",),
