@@ -97,6 +97,7 @@ DIMERS = Shape(
         extreme_drive=fix(1e-4, 0.02),
         extreme_steps=100,
         limit=2e-13,
+        few_stops=True,
     ),
     minimized={name: PLANE[name] for name in ("own images", "overlaps of a third")},
     two_ranks={
