@@ -1,125 +1,164 @@
-"""Draw a packing of 2D spherocylinders or discs: Fig. 7 of Marschall & Teitel, PRE 97, 012905.
+"""Draw packings of any shape, in the plane and in space.
 
-    python analysis/draw.py FILE [--frame -1] --out packing.png
+    python analysis/draw.py FILE [MORE ...] [--frame -1] [--color kind] --out packing.png
 
-FILE is H5MD, a LAMMPS dump or a data file. Big particles are blue, small ones green and rattlers grey
-(unless all are); black lines are along the spines, red dots where they touch. The last line of
-standard output is one JSON object with what was counted.
+FILE is H5MD, a LAMMPS dump or a data file. In the plane black lines are along the spines, red dots where particles
+touch; in space each particle whose centre is in the box is drawn whole, seen from afar. Colours tell the kinds of
+particles, with rattlers in grey (unless all are); the order of the particles in contact with each, green to red as it
+grows and grey without contacts: nematic (S2), tetratic (S4, in the plane), cubatic (C4, in space); the orientation;
+or the packing (one). As Fig. 7 of Marschall & Teitel, PRE 97, 012905, and Figs. 2, 4 b, c and 8 b of Yuan,
+VanderWerf, Shattuck & O'Hern, Soft Matter (2019). The last line of standard output is one JSON object with what
+was counted.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
-import sys
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from jamshape.arrays import FloatArray, IntArray
-from jamshape.contacts import ContactNetwork, coordination, find_contacts, find_rattlers
+from jamshape.command import parser_of, report, run
+from jamshape.contacts import coordination, find_contacts, find_rattlers
+from jamshape.drawing.colors import CHOICES, ORDER, Coloring, Scale
+from jamshape.drawing.kinds import kinds_of
+from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
+from jamshape.drawing.space import save_smooth
+from jamshape.drawing.text import scientific
 from jamshape.files.h5md import FileFormatError, read_attributes
 from jamshape.files.lammps_text import read_any
-from jamshape.packing import Box, Packing
+from jamshape.files.sets import Contacts
+from jamshape.measures.minimum import order
 
-SMALL, BIG, RATTLER, CONTACT = "#86c98a", "#6ea6dc", "#cfcfcf", "#d7191c"
-INCHES, MARGIN = 7.0, np.array([0.1, 0.35])  # of the longer edge, around the box
-SHORTEST = 0.6  # half length of a line along a spine where A is less, over R
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-
-def images(position: FloatArray, reach: FloatArray, box: Box) -> tuple[IntArray, FloatArray]:
-    """Find the owners and positions of all periodic images that reach into the box."""
-    inside = box.lo + (position - box.lo) % box.edges
-    turns = np.ceil(reach.max(axis=0, initial=0) / box.edges).astype(int)
-    found = []
-    for shift in np.ndindex(*(2 * turns + 1)):
-        moved = inside + (np.array(shift) - turns) * box.edges
-        seen = ((moved > box.lo - reach) & (moved < box.lo + box.edges + reach)).all(axis=1)
-        found.append((np.flatnonzero(seen), moved[seen]))
-    return np.concatenate([i for i, _ in found]), np.concatenate([x for _, x in found])
+COLUMNS = 3
+INCHES = (7.0, 5.0, 4.0)  # of the longer edge of a panel, for one column, two, three
+MANY_KINDS = 3  # of which the title names no parameters
+ROOM = 0.75  # above and below a panel, for words
 
 
-def outlines(center: FloatArray, axis: FloatArray, A: ArrayLike, R: ArrayLike) -> FloatArray:
-    """Trace spherocylinders: (N, V, 2) vertices; half length and radius may be one number."""
-    vertices = int(np.clip(400 / np.sqrt(len(center) + 1), 8, 64))
-    angle = np.linspace(-np.pi / 2, np.pi / 2, vertices)
-    cap = np.column_stack([np.cos(angle), np.sin(angle)])
-    unit = np.concatenate([cap, -cap])
-    along = np.multiply.outer(R, unit[:, 0]) + np.multiply.outer(A, np.repeat([1, -1], vertices))
-    across = np.multiply.outer(R, unit[:, 1])
-    normal = axis[:, None, ::-1] * [-1, 1]
-    return np.asarray(
-        center[:, None] + along[..., None] * axis[:, None] + across[..., None] * normal
+class Picture(NamedTuple):
+    """A packing with what is said of it."""
+
+    found: Contacts
+    numbers: list[str]
+    """For the title."""
+    report: dict[str, Any]
+
+
+def picture(path: Path, options: Namespace) -> Picture:
+    """Read a packing, find its contacts and count."""
+    packing = read_any(path, options.frame)
+    known: dict[str, Any] = {"sides": 2, "k_e": 1.0}
+    with contextlib.suppress(FileFormatError):  # dumps and data files have no attributes
+        known |= read_attributes(path)
+    sides = known["sides"] if options.sides == "auto" else int(options.sides)
+    network = find_contacts(packing, known["k_e"], sides)
+    counts = coordination(packing, network)
+    u = float(network.energy.sum()) / packing.box.volume
+    told = {"packing": path, "shape": packing.shape_style, "dimension": packing.dimension}
+    told |= {"n": packing.n, "rattlers": counts.n_rattlers, "contacts": len(network.pairs)}
+    told |= {"phi": packing.phi, "u": u, "z": counts.z}
+    known_order = order(packing) if options.color in ORDER else {}
+    numbers = [rf"$N={packing.n}$", rf"$\phi={packing.phi:.5f}$"]
+    numbers += [rf"$u={scientific(u)}$", f"$z={counts.z:.3f}$"]
+    numbers += [f"step {packing.step}"] * (packing.step > 0)
+    numbers += [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
+    if "protocol" in known:
+        numbers.append(f"protocol {known['protocol']}")
+    return Picture(
+        Contacts(packing, network, find_rattlers(packing, network)), numbers, told | known_order
     )
 
 
-def draw(packing: Packing, network: ContactNetwork, title: str, out: Path, dpi: int) -> None:
-    """Draw the box and what is in it."""
-    from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415
-    from matplotlib.colors import LinearSegmentedColormap, to_rgba  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415 - none of these is needed for --help
-
-    box, A, R = packing.box, packing.half_length, packing.radius
-    size = np.interp(A + R, [(A + R).min(), (A + R).max()], [0, 1])
-    color = LinearSegmentedColormap.from_list("size", [SMALL, BIG])(size)
-    grey = find_rattlers(packing, network)
-    color[grey & ~grey.all()] = to_rgba(RATTLER)
-    scale = INCHES / box.edges.max()
-    figure = Figure(figsize=scale * box.edges + MARGIN, layout="constrained")
-    axes = figure.subplots()
-    line = np.clip(0.05 * 72 * scale * R.min(), 0.1, 1.0)  # points
-    dot = np.clip(0.016 / scale, 0.18 * R.min(), 0.5 * R.min())
-    i, center = images(packing.position, A[:, None] * np.abs(packing.axes) + R[:, None], box)
-    bodies = list(outlines(center, packing.axes[i], A[i], R[i]))
-    axes.add_collection(PolyCollection(bodies, facecolors=color[i], edgecolors="k", lw=line))
-    half = (np.maximum(A, SHORTEST * R) * (A > 0))[i, None] * packing.axes[i]
-    spines = list(np.stack([center - half, center + half], axis=1))
-    axes.add_collection(LineCollection(spines, colors="k", lw=1.5 * line))
-    i, center = images(network.bonds.point, np.full_like(network.bonds.point, dot), box)
-    dots = list(outlines(center, np.eye(2)[0 * i], 0.0, dot))
-    axes.add_collection(PolyCollection(dots, facecolors=CONTACT, lw=0))
-    xlim, ylim = np.transpose([box.lo, box.lo + box.edges])
-    axes.set(xlim=xlim, ylim=ylim, aspect="equal", xticks=[], yticks=[])
-    axes.set_title(title, fontsize=9)
-    figure.savefig(out, dpi=dpi)
+def draw(pictures: list[Picture], options: Namespace) -> list[Coloring]:
+    """Draw all packings, with one scale of order."""
+    look = Look(options.color, options.height, options.turn, options.level or 0)
+    colored, scale = colorings([one.found for one in pictures], look.color)
+    figure, panels = make_panels(pictures, with_bar=scale is not None)
+    for axes, one, colors in zip(panels, pictures, colored, strict=False):
+        draw_packing(axes, one.found, colors, look)
+        axes.set_title(title(one, narrow=len(pictures) > 1), fontsize=9, linespacing=1.4)
+        add_legend(axes, colors)
+    for axes in panels[len(pictures) :]:
+        axes.set_axis_off()
+    if scale:
+        add_bar(figure, panels, scale)
+    smooth = any(one.found.packing.dimension == 3 for one in pictures)
+    if smooth:
+        save_smooth(figure, options.out, options.dpi)
+    else:
+        figure.savefig(options.out, dpi=options.dpi)
+    return colored
 
 
-def main() -> None:
-    """Read, find the contacts, draw, report."""
-    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument("file", type=Path, metavar="FILE", help="H5MD file, dump or data file")
-    parser.add_argument("--frame", type=int, default=-1, help="negative: from the end (-1)")
-    parser.add_argument("--out", type=Path, default=Path("packing.png"), help="(packing.png)")
+def title(one: Picture, *, narrow: bool) -> str:
+    """Name the particles, if they are few kinds, and what was counted; narrow ones in more lines."""
+    kinds, gap = kinds_of(one.found.packing), "    "
+    lines = [gap.join(one.numbers[:2]), gap.join(one.numbers[2:])]
+    lines = lines if narrow else [gap.join(one.numbers)]
+    return "\n".join([kinds.title] * (len(kinds.parameters) < MANY_KINDS) + lines)
+
+
+def make_panels(pictures: list[Picture], *, with_bar: bool) -> tuple[Figure, Any]:
+    """Make a figure with a panel for each packing, as long and wide as its box."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
+
+    columns = min(COLUMNS, len(pictures))
+    rows = -(-len(pictures) // columns)
+    shapes = [
+        one.found.packing.box.edges[:2] for one in pictures if one.found.packing.dimension == 2
+    ]
+    ratios = [edges / edges.max() for edges in shapes] or [np.ones(2)]
+    width, height = INCHES[columns - 1] * np.max(ratios, axis=0)
+    size = (columns * width + 0.1 + 0.7 * with_bar, rows * (height + ROOM))
+    figure = Figure(figsize=size)
+    figure.set_layout_engine("constrained", h_pad=0.1, w_pad=0.06)
+    return figure, figure.subplots(rows, columns, squeeze=False).ravel()
+
+
+def add_bar(figure: Figure, panels: Any, scale: Scale) -> None:
+    """Explain the colours of local order."""
+    bar = figure.colorbar(scale.mapped, ax=list(panels), fraction=0.04, pad=0.02, shrink=0.8)
+    bar.set_label(scale.label)
+
+
+def parser() -> ArgumentParser:
+    """Describe the command line."""
+    found = parser_of(__doc__, "packing.png")
+    found.add_argument(
+        "files", type=Path, nargs="+", metavar="FILE", help="H5MD, dumps, data files"
+    )
+    found.add_argument("--frame", type=int, default=-1, help="negative: from the end (-1)")
+    found.add_argument("--color", choices=CHOICES, default="kind", help="by what (%(default)s)")
     sides = "points of a side-to-side contact; auto: as the file says, or else 2 (auto)"
-    parser.add_argument("--sides", choices=("auto", "1", "2"), default="auto", help=sides)
-    parser.add_argument("--dpi", type=int, default=200, help="dots per inch (200)")
-    options = parser.parse_args()
-    packing = read_any(options.file, options.frame)
-    if packing.shape_style != "spherocylinder":
-        msg = f"{options.file}: holds {packing.shape_style!r}, expected 'spherocylinder'"
-        raise ValueError(msg)
-    if packing.dimension != 2:
-        msg = f"{options.file}: is three-dimensional, expected two dimensions; OVITO draws 3D dumps"
-        raise ValueError(msg)
-    known: dict[str, Any] = {"sides": 2, "k_e": 1.0}
-    with contextlib.suppress(FileFormatError):  # dumps and data files have no attributes
-        known |= read_attributes(options.file)
-    n_sides = known["sides"] if options.sides == "auto" else int(options.sides)
-    network = find_contacts(packing, known["k_e"], n_sides)
-    z, _, rattlers, _, _ = coordination(packing, network)
-    u = float(network.energy.sum()) / packing.box.volume
-    title = rf"$N={packing.n}$    $\phi={packing.phi:.5f}$    $u=${u:.1e}    $z={z:.3f}$"
-    title += f"    step {packing.step}" * (packing.step > 0)
-    draw(packing, network, title, options.out, options.dpi)
-    report = {"out": str(options.out), "n": packing.n, "rattlers": rattlers}
-    print(json.dumps(report | {"contacts": len(network.pairs), "phi": packing.phi, "u": u, "z": z}))
+    found.add_argument("--sides", choices=("auto", "1", "2"), default="auto", help=sides)
+    up, around = "of the eye in space, degrees (%(default)s)", "of it about z (%(default)s)"
+    found.add_argument("--height", type=float, default=22, help=up)
+    found.add_argument("--turn", type=float, default=-58, help=around)
+    finer = "of meshes in space, 1 to 4; each makes four triangles of one (3, or 2 for many)"
+    found.add_argument("--level", type=int, choices=range(1, 5), help=finer)
+    found.add_argument("--dpi", type=int, default=200, help="dots per inch (%(default)s)")
+    return found
+
+
+def main(options: Namespace) -> None:
+    """Read, find the contacts, draw, report."""
+    pictures = [picture(path, options) for path in options.files]
+    colored = draw(pictures, options)
+    rows = [one.report for one in pictures]
+    for row, colors in zip(rows, colored, strict=True):
+        if len(colors.values):
+            row["mean_local"] = (
+                np.nanmean(colors.values) if np.isfinite(colors.values).any() else None
+            )
+    # The numbers of a single packing stand at the top.
+    report({"out": options.out, **(rows[0] if len(rows) == 1 else {}), "packings": rows})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"draw.py: {error}")
+    run(parser(), main)

@@ -9,46 +9,47 @@ one JSON object; the exit code is 0 only if every file is there and each is in e
 
 from __future__ import annotations
 
-import json
 import sys
-from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
-from sweep_files import REACHED
 from tqdm import tqdm
 
-from jamshape.files.h5md import read_attributes
+from jamshape.command import parser_of, report, run
+from jamshape.files.sets import REACHED, PackingFile
 from jamshape.minima.target import Target
 from jamshape.protocols.ladder import Rung, climb
 
-SUMMARY = ("u0", "alpha", "seed", "outcome", "phi", "phi_J", "residual", "z", "contacts_shared")
+SUMMARY = ("u0", "seed", "outcome", "phi", "phi_J", "residual", "z", "contacts_shared")
 
 
-def parse() -> Namespace:
-    """Read the command line."""
-    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument("packings", type=Path, nargs="+", metavar="PACKING", help="H5MD files")
-    parser.add_argument(
-        "--u0", type=float, nargs="+", required=True, help="energy densities U/L^2, in any order"
+def parser() -> ArgumentParser:
+    """Describe the command line."""
+    usual = Target()
+    found = parser_of(__doc__)
+    found.add_argument("packings", type=Path, nargs="+", metavar="PACKING", help="H5MD files")
+    energies = "energy densities U/L^D, in any order"
+    found.add_argument("--u0", type=float, nargs="+", required=True, help=energies)
+    close, largest = (
+        "of |u - u0|/u0 (%(default)s)",
+        "largest net force and torque over the mean bond force",
     )
-    accuracy, tolerance = Target().accuracy, Target().tolerance
-    parser.add_argument(
-        "--accuracy", type=float, default=accuracy, help=f"of |u - u0|/u0 ({accuracy:g})"
+    found.add_argument("--accuracy", type=float, default=usual.accuracy, help=close)
+    found.add_argument(
+        "--tolerance", type=float, default=usual.tolerance, help=f"{largest} (%(default)s)"
     )
-    largest = f"largest net force and torque over the mean bond force ({tolerance:g})"
-    parser.add_argument("--tolerance", type=float, default=tolerance, help=largest)
-    parser.add_argument("--out", type=Path, required=True, help="folder")
-    return parser.parse_args()
+    found.add_argument("--out", type=Path, required=True, help="folder")
+    return found
 
 
-def row(rung: Rung) -> dict[str, Any]:
+def row_of(rung: Rung) -> dict[str, Any]:
     """Summarise one rung."""
     if rung.failure:
-        return {"out": str(rung.path), "u0": rung.u0, "failure": rung.failure}
-    stored = read_attributes(rung.path)
-    found = {name: stored[name] for name in SUMMARY if name in stored}
-    return {"out": str(rung.path), "made": rung.made, **found}
+        return {"out": rung.path, "u0": rung.u0, "failure": rung.failure}
+    file = PackingFile.read(rung.path)
+    stored = {name: file.attributes[name] for name in SUMMARY if name in file.attributes}
+    return {"out": rung.path, "made": rung.made, **file.system().report(), **stored}
 
 
 def main(options: Namespace) -> int:
@@ -60,7 +61,7 @@ def main(options: Namespace) -> int:
     with tqdm(total=total, unit="packing") as bar:
         for source in options.packings:
             for rung in climb(source, options.u0, options.out, target):
-                rows.append(row(rung))
+                rows.append(row_of(rung))
                 bar.set_postfix_str(rung.path.name, refresh=False)
                 bar.update()
                 if rung.failure:
@@ -68,12 +69,9 @@ def main(options: Namespace) -> int:
     failed = sum("failure" in found for found in rows)
     reached = sum(found.get("outcome") in REACHED for found in rows)
     made = sum(found.get("made", False) for found in rows)
-    print(json.dumps({"made": made, "reached": reached, "failed": failed, "ladder": rows}))
+    report({"made": made, "reached": reached, "failed": failed, "ladder": rows})
     return 0 if reached == len(rows) else 1
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main(parse()))
-    except (ValueError, OSError) as error:
-        sys.exit(f"energy_ladder.py: {error}")
+    run(parser(), main)

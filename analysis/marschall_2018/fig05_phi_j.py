@@ -1,112 +1,105 @@
 """Draw the jamming density against aspect ratio: Fig. 5 of Marschall & Teitel, PRE 97, 012905.
 
-    python analysis/fig_phi_j.py SWEEP [MORE.h5 ...] --out phi_j.png
+    python analysis/marschall_2018/fig05_phi_j.py SWEEP [MORE.h5 ...] --out phi_j.png
 
 phi_J is known in three ways: of each packing, led from its energy density u0 to zero; and of the run
 at finite rate before it, where there is one, led from its pressure to zero as in the paper, once as the box
-closes and once as it opens again. Those two tell what the rate does: they rise as kappa falls. The last
-line of standard output is one JSON object with the averages over samples.
+closes and once as it opens again. Those two tell what the rate does: they rise as kappa falls. Any shapes with
+an aspect ratio alpha may be given, each is a curve. The last line of standard output is one JSON object with
+the averages over samples.
 """
 
 from __future__ import annotations
 
-import json
-import math
-import sys
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from pathlib import Path
+from argparse import Namespace
 from typing import Any
 
 import numpy as np
-from sweep_files import (
-    BLUE,
-    PAPER_STYLE,
-    RED,
-    Mean,
-    Sweep,
-    discs_at,
-    error_bars,
-    label_alpha_axis,
-    mean,
-    read_sweep,
-    samples_text,
+
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.axes import discs_at, error_bars, label_alpha_axis
+from jamshape.drawing.styles import PAPER_STYLE, color
+from jamshape.drawing.text import conditions_text, system_labels
+from jamshape.files.sets import (
+    Curve,
+    Groups,
+    System,
+    conditions,
+    curves_over,
+    of_paper,
+    read_groups,
 )
+from jamshape.measures.averages import Mean, mean
 
 # Secs. III A, B; the error is that of the average, where it is given.
-PAPER = {
-    0.0: Mean(0.8412, 0.0005, 0),
-    1.0: Mean(0.8875, math.nan, 0),
-    4.0: Mean(0.866, math.nan, 0),
+PAPER = {0.0: Mean(0.8412, 0.0005), 1.0: Mean(0.8875), 4.0: Mean(0.866)}
+WAYS = {
+    "phi_J": ("o-", r"$\phi_J$ from $u_0$ to 0"),
+    "phi_J_compression": ("s", r"$\phi_J$ from $p$ to 0, compression"),
+    "phi_J_opening": ("^", r"$\phi_J$ from $p$ to 0, opening again"),
 }
-NAMES = ("phi_J", "phi_J_compression", "phi_J_opening")
 
 Averages = dict[str, dict[float, Mean]]
 
 
-def averages(sweep: Sweep) -> Averages:
+def averages(curve: Curve) -> Averages:
     """Average over the samples of each alpha, those left out that do not know."""
     return {
         name: {
             alpha: mean([s.number(name) for s in samples if name in s.attributes])
-            for alpha, samples in sweep.items()
+            for alpha, samples in curve.items()
         }
-        for name in NAMES
+        for name in WAYS
     }
 
 
-def draw(known: Averages, samples: str, out: Path) -> None:
+def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> None:
     """Draw phi_J against alpha, discs at the left end."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(5.6, 4), dpi=200, layout="constrained")
     axes = figure.subplots()
-    alphas = list(known["phi_J"])
-    discs = discs_at([*alphas, *PAPER])
-    styles: tuple[dict[str, Any], ...] = (
-        {"fmt": "o-", "color": BLUE, "label": f"$\\phi_J$ from $u_0$ to 0 ({samples})"},
-        {"fmt": "s", "color": RED, "mfc": "none", "label": r"$\phi_J$ from $p$ to 0, compression"},
-        {
-            "fmt": "^",
-            "color": RED,
-            "mfc": "none",
-            "label": r"$\phi_J$ from $p$ to 0, opening again",
-        },
-    )
-    for name, style in zip(NAMES, styles, strict=True):
-        found = {alpha: m for alpha, m in known[name].items() if m.samples}
-        if found:
-            error_bars(axes, found, discs, **style)
-    error_bars(axes, PAPER, discs, **PAPER_STYLE)
+    discs = discs_at([*PAPER, *(alpha for of in known.values() for alpha in of["phi_J"])])
+    labels = system_labels(known)
+    for k, (system, of) in enumerate(known.items()):
+        for way, (name, (marker, text)) in enumerate(WAYS.items()):
+            found = {alpha: m for alpha, m in of[name].items() if m.samples}
+            if found:
+                # One curve alone has two colours, of packings and of runs.
+                tint = color(2 * k + (way > 0) * (len(known) == 1))
+                label = ", ".join(filter(None, [labels[system], text]))
+                style: dict[str, Any] = {"fmt": marker, "color": tint, "label": label}
+                error_bars(axes, found, discs, mfc=tint if way == 0 else "none", **style)
+    if any(of_paper(system) for system in known):
+        error_bars(axes, PAPER, discs, **PAPER_STYLE)
     label_alpha_axis(axes, discs)
     axes.set_ylabel(r"jamming density $\langle\phi_J\rangle$")
-    axes.legend(fontsize=8, frameon=False)
-    figure.savefig(out)
+    axes.legend(fontsize=8, frameon=False, title=conditions_text(groups), title_fontsize=8)
+    figure.savefig(options.out)
 
 
-def main() -> None:
-    """Read, average, draw, report."""
-    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument("packings", type=Path, nargs="+", metavar="SWEEP", help="folder or files")
-    parser.add_argument("--out", type=Path, default=Path("phi_j.png"), help="(phi_j.png)")
-    options = parser.parse_args()
-    sweep = read_sweep(options.packings)
-    known = averages(sweep)
-    if not np.isfinite([m.value for m in known["phi_J"].values()]).all():
-        msg = (
-            f"{options.packings[0]}: phi_J is not known at some alpha, expected it of each packing"
-        )
-        raise ValueError(msg)
-    draw(known, samples_text(sweep), options.out)
-    report = [
-        {"alpha": alpha, "paper": PAPER[alpha].value if alpha in PAPER else None}
-        | {n: known[n][alpha].report() for n in NAMES}
-        for alpha in sweep
+def rows(system: System, known: Averages) -> list[dict[str, Any]]:
+    """Report the averages of one curve."""
+    paper = PAPER if of_paper(system) else {}
+    return [
+        system.report()
+        | {"alpha": alpha, "paper": paper[alpha].value if alpha in paper else None}
+        | {name: of[alpha] for name, of in known.items()}
+        for alpha in known["phi_J"]
     ]
-    print(json.dumps({"out": str(options.out), "phi_J": report}))
+
+
+def main(options: Namespace) -> None:
+    """Read, average, draw, report."""
+    groups = read_groups(options.files, needs=["alpha"], same=("n", "size_ratio", "u0"))
+    known = {system: averages(curve) for system, curve in curves_over(groups, "alpha").items()}
+    if not np.isfinite([m.value for of in known.values() for m in of["phi_J"].values()]).all():
+        msg = f"{options.files[0]}: phi_J is not known at some alpha, expected it of each packing"
+        raise ValueError(msg)
+    draw(known, groups, options)
+    found = [row for system, of in known.items() for row in rows(system, of)]
+    report({"out": options.out, "conditions": conditions(groups), "phi_J": found})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_phi_j.py: {error}")
+    run(parser_of(__doc__, "phi_j.png", "SWEEP"), main)

@@ -1,6 +1,6 @@
 """Draw classes of contact against aspect ratio: Fig. 9 of Marschall & Teitel, PRE 97, 012905.
 
-    python analysis/fig_contact_classes.py SWEEP [MORE.h5 ...] --out contact_classes.png
+    python analysis/marschall_2018/fig09_contact_classes.py SWEEP [MORE.h5 ...] --out contact_classes.png
 
 On the left the fractions of the bonds that are side-to-side (two bonds a contact), tip-to-side and
 tip-to-tip; on the right the fraction of the particles that have a contact on a flat side, beside
@@ -10,62 +10,42 @@ JSON object with the averages over samples.
 
 from __future__ import annotations
 
-import json
-import math
-import sys
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from pathlib import Path
-from typing import Any
+from argparse import Namespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sweep_files import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PAPER_STYLE,
-    RED,
-    Mean,
-    Sample,
-    Sweep,
-    discs_at,
-    error_bars,
-    label_alpha_axis,
-    mean,
-    read_sweep,
-    samples_text,
-)
 
-from jamshape.measures.contact_statistics import (
-    ClassFractions,
-    FlatFraction,
-    class_fractions,
-    flat_fraction,
-)
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
+from jamshape.drawing.styles import BLUE, GREEN, ORANGE, PAPER_STYLE, RED
+from jamshape.drawing.text import conditions_text
+from jamshape.files.sets import Curve, conditions, one_curve, read_groups
+from jamshape.measures.averages import Mean, mean
+from jamshape.measures.touching import NAMES, class_numbers
 
-PAPER_FLAT = {0.01: Mean(0.963, math.nan, 0)}  # Sec. III C
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+PAPER_FLAT = {0.01: Mean(0.963)}  # Sec. III C
 STYLES = {
-    "side_to_side": ("s", BLUE, "side-to-side, as two"),
-    "tip_to_side": ("o", RED, "tip-to-side"),
-    "tip_to_tip": ("D", GREEN, "tip-to-tip"),
+    "side_to_side": ("s-", BLUE, "side-to-side, as two"),
+    "tip_to_side": ("o-", RED, "tip-to-side"),
+    "tip_to_tip": ("D-", GREEN, "tip-to-tip"),
+}
+FLAT_STYLES = {
+    "flat_of_backbone": ("s", BLUE, "of those that are no rattlers"),
+    "flat_of_all": ("o", RED, "of all particles"),
 }
 
 Averages = dict[float, dict[str, Mean]]
 
 
-def statistics(sample: Sample) -> dict[str, float]:
-    """Count classes and flat contacts of one packing."""
-    _, network, rattlers = sample.contacts()
-    fractions, flat = class_fractions(network, rattlers), flat_fraction(network, rattlers)
-    return fractions._asdict() | {f"flat_{name}": value for name, value in flat._asdict().items()}
-
-
-def averages(sweep: Sweep) -> Averages:
+def averages(curve: Curve) -> Averages:
     """Average over the samples of each alpha."""
-    names = (*ClassFractions._fields, *(f"flat_{name}" for name in FlatFraction._fields))
     known: Averages = {}
-    for alpha, samples in sweep.items():
-        found = [statistics(sample) for sample in samples]
-        known[alpha] = {name: mean([numbers[name] for numbers in found]) for name in names}
+    for alpha, files in curve.items():
+        found = [class_numbers(file.contacts()) for file in files]
+        known[alpha] = {name: mean([numbers[name] for numbers in found]) for name in NAMES}
     return known
 
 
@@ -74,25 +54,24 @@ def perimeter_share(alpha: Any) -> Any:
     return 2 * alpha / (2 * alpha + np.pi)
 
 
-def draw(known: Averages, samples: str, out: Path) -> None:
+def draw_all(axes: Axes, known: Averages, discs: float, styles: dict[str, Any]) -> None:
+    """Draw several fractions."""
+    for name, (fmt, tint, text) in styles.items():
+        means = {alpha: row[name] for alpha, row in known.items()}
+        error_bars(axes, means, discs, fmt=fmt, color=tint, mfc="none", label=text)
+
+
+def draw(known: Averages, title: str, options: Namespace) -> None:
     """Draw classes on the left and flat contacts on the right."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(9, 3.9), dpi=200, layout="constrained")
     classes, flat = figure.subplots(1, 2, sharex=True)
     discs = discs_at([*known, *PAPER_FLAT])
-    for name, (marker, color, text) in STYLES.items():
-        means = {alpha: row[name] for alpha, row in known.items()}
-        error_bars(classes, means, discs, fmt=f"{marker}-", color=color, mfc="none", label=text)
+    draw_all(classes, known, discs, STYLES)
     classes.set_ylabel("fraction of contact bonds")
-    classes.legend(title=samples, title_fontsize=8, fontsize=8)
-    texts = {
-        "flat_of_backbone": ("s", BLUE, "of those that are no rattlers"),
-        "flat_of_all": ("o", RED, "of all particles"),
-    }
-    for name, (marker, color, text) in texts.items():
-        means = {alpha: row[name] for alpha, row in known.items()}
-        error_bars(flat, means, discs, fmt=marker, color=color, mfc="none", label=text)
+    classes.legend(title=title, **SMALL_TEXT)
+    draw_all(flat, known, discs, FLAT_STYLES)
     error_bars(flat, PAPER_FLAT, discs, **PAPER_STYLE)
     curve = np.geomspace(2 * discs, max(10.0, *known), 200)
     flat.plot(curve, perimeter_share(curve), "--", color=ORANGE, label="flat part of the perimeter")
@@ -101,30 +80,22 @@ def draw(known: Averages, samples: str, out: Path) -> None:
     for axes in (classes, flat):
         axes.set_ylim(-0.03, 1.03)
         label_alpha_axis(axes, discs)
-    figure.savefig(out)
+    figure.savefig(options.out)
 
 
-def main() -> None:
+def main(options: Namespace) -> None:
     """Read, count, draw, report."""
-    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument("packings", type=Path, nargs="+", metavar="SWEEP", help="folder or files")
-    out = Path("contact_classes.png")
-    parser.add_argument("--out", type=Path, default=out, help="(%(default)s)")
-    options = parser.parse_args()
-    sweep = read_sweep(options.packings)
-    known = averages(sweep)
-    draw(known, samples_text(sweep), options.out)
+    groups = read_groups(options.files, needs=["alpha"], same=("n", "size_ratio", "u0"))
+    known = averages(one_curve(groups, "alpha"))
+    draw(known, conditions_text(groups), options)
     rows = [
         {"alpha": alpha, "flat_perimeter": perimeter_share(alpha)}
-        | {"paper_flat": PAPER_FLAT[alpha].value if alpha in PAPER_FLAT else None}
-        | {name: value.report() for name, value in row.items()}
+        | {"paper_flat": PAPER_FLAT[alpha].value if alpha in PAPER_FLAT else None, **row}
         for alpha, row in known.items()
     ]
-    print(json.dumps({"out": str(options.out), "contact_classes": rows}))
+    told = {"out": options.out, "conditions": conditions(groups)}
+    report(told | {"contact_classes": rows})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_contact_classes.py: {error}")
+    run(parser_of(__doc__, "contact_classes.png", "SWEEP"), main)

@@ -1,6 +1,6 @@
 """Draw the energy along modes: Figs. 13 and 17 of Marschall & Teitel, PRE 97, 012905.
 
-    python analysis/fig_energy_along_modes.py PACKING.h5 --modes MODES.h5 --out energy_along_modes.png
+    python analysis/marschall_2018/fig13_energy_along_modes.py PACKING.h5 --modes MODES.h5 --out energy_along_modes.png
 
 MODES.h5 is of analysis/modes.py with --vectors; without it modes are found here. Modes are numbered from 0 by
 ascending eigenvalue (--mode), or those next to a frequency are taken (--omega); else some of each band. Delta U
@@ -11,21 +11,21 @@ it is dashed. Below are the bonds that have broken and formed. Dots are where a 
 
 from __future__ import annotations
 
-import json
 import math
-import sys
-from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from mode_files import mode_text, pick_modes, scientific, table_of
-from sweep_files import plain
 from tqdm import tqdm
 
 from jamshape.arrays import FloatArray
-from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.mode_axes import mode_text, packing_text
+from jamshape.drawing.text import unit_text
+from jamshape.files.sets import PackingFile
 from jamshape.vibration.energy_along import AlongModes, Crossover, EnergyAlong, fit_crossover
+from jamshape.vibration.sets import Wanted, pick_modes, table_of
 from jamshape.vibration.table import ModeTable
 
 if TYPE_CHECKING:
@@ -33,8 +33,18 @@ if TYPE_CHECKING:
 
 PER_DECADE = 12
 PER_BAND = {"low": 2, "middle": 2, "high": 2}
+GUIDE = (3e-3, 0.3)  # ends of the lines of powers
+CROSSOVER: dict[str, Any] = {"mec": "k", "mew": 0.6, "ms": 6}
 
-Curves = dict[int, tuple[EnergyAlong, Crossover | None]]
+
+class Curve(NamedTuple):
+    """The energy along one mode."""
+
+    along: EnergyAlong
+    crossover: Crossover | None
+
+
+Curves = dict[int, Curve]
 
 
 def follow(modes: AlongModes, table: ModeTable, chosen: list[int], delta: FloatArray) -> Curves:
@@ -42,7 +52,7 @@ def follow(modes: AlongModes, table: ModeTable, chosen: list[int], delta: FloatA
     found: Curves = {}
     for mode in tqdm(chosen, unit="mode"):
         along = modes.energy(table.vectors[:, mode], delta)
-        found[mode] = (along, fit_crossover(along))
+        found[mode] = Curve(along, fit_crossover(along))
     return found
 
 
@@ -55,20 +65,42 @@ def signed(axes: Axes, x: FloatArray, y: FloatArray, **style: Any) -> None:
 
 def guides(axes: Axes, curves: Curves) -> None:
     """Draw delta^2 and delta^4 as lines below the curves."""
-    delta = next(iter(curves.values()))[0].delta
-    stiff = [along.mean_energy[0] / delta[0] ** 2 for along, _ in curves.values()]
-    x = np.geomspace(3e-3, 0.3, 2)
+    delta = next(iter(curves.values())).along.delta
+    stiff = [curve.along.mean_energy[0] / delta[0] ** 2 for curve in curves.values()]
+    x = np.geomspace(*GUIDE, 2)
     x = x[(x >= delta[0]) & (x <= delta[-1])]
     if len(x) < 2 or not max(stiff) > 0:
         return
     note: dict[str, Any] = {"fontsize": 8, "ha": "left", "va": "center"}
-    for power, height in ((2, 30.0), (4, 1e-7)):
-        y = height * max(stiff) * x**power if power == 2 else height * x**power / x[1] ** 4
+    for power, y in ((2, 30.0 * max(stiff) * x**2), (4, 1e-7 * (x / x[1]) ** 4)):
         axes.plot(x, y, "k-", lw=1.2)
         axes.text(x[1] * 1.15, y[1], rf"$\delta^{power}$", **note)
 
 
-def draw(curves: Curves, table: ModeTable, title: str, out: Path) -> None:
+def draw_curve(top: Axes, bottom: Axes, curve: Curve, **style: Any) -> None:
+    """Draw the energy along one mode, and the bonds that break and form."""
+    label, (along, crossover) = style.pop("label"), curve
+    signed(top, along.delta, along.mean_energy, label=label, **style)
+    if crossover:
+        at = np.interp(np.log(crossover.delta), np.log(along.delta), along.mean_energy)
+        top.plot(crossover.delta, at, "o", color=style["color"], zorder=3, **CROSSOVER)
+    for values, line in ((along.broken, "-"), (along.formed, ":")):
+        count = values.mean(axis=0)
+        bottom.plot(along.delta, np.where(count > 0, count, np.nan), line, **style)
+
+
+def explain(top: Axes, bottom: Axes, curves: Curves) -> None:
+    """Name lines and dots, as far as there are any."""
+    for line, text in (("-", "broken"), (":", "formed")):
+        bottom.plot([], [], line, color="k", lw=1.3, label=text)
+    bottom.legend(fontsize=8, frameon=False, loc="upper left")
+    if any(curve.crossover for curve in curves.values()):
+        top.plot([], [], "o", color="w", label=r"crossover $\delta^*$", **CROSSOVER)
+    if any((curve.along.mean_energy < 0).any() for curve in curves.values()):
+        top.plot([], [], "--", color="k", lw=1.3, label=r"$-\Delta U$, where $\Delta U<0$")
+
+
+def draw(curves: Curves, table: ModeTable, file: PackingFile, out: Path) -> None:
     """Draw energies, and the bonds that break and form."""
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
     from matplotlib.figure import Figure  # noqa: PLC0415
@@ -76,71 +108,46 @@ def draw(curves: Curves, table: ModeTable, title: str, out: Path) -> None:
     figure = Figure(figsize=(8.4, 6.0), dpi=200, layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2.3, 1])
     shades = colormaps["viridis"](np.linspace(0.92, 0.0, len(curves)))
-    for color, (mode, (along, crossover)) in zip(shades, curves.items(), strict=True):
-        style: dict[str, Any] = {"color": color, "lw": 1.3}
-        signed(top, along.delta, along.mean_energy, label=mode_text(table, mode), **style)
-        if crossover:
-            at = np.interp(np.log(crossover.delta), np.log(along.delta), along.mean_energy)
-            top.plot(crossover.delta, at, "o", color=color, ms=6, mec="k", mew=0.6, zorder=3)
-        for values, line in ((along.broken, "-"), (along.formed, ":")):
-            count = values.mean(axis=0)
-            bottom.plot(along.delta, np.where(count > 0, count, np.nan), line, **style)
+    for color, (mode, curve) in zip(shades, curves.items(), strict=True):
+        style: dict[str, Any] = {"color": color, "lw": 1.3, "label": mode_text(table, mode)}
+        draw_curve(top, bottom, curve, **style)
     for axes in (top, bottom):
         axes.set(xscale="log", yscale="log")
     guides(top, curves)
-    delta = next(iter(curves.values()))[0].delta
+    delta = next(iter(curves.values())).along.delta
     top.set_xlim(delta[0], delta[-1])
     top.set_ylabel(r"$\Delta U\;/\;k_e$")
     bottom.set_ylabel("bonds")
-    bottom.set_xlabel(r"displacement  $\delta\;/\;2R_s$  along the mode")
-    for line, text in (("-", "broken"), (":", "formed")):
-        bottom.plot([], [], line, color="k", lw=1.3, label=text)
-    bottom.legend(fontsize=8, frameon=False, loc="upper left")
-    if any(crossover for _, crossover in curves.values()):
-        top.plot([], [], "o", color="w", mec="k", mew=0.6, ms=6, label=r"crossover $\delta^*$")
-    if any((along.mean_energy < 0).any() for along, _ in curves.values()):
-        top.plot([], [], "--", color="k", lw=1.3, label=r"$-\Delta U$, where $\Delta U<0$")
-    figure.legend(
-        *top.get_legend_handles_labels(),
-        title=title,
-        title_fontsize=8,
-        fontsize=8,
-        frameon=False,
-        loc="outside right upper",
-    )
+    unit = unit_text([file.system()])
+    bottom.set_xlabel(rf"displacement  $\delta\;/\;{unit}$  along the mode")
+    explain(top, bottom, curves)
+    text: dict[str, Any] = {"title_fontsize": 8, "fontsize": 8, "frameon": False}
+    handles = top.get_legend_handles_labels()
+    figure.legend(*handles, title=packing_text(file), loc="outside right upper", **text)
     figure.savefig(out)
 
 
-def report(table: ModeTable, mode: int, found: tuple[EnergyAlong, Crossover | None]) -> Any:
+def row_of(table: ModeTable, mode: int, curve: Curve) -> dict[str, Any]:
     """Describe one mode."""
-    along, crossover = found
-    row: dict[str, Any] = {"mode": mode, "eigenvalue": float(table["eigenvalues"][mode])}
-    row |= {"bound": float(table.bound[mode]), "slope_at_0": along.slope_at_0}
-    row |= {"first_change": plain(along.first_change)}
-    row |= {"differences_of_energies_from": plain(along.differences_from)}
-    row["crossover"] = crossover and {k: plain(v) for k, v in crossover._asdict().items()}
-    return row
+    along = curve.along
+    row: dict[str, Any] = {"mode": mode, "eigenvalue": table["eigenvalues"][mode]}
+    row |= {"bound": table.bound[mode], "slope_at_0": along.slope_at_0}
+    row |= {"first_change": along.first_change}
+    row |= {"differences_of_energies_from": along.differences_from}
+    return row | {"crossover": curve.crossover}
 
 
-def parse() -> Namespace:
-    """Read the command line."""
-    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument("packing", type=Path, metavar="PACKING.h5")
-    parser.add_argument("--modes", type=Path, metavar="MODES.h5", help="of analysis/modes.py")
-    parser.add_argument("--mode", type=int, nargs="+", default=[], help="numbers, from 0")
-    parser.add_argument("--omega", type=float, nargs="+", default=[], help="frequencies")
-    for name, value, meaning in (("from", 1e-8, "smallest"), ("to", 1.0, "largest")):
-        parser.add_argument(
-            f"--{name}",
-            type=float,
-            default=value,
-            dest=meaning,
-            help=f"{meaning} delta ({value:g})",
-        )
-    parser.add_argument(
-        "--out", type=Path, default=Path("energy_along_modes.png"), help="(%(default)s)"
-    )
-    return parser.parse_args()
+def parser() -> ArgumentParser:
+    """Describe the command line."""
+    found = parser_of(__doc__, "energy_along_modes.png")
+    found.add_argument("packing", type=Path, metavar="PACKING.h5")
+    found.add_argument("--modes", type=Path, metavar="MODES.h5", help="of analysis/modes.py")
+    found.add_argument("--mode", type=int, nargs="+", default=[], help="numbers, from 0")
+    found.add_argument("--omega", type=float, nargs="+", default=[], help="frequencies")
+    for name, value, meaning in (("--from", 1e-8, "smallest"), ("--to", 1.0, "largest")):
+        text = f"{meaning} delta (%(default)s)"
+        found.add_argument(name, type=float, default=value, dest=meaning, help=text)
+    return found
 
 
 def main(options: Namespace) -> None:
@@ -148,22 +155,17 @@ def main(options: Namespace) -> None:
     if not 0 < options.smallest < options.largest < math.inf:
         msg = f"delta goes from {options.smallest:g} to {options.largest:g}, expected 0 < from < to"
         raise ValueError(msg)
-    packing, stored = read_packing(options.packing), read_attributes(options.packing)
+    file = PackingFile.read(options.packing)
+    packing = file.packing()
     table = table_of(packing, options.modes)
-    chosen = pick_modes(table, options.mode, options.omega, PER_BAND)
+    chosen = pick_modes(table, Wanted(options.mode, options.omega, PER_BAND))
     decades = math.log10(options.largest / options.smallest)
     delta = np.geomspace(options.smallest, options.largest, math.ceil(decades * PER_DECADE) + 1)
     curves = follow(AlongModes(packing, table.coordinates), table, chosen, delta)
-    of = [rf"$\alpha={stored['alpha']:g}$"] if "alpha" in stored else []
-    of += [rf"$N={packing.n}$"]
-    of += [rf"$u={scientific(stored['u0'])}$"] if "u0" in stored else []
-    draw(curves, table, ", ".join(of), options.out)
-    rows = [report(table, mode, found) for mode, found in curves.items()]
-    print(json.dumps({"out": str(options.out), "modes": rows}))
+    draw(curves, table, file, options.out)
+    rows = [row_of(table, mode, curve) for mode, curve in curves.items()]
+    report({"out": options.out, **file.system().report(), "n": packing.n, "modes": rows})
 
 
 if __name__ == "__main__":
-    try:
-        main(parse())
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_energy_along_modes.py: {error}")
+    run(parser(), main)

@@ -1,6 +1,6 @@
 """Draw what is left of forces and torques: Fig. 21 of Marschall & Teitel, PRE 97, 012905.
 
-    python analysis/fig_residuals.py SWEEP [MORE.h5 ...] --out residuals.png
+    python analysis/marschall_2018/fig21_residuals.py SWEEP [MORE.h5 ...] --out residuals.png
 
 Distributions over the particles that are no rattlers, of the net force over the mean bond force
 (Eq. 36) and of the net torque over the mean contact torque (Eq. 37), as each packing's file gives
@@ -10,35 +10,40 @@ quantiles.
 
 from __future__ import annotations
 
-import json
 import math
-import sys
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from pathlib import Path
-from typing import Any
+from argparse import Namespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sweep_files import COLORS, MARKERS, Sample, choose_alphas, plain, read_sweep
 
 from jamshape.arrays import FloatArray
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.axes import SMALL_TEXT, log_bars
+from jamshape.drawing.styles import marked
+from jamshape.drawing.text import conditions_alone, counted, system_labels
 from jamshape.files.h5md import read_observables
+from jamshape.files.sets import Choice, PackingFile, System, choose, conditions, read_groups
+from jamshape.measures.averages import standard_error
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PAPER_ALPHAS = (0.01, 4.0)
+MOST = 5  # curves
 PER_DECADE = 5  # bins
-NAMES = ("net_force", "net_torque")
-LABELS = (
-    r"net force / mean bond force,  $|\mathbf{F}_i|\,/\,\bar F$",
-    r"net torque / mean contact torque,  $|\tau_i|\,/\,\bar\tau$",
-)
+NAMES = {
+    "net_force": r"net force / mean bond force,  $|\mathbf{F}_i|\,/\,\bar F$",
+    "net_torque": r"net torque / mean contact torque,  $|\tau_i|\,/\,\bar\tau$",
+}
 
-Values = dict[float, list[FloatArray]]
+Values = dict[System, list[FloatArray]]
 
 
-def values_of(sample: Sample, name: str) -> FloatArray:
+def values_of(file: PackingFile, name: str) -> FloatArray:
     """Read one residual of all particles but the rattlers."""
-    observables = read_observables(sample.path)
+    observables = read_observables(file.path)
     if name not in observables:
-        msg = f"{sample.path}: has no observable {name!r}, expected a packing of make_packing.py"
+        msg = f"{file.path}: has no observable {name!r}, expected a packing of make_packing.py"
         raise ValueError(msg)
     values: FloatArray = np.abs(np.asarray(observables[name][-1], np.float64))
     return values[np.isfinite(values)]
@@ -56,37 +61,36 @@ def decade_bins(values: Values) -> FloatArray:
     return bins
 
 
-def draw(residuals: dict[str, Values], n: int, out: Path) -> None:
-    """Draw both distributions, averaged over samples with standard errors."""
+def draw_curve(axes: Axes, samples: list[FloatArray], bins: FloatArray, **style: Any) -> None:
+    """Draw a distribution, averaged over samples with standard errors."""
+    density = np.array([np.histogram(x, bins)[0] / len(x) / np.diff(bins) for x in samples])
+    height, middles = density.mean(axis=0), np.sqrt(bins[1:] * bins[:-1])
+    seen = height > 0
+    bars = log_bars(height, standard_error(density))[:, seen]
+    shown = style | ({"yerr": bars} if len(samples) > 1 else {})
+    axes.errorbar(middles[seen], height[seen], **shown)
+
+
+def draw(residuals: dict[str, Values], title: str, options: Namespace) -> None:
+    """Draw both distributions."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(9, 3.9), dpi=200, layout="constrained")
     panels = figure.subplots(1, 2)
-    for axes, values, text in zip(panels, residuals.values(), LABELS, strict=True):
-        bins = decade_bins(values)
-        axes.set(
-            xscale="log", yscale="log", xlabel=text, ylabel=r"probability density $\mathcal{P}$"
-        )
+    for axes, (name, values) in zip(panels, residuals.items(), strict=True):
+        bins, labels = decade_bins(values), system_labels(values)
+        axes.set(xscale="log", yscale="log", xlabel=NAMES[name])
+        axes.set_ylabel(r"probability density $\mathcal{P}$")
         if not len(bins):
             axes.text(0.5, 0.5, "none above 0", transform=axes.transAxes, ha="center")
             continue
-        middles = np.sqrt(bins[1:] * bins[:-1])
-        for k, (alpha, samples) in enumerate(values.items()):
-            samples = [x for x in samples if len(x)]  # noqa: PLW2901 - discs have no torques
-            if not samples:
-                continue
-            density = np.array([np.histogram(x, bins)[0] / len(x) / np.diff(bins) for x in samples])
-            height, error = density.mean(axis=0), density.std(axis=0)
-            error /= np.sqrt(max(len(samples) - 1, 1))
-            seen = height > 0
-            bars = np.array([np.minimum(error, 0.9 * height), error])[:, seen]  # log axis: not to 0
-            label = rf"$\alpha={alpha:g}$ ({len(samples)} sample{'s' * (len(samples) > 1)})"
-            style: dict[str, Any] = {"color": COLORS[k % len(COLORS)], "mfc": "none", "ms": 4}
-            style |= {"fmt": f"{MARKERS[k % len(MARKERS)]}-", "lw": 0.8, "elinewidth": 0.8}
-            style |= {"yerr": bars} if len(samples) > 1 else {}
-            axes.errorbar(middles[seen], height[seen], capsize=1.5, label=label, **style)
-        axes.legend(title=f"$N={n}$", title_fontsize=8, fontsize=8)
-    figure.savefig(out)
+        for k, (system, samples) in enumerate(values.items()):
+            known = [x for x in samples if len(x)]  # discs have no torques
+            if known:
+                label = f"{labels[system]} ({counted(len(known), 'sample')})"
+                draw_curve(axes, known, bins, label=label, **marked(k, "-"))
+        axes.legend(title=title, **SMALL_TEXT)
+    figure.savefig(options.out)
 
 
 def quantiles(samples: list[FloatArray]) -> dict[str, float | None]:
@@ -95,38 +99,32 @@ def quantiles(samples: list[FloatArray]) -> dict[str, float | None]:
     if not len(every):
         return dict.fromkeys(("median", "percentile_99", "largest"))
     return {
-        "median": plain(float(np.median(every))),
-        "percentile_99": plain(float(np.percentile(every, 99))),
-        "largest": plain(float(every.max())),
+        "median": float(np.median(every)),
+        "percentile_99": float(np.percentile(every, 99)),
+        "largest": float(every.max()),
     }
 
 
-def main() -> None:
+def main(options: Namespace) -> None:
     """Read, count, draw, report."""
-    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument("packings", type=Path, nargs="+", metavar="SWEEP", help="folder or files")
-    which = "of the curves (0.01 and 4 where there are such, as in the paper)"
-    parser.add_argument("--alpha", type=float, nargs="+", default=[], help=which)
-    parser.add_argument("--out", type=Path, default=Path("residuals.png"), help="(%(default)s)")
-    options = parser.parse_args()
-    sweep = read_sweep(options.packings, with_stalled=True)
-    alphas = choose_alphas(sweep, options.alpha, PAPER_ALPHAS, most=5)
+    same = ("n", "size_ratio", "u0")
+    every = read_groups(options.files, needs=["alpha"], same=same, with_stalled=True)
+    groups = choose(every, "alpha", Choice(options.alpha, PAPER_ALPHAS, MOST))
     residuals = {
-        name: {alpha: [values_of(sample, name) for sample in sweep[alpha]] for alpha in alphas}
+        name: {system: [values_of(file, name) for file in of] for system, of in groups.items()}
         for name in NAMES
     }
-    n = next(iter(sweep.values()))[0].attributes["n"]
-    draw(residuals, n, options.out)
+    draw(residuals, conditions_alone(groups), options)
     rows: list[dict[str, Any]] = []
-    for alpha in alphas:
-        stalled = sum(not sample.reached for sample in sweep[alpha])
-        rows.append({"alpha": alpha, "samples": len(sweep[alpha]), "stalled": stalled})
-        rows[-1] |= {name: quantiles(residuals[name][alpha]) for name in NAMES}
-    print(json.dumps({"out": str(options.out), "residuals": rows}))
+    for system, files in groups.items():
+        stalled = sum(not file.reached for file in files)
+        rows.append(system.report() | {"samples": len(files), "stalled": stalled})
+        rows[-1] |= {name: quantiles(residuals[name][system]) for name in NAMES}
+    report({"out": options.out, "conditions": conditions(groups), "residuals": rows})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_residuals.py: {error}")
+    parser = parser_of(__doc__, "residuals.png", "SWEEP")
+    which = "of the curves (0.01 and 4 where there are such, as in the paper)"
+    parser.add_argument("--alpha", type=float, nargs="+", default=[], help=which)
+    run(parser, main)

@@ -1,6 +1,6 @@
 """Draw phi_J of spheroids and superballs: Fig. 3 of Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019).
 
-    python analysis/fig_phi_j_shapes.py SWEEP [MORE ...] --out phi_j_shapes.png
+    python analysis/yuan_2019/fig03_phi_j.py SWEEP [MORE ...] --out phi_j_shapes.png
 
 Left against the aspect ratio w of ellipsoids with two equal axes, the third over these; right against the
 exponent p of particles with three equal axes. Open marks are of protocol 1, filled ones of protocol 2. The last
@@ -9,53 +9,39 @@ line of standard output is one JSON object with averages over samples and their 
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
+from argparse import Namespace
 from typing import Any
 
-from superellipsoid_files import (
-    OF_PAPER,
-    PHI_SPHERES,
-    Groups,
-    Kind,
-    averages,
-    exactly,
-    family_legend,
-    only,
-    parser_of,
-    points,
-    read_groups,
-    rows,
-    samples_text,
-)
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.axes import points
+from jamshape.drawing.families import NEEDS, beta, family_legend, is_axisymmetric, shape_of
+from jamshape.drawing.styles import PAPER_LINE
+from jamshape.drawing.text import conditions_text
+from jamshape.files.sets import Groups, System, conditions, only, read_groups
+from jamshape.measures.averages import averages, exactly, rows
 
+PHI_SPHERES = 0.64  # the paper's
 TICKS = (0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 4)
 
 
-def is_spheroid(kind: Kind) -> bool:
-    """Whether two axes of an ellipsoid are equal."""
-    return kind.is_axisymmetric
-
-
-def is_superball(kind: Kind) -> bool:
+def is_superball(system: System) -> bool:
     """Whether all axes are equal."""
-    return kind.w1 == kind.w2 == 1
+    return shape_of(system)[1:] == (1, 1)
 
 
-def draw(groups: Groups, out: Path) -> None:
+def draw(groups: Groups, options: Namespace) -> None:
     """Draw phi_J against w and against p."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(9, 4), dpi=200, layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
-    cases: tuple[Any, ...] = ((is_spheroid, lambda k: k.beta), (is_superball, lambda k: k.p))
+    cases: tuple[Any, ...] = ((is_axisymmetric, beta), (is_superball, lambda s: shape_of(s)[0]))
     for axes, (belongs, x) in zip(panels, cases, strict=True):
         shown = only(groups, belongs)
         points(axes, exactly(shown, x), averages(shown, "phi_J"))
-        axes.axhline(PHI_SPHERES, **OF_PAPER, label="spheres, paper")
+        axes.axhline(PHI_SPHERES, **PAPER_LINE, label="spheres, paper")
         if shown:
-            family_legend(axes, shown, samples_text(shown), loc="best")
+            family_legend(axes, shown, conditions_text(shown), loc="best")
     panels[0].set_xscale("log")
     low, high = panels[0].get_xlim()
     ticks = [tick for tick in TICKS if low < tick < high]
@@ -64,24 +50,21 @@ def draw(groups: Groups, out: Path) -> None:
     panels[0].set_xlabel("aspect ratio $w$ of spheroids")
     panels[0].set_ylabel(r"packing fraction $\phi_J$")
     panels[1].set_xlabel("exponent $p$ of superballs")
-    figure.savefig(out)
+    figure.savefig(options.out)
 
 
-def main() -> None:
+def main(options: Namespace) -> None:
     """Read, average, draw, report."""
-    options = parser_of(__doc__, "phi_j_shapes.png").parse_args()
-    every = read_groups(options.packings)
-    groups = only(every, lambda kind: is_spheroid(kind) or is_superball(kind))
+    every = read_groups(options.files, needs=NEEDS)
+    groups = only(every, lambda system: is_axisymmetric(system) or is_superball(system))
     if not groups:
         msg = f"none of {len(every)} shapes is a spheroid or a superball, expected one"
         raise ValueError(msg)
-    draw(groups, options.out)
+    draw(groups, options)
     found = rows(groups, {"phi_J": averages(groups, "phi_J")})
-    print(json.dumps({"out": str(options.out), "phi_J": found, "paper_spheres": PHI_SPHERES}))
+    told = {"out": options.out, "conditions": conditions(groups)}
+    report(told | {"phi_J": found, "paper_spheres": PHI_SPHERES})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_phi_j_shapes.py: {error}")
+    run(parser_of(__doc__, "phi_j_shapes.png", "SWEEP"), main)

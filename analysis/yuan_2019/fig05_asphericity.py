@@ -1,7 +1,7 @@
 """Draw phi_J and z_J against asphericity: Figs. 5 and 6 of Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019).
 
-    python analysis/fig_asphericity.py SWEEP [MORE ...] --quantity phi_J --out phi_j_asphericity.png
-    python analysis/fig_asphericity.py SWEEP [MORE ...] --quantity z --out z_asphericity.png
+    python analysis/yuan_2019/fig05_asphericity.py SWEEP [MORE ...] --quantity phi_J --out phi_j_asphericity.png
+    python analysis/yuan_2019/fig05_asphericity.py SWEEP [MORE ...] --quantity z --out z_asphericity.png
 
 phi_J in one panel, with the paper's peak, 0.70 to 0.74 near A = 0.05, and 0.64 of spheres; z_J in two, of
 axisymmetric particles (z_iso = 10) and of all others (12), spheres in both. Open marks are of protocol 1, filled
@@ -10,94 +10,83 @@ ones of protocol 2. The last line of standard output is one JSON object with ave
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
+from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from superellipsoid_files import (
-    OF_PAPER,
-    PEAK,
-    PHI_SPHERES,
-    Z_SPHERES,
-    Groups,
-    averages,
-    family_legend,
-    parser_of,
-    points,
-    read_groups,
-    rows,
-    samples_text,
-)
-from sweep_files import YELLOW
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.axes import points
+from jamshape.drawing.families import NEEDS, SPHERES, family, family_legend, is_axisymmetric
+from jamshape.drawing.styles import PAPER_LINE, YELLOW
+from jamshape.drawing.text import conditions_text
+from jamshape.files.sets import Groups, conditions, read_groups
+from jamshape.measures.averages import averages, rows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SPHERES = "spheres"
-LEAST, LOG_BELOW = 1e-5, 1e-3  # asphericity: linear up to the first, which is next to 0
+PHI_SPHERES, Z_SPHERES = 0.64, 6.0  # the paper's
+PEAK = (0.05, 0.70, 0.74)  # asphericity at the peak of phi_J, and where phi_J lies there
+LOG_BELOW = 1e-3  # asphericity: linear up to this, which is next to 0
 
 
 def draw_phi(groups: Groups, axes: Axes) -> None:
     """Draw phi_J, and where the paper says that it is."""
     at, low, high = PEAK
-    axes.axhline(PHI_SPHERES, **OF_PAPER, label="spheres, paper")
-    axes.axvline(at, **(OF_PAPER | {"ls": ":"}), label=r"$\mathcal{A}_c$, paper")
-    band = r"peak, paper"
-    axes.axhspan(low, high, color=YELLOW, alpha=0.25, lw=0, zorder=0, label=band)
+    axes.axhline(PHI_SPHERES, **PAPER_LINE, label="spheres, paper")
+    axes.axvline(at, **(PAPER_LINE | {"ls": ":"}), label=r"$\mathcal{A}_c$, paper")
+    axes.axhspan(low, high, color=YELLOW, alpha=0.25, lw=0, zorder=0, label="peak, paper")
     points(axes, averages(groups, "asphericity"), averages(groups, "phi_J"))
     axes.set_xlim(left=min(-0.005, axes.get_xlim()[0]))
     axes.set(xlabel=r"asphericity $\mathcal{A}$", ylabel=r"packing fraction $\phi_J$")
-    family_legend(axes, groups, samples_text(groups), loc="outside right center")
+    family_legend(axes, groups, conditions_text(groups), loc="outside right center")
 
 
 def draw_z(groups: Groups, panels: list[Axes]) -> None:
     """Draw z_J below the isostatic one, of particles with and without an axis of symmetry."""
-    cases = ((panels[0], True, 10), (panels[1], False, 12))
-    for axes, symmetric, isostatic in cases:
-        chosen = [k for k in groups if k.family == SPHERES or k.is_axisymmetric == symmetric]
-        shown = {kind: groups[kind] for kind in chosen}
+    for axes, symmetric, isostatic in ((panels[0], True, 10), (panels[1], False, 12)):
+        shown = {
+            system: files
+            for system, files in groups.items()
+            if family(system) == SPHERES or is_axisymmetric(system) == symmetric
+        }
         points(axes, averages(shown, "asphericity"), averages(shown, "z"))
         text = rf"isostatic, $z_\mathrm{{iso}}={isostatic}$"
-        axes.axhline(isostatic, **OF_PAPER, label=text)
-        axes.axhline(Z_SPHERES, **(OF_PAPER | {"ls": ":"}), label="spheres, 6")
+        axes.axhline(isostatic, **PAPER_LINE, label=text)
+        axes.axhline(Z_SPHERES, **(PAPER_LINE | {"ls": ":"}), label="spheres, 6")
         axes.set_xscale("symlog", linthresh=LOG_BELOW, linscale=0.3)
         axes.set_xlim(-LOG_BELOW / 4, max(0.4, axes.get_xlim()[1]))
         axes.set_xlabel(r"asphericity $\mathcal{A}$")
-        title = samples_text(shown) if shown else ""
+        title = conditions_text(shown) if shown else ""
         family_legend(axes, shown, title, loc="best")
     panels[0].set_ylabel("contacts per particle $z_J$")
 
 
-def main() -> None:
-    """Read, average, draw, report."""
-    parser = parser_of(__doc__, "asphericity.png")
-    what = "what is drawn (%(default)s)"
-    parser.add_argument("--quantity", choices=("phi_J", "z"), default="phi_J", help=what)
-    options = parser.parse_args()
-    groups = read_groups(options.packings)
-    draw(groups, options.quantity, options.out)
-    names = (options.quantity, "asphericity", "beta", "z_iso", "n_rattlers")
-    found = rows(groups, {name: averages(groups, name) for name in names})
-    paper = {"spheres": PHI_SPHERES if options.quantity == "phi_J" else Z_SPHERES}
-    print(json.dumps({"out": str(options.out), "shapes": found, "paper": paper}))
-
-
-def draw(groups: Groups, quantity: str, out: Path) -> None:
+def draw(groups: Groups, options: Namespace) -> None:
     """Draw one figure."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    if quantity == "phi_J":
+    if options.quantity == "phi_J":
         figure = Figure(figsize=(7.4, 4.4), dpi=200, layout="constrained")
         draw_phi(groups, figure.subplots())
     else:
         figure = Figure(figsize=(9, 4.2), dpi=200, layout="constrained")
         draw_z(groups, list(figure.subplots(1, 2)))
-    figure.savefig(out)
+    figure.savefig(options.out)
+
+
+def main(options: Namespace) -> None:
+    """Read, average, draw, report."""
+    names = (options.quantity, "asphericity", "beta", "z_iso", "n_rattlers")
+    groups = read_groups(options.files, needs=(*NEEDS, *names))
+    draw(groups, options)
+    found = rows(groups, {name: averages(groups, name) for name in names})
+    paper = {"spheres": PHI_SPHERES if options.quantity == "phi_J" else Z_SPHERES}
+    told = {"out": options.out, "conditions": conditions(groups)}
+    report(told | {"shapes": found, "paper": paper})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_asphericity.py: {error}")
+    parser = parser_of(__doc__, "asphericity.png", "SWEEP")
+    what = "what is drawn (%(default)s)"
+    parser.add_argument("--quantity", choices=("phi_J", "z"), default="phi_J", help=what)
+    run(parser, main)

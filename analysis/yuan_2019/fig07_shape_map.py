@@ -1,6 +1,6 @@
 """Draw phi_J over the plane of shapes: Fig. 7 of Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019).
 
-    python analysis/fig_shape_map.py SWEEP [MORE ...] --out shape_map.png
+    python analysis/yuan_2019/fig07_shape_map.py SWEEP [MORE ...] --out shape_map.png
 
 Left phi_J against the reduced aspect ratio beta, in bands of asphericity A = 0.1, 0.15, 0.2, 0.25 (+- 0.025),
 without boxes (p > 1), as in the paper, and what is below; right phi_J as color against A and beta, with contours
@@ -10,26 +10,18 @@ JSON object.
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
+from argparse import Namespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from superellipsoid_files import (
-    OF_PAPER,
-    Averages,
-    Groups,
-    averages,
-    beta_axis,
-    exactly,
-    only,
-    parser_of,
-    read_groups,
-    rows,
-    samples_text,
-)
-from sweep_files import BLACK, COLORS
+
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.axes import beta_axis
+from jamshape.drawing.families import NEEDS, beta, shape_of
+from jamshape.drawing.styles import BLACK, COLORS, PAPER_LINE
+from jamshape.drawing.text import conditions_text
+from jamshape.files.sets import Groups, System, conditions, only, read_groups
+from jamshape.measures.averages import Mean, averages, exactly, rows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,26 +31,22 @@ HALF = 0.025
 ENOUGH = 10  # shapes for contours
 LEAST_ROUND = 0.05  # radius of the inner over the outer circle of a triangle at the rim
 
+Averages = dict[System, Mean]
+
 
 def draw_bands(axes: Axes, A: Averages, phi: Averages) -> None:
     """Draw phi_J against beta in bands of asphericity."""
     for color, middle in zip((*COLORS[:4], BLACK), BANDS, strict=True):
         low = -1.0 if middle == BANDS[0] else middle - HALF
-        inside = [k for k in A if low <= A[k].value < middle + HALF and k.p <= 1]
-        inside.sort(key=lambda kind: kind.beta)
+        inside = [s for s in A if low <= A[s].value < middle + HALF and shape_of(s)[0] <= 1]
+        inside.sort(key=beta)
         if not inside:
             continue
-        error = np.nan_to_num([phi[k].error for k in inside])
+        error = np.nan_to_num([phi[s].error for s in inside])
         text = rf"$\mathcal{{A}}={middle:g}$" if low > 0 else rf"$\mathcal{{A}}<{middle + HALF:g}$"
-        style: dict[str, Any] = {
-            "fmt": "o-" if low > 0 else "o",
-            "ms": 5,
-            "lw": 1,
-            "capsize": 2,
-            "mfc": "none",
-        }
-        style |= {"color": color, "label": text}
-        axes.errorbar([k.beta for k in inside], [phi[k].value for k in inside], error, **style)
+        style: dict[str, Any] = {"ms": 5, "lw": 1, "capsize": 2, "mfc": "none"}
+        style |= {"fmt": "o-" if low > 0 else "o", "color": color, "label": text}
+        axes.errorbar([beta(s) for s in inside], [phi[s].value for s in inside], error, **style)
     axes.set_ylabel(r"packing fraction $\phi_J$")
     beta_axis(axes.xaxis)
     if axes.get_legend_handles_labels()[0]:
@@ -67,60 +55,61 @@ def draw_bands(axes: Axes, A: Averages, phi: Averages) -> None:
 
 def draw_map(figure: Any, axes: Axes, A: Averages, phi: Averages) -> bool:
     """Draw phi_J as color; return whether there are contours."""
-    from matplotlib.tri import TriAnalyzer, Triangulation  # noqa: PLC0415
-
-    x = np.array([A[k].value for k in A])
-    y = np.array([k.beta for k in A])
-    z = np.array([phi[k].value for k in A])
+    x, y = (np.array(values) for values in ([A[s].value for s in A], [beta(s) for s in A]))
+    z = np.array([phi[s].value for s in A])
     spread = np.ptp(x) > 0 and np.ptp(np.log(y)) > 0
-    contours = len(x) >= ENOUGH and spread
+    contours = bool(len(x) >= ENOUGH and spread)
     if contours:
-        levels = np.arange(np.floor(z.min() * 100) / 100, z.max() + 0.01, 0.01)
-        mesh = Triangulation(x / np.ptp(x), np.log(y) / np.ptp(np.log(y)))
-        flat = TriAnalyzer(mesh).get_flat_tri_mask(LEAST_ROUND)
-        mesh = Triangulation(x, y, mesh.triangles, flat)
-        axes.tricontourf(mesh, z, levels, cmap="viridis", alpha=0.6)
-        axes.tricontour(mesh, z, levels, colors="0.4", linewidths=0.5)
+        draw_contours(axes, x, y, z)
     dots = axes.scatter(x, y, c=z, cmap="viridis", s=60, edgecolors="k", linewidths=0.6, zorder=3)
     figure.colorbar(dots, ax=axes, label=r"$\phi_J$")
-    axes.axhline(1, **OF_PAPER)
+    axes.axhline(1, **PAPER_LINE)
     axes.set_xlabel(r"asphericity $\mathcal{A}$")
     beta_axis(axes.yaxis)
-    return bool(contours)
+    return contours
 
 
-def draw(groups: Groups, out: Path) -> bool:
-    """Draw both panels."""
+def draw_contours(axes: Axes, x: Any, y: Any, z: Any) -> None:
+    """Draw lines of equal z over the triangles between points, flat ones at the rim left out."""
+    from matplotlib.tri import TriAnalyzer, Triangulation  # noqa: PLC0415 - not needed for --help
+
+    levels = np.arange(np.floor(z.min() * 100) / 100, z.max() + 0.01, 0.01)
+    even = Triangulation(x / np.ptp(x), np.log(y) / np.ptp(np.log(y)))
+    flat = TriAnalyzer(even).get_flat_tri_mask(LEAST_ROUND)
+    mesh = Triangulation(x, y, even.triangles, flat)
+    axes.tricontourf(mesh, z, levels, cmap="viridis", alpha=0.6)
+    axes.tricontour(mesh, z, levels, colors="0.4", linewidths=0.5)
+
+
+def draw(groups: Groups, options: Namespace) -> bool:
+    """Draw both panels; return whether there are contours."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(9.5, 4.2), dpi=200, layout="constrained")
     left, right = figure.subplots(1, 2)
     A, phi = averages(groups, "asphericity"), averages(groups, "phi_J")
     draw_bands(left, A, phi)
-    left.set_title(samples_text(groups), fontsize=9)
+    left.set_title(conditions_text(groups), fontsize=9)
     contours = draw_map(figure, right, A, phi)
-    figure.savefig(out)
+    figure.savefig(options.out)
     return contours
 
 
-def main() -> None:
+def main(options: Namespace) -> None:
     """Read, average, draw, report."""
-    parser = parser_of(__doc__, "shape_map.png")
-    parser.add_argument("--protocol", type=int, choices=(1, 2), default=1, help="(%(default)s)")
-    options = parser.parse_args()
-    groups = only(read_groups(options.packings), lambda kind: kind.protocol == options.protocol)
+    every = read_groups(options.files, needs=(*NEEDS, "asphericity", "phi_J"))
+    groups = only(every, lambda system: system.protocol == options.protocol)
     if not groups:
         msg = f"no packing is of protocol {options.protocol}, expected one"
         raise ValueError(msg)
-    contours = draw(groups, options.out)
+    contours = draw(groups, options)
     columns = {name: averages(groups, name) for name in ("phi_J", "asphericity")}
-    columns["beta"] = exactly(groups, lambda kind: kind.beta)
-    found = {"out": str(options.out), "contours": contours, "shapes": rows(groups, columns)}
-    print(json.dumps(found))
+    columns["beta"] = exactly(groups, beta)
+    told = {"out": options.out, "conditions": conditions(groups), "contours": contours}
+    report(told | {"shapes": rows(groups, columns)})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_shape_map.py: {error}")
+    parser = parser_of(__doc__, "shape_map.png", "SWEEP")
+    parser.add_argument("--protocol", type=int, choices=(1, 2), default=1, help="(%(default)s)")
+    run(parser, main)

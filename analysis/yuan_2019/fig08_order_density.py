@@ -1,6 +1,6 @@
 """Draw what order does to density and contacts: Figs. 8 a and 11 a of Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019).
 
-    python analysis/fig_order_density.py SWEEP1 SWEEP2 --out order_density.png
+    python analysis/yuan_2019/fig08_order_density.py SWEEP1 SWEEP2 --out order_density.png
 
 S_2, C_4 and z_J of packings against their phi_J: of protocol 2 each packing, of protocol 1 averages over
 samples (open, with standard errors). Only shapes that have both are drawn; all of them if none has. The last
@@ -9,92 +9,77 @@ line of standard output is one JSON object with the averages and, of shapes with
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
+from argparse import Namespace
 from typing import Any
 
-from superellipsoid_files import (
-    Groups,
-    averages,
-    family_legend,
-    mark,
-    only,
-    parser_of,
-    points,
-    read_groups,
-    rows,
-    samples_text,
-)
-from sweep_files import mean
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.axes import points
+from jamshape.drawing.families import family_legend, is_thermal, mark
+from jamshape.drawing.text import conditions_text
+from jamshape.files.sets import Groups, PackingFile, System, conditions, only, read_groups
+from jamshape.measures.averages import averages, mean, rows
 
 PANELS = {"S2": "nematic order $S_2$", "C4": "cubatic order $C_4$", "z": "contacts $z_J$"}
+NAMES = ("phi_J", *PANELS)
+
+
+def particles(system: System) -> System:
+    """Tell what is packed, however it was."""
+    return system._replace(protocol=0, n_sweeps=0)
 
 
 def with_both(groups: Groups) -> Groups:
     """Keep shapes of both protocols, or all if there is none."""
-    protocols: dict[tuple[float, ...], set[int]] = {}
-    for kind in groups:
-        protocols.setdefault(kind[:3], set()).add(kind.protocol)
-    shown = only(groups, lambda kind: len(protocols[kind[:3]]) > 1)
+    protocols: dict[System, set[int]] = {}
+    for system in groups:
+        protocols.setdefault(particles(system), set()).add(system.protocol)
+    shown = only(groups, lambda system: len(protocols[particles(system)]) > 1)
     return shown or groups
 
 
-def draw(groups: Groups, out: Path) -> None:
+def draw(groups: Groups, options: Namespace) -> None:
     """Draw order and contacts against phi_J."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(12, 4), dpi=200, layout="constrained")
     panels = figure.subplots(1, len(PANELS))
-    first = only(groups, lambda kind: kind.protocol == 1)
-    second = only(groups, lambda kind: kind.protocol == 2)
+    first, second = only(groups, lambda s: not is_thermal(s)), only(groups, is_thermal)
     for axes, (name, text) in zip(panels, PANELS.items(), strict=True):
         points(axes, averages(first, "phi_J"), averages(first, name))
-        for kind, samples in second.items():
-            style: dict[str, Any] = mark(kind) | {"ls": "none", "ms": 5}
-            x = [s.number("phi_J") for s in samples]
-            axes.plot(x, [s.number(name) for s in samples], **style)
+        for system, files in second.items():
+            style: dict[str, Any] = mark(system) | {"ls": "none", "ms": 5}
+            x = [file.number("phi_J") for file in files]
+            axes.plot(x, [file.number(name) for file in files], **style)
         axes.set(xlabel=r"packing fraction $\phi_J$", ylabel=text)
     for axes in panels[:2]:
         axes.set_ylim(0, max(0.5, axes.get_ylim()[1]))
-    family_legend(panels[0], groups, samples_text(groups), loc="outside right center")
-    figure.savefig(out)
+    family_legend(panels[0], groups, conditions_text(groups), loc="outside right center")
+    figure.savefig(options.out)
 
 
 def gains(groups: Groups) -> list[dict[str, Any]]:
     """Tell how much denser, more ordered and better connected protocol 2 is, shape by shape."""
+    sides: dict[System, tuple[list[PackingFile], list[PackingFile]]] = {}
+    for system, files in groups.items():
+        sides.setdefault(particles(system), ([], []))[is_thermal(system)].extend(files)
     found = []
-    for shape in dict.fromkeys(kind[:3] for kind in groups):
-        row: dict[str, Any] = dict(zip(("p", "w1", "w2"), shape, strict=True))
-        for name in ("phi_J", *PANELS):
-            of = [
-                [
-                    s.number(name)
-                    for k, ss in groups.items()
-                    if k[:3] == shape and k.protocol == q
-                    for s in ss
-                ]
-                for q in (1, 2)
-            ]
-            if not all(of):
-                break
-            row[name] = mean(of[1]).value - mean(of[0]).value
-        else:
-            found.append(row)
+    for shape, both in sides.items():
+        if all(both):
+            before, after = (
+                {n: mean([f.number(n) for f in of]).value for n in NAMES} for of in both
+            )
+            found.append(shape.report() | {n: after[n] - before[n] for n in NAMES})
     return found
 
 
-def main() -> None:
+def main(options: Namespace) -> None:
     """Read, average, draw, report."""
-    options = parser_of(__doc__, "order_density.png").parse_args()
-    groups = with_both(read_groups(options.packings))
-    draw(groups, options.out)
-    found = rows(groups, {name: averages(groups, name) for name in ("phi_J", *PANELS)})
-    print(json.dumps({"out": str(options.out), "shapes": found, "gains": gains(groups)}))
+    groups = with_both(read_groups(options.files, needs=NAMES))
+    draw(groups, options)
+    found = rows(groups, {name: averages(groups, name) for name in NAMES})
+    told = {"out": options.out, "conditions": conditions(groups)}
+    report(told | {"shapes": found, "gains": gains(groups)})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_order_density.py: {error}")
+    run(parser_of(__doc__, "order_density.png", "SWEEP"), main)

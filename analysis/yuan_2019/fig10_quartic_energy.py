@@ -1,7 +1,7 @@
 """Draw the energy along quartic modes: Fig. 10 of Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019).
 
     python analysis/energy_ladder.py PACKING.h5 --u0 1e-14 1e-12 1e-10 1e-8 --out LADDER
-    python analysis/fig_quartic_energy.py PACKING.h5 [MORE.h5 ...] LADDER --out quartic_energy.png
+    python analysis/yuan_2019/fig10_quartic_energy.py PACKING.h5 [MORE.h5 ...] LADDER --out quartic_energy.png
 
 Delta U / N of some packings, the first three of different shape or sample, along modes below the gap of the spectrum
 (lines) and above it (dashed), with dots where the energy is twice its quadratic start; on the right this delta* of the
@@ -11,74 +11,93 @@ one packing at several pressures. The last line of standard output is one JSON o
 
 from __future__ import annotations
 
-import json
-import sys
 from argparse import Namespace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from mode_files import pick_modes
-from superellipsoid_files import Kind, mark, parser_of, read_groups
-from superellipsoid_modes import along, found_modes
-from sweep_files import Sample, plain
 from tqdm import tqdm
 
+from jamshape.command import parser_of, report, run
+from jamshape.drawing.families import label, mark
+from jamshape.drawing.styles import PAPER_LINE, RED
+from jamshape.drawing.text import pressure_unit, unit_text
+from jamshape.files.sets import PackingFile, System, read_groups
 from jamshape.vibration.energy_along import EnergyAlong, quartic_crossover
+from jamshape.vibration.quartic import along, found_modes, quartic_count
+from jamshape.vibration.sets import Wanted, pick_modes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 PANELS = 3
 OTHERS = 2  # modes above the gap
+GUIDE = (3e-3, 0.1)  # ends of the lines of powers
 
-Name = tuple[Kind, int]  # one sample of a shape
+
+class Name(NamedTuple):
+    """One sample of a system."""
+
+    system: System
+    seed: int
+
+    @property
+    def label(self) -> str:
+        """For a legend."""
+        return f"{label(self.system)}, seed {self.seed}"
 
 
 class Followed(NamedTuple):
     """A packing and the energy along some of its modes."""
 
     name: Name
-    sample: Sample
+    file: PackingFile
     quartic: dict[int, EnergyAlong]
     others: dict[int, EnergyAlong]
     eigenvalues: dict[int, float]
 
     @property
     def pressure(self) -> float:
-        """Of the packing, [energy / length^3]."""
-        return self.sample.number("pressure")
+        """Of the packing, [energy / length^D]."""
+        return self.file.number("pressure")
+
+    @property
+    def energies(self) -> list[EnergyAlong]:
+        """Those along quartic modes, or along others if there are none."""
+        return list((self.quartic or self.others).values())
 
     @property
     def crossovers(self) -> list[float]:
         """delta* of the quartic modes, NaN where there is none."""
         return [quartic_crossover(energy) for energy in self.quartic.values()]
 
+    @property
+    def crossover(self) -> float:
+        """Geometric mean of delta*."""
+        return float(np.exp(np.nanmean(np.log(self.crossovers))))
 
-def follow(name: Name, sample: Sample, n_quartic: int) -> Followed:
+
+def follow(file: PackingFile, n_quartic: int) -> Followed:
     """Find the energy along modes of one packing."""
-    table = found_modes(sample)
-    per_band = {"low": 0, "middle": n_quartic, "high": OTHERS}
-    below = len(table.in_band("low")) + len(table.in_band("middle"))
-    if not below:
-        per_band["middle"] = 0
-    elif not len(table.in_band("middle")):
-        per_band = {"low": n_quartic, "middle": 0, "high": OTHERS}
-    chosen = pick_modes(table, [], [], per_band)
-    energies, high = along(sample, table, chosen), set(table.in_band("high").tolist())
+    table = found_modes(file)
+    below = n_quartic if quartic_count(table).n_quartic else 0
+    band = "middle" if len(table.in_band("middle")) else "low"
+    per_band = {"low": 0, "middle": 0, "high": OTHERS} | {band: below}
+    chosen = pick_modes(table, Wanted(per_band=per_band))
+    energies, high = along(file, table, chosen), set(table.in_band("high").tolist())
     return Followed(
-        name,
-        sample,
+        Name(file.system(), int(file.number("seed"))),
+        file,
         {k: v for k, v in energies.items() if k not in high},
         {k: v for k, v in energies.items() if k in high},
         {k: float(table["eigenvalues"][k]) for k in chosen},
     )
 
 
-def draw_energies(axes: Axes, found: Followed, n: int) -> None:
+def draw_energies(axes: Axes, found: Followed) -> None:
     """Draw the energies of one packing."""
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
 
+    n = found.file.number("n")
     shades = colormaps["viridis"](np.linspace(0.0, 0.85, max(len(found.quartic), 1)))
     for color, energy in zip(shades, found.quartic.values(), strict=False):
         size = energy.mean_energy / n
@@ -88,21 +107,53 @@ def draw_energies(axes: Axes, found: Followed, n: int) -> None:
             at = np.interp(np.log(end), np.log(energy.delta), size)
             axes.plot(end, at, "o", color=color, ms=5, mec="k", mew=0.6, zorder=3)
     for energy in found.others.values():
-        axes.plot(energy.delta, energy.mean_energy / n, "--", color="#D55E00", lw=1.1)
-    axes.set(xscale="log", yscale="log", xlabel=r"amplitude $\delta\;/\;a$")
-    kind, seed = found.name
-    z = found.sample.number("z")
-    axes.set_title(f"{kind.label}, seed {seed}, $z_J={z:.2f}$", fontsize=9)
-    delta = next(iter((found.quartic or found.others).values())).delta
-    part = delta[(delta > 3e-3) & (delta < 0.1)]
-    low = min(e.mean_energy[-1] / n for e in (found.quartic or found.others).values())
+        axes.plot(energy.delta, energy.mean_energy / n, "--", color=RED, lw=1.1)
+    unit = unit_text([found.name.system])
+    axes.set(xscale="log", yscale="log", xlabel=rf"amplitude $\delta\;/\;{unit}$")
+    z = found.file.number("z")
+    axes.set_title(f"{found.name.label}, $N={n:g}$, $z_J={z:.2f}$", fontsize=9)
+    draw_powers(axes, found, n)
+
+
+def draw_powers(axes: Axes, found: Followed, n: float) -> None:
+    """Draw delta^2 and delta^4 below the energies."""
+    delta = found.energies[0].delta
+    part = delta[(delta > GUIDE[0]) & (delta < GUIDE[1])]
+    low = min(energy.mean_energy[-1] / n for energy in found.energies)
     for power, height in ((4, 3e-4), (2, 1e-3)):
         line = height * low * (part / part[-1]) ** power
         axes.plot(part, line, "k-", lw=1)
         axes.annotate(rf"$\delta^{power}$", (part[0], line[0]), fontsize=8, ha="right")
 
 
-def draw(every: list[Followed], out: Path) -> None:
+def rungs_of(every: list[Followed], name: Name) -> list[Followed]:
+    """Return one sample at all pressures, the lowest first, where it has a crossover."""
+    own = [f for f in every if f.name == name and np.isfinite(f.crossovers).any()]
+    return sorted(own, key=lambda f: f.pressure)
+
+
+def draw_crossovers(axes: Axes, every: list[Followed]) -> None:
+    """Draw crossovers against pressure."""
+    for name in dict.fromkeys(found.name for found in every):
+        rungs = rungs_of(every, name)
+        if rungs:
+            means = np.array([f.crossover for f in rungs])
+            ends = [(np.nanmin(f.crossovers), np.nanmax(f.crossovers)) for f in rungs]
+            bars = np.abs(np.transpose(ends) - means)
+            style: dict[str, Any] = mark(name.system) | {"ls": "-", "lw": 0.8, "capsize": 2}
+            pressures = [f.pressure for f in rungs]
+            axes.errorbar(pressures, means, bars, label=name.label, ms=5, **style)
+    systems = {found.name.system for found in every}
+    axes.set(xscale="log", yscale="log", xlabel=rf"pressure $P\;{pressure_unit(systems)}$")
+    axes.set_ylabel(rf"crossover $\delta^*\;/\;{unit_text(systems)}$")
+    low, high = axes.get_xlim()
+    x, middle = np.array([low, high]), (np.sqrt(low * high), np.sqrt(np.prod(axes.get_ylim())))
+    axes.plot(x, middle[1] * np.sqrt(x / middle[0]), **PAPER_LINE, label=r"$\sqrt{P}$")
+    axes.set_xlim(low, high)
+    axes.legend(fontsize=7)
+
+
+def draw(every: list[Followed], options: Namespace) -> None:
     """Draw energies, and crossovers against pressure."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
@@ -111,86 +162,47 @@ def draw(every: list[Followed], out: Path) -> None:
     figure = Figure(figsize=(3.9 * (len(shown) + 1), 4), dpi=160, layout="constrained")
     panels = figure.subplots(1, len(shown) + 1)
     for axes, found in zip(panels, shown, strict=False):
-        draw_energies(axes, found, int(found.sample.number("n")))
-    panels[0].set_ylabel(r"$\Delta U/N\;/\;\epsilon$")
-    last = panels[-1]
-    for name in names:
-        rungs = sorted((f for f in every if f.name == name), key=lambda f: f.pressure)
-        rungs = [f for f in rungs if np.isfinite(f.crossovers).any()]
-        if not rungs:
-            continue
-        means = np.array([_geometric(f.crossovers) for f in rungs])
-        ends = [(np.nanmin(f.crossovers), np.nanmax(f.crossovers)) for f in rungs]
-        bars = np.abs(np.transpose(ends) - means)
-        style: dict[str, Any] = mark(name[0]) | {"ls": "-", "lw": 0.8, "capsize": 2, "ms": 5}
-        label = f"{name[0].label}, seed {name[1]}"
-        last.errorbar([f.pressure for f in rungs], means, bars, label=label, **style)
-    last.set(xscale="log", yscale="log", xlabel=r"pressure $P\,a^3/\epsilon$")
-    last.set_ylabel(r"crossover $\delta^*\;/\;a$")
-    low, high = last.get_xlim()
-    x = np.array([low, high])
-    middle = np.sqrt(low * high), np.sqrt(np.prod(last.get_ylim()))
-    line = middle[1] * np.sqrt(x / middle[0])
-    last.plot(x, line, "--", color="0.5", lw=1, zorder=0, label=r"$\sqrt{P}$")
-    last.set_xlim(low, high)
-    last.legend(fontsize=7)
-    figure.savefig(out)
-
-
-def _geometric(values: list[float]) -> float:
-    return float(np.exp(np.nanmean(np.log(values))))
+        draw_energies(axes, found)
+    panels[0].set_ylabel(r"$\Delta U/N\;/\;k_e$")
+    draw_crossovers(panels[-1], every)
+    figure.savefig(options.out)
 
 
 def exponents(every: list[Followed], name: Name) -> dict[str, float | None]:
     """Fit delta* of one packing to a power of the pressure: of all pressures, and of the lowest two."""
-    rungs = [f for f in every if f.name == name and np.isfinite(f.crossovers).any()]
-    rungs.sort(key=lambda f: f.pressure)
-    x = np.log([f.pressure for f in rungs])
-    y = np.log([_geometric(f.crossovers) for f in rungs])
+    rungs = rungs_of(every, name)
+    x, y = (np.log([f.pressure for f in rungs]), np.log([f.crossover for f in rungs]))
     if len(x) < 2 or x[0] == x[1]:
         return {"exponent": None, "exponent_of_lowest": None}
     slopes = [float(np.polyfit(x[:n], y[:n], 1)[0]) for n in (len(x), 2)]
     return dict(zip(("exponent", "exponent_of_lowest"), slopes, strict=True))
 
 
-def row(found: Followed) -> dict[str, Any]:
+def row_of(found: Followed) -> dict[str, Any]:
     """Describe one packing."""
-    modes: list[dict[str, Any]] = [
-        {
-            "mode": k,
-            "eigenvalue": found.eigenvalues[k],
-            "quartic": k in found.quartic,
-            "crossover": plain(quartic_crossover(energy)),
-            "first_change": plain(energy.first_change),
-        }
+    modes = [
+        {"mode": k, "eigenvalue": found.eigenvalues[k], "quartic": k in found.quartic}
+        | {"crossover": quartic_crossover(energy), "first_change": energy.first_change}
         for k, energy in (found.quartic | found.others).items()
     ]
-    known: dict[str, Any] = {"packing": str(found.sample.path), "pressure": found.pressure}
-    return known | found.name[0].report() | {"seed": found.name[1], "modes": modes}
+    known: dict[str, Any] = {"packing": found.file.path, "pressure": found.pressure}
+    return known | found.name.system.report() | {"seed": found.name.seed, "modes": modes}
 
 
 def main(options: Namespace) -> None:
     """Read, follow, draw, report."""
-    groups = read_groups(options.packings)
-    packings = [(k, s) for k, samples in groups.items() for s in samples]
-    every = [
-        follow((kind, int(sample.number("seed"))), sample, options.modes)
-        for kind, sample in tqdm(packings, unit="packing")
-    ]
-    draw(every, options.out)
+    groups = read_groups(options.files)
+    files = [file for files in groups.values() for file in files]
+    every = [follow(file, options.modes) for file in tqdm(files, unit="packing")]
+    draw(every, options)
     names = dict.fromkeys(found.name for found in every)
-    slopes = [
-        kind.report() | {"seed": seed} | exponents(every, (kind, seed)) for kind, seed in names
-    ]
-    rows = [row(found) for found in every]
-    print(json.dumps({"out": str(options.out), "packings": rows, "delta_of_pressure": slopes}))
+    slopes = [name.system.report() | {"seed": name.seed} | exponents(every, name) for name in names]
+    rows = [row_of(found) for found in every]
+    report({"out": options.out, "packings": rows, "delta_of_pressure": slopes})
 
 
 if __name__ == "__main__":
-    asked = parser_of(__doc__, "quartic_energy.png")
+    parser = parser_of(__doc__, "quartic_energy.png", "PACKING")
     number = "quartic modes of each packing, evenly by rank (%(default)s)"
-    asked.add_argument("--modes", type=int, default=4, metavar="K", help=number)
-    try:
-        main(asked.parse_args())
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_quartic_energy.py: {error}")
+    parser.add_argument("--modes", type=int, default=4, metavar="K", help=number)
+    run(parser, main)

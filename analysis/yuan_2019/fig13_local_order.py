@@ -1,69 +1,65 @@
 """Draw global against local order: Fig. 13 of Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019).
 
-    python analysis/fig_local_order.py SWEEP [MORE ...] --out local_order.png
+    python analysis/yuan_2019/fig13_local_order.py SWEEP [MORE ...] --out local_order.png
 
 S_2 and C_4 of whole packings against the averages over their particles of those of the particles in contact
 (Appendix B). Crosses are what as many random directions have, by the number of contacts: few neighbours seem
-ordered. The last line of standard output is one JSON object with averages over samples and their errors.
+ordered. Spheres have no direction and are not drawn. The last line of standard output is one JSON object with
+averages over samples and their errors.
 """
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
+from argparse import Namespace
 
 import numpy as np
-from superellipsoid_files import (
-    LOCAL_ORDER,
-    Averages,
-    Groups,
-    averages,
-    family_legend,
-    local_order,
-    packing_of,
-    parser_of,
-    points,
-    read_groups,
-    rows,
-    samples_text,
-)
-from sweep_files import BLACK, Mean, mean
 
+from jamshape.command import parser_of, report, run
 from jamshape.contacts import find_contacts
+from jamshape.drawing.axes import points
+from jamshape.drawing.colors import ORDER
+from jamshape.drawing.families import family_legend
+from jamshape.drawing.styles import BLACK
+from jamshape.drawing.text import conditions_text
+from jamshape.files.sets import Groups, System, conditions, only, read_groups
+from jamshape.measures.averages import Mean, averages, mean, rows
+from jamshape.measures.local_order import local_order
 from jamshape.measures.order3d import local_cubatic_order, local_nematic_order
-from jamshape.packing import body_axes
+from jamshape.packing import Packing, body_axes
 
 GLOBAL = {"S2": "nematic order $S_2$", "C4": "cubatic order $C_4$"}
 
+Columns = dict[str, dict[System, Mean]]
 
-def measure(groups: Groups) -> tuple[dict[str, Averages], dict[str, Averages]]:
+
+def averaged(packing: Packing) -> dict[str, float]:
+    """Average local order over the particles of a packing."""
+    found = local_order(packing, find_contacts(packing).pairs)
+    return {name: mean(found[name]).value for name in GLOBAL}
+
+
+def at_random(packing: Packing, rng: np.random.Generator) -> dict[str, Mean]:
+    """Average local order if all directions were random."""
+    axes, pairs = body_axes(rng.normal(size=(packing.n, 4))), find_contacts(packing).pairs
+    orders = (local_nematic_order(axes[:, 0], pairs), local_cubatic_order(axes, pairs))
+    return {name: Mean(mean(of).value, samples=1) for name, of in zip(GLOBAL, orders, strict=True)}
+
+
+def measure(groups: Groups) -> tuple[Columns, Columns]:
     """Average local order over particles and samples, and that of the same contacts at random."""
-    found: dict[str, Averages] = {name: {} for name in LOCAL_ORDER}
-    at_random: dict[str, Averages] = {name: {} for name in LOCAL_ORDER}
+    found: Columns = {name: {} for name in GLOBAL}
+    lost: Columns = {name: {} for name in GLOBAL}
     rng = np.random.default_rng(1)
-    for kind, samples in groups.items():
-        packings = [packing_of(sample) for sample in samples]
-        own = [local_order(packing) for packing in packings]
-        packing = packings[0]
-        axes, pairs = body_axes(rng.normal(size=(packing.n, 4))), find_contacts(packing).pairs
-        lost = {
-            "S2": local_nematic_order(axes[:, 0], pairs),
-            "C4": local_cubatic_order(axes, pairs),
-        }
-        for name in LOCAL_ORDER:
-            found[name][kind] = mean([_average(values[name]) for values in own])
-            at_random[name][kind] = Mean(_average(lost[name]), np.nan, 1)
-    return found, at_random
+    for system, files in groups.items():
+        packings = [file.packing() for file in files]
+        own, random = [averaged(packing) for packing in packings], at_random(packings[0], rng)
+        for name in GLOBAL:
+            found[name][system] = mean([values[name] for values in own])
+            lost[name][system] = random[name]
+    return found, lost
 
 
-def _average(values: np.ndarray) -> float:
-    return mean(values).value
-
-
-def draw(
-    groups: Groups, local: dict[str, Averages], at_random: dict[str, Averages], out: Path
-) -> None:
+def draw(groups: Groups, local: Columns, lost: Columns, options: Namespace) -> None:
     """Draw both kinds of order."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
@@ -71,30 +67,28 @@ def draw(
     panels = figure.subplots(1, 2)
     for axes, name in zip(panels, GLOBAL, strict=True):
         known = averages(groups, name)
-        level = float(np.median([m.value for m in known.values()]))
-        x = [m.value for m in at_random[name].values()]
-        low = np.full(len(x), min(level, *(m.value for m in known.values())))
+        shown = {s: m for s, m in local[name].items() if m.samples and known[s].samples}
+        x = [m.value for m in lost[name].values()]
+        low = np.full(len(x), min((known[s].value for s in shown), default=0.0))
         axes.plot(x, low, "+", color=BLACK, ms=6, alpha=0.6, label="local, random directions")
-        points(axes, local[name], known)
-        axes.set(xlabel=LOCAL_ORDER[name], ylabel=GLOBAL[name])
-    family_legend(panels[0], groups, samples_text(groups), loc="outside right center")
-    figure.savefig(out)
+        points(axes, shown, known)
+        axes.set(xlabel=ORDER[name], ylabel=GLOBAL[name])
+    turning = only(groups, lambda system: any(of[system].samples for of in local.values()))
+    family_legend(panels[0], turning, conditions_text(groups), loc="outside right center")
+    figure.savefig(options.out)
 
 
-def main() -> None:
+def main(options: Namespace) -> None:
     """Read, measure, draw, report."""
-    options = parser_of(__doc__, "local_order.png").parse_args()
-    groups = read_groups(options.packings)
-    local, at_random = measure(groups)
-    draw(groups, local, at_random, options.out)
+    groups = read_groups(options.files, needs=tuple(GLOBAL))
+    local, lost = measure(groups)
+    draw(groups, local, lost, options)
     columns = {name: averages(groups, name) for name in GLOBAL}
     columns |= {f"local_{name}": values for name, values in local.items()}
-    columns |= {f"random_{name}": values for name, values in at_random.items()}
-    print(json.dumps({"out": str(options.out), "order": rows(groups, columns)}))
+    columns |= {f"random_{name}": values for name, values in lost.items()}
+    told = {"out": options.out, "conditions": conditions(groups)}
+    report(told | {"order": rows(groups, columns)})
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except (OSError, ValueError) as error:
-        sys.exit(f"fig_local_order.py: {error}")
+    run(parser_of(__doc__, "local_order.png", "SWEEP"), main)

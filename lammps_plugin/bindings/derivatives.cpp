@@ -102,30 +102,17 @@ nb::dict derivatives_in(const ShapeOf<Model> &of, const PairArrays &arrays)
   return derivatives.release();
 }
 
-template <class Model>
-nb::dict derivatives(const ShapeOf<Model> &of, const PairArrays &arrays, bool extended)
-{
-  return of.in_space([&](auto D) {
-    return in_precision(extended,
-                        [&](auto s) { return derivatives_in<Model, D, decltype(s)>(of, arrays); });
-  });
-}
-
 }  // namespace
 
 void export_derivatives()
 {
-  using namespace nb::literals;
   Shapes::each([](auto model) {
     using Model = decltype(model);
-    class_of<Model>().def(
-        "derivatives",
-        [](const ShapeOf<Model> &of, const Array3<double> &position,
-           const Array3<double> &orientation, const Array2<double> &edges,
-           const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift, bool extended) {
-          return derivatives(of, {position, orientation, edges, pairs, shift}, extended);
+    def_in_precision(
+        class_of<Model>(), "derivatives",
+        [](auto D, auto s, const auto &of, const PairArrays &arrays) {
+          return derivatives_in<Model, D, decltype(s)>(of, arrays);
         },
-        "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "extended"_a,
         "Second derivatives of the C touching pairs, arguments as in `sums`. The variables are\n"
         "r_i - r_j and the rotations of i and j, n = 4 in 2D, 9 in 3D. Returns a dict: pair (C,)\n"
         "rows of pairs; n_bonds, kind, energy (C,); separation, force (C, D); of up to most_bonds\n"

@@ -83,10 +83,40 @@ template <class Model> nb::class_<ShapeOf<Model>> class_of()
   return nb::borrow<nb::class_<ShapeOf<Model>>>(nb::type<ShapeOf<Model>>());
 }
 
-/// `visit(S())` for doubles or for long doubles.
-template <class Visit> auto in_precision(bool extended, const Visit &visit)
+/// Binds `function(shape, arrays, more...)` as a method of a shape's class that takes poses and
+/// pairs; `extra` are the names of more arguments and the text.
+template <class... More, class Model, class Function, class... Extra>
+void def_over_pairs(nb::class_<ShapeOf<Model>> of, const char *name, const Function &function,
+                    const Extra &...extra)
 {
-  return extended ? visit(static_cast<long double>(0)) : visit(0.0);
+  using namespace nb::literals;
+  of.def(
+      name,
+      [function](const ShapeOf<Model> &self, const Array3<double> &position,
+                 const Array3<double> &orientation, const Array2<double> &edges,
+                 const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
+                 More... more) {
+        return function(self, PairArrays{position, orientation, edges, pairs, shift}, more...);
+      },
+      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, extra...);
+}
+
+/// Binds `function(D, S(), shape, arrays)` as such a method that is asked for doubles or for long
+/// doubles S.
+template <class Model, class Function>
+void def_in_precision(nb::class_<ShapeOf<Model>> of, const char *name, const Function &function,
+                      const char *text)
+{
+  using namespace nb::literals;
+  def_over_pairs<bool>(
+      of, name,
+      [function](const ShapeOf<Model> &self, const PairArrays &arrays, bool extended) {
+        return self.in_space([&](auto D) {
+          return extended ? function(D, static_cast<long double>(0), self, arrays)
+                          : function(D, 0.0, self, arrays);
+        });
+      },
+      "extended"_a = false, text);
 }
 
 }  // namespace jamshape

@@ -113,46 +113,33 @@ template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
 {
   using namespace nb::literals;
   using Self = const ShapeOf<Model> &;
-  using Numbers = const Array3<double> &;
-  using Edges = const Array2<double> &;
-  using Integers = const Array2<std::int64_t> &;
-  of.def(
-      "near",
-      [](Self self, Numbers position, Numbers orientation, Edges edges, Integers pairs,
-         Integers shift, double margin) {
-        return each_pair(self, {position, orientation, edges, pairs, shift},
+  def_over_pairs<double>(
+      of, "near",
+      [](Self self, const PairArrays &arrays, double margin) {
+        return each_pair(self, arrays,
                          [&](const auto &of, std::size_t p) { return of.are_closer(p, margin); });
       },
-      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "margin"_a,
+      "margin"_a,
       "Whether surfaces of M pairs may be closer than `margin` (M,): false only where they are\n"
       "not. Poses and pairs as `sums` takes them.");
-  of.def(
-      "overlaps",
-      [](Self self, Numbers position, Numbers orientation, Edges edges, Integers pairs,
-         Integers shift) {
-        return each_pair(self, {position, orientation, edges, pairs, shift},
-                         [](const auto &of, std::size_t p) { return of.overlap(p); });
+  def_over_pairs(
+      of, "overlaps",
+      [](Self self, const PairArrays &arrays) {
+        return each_pair(self, arrays, [](const auto &of, std::size_t p) { return of.overlap(p); });
       },
-      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a,
       "Whether the particles of M pairs share more than a point (M,).");
-  of.def(
-      "contacts",
-      [](Self self, Numbers position, Numbers orientation, Edges edges, Integers pairs,
-         Integers shift, bool extended) {
-        const PairArrays arrays{position, orientation, edges, pairs, shift};
-        return self.in_space([&](auto D) {
-          return extended ? contacts_in<Model, D, long double>(self, arrays)
-                          : contacts_in<Model, D, double>(self, arrays);
-        });
+  def_in_precision(
+      of, "contacts",
+      [](auto D, auto s, Self self, const PairArrays &arrays) {
+        return contacts_in<Model, D, decltype(s)>(self, arrays);
       },
-      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "extended"_a,
-      "The C of M pairs that are not apart, found in long double if extended. Returns a dict: pair "
-      "(C,) rows of pairs; status (1\n"
-      "touching, 2 crossing, 3 unconverged), kind, n_bonds, error (relative, of an iteration),\n"
-      "energy (C,); separation, force (on i) (C, D); torque_i, torque_j (C, 1 or 3) and, of up to\n"
-      "most_bonds bonds B, bond_normal (into i), bond_force, bond_arm_i (C, B, D), bond_distance,\n"
-      "bond_reach, bond_energy, bond_stiffness (C, B), bond_on_side and\n"
-      "bond_on_face (flat in all D - 1 directions) of i and j (C, B, 2).");
+      "The C of M pairs that are not apart, found in long double if extended. Returns a dict: "
+      "pair\n"
+      "(C,) rows of pairs; status (1 touching, 2 crossing, 3 unconverged), kind, n_bonds, error\n"
+      "(relative, of an iteration), energy (C,); separation, force (on i) (C, D); torque_i,\n"
+      "torque_j (C, 1 or 3) and, of up to most_bonds bonds B, bond_normal (into i), bond_force,\n"
+      "bond_arm_i (C, B, D), bond_distance, bond_reach, bond_energy, bond_stiffness (C, B),\n"
+      "bond_on_side and bond_on_face (flat in all D - 1 directions) of i and j (C, B, 2).");
 }
 
 template <class Model> void export_shape(nb::module_ &m)

@@ -29,30 +29,17 @@ nb::dict sums_in(const ShapeOf<Model> &of, const PairArrays &arrays)
   return result;
 }
 
-template <class Model>
-nb::dict sums(const ShapeOf<Model> &of, const PairArrays &arrays, bool extended)
-{
-  return of.in_space([&](auto D) {
-    return in_precision(extended,
-                        [&](auto s) { return sums_in<Model, D, decltype(s)>(of, arrays); });
-  });
-}
-
 }  // namespace
 
 void export_sums()
 {
-  using namespace nb::literals;
   Shapes::each([](auto model) {
     using Model = decltype(model);
-    class_of<Model>().def(
-        "sums",
-        [](const ShapeOf<Model> &of, const Array3<double> &position,
-           const Array3<double> &orientation, const Array2<double> &edges,
-           const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift, bool extended) {
-          return sums(of, {position, orientation, edges, pairs, shift}, extended);
+    def_in_precision(
+        class_of<Model>(), "sums",
+        [](auto D, auto s, const auto &of, const PairArrays &arrays) {
+          return sums_in<Model, D, decltype(s)>(of, arrays);
         },
-        "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "extended"_a,
         "Sums over M pairs. Position (2, N, D), orientation (2, N, 1) angles or (2, N, 4)\n"
         "quaternions and edges (2, D) as a double and its small rest; pairs (M, 2), shift (M, D)\n"
         "box edges to add to the second; extended: in long double. Returns a dict: energy, force\n"

@@ -33,6 +33,10 @@ constexpr double LARGEST_STRAIN = 1.0;
 
 constexpr int N_OF_SUBSTEPS = 8;
 
+constexpr const char *SYNTAX =
+    "'drag k_d compress kappa [integrator NAME] [tolerance T] [stages MAX] "
+    "[reference center|corner] [check N]'.";
+
 /// What is global in a restart file.
 struct Saved {
   AffineBox::State box;
@@ -41,60 +45,87 @@ struct Saved {
 
 }  // namespace
 
+/// What the words of the command say, beside how often to check.
+struct FixOverdampedAffine::Command {
+  double k_d, kappa;
+  std::string method = "heun";
+  IntegratorOptions of_method{};
+  AffineBox::Reference reference = AffineBox::Reference::CENTER;
+};
+
 FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), check_every(1000), next_check(0), largest_rate(0.0), warned(false),
     was_told(false), running(false)
 {
-  const auto fail = [&](const std::string &found_and_expected) {
-    error->all(FLERR, "fix overdamped/affine found " + found_and_expected);
-  };
-  const std::string syntax =
-      "'drag k_d compress kappa [integrator NAME] [tolerance T] [stages MAX] "
-      "[reference center|corner] [check N]'.";
+  make_parts(read(narg, arg));
+  tell_what_this_is();
+  grow_arrays(atom->nmax);
+  atom->add_callback(LAMMPS_NS::Atom::GROW);
+  atom->add_callback(LAMMPS_NS::Atom::RESTART);
+  for (int i = 0; i < atom->nlocal; ++i) set_arrays(i);
+}
+
+void FixOverdampedAffine::fail(const std::string &found_and_expected) const
+{
+  error->all(FLERR, "fix overdamped/affine found " + found_and_expected);
+}
+
+FixOverdampedAffine::Command FixOverdampedAffine::read(int narg, char **arg)
+{
   if (igroup != 0) fail("a group other than all, expected 'all': the whole box moves.");
   if (narg < 7 || narg % 2 == 0 || std::strcmp(arg[3], "drag") || std::strcmp(arg[5], "compress")) {
-    fail("a wrong list of arguments, expected " + syntax);
+    fail(std::string("a wrong list of arguments, expected ") + SYNTAX);
   }
-  const double k_d = LAMMPS_NS::utils::numeric(FLERR, arg[4], false, lmp);
-  const double kappa = LAMMPS_NS::utils::numeric(FLERR, arg[6], false, lmp);
-  if (!(k_d > 0.0) || !std::isfinite(k_d)) {
+  Command command;
+  command.k_d = LAMMPS_NS::utils::numeric(FLERR, arg[4], false, lmp);
+  command.kappa = LAMMPS_NS::utils::numeric(FLERR, arg[6], false, lmp);
+  if (!(command.k_d > 0.0) || !std::isfinite(command.k_d)) {
     fail(std::string("drag ") + arg[4] + ", expected a positive number.");
   }
-  if (!std::isfinite(kappa)) {
+  if (!std::isfinite(command.kappa)) {
     fail(std::string("compress ") + arg[6] + ", expected a finite rate.");
   }
-  std::string method = "heun";
-  IntegratorOptions of_method;
-  AffineBox::Reference reference = AffineBox::Reference::CENTER;
-  for (int k = 7; k < narg; k += 2) {
-    const std::string keyword = arg[k], value = arg[k + 1];
-    if (keyword == "integrator") {
-      method = value;
-    } else if (keyword == "tolerance") {
-      of_method.tolerance = LAMMPS_NS::utils::numeric(FLERR, arg[k + 1], false, lmp);
-    } else if (keyword == "stages") {
-      of_method.stages = LAMMPS_NS::utils::inumeric(FLERR, arg[k + 1], false, lmp);
-    } else if (keyword == "reference" && (value == "center" || value == "corner")) {
-      reference = value == "center" ? AffineBox::Reference::CENTER : AffineBox::Reference::CORNER;
-    } else if (keyword == "check") {
-      check_every = LAMMPS_NS::utils::bnumeric(FLERR, arg[k + 1], false, lmp);
-      if (check_every < 0) fail("check " + value + ", expected a number of steps, or 0 for never.");
-    } else {
-      fail("'" + keyword + " " + value + "', expected " + syntax);
-    }
+  for (int k = 7; k < narg; k += 2) read_option(arg[k], arg[k + 1], command);
+  return command;
+}
+
+void FixOverdampedAffine::read_option(const std::string &keyword, const char *text, Command &to)
+{
+  const std::string value = text;
+  if (keyword == "integrator") {
+    to.method = value;
+  } else if (keyword == "tolerance") {
+    to.of_method.tolerance = LAMMPS_NS::utils::numeric(FLERR, text, false, lmp);
+  } else if (keyword == "stages") {
+    to.of_method.stages = LAMMPS_NS::utils::inumeric(FLERR, text, false, lmp);
+  } else if (keyword == "reference" && (value == "center" || value == "corner")) {
+    to.reference = value == "center" ? AffineBox::Reference::CENTER : AffineBox::Reference::CORNER;
+  } else if (keyword == "check") {
+    check_every = LAMMPS_NS::utils::bnumeric(FLERR, text, false, lmp);
+    if (check_every < 0) fail("check " + value + ", expected a number of steps, or 0 for never.");
+  } else {
+    fail("'" + keyword + " " + value + "', expected " + SYNTAX);
   }
-  box = std::make_unique<AffineBox>(lmp, kappa, reference);
+}
+
+void FixOverdampedAffine::make_parts(const Command &of)
+{
+  box = std::make_unique<AffineBox>(lmp, of.kappa, of.reference);
   try {
-    integrator = make_integrator(method, *box, of_method);
+    integrator = make_integrator(of.method, *box, of.of_method);
   } catch (const std::invalid_argument &problem) {
     fail(problem.what());
   }
   if (!integrator) {
-    fail("integrator " + method + ", expected one of: " + integrator_names() + ".");
+    fail("integrator " + of.method + ", expected one of: " + integrator_names() + ".");
   }
-  flow = std::make_unique<OverdampedFlow>(lmp, k_d, *box, this, integrator->n_registers());
+  flow = std::make_unique<OverdampedFlow>(lmp, of.k_d, *box, this, integrator->n_registers());
   if (integrator->state()) flow->allow_retries();
+}
 
+/// To LAMMPS, in the members that it reads.
+void FixOverdampedAffine::tell_what_this_is()
+{
   time_integrate = 1;
   time_depend = 1;
   no_change_box = 1;
@@ -107,11 +138,6 @@ FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char 
   size_vector = 8 + N_OF_SUBSTEPS;
   global_freq = 1;
   extvector = 0;
-
-  grow_arrays(atom->nmax);
-  atom->add_callback(LAMMPS_NS::Atom::GROW);
-  atom->add_callback(LAMMPS_NS::Atom::RESTART);
-  for (int i = 0; i < atom->nlocal; ++i) set_arrays(i);
 }
 
 FixOverdampedAffine::~FixOverdampedAffine()

@@ -6,6 +6,7 @@
 #include "overdamped_flow.h"
 
 #include <memory>
+#include <string>
 
 namespace jamshape {
 
@@ -55,6 +56,12 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   double largest_rate;
   bool warned, was_told, running;
 
+  struct Command;
+  Command read(int narg, char **arg);
+  void read_option(const std::string &keyword, const char *text, Command &to);
+  void make_parts(const Command &of);
+  void tell_what_this_is();
+  [[noreturn]] void fail(const std::string &found_and_expected) const;
   void require_timestep() const;
   void require_strain(double strain) const;
   void tell_what_is_left_out();

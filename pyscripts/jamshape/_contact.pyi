@@ -58,7 +58,7 @@ class _Shape:
         edges: NDArray[np.float64],
         pairs: NDArray[np.int64],
         shift: NDArray[np.int64],
-        extended: bool,
+        extended: bool = False,
     ) -> dict[str, NDArray[Any]]: ...
     def sums(
         self,
@@ -67,7 +67,7 @@ class _Shape:
         edges: NDArray[np.float64],
         pairs: NDArray[np.int64],
         shift: NDArray[np.int64],
-        extended: bool,
+        extended: bool = False,
     ) -> dict[str, Any]: ...
     def derivatives(
         self,
@@ -76,7 +76,7 @@ class _Shape:
         edges: NDArray[np.float64],
         pairs: NDArray[np.int64],
         shift: NDArray[np.int64],
-        extended: bool,
+        extended: bool = False,
     ) -> dict[str, NDArray[Any]]: ...
     def sweeps(
         self,

@@ -4,10 +4,10 @@ A script's docstring is its help, the last line of its standard output one JSON 
 input one sentence on standard error after its name::
 
     def main(options: Namespace) -> None:
-        report({"out": options.out, "phi_J": mean(...)})
+        report({"out": options.out, "phi_J": measured(options.files)})
 
     if __name__ == "__main__":
-        run(parser_of(__doc__, "phi_j.png"), main)
+        run(parser_of(__doc__, "phi_j.png", "SWEEP"), main)
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ import numpy as np
 PROBLEMS = (OSError, ValueError, RuntimeError)
 
 
-def parser_of(doc: str | None, out: str = "") -> ArgumentParser:
-    """Make a parser whose help is a script's docstring, with --out if there is a usual file to write.
+def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser:
+    """Make a parser whose help is a script's docstring, with --out and files if these are named.
 
     Parameters
     ----------
@@ -35,8 +35,12 @@ def parser_of(doc: str | None, out: str = "") -> ArgumentParser:
         Of the script, shown as it is.
     out : str
         What is written if nothing else is asked for.
+    files : str
+        What the files are that the script reads, one or more, called `files` among the options.
     """
     parser = ArgumentParser(description=doc, formatter_class=RawDescriptionHelpFormatter)
+    if files:
+        parser.add_argument("files", type=Path, nargs="+", metavar=files, help="folders or files")
     if out:
         parser.add_argument("--out", type=Path, default=Path(out), help="(%(default)s)")
     return parser

@@ -1,5 +1,6 @@
-"""What tests of scripts share."""
+"""What tests of scripts share: running them in this process, which saves the time of starting them."""
 
+import json
 import runpy
 import sys
 from pathlib import Path
@@ -11,16 +12,53 @@ ANALYSIS = Path(__file__).parents[2] / "analysis"
 
 @pytest.fixture
 def here(monkeypatch):
-    """Run a script in this process, which saves the time of starting it; return how it ended."""
+    """Run a script of analysis/; return how it ended."""
 
     def run_here(script, *arguments):
         path = ANALYSIS / script
         monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
-        monkeypatch.syspath_prepend(str(path.parent))
+        monkeypatch.syspath_prepend(path.parent)
         try:
             runpy.run_path(str(path), run_name="__main__")
         except SystemExit as ended:
-            return ended.code
+            return ended.code or 0
         return 0
 
     return run_here
+
+
+@pytest.fixture
+def report(here, capsys):
+    """Run a script that must succeed; return its last line, which is JSON without NaN."""
+
+    def reported(script, *arguments):
+        assert here(script, *arguments) == 0
+        last = capsys.readouterr().out.splitlines()[-1]
+        return json.loads(last, parse_constant=pytest.fail)
+
+    return reported
+
+
+@pytest.fixture
+def problem(here):
+    """Run a script that must end with one sentence after its name, and so with exit code 1."""
+
+    def sentence(script, *arguments):
+        said = here(script, *arguments)
+        assert isinstance(said, str)
+        assert "\n" not in said
+        assert said.startswith(f"{Path(script).name}: ")
+        return said
+
+    return sentence
+
+
+@pytest.fixture
+def help_of(here, capsys):
+    """Return what a script says to --help."""
+
+    def text(script):
+        assert here(script, "--help") == 0
+        return capsys.readouterr().out
+
+    return text

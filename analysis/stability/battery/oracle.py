@@ -5,7 +5,7 @@ Rods from the definitions of Marschall & Teitel 2018; it shares nothing with `la
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -201,7 +201,7 @@ def of_dimers(packing: Packing, k_e: float = 1.0, quaternion: FloatArray | None 
     return summed(packing, pulls, n_contacts)
 
 
-def _of_discs(s: Spines, a: int, b: int, k_e: float) -> tuple[LongArray, ...]:
+def _of_discs(s: Spines, a: int, b: int, k_e: float) -> tuple[Any, ...]:
     """Arms, force, energy and whether they touch, of one disc of each: at the ends a and b of the spines."""
     arms = (a * s.A_i[:, None] * s.u_i, b * s.A_j[:, None] * s.u_j)
     delta = s.r + arms[0] - arms[1]

@@ -1,13 +1,12 @@
 #pragma once
 
+#include "contact/along_x.hpp"
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
-#include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 namespace jamshape {
 
@@ -17,14 +16,6 @@ struct Dimer {
   double half_length;
   double radius;
 };
-
-/// From the semi-axes that LAMMPS stores, (A + R, R, R); nothing when they are of another shape.
-inline std::optional<Dimer> dimer_from(const Vec<3> &semi_axes)
-{
-  const double A = semi_axes[0] - semi_axes[1], R = semi_axes[1];
-  if (!(A >= 0.0) || !(R > 0.0) || R != semi_axes[2] || !std::isfinite(A)) return std::nullopt;
-  return Dimer{A, R};
-}
 
 /// Area (volume in 3D) and moments of the union: twice the part of one disc that lies on its side
 /// of the middle. With x from that disc's centre, it ends at x = -h, h = min(A, R).
@@ -55,16 +46,13 @@ template <> inline SubstrateDrag substrate_drag<3>(const Dimer &shape)
   return {2.0 * volume, {{across / volume, about_y, about_y}}};
 }
 
-/// Shape and pose of one particle, as the pair loops read it.
-template <int D, class S = double> struct DimerBody {
-  Vec<D, S> centre;
-  Vec<D, S> axis;
-  double half_length;
-  double radius;
+template <int D, class S = double> using DimerBody = BodyAlongX<Dimer, D, S>;
 
-  /// From the centre to that of the first or the second disc.
-  Vec<D, S> to_disc(int which) const { return S(which == 0 ? half_length : -half_length) * axis; }
-};
+/// From the centre of a dimer to that of its first or its second disc.
+template <int D, class S> Vec<D, S> to_disc(const DimerBody<D, S> &body, int which)
+{
+  return S(which == 0 ? body.half_length : -body.half_length) * body.axis;
+}
 
 struct DimerLaw {
   Harmonic harmonic;
@@ -86,8 +74,8 @@ template <int D, class S> class DimerContact {
   {
     Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
     for (int a = 0; a < 2; ++a) {
-      const Vec<D, S> arm_i = i.to_disc(a);
-      for (int b = 0; b < 2; ++b) add_bond(contact, arm_i, j.to_disc(b));
+      const Vec<D, S> arm_i = to_disc(i, a);
+      for (int b = 0; b < 2; ++b) add_bond(contact, arm_i, to_disc(j, b));
     }
     return contact;
   }
@@ -144,10 +132,8 @@ Contact<D, S, 4> contact_of(const DimerBody<D, S> &i, const DimerBody<D, S> &j, 
 }
 
 /// What is asked of a shape (see SpherocylinderModel).
-struct DimerModel {
-  using Shape = Dimer;
+struct DimerModel : AlongX<Dimer> {
   using Law = DimerLaw;
-  template <int D, class S = double> using Body = DimerBody<D, S>;
 
   static constexpr const char *NAME = "dimer";
   static constexpr const char *SHAPE_RULE =
@@ -160,41 +146,11 @@ struct DimerModel {
 
   static Law law(double k_e, Sides, bool /*shortcuts*/ = true) { return {{k_e}}; }
 
-  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)
-  {
-    return dimer_from(semi_axes);
-  }
-
   template <int D> static Shortcut shortcut(const Shape &) { return Shortcut::NONE; }
-  template <int D> static bool turns(const Shape &shape) { return shape.half_length > 0.0; }
 
   template <int D> static SubstrateDrag drag(const Shape &shape)
   {
     return substrate_drag<D>(shape);
-  }
-  template <int D> static double outer_radius(const Shape &shape)
-  {
-    return shape.half_length + shape.radius;
-  }
-  template <int D> static double inner_radius(const Shape &shape) { return shape.radius; }
-  template <int D> static double rotation_length(const Shape &shape) { return shape.half_length; }
-  template <int D> static double turning_radius(const Shape &shape) { return shape.half_length; }
-  static std::optional<int> symmetry_axis(const Shape &shape) { return director<3>(shape); }
-  template <int D> static std::optional<int> director(const Shape &shape)
-  {
-    return turns<D>(shape) ? std::optional<int>(0) : std::nullopt;
-  }
-
-  template <int D, class S = double> static Body<D, S> body(const Shape &shape)
-  {
-    Vec<D, S> along_x{};
-    along_x[0] = 1.0;
-    return {{}, along_x, shape.half_length, shape.radius};
-  }
-
-  template <int D, class S> static void turn_to(Body<D, S> &body, const QuaternionOf<S> &q)
-  {
-    body.axis = long_axis<D, S>(q);
   }
 
   /// Discs have no faces.
@@ -208,29 +164,15 @@ struct DimerModel {
   /// Whether the surfaces of i and j are closer than `margin`.
   template <int D> static bool closer_than(double margin, const Body<D> &i, const Body<D> &j)
   {
+    if (!spheres_are_closer<D>(margin, i, j)) return false;
     const Vec<D> r = i.centre - j.centre;
     const double reach = i.radius + j.radius + margin;
-    const double bounding = reach + i.half_length + j.half_length;
-    if (!(norm_sq(r) < bounding * bounding)) return false;
     for (int a = 0; a < 2; ++a) {
       for (int b = 0; b < 2; ++b) {
-        if (norm_sq(r + i.to_disc(a) - j.to_disc(b)) < reach * reach) return true;
+        if (norm_sq(r + to_disc(i, a) - to_disc(j, b)) < reach * reach) return true;
       }
     }
     return false;
-  }
-
-  template <int D> struct Pose {
-    Vec<D> centre, axis;
-  };
-  template <int D> static Pose<D> pose(const Body<D> &body) { return {body.centre, body.axis}; }
-
-  /// The larger of the squared distances |dx +- A du| that the two centres moved.
-  template <int D>
-  static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
-  {
-    const Vec<D> turned = now.half_length * (now.axis - then.axis);
-    return norm_sq(shift) + norm_sq(turned) + 2.0 * std::abs(dot(shift, turned));
   }
 };
 

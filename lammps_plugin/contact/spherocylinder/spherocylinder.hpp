@@ -1,5 +1,6 @@
 #pragma once
 
+#include "contact/along_x.hpp"
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
 #include "contact/math/rotation.hpp"
@@ -9,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <type_traits>
 
 namespace jamshape {
@@ -20,15 +20,6 @@ struct Spherocylinder {
   double half_length;
   double radius;
 };
-
-/// From the semi-axes that LAMMPS stores, (A + R, R, R); nothing when they are of another shape.
-inline std::optional<Spherocylinder> spherocylinder_from(const Vec<3> &semi_axes)
-{
-  const bool is_one = semi_axes[1] == semi_axes[2] && semi_axes[0] >= semi_axes[1] &&
-                      semi_axes[1] > 0.0 && std::isfinite(semi_axes[0]);
-  if (!is_one) return std::nullopt;
-  return Spherocylinder{semi_axes[0] - semi_axes[1], semi_axes[1]};
-}
 
 /// Area 4AR + pi R^2 in 2D, volume in 3D, and their moments. In 2D about z: Marschall & Teitel
 /// 2018, Eq. 10, here as the sum over the rectangle and the two half discs (each with its centroid
@@ -56,13 +47,7 @@ template <> inline SubstrateDrag substrate_drag<3>(const Spherocylinder &shape)
   return {volume, {{along / volume, across / volume, across / volume}}};
 }
 
-/// Shape and pose of one particle, as the pair loops read it.
-template <int D, class S = double> struct SpherocylinderBody {
-  Vec<D, S> centre;
-  Vec<D, S> axis;
-  double half_length;
-  double radius;
-};
+template <int D, class S = double> using SpherocylinderBody = BodyAlongX<Spherocylinder, D, S>;
 
 struct SpherocylinderLaw {
   Harmonic harmonic;
@@ -338,12 +323,10 @@ Contact<D, S, 2> contact_of(const SpherocylinderBody<D, S> &i, const Spherocylin
   return SpherocylinderContact<D, S>(i, j, law).evaluate();
 }
 
-/// All that pair styles, Python and sums over pairs need to know of a shape; every shape has one
-/// such struct (see ARCHITECTURE.md, how to add a shape).
-struct SpherocylinderModel {
-  using Shape = Spherocylinder;
+/// With AlongX all that pair styles, Python and sums over pairs need to know of a shape; every
+/// shape has one such struct (see ARCHITECTURE.md, how to add a shape).
+struct SpherocylinderModel : AlongX<Spherocylinder> {
   using Law = SpherocylinderLaw;
-  template <int D, class S = double> using Body = SpherocylinderBody<D, S>;
 
   static constexpr const char *NAME = "spherocylinder";
   static constexpr const char *SHAPE_RULE =
@@ -362,56 +345,15 @@ struct SpherocylinderModel {
     return {{k_e}, sides, shortcuts};
   }
 
-  /// Other shapes have an exponent.
-  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)
-  {
-    return spherocylinder_from(semi_axes);
-  }
-
   /// Whose contacts need no search.
   template <int D> static Shortcut shortcut(const Shape &shape)
   {
     return shape.half_length > 0.0 ? Shortcut::NONE : Shortcut::ROUND;
   }
 
-  /// Particles that no contact can turn need no orientation.
-  template <int D> static bool turns(const Shape &shape) { return shape.half_length > 0.0; }
-
   template <int D> static SubstrateDrag drag(const Shape &shape)
   {
     return substrate_drag<D>(shape);
-  }
-
-  /// Of the sphere around a particle, and its smallest length.
-  template <int D> static double outer_radius(const Shape &shape)
-  {
-    return shape.half_length + shape.radius;
-  }
-  template <int D> static double inner_radius(const Shape &shape) { return shape.radius; }
-
-  /// The length that a radian counts for, 0 where no contact can turn the particle; and how much
-  /// closer to others a radian brings its surface at most.
-  template <int D> static double rotation_length(const Shape &shape) { return shape.half_length; }
-  template <int D> static double turning_radius(const Shape &shape) { return shape.half_length; }
-
-  /// The body axis (0, 1, 2) about which a turn changes nothing, and the one that tells a
-  /// particle's direction; nothing for particles that have none.
-  static std::optional<int> symmetry_axis(const Shape &shape) { return director<3>(shape); }
-  template <int D> static std::optional<int> director(const Shape &shape)
-  {
-    return shape.half_length > 0.0 ? std::optional<int>(0) : std::nullopt;
-  }
-
-  template <int D, class S = double> static Body<D, S> body(const Shape &shape)
-  {
-    Vec<D, S> along_x{};
-    along_x[0] = 1.0;
-    return {{}, along_x, shape.half_length, shape.radius};
-  }
-
-  template <int D, class S> static void turn_to(Body<D, S> &body, const QuaternionOf<S> &q)
-  {
-    body.axis = long_axis<D, S>(q);
   }
 
   /// Of bond b of a contact.
@@ -427,25 +369,9 @@ struct SpherocylinderModel {
   /// Whether the surfaces of i and j are closer than `margin`.
   template <int D> static bool closer_than(double margin, const Body<D> &i, const Body<D> &j)
   {
-    const SpinePair<D> pair = spine_pair(i, j);
     const double reach = i.radius + j.radius + margin;
-    const double bounding = reach + i.half_length + j.half_length;
-    return norm_sq(pair.r) < bounding * bounding && spine_distance_sq(pair) < reach * reach;
-  }
-
-  /// Where a particle was when the pairs were last chosen.
-  template <int D> struct Pose {
-    Vec<D> centre, axis;
-  };
-  template <int D> static Pose<D> pose(const Body<D> &body) { return {body.centre, body.axis}; }
-
-  /// Upper bound of the squared distance that any point of the spine moved: |dx + s du| over |s| <=
-  /// A, by (a + b)^2 <= 2 a^2 + 2 b^2.
-  template <int D>
-  static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
-  {
-    const double turned = now.half_length * now.half_length * norm_sq(now.axis - then.axis);
-    return turned == 0.0 ? norm_sq(shift) : 2.0 * (norm_sq(shift) + turned);
+    return spheres_are_closer<D>(margin, i, j) &&
+           spine_distance_sq(spine_pair(i, j)) < reach * reach;
   }
 };
 

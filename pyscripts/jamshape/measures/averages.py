@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,26 @@ from jamshape.arrays import FloatArray
 _DIGITS = (3, 9)
 
 
+_Group = TypeVar("_Group")
+
+
+class Measured(Protocol):
+    """A sample with numbers by name, such as `jamshape.files.sets.PackingFile`."""
+
+    def number(self, name: str) -> float:
+        """Look up a number."""
+
+
+class Reported(Protocol):
+    """A group that names itself in JSON, such as `jamshape.files.sets.System`."""
+
+    def report(self) -> dict[str, Any]:
+        """Name it."""
+
+
+_Named = TypeVar("_Named", bound=Reported)
+
+
 class Mean(NamedTuple):
     """An average over samples with its standard error."""
 
@@ -22,6 +43,11 @@ class Mean(NamedTuple):
     """NaN for one sample."""
     samples: int = 0
     """0 where that is not known."""
+
+    @property
+    def tex(self) -> str:
+        """Write it in TeX, without dollars."""
+        return self.text(r"\pm")
 
     def text(self, plus_minus: str = "+-") -> str:
         """Write the digits that the error leaves; empty for NaN."""
@@ -53,3 +79,25 @@ def standard_error(values: ArrayLike) -> FloatArray:
     """Return the standard error of the mean over the first axis; 0 for one sample."""
     array = np.asarray(values, np.float64)
     return np.asarray(array.std(axis=0) / np.sqrt(max(len(array) - 1, 1)))
+
+
+def averages(groups: Mapping[_Group, Sequence[Measured]], name: str) -> dict[_Group, Mean]:
+    """Average one number over the samples of each group."""
+    return {group: mean([s.number(name) for s in samples]) for group, samples in groups.items()}
+
+
+def exactly(
+    groups: Mapping[_Group, Sequence[Any]], value: Callable[[_Group], float]
+) -> dict[_Group, Mean]:
+    """Give each group a number that needs no average."""
+    return {group: Mean(value(group), math.nan, len(samples)) for group, samples in groups.items()}
+
+
+def rows(
+    groups: Mapping[_Named, Any], columns: Mapping[str, Mapping[_Named, Mean]]
+) -> list[dict[str, Any]]:
+    """Report averages for JSON, a row for each group."""
+    return [
+        group.report() | {name: values[group] for name, values in columns.items()}
+        for group in groups
+    ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from jamshape.shapes.dimer import Dimer
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.spherocylinder import Spherocylinder
 from jamshape.shapes.superellipsoid import Superellipsoid
@@ -16,6 +17,7 @@ SHAPES: dict[str, Shape] = {
     for shape in (
         Spherocylinder(),
         Superellipsoid(),
+        Dimer(),
     )
 }
 """By name; the first is what is meant when nobody says."""

@@ -17,7 +17,7 @@ def test_mean_leaves_out_what_is_not_known():
 
 def test_text_has_the_digits_that_the_error_leaves():
     assert Mean(0.84123456, 0.0005, 3).text() == "0.8412 +- 0.0005"
-    assert Mean(0.84123456, 2e-7, 3).text(r"\pm") == r"0.8412346 \pm 0.0000002"
+    assert Mean(0.84123456, 2e-7, 3).tex == r"0.8412346 \pm 0.0000002"
     assert Mean(5.9, 0.2, 3).text() == "5.900 +- 0.200"
     assert Mean(1.0, 0.0, 2).text() == "1.000000000 +- 0.000000000"
     assert Mean(0.25).text() == "0.2500"

@@ -16,5 +16,5 @@ def test_discs_become_rods_of_the_same_radii_and_phi():
         rods.position / rods.box.edges, discs.position / discs.box.edges, rtol=1e-14
     )
     assert len(np.unique(rods.orientation)) == 30
-    with pytest.raises(ValueError, match="half lengths up to .*, expected discs"):
+    with pytest.raises(ValueError, match=r"half lengths up to .*, expected discs"):
         with_spines(rods, 0.01, 1)

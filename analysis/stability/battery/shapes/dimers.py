@@ -23,6 +23,7 @@ from battery.shapes.shape import (
     Shape,
     Touch,
 )
+from jamshape.packing import Packing
 
 PLANE: Scenes = {
     "alpha 1e-6 to 100 in one box": partial(scenes.all_aspect_ratios, 2, style=STYLE),
@@ -44,7 +45,7 @@ INTERLOCKED: Scenes = {
 }
 
 
-def _pair(*positions: list[float], angle: float = 0.0) -> partial[scenes.Packing]:
+def _pair(*positions: list[float], angle: float = 0.0) -> partial[Packing]:
     return partial(scenes.as_dimers, partial(scenes.two, list(positions), angle))
 
 

@@ -1,32 +1,30 @@
-"""What the figures of modes of superellipsoids share: spectra kept in files, modes that are quartic."""
+"""Quartic modes of packings at first contact (Yuan et al., Soft Matter (2019), Sec. 3.2), spectra kept in files."""
 
 from __future__ import annotations
 
 import contextlib
-from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from superellipsoid_files import packing_of
-from sweep_files import Sample
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.h5md import FileFormatError
-from jamshape.landscape import Landscape, State
+from jamshape.files.sets import PackingFile
 from jamshape.vibration.energy_along import AlongModes, EnergyAlong, quartic_crossover
-from jamshape.vibration.hessian import dynamical_matrix
-from jamshape.vibration.spectrum import spectrum
-from jamshape.vibration.table import ModeTable, read_modes, tabulate, write_modes
+from jamshape.vibration.sets import modes_of, of_packing, to_store
+from jamshape.vibration.table import ModeTable, read_modes, write_modes
+
+KEPT = "folder to keep spectra in (beside the packings)"
 
 # What tells a packing from others.
 _IDENTITY = ("phi", "u", "seed")
 
-AMPLITUDES: FloatArray = np.geomspace(1e-5, 0.3, 37)  # in units of a
+AMPLITUDES: FloatArray = np.geomspace(1e-5, 0.3, 37)  # in the unit of length
 
 
 class QuarticCount(NamedTuple):
-    """Contacts and quartic modes of a packing (Yuan et al. 2019, Sec. 3.2)."""
+    """Contacts and quartic modes of a packing."""
 
     n_contacts: int
     """N_c, without those of rattlers."""
@@ -39,11 +37,13 @@ class QuarticCount(NamedTuple):
     gap: float
     """Ratio of the eigenvalues on its two sides; 0 if there is no quartic mode."""
     n_negative: int
+    n_translations: int
+    """D: modes that move everything."""
 
     @property
     def expected(self) -> int:
-        """N_c of the paper: d_f (N - N_r) - N_q - 2."""
-        return self.n_coordinates - self.n_quartic - 2
+        """N_c of the paper: d_f (N - N_r) - N_q - (D - 1)."""
+        return self.n_coordinates - self.n_quartic - self.n_translations + 1
 
     @property
     def missing(self) -> int:
@@ -51,36 +51,33 @@ class QuarticCount(NamedTuple):
         return self.n_contacts - self.expected
 
 
-def modes_option(parser: ArgumentParser) -> None:
-    """Add the option that says where spectra are kept."""
-    where = "folder to keep spectra in (beside the packings)"
-    parser.add_argument("--modes", type=Path, metavar="FOLDER", help=where)
-
-
-def kept_modes(sample: Sample, folder: Path | None) -> ModeTable:
+def kept_modes(file: PackingFile, folder: Path | None) -> ModeTable:
     """Read the modes of a packing, or find them and keep them for the next time, without vectors."""
-    path = (folder or sample.path.parent) / f"{sample.path.stem}.modes.h5"
+    path = (folder or file.path.parent) / f"{file.path.stem}.modes.h5"
     with contextlib.suppress(FileFormatError, FileNotFoundError):
         table = read_modes(path)
-        if all(table.attributes.get(f"packing_{k}") == sample.number(k) for k in _IDENTITY):
+        known = of_packing(table)
+        if all(known.get(name) == file.number(name) for name in _IDENTITY):
             return table
-    table = found_modes(sample)
+    table = found_modes(file)
     path.parent.mkdir(parents=True, exist_ok=True)
-    stored = {f"packing_{k}": v for k, v in sample.attributes.items()}
-    write_modes(path, table, stored, vectors=False)
+    write_modes(path, table, to_store(file.attributes, file.packing()), vectors=False)
     return table
 
 
-def found_modes(sample: Sample) -> ModeTable:
-    """Find the modes of a packing, with their vectors."""
-    packing = packing_of(sample)
-    landscape, state = Landscape(packing), State.of(packing)
+def found_modes(file: PackingFile) -> ModeTable:
+    """Find the modes of a packing, with their vectors.
+
+    Raises
+    ------
+    ValueError
+        If it is at no minimum, or has no modes; the sentence names the file.
+    """
     try:
-        matrix = dynamical_matrix(landscape, state)
+        return modes_of(file.packing())
     except ValueError as error:
-        msg = f"{sample.path}: {error}"
+        msg = f"{file.path}: {error}"
         raise ValueError(msg) from error
-    return tabulate(landscape, state, matrix, spectrum(matrix))
 
 
 def by_size(table: ModeTable) -> IntArray:
@@ -100,33 +97,33 @@ def quartic_count(table: ModeTable) -> QuarticCount:
         n_quartic_by_rank=int(table.attributes["n_floppy"]),
         gap=float(size[below] / size[below - 1]) if 0 < below < len(size) else 0.0,
         n_negative=int((table["sign"] < 0).sum()),
+        n_translations=table.coordinates.dimension,
     )
 
 
-def along(sample: Sample, table: ModeTable, modes: list[int]) -> dict[int, EnergyAlong]:
+def along(file: PackingFile, table: ModeTable, modes: list[int]) -> dict[int, EnergyAlong]:
     """Follow the energy along modes of a table with vectors."""
-    walker = AlongModes(packing_of(sample), table.coordinates)
+    walker = AlongModes(file.packing(), table.coordinates)
     return {mode: walker.energy(table.vectors[:, mode], AMPLITUDES) for mode in modes}
 
 
-def followed(sample: Sample, each_side: int) -> dict[str, Any]:
+def followed(file: PackingFile, each_side: int) -> dict[str, Any]:
     """Follow the energy along modes on both sides of the gap: which of them are quartic.
 
     Returns
     -------
     dict
-        Numbers of modes followed below and above, of those that are quartic, and the crossovers.
+        Numbers of modes followed below and above, and of those that are quartic.
     """
-    table = found_modes(sample)
+    table = found_modes(file)
     n = quartic_count(table).n_quartic
     order = by_size(table)
     below, above = order[max(n - each_side, 0) : n].tolist(), order[n : n + each_side].tolist()
-    energies = along(sample, table, below + above)
-    delta = {mode: quartic_crossover(energy) for mode, energy in energies.items()}
-    crossovers = [delta[mode] for mode in below]
+    energies = along(file, table, below + above)
+    quartic = {mode: bool(np.isfinite(quartic_crossover(e))) for mode, e in energies.items()}
     return {
         "followed_below": len(below),
-        "quartic_below": int(np.isfinite(crossovers).sum()),
+        "quartic_below": sum(quartic[mode] for mode in below),
         "followed_above": len(above),
-        "quartic_above": sum(bool(np.isfinite(delta[mode])) for mode in above),
+        "quartic_above": sum(quartic[mode] for mode in above),
     }

@@ -1,4 +1,4 @@
-"""What pictures of bodies in space share: the view from afar, the light, and what hides what."""
+"""Pictures of bodies in space: the view from afar, the light, and what hides what."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import Packing
-from jamshape.shapes.superellipsoid_surface import SurfaceMesh, surface_mesh
+from jamshape.shapes.mesh import SurfaceMesh
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 AMBIENT, DIFFUSE, SHINE, GLOSS = 0.42, 0.62, 0.4, 28
@@ -72,19 +73,19 @@ def mean_normals(mesh: SurfaceMesh) -> FloatArray:
 
 
 def faces_of(packing: Packing, level: int, seen_from: View) -> Faces:
-    """Cover superellipsoids with triangles and keep those that face the eye.
+    """Cover particles with triangles and keep those that face the eye.
 
     Particles stand where their centres are in the box; equal shapes share one mesh.
     """
     box = packing.box
     centers = box.lo + (packing.position - box.lo) % box.edges
     turned = np.stack([packing.body_axes(k) for k in range(3)], axis=1)
-    shapes = np.column_stack([packing.diameters / 2, packing.exponent])
+    kinds = np.column_stack([packing.diameters, packing.exponent])
     found = []
-    for shape in np.unique(shapes, axis=0):
-        mesh = surface_mesh(shape[:3], float(shape[3]), level)
+    for kind in np.unique(kinds, axis=0):
+        mesh = packing.shape.surface(kind[:3], float(kind[3]), level)
         normals = mean_normals(mesh)
-        for body in np.flatnonzero((shapes == shape).all(axis=1)):
+        for body in np.flatnonzero((kinds == kind).all(axis=1)):
             out = normals @ turned[body]
             seen = out @ seen_from.eye > 0
             corners = centers[body] + mesh.vertices[mesh.triangles[seen]] @ turned[body]
@@ -131,15 +132,25 @@ def box_edges(packing: Packing, seen_from: View) -> tuple[FloatArray, FloatArray
     return seen_from.flat(np.array(hidden)), seen_from.flat(np.array(seen))
 
 
-def draw_packing(
-    axes: Any, packing: Packing, colors: FloatArray, seen_from: View, level: int
-) -> None:
-    """Draw particles in their box, on axes of equal scale without ticks."""
+def draw_bodies(axes: Axes, packing: Packing, colors: FloatArray, seen: tuple[View, int]) -> None:
+    """Draw particles in their box, on axes of equal scale without ticks.
+
+    Parameters
+    ----------
+    axes : Axes
+    packing : Packing
+        In three dimensions.
+    colors : (N, 3) array of float64
+    seen : View and int
+        From where, and the level of the meshes (`faces_of`).
+    """
     from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415
 
+    seen_from, level = seen
     polygons, shades = painted(faces_of(packing, level, seen_from), colors, seen_from)
     back, front = box_edges(packing, seen_from)
     axes.add_collection(LineCollection(list(back), colors="0.45", lw=0.8, zorder=1))
+    # Smoothed, neighbours would leave a line between them.
     shown = PolyCollection(list(polygons), facecolors=shades, lw=0, antialiaseds=False, zorder=2)
     axes.add_collection(shown)
     axes.add_collection(LineCollection(list(front), colors="0.15", lw=0.9, zorder=3))

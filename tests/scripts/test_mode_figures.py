@@ -3,70 +3,38 @@
 On tables made up with known numbers, and on one small packing.
 """
 
-import json
 import runpy
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
-from jamshape.protocols.jammed import write_minimum
-from mixtures import bidisperse
+from jamming import write_jammed
+from mixtures import bidisperse, superellipsoids
 from numpy.testing import assert_allclose
+from pictures import image
 
+from jamshape.drawing.mode_axes import bin_edges
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
-from jamshape.landscape import Landscape, State
-from jamshape.minima import Stop, minimise
-from jamshape.minima.target import Target, find
 from jamshape.protocols.random_start import random_packing
 from jamshape.vibration.hessian import Coordinates, dynamical_matrix
+from jamshape.vibration.sets import read_tables, to_store
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.table import ModeTable, tabulate, write_modes
 
-ANALYSIS = Path(__file__).parents[2] / "analysis"
-OF_MODES = ("density_of_states", "participation", "mode_components", "band_frequency")
-OF_PACKING = ("modes", "energy_along_modes")
-SCRIPTS = (*OF_MODES, *OF_PACKING, "jamming_distance")
+ANALYSIS, FOLDER = Path(__file__).parents[2] / "analysis", "marschall_2018"
+STATES, PARTICIPATION, COMPONENTS, BANDS_OF, MODES, ALONG, DISTANCE = SCRIPTS = [
+    f"{FOLDER}/{name}.py"
+    for name in (
+        *("fig11a_density_of_states", "fig11b_participation", "fig11c_mode_components"),
+        *("fig14_band_frequency", "fig12_modes", "fig13_energy_along_modes"),
+        "fig14_jamming_distance",
+    )
+]
+OF_MODES = SCRIPTS[:4]
 
 N = 40
 BANDS = {"low": 3, "middle": 5, "high": 110}
 U0 = 1e-15
-
-
-@pytest.fixture
-def report(here, capsys):
-    """Run a figure and read its last line; look at whether anything is drawn."""
-
-    def reported(figure, *arguments):
-        assert here(f"fig_{figure}.py", *arguments) == 0
-        last = json.loads(capsys.readouterr().out.splitlines()[-1], parse_constant=pytest.fail)
-        look_at(last["out"])
-        return last
-
-    return reported
-
-
-@pytest.fixture
-def problem(here):
-    """Run a figure that must end with one sentence."""
-
-    def sentence(figure, *arguments):
-        said = here(f"fig_{figure}.py", *arguments)
-        assert isinstance(said, str)
-        assert "\n" not in said
-        assert said.startswith(f"fig_{figure}.py: ")
-        return said
-
-    return sentence
-
-
-def look_at(path):
-    from matplotlib.image import imread  # noqa: PLC0415 - the other helpers need none
-
-    pixels = imread(path)
-    assert min(pixels.shape[:2]) > 500
-    assert max(pixels.shape[:2]) < 3000
-    assert pixels[..., :3].std() > 0.02
 
 
 def sizes_at(u):
@@ -126,37 +94,35 @@ def modes(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def jammed(tmp_path_factory):
-    """A small packing and its modes, as files."""
-    packing = random_packing(14, 0.4, 1, bidisperse(1))
-    landscape, state = Landscape(packing), State.of(packing)
-    while state.packing(packing).phi < 0.84:
-        state = state.strained(-0.01)
-        rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
-        state = minimise(landscape, state, "lbfgs", rough).state
-    minimum = find(landscape, state, Target(1e-12))
-    folder = tmp_path_factory.mktemp("jammed")
-    attributes = {"alpha": 1.0, "n": packing.n, "seed": 1, "size_ratio": 1.4, "u0": 1e-12}
-    write_minimum(folder / "packing.h5", landscape, minimum, attributes)
+def with_modes(folder, particles, phi):
+    """A small packing and its modes, as files; the table of its modes."""
+    landscape, minimum = write_jammed(folder / "packing.h5", particles, 14, phi)
     matrix = dynamical_matrix(landscape, minimum.state)
     table = tabulate(landscape, minimum.state, matrix, spectrum(matrix))
-    write_modes(folder / "modes.h5", table, {}, vectors=True)
-    write_modes(folder / "bare.h5", table, {}, vectors=False)
-    return folder, table
+    stored = to_store(read_attributes(folder / "packing.h5"), landscape.particles)
+    write_modes(folder / "modes.h5", table, stored, vectors=True)
+    write_modes(folder / "bare.h5", table, stored, vectors=False)
+    return table
 
 
-@pytest.mark.parametrize("figure", SCRIPTS)
-def test_help(here, capsys, figure):
-    assert here(f"fig_{figure}.py", "--help") == 0
-    help_text = capsys.readouterr().out
-    assert "of Marschall & Teitel, PRE 97, 012905" in help_text
-    assert "--out" in help_text
+@pytest.fixture(scope="module")
+def jammed(tmp_path_factory):
+    """Of rods."""
+    folder = tmp_path_factory.mktemp("jammed")
+    return folder, with_modes(folder, bidisperse(1), 0.84)
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_help(help_of, script):
+    said = help_of(script)
+    assert "of Marschall & Teitel, PRE 97, 012905" in said
+    assert f"python analysis/{script}" in said
+    assert "--out" in said
 
 
 def test_density_of_states(report, modes, tmp_path):
     out = tmp_path / "a.png"
-    rows = report("density_of_states", modes, "--u0", U0, "--out", out)["bands"]
+    rows = report(STATES, modes, "--u0", U0, "--out", out)["bands"]
     assert [row["alpha"] for row in rows] == [0.01, 4.0]
     for row in rows:
         assert row["samples"] == 2
@@ -165,24 +131,22 @@ def test_density_of_states(report, modes, tmp_path):
         assert row["low"]["unstable"] == [2, 2]
         assert row["unsure"] == 0
     assert rows[1]["low"]["paper"] == 0.0638
-    rows = report("density_of_states", modes, "--alpha", 4, "--out", out)["bands"]
+    rows = report(STATES, modes, "--alpha", 4, "--out", out)["bands"]
     assert [row["u0"] for row in rows] == [1e-18, 1e-15, 1e-14, 1e-12]
     assert [row["low"]["paper"] for row in rows] == [None, 0.0638, None, None]
 
 
-def test_density_is_normalised(modes, monkeypatch):
-    monkeypatch.syspath_prepend(ANALYSIS)
-    script = runpy.run_path(str(ANALYSIS / "fig_density_of_states.py"))
-    tables = import_module("mode_files").read_tables([modes])
-    samples = tables[(4.0, U0)]
-    edges = script["bin_edges"](samples)
+def test_density_is_normalised(modes):
+    script = runpy.run_path(str(ANALYSIS / STATES))
+    samples = next(of for key, of in read_tables([modes]).items() if key.u0 == U0)
+    edges = bin_edges(samples)
     both = [script["densities"](samples, edges, below=below) for below in (False, True)]
     # Translations have no frequency.
     assert_allclose((sum(both) * np.diff(edges)).sum(axis=1), (3 * N - 2) / (3 * N))
 
 
 def test_participation(report, modes, tmp_path):
-    rows = report("participation", modes, "--out", tmp_path / "a.png")["participation"]
+    rows = report(PARTICIPATION, modes, "--out", tmp_path / "a.png")["participation"]
     for row in rows:
         assert_allclose(row["high"]["value"], 0.7)
         assert_allclose(row["low"]["value"], 1 / N)
@@ -190,13 +154,13 @@ def test_participation(report, modes, tmp_path):
 
 def test_components(report, modes, tmp_path):
     arguments = (modes, "--alpha", 4, "--u0", U0, 1e-12, "--out", tmp_path / "a.png")
-    for row in report("mode_components", *arguments)["components"]:
+    for row in report(COMPONENTS, *arguments)["components"]:
         for band in BANDS:
             assert_allclose(sum(part["value"] for part in row[band].values()), 1)
 
 
 def test_band_frequencies_and_exponents(report, modes, tmp_path):
-    rows = report("band_frequency", modes, "--out", tmp_path / "a.png")["bands"]
+    rows = report(BANDS_OF, modes, "--out", tmp_path / "a.png")["bands"]
     assert len(rows) == 4
     for row in rows:
         expected = {"low": 0.5, "middle": 0.25}[row["band"]]
@@ -219,18 +183,18 @@ def test_jamming_distance(report, problem, tmp_path):
             attributes |= {"phi": phi_J + 2.9 * u**0.5, "phi_J": phi_J}
             write_packing(tmp_path / f"{seed}_{u:g}.h5", packing, attributes)
     out = tmp_path / "a.png"
-    (row,) = report("jamming_distance", tmp_path, "--out", out)["jamming_distance"]
+    (row,) = report(DISTANCE, tmp_path, "--out", out)["jamming_distance"]
     assert_allclose(row["exponent"]["value"], 0.5, rtol=1e-6)
     assert_allclose(row["distance"]["1e-15"]["value"], 2.9e-15**0.5, rtol=0.8)
     assert row["paper"]["1e-15"] == 9.1e-8
     one = tmp_path / "1_1e-17.h5"
-    assert "no sample at two energies" in problem("jamming_distance", one, "--out", out)
+    assert "no sample at two energies" in problem(DISTANCE, one, "--out", out)
 
 
 def test_modes_of_a_packing(report, problem, jammed, tmp_path):
     folder, table = jammed
     packing, out = folder / "packing.h5", tmp_path / "a.png"
-    rows = report("modes", packing, "--modes", folder / "modes.h5", "--out", out)["modes"]
+    rows = report(MODES, packing, "--modes", folder / "modes.h5", "--out", out)["modes"]
     assert rows
     for row in rows:
         assert row["eigenvalue"] == table["eigenvalues"][row["mode"]]
@@ -238,12 +202,12 @@ def test_modes_of_a_packing(report, problem, jammed, tmp_path):
     last = len(table["omega"]) - 1
     # Found here, to rounding.
     arguments = (packing, "--mode", last, "--omega", 1.0, "--zoom", "--out", out)
-    stiff, near = report("modes", *arguments)["modes"]
+    stiff, near = report(MODES, *arguments)["modes"]
     assert_allclose(stiff["eigenvalue"], table["eigenvalues"][last], rtol=1e-9)
     assert abs(np.log(near["omega"])) <= np.abs(np.log(np.abs(table["omega"][-5:]))).min() + 1e-12
     bare = folder / "bare.h5"
-    assert "holds no vectors" in problem("modes", packing, "--modes", bare, "--out", out)
-    assert "no mode 999" in problem("modes", packing, "--mode", 999, "--out", out)
+    assert "holds no vectors" in problem(MODES, packing, "--modes", bare, "--out", out)
+    assert "no mode 999" in problem(MODES, packing, "--mode", 999, "--out", out)
 
 
 def test_energy_along_modes(report, problem, jammed, tmp_path):
@@ -251,21 +215,42 @@ def test_energy_along_modes(report, problem, jammed, tmp_path):
     packing, out = folder / "packing.h5", tmp_path / "a.png"
     last = len(table["omega"]) - 1
     arguments = ("--modes", folder / "modes.h5", "--mode", last, "--from", 1e-9, "--to", 1e-2)
-    (row,) = report("energy_along_modes", packing, *arguments, "--out", out)["modes"]
+    (row,) = report(ALONG, packing, *arguments, "--out", out)["modes"]
     assert row["eigenvalue"] == table["eigenvalues"][last]
     assert abs(row["slope_at_0"]) < 1e-12
     assert row["crossover"] is None
-    wrong = problem("energy_along_modes", packing, "--from", 1, "--to", 0.1, "--out", out)
+    wrong = problem(ALONG, packing, "--from", 1, "--to", 0.1, "--out", out)
     assert "expected 0 < from < to" in wrong
 
 
-def test_ladder_is_climbed_once(here, jammed, capsys, tmp_path):
+def test_other_shapes_have_the_same_figures(report, tmp_path):
+    """Superellipses, which tell the directions of their axes and have no second bonds."""
+    particles = superellipsoids(1.5, 0.7)
+    table = with_modes(tmp_path, particles, 0.86)
+    out = ("--out", tmp_path / "a.png")
+    packing, modes = tmp_path / "packing.h5", tmp_path / "modes.h5"
+    found = report(MODES, packing, "--modes", modes, "--mode", 3, "--zoom", *out)
+    assert (found["exponent"], found["w1"], found["dimension"]) == (1.5, 0.7, 2)
+    assert found["modes"][0]["eigenvalue"] == table["eigenvalues"][3]
+    image(tmp_path / "a.png")
+    (row,) = report(ALONG, packing, "--modes", modes, "--mode", 5, "--from", 1e-6, *out)["modes"]
+    assert row["eigenvalue"] == table["eigenvalues"][5]
+    for script, name in (
+        (STATES, "bands"),
+        (PARTICIPATION, "participation"),
+        (COMPONENTS, "components"),
+    ):
+        (row,) = report(script, modes, *out)[name]
+        assert (row["w1"], row["u0"]) == (0.7, 1e-12)
+        image(tmp_path / "a.png")
+
+
+def test_ladder_is_climbed_once(report, jammed, tmp_path):
     folder, _ = jammed
     energies = (1e-13, 1e-12, 1e-11)
     arguments = (folder / "packing.h5", "--u0", *energies, "--out", tmp_path)
     for made in (3, 0):
-        assert here("energy_ladder.py", *arguments) == 0
-        found = json.loads(capsys.readouterr().out.splitlines()[-1])
+        found = report("energy_ladder.py", *arguments)
         assert (found["made"], found["reached"], found["failed"]) == (made, 3, 0)
     rungs = {row["u0"]: row for row in found["ladder"]}
     distance = {}
@@ -291,15 +276,15 @@ def test_ladders_of_other_packings_are_refused(here, jammed, tmp_path):
     assert "does not exist" in said
 
 
-@pytest.mark.parametrize("figure", OF_MODES)
-def test_user_errors_are_one_sentence(problem, modes, tmp_path, figure):
+@pytest.mark.parametrize("script", OF_MODES)
+def test_user_errors_are_one_sentence(problem, modes, tmp_path, script):
     out = tmp_path / "out.png"
-    assert "none.h5" in problem(figure, tmp_path / "none.h5", "--out", out)
+    assert "none.h5" in problem(script, tmp_path / "none.h5", "--out", out)
     (tmp_path / "empty").mkdir()
-    assert "no modes, expected files" in problem(figure, tmp_path / "empty", "--out", out)
-    assert "no modes have alpha = 7" in problem(figure, modes, "--alpha", 7, "--out", out)
+    assert "no modes, expected files" in problem(script, tmp_path / "empty", "--out", out)
+    assert "no modes have alpha = 7" in problem(script, modes, "--alpha", 7, "--out", out)
     packing = modes / "packing.h5"
-    assert "packing.h5: is no complete file of modes" in problem(figure, packing, "--out", out)
+    assert "packing.h5: is no complete file of modes" in problem(script, packing, "--out", out)
     more = write(tmp_path, 4.0, U0, 3, n=N + 1)
-    assert "expected one ensemble" in problem(figure, modes, more, "--out", out)
+    assert "expected one ensemble" in problem(script, modes, more, "--out", out)
     assert not out.exists()

@@ -1,66 +1,21 @@
 """The check of the singular limit, as its users run it, on few discs."""
 
-import json
-import runpy
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-from jamshape.protocols.jammed import write_minimum
+from jamming import write_jammed
 from mixtures import bidisperse
 
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.landscape import Landscape, State
-from jamshape.minima import Stop, minimise
-from jamshape.minima.target import Target, find
 from jamshape.protocols.random_start import random_packing
 
-SCRIPT = Path(__file__).parents[2] / "analysis" / "singular_limit.py"
+SCRIPT = "marschall_2018/singular_limit.py"
 N, U0 = 16, 1e-14
 
 
-def run(*arguments):
-    command = [sys.executable, "-W", "error", SCRIPT, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-
-
-def report(*arguments):
-    done = run(*arguments)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1], parse_constant=pytest.fail)  # no NaN
-
-
-@pytest.fixture
-def problem(monkeypatch, capsys):
-    """Run the script here, which saves the time of starting it; return its one sentence."""
-
-    def sentence(*arguments):
-        monkeypatch.setattr(sys, "argv", [str(SCRIPT), *map(str, arguments)])
-        monkeypatch.syspath_prepend(SCRIPT.parent)
-        with pytest.raises(SystemExit) as ended:
-            runpy.run_path(str(SCRIPT), run_name="__main__")
-        said = ended.value.code
-        assert isinstance(said, str)  # printed by Python, which then ends with exit code 1
-        assert "\n" not in said
-        assert said.startswith("singular_limit.py: ")
-        assert not capsys.readouterr().out
-        return said
-
-    return sentence
-
-
-def write_jammed(path, alpha, seed):
+def write(path, alpha, seed):
     """A packing as make_packing.py writes it, without its compression in LAMMPS."""
-    packing = random_packing(N, 0.4, seed, bidisperse(alpha))
-    landscape, state = Landscape(packing), State.of(packing)
-    rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
-    while state.packing(packing).phi < 0.8:
-        state = minimise(landscape, state.strained(-0.01), "lbfgs", rough).state
-    minimum = find(landscape, state, Target(U0))
-    known = {"alpha": float(alpha), "n": N, "size_ratio": 1.4, "seed": seed, "u0": U0}
-    write_minimum(path, landscape, minimum, known)
+    write_jammed(path, bidisperse(alpha), N, 0.8, seed, u0=U0)
     return path
 
 
@@ -68,28 +23,26 @@ def write_jammed(path, alpha, seed):
 def sweep(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sweep")
     for seed in (1, 2):
-        write_jammed(folder / f"alpha0_seed{seed}.h5", 0, seed)
-    write_jammed(folder / "alpha0.01_seed1.h5", 0.01, 1)
+        write(folder / f"alpha0_seed{seed}.h5", 0, seed)
+    write(folder / "alpha0.01_seed1.h5", 0.01, 1)
     return folder
 
 
 @pytest.fixture(scope="module")
-def made(sweep, tmp_path_factory):
-    out = tmp_path_factory.mktemp("out") / "new"
-    return out, report(sweep, "--out", out)
+def out(tmp_path_factory):
+    return tmp_path_factory.mktemp("out") / "new"
 
 
-def test_help():
-    done = run("--help")
-    assert done.returncode == 0
-    assert "Marschall & Teitel" in done.stdout
-    for name in ("SWEEP", "--alpha", "--seed", "--out"):
-        assert name in done.stdout
+@pytest.fixture
+def made(report, sweep, out):
+    """Packings of rods, made by the first test that asks."""
+    return out, report(SCRIPT, sweep, "--out", out)
 
 
-def test_an_error_ends_the_process_without_traceback(tmp_path):
-    done = run("--alpha", 0, "--out", tmp_path / "out")
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+def test_help(help_of):
+    said = help_of(SCRIPT)
+    for words in ("Marschall & Teitel", "SWEEP", "--alpha", "--seed", "--out", SCRIPT):
+        assert words in said
 
 
 def test_discs_become_jammed_rods_of_the_same_radii(sweep, made):
@@ -128,13 +81,13 @@ def test_spines_find_the_contacts(made):
     assert (out / "singular_limit.png").stat().st_size > 10_000
 
 
-def test_packings_that_are_there_are_taken(sweep, made):
+def test_packings_that_are_there_are_taken(report, sweep, made):
     out, found = made
     before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.glob("*.h5")}
-    assert report(sweep, "--out", out) == found
+    assert report(SCRIPT, sweep, "--out", out) == found
     after = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in out.glob("*.h5")}
     assert after == before
-    one = report(sweep / "alpha0_seed1.h5", "--out", out)
+    one = report(SCRIPT, sweep / "alpha0_seed1.h5", "--out", out)
     assert "compressed" not in one
     assert one["from_discs"]["samples"] == 1
 
@@ -142,20 +95,20 @@ def test_packings_that_are_there_are_taken(sweep, made):
 def test_packings_of_other_directions_or_discs_are_not_taken(problem, sweep, made, tmp_path):
     out, _ = made
     before = {path: path.read_bytes() for path in out.iterdir()}
-    assert "with spine_seed = 1, expected 2" in problem(sweep, "--seed", 2, "--out", out)
-    other = write_jammed(tmp_path / "alpha0_seed1.h5", 0, 5)
-    assert "with seed = 1, expected 5" in problem(other, "--out", out)
+    assert "with spine_seed = 1, expected 2" in problem(SCRIPT, sweep, "--seed", 2, "--out", out)
+    other = write(tmp_path / "alpha0_seed1.h5", 0, 5)
+    assert "with seed = 1, expected 5" in problem(SCRIPT, other, "--out", out)
     assert {path: path.read_bytes() for path in out.iterdir()} == before
 
 
 @pytest.mark.lammps
-def test_discs_are_made_where_none_are_given(problem, tmp_path):
+def test_discs_are_made_where_none_are_given(report, problem, tmp_path):
     small = ("--n", 12, "--samples", 1, "--kappa", 1e-5, "--u0", 1e-12, "--out", tmp_path)
-    found = report(*small)
+    found = report(SCRIPT, *small)
     assert found["from_discs"]["samples"] == 1
     discs = read_packing(tmp_path / "discs" / "alpha0_seed1.h5")
     assert not discs.half_length.any()
-    assert "with approach_kappa = 1e-05, expected" in problem(*small, "--kappa", 2e-5)
+    assert "with approach_kappa = 1e-05, expected" in problem(SCRIPT, *small, "--kappa", 2e-5)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +122,7 @@ def test_discs_are_made_where_none_are_given(problem, tmp_path):
     ],
 )
 def test_user_errors_are_one_sentence(problem, tmp_path, arguments, words):
-    assert words in problem(*arguments, "--out", tmp_path / "out")
+    assert words in problem(SCRIPT, *arguments, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -178,4 +131,6 @@ def test_rods_that_are_called_discs_are_refused(problem, tmp_path):
     known = {"alpha": 0.0, "n": 4, "size_ratio": 1.4, "seed": 1, "u0": U0}
     known |= {"outcome": "converged", "phi": 0.3}
     write_packing(path, random_packing(4, 0.3, 1, bidisperse(1.0)), known)
-    assert "half lengths up to 0.7, expected discs" in problem(path, "--out", tmp_path / "out")
+    assert "half lengths up to 0.7, expected discs" in problem(
+        SCRIPT, path, "--out", tmp_path / "out"
+    )

@@ -1,0 +1,93 @@
+#pragma once
+
+#include "contact/math/rotation.hpp"
+#include "contact/math/vec.hpp"
+
+#include <cmath>
+#include <optional>
+
+namespace jamshape {
+
+/// Shape and pose of a particle that its long axis tells, as the pair loops read it.
+template <class Shape, int D, class S = double> struct BodyAlongX {
+  Vec<D, S> centre;
+  Vec<D, S> axis;
+  double half_length;
+  double radius;
+};
+
+/// What models share whose shape is a half length A >= 0 along the body's x and a radius R, of
+/// which LAMMPS stores the semi-axes (A + R, R, R). A = 0 is a disc (a sphere).
+template <class ShapeAlongX> struct AlongX {
+  using Shape = ShapeAlongX;
+  template <int D, class S = double> using Body = BodyAlongX<Shape, D, S>;
+
+  /// Nothing when the semi-axes are of another shape. Other shapes have an exponent.
+  static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)
+  {
+    const bool is_one = semi_axes[1] == semi_axes[2] && semi_axes[0] >= semi_axes[1] &&
+                        semi_axes[1] > 0.0 && std::isfinite(semi_axes[0]);
+    if (!is_one) return std::nullopt;
+    return Shape{semi_axes[0] - semi_axes[1], semi_axes[1]};
+  }
+
+  /// Particles that no contact can turn need no orientation.
+  template <int D> static bool turns(const Shape &shape) { return shape.half_length > 0.0; }
+
+  /// Of the sphere around a particle, and its smallest length.
+  template <int D> static double outer_radius(const Shape &shape)
+  {
+    return shape.half_length + shape.radius;
+  }
+  template <int D> static double inner_radius(const Shape &shape) { return shape.radius; }
+
+  /// The length that a radian counts for, 0 where no contact can turn the particle; and how much
+  /// closer to others a radian brings its surface at most.
+  template <int D> static double rotation_length(const Shape &shape) { return shape.half_length; }
+  template <int D> static double turning_radius(const Shape &shape) { return shape.half_length; }
+
+  /// The body axis (0, 1, 2) about which a turn changes nothing, and the one that tells a
+  /// particle's direction; nothing for particles that have none.
+  static std::optional<int> symmetry_axis(const Shape &shape) { return director<3>(shape); }
+  template <int D> static std::optional<int> director(const Shape &shape)
+  {
+    return shape.half_length > 0.0 ? std::optional<int>(0) : std::nullopt;
+  }
+
+  template <int D, class S = double> static Body<D, S> body(const Shape &shape)
+  {
+    Vec<D, S> along_x{};
+    along_x[0] = 1.0;
+    return {{}, along_x, shape.half_length, shape.radius};
+  }
+
+  template <int D, class S> static void turn_to(Body<D, S> &body, const QuaternionOf<S> &q)
+  {
+    body.axis = long_axis<D, S>(q);
+  }
+
+  /// Where a particle was when the pairs were last chosen.
+  template <int D> struct Pose {
+    Vec<D> centre, axis;
+  };
+  template <int D> static Pose<D> pose(const Body<D> &body) { return {body.centre, body.axis}; }
+
+  /// The larger of the squared distances |dx +- A du| that the ends of the axis moved: no point
+  /// between them moved farther.
+  template <int D>
+  static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
+  {
+    const Vec<D> turned = now.half_length * (now.axis - then.axis);
+    return norm_sq(shift) + norm_sq(turned) + 2.0 * std::abs(dot(shift, turned));
+  }
+
+ protected:
+  /// Whether the spheres around two bodies are closer than a margin.
+  template <int D> static bool spheres_are_closer(double margin, const Body<D> &i, const Body<D> &j)
+  {
+    const double bounding = i.radius + j.radius + margin + i.half_length + j.half_length;
+    return norm_sq(i.centre - j.centre) < bounding * bounding;
+  }
+};
+
+}  // namespace jamshape

@@ -1,0 +1,72 @@
+"""The kinds of particles of a packing, found from the particles alone, for colours and legends."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import BoolArray, IntArray
+from jamshape.packing import Packing
+
+MOST = 8  # kinds that colours can tell apart
+
+_DIGITS = 9  # what is equal to so many is of one kind
+
+
+class Kinds(NamedTuple):
+    """Kinds of particles, the smallest first."""
+
+    of: IntArray
+    """(N,)"""
+    parameters: list[str]
+    """In TeX, those of each kind; empty if there are too many kinds."""
+    sizes: list[str]
+    """In TeX."""
+
+    @property
+    def labels(self) -> list[str]:
+        """Name them by parameters, size and how many there are."""
+        counts = np.bincount(self.of)
+        rows = zip(self.parameters, self.sizes, counts, strict=False)
+        return [f"{parameters}, {size} ({count})" for parameters, size, count in rows]
+
+    @property
+    def title(self) -> str:
+        """Name the parameters that there are; empty if there are too many kinds."""
+        return "; ".join(dict.fromkeys(self.parameters))
+
+
+def kinds_of(packing: Packing) -> Kinds:
+    """Tell the kinds of particles: those that are equal, or of one species where most are different.
+
+    Returns
+    -------
+    Kinds
+        Without labels, each particle a kind, where there are more than `MOST`.
+    """
+    rows = np.column_stack([packing.diameters, packing.exponent])
+    rounded = np.round(rows / rows.max(axis=0), _DIGITS)
+    first, of = np.unique(rounded, axis=0, return_index=True, return_inverse=True)[1:]
+    if len(first) > MOST:
+        first, of = np.unique(packing.species, return_index=True, return_inverse=True)[1:]
+        if not 1 < len(first) <= MOST:
+            return Kinds(np.arange(packing.n), [], [])
+    size = np.array(
+        [packing.diameters[of.ravel() == k].prod(axis=1).mean() for k in range(len(first))]
+    )
+    place = np.argsort(np.argsort(size, kind="stable"), kind="stable")
+    of = place[of.ravel()]
+    named = [_named(packing, of == k) for k in range(len(first))]
+    return Kinds(of, [parameters for parameters, _ in named], [text for _, text in named])
+
+
+def _named(packing: Packing, own: BoolArray) -> tuple[str, str]:
+    """Name the parameters and the sizes of the particles of one kind."""
+    shape, rows = packing.shape, zip(packing.diameters[own], packing.exponent[own], strict=True)
+    known = [shape.parameters_of(*row) for row in rows]
+    sizes = np.array([size for _, size in known])
+    low, high = sizes.min(), sizes.max()
+    size = f"{low:.3g}" if np.isclose(low, high) else rf"{low:.3g}\dots {high:.3g}"
+    parameters = {name: float(f"{value:.3g}") for name, value in known[0][0].items()}
+    return shape.label(parameters), f"${shape.unit}={size}$"

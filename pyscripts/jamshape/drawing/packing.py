@@ -1,0 +1,115 @@
+"""Pictures of packings of any shape, in the plane and in space."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.drawing import plane, space
+from jamshape.drawing.colors import (
+    ORDER,
+    Coloring,
+    Scale,
+    all_one,
+    by_direction,
+    by_kind,
+    order_of,
+)
+from jamshape.drawing.styles import KINDS
+from jamshape.files.sets import Contacts
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+MANY = 250  # particles in space from which on meshes are coarser
+
+
+class Look(NamedTuple):
+    """How packings are drawn."""
+
+    color: str = "kind"
+    """One of `jamshape.drawing.colors.CHOICES`."""
+    height: float = 22.0
+    """Of the eye in space, degrees."""
+    turn: float = -58.0
+    """Of the eye about z, degrees."""
+    level: int = 0
+    """Of meshes in space, each four times as many triangles as the one before; 0 for what suits N."""
+
+
+def colorings(found: Sequence[Contacts], color: str) -> tuple[list[Coloring], Scale | None]:
+    """Colour the particles of packings; local order by one scale for all.
+
+    Raises
+    ------
+    ValueError
+        If a packing's dimension knows no such order.
+    """
+    if color in ORDER:
+        values = [order_of(one, color) for one in found]
+        scale = Scale.of(color, np.concatenate(values))
+        return [Coloring(scale.rgb(v), [], v) for v in values], scale
+    if color == "orientation":
+        return [by_direction(one.packing) for one in found], None
+    if color == "one":
+        return [all_one(one.packing, KINDS[k % len(KINDS)]) for k, one in enumerate(found)], None
+    return [by_kind(one) for one in found], None
+
+
+def draw_packing(axes: Axes, found: Contacts, colored: Coloring, look: Look | None = None) -> None:
+    """Draw a packing in its box; in the plane with spines and points of contact.
+
+    Parameters
+    ----------
+    axes : Axes
+        Of a figure that has its size: lines are thin where particles are small.
+    found : Contacts
+    colored : Coloring
+        From `colorings`.
+    look : Look
+    """
+    look, packing = look or Look(), found.packing
+    if packing.dimension == 3:
+        level = look.level or (3 if packing.n < MANY else 2)
+        space.draw_bodies(axes, packing, colored.rgb, (space.view(look.height, look.turn), level))
+        return
+    shown = shown_at(axes, found)
+    style = {"facecolors": colored.rgb, "edgecolors": "k", "lw": shown.line}
+    plane.draw_bodies(axes, packing, packing.box, **style)
+    plane.draw_spines(axes, packing, 1.5 * shown.line)
+    plane.draw_contacts(axes, packing, found.network, shown.dot)
+    plane.show_box(axes, packing.box.lo, packing.box.edges)
+
+
+def shown_at(axes: Axes, found: Contacts) -> plane.Shown:
+    """Tell how thick lines are where a packing fills the axes."""
+    inch = float((found.packing.box.edges / inches_of(axes)).max())
+    return plane.Shown(inch, float(found.packing.diameters[:, :2].min()))
+
+
+def inches_of(axes: Axes) -> FloatArray:
+    """Width and height of axes."""
+    figure: Any = axes.figure
+    return np.asarray(axes.get_position().size * figure.get_size_inches())
+
+
+def add_legend(axes: Axes, colored: Coloring) -> None:
+    """Name the colours below a picture, if they are those of kinds or directions."""
+    from matplotlib.patches import Patch  # noqa: PLC0415 - not needed for --help
+
+    if not colored.legend:
+        return
+    handles = [Patch(fc=rgb, ec="k", lw=0.5, label=text) for text, rgb in colored.legend]
+    # A sign is about 0.055 inch wide, and TeX has more signs than are seen.
+    longest = 0.04 * max(len(text) for text, _ in colored.legend) + 0.6
+    columns = max(1, min(len(handles), int(inches_of(axes)[0] / longest)))
+    place: dict[str, Any] = {
+        "loc": "upper center",
+        "bbox_to_anchor": (0.5, 0.0),
+        "borderaxespad": 0.3,
+    }
+    axes.legend(handles=handles, ncols=columns, fontsize=7, frameon=False, **place)

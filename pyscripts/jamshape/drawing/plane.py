@@ -1,0 +1,140 @@
+"""Pictures of particles in the plane: outlines in a periodic box, spines and points of contact."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.contacts import ContactNetwork
+from jamshape.drawing.styles import CONTACT
+from jamshape.packing import Box, Packing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+
+SHORTEST = 0.6  # half length of a line along a spine where it is shorter, over the particle's width
+
+# Corners of an outline: so many over the root of the number of particles, within these.
+_CORNERS, _FEWEST, _MOST = 800, 16, 128
+
+
+class Images(NamedTuple):
+    """Periodic images that reach into a box."""
+
+    owner: IntArray
+    """(M,) rows of the packing."""
+    center: FloatArray
+    """(M, 2)"""
+
+
+class Shown(NamedTuple):
+    """How large things are drawn in a box of this scale."""
+
+    inch: float
+    """[length]"""
+    thinnest: float
+    """Shortest diameter, [length]."""
+
+    @property
+    def line(self) -> float:
+        """Width of outlines, in points."""
+        return float(np.clip(0.025 * 72 * self.thinnest / self.inch, 0.1, 1.0))
+
+    @property
+    def dot(self) -> float:
+        """Radius of points of contact, [length]."""
+        return float(np.clip(0.016 * self.inch, 0.09 * self.thinnest, 0.25 * self.thinnest))
+
+
+def images(position: FloatArray, reach: FloatArray, box: Box) -> Images:
+    """Find all periodic images of bodies of these (N,) radii that reach into the box."""
+    inside = box.lo + (position - box.lo) % box.edges
+    turns = np.ceil(reach.max(initial=0) / box.edges).astype(int)
+    near = reach[:, None]
+    found = []
+    for shift in np.ndindex(*(2 * turns + 1)):
+        moved = inside + (np.array(shift) - turns) * box.edges
+        seen = ((moved > box.lo - near) & (moved < box.lo + box.edges + near)).all(axis=1)
+        found.append((np.flatnonzero(seen), moved[seen]))
+    return Images(np.concatenate([i for i, _ in found]), np.concatenate([x for _, x in found]))
+
+
+def outlines(packing: Packing, at: Images) -> list[FloatArray]:
+    """Trace particles: M polygons (K, 2); equal shapes share one."""
+    corners = int(np.clip(_CORNERS / np.sqrt(packing.n + 1), _FEWEST, _MOST))
+    rows = np.column_stack([packing.diameters, packing.exponent])
+    kinds, kind = np.unique(rows, axis=0, return_inverse=True)
+    bodies = [packing.shape.outline(row[:3], float(row[3]), corners) for row in kinds]
+    axes = np.stack([packing.body_axes(0), packing.body_axes(1)], axis=1)
+    of = zip(at.owner.tolist(), at.center, strict=True)
+    return [bodies[kind.ravel()[i]] @ axes[i] + center for i, center in of]
+
+
+def spines(packing: Packing, at: Images) -> FloatArray:
+    """(S, 2, 2) ends of lines along the spines of what has one, long enough to be seen."""
+    length = np.array([packing.shape.spine(row) for row in packing.diameters])
+    width = packing.diameters[:, :2].min(axis=1) / 2
+    half = (np.maximum(length, SHORTEST * width) * (length > 0))[:, None] * packing.axes
+    seen = length[at.owner] > 0
+    half, center = half[at.owner[seen]], at.center[seen]
+    return np.stack([center - half, center + half], axis=1)
+
+
+def discs(center: FloatArray, radius: float) -> list[FloatArray]:
+    """Trace small discs."""
+    turn = np.linspace(0, 2 * np.pi, 17)[:-1]
+    circle = radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    return list(center[:, None] + circle)
+
+
+def draw_bodies(axes: Axes, packing: Packing, box: Box, **style: Any) -> PolyCollection:
+    """Draw particles as far as they are in a box, which may be another part of the periodic packing.
+
+    Parameters
+    ----------
+    axes : Axes
+    packing : Packing
+        In two dimensions.
+    box : Box
+        Its edges are those of the packing's box or longer than what is seen.
+    **style
+        Of the collection; arrays of length N are taken image by image.
+    """
+    from matplotlib.collections import PolyCollection  # noqa: PLC0415 - not needed for --help
+
+    at = images(packing.position, packing.outer_radius, box)
+    every: dict[str, Any] = {
+        name: value[at.owner]
+        if isinstance(value, np.ndarray) and len(value) == packing.n
+        else value
+        for name, value in style.items()
+    }
+    shown = PolyCollection(outlines(packing, at), **every)
+    axes.add_collection(shown)
+    return shown
+
+
+def draw_spines(axes: Axes, packing: Packing, line: float) -> None:
+    """Draw lines along the spines."""
+    from matplotlib.collections import LineCollection  # noqa: PLC0415 - not needed for --help
+
+    at = images(packing.position, packing.outer_radius, packing.box)
+    axes.add_collection(LineCollection(list(spines(packing, at)), colors="k", lw=line))
+
+
+def draw_contacts(axes: Axes, packing: Packing, network: ContactNetwork, dot: float) -> None:
+    """Draw points of contact."""
+    from matplotlib.collections import PolyCollection  # noqa: PLC0415 - not needed for --help
+
+    point = network.bonds.point
+    at = images(point, np.full(len(point), dot), packing.box)
+    axes.add_collection(PolyCollection(discs(at.center, dot), facecolors=CONTACT, lw=0))
+
+
+def show_box(axes: Axes, lo: FloatArray, edges: FloatArray) -> None:
+    """Show this part of the plane, at equal scales and without ticks."""
+    (left, bottom), (right, top) = lo, lo + edges
+    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xticks=[], yticks=[])

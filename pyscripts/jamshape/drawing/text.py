@@ -1,0 +1,134 @@
+"""What figures say: numbers in TeX, names of systems, N and the number of samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence, Sized
+from typing import Any
+
+from jamshape.files.sets import PackingFile, System, conditions, n_of
+from jamshape.measures.runs import Ensemble
+from jamshape.shapes.table import shape_named
+
+_NUMBERS = {"n": "$N={}$", "size_ratio": "$R_b/R_s={:g}$", "kappa": r"$\kappa={:g}$"}
+_SYMBOLS = {"u0": "u_0", "kappa": r"\kappa"}
+
+
+def scientific(value: float) -> str:
+    """Write a number from 0 as a power of ten in TeX, without dollars."""
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(value) + 1e-9)
+    factor = value / 10.0**exponent
+    power = f"10^{{{exponent}}}"
+    return power if abs(factor - 1) < 1e-6 else rf"{factor:.2g}\times {power}"
+
+
+def short(value: float) -> str:
+    """Write a number in TeX, as a power of ten where it is small."""
+    return f"{value:.2g}" if 0.01 <= value < 100 else scientific(value)
+
+
+def counted(count: int, thing: str) -> str:
+    """Write a number of things."""
+    return f"{count} {thing}{'s' * (count != 1)}"
+
+
+def range_text(counts: Iterable[int], thing: str) -> str:
+    """Write a number of things that may differ from place to place."""
+    known = sorted(set(counts))
+    return counted(known[0], thing) if len(known) == 1 else f"{known[0]} to {known[-1]} {thing}s"
+
+
+def samples_text(n: int, groups: Mapping[Any, Sized]) -> str:
+    """Name N and the number of samples, for a legend."""
+    many = range_text(map(len, groups.values()), "sample")
+    return rf"$N={n}$, {many}" + " each" * (len(groups) > 1)
+
+
+def conditions_text(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
+    """Name N, the number of samples, and the energy and compression rate that all packings share."""
+    return ", ".join([samples_text(n_of(groups), groups), *_shared(groups)])
+
+
+def conditions_alone(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
+    """Say the same without the number of samples, for legends that tell it of each curve."""
+    return ", ".join([f"$N={n_of(groups)}$", *_shared(groups)])
+
+
+def _shared(groups: Mapping[Any, Sequence[PackingFile]]) -> list[str]:
+    known = conditions(groups)
+    return [rf"${_SYMBOLS[name]}={scientific(known[name])}$" for name in _SYMBOLS if name in known]
+
+
+def system_text(system: System) -> str:
+    """Name a system by its parameters, or those that it has of them; a mixture by its kinds."""
+    if system.kinds:
+        return system.kinds
+    known = dict(system.parameters)
+    return shape_named(system.shape).label(known) if known else ""
+
+
+def system_labels(systems: Collection[System]) -> dict[System, str]:
+    """Name what tells systems apart, for a legend; their parameters in any case."""
+    shapes, dimensions, protocols = (
+        {getattr(system, name) for system in systems} for name in ("shape", "dimension", "protocol")
+    )
+    labels = {}
+    for system in systems:
+        parts = [f"{system.shape}s"] * (len(shapes) > 1)
+        parts += [f"{system.dimension}D"] * (len(dimensions) > 1)
+        parts += [system_text(system)]
+        parts += [protocol_text(system)] * (len(protocols) > 1)
+        labels[system] = ", ".join(part for part in parts if part)
+    return labels
+
+
+def ensemble_text(ensemble: Ensemble, names: Iterable[str] = ("n", "kappa")) -> str:
+    """Name an ensemble of compressions by its system and the numbers of these names."""
+    told = [_NUMBERS[name].format(getattr(ensemble, name)) for name in names]
+    return ", ".join(filter(None, [system_text(ensemble.system), *told]))
+
+
+def ensemble_labels(ensembles: Collection[Ensemble]) -> dict[Ensemble, str]:
+    """Name what tells ensembles of compressions apart, for a legend; N in any case."""
+    systems, differ = _differing(ensembles)
+    labels = {}
+    for e in ensembles:
+        told = [_NUMBERS[name].format(getattr(e, name)) for name in differ]
+        labels[e] = ", ".join([*told, *[systems[e.system]] * (len(systems) > 1)])
+    return labels
+
+
+def ensembles_title(ensembles: Collection[Ensemble]) -> str:
+    """Name what ensembles of compressions have in common."""
+    systems, differ = _differing(ensembles)
+    first = next(iter(ensembles))
+    told = [_NUMBERS[name].format(getattr(first, name)) for name in _NUMBERS if name not in differ]
+    return ", ".join([*[systems[first.system]] * (len(systems) == 1), *told])
+
+
+def _differing(ensembles: Collection[Ensemble]) -> tuple[dict[System, str], list[str]]:
+    """Labels of the systems, and names of the numbers that ensembles differ in, with N."""
+    systems = system_labels({e.system: None for e in ensembles})
+    return systems, [k for k in _NUMBERS if k == "n" or len({getattr(e, k) for e in ensembles}) > 1]
+
+
+def unit_text(systems: Iterable[System]) -> str:
+    """Name the unit of length that systems share, in TeX without dollars."""
+    units = {shape_named(system.shape).unit for system in systems}
+    unit = units.pop() if len(units) == 1 else r"\mathrm{length}"
+    return unit if len(unit) == 1 else f"({unit})"
+
+
+def pressure_unit(systems: Collection[System]) -> str:
+    """Write the unit of pressure and energy density in TeX, without dollars."""
+    dimensions = {system.dimension for system in systems}
+    power = dimensions.pop() if len(dimensions) == 1 else "D"
+    return rf"[k_e/{unit_text(systems)}^{power}]"
+
+
+def protocol_text(system: System) -> str:
+    """Name how the packings of a system were made."""
+    sweeps = f", {system.n_sweeps} sweeps" * (system.n_sweeps > 0)
+    return f"protocol {system.protocol}{sweeps}" if system.protocol else "dynamics"

@@ -1,0 +1,322 @@
+"""Sets of finished packings in folders and files, grouped by the systems that they are samples of.
+
+A sweep is a folder of files that `make_packing.py` or `sweep.py` wrote; several may be given together. Packings
+are of one system where shape, dimension, the shape's parameters, mixture, protocol and its sweeps agree.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import BoolArray
+from jamshape.contacts import ContactNetwork, find_contacts, find_rattlers
+from jamshape.files import layout
+from jamshape.files.h5md import FileFormatError, read_attributes, read_observables, read_packing
+from jamshape.packing import Packing
+from jamshape.shapes.table import DEFAULT, shape_named
+
+REACHED = ("converged", "sliding")  # outcomes with mechanical equilibrium; others stalled
+
+# Ends of the names of files that may lie beside a packing and are none.
+OTHERS = (".run.h5", ".search.h5", ".path.h5", ".modes.h5")
+
+CONDITIONS = ("n", "size_ratio", "u0", "kappa")
+
+# Parameters that are the same in this many digits are one.
+_SAME = 1e-9
+
+
+class Contacts(NamedTuple):
+    """A packing with its contacts, two bonds side to side, and its rattlers."""
+
+    packing: Packing
+    network: ContactNetwork
+    rattlers: BoolArray
+
+
+class System(NamedTuple):
+    """What the packings of one point of a figure have in common, but for N and energy."""
+
+    shape: str
+    dimension: int
+    parameters: tuple[tuple[str, float], ...]
+    """Those of the shape, by name; none of a mixture, and none where files do not tell all."""
+    kinds: str = ""
+    """The particles of a mixture."""
+    protocol: int = 0
+    """Of quasistatic steps: 1, or 2 with Monte Carlo on the way; 0 of compressions by dynamics."""
+    n_sweeps: int = 0
+    """Of Monte Carlo."""
+
+    def number(self, name: str) -> float:
+        """Look up a parameter; NaN where the shape has none of that name."""
+        return dict(self.parameters).get(name, math.nan)
+
+    def without(self, name: str) -> System:
+        """Leave out a parameter: what the points of a curve over it have in common."""
+        return self._replace(parameters=tuple(p for p in self.parameters if p[0] != name))
+
+    def report(self) -> dict[str, Any]:
+        """Name it in JSON: parameters by their names, the last three where there are any."""
+        told = {name: getattr(self, name) for name in ("kinds", "protocol", "n_sweeps")}
+        told = {name: value for name, value in told.items() if value}
+        return {"shape": self.shape, "dimension": self.dimension, **dict(self.parameters), **told}
+
+
+@dataclass(frozen=True)
+class PackingFile:
+    """One finished packing: its file and what is said of it there."""
+
+    path: Path
+    attributes: dict[str, Any]
+
+    @classmethod
+    def read(cls, path: Path) -> PackingFile:
+        """Read what a file says; errors as `read_attributes`."""
+        return cls(path, read_attributes(path))
+
+    @property
+    def reached(self) -> bool:
+        """Whether it is in mechanical equilibrium."""
+        return self.attributes["outcome"] in REACHED
+
+    def number(self, name: str) -> float:
+        """Look up an attribute that is a number.
+
+        Raises
+        ------
+        ValueError
+            If there is none.
+        """
+        return number(self.attributes, name, f"{self.path}: has", "a packing of make_packing.py")
+
+    def packing(self) -> Packing:
+        """Read the particles."""
+        return read_packing(self.path)
+
+    def system(self) -> System:
+        """Tell what it is a sample of."""
+        with layout.opened(self.path) as file:
+            shape = layout.require_item(file, "particles/all").attrs["shape_style"]
+            dimension = int(layout.require_item(file, "particles/all/box").attrs["dimension"])
+        return system_of(self.attributes, shape, dimension)
+
+    def contacts(self) -> Contacts:
+        """Read the packing and find its contacts, with two bonds side to side, and its rattlers."""
+        packing = self.packing()
+        network = find_contacts(packing, sides=2)
+        observables = read_observables(self.path)
+        if "rattler_ids" not in observables:
+            return Contacts(packing, network, find_rattlers(packing, network))
+        return Contacts(packing, network, np.isin(packing.id, observables["rattler_ids"][-1]))
+
+
+Groups = dict[System, list[PackingFile]]
+Curve = dict[float, list[PackingFile]]
+"""Samples by the value of a parameter."""
+
+
+def number(attributes: Mapping[str, Any], name: str, who: str, expected: str) -> float:
+    """Look up an attribute that is a number.
+
+    Parameters
+    ----------
+    attributes : mapping
+    name : str
+    who, expected : str
+        Begin and end of the sentence, if there is none.
+
+    Raises
+    ------
+    ValueError
+    """
+    value = np.asarray(attributes.get(name, "missing"))
+    if value.ndim or value.dtype.kind not in "biuf":
+        msg = f"{who} no number {name!r}, expected {expected}"
+        raise ValueError(msg)
+    return float(value)
+
+
+def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> System:
+    """Tell what a packing is a sample of, by its attributes, shape style and dimension."""
+    names = [parameter.name for parameter in shape_named(shape).parameters]
+    told = set(names) <= attributes.keys()
+    known = tuple((name, float(attributes[name])) for name in names if told)
+    kinds = str(attributes.get("kinds", ""))
+    protocol, sweeps = (int(attributes.get(name, 0)) for name in ("protocol", "n_sweeps"))
+    return System(shape, dimension, known, kinds, protocol, sweeps)
+
+
+def read_groups(
+    paths: Iterable[Path],
+    *,
+    needs: Sequence[str] = (),
+    same: Sequence[str] = ("n",),
+    with_stalled: bool = False,
+) -> Groups:
+    """Find the finished packings in folders and files, by system in ascending order, then by seed.
+
+    Parameters
+    ----------
+    paths
+        Folders, of which other files are left out, and files, which must be packings.
+    needs
+        Numbers that every file must have, such as the parameters of the shapes that are drawn.
+    same
+        Attributes in which all must agree.
+    with_stalled
+        Keep packings whose minimisation did not reach equilibrium.
+
+    Raises
+    ------
+    ValueError
+        If there is none, a file is none, lacks a number, or they are of several ensembles.
+    OSError
+        If one cannot be read.
+    """
+    files = finished(list(paths), with_stalled=with_stalled)
+    for file in files:
+        for name in needs:
+            file.number(name)
+    require_one_ensemble([file.attributes for file in files], same)
+    groups: Groups = {}
+    systems = [(file.system(), file.number("seed"), file) for file in files]
+    for system, _, file in sorted(systems, key=lambda row: row[:2]):
+        groups.setdefault(system, []).append(file)
+    return groups
+
+
+def finished(paths: list[Path], *, with_stalled: bool = False) -> list[PackingFile]:
+    """Find the finished packings in folders and files, at least one; arguments as `read_groups`."""
+    files = [file for path in paths for file in _files(path)]
+    kept = [file for file in files if with_stalled or file.reached]
+    if not kept:
+        places, n = ", ".join(map(str, paths)), len(files)
+        stalled = f" in equilibrium, of {n} that ended otherwise" if files else ""
+        msg = (
+            f"{places}: no finished packing{stalled}, expected files of sweep.py or make_packing.py"
+        )
+        raise ValueError(msg)
+    return kept
+
+
+def _files(path: Path) -> list[PackingFile]:
+    """Read one file, or those of a folder that are packings."""
+    if not path.is_dir():
+        file = PackingFile.read(path)
+        if "outcome" not in file.attributes:
+            msg = f"{path}: has no attribute 'outcome', expected a packing of make_packing.py"
+            raise ValueError(msg)
+        return [file]
+    # Runs and searches that lead to a packing may still be written, and are then locked.
+    places = [place for place in sorted(path.glob("*.h5")) if not place.name.endswith(OTHERS)]
+    found = []
+    for place in places:
+        with contextlib.suppress(FileFormatError):  # files of other kinds
+            found.append(PackingFile.read(place))
+    return [file for file in found if "outcome" in file.attributes]
+
+
+def require_one_ensemble(attributes: Sequence[Mapping[str, Any]], same: Sequence[str]) -> None:
+    """Refuse attributes that differ in one of these.
+
+    Raises
+    ------
+    ValueError
+    """
+    for name in same:
+        values = sorted({float(known[name]) for known in attributes if name in known})
+        if len(values) > 1:
+            found = " and ".join(f"{value:g}" for value in values)
+            msg = f"{name} is {found}, expected one ensemble; give the files of one"
+            raise ValueError(msg)
+
+
+def n_of(groups: Mapping[Any, Sequence[PackingFile]]) -> int:
+    """Return the number of particles of the packings, which is that of the first."""
+    return int(next(iter(groups.values()))[0].number("n"))
+
+
+def conditions(groups: Mapping[Any, Sequence[PackingFile]]) -> dict[str, Any]:
+    """Return what all files share of N, size ratio, energy and compression rate, for JSON."""
+    every = [file.attributes for files in groups.values() for file in files]
+    values = {name: {known.get(name) for known in every} for name in CONDITIONS}
+    return {name: of.pop() for name, of in values.items() if len(of) == 1 and None not in of}
+
+
+def of_paper(system: System) -> bool:
+    """Whether it is what Marschall & Teitel, PRE 97, 012905, studied, whatever its parameters."""
+    return system._replace(parameters=(), protocol=0, n_sweeps=0) == System(DEFAULT, 2, ())
+
+
+def only(groups: Groups, chosen: Callable[[System], bool]) -> Groups:
+    """Select systems."""
+    return {system: files for system, files in groups.items() if chosen(system)}
+
+
+def curves_over(groups: Groups, name: str) -> dict[System, Curve]:
+    """Split into curves over a parameter, each of systems that differ in nothing else."""
+    curves: dict[System, Curve] = {}
+    for system, files in groups.items():
+        curves.setdefault(system.without(name), {})[system.number(name)] = files
+    return curves
+
+
+def one_curve(groups: Groups, name: str) -> Curve:
+    """Take the only curve over a parameter.
+
+    Raises
+    ------
+    ValueError
+        If systems differ in something else, too.
+    """
+    curves = curves_over(groups, name)
+    if len(curves) > 1:
+        found = " and ".join(f"{s.shape}s in {s.dimension}D, protocol {s.protocol}" for s in curves)
+        msg = f"packings are {found}, expected systems that differ in {name} only; give such files"
+        raise ValueError(msg)
+    return next(iter(curves.values()))
+
+
+class Choice(NamedTuple):
+    """Which values of a parameter to draw."""
+
+    asked: Sequence[float]
+    """All that are drawn, if there are any."""
+    usual: Sequence[float]
+    """Else those of these that are there."""
+    most: int
+    """Else so many, evenly."""
+
+
+def choose(groups: Groups, name: str, which: Choice) -> Groups:
+    """Select systems by a parameter.
+
+    Raises
+    ------
+    ValueError
+        If a value that is asked for is not there.
+    """
+    values = sorted({system.number(name) for system in groups})
+    missing = [value for value in which.asked if not is_among(value, values)]
+    if missing:
+        known = ", ".join(f"{value:g}" for value in values)
+        msg = f"no packing has {name} = {missing[0]:g}, expected one of {known}"
+        raise ValueError(msg)
+    wanted = which.asked or [value for value in which.usual if is_among(value, values)]
+    if wanted:
+        return only(groups, lambda system: is_among(system.number(name), wanted))
+    spread = np.unique(np.linspace(0, len(groups) - 1, which.most).round().astype(int))
+    return {system: groups[system] for k, system in enumerate(groups) if k in spread}
+
+
+def is_among(value: float, others: Iterable[float]) -> bool:
+    """Whether a number is one of others, but for rounding."""
+    return any(math.isclose(value, other, rel_tol=_SAME) for other in others)

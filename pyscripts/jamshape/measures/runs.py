@@ -1,0 +1,86 @@
+"""Compressions in files: p(phi) with the onset of jamming, grouped by what they are samples of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.files.h5md import read_observables
+from jamshape.files.sets import PackingFile, System
+from jamshape.measures.onset import OnsetFit, fit_onset
+
+
+class Ensemble(NamedTuple):
+    """What compressions that differ in their seed only have in common."""
+
+    system: System
+    n: int
+    size_ratio: float
+    """1 where it is not told."""
+    kappa: float
+    """Last compression rate."""
+
+    def report(self) -> dict[str, Any]:
+        """Name it in JSON."""
+        own = {name: getattr(self, name) for name in ("n", "size_ratio", "kappa")}
+        return self.system.report() | own
+
+
+class Run(NamedTuple):
+    """A compression and its onset, or the sentence that says why there is none."""
+
+    path: Path
+    ensemble: Ensemble
+    seed: int
+    phi: FloatArray
+    pressure: FloatArray
+    fit: OnsetFit | None
+    problem: str = ""
+
+
+def ensemble_of(file: PackingFile) -> Ensemble:
+    """Tell what a compression is a sample of.
+
+    Raises
+    ------
+    ValueError
+        If its file does not tell N or the rate.
+    """
+    missing = [name for name in ("n", "kappa") if name not in file.attributes]
+    if missing:
+        msg = f"{file.path}: has no attribute {missing[0]!r}, expected a run of compress.py"
+        raise ValueError(msg)
+    kappa = float(np.ravel(file.attributes["kappa"])[-1])
+    ratio = float(file.attributes.get("size_ratio", 1.0))
+    return Ensemble(file.system(), int(file.attributes["n"]), ratio, kappa)
+
+
+def observables_of(file: PackingFile, names: Iterable[str]) -> dict[str, FloatArray]:
+    """Read observables of a compression.
+
+    Raises
+    ------
+    ValueError
+        If one is not there.
+    """
+    names, found = list(names), read_observables(file.path)
+    if not set(names) <= found.keys():
+        msg = f"{file.path}: has no observables {', '.join(names)}, expected a run of compress.py"
+        raise ValueError(msg)
+    return {name: np.asarray(found[name], np.float64) for name in names}
+
+
+def read_run(path: Path) -> Run:
+    """Read p(phi) and fit its onset; errors as above."""
+    file = PackingFile.read(path)
+    phi, pressure = observables_of(file, ("phi", "pressure")).values()
+    seed = int(file.attributes.get("seed", 0))
+    run = Run(path, ensemble_of(file), seed, phi, pressure, None)
+    try:
+        return run._replace(fit=fit_onset(phi, pressure))
+    except ValueError as error:  # it ends below jamming, or rearranges too soon
+        return run._replace(problem=f"{path}: {error}")

@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+
+from jamshape.drawing.plane import images, outlines, spines
+from jamshape.packing import Box, Packing
+from jamshape.shapes.table import SHAPES
+
+BOX = Box(np.array([-1.0, 2.0]), np.array([4.0, 7.0]))
+
+
+def one(shape, **parameters):
+    known = {p.name: p.default for p in SHAPES[shape].parameters} | parameters
+    diameters, exponent = SHAPES[shape].sizes(known, np.ones(1))
+    return Packing(
+        position=np.array([[-20.0, 31.0]]),
+        orientation=np.array([0.3]),
+        diameters=diameters,
+        exponent=exponent,
+        species=np.ones(1, int),
+        id=np.ones(1, int),
+        box=BOX,
+        shape_style=shape,
+    )
+
+
+def area(polygon):
+    x, y = polygon.T
+    return 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
+
+
+def test_images_that_reach_into_the_box():
+    at = images(np.array([[0.0, 2.1], [1.0, 5.0]]), np.array([0.5, 0.5]), BOX)
+    assert at.owner.tolist() == [0, 1, 0]
+    assert sorted(at.center[at.owner == 0].tolist()) == [[0.0, 2.1], [0.0, 9.1]]
+    # One that is longer than the box is there many times.
+    assert len(images(np.zeros((1, 2)), np.array([20.0]), BOX).owner) > 20
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_outlines_enclose_the_area_of_the_particle(shape):
+    packing = one(shape)
+    at = images(packing.position, packing.outer_radius, packing.box)
+    polygons = outlines(packing, at)
+    assert len(polygons) == len(at.owner) >= 1
+    for polygon, center in zip(polygons, at.center, strict=True):
+        assert area(polygon) == pytest.approx(float(packing.measures[0]), rel=0.01)
+        reach = np.linalg.norm(polygon - center, axis=1).max()
+        assert reach == pytest.approx(float(packing.outer_radius[0]), rel=0.01)
+
+
+def test_spines_lie_along_the_particle_and_discs_have_none():
+    rod = one("spherocylinder", alpha=4.0)
+    at = images(rod.position, rod.outer_radius, rod.box)
+    lines = spines(rod, at)
+    assert np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1) == pytest.approx(4.0)
+    np.testing.assert_allclose(lines.mean(axis=1), at.center, atol=1e-12)
+    disc = one("spherocylinder", alpha=0.0)
+    assert not len(spines(disc, images(disc.position, disc.outer_radius, disc.box)))

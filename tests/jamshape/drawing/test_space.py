@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+
+from jamshape.drawing.space import faces_of, painted, view
+from jamshape.packing import Box, Packing
+from jamshape.shapes.table import SHAPES
+
+
+def spheres(shape, position):
+    n = len(position)
+    diameters, exponent = SHAPES[shape].parameters_of(np.full(3, 2.0), 1.0), np.ones(n)
+    sizes, _ = SHAPES[shape].sizes(diameters[0], np.full(n, diameters[1]))
+    return Packing(
+        position=np.array(position),
+        orientation=np.tile([1.0, 0, 0, 0], (n, 1)),
+        diameters=sizes,
+        species=np.ones(n, int),
+        id=np.arange(1, n + 1),
+        box=Box(np.zeros(3), np.full(3, 10.0)),
+        shape_style=shape,
+        exponent=exponent,
+    )
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_near_bodies_hide_far_ones(shape):
+    """Two spheres behind each other: where they meet on the screen, the nearer one is painted last."""
+    eye = view(20, 30)
+    center = np.full(3, 5.0)
+    packing = spheres(shape, [center + 1.01 * eye.eye, center - 1.01 * eye.eye])
+    colors = np.array([[1.0, 0, 0], [0, 0, 1.0]])
+    polygons, shades = painted(faces_of(packing, 2, eye), colors, eye)
+    middle = np.abs(polygons.mean(axis=1) - eye.flat(center)).max(axis=1) < 0.3
+    assert (shades[middle][-1] * [1, 0, -1]).sum() > 0, "red is last"
+    far = np.flatnonzero(shades[:, 2] > shades[:, 0])
+    assert far.max() < np.flatnonzero(middle & (shades[:, 0] > shades[:, 2])).min()
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_faces_look_outwards_and_cover_what_is_seen(shape):
+    eye = view(20, 30)
+    packing = spheres(shape, [[5.0, 5.0, 5.0]])
+    faces = faces_of(packing, 3, eye)
+    away = faces.corners.mean(axis=1) - 5.0
+    assert ((away * faces.normals).sum(axis=1) > 0.9).all()
+    a, b, c = np.moveaxis(eye.flat(faces.corners), 1, 0)
+    (x, y), (u, v) = (b - a).T, (c - a).T
+    area = 0.5 * np.abs(x * v - y * u).sum()
+    assert area == pytest.approx(np.pi, rel=0.03)

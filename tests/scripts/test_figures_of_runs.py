@@ -1,0 +1,187 @@
+"""Figures of compressions, as their users run them, on small files made here."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pictures import image
+
+from jamshape.files.h5md import write_packing
+from jamshape.files.run_writer import RunWriter
+from jamshape.measures.order import orientational_order
+from jamshape.packing import Box, Packing
+
+FOLDER = "marschall_2018"
+ORDER, PRESSURE, SLOW = (
+    f"{FOLDER}/{name}.py" for name in ("fig02_order", "fig04_pressure", "fig03_slow_compression")
+)
+PHI_J = 0.866
+SHIFTS = {1: 0.001, 2: 0.002, 3: 0.003}
+
+
+def packing(angle=(0.0, 0.0, 0.0)):
+    return Packing(
+        position=np.array([[3.0, 7.8], [3.0, 0.75], [2.0, 4.0]]),
+        orientation=np.array(angle),
+        diameters=np.array([[4.0, 1.0, 1.0], [4.0, 1.0, 1.0], [2.8, 1.4, 1.4]]),
+        species=np.array([1, 1, 2]),
+        id=np.array([1, 2, 3]),
+        box=Box(lo=np.zeros(2), edges=np.array([8.0, 8.0])),
+    )
+
+
+def compression(path, seed=1, shift=0.0, ends=(0.8, 0.9), slope=0.2, **attributes):
+    """A run whose pressure is a line from PHI_J + shift on, of particles at random angles."""
+    rng = np.random.default_rng(seed)
+    first = packing(rng.uniform(0, 7, 3))
+    known = {"alpha": 4.0, "n": 1024, "kappa": 1e-6, "size_ratio": 1.4, "k_e": 1.0, "sides": 2}
+    known |= {"seed": seed, "finished": True} | attributes
+    writer = RunWriter.create(path, first, known)
+    n = known["n"]
+    S = {f"S_{k}": orientational_order(rng.uniform(0, 7, n), k).S_n for k in (2, 4)}
+    phi, steps = np.linspace(*ends, 81), np.arange(81)
+    rows = {"phi": phi, "pressure": slope * np.maximum(phi - PHI_J - shift, 0)}
+    rows |= {name: np.full(81, value) for name, value in S.items()}
+    writer.append_series(steps, steps / 3, rows)
+    return path
+
+
+@pytest.mark.parametrize("script", [ORDER, PRESSURE, SLOW])
+def test_help(help_of, script):
+    said = help_of(script)
+    assert "Marschall & Teitel, PRE 97, 012905" in said
+    assert f"python analysis/{script}" in said
+    assert "--out" in said
+
+
+@pytest.mark.parametrize("script", [ORDER, PRESSURE, SLOW])
+def test_user_errors_are_one_sentence(problem, tmp_path, script):
+    out = tmp_path / "out.png"
+    assert "No such file" in problem(script, tmp_path / "none.h5", "--out", out)
+    text = tmp_path / "notes.txt"
+    text.write_text("nothing of the kind\n")
+    assert str(text) in problem(script, text, "--out", out)
+    run_file = compression(tmp_path / "run.h5")
+    assert "No such file" in problem(script, run_file, "--out", tmp_path / "none" / "out.png")
+    assert "not supported" in problem(script, run_file, "--out", tmp_path / "out.nonsense")
+    path = tmp_path / "packing.h5"
+    write_packing(path, packing())
+    assert "expected a run of compress.py" in problem(script, path, "--out", out)
+    assert not out.exists()
+
+
+def test_an_error_ends_the_process_without_traceback(tmp_path):
+    script = Path(__file__).parents[2] / "analysis" / PRESSURE
+    command = [sys.executable, "-W", "error", script, tmp_path / "none.h5"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith("fig04_pressure.py: ")
+
+
+def test_pressure_of_one_run(report, tmp_path):
+    run_file, out = compression(tmp_path / "run.h5"), tmp_path / "pressure.png"
+    found = report(PRESSURE, run_file, "--out", out)
+    assert found["out"] == str(out)
+    assert (found["mean"], found["error"]) == (None, None)
+    (fit,) = found["runs"]
+    assert fit["run"] == str(run_file)
+    assert fit["phi_J"] == pytest.approx(PHI_J, abs=1e-12)
+    assert fit["slope"] == pytest.approx(0.2, rel=1e-9)
+    assert 0 < fit["phi_J_error"] < 1e-9
+    image(out)
+
+
+def test_pressure_of_samples(report, tmp_path):
+    shifts = (-0.003, 0.0, 0.001)
+    runs = [compression(tmp_path / f"{k}.h5", k, shift=s) for k, s in enumerate(shifts)]
+    found = report(PRESSURE, *runs, "--out", tmp_path / "p.png")
+    assert [fit["phi_J"] for fit in found["runs"]] == pytest.approx(PHI_J + np.array(shifts))
+    assert found["mean"] == pytest.approx(PHI_J + np.mean(shifts))
+    assert found["error"] == pytest.approx(np.std(shifts, ddof=1) / np.sqrt(3))
+    image(tmp_path / "p.png")
+
+
+def test_pressure_of_other_ensembles_has_no_mean(report, tmp_path):
+    runs = [compression(tmp_path / f"{alpha}.h5", alpha=alpha) for alpha in (1.0, 4.0)]
+    assert report(PRESSURE, *runs, "--out", tmp_path / "p.png")["mean"] is None
+
+
+def test_pressure_without_onset_is_drawn_and_said(problem, capsys, tmp_path):
+    runs = [compression(tmp_path / "a.h5"), compression(tmp_path / "b.h5", ends=(0.7, 0.8))]
+    said = problem(PRESSURE, *runs, "--out", tmp_path / "p.png")
+    assert said.startswith(f"fig04_pressure.py: {runs[1]}: p has no onset of jamming")
+    fits = json.loads(capsys.readouterr().out)["runs"]
+    assert fits[0]["phi_J"] == pytest.approx(PHI_J)
+    assert fits[1]["phi_J"] is None
+    image(tmp_path / "p.png")
+
+
+def test_order_of_samples(report, tmp_path):
+    runs = [compression(tmp_path / f"{n}-{k}.h5", k, n=n) for n in (100, 400) for k in range(3)]
+    found = report(ORDER, *runs, "--out", tmp_path / "order.png")
+    assert found["random"] == pytest.approx(np.sqrt(np.pi) / 2)
+    assert [(e["n"], e["samples"]) for e in found["ensembles"]] == [(100, 3), (400, 3)]
+    rng = [np.random.default_rng(k) for k in range(3)]
+    for r in rng:
+        r.uniform(0, 7, 3)
+    S_2 = [orientational_order(r.uniform(0, 7, 400), 2).S_n for r in rng]
+    assert found["ensembles"][1]["sqrtN_S_2"] == pytest.approx(20 * np.mean(S_2))
+    image(tmp_path / "order.png")
+
+
+def test_order_of_one_run_and_of_runs_that_do_not_overlap(report, problem, tmp_path):
+    one = compression(tmp_path / "one.h5")
+    (found,) = report(ORDER, one, "--out", tmp_path / "order.png")["ensembles"]
+    assert (found["samples"], found["alpha"], found["kappa"]) == (1, 4.0, 1e-6)
+    low = compression(tmp_path / "low.h5", ends=(0.7, 0.8))
+    assert "share no range of phi" in problem(ORDER, one, low, "--out", tmp_path / "o.png")
+
+
+@pytest.fixture(scope="module")
+def rates(tmp_path_factory):
+    """Three samples at two rates, of which the slower one begins later; in one file each."""
+    folder = tmp_path_factory.mktemp("rates")
+    onsets = {1: 0.0, 2: 0.002, 3: 0.01}
+    cost = {"flow_evaluations": 100, "flow_strain": 0.05, "flow_wall_seconds": 1.5}
+    paths = []
+    for seed, onset in onsets.items():
+        of = {"seed": seed, "ends": (0.84, 0.9)}
+        slow = compression(folder / f"slow{seed}.h5", shift=onset, kappa=1e-10, **of, **cost)
+        shift = onset - SHIFTS[seed]
+        fast = compression(folder / f"fast{seed}.h5", shift=shift, kappa=1e-8, slope=0.22, **of)
+        paths += [slow, fast]
+    return paths
+
+
+def test_rates_are_compared_sample_by_sample(report, rates, tmp_path):
+    fast, slow = report(SLOW, *rates, "--out", tmp_path / "slow.png")["rows"]
+    assert (fast["kappa"], slow["kappa"]) == (1e-8, 1e-10)
+    assert slow["phi_J"]["value"] == pytest.approx(PHI_J + 0.004, abs=2e-4)
+    assert slow["phi_J"]["error"] == pytest.approx(
+        np.std([0, 2, 10], ddof=1) / 1e3 / 3**0.5, rel=0.05
+    )
+    # Samples differ by more than the rates do, and that does not enter.
+    assert fast["shift"]["value"] == pytest.approx(-0.002, abs=1e-4)
+    assert fast["shift"]["error"] == pytest.approx(0.001 / np.sqrt(3), rel=0.1)
+    assert fast["excess"]["value"] > 0.1
+    assert slow["shift"] is slow["excess"] is None
+    assert (slow["evaluations"], slow["seconds"], fast["evaluations"]) == (100, 1.5, None)
+    assert slow["heun"] == pytest.approx(2 * 0.05 / (1e-10 * 0.01) / 100)
+    image(tmp_path / "slow.png")
+
+
+def test_one_sample_has_the_error_of_its_fit_and_packings_are_marked(here, capsys, rates, tmp_path):
+    marked = tmp_path / "packing.h5"
+    write_packing(marked, packing(), {"alpha": 4.0, "n": 1024, "phi_J": 0.867})
+    asked = ("--packing", marked, rates[0], "--out", tmp_path / "slow.png")
+    assert here(SLOW, rates[0], *asked) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (row,) = json.loads(lines[-1])["rows"]
+    assert row["phi_J"]["samples"] == 1
+    assert 0 < row["phi_J"]["error"] < 1e-9
+    table = lines[:3]
+    assert {line.count("|") for line in table} == {11}
+    image(tmp_path / "slow.png")
