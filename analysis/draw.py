@@ -92,7 +92,7 @@ def draw(pictures: list[Picture], options: Namespace) -> list[Coloring]:
     if smooth:
         save_smooth(figure, options.out, options.dpi)
     else:
-        figure.savefig(options.out, dpi=options.dpi)
+        figure.savefig(options.out, dpi=options.dpi, bbox_inches="tight", pad_inches=0.05)
     return colored
 
 

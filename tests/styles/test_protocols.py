@@ -5,6 +5,7 @@ from mixtures import bidisperse
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.shape import Interaction
 
 pytestmark = pytest.mark.lammps
 
@@ -34,3 +35,16 @@ def test_writing_restart_files_does_not_change_a_run(tmp_path):
     for name in ("pressure", "u"):
         one, other = (np.array([row[name] for row in found]) for found in (rows, others))
         np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-15)
+
+
+def test_a_session_takes_any_ids_and_gives_them_back():
+    start = random_packing(6, 0.2, 1, bidisperse(2.0)).with_(id=[9, 2, 70, 4, 5, 1])
+    with Session() as session:
+        session.load(start)
+        session.interact(Interaction())
+        session.commands(f"{session.neighbours()}\nrun 0 post no")
+        found = session.packing()
+    expected = start.sorted_by_id()
+    for name in ("id", "species", "diameters"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+    np.testing.assert_allclose(found.position, expected.position, rtol=0, atol=1e-14)

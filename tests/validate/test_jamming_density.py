@@ -34,7 +34,7 @@ def runs():
 
 
 def onsets(samples):
-    return np.array([fit_onset(row["phi"], row["p"]).phi_J for row in samples])
+    return np.array([fit_onset(row["phi"], row["pressure"]).phi_J for row in samples])
 
 
 @pytest.mark.parametrize("alpha", PAPER)
@@ -62,7 +62,7 @@ def test_contacts_are_hypostatic_near_the_onset(runs):
     """z below 2 d_f = 6 within 0.01 above phi_J; discs, d_f = 2, near 4 + 3.6 (phi - phi_J)^(1/2)."""
     for alpha, samples in runs.items():
         for row in samples:
-            start = fit_onset(row["phi"], row["p"]).phi_J
+            start = fit_onset(row["phi"], row["pressure"]).phi_J
             near = (row["phi"] > start) & (row["phi"] < start + 0.01)
             assert np.all(row["z"][near] < (6.0 if alpha else 4.5))
 

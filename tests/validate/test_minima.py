@@ -8,13 +8,14 @@ modes go up.
 
 import numpy as np
 import pytest
-from jamshape.protocols.jammed import Sample, make
 from minima import complaints, dense, probes, soft_directions, typical_overlap, unconstrained
+from mixtures import bidisperse
 
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima import History, Minimum, Outcome, residual_of
 from jamshape.protocols.approach import Approach
+from jamshape.protocols.make import Dynamics, Recipe, make
 
 pytestmark = [pytest.mark.lammps, pytest.mark.validate]
 
@@ -29,7 +30,8 @@ ALPHAS, SEEDS = (0.0, 0.01, 1.0, 4.0), (21, 22)
 def found(request, tmp_path_factory):
     alpha, seed = request.param
     out = tmp_path_factory.mktemp("packing") / "packing.h5"
-    for _ in make(Sample(256, alpha, seed=seed, approach=Approach(kappa=4e-6)), out):
+    recipe = Recipe(bidisperse(alpha), seed=seed, way=Dynamics(Approach(kappa=4e-6)))
+    for _ in make(recipe, out):
         pass
     packing = read_packing(out)
     landscape, state = Landscape(packing), State.of(packing)

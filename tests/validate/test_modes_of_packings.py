@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jamshape.protocols.jammed import Sample, make
+from mixtures import bidisperse
 
 from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
+from jamshape.protocols.make import Dynamics, Recipe, make
 from jamshape.vibration.hessian import Scope, dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.statistics import bands, components, count, participation, redundancies
@@ -32,7 +33,8 @@ def packings(tmp_path_factory):
     for alpha in PAPER:
         for seed in SEEDS:
             out = tmp_path_factory.mktemp("packings") / f"alpha{alpha}_seed{seed}.h5"
-            sample = Sample(n=256, alpha=alpha, seed=seed, approach=Approach(kappa=2e-6))
+            way = Dynamics(Approach(kappa=2e-6))
+            sample = Recipe(bidisperse(alpha), seed=seed, way=way)
             for _ in make(sample, out):
                 pass
             found[alpha, seed] = read_packing(out)
@@ -108,7 +110,8 @@ def test_low_band_at_alpha_4_is_single_rods_that_slide(packings):
     ("alpha", "u0"), [(1e-6, 1e-15), (50.0, 1e-15), (0.01, 1e-18), (4.0, 1e-18)]
 )
 def test_modes_of_extremes(alpha, u0, tmp_path):
-    sample = Sample(n=32, alpha=alpha, seed=1, phi_start=0.4 if alpha < 10 else 0.15)
+    phi = 0.4 if alpha < 10 else 0.15
+    sample = Recipe(bidisperse(alpha), n=32, phi_start=phi)
     sample = replace(sample, approach=Approach(kappa=1e-5), target=Target(u0=u0))
     for _ in make(sample, tmp_path / "packing.h5"):
         pass

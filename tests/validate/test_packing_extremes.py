@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jamshape.protocols.jammed import Sample, make
-from mixtures import of_arrays
+from mixtures import bidisperse, of_arrays
 
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
+from jamshape.protocols.make import Dynamics, Recipe, make
 
 pytestmark = [pytest.mark.lammps, pytest.mark.validate]
 
-SMALL = Sample(n=32, approach=Approach(kappa=1e-5))
+SMALL = Recipe(n=32, way=Dynamics(Approach(kappa=1e-5)))
 
 
 def discs_and_rods(n):
@@ -26,17 +26,17 @@ def discs_and_rods(n):
 
 
 EXTREMES = {
-    "alpha 1e-6": {"alpha": 1e-6},
-    "alpha 1e-3": {"alpha": 1e-3},
-    "alpha 50": {"alpha": 50.0, "phi_start": 0.1},
-    "alpha 100": {"alpha": 100.0, "phi_start": 0.05},
-    "size ratio 10": {"alpha": 2.0, "size_ratio": 10.0, "phi_start": 0.3},
-    "2 particles longer than the box": {"n": 2, "alpha": 4.0, "phi_start": 0.2},
-    "8 particles longer than the box": {"n": 8, "alpha": 20.0, "phi_start": 0.1},
+    "alpha 1e-6": {"particles": bidisperse(1e-6)},
+    "alpha 1e-3": {"particles": bidisperse(1e-3)},
+    "alpha 50": {"particles": bidisperse(50.0), "phi_start": 0.1},
+    "alpha 100": {"particles": bidisperse(100.0), "phi_start": 0.05},
+    "size ratio 10": {"particles": bidisperse(2.0, 10.0), "phi_start": 0.3},
+    "2 particles longer than the box": {"n": 2, "particles": bidisperse(4.0), "phi_start": 0.2},
+    "8 particles longer than the box": {"n": 8, "particles": bidisperse(20.0), "phi_start": 0.1},
     "u0 1e-4": {"target": Target(u0=1e-4)},
     "u0 1e-18": {"target": Target(u0=1e-18)},
-    "u0 1e-18, alpha 1": {"alpha": 1.0, "target": Target(u0=1e-18)},
-    "discs and rods": {"mixture": discs_and_rods(32)},
+    "u0 1e-18, alpha 1": {"particles": bidisperse(1.0), "target": Target(u0=1e-18)},
+    "discs and rods": {"particles": discs_and_rods(32)},
 }
 
 

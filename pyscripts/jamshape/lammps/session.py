@@ -132,13 +132,14 @@ class Session:
         return str(function(self.lmp.lmp).decode())
 
     def load(self, packing: Packing) -> None:
-        """Read a packing into a fresh instance; LAMMPS types are those of `Shape.style`."""
+        """Read a packing into a fresh instance; LAMMPS types are those of `Shape.style`, its IDs 1 to N."""
         self.commands(f"{_ATOMS}\ndimension {packing.dimension}")
         self._like = packing
         types = packing.shape.style(packing, Interaction()).types
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "start.data"
-            write_data(path, packing.with_(species=types))
+            rank = 1 + np.argsort(np.argsort(packing.id))
+            write_data(path, packing.with_(species=types, id=rank))
             self.commands(f"read_data {path}")
         self.commands(_POSES)
 
@@ -178,7 +179,6 @@ class Session:
             orientation=angle_from_quaternion(quaternion) if d == 2 else quaternion,
             diameters=diameters,
             **self._known(diameters, rows("type", 0, 1)[:, 0]),
-            id=np.arange(1, n + 1),
             image=rows("image", 0, 3)[:, :d],
             box=Box(np.array(lo[:d]), np.array(hi[:d]) - np.array(lo[:d])),
             step=self.step,
@@ -188,9 +188,10 @@ class Session:
     def _known(self, diameters: FloatArray, types: IntArray) -> dict[str, Any]:
         """Give what LAMMPS does not know of its particles."""
         if self._like is None:
-            return {"shape_style": guess_shape_style(diameters), "species": types}
+            known = {"shape_style": guess_shape_style(diameters), "species": types}
+            return known | {"id": np.arange(1, len(types) + 1)}
         like = self._like.sorted_by_id()
-        names = ("shape_style", "exponent", "species")
+        names = ("shape_style", "exponent", "species", "id")
         return {name: getattr(like, name) for name in names}
 
     def neighbours(self) -> str:
