@@ -15,7 +15,9 @@ from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Kind, Particles
 from jamshape.shapes.table import SHAPES
 
-# Of the particles of a scene.
+EPS = float(np.finfo(float).eps)
+
+# Particles of a scene.
 NUMBER = {2: 12, 3: 8}
 
 # The phi of random starts, and the overlap 1 - r/d of the deepest bond of a pressed scene.
