@@ -26,7 +26,7 @@ from jamshape.drawing.colors import CHOICES, ORDER, Coloring, Scale
 from jamshape.drawing.kinds import kinds_of
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.space import save_smooth
-from jamshape.drawing.text import scientific
+from jamshape.drawing.text import is_told_by_parameters, scientific
 from jamshape.files.h5md import FileFormatError, read_attributes
 from jamshape.files.lammps_text import read_any
 from jamshape.files.sets import Contacts
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 COLUMNS = 3
 INCHES = (7.0, 5.0, 4.0)  # of the longer edge of a panel, for one column, two, three
 MANY_KINDS = 3  # of which the title names no parameters
-ROOM = 0.75  # above and below a panel, for words
+ROOM = (0.75, 1.4)  # above and below a panel, for words, of one and of several
 
 
 class Picture(NamedTuple):
@@ -98,10 +98,13 @@ def draw(pictures: list[Picture], options: Namespace) -> list[Coloring]:
 
 def title(one: Picture, *, narrow: bool) -> str:
     """Name the particles, if they are few kinds, and what was counted; narrow ones in more lines."""
-    kinds, gap = kinds_of(one.found.packing), "    "
+    packing, gap = one.found.packing, "    "
+    kinds, shape = kinds_of(packing), packing.shape
+    known = [f"{shape.name}s"] * (not is_told_by_parameters(shape))
+    known += [kinds.title] * (0 < len(kinds.parameters) < MANY_KINDS)
     lines = [gap.join(one.numbers[:2]), gap.join(one.numbers[2:])]
     lines = lines if narrow else [gap.join(one.numbers)]
-    return "\n".join([kinds.title] * (len(kinds.parameters) < MANY_KINDS) + lines)
+    return "\n".join([", ".join(known)] * (known != []) + lines)
 
 
 def make_panels(pictures: list[Picture], *, with_bar: bool) -> tuple[Figure, Any]:
@@ -115,7 +118,7 @@ def make_panels(pictures: list[Picture], *, with_bar: bool) -> tuple[Figure, Any
     ]
     ratios = [edges / edges.max() for edges in shapes] or [np.ones(2)]
     width, height = INCHES[columns - 1] * np.max(ratios, axis=0)
-    size = (columns * width + 0.1 + 0.7 * with_bar, rows * (height + ROOM))
+    size = (columns * width + 0.1 + 0.7 * with_bar, rows * (height + ROOM[len(pictures) > 1]))
     figure = Figure(figsize=size)
     figure.set_layout_engine("constrained", h_pad=0.1, w_pad=0.06)
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()

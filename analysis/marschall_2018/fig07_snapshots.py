@@ -19,7 +19,7 @@ from jamshape.drawing.text import counted, system_labels
 from jamshape.files.sets import Choice, Contacts, Groups, choose, read_groups
 
 PAPER_ALPHAS = (0.01, 4.0)
-INCHES, ROOM = 5.0, 0.6  # of a panel, and below it
+INCHES, ROOM = 5.0, 0.9  # of a panel, and below it
 COLUMNS, MOST = 3, 2
 
 

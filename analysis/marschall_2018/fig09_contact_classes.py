@@ -19,7 +19,7 @@ from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
 from jamshape.drawing.styles import BLUE, GREEN, ORANGE, PAPER_STYLE, RED
 from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Curve, conditions, one_curve, read_groups
+from jamshape.files.sets import Curve, System, conditions, of_paper, one_curve, read_groups
 from jamshape.measures.averages import Mean, mean
 from jamshape.measures.touching import NAMES, class_numbers
 
@@ -61,7 +61,14 @@ def draw_all(axes: Axes, known: Averages, discs: float, styles: dict[str, Any]) 
         error_bars(axes, means, discs, fmt=fmt, color=tint, mfc="none", label=text)
 
 
-def draw(known: Averages, title: str, options: Namespace) -> None:
+def draw_paper(axes: Axes, known: Averages, discs: float) -> None:
+    """Draw the number of the paper, and what the flat sides of its particles are of the perimeter."""
+    error_bars(axes, PAPER_FLAT, discs, **PAPER_STYLE)
+    curve = np.geomspace(2 * discs, max(10.0, *known), 200)
+    axes.plot(curve, perimeter_share(curve), "--", color=ORANGE, label="flat part of the perimeter")
+
+
+def draw(system: System, known: Averages, title: str, options: Namespace) -> None:
     """Draw classes on the left and flat contacts on the right."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
@@ -72,9 +79,8 @@ def draw(known: Averages, title: str, options: Namespace) -> None:
     classes.set_ylabel("fraction of contact bonds")
     classes.legend(title=title, **SMALL_TEXT)
     draw_all(flat, known, discs, FLAT_STYLES)
-    error_bars(flat, PAPER_FLAT, discs, **PAPER_STYLE)
-    curve = np.geomspace(2 * discs, max(10.0, *known), 200)
-    flat.plot(curve, perimeter_share(curve), "--", color=ORANGE, label="flat part of the perimeter")
+    if of_paper(system):
+        draw_paper(flat, known, discs)
     flat.set_ylabel("fraction of particles with a flat contact")
     flat.legend(fontsize=8, loc="upper left", bbox_to_anchor=(0, 0.45))
     for axes in (classes, flat):
@@ -86,11 +92,13 @@ def draw(known: Averages, title: str, options: Namespace) -> None:
 def main(options: Namespace) -> None:
     """Read, count, draw, report."""
     groups = read_groups(options.files, needs=["alpha"], same=("n", "size_ratio", "u0"))
-    known = averages(one_curve(groups, "alpha"))
-    draw(known, conditions_text(groups), options)
+    system, curve = one_curve(groups, "alpha")
+    known, paper = averages(curve), PAPER_FLAT if of_paper(system) else {}
+    draw(system, known, conditions_text(groups), options)
     rows = [
-        {"alpha": alpha, "flat_perimeter": perimeter_share(alpha)}
-        | {"paper_flat": PAPER_FLAT[alpha].value if alpha in PAPER_FLAT else None, **row}
+        system.report()
+        | {"alpha": alpha, "flat_perimeter": perimeter_share(alpha) if paper else None}
+        | {"paper_flat": paper[alpha].value if alpha in paper else None, **row}
         for alpha, row in known.items()
     ]
     told = {"out": options.out, "conditions": conditions(groups)}

@@ -98,7 +98,7 @@ def make_discs(options: Namespace) -> list[Path]:
 def read(paths: list[Path]) -> Curve:
     """Read a sweep, by alpha."""
     groups = read_groups(paths, needs=["alpha"], same=("n", "size_ratio", "u0"))
-    return one_curve(groups, "alpha")
+    return one_curve(groups, "alpha")[1]
 
 
 def lead(discs: PackingFile, options: Namespace) -> PackingFile:

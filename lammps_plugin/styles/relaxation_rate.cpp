@@ -153,8 +153,7 @@ double RelaxationRate::dot_with_forces(const std::function<Rate(int)> &rate) con
 void RelaxationRate::end()
 {
   for (int i = 0; i < atom->nlocal; ++i) unpack_force(i, &forces[n_rates * i]);
-  directions = {};
-  forces = {};
+  for (std::vector<double> *const of : {&directions, &forces}) std::vector<double>().swap(*of);
 }
 
 /* ----------------------------------------------------------------------

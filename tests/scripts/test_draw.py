@@ -31,8 +31,9 @@ def packing(angle=(0.0, 0.0, 0.0), **changes):
     return Packing(**(fields | changes))
 
 
-def mixture(shape, dimension, n_side=3):
+def mixture(shape, dimension):
     """Particles of two kinds of a shape, on a grid in any direction."""
+    n_side = {2: 3, 3: 2}[dimension]
     rng, n = np.random.default_rng(1), n_side**dimension
     grid = np.stack(np.meshgrid(*[np.arange(n_side)] * dimension), axis=-1).reshape(-1, dimension)
     species = 1 + np.arange(n) % 2

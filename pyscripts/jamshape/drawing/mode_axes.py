@@ -21,7 +21,6 @@ from jamshape.drawing.text import (
     scientific,
     short,
     system_labels,
-    system_text,
     unit_text,
 )
 from jamshape.files.sets import PackingFile
@@ -123,7 +122,7 @@ def packing_text(file: PackingFile) -> str:
     told = [f"$N={known['n']}$"] if "n" in known else []
     told += [energy_text(known["u0"])] if "u0" in known else []
     told += [f"seed {known['seed']}"] if "seed" in known else []
-    return ", ".join(filter(None, [system_text(shape), *told]))
+    return ", ".join([*system_labels([shape]).values(), *told])
 
 
 def bin_edges(tables: Iterable[ModeTable], per_decade: int = PER_DECADE) -> FloatArray:

@@ -8,9 +8,11 @@ from typing import Any
 
 from jamshape.files.sets import PackingFile, System, conditions, n_of
 from jamshape.measures.runs import Ensemble
-from jamshape.shapes.table import shape_named
+from jamshape.shapes.particles import parse_kind
+from jamshape.shapes.shape import Shape
+from jamshape.shapes.table import SHAPES, shape_named
 
-_NUMBERS = {"n": "$N={}$", "size_ratio": "$R_b/R_s={:g}$", "kappa": r"$\kappa={:g}$"}
+_NUMBERS = {"n": "N", "size_ratio": "R_b/R_s", "kappa": r"\kappa"}
 _SYMBOLS = {"u0": "u_0", "kappa": r"\kappa"}
 
 
@@ -64,20 +66,44 @@ def _shared(groups: Mapping[Any, Sequence[PackingFile]]) -> list[str]:
 def system_text(system: System) -> str:
     """Name a system by its parameters, or those that it has of them; a mixture by its kinds."""
     if system.kinds:
-        return system.kinds
+        return mixture_text(system)
     known = dict(system.parameters)
     return shape_named(system.shape).label(known) if known else ""
 
 
+def is_told_by_parameters(shape: Shape) -> bool:
+    """Whether it is what is meant where nothing but parameters is told: the first shape with these."""
+    names = [p.name for p in shape.parameters]
+    alike = (s for s in SHAPES.values() if [p.name for p in s.parameters] == names)
+    return next(alike).name == shape.name
+
+
+def mixture_text(system: System) -> str:
+    """Name the kinds of a mixture, as far as its file does, by parameters, size and share."""
+    shape = shape_named(system.shape)
+    try:
+        kinds = [parse_kind(text) for text in system.kinds.split(";")]
+        named = [shape.label(kind.parameters) for kind in kinds]
+    except (ValueError, KeyError):  # particles that were given one by one
+        return f"{system.shape}s {system.kinds}"
+    total = sum(kind.share for kind in kinds)
+    shares = [f"{100 * kind.share / total:.0f} %" for kind in kinds]
+    sizes = [f"${shape.unit}={kind.size:g}$" for kind in kinds]
+    return "; ".join(map(", ".join, zip(named, sizes, shares, strict=True)))
+
+
 def system_labels(systems: Collection[System]) -> dict[System, str]:
-    """Name what tells systems apart, for a legend; their parameters in any case."""
+    """Name what tells systems apart, for a legend; their parameters, and what is unusual, in any case."""
     shapes, dimensions, protocols = (
         {getattr(system, name) for system in systems} for name in ("shape", "dimension", "protocol")
     )
     labels = {}
     for system in systems:
-        parts = [f"{system.shape}s"] * (len(shapes) > 1)
-        parts += [f"{system.dimension}D"] * (len(dimensions) > 1)
+        shape = shape_named(system.shape)
+        parts = [f"{shape.name}s"] * (len(shapes) > 1 or not is_told_by_parameters(shape))
+        parts += [f"{system.dimension}D"] * (
+            len(dimensions) > 1 or system.dimension != shape.dimension
+        )
         parts += [system_text(system)]
         parts += [protocol_text(system)] * (len(protocols) > 1)
         labels[system] = ", ".join(part for part in parts if part)
@@ -86,7 +112,7 @@ def system_labels(systems: Collection[System]) -> dict[System, str]:
 
 def ensemble_text(ensemble: Ensemble, names: Iterable[str] = ("n", "kappa")) -> str:
     """Name an ensemble of compressions by its system and the numbers of these names."""
-    told = [_NUMBERS[name].format(getattr(ensemble, name)) for name in names]
+    told = [_number(ensemble, name) for name in names]
     return ", ".join(filter(None, [system_text(ensemble.system), *told]))
 
 
@@ -95,7 +121,7 @@ def ensemble_labels(ensembles: Collection[Ensemble]) -> dict[Ensemble, str]:
     systems, differ = _differing(ensembles)
     labels = {}
     for e in ensembles:
-        told = [_NUMBERS[name].format(getattr(e, name)) for name in differ]
+        told = [_number(e, name) for name in differ]
         labels[e] = ", ".join([*told, *[systems[e.system]] * (len(systems) > 1)])
     return labels
 
@@ -104,8 +130,14 @@ def ensembles_title(ensembles: Collection[Ensemble]) -> str:
     """Name what ensembles of compressions have in common."""
     systems, differ = _differing(ensembles)
     first = next(iter(ensembles))
-    told = [_NUMBERS[name].format(getattr(first, name)) for name in _NUMBERS if name not in differ]
+    told = [_number(first, name) for name in _NUMBERS if name not in differ]
     return ", ".join([*[systems[first.system]] * (len(systems) == 1), *told])
+
+
+def _number(ensemble: Ensemble, name: str) -> str:
+    """Write one number of an ensemble with its symbol."""
+    value = getattr(ensemble, name)
+    return f"${_NUMBERS[name]}={scientific(value) if name == 'kappa' else f'{value:g}'}$"
 
 
 def _differing(ensembles: Collection[Ensemble]) -> tuple[dict[System, str], list[str]]:

@@ -269,8 +269,8 @@ def curves_over(groups: Groups, name: str) -> dict[System, Curve]:
     return curves
 
 
-def one_curve(groups: Groups, name: str) -> Curve:
-    """Take the only curve over a parameter.
+def one_curve(groups: Groups, name: str) -> tuple[System, Curve]:
+    """Take the only curve over a parameter, and what its points have in common.
 
     Raises
     ------
@@ -282,7 +282,7 @@ def one_curve(groups: Groups, name: str) -> Curve:
         found = " and ".join(f"{s.shape}s in {s.dimension}D, protocol {s.protocol}" for s in curves)
         msg = f"packings are {found}, expected systems that differ in {name} only; give such files"
         raise ValueError(msg)
-    return next(iter(curves.values()))
+    return next(iter(curves.items()))
 
 
 class Choice(NamedTuple):

@@ -106,7 +106,8 @@ def test_curves_are_of_systems_that_differ_in_nothing_else(folder):
     assert ([*plane], [*space]) == ([0.0, 4.0], [4.0])
     with pytest.raises(ValueError, match="expected systems that differ in alpha only"):
         one_curve(groups, "alpha")
-    assert [*one_curve({s: of for s, of in groups.items() if s.dimension == 2}, "alpha")] == [0, 4]
+    system, curve = one_curve({s: of for s, of in groups.items() if s.dimension == 2}, "alpha")
+    assert (system, [*curve]) == (System(ROD, 2, ()), [0, 4])
 
 
 def test_choice_of_systems(folder):
