@@ -8,6 +8,7 @@ from every_shape import (
     ALL,
     EPS,
     MIXTURES,
+    ROUNDING,
     SIDES,
     TYPICAL,
     in_a_small_box,
@@ -25,9 +26,6 @@ from jamshape.lammps.session import Session
 from jamshape.measures.minimum import order
 
 pytestmark = pytest.mark.lammps
-
-# Of the largest force and torque of a contact: a few hundred roundings.
-ROUNDING = 1e-13
 
 SCENES = {
     **{str(case): (pressed, case) for case in ALL},
