@@ -7,7 +7,7 @@
 
 Rods: ours-one, ours-two: spherocylinder/harmonic; polygon: body/rounded/polygon with the same centres,
 angles, spines and radii; wca: lj/cut discs with sigma = R_i + R_j at the same N and phi.
-Superellipsoids: ours; gayberne and resquared with the same centres, orientations and axes, and a cutoff
+Dimers: ours and wca. Superellipsoids: ours; gayberne and resquared with the same centres, orientations and axes, and a cutoff
 of the longest diameter, so that no contact is out of reach.
 
   force   `run M` without integrator: each step is one force evaluation on a kept neighbour list;

@@ -59,6 +59,7 @@ FLOW = "fix flow all overdamped/affine drag 1 compress 1e-4\ntimestep 0.05"
 SCENES = {
     "discs": Scene(Particles.of(alpha=0.0), 2, 0.4, Compression(1e-3, 0.86, 0.1)),
     "rods": Scene(Particles.of(alpha=4.0), 2, 0.4, Compression(1e-3, 0.86, 0.1)),
+    "dimers": Scene(Particles.of("dimer"), 2, 0.4, Compression(1e-3, 0.86, 0.1)),
     "spheres": Scene(Particles.of("superellipsoid"), 3, 0.3, Compression(2e-3, 0.66, 0.5)),
     "spheroids": Scene(
         Particles.of("superellipsoid", w2=1.5), 3, 0.3, Compression(2e-3, 0.72, 0.5)
@@ -101,6 +102,9 @@ CASES = [
     Case("rods", "energy and virial", "step", more=TALLY),
     Case("rods", PAIRS, "force", general="pairs"),
     Case("rods", "third dimension", "force", is_lifted=True),
+    Case("dimers", "energy and virial", "step", more=TALLY),
+    Case("dimers", PAIRS, "force", general="pairs"),
+    Case("dimers", "third dimension", "force", is_lifted=True),
     Case("spheres", "rotation", "step", general="rotation"),
     Case("spheres", SEARCH, "force", general="contact"),
     Case("spheres", PAIRS, "force", general="pairs"),

@@ -1,13 +1,16 @@
 """The cases of analysis/stability/stability_report.py, one test each, and the report itself."""
 
 import argparse
+import ast
 import json
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "analysis" / "stability"))
+STABILITY = Path(__file__).parents[2] / "analysis" / "stability"
+sys.path.insert(0, str(STABILITY))
 
 import stability_report
 from battery.case import Case
@@ -112,3 +115,16 @@ def test_a_process_that_ends_is_a_verdict(tmp_path):
 def test_nothing_of_that_name(tmp_path):
     with pytest.raises(ValueError, match="no case is called 'unheard of'"):
         stability_report.main(options(tmp_path, only="unheard of"))
+
+
+def test_modules_import_one_another_in_no_circle():
+    graph = {}
+    for path in (STABILITY / "battery").rglob("*.py"):
+        imports = [
+            x for x in ast.walk(ast.parse(path.read_text())) if isinstance(x, ast.ImportFrom)
+        ]
+        both = {f"{x.module}.{alias.name}" for x in imports for alias in x.names}
+        name = ".".join(path.relative_to(STABILITY).with_suffix("").parts)
+        graph[name] = both | {x.module for x in imports}
+    order = [name for name in TopologicalSorter(graph).static_order() if name in graph]
+    assert order[-1] == "battery.cases"

@@ -15,7 +15,12 @@ from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Kind, Particles
 from jamshape.shapes.table import SHAPES
 
-# Of the particles of a scene.
+EPS = float(np.finfo(float).eps)
+
+# Of the largest force and torque of a contact: a few hundred roundings.
+ROUNDING = 1e-13
+
+# Particles of a scene.
 NUMBER = {2: 12, 3: 8}
 
 # The phi of random starts, and the overlap 1 - r/d of the deepest bond of a pressed scene.
@@ -173,3 +178,14 @@ def replicated(packing, times):
     moved = packing.position[rows] + np.repeat(shifts, packing.n, axis=0) * packing.box.edges
     box = Box(packing.box.lo, times * packing.box.edges)
     return taken(packing, rows, id=1 + np.arange(len(rows)), position=moved, box=box)
+
+
+def size_of(network):
+    """Largest force and torque of a contact."""
+    torques = np.abs([network.torque_i, network.torque_j]).max()
+    return np.abs(network.force).max(), torques
+
+
+def as_vectors(torque):
+    """(N, 1) or (N, 3)"""
+    return torque.reshape(len(torque), -1)

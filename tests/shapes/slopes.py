@@ -1,8 +1,9 @@
 """Slopes by differences that know their own error."""
 
 import numpy as np
+from every_shape import EPS
 
-EPS = float(np.finfo(float).eps)
+LONG_EPS = float(np.finfo(np.longdouble).eps)
 
 
 def slope_at_0(function, step):
@@ -15,13 +16,14 @@ def slope_at_0(function, step):
     return near + (near - far) / 3, np.abs(near - far).max()
 
 
-def assert_is_slope(found, function, step, scale):
+def assert_is_slope(found, function, step, scale, size=1.0):
     """A slope as differences give it, within their error, which must be below a millionth of the scale.
 
-    The function's values are rounded to doubles, its argument to many more digits.
+    The function's values are rounded to doubles, what it is of, numbers up to a size, to long doubles.
     """
     expected, error = slope_at_0(function, step)
-    tolerance = error + 4 * EPS * np.abs([function(step), function(-step)]).max() / step
+    rounding = EPS * np.abs([function(step), function(-step)]).max() + LONG_EPS * size * scale
+    tolerance = error + 4 * rounding / step
     assert tolerance < 1e-6 * scale
     off = float(np.abs(found - expected).max())
     assert off <= tolerance

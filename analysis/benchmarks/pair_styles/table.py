@@ -97,6 +97,11 @@ BENCHES = {
         faster_than={"speed over polygon (>= 10)": "polygon"},
         dearer_than={"cost over wca (<= 4)": "wca"},
     ),
+    "dimer": _PLANE._replace(
+        cases=(Case("alpha 1", "--shape dimer --alpha 1", (0.5, 0.86)),),
+        styles={"ours": ours(2, ELLIPSOIDS, _SLOWLY), "wca": WCA},
+        dearer_than={"cost over wca": "wca"},
+    ),
     "superellipsoid": Bench(
         dimension=3,
         cases=tuple(

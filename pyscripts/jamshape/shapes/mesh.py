@@ -47,7 +47,7 @@ def revolved(profile: FloatArray, slope: FloatArray, turns: int) -> SurfaceMesh:
     ring, corner = np.meshgrid(np.arange(len(profile) - 1), np.arange(turns), indexing="ij")
     a, b = ring * turns + corner, ring * turns + (corner + 1) % turns
     c, d = a + turns, b + turns
-    faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, c, b), (b, c, d))])
+    faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (b, d, c))])
     return SurfaceMesh(rings(profile), faces.astype(np.int64), rings(slope))
 
 

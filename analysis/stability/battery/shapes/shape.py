@@ -162,6 +162,8 @@ class InFlow:
     extreme_steps: int
     limit: float
     """Of forces after a run."""
+    few_stops: bool = False
+    """Whether one time step beyond the limit is enough in a quick run."""
     must_relax: bool = False
     """Whether the energy of these must fall."""
     heavy: tuple[str, ...] = ()

@@ -7,22 +7,9 @@ from functools import partial
 from battery.scenes import superellipsoids as scenes
 from battery.scenes.superellipsoids import EXPONENTS, P, W
 from battery.session import fix
-from battery.shapes.shape import (
-    RELATIVE,
-    Compressed,
-    Drive,
-    InFlow,
-    InPairStyle,
-    InSolvers,
-    Law,
-    Limits,
-    OnLandscape,
-    Scenes,
-    Shape,
-    Touch,
-)
+from battery.shapes import shape as row
 
-SCATTERED: Scenes = {
+SCATTERED: row.Scenes = {
     "p 0.55 to 10 in one box": partial(scenes.scattered, EXPONENTS, (1.0,)),
     "w 0.1 to 10 in one box": partial(scenes.scattered, (1.0, 1.5), (0.1, 1.0, 10.0)),
     "2D, p 0.55 to 10, w to 10": partial(scenes.scattered, (0.55, 1.0, 10.0), (10.0, 1.0), 2),
@@ -31,7 +18,7 @@ SCATTERED: Scenes = {
 }
 
 # For the pair style, and its tests.
-CROWDS: Scenes = {
+CROWDS: row.Scenes = {
     **{f"p {p} {w}": partial(scenes.of_one_shape, p, axes) for p in P for w, axes in W.items()},
     "all shapes": partial(scenes.of_all_shapes, 3),
     "plane, all shapes": partial(scenes.of_all_shapes, 2),
@@ -53,12 +40,12 @@ def _name(D: int, p: float, w: float) -> str:
     return f"{D}D, p {p:g}, w {w:g}"
 
 
-SUPERELLIPSOIDS = Shape(
+SUPERELLIPSOIDS = row.Shape(
     name="superellipsoids",
     style_name="superellipsoid",
-    units=RELATIVE,
-    laws=(Law("", 2, is_of_oracle=False),),
-    landscape=OnLandscape(
+    units=row.RELATIVE,
+    laws=(row.Law("", 2, is_of_oracle=False),),
+    landscape=row.OnLandscape(
         scenes=SCATTERED,
         counted=("p 0.55 to 10 in one box", "w 0.1 to 10 in one box", "own images, w 10"),
         rounding=1e-12,
@@ -66,7 +53,7 @@ SUPERELLIPSOIDS = Shape(
         bend=1e-6,
         same_place=("concentric bodies", scenes.needles),
     ),
-    style=InPairStyle(
+    style=row.InPairStyle(
         scenes=CROWDS
         | {
             "p 0.55 to 10 in one box": scenes.of_all_exponents,
@@ -75,7 +62,7 @@ SUPERELLIPSOIDS = Shape(
         without_newton=("own images", "plane, own images"),
         in_units={name: CROWDS[name] for name in ("all shapes", "plane, all shapes", "own images")},
         mixed=scenes.of_two_types,
-        limits=Limits(force=_FORCES, mixed=_FORCES, units=_FORCES),
+        limits=row.Limits(force=_FORCES, mixed=_FORCES, units=_FORCES),
         stops={
             f"{D}D, coincident centres, p {p:g}": partial(scenes.coincident, p, D)
             for p in (0.55, 1.0, 10.0)
@@ -83,11 +70,11 @@ SUPERELLIPSOIDS = Shape(
         },
         sentence="coinciding centres, where no contact force exists",
     ),
-    flow=InFlow(
-        invariant={f"{D}D, ": Drive(partial(scenes.dense, D), 1e-3, 0.01, 100) for D in (2, 3)},
-        changed={f"{D}D": Drive(partial(scenes.dense, D), 1e-2, 0.01) for D in (2, 3)},
-        restarted={f"{D}D": Drive(partial(scenes.dense, D), 1e-3, 0.02, 100) for D in (2, 3)},
-        touch=Touch(scenes.two_spheres, 1e-6, scenes.RATE_OF_TWO_SPHERES, 1.0, 3.0),
+    flow=row.InFlow(
+        invariant={f"{D}D, ": row.Drive(partial(scenes.dense, D), 1e-3, 0.01, 100) for D in (2, 3)},
+        changed={f"{D}D": row.Drive(partial(scenes.dense, D), 1e-2, 0.01) for D in (2, 3)},
+        restarted={f"{D}D": row.Drive(partial(scenes.dense, D), 1e-3, 0.02, 100) for D in (2, 3)},
+        touch=row.Touch(scenes.two_spheres, 1e-6, scenes.RATE_OF_TWO_SPHERES, 1.0, 3.0),
         lone=scenes.lone,
         extreme={
             name: CROWDS[name]
@@ -103,11 +90,11 @@ SUPERELLIPSOIDS = Shape(
         name: CROWDS[name] for name in ("plane, all shapes", "own images", "plane, own images")
     },
     two_ranks={
-        "own images": Drive(CROWDS["own images"], 0.0, 0.0),
-        "p 0.55 and 10, w 0.1 and 10": Drive(CROWDS["all shapes"], 0.0, 0.0),
-        "in motion": Drive(partial(scenes.dense, 3), 1e-3, 0.01, 50),
+        "own images": row.Drive(CROWDS["own images"], 0.0, 0.0),
+        "p 0.55 and 10, w 0.1 and 10": row.Drive(CROWDS["all shapes"], 0.0, 0.0),
+        "in motion": row.Drive(partial(scenes.dense, 3), 1e-3, 0.01, 50),
     },
-    solvers=InSolvers(
+    solvers=row.InSolvers(
         minimised={
             name: SCATTERED[name] for name in ("p 0.55 to 10 in one box", "w 0.1 to 10 in one box")
         },
@@ -119,7 +106,7 @@ SUPERELLIPSOIDS = Shape(
         modes_in_units=(),
         spectra=("spheroids",),
     ),
-    compressed=Compressed(
+    compressed=row.Compressed(
         implicit={name: SCATTERED[name] for name in ("2D, p 0.55 to 10, w to 10",)},
         quasistatic={_name(*x): partial(scenes.loose, *x) for x in SHAPES_OF_ONE},
         quick=(_name(2, 1.0, 1.0),),
