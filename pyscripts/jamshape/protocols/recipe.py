@@ -152,6 +152,11 @@ class Recipe:
         if not 0 < self.phi_start < 1:
             msg = f"phi_start is {self.phi_start}, expected a packing fraction between 0 and 1"
             raise ValueError(msg)
+        thermal = self.way.thermal if isinstance(self.way, Steps) else None
+        if thermal and not self.phi_start < thermal.phi:
+            found = f"phi_start is {self.phi_start} and the Monte Carlo runs at {thermal.phi}"
+            msg = f"{found}, expected a start at a smaller packing fraction"
+            raise ValueError(msg)
         if self.target is None and isinstance(self.way, Dynamics):
             msg = "there is no energy to reach, expected one after a compression by dynamics (u0)"
             raise ValueError(msg)

@@ -145,6 +145,8 @@ def test_senseless_recipes_are_refused(numbers, sentence):
 
 
 def test_senseless_monte_carlo_is_refused():
+    with pytest.raises(ValueError, match="expected a start at a smaller packing fraction"):
+        Recipe(way=Steps(thermal=Thermalisation(0.3)), phi_start=0.3)
     with pytest.raises(ValueError, match="expected 0 < phi < 1"):
         Thermalisation(1.5)
 
