@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from every_shape import EPS, MIXTURES, SIDES, TYPICAL, Case, close_to, particles_of
+from every_shape import EPS, MIXTURES, SIDES, TYPICAL, Case, close_to, particles_of, taken
 
 from jamshape.contacts import coordination, find_contacts, find_rattlers
 from jamshape.files.h5md import (
@@ -32,12 +32,14 @@ from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum, state_error
 from jamshape.vibration.statistics import components, count, participation
 
-U0 = 1e-10
+# What is asked for: the energy density, how well it is met, and what may be left of the forces.
+U0, ACCURACY, RESIDUAL = 1e-10, 1e-7, 1e-8
 TARGET = Target(U0)
 
 # Coarse, since the energy is led to its target from wherever this ends.
-QUASISTATIC = Quasistatic(step=0.03, energy=1e-6, tolerance=1e-3)
+QUASISTATIC = Quasistatic(step=0.03, energy=1e-6, closeness=2.0, tolerance=1e-3)
 FAST = Approach(kappa=5e-3, kappa_start=2e-2, p_flow=1e-2, p_end=5e-2, p_open=4e-2, strain=2e-3)
+RESTS = ("position", "position_rest", "orientation", "orientation_rest")
 CASES = [*TYPICAL, *MIXTURES]
 EVERY = pytest.mark.parametrize("case", CASES, ids=str)
 TYPICAL_ONES = pytest.mark.parametrize("case", TYPICAL, ids=str)
@@ -85,9 +87,9 @@ def assert_at_the_energy(out, u0=U0):
     stored = read_attributes(out)
     assert is_done(out)
     assert stored["outcome"] in {"converged", "sliding"}
-    assert abs(stored["u"] / u0 - 1) <= TARGET.accuracy
+    assert abs(stored["u"] / u0 - 1) <= ACCURACY
     if stored["outcome"] == "converged":
-        assert stored["residual"] <= TARGET.tolerance
+        assert stored["residual"] <= RESIDUAL
     # The file itself holds it: to rounding of overlaps, which long doubles know to 1e-13.
     packing = read_packing(out)
     found = Landscape(packing, sides=SIDES).evaluate(State.of(packing))
@@ -149,8 +151,8 @@ def test_packings_without_a_target_are_the_first_that_are_jammed(case, tmp_path)
     for _ in make(recipe, tmp_path / "a.h5"):
         pass
     stored = read_attributes(tmp_path / "a.h5")
-    assert 1 < stored["energy_per_particle"] / QUASISTATIC.energy <= QUASISTATIC.closeness
-    assert stored["residual"] <= QUASISTATIC.tolerance
+    assert 1e-6 < stored["energy_per_particle"] <= 2e-6
+    assert stored["residual"] <= 1e-3
 
 
 def assert_same_packing(one, other):
@@ -291,22 +293,21 @@ def test_no_mode_of_a_minimum_is_unstable(case, modes, measured):
 @EVERY
 def test_eigenvalues_are_those_of_the_hessian_of_the_landscape(case, modes):
     landscape, state, matrix, found = modes(case)
-    hessian = landscape.curvature(state, extended=True).hessian.toarray()
-    motion = [matrix.coordinates.motion(row) for row in np.eye(matrix.size)]
-    length = np.where(landscape.rotation_length > 0, landscape.rotation_length, 1.0)[:, None]
-    columns = [
-        landscape.coordinates(np.column_stack([shift, turn * length])) for shift, turn in motion
-    ]
+    held = matrix.coordinates.backbone
+    rests = {name: getattr(state.packing(landscape.particles), name)[held] for name in RESTS}
+    backbone = taken(state.packing(landscape.particles), held, **rests)
+    alone = Landscape(backbone, sides=SIDES)
+    hessian = alone.curvature(State.of(backbone), extended=True).hessian
+    length = np.where(alone.rotation_length > 0, alone.rotation_length, 1.0)[:, None]
+    columns = []
+    for one in np.eye(matrix.size):
+        shift, turn = (part[held] for part in matrix.coordinates.motion(one))
+        columns.append(alone.coordinates(np.column_stack([shift, turn * length])))
     embedding = np.array(columns).T
     np.testing.assert_allclose(embedding.T @ embedding, np.eye(matrix.size), atol=1e-12)
-    held = embedding.T @ hessian @ embedding
-    # Contacts with rattlers have nearly no force, but all of their stiffness.
-    kept = ~landscape.rattlers(state)
-    if kept.all():
-        rounding = len(held) * EPS * np.abs(held).max()
-        expected = np.linalg.eigvalsh(held)
-        off = np.abs(np.sort(found.eigenvalues) - expected)
-        assert (off <= 10 * rounding + found.bound).all()
+    expected = np.linalg.eigvalsh(embedding.T @ hessian @ embedding)
+    rounding = 10 * matrix.size * EPS * expected[-1]
+    assert (np.abs(found.eigenvalues - expected) <= rounding + found.bound).all()
 
 
 @EVERY
@@ -359,12 +360,17 @@ def test_a_packing_is_led_to_other_energies(case, made, tmp_path, measured):
     assert packing.shape_style == case.shape
 
 
-@TYPICAL_ONES
+@EVERY
 def test_what_is_measured_does_not_depend_on_the_order_of_particles(case, made):
-    packing = read_packing(made(case))
-    landscape, state = Landscape(packing, sides=SIDES), State.of(packing)
-    minimum = minimise(landscape, state, "auto", Stop(tolerance=1.0))
-    numbers = measure(landscape, minimum).attributes
-    stored = read_attributes(made(case))
-    for name in ("z", "z_single", "n_rattlers", "n_bonds", "phi", "S2", "u"):
-        assert numbers[name] == pytest.approx(stored[name], rel=1e-9, abs=0, nan_ok=True), name
+    packing, stored = read_packing(made(case)), read_attributes(made(case))
+    rows = np.random.default_rng(1).permutation(packing.n)
+    mixed = taken(packing, rows, **{name: getattr(packing, name)[rows] for name in RESTS})
+    minimum = minimise(Landscape(mixed, sides=SIDES), State.of(mixed), stop=Stop(tolerance=1e-6))
+    found = measure(Landscape(mixed, sides=SIDES), minimum)
+    np.testing.assert_array_equal(
+        np.sort(found.observables["rattler_ids"]),
+        np.sort(read_observables(made(case))["rattler_ids"][0]),
+    )
+    for name in ("z", "z_single", "n_rattlers", "n_bonds", "phi", "S2", "u", "pressure"):
+        expected = pytest.approx(stored[name], rel=1e-9, abs=0, nan_ok=True)
+        assert found.attributes[name] == expected, name
