@@ -63,6 +63,8 @@ def test_bonds_make_up_their_contacts(packing):
         assert ((bonds.force * bonds.normal).sum(axis=1) > 0).all()
         if sides != laws(packing)[0]:  # bonds that fade turn particles by more than their forces do
             continue
+        overlap = 1 - bonds.distance / bonds.reach
+        np.testing.assert_allclose(bonds.energy, 0.5 * 1.7 * overlap**2, rtol=0, atol=ROUNDING)
         arm_i = bonds.point - packing.position[i[bonds.contact]]
         arm_j = arm_i + network.separation[bonds.contact]
         for arm, sign, expected in ((arm_i, 1, network.torque_i), (arm_j, -1, network.torque_j)):
@@ -81,6 +83,19 @@ def crossed(arm, force):
     if arm.shape[1] == 3:
         return np.cross(arm, force)
     return (arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])[:, None]
+
+
+def test_round_particles_are_pushed_along_the_line_between_centres(packing, network):
+    force, _ = size_of(network)
+    size = ROUNDING * force * packing.outer_radius.max()
+    i, j = network.pairs.T
+    assert np.abs(network.torque_i[packing.is_round[i]]).max(initial=0.0) <= size
+    assert np.abs(network.torque_j[packing.is_round[j]]).max(initial=0.0) <= size
+    both = packing.is_round[i] & packing.is_round[j]
+    across = crossed(network.separation[both], network.force[both])
+    assert np.abs(across).max(initial=0.0) <= size
+    along = (network.separation[both] * network.force[both]).sum(axis=1)
+    assert (along > 0).all()
 
 
 # --- what changes nothing ------------------------------------------------------------------------

@@ -6,7 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from every_shape import EPS, MIXTURES, SIDES, TYPICAL, Case, close_to, particles_of, taken
+from every_shape import (
+    EPS,
+    MIXTURES,
+    SIDES,
+    TYPICAL,
+    Case,
+    close_to,
+    in_doubles,
+    particles_of,
+    taken,
+)
 
 from jamshape.contacts import coordination, find_contacts, find_rattlers
 from jamshape.files.h5md import (
@@ -16,6 +26,7 @@ from jamshape.files.h5md import (
     read_report,
     write_packing,
 )
+from jamshape.files.run_writer import RunWriter
 from jamshape.landscape import Landscape
 from jamshape.measures.minimum import measure
 from jamshape.minima import METHODS, Outcome, Stop, minimise
@@ -182,6 +193,34 @@ def test_what_was_cut_off_goes_on_to_the_same_bits(case, made, tmp_path, monkeyp
     assert len(stages) > 5
     assert_same_packing(out, made(case))
     assert {path.name for path in tmp_path.iterdir()} == {"a.h5"}
+
+
+def compressed(recipe, out, packing):
+    """What a compression by dynamics leaves, ended at some packing."""
+    writer = RunWriter.create(out.with_name(out.name + ".run.h5"), packing, {})
+    phi = np.linspace(0.9, 1.0, 20) * packing.phi
+    rows = {"phi": phi, "pressure": 0.0 * phi, "kappa": np.ones(20)}
+    writer.append_series(np.arange(20), np.arange(20.0), rows)
+    writer.set_attributes(recipe.attributes() | {"finished": True})
+
+
+@TYPICAL_ONES
+def test_a_search_from_below_jamming_goes_on_to_the_same_bits(case, made, tmp_path):
+    packing = read_packing(made(case))
+    loose = in_doubles(State.of(packing).strained(2e-3).packing(packing))
+    recipe = recipe_of(case, way=Dynamics(FAST))
+    whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
+    for out in (whole, cut):
+        compressed(recipe, out, loose)
+    stages = [at.stage for at in make(recipe, whole)]
+    assert set(stages) == {"search"}
+    assert len(stages) > 3
+    assert_at_the_energy(whole)
+    cut_off(recipe, cut, 2)
+    assert (tmp_path / "cut.h5.search.h5").exists()
+    assert len(list(make(recipe, cut))) == len(stages) - 2
+    assert_same_packing(cut, whole)
+    assert not (tmp_path / "cut.h5.search.h5").exists()
 
 
 @TYPICAL_ONES
