@@ -6,6 +6,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 
 from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape
@@ -178,6 +179,11 @@ def replicated(packing, times):
     moved = packing.position[rows] + np.repeat(shifts, packing.n, axis=0) * packing.box.edges
     box = Box(packing.box.lo, times * packing.box.edges)
     return taken(packing, rows, id=1 + np.arange(len(rows)), position=moved, box=box)
+
+
+def close_to(value, rel):
+    """Of a number, however small."""
+    return pytest.approx(value, rel=rel, abs=0)
 
 
 def size_of(network):

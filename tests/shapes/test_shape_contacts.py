@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from every_shape import (
     EPS,
+    PURE,
     ROUNDING,
     SIDES,
     TYPICAL,
     apart,
     as_vectors,
+    close_to,
     kicked,
     laws,
     replicated,
@@ -18,9 +20,17 @@ from every_shape import (
     turned_as_a_whole,
 )
 
-from jamshape.contacts import PairArrays, find_contacts, forces, sum_forces
+from jamshape.contacts import (
+    CrossingError,
+    PairArrays,
+    coordination,
+    find_contacts,
+    find_rattlers,
+    forces,
+    sum_forces,
+)
 from jamshape.contacts.near import NearPairs
-from jamshape.landscape import CrossingError, Landscape
+from jamshape.landscape import Landscape
 from jamshape.packing import State
 from jamshape.shapes.shape import Interaction
 
@@ -53,6 +63,8 @@ def test_bonds_make_up_their_contacts(packing):
         assert ((bonds.force * bonds.normal).sum(axis=1) > 0).all()
         if sides != laws(packing)[0]:  # bonds that fade turn particles by more than their forces do
             continue
+        overlap = 1 - bonds.distance / bonds.reach
+        np.testing.assert_allclose(bonds.energy, 0.5 * 1.7 * overlap**2, rtol=0, atol=ROUNDING)
         arm_i = bonds.point - packing.position[i[bonds.contact]]
         arm_j = arm_i + network.separation[bonds.contact]
         for arm, sign, expected in ((arm_i, 1, network.torque_i), (arm_j, -1, network.torque_j)):
@@ -71,6 +83,19 @@ def crossed(arm, force):
     if arm.shape[1] == 3:
         return np.cross(arm, force)
     return (arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])[:, None]
+
+
+def test_round_particles_are_pushed_along_the_line_between_centres(packing, network):
+    force, _ = size_of(network)
+    size = ROUNDING * force * packing.outer_radius.max()
+    i, j = network.pairs.T
+    assert np.abs(network.torque_i[packing.is_round[i]]).max(initial=0.0) <= size
+    assert np.abs(network.torque_j[packing.is_round[j]]).max(initial=0.0) <= size
+    both = packing.is_round[i] & packing.is_round[j]
+    across = crossed(network.separation[both], network.force[both])
+    assert np.abs(across).max(initial=0.0) <= size
+    along = (network.separation[both] * network.force[both]).sum(axis=1)
+    assert (along > 0).all()
 
 
 # --- what changes nothing ------------------------------------------------------------------------
@@ -109,7 +134,7 @@ def assert_same_but_for_rounding(packing, changed, rows=slice(None), matrix=None
     # Positions are rounded to the size of the box; forces are stiff as k_e over lengths squared.
     away = np.abs(changed.position - packing.box.lo).max() / packing.compiled().inner_radius.min()
     size = ROUNDING * (1 + away) * max(force, torque)
-    assert found.energy == pytest.approx(expected.energy, rel=ROUNDING * (1 + away))
+    assert found.energy == close_to(expected.energy, ROUNDING * (1 + away))
     np.testing.assert_allclose(found.force, expected.force[rows] @ matrix.T, rtol=0, atol=size)
     wanted = as_vectors(expected.torque[rows]) @ of_torque.T
     np.testing.assert_allclose(as_vectors(found.torque), wanted, rtol=0, atol=size)
@@ -150,10 +175,33 @@ def test_particles_may_turn_about_their_axes_of_symmetry(packing):
         turn if packing.dimension == 3 else turn[:, 2:],
     )
     one, other = landscape.evaluate(state), Landscape(packing).evaluate(turned)
-    assert other.energy == pytest.approx(one.energy, rel=ROUNDING)
+    assert other.energy == close_to(one.energy, ROUNDING)
     D, size = packing.dimension, 10 * ROUNDING * one.bond_force
     gradients = [landscape.components(x.gradient)[:, :D] for x in (one, other)]
     np.testing.assert_allclose(*gradients, rtol=0, atol=size)
+
+
+# --- what holds a particle -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", PURE, ids=str)
+def test_two_particles_that_barely_touch_hold_neither(case):
+    packing = scattered(case, 2, phi=0.01)
+    towards = packing.position[0] - packing.position[1]
+    far, near = 1.0, 0.0  # of their distance
+    for _ in range(60):
+        middle = 0.5 * (far + near)
+        position = np.array([packing.position[1] + middle * towards, packing.position[1]])
+        closer = packing.with_(position=position)
+        touching = len(find_contacts(closer, sides=SIDES).pairs) > 0
+        far, near = (far, middle) if touching else (middle, near)
+    position[0] = packing.position[1] + (near - 1e-6) * towards
+    closer = packing.with_(position=position)
+    network = find_contacts(closer, sides=SIDES)
+    assert len(network.pairs) == 1
+    assert network.n_bonds[0] <= 2
+    assert find_rattlers(closer, network).all()
+    assert coordination(closer, network) == (0.0, 0.0, 2, 0, 0)
 
 
 # --- what is refused -----------------------------------------------------------------------------

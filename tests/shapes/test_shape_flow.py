@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from every_shape import EPS, MIXTURES, SIDES, TYPICAL, pressed, scattered, squeezed
+from every_shape import EPS, MIXTURES, SIDES, TYPICAL, close_to, pressed, scattered, squeezed
 from in_lammps import fix_value, holding, law_of
 from slopes import slope_at_0
 
@@ -76,7 +76,7 @@ def test_lone_particles_follow_the_box_implicitly(case):
     np.testing.assert_allclose(np.float64(scale), math.exp(-0.1), rtol=1e-13)
     np.testing.assert_allclose(np.float64(flow.state.position / scale), start.position, rtol=1e-13)
     assert steps[-1].pressure == 0
-    assert flow.time == pytest.approx(10.0, rel=1e-12)
+    assert flow.time == close_to(10.0, 1e-12)
 
 
 # --- the same motion by all methods --------------------------------------------------------------
@@ -94,7 +94,7 @@ def by_lammps(start, phi_end, integrator, tolerance):
         run = CompressionRun(session, settings, start)
         run.advance(run.last_step)
         found = run.measure()
-    assert found["phi"] == pytest.approx(phi_end, rel=1e-10)
+    assert found["phi"] == close_to(phi_end, 1e-10)
     return found["pressure"]
 
 

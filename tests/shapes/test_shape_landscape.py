@@ -12,6 +12,7 @@ from every_shape import (
     SIDES,
     TYPICAL,
     as_vectors,
+    close_to,
     pressed,
     size_of,
 )
@@ -101,8 +102,8 @@ def test_the_virial_is_the_slope_of_the_energy_along_each_axis(packing):
     landscape, state = Landscape(packing), State.of(packing)
     found = forces(packing, sides=SIDES)
     scale = np.abs(found.virial).max()
-    assert np.trace(found.virial) / (packing.dimension * packing.box.volume) == pytest.approx(
-        found.pressure, rel=4 * EPS
+    assert np.trace(found.virial) / (packing.dimension * packing.box.volume) == close_to(
+        found.pressure, 4 * EPS
     )
     for axis in range(packing.dimension):
 
@@ -128,17 +129,17 @@ def test_the_landscape_is_the_sum_of_the_contacts(packing, network):
     turns = landscape.rotation_length > 0
     expected = -as_vectors(found.torque)[turns]
     np.testing.assert_allclose(turned[turns], expected, rtol=0, atol=ROUNDING * max(torque, force))
-    assert here.energy == pytest.approx(found.energy, rel=ROUNDING)
-    assert here.strain_gradient == pytest.approx(-np.trace(found.virial), rel=ROUNDING)
+    assert here.energy == close_to(found.energy, ROUNDING)
+    assert here.strain_gradient == close_to(-np.trace(found.virial), ROUNDING)
     assert here.n_bonds == network.n_bonds.sum()
     bond_force = np.linalg.norm(network.bonds.force, axis=1).mean()
-    assert here.bond_force == pytest.approx(bond_force, rel=ROUNDING)
+    assert here.bond_force == close_to(bond_force, ROUNDING)
 
 
 def test_long_doubles_agree_with_doubles(packing):
     landscape, state = Landscape(packing), State.of(packing)
     short, long = (landscape.evaluate(state, extended=extended) for extended in (False, True))
-    assert short.energy == pytest.approx(long.energy, rel=ROUNDING)
+    assert short.energy == close_to(long.energy, ROUNDING)
     assert np.abs(short.gradient - long.gradient).max() <= ROUNDING * long.bond_force
     assert not np.array_equal(short.gradient, long.gradient)
     short, long = (landscape.curvature(state, extended=extended) for extended in (False, True))
@@ -164,7 +165,7 @@ def test_lists_of_pairs_are_renewed_in_time(case, measured):
             break
         found = landscape.evaluate(state, extended=False)
         assert found.n_bonds == expected.n_bonds
-        assert found.energy == pytest.approx(expected.energy, rel=ROUNDING)
+        assert found.energy == close_to(expected.energy, ROUNDING)
         renewed += landscape.pairs_at(state) is not lists
         lists = landscape.pairs_at(state)
     measured(renewed=renewed)
@@ -192,7 +193,7 @@ def test_the_vicinity_has_the_energy_of_the_landscape(case, extended):
     size = ROUNDING * expected.bond_force
     np.testing.assert_allclose(found.gradient, expected.gradient, rtol=0, atol=size)
     for name in ("energy", "strain_gradient", "bond_force", "n_bonds"):
-        assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=ROUNDING)
+        assert getattr(found, name) == close_to(getattr(expected, name), ROUNDING)
 
 
 @PLANE

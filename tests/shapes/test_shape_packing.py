@@ -6,7 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from every_shape import EPS, MIXTURES, SIDES, TYPICAL, Case, particles_of
+from every_shape import (
+    EPS,
+    MIXTURES,
+    SIDES,
+    TYPICAL,
+    Case,
+    close_to,
+    in_doubles,
+    particles_of,
+    taken,
+)
 
 from jamshape.contacts import coordination, find_contacts, find_rattlers
 from jamshape.files.h5md import (
@@ -16,6 +26,7 @@ from jamshape.files.h5md import (
     read_report,
     write_packing,
 )
+from jamshape.files.run_writer import RunWriter
 from jamshape.landscape import Landscape
 from jamshape.measures.minimum import measure
 from jamshape.minima import METHODS, Outcome, Stop, minimise
@@ -32,12 +43,14 @@ from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum, state_error
 from jamshape.vibration.statistics import components, count, participation
 
-U0 = 1e-10
+# What is asked for: the energy density, how well it is met, and what may be left of the forces.
+U0, ACCURACY, RESIDUAL = 1e-10, 1e-7, 1e-8
 TARGET = Target(U0)
 
 # Coarse, since the energy is led to its target from wherever this ends.
-QUASISTATIC = Quasistatic(step=0.03, energy=1e-6, tolerance=1e-3)
+QUASISTATIC = Quasistatic(step=0.03, energy=1e-6, closeness=2.0, tolerance=1e-3)
 FAST = Approach(kappa=5e-3, kappa_start=2e-2, p_flow=1e-2, p_end=5e-2, p_open=4e-2, strain=2e-3)
+RESTS = ("position", "position_rest", "orientation", "orientation_rest")
 CASES = [*TYPICAL, *MIXTURES]
 EVERY = pytest.mark.parametrize("case", CASES, ids=str)
 TYPICAL_ONES = pytest.mark.parametrize("case", TYPICAL, ids=str)
@@ -85,13 +98,13 @@ def assert_at_the_energy(out, u0=U0):
     stored = read_attributes(out)
     assert is_done(out)
     assert stored["outcome"] in {"converged", "sliding"}
-    assert abs(stored["u"] / u0 - 1) <= TARGET.accuracy
+    assert abs(stored["u"] / u0 - 1) <= ACCURACY
     if stored["outcome"] == "converged":
-        assert stored["residual"] <= TARGET.tolerance
+        assert stored["residual"] <= RESIDUAL
     # The file itself holds it: to rounding of overlaps, which long doubles know to 1e-13.
     packing = read_packing(out)
     found = Landscape(packing, sides=SIDES).evaluate(State.of(packing))
-    assert found.energy / packing.box.volume == pytest.approx(stored["u"], rel=1e-10, abs=0)
+    assert found.energy / packing.box.volume == close_to(stored["u"], 1e-10)
     return stored, packing
 
 
@@ -108,7 +121,7 @@ def test_steps_lead_to_the_energy(case, made, measured):
     )
     rattlers = packing.id[find_rattlers(packing, network)]
     np.testing.assert_array_equal(read_observables(made(case))["rattler_ids"][0], rattlers)
-    assert stored["phi"] == pytest.approx(packing.phi, rel=4 * EPS)
+    assert stored["phi"] == close_to(packing.phi, 4 * EPS)
     assert stored["phi_J"] < stored["phi"]
     assert stored["z"] > case.dimension + 1
     assert 0 < stored["pressure"] < 1e-3
@@ -149,8 +162,8 @@ def test_packings_without_a_target_are_the_first_that_are_jammed(case, tmp_path)
     for _ in make(recipe, tmp_path / "a.h5"):
         pass
     stored = read_attributes(tmp_path / "a.h5")
-    assert 1 < stored["energy_per_particle"] / QUASISTATIC.energy <= QUASISTATIC.closeness
-    assert stored["residual"] <= QUASISTATIC.tolerance
+    assert 1e-6 < stored["energy_per_particle"] <= 2e-6
+    assert stored["residual"] <= 1e-3
 
 
 def assert_same_packing(one, other):
@@ -180,6 +193,34 @@ def test_what_was_cut_off_goes_on_to_the_same_bits(case, made, tmp_path, monkeyp
     assert len(stages) > 5
     assert_same_packing(out, made(case))
     assert {path.name for path in tmp_path.iterdir()} == {"a.h5"}
+
+
+def compressed(recipe, out, packing):
+    """What a compression by dynamics leaves, ended at some packing."""
+    writer = RunWriter.create(out.with_name(out.name + ".run.h5"), packing, {})
+    phi = np.linspace(0.9, 1.0, 20) * packing.phi
+    rows = {"phi": phi, "pressure": 0.0 * phi, "kappa": np.ones(20)}
+    writer.append_series(np.arange(20), np.arange(20.0), rows)
+    writer.set_attributes(recipe.attributes() | {"finished": True})
+
+
+@TYPICAL_ONES
+def test_a_search_from_below_jamming_goes_on_to_the_same_bits(case, made, tmp_path):
+    packing = read_packing(made(case))
+    loose = in_doubles(State.of(packing).strained(2e-3).packing(packing))
+    recipe = recipe_of(case, way=Dynamics(FAST))
+    whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
+    for out in (whole, cut):
+        compressed(recipe, out, loose)
+    stages = [at.stage for at in make(recipe, whole)]
+    assert set(stages) == {"search"}
+    assert len(stages) > 3
+    assert_at_the_energy(whole)
+    cut_off(recipe, cut, 2)
+    assert (tmp_path / "cut.h5.search.h5").exists()
+    assert len(list(make(recipe, cut))) == len(stages) - 2
+    assert_same_packing(cut, whole)
+    assert not (tmp_path / "cut.h5.search.h5").exists()
 
 
 @TYPICAL_ONES
@@ -229,7 +270,7 @@ def test_every_minimiser_finds_a_minimum(case, method, made, measured):
     assert found.evaluation.energy < start.energy
     assert found.outcome in {Outcome.CONVERGED, Outcome.SLIDING, Outcome.STALLED}
     again = Landscape(packing, sides=SIDES).evaluate(found.state)
-    assert again.energy == pytest.approx(found.evaluation.energy, rel=1e-9)
+    assert again.energy == close_to(found.evaluation.energy, 1e-9)
     assert found.outcome is Outcome.STALLED or found.residual.largest <= 1e-4
     assert found.outcome is not Outcome.STALLED or method in {"paper", "lammps", "lbfgs"}
 
@@ -291,22 +332,21 @@ def test_no_mode_of_a_minimum_is_unstable(case, modes, measured):
 @EVERY
 def test_eigenvalues_are_those_of_the_hessian_of_the_landscape(case, modes):
     landscape, state, matrix, found = modes(case)
-    hessian = landscape.curvature(state, extended=True).hessian.toarray()
-    motion = [matrix.coordinates.motion(row) for row in np.eye(matrix.size)]
-    length = np.where(landscape.rotation_length > 0, landscape.rotation_length, 1.0)[:, None]
-    columns = [
-        landscape.coordinates(np.column_stack([shift, turn * length])) for shift, turn in motion
-    ]
+    held = matrix.coordinates.backbone
+    rests = {name: getattr(state.packing(landscape.particles), name)[held] for name in RESTS}
+    backbone = taken(state.packing(landscape.particles), held, **rests)
+    alone = Landscape(backbone, sides=SIDES)
+    hessian = alone.curvature(State.of(backbone), extended=True).hessian
+    length = np.where(alone.rotation_length > 0, alone.rotation_length, 1.0)[:, None]
+    columns = []
+    for one in np.eye(matrix.size):
+        shift, turn = (part[held] for part in matrix.coordinates.motion(one))
+        columns.append(alone.coordinates(np.column_stack([shift, turn * length])))
     embedding = np.array(columns).T
     np.testing.assert_allclose(embedding.T @ embedding, np.eye(matrix.size), atol=1e-12)
-    held = embedding.T @ hessian @ embedding
-    # Contacts with rattlers have nearly no force, but all of their stiffness.
-    kept = ~landscape.rattlers(state)
-    if kept.all():
-        rounding = len(held) * EPS * np.abs(held).max()
-        expected = np.linalg.eigvalsh(held)
-        off = np.abs(np.sort(found.eigenvalues) - expected)
-        assert (off <= 10 * rounding + found.bound).all()
+    expected = np.linalg.eigvalsh(embedding.T @ hessian @ embedding)
+    rounding = 10 * matrix.size * EPS * expected[-1]
+    assert (np.abs(found.eigenvalues - expected) <= rounding + found.bound).all()
 
 
 @EVERY
@@ -359,12 +399,17 @@ def test_a_packing_is_led_to_other_energies(case, made, tmp_path, measured):
     assert packing.shape_style == case.shape
 
 
-@TYPICAL_ONES
+@EVERY
 def test_what_is_measured_does_not_depend_on_the_order_of_particles(case, made):
-    packing = read_packing(made(case))
-    landscape, state = Landscape(packing, sides=SIDES), State.of(packing)
-    minimum = minimise(landscape, state, "auto", Stop(tolerance=1.0))
-    numbers = measure(landscape, minimum).attributes
-    stored = read_attributes(made(case))
-    for name in ("z", "z_single", "n_rattlers", "n_bonds", "phi", "S2", "u"):
-        assert numbers[name] == pytest.approx(stored[name], rel=1e-9, nan_ok=True), name
+    packing, stored = read_packing(made(case)), read_attributes(made(case))
+    rows = np.random.default_rng(1).permutation(packing.n)
+    mixed = taken(packing, rows, **{name: getattr(packing, name)[rows] for name in RESTS})
+    minimum = minimise(Landscape(mixed, sides=SIDES), State.of(mixed), stop=Stop(tolerance=1e-6))
+    found = measure(Landscape(mixed, sides=SIDES), minimum)
+    np.testing.assert_array_equal(
+        np.sort(found.observables["rattler_ids"]),
+        np.sort(read_observables(made(case))["rattler_ids"][0]),
+    )
+    for name in ("z", "z_single", "n_rattlers", "n_bonds", "phi", "S2", "u", "pressure"):
+        expected = pytest.approx(stored[name], rel=1e-9, abs=0, nan_ok=True)
+        assert found.attributes[name] == expected, name

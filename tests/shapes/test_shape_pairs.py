@@ -3,11 +3,11 @@
 import itertools
 
 import numpy as np
-import pytest
 from every_shape import (
     ROUNDING,
     SIDES,
     as_vectors,
+    close_to,
     replicated,
     size_of,
 )
@@ -26,7 +26,7 @@ def test_boxes_side_by_side_are_one_packing(packing, network):
     times = 2
     one, many = forces(packing, sides=SIDES), forces(replicated(packing, times), sides=SIDES)
     copies = times**packing.dimension
-    assert many.energy == pytest.approx(copies * one.energy, rel=10 * ROUNDING)
+    assert many.energy == close_to(copies * one.energy, 10 * ROUNDING)
     force, torque = size_of(network)
     size = 10 * ROUNDING * max(force, torque)
     np.testing.assert_allclose(many.force, np.tile(one.force, (copies, 1)), rtol=0, atol=size)
@@ -83,9 +83,9 @@ def test_contacts_are_those_of_all_pairs_and_hard_particles_overlap_there(packin
     assert len(expected) >= packing.n
 
 
-def test_every_contact_is_near(packing, network):
+def test_every_contact_is_near(packing):
     bodies = packing.compiled()
-    expected = rows_of(NearPairs(*network.pairs.T, network.shift))
+    expected = rows_of(contacts_among(packing, every_pair(packing)))
     for margin in (0.0, 0.3 * bodies.inner_radius.min()):
         assert expected <= rows_of(near_particles(packing, bodies, margin))
 

@@ -4,7 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from every_shape import ALL, EPS, MIXTURES, PLACES, PURE, TYPICAL, examples, particles_of, scattered
+from every_shape import (
+    ALL,
+    EPS,
+    MIXTURES,
+    PLACES,
+    PURE,
+    TYPICAL,
+    close_to,
+    examples,
+    particles_of,
+    scattered,
+)
 
 from jamshape.contacts import find_contacts, find_rattlers
 from jamshape.packing import Packing
@@ -42,7 +53,7 @@ def test_parameters_make_particles_that_fit_and_come_back(case):
     for k in range(3):
         found, its_size = shape.parameters_of(diameters[k], float(exponent[k]))
         assert found == pytest.approx(parameters, rel=1e-13, abs=1e-13)
-        assert its_size == pytest.approx(size[k], rel=1e-13)
+        assert its_size == close_to(size[k], 1e-13)
     assert SHAPES[guess_shape_style(diameters)].fits(diameters)
     assert shape.has_exponent or (exponent == 1).all()
     assert "$" in shape.label(parameters)
@@ -119,7 +130,7 @@ def test_outlines_have_the_area_and_the_moment_of_the_particle(case, measured):
         area, moment = areas_and_moments(outline)
         off.append((abs(area / bodies.measure[1] - 1), abs(moment / bodies.moment[1, 2] - 1)))
         radius = np.linalg.norm(outline, axis=1)
-        assert radius.max() == pytest.approx(bodies.outer_radius[1], rel=1e-3)
+        assert radius.max() == close_to(bodies.outer_radius[1], 1e-3)
         assert (radius <= bodies.outer_radius[1] * (1 + 1e-12)).all()
         assert len(outline) >= points / 2
     measured(area=off[1][0], moment=off[1][1])
@@ -186,7 +197,7 @@ def test_freedoms_and_directions_agree(case):
     directed = ~np.isnan(packing.directors[:, 0])
     np.testing.assert_allclose(np.linalg.norm(packing.directors[directed], axis=1), 1, rtol=8 * EPS)
     assert not (directed & packing.is_round).any()
-    assert packing.phi == pytest.approx(packing.measures.sum() / packing.box.volume, rel=1e-15)
+    assert packing.phi == close_to(packing.measures.sum() / packing.box.volume, 1e-15)
     spine = SHAPES[case.shape].spine(packing.diameters[0])
     assert 0 <= spine <= packing.outer_radius[0]
 
@@ -233,7 +244,7 @@ def test_random_starts_have_no_overlaps_and_follow_from_the_seed(case):
 def test_starts_have_the_packing_fraction_that_was_asked_for(case):
     for make in (random_packing, dilute_packing):
         packing = make(10, 0.2, 1, particles_of(case), case.dimension)
-        assert packing.phi == pytest.approx(0.2, rel=1e-13)
+        assert packing.phi == close_to(0.2, 1e-13)
         assert packing.shape_style == case.shape
 
 

@@ -11,6 +11,7 @@ from every_shape import (
     ROUNDING,
     SIDES,
     TYPICAL,
+    close_to,
     in_a_small_box,
     laws,
     pressed,
@@ -61,8 +62,8 @@ def assert_same_forces(packing, law, found, measured):
     measured(force=off, torque=off_torque)
     assert off <= ROUNDING
     assert off_torque <= ROUNDING
-    assert energy == pytest.approx(expected.energy, rel=ROUNDING)
-    assert pressure == pytest.approx(expected.pressure, rel=ROUNDING)
+    assert energy == close_to(expected.energy, ROUNDING)
+    assert pressure == close_to(expected.pressure, ROUNDING)
     assert len(network.pairs) >= 3
 
 
@@ -201,7 +202,7 @@ def test_order_is_that_of_the_library(case):
     at = {"S2": 4, "S4": 5, "C4": 13}
     for name, value in expected.items():
         if not (name == "C4" and found[13] == 0.0):  # of shapes for which it is not defined
-            assert found[at[name]] == pytest.approx(value, rel=1e-11), name
+            assert found[at[name]] == close_to(value, 1e-11), name
 
 
 # --- moving --------------------------------------------------------------------------------------
@@ -224,7 +225,7 @@ def test_cg_relaxes_positions_and_orientations(case, measured):
     assert before > 1.02 * start
     assert after - start < 0.1 * (before - start)
     assert turned > 1e-3
-    assert after == pytest.approx(forces(end, law.k_e, law.sides).energy, rel=1e-11)
+    assert after == close_to(forces(end, law.k_e, law.sides).energy, 1e-11)
 
 
 @pytest.mark.parametrize("case", [*TYPICAL, *MIXTURES], ids=str)
@@ -324,4 +325,4 @@ def assert_same_packing(found, written):
     np.testing.assert_allclose(found.box.edges, expected.box.edges, rtol=8 * EPS)
     told = found.with_(shape_style=written.shape_style, exponent=expected.exponent)
     energy = forces(expected, sides=SIDES).energy
-    assert forces(told, sides=SIDES).energy == pytest.approx(energy, rel=1e-12)
+    assert forces(told, sides=SIDES).energy == close_to(energy, 1e-12)
