@@ -22,18 +22,10 @@ class Dimer(ElongatedShape):
     parameters = (Parameter("alpha", 1.0, "A/R: 1 where the discs just touch", "alpha"),)
     examples = ({"alpha": 1.0}, {"alpha": 0.4}, {"alpha": 1.3})
 
-    def fits(self, diameters: FloatArray) -> bool:
-        """As `Shape.fits`; discs that coincide would count as four bonds with each neighbour."""
-        return super().fits(diameters) and bool((diameters[:, 0] > diameters[:, 1]).all())
-
-    def rule(self) -> str:
-        """As `Shape.rule`."""
-        return "(2(A+R), 2R, 2R) with A > 0"
-
     def sizes(
         self, parameters: Mapping[str, float], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """As `Shape.sizes`."""
+        """As `Shape.sizes`; discs that coincide would count as four bonds with each neighbour."""
         if parameters["alpha"] == 0:
             msg = "alpha is 0, expected A / R above 0: a disc is a spherocylinder of alpha 0"
             raise ValueError(msg)

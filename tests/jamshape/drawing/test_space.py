@@ -8,8 +8,7 @@ from jamshape.shapes.table import SHAPES
 
 def spheres(shape, position):
     n = len(position)
-    diameters, exponent = SHAPES[shape].parameters_of(np.full(3, 2.0), 1.0), np.ones(n)
-    sizes, _ = SHAPES[shape].sizes(diameters[0], np.full(n, diameters[1]))
+    sizes, exponent = np.full((n, 3), 2.0), np.ones(n)
     return Packing(
         position=np.array(position),
         orientation=np.tile([1.0, 0, 0, 0], (n, 1)),
