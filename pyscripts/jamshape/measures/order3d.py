@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import UNIT_QUATERNION_TOLERANCE
-from jamshape.shapes.roundness import director_axis
 
 # So many cosines are held at a time, 16 MB.
 _BLOCK = 2_000_000
@@ -31,35 +30,6 @@ class Order(NamedTuple):
     """(3,) unit vector, of either sign; arbitrary where there is no order."""
 
 
-def directors(axes: ArrayLike, semi_axes: ArrayLike) -> FloatArray:
-    """Choose the axis of each particle that tells its direction, for the nematic order.
-
-    Parameters
-    ----------
-    axes : (N, 3, 3) array_like
-        From `jamshape.packing.body_axes`.
-    semi_axes : (3,) or (N, 3) array_like, [length]
-        Of all particles or of each; `jamshape.shapes.roundness.director_axis` says which axis.
-
-    Returns
-    -------
-    (N, 3) array of float64
-        Unit vectors.
-
-    Raises
-    ------
-    ValueError
-        If axes are no such unit vectors, or semi-axes are not positive or of another number.
-    """
-    u = _units("axes", axes, 3)
-    which = director_axis(semi_axes)
-    if which.shape not in {(), (len(u),)}:
-        found = f"semi-axes have shape {np.shape(semi_axes)}"
-        msg = f"{found}, expected (3,) or ({len(u)}, 3) for {len(u)} particles"
-        raise ValueError(msg)
-    return u[np.arange(len(u)), which]
-
-
 def nematic_order(directors: ArrayLike) -> Order:
     r"""S_2, the largest eigenvalue of :math:`\frac32 \langle s s^T \rangle - \frac12`.
 
@@ -69,7 +39,7 @@ def nematic_order(directors: ArrayLike) -> Order:
     Parameters
     ----------
     directors : (N, 3) array_like
-        Unit vectors s, such as `directors` finds; their signs do not matter.
+        Unit vectors s, such as `Packing.directors`; their signs do not matter.
 
     Returns
     -------

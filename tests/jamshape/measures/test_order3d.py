@@ -4,7 +4,6 @@ from scipy.spatial.transform import Rotation
 
 from jamshape.measures.order3d import (
     cubatic_order,
-    directors,
     local_cubatic_order,
     local_nematic_order,
     nematic_order,
@@ -170,16 +169,6 @@ def test_directors_in_a_plane():
     angle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
     s = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     assert nematic_order(s).magnitude == pytest.approx(0.25)
-
-
-def test_directors_are_along_the_short_or_the_long_axis():
-    axes = random_axes(3)
-    np.testing.assert_array_equal(directors(axes, (2, 0.5, 2)), axes[:, 1])  # a disc
-    np.testing.assert_array_equal(directors(axes, (1, 1, 4)), axes[:, 2])  # a needle
-    each = directors(axes, [[2, 0.5, 2], [1, 1, 4], [5, 1, 1]])
-    np.testing.assert_array_equal(each, axes[[0, 1, 2], [1, 2, 0]])
-    with pytest.raises(ValueError, match=r"shape \(2, 3\), expected \(3,\) or \(3, 3\)"):
-        directors(axes, np.ones((2, 3)))
 
 
 def test_particles_without_contacts_have_no_local_order():
