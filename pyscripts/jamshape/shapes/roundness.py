@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import elliprg, gamma
 
-from jamshape.arrays import FloatArray, IntArray
+from jamshape.arrays import FloatArray
 
 OCTAHEDRON = 0.5  # the least p of a convex body
 
@@ -25,9 +25,6 @@ _STEPS = (1 / 4, 1 / 8, 1 / 16, 1 / 32)
 
 # The integrand is left out where its weight has fallen to exp of minus this.
 _TAIL = 40.0
-
-# A reduced aspect ratio this close to 1 is that of a self-dual shape but for rounding.
-_SELF_DUAL = 1e-9
 
 
 class SurfaceArea(NamedTuple):
@@ -190,24 +187,6 @@ def reduced_aspect_ratio(semi_axes: ArrayLike) -> FloatArray:
     axes, _ = checked(semi_axes, 1.0)
     a, b, c = np.moveaxis(np.sort(axes, axis=-1), -1, 0)
     return np.asarray((a / b) * (c / b))
-
-
-def director_axis(semi_axes: ArrayLike) -> IntArray:
-    """Which axis of the body tells its direction: the shortest if it is flat, the longest if it is long.
-
-    Yuan et al. 2019, Sec. 2.4, of the nematic order S_2. They do not say which one it is for self-dual
-    shapes, beta = 1: here the shortest, and the first one if all are equal.
-
-    Parameters and errors are those of `reduced_aspect_ratio`.
-
-    Returns
-    -------
-    (...) array of int64
-        0, 1 or 2 for the body's x, y or z.
-    """
-    axes, _ = checked(semi_axes, 1.0)
-    is_long = reduced_aspect_ratio(axes) > 1 + _SELF_DUAL
-    return np.asarray(np.where(is_long, axes.argmax(axis=-1), axes.argmin(axis=-1)), np.int64)
 
 
 def _area_of(axes: FloatArray, p: float) -> tuple[float, float]:
