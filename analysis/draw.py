@@ -29,7 +29,7 @@ from jamshape.drawing.space import save_smooth
 from jamshape.drawing.text import is_told_by_parameters, scientific
 from jamshape.files.h5md import FileFormatError, read_attributes
 from jamshape.files.lammps_text import read_any
-from jamshape.files.sets import Contacts
+from jamshape.contacts import Contacts
 from jamshape.measures.minimum import order
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ from jamshape.command import parser_of, report, run
 from jamshape.drawing.packing import add_legend, colorings, draw_packing
 from jamshape.drawing.space import save_smooth
 from jamshape.drawing.text import counted, system_labels
-from jamshape.files.sets import Choice, Contacts, Groups, choose, read_groups
+from jamshape.contacts import Contacts
+from jamshape.files.sets import Choice, Groups, choose, read_groups
 
 PAPER_ALPHAS = (0.01, 4.0)
 INCHES, ROOM = 5.0, 0.9  # of a panel, and below it

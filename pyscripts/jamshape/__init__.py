@@ -1,1 +1,26 @@
-"""jamshape."""
+"""Jamming of soft, frictionless, athermal particles that are not round.
+
+>>> import jamshape as js
+>>> rods = js.Spherocylinders(alpha=4)
+>>> packing = js.make_packing(rods, n=24, u0=1e-8, progress=False)
+>>> packing.n, packing.z > 4
+(24, True)
+
+Names are loaded when they are first used, so that the import itself is quick and needs neither LAMMPS nor HDF5 nor
+matplotlib; ``__init__.pyi`` lists them.
+"""
+
+import lazy_loader as _lazy
+
+_load, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
+
+
+def __getattr__(name):  # type: ignore[no-untyped-def]
+    if name == "__version__":
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            return version(__name__)
+        except PackageNotFoundError:
+            return "0+not.installed"
+    return _load(name)

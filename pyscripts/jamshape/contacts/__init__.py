@@ -1,5 +1,6 @@
 """Near pairs, contacts, forces and rattlers of a packing."""
 
+from jamshape.contacts.found import Contacts
 from jamshape.contacts.near import NearPairs, PairArrays, Spheres, each_once, near_pairs
 from jamshape.contacts.network import (
     Bonds,
@@ -18,6 +19,7 @@ __all__ = [
     "Bonds",
     "ContactKind",
     "ContactNetwork",
+    "Contacts",
     "Coordination",
     "CrossingError",
     "Forces",

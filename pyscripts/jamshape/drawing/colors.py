@@ -9,7 +9,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.drawing.kinds import kinds_of
 from jamshape.drawing.styles import GREEN, KINDS, RATTLER, RED, YELLOW
-from jamshape.files.sets import Contacts
+from jamshape.contacts import Contacts
 from jamshape.measures.local_order import NAMES, local_order
 from jamshape.packing import Packing
 

@@ -18,7 +18,7 @@ from jamshape.drawing.colors import (
     order_of,
 )
 from jamshape.drawing.styles import KINDS
-from jamshape.files.sets import Contacts
+from jamshape.contacts import Contacts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

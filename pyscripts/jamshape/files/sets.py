@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import BoolArray
-from jamshape.contacts import ContactNetwork, find_contacts, find_rattlers
+from jamshape.contacts import Contacts, find_contacts, find_rattlers
 from jamshape.files import layout
 from jamshape.files.h5md import FileFormatError, read_attributes, read_observables, read_packing
 from jamshape.packing import Packing
@@ -31,14 +30,6 @@ CONDITIONS = ("n", "size_ratio", "u0", "kappa")
 
 # Parameters that are the same in this many digits are one.
 _SAME = 1e-9
-
-
-class Contacts(NamedTuple):
-    """A packing with its contacts, two bonds side to side, and its rattlers."""
-
-    packing: Packing
-    network: ContactNetwork
-    rattlers: BoolArray
 
 
 class System(NamedTuple):

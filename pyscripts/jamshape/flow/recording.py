@@ -7,7 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_series
+from jamshape.files.h5md import (
+    read_attributes,
+    read_observables,
+    read_packing,
+    read_series,
+    read_style,
+    require_attributes,
+)
 from jamshape.files.run_writer import RunWriter
 from jamshape.flow.compression import Compression, CompressionRun, Row
 from jamshape.measures.onset import fit_onset
@@ -62,6 +69,24 @@ class Recording:
 def is_finished(path: Path) -> bool:
     """Whether the file holds a compression that reached its end."""
     return path.exists() and bool(read_attributes(path).get("finished"))
+
+
+def require_same(to: Recording, settings: Compression, dimension: int) -> None:
+    """Refuse the file of another run.
+
+    Raises
+    ------
+    ValueError
+    """
+    expected = dataclasses.asdict(settings) | dict(to.attributes)
+    require_attributes(to.path, expected | {"rows": to.rows, "frames": to.frames}, "a compression")
+    found = read_style(to.path)[1]
+    if found != dimension:
+        msg = (
+            f"{to.path} holds a compression in {found} dimensions, expected {dimension};"
+            " write to another file, or make it again"
+        )
+        raise ValueError(msg)
 
 
 def begin(session: Session, settings: Compression, start: Packing, to: Recording) -> CompressionRun:

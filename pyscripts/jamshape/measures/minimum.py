@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import BoolArray, FloatArray
-from jamshape.contacts import ContactNetwork, coordination, find_contacts, find_rattlers
+from jamshape.contacts import Contacts
 from jamshape.files.h5md import read_attributes, write_packing
 from jamshape.files.run_writer import RunWriter
 from jamshape.landscape import Landscape
@@ -48,11 +48,6 @@ class Measured(NamedTuple):
     observables: dict[str, FloatArray]
 
 
-class _Contacts(NamedTuple):
-    network: ContactNetwork
-    rattlers: BoolArray
-
-
 def write_minimum(
     path: Path, landscape: Landscape, minimum: Minimum, attributes: Mapping[str, Any]
 ) -> None:
@@ -80,8 +75,7 @@ def measure(landscape: Landscape, minimum: Minimum) -> Measured:
         largest of all particles. z counts bonds, z_single contacts.
     """
     packing = minimum.state.packing(landscape.particles)
-    network = find_contacts(packing, landscape.k_e, landscape.sides)
-    found = _Contacts(network, find_rattlers(packing, network))
+    found = Contacts.of(packing, landscape.k_e, landscape.sides)
     u, D = minimum.energy_density, packing.dimension
     pressure = -minimum.evaluation.strain_gradient / (D * minimum.state.volume)
     attributes: dict[str, float | str] = {
@@ -92,7 +86,7 @@ def measure(landscape: Landscape, minimum: Minimum) -> Measured:
         "energy_per_particle": minimum.evaluation.energy / packing.n,
         "pressure": pressure,
         **_residuals(landscape, minimum, found.rattlers),
-        **coordination(packing, network)._asdict(),
+        **found.counts._asdict(),
         "z_iso": 2 * float(packing.freedoms.mean()),
         **order(packing),
     }
@@ -117,7 +111,7 @@ def _residuals(
     }
 
 
-def _net(landscape: Landscape, minimum: Minimum, found: _Contacts) -> dict[str, FloatArray]:
+def _net(landscape: Landscape, minimum: Minimum, found: Contacts) -> dict[str, FloatArray]:
     """Net force and torque of each particle over their averages, in two dimensions."""
     packing, D = landscape.particles, minimum.state.dimension
     held = ~found.rattlers[found.network.pairs].any(axis=1)

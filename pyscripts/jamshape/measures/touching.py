@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.files.sets import Contacts, PackingFile
+from jamshape.contacts import Contacts
+from jamshape.files.sets import PackingFile
 from jamshape.measures.averages import Mean, mean, standard_error
 from jamshape.measures.contact_statistics import (
     ClassFractions,

@@ -84,6 +84,10 @@ class Particles:
     draw: Callable[[int, np.random.Generator], Sizes]
     told: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        known = [f"{k}={v if isinstance(v, str) else format(v, 'g')}" for k, v in self.told.items()]
+        return f"Particles({', '.join([repr(self.shape.name), *known])})"
+
     @classmethod
     def of(
         cls, shape: str | Shape = DEFAULT, size_ratio: float | None = None, **parameters: float

@@ -191,6 +191,12 @@ def read_modes(path: PathLike) -> ModeTable:
         raise FileFormatError(msg) from error
 
 
+def holds_modes(path: PathLike) -> bool:
+    """Whether an HDF5 file is one of `write_modes`, complete or not; OSError if it cannot be opened."""
+    with _h5py().File(path, "r") as file:
+        return "modes" in file
+
+
 def _read(file: h5py.File) -> ModeTable:
     group, of = file["modes"], file["coordinates"]
     columns = {name: group[name][()] for name in _COLUMNS}

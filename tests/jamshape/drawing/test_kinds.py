@@ -1,10 +1,9 @@
 import numpy as np
 from mixtures import bidisperse, of_arrays
 
-from jamshape.contacts import find_contacts
+from jamshape.contacts import Contacts, find_contacts
 from jamshape.drawing.colors import by_kind
 from jamshape.drawing.kinds import MOST, kinds_of
-from jamshape.files.sets import Contacts
 from jamshape.protocols.random_start import random_packing
 
 

@@ -1,0 +1,22 @@
+"""Jamming of soft, frictionless, athermal particles that are not round; see `jamshape.__init__`."""
+
+from .front.compressing import compress as compress
+from .front.compressing import resume as resume
+from .front.compressing import slow_compress as slow_compress
+from .front.files import load as load
+from .front.files import save as save
+from .front.making import make_packing as make_packing
+from .front.modes import Modes as Modes
+from .front.modes import modes as modes
+from .front.packing import MeasuredPacking as MeasuredPacking
+from .front.pictures import plot as plot
+from .front.run import RunFile as RunFile
+from .packing import Box as Box
+from .packing import Packing as Packing
+from .shapes.named import Dimers as Dimers
+from .shapes.named import Spherocylinders as Spherocylinders
+from .shapes.named import Superellipsoids as Superellipsoids
+from .shapes.particles import Kind as Kind
+from .shapes.particles import Particles as Particles
+
+__version__: str

@@ -1,0 +1,75 @@
+"""A packing with its contacts and rattlers, and the numbers that follow from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.contacts.network import ContactNetwork, find_contacts
+from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers
+from jamshape.packing import Packing
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """A packing with its M contacts, and which of its N particles are rattlers.
+
+    Parameters
+    ----------
+    packing : Packing
+    network : ContactNetwork
+    rattlers : (N,) array of bool
+        Particles that their contacts do not hold in place.
+    """
+
+    packing: Packing
+    network: ContactNetwork
+    rattlers: BoolArray
+
+    @classmethod
+    def of(cls, packing: Packing, k_e: float = 1.0, sides: int = 2) -> Contacts:
+        """Find them; arguments and errors as `find_contacts`."""
+        network = find_contacts(packing, k_e, sides)
+        return cls(packing, network, find_rattlers(packing, network))
+
+    @cached_property
+    def counts(self) -> Coordination:
+        """Contact numbers without rattlers (Marschall & Teitel 2018, Sec. III C)."""
+        return coordination(self.packing, self.network)
+
+    @property
+    def z(self) -> float:
+        """Bonds per particle that is no rattler."""
+        return self.counts.z
+
+    @property
+    def z_single(self) -> float:
+        """Contacts per particle that is no rattler."""
+        return self.counts.z_single
+
+    @property
+    def pairs(self) -> IntArray:
+        """(M, 2) rows i <= j of the packing; i = j where a particle touches its own periodic image."""
+        return self.network.pairs
+
+    @property
+    def force(self) -> FloatArray:
+        """(M, D) force on i, [energy / length]; j carries the opposite."""
+        return self.network.force
+
+    @property
+    def energy(self) -> FloatArray:
+        """(M,) elastic energy, [energy]."""
+        return self.network.energy
+
+    def __len__(self) -> int:
+        return len(self.network.pairs)
+
+    def __repr__(self) -> str:
+        c = self.counts
+        held = self.packing.n - c.n_rattlers
+        return (
+            f"<{len(self)} contacts of {self.packing.n} particles: z = {c.z:.4g} bonds for each of"
+            f" the {held} that are no rattlers>"
+        )

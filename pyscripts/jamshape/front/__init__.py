@@ -1,0 +1,1 @@
+"""The front door: what `import jamshape as js` offers, in words of its own."""

@@ -1,0 +1,269 @@
+"""Compressions at a rate: in LAMMPS, and implicit ones as slow as one likes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from jamshape.files.h5md import read_attributes, read_packing, require_attributes
+from jamshape.flow import recording, slow_recording
+from jamshape.flow.compression import Compression
+from jamshape.flow.implicit import Protocol, Step
+from jamshape.flow.recording import Recording
+from jamshape.front.progress import Bar, follow, place
+from jamshape.front.run import RunFile
+from jamshape.lammps.session import Session
+from jamshape.packing import Packing
+from jamshape.protocols.approach import compressed_start
+from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Particles
+
+_PHI_RANDOM = 0.4  # of the random start of a slow compression
+_PER_PHI = 1_000_000  # what the bar of one counts
+
+
+def compress(
+    particles: Particles,
+    *,
+    n: int = 256,
+    dimension: int = 2,
+    phi: tuple[float, float] = (0.4, 0.9),
+    kappa: float = 1e-6,
+    seed: int = 1,
+    integrator: str | None = None,
+    dt: float | None = None,
+    tolerance: float = 1e-4,
+    sides: int = 1,
+    rows: int = 400,
+    frames: int = 20,
+    file: str | Path | None = None,
+    again: bool = False,
+    progress: bool = True,
+) -> RunFile:
+    """Compress particles through jamming in LAMMPS, as Marschall & Teitel 2018, Sec. II.
+
+    Parameters
+    ----------
+    particles : Particles
+        Such as ``Spherocylinders(alpha=4)``.
+    n : int
+        Number of particles.
+    dimension : {2, 3}
+    phi : (float, float)
+        Packing fractions of the random start and of the end.
+    kappa : float, [1/time]
+        Rate: the box shrinks with dL/dt = -kappa L.
+    seed : int
+        Of the random start.
+    integrator : {"rkc2", "heun/adaptive", "heun"}, optional
+        The paper's is ``heun``, with equal time steps; the others choose their own. ``rkc2``, the
+        fastest, when left out, and ``heun`` where `dt` is given.
+    dt : float, [time], optional
+        Time step of ``heun``; 0.05 when left out.
+    tolerance : float
+        Of the others: local error of a step over the typical overlap.
+    sides : {1, 2}
+        Bonds of a side-to-side contact; the paper's dynamics has one.
+    rows, frames : int
+        How many samples of p(phi) and how many snapshots to keep.
+    file : path, optional
+        H5MD file of the run. A finished run of these settings is loaded from it, one that was cut off
+        goes on, and one of other settings is refused. Without it the run is gone with its result.
+    again : bool
+        Begin anew, whatever the file holds.
+    progress : bool
+        Whether a bar on standard error says how far it is.
+
+    Returns
+    -------
+    RunFile
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, or the file holds another run.
+    PluginError
+        If there is no LAMMPS or no plugin for it.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> rods = js.Spherocylinders(alpha=4)
+    >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, progress=False)
+    >>> bool(run.pressure[-1] > 1e-3)
+    True
+    """
+    at = place(file, "run.h5")
+    integrator = integrator or ("rkc2" if dt is None else "heun")
+    settings = Compression(
+        kappa, phi[1], 0.05 if dt is None else dt, sides, integrator=integrator, tolerance=tolerance
+    )
+    if settings.chooses_steps:
+        settings = settings.in_steps(phi[0], rows, dimension)
+    made_from = dict(particles.told) | {"n": n, "seed": seed}
+    to = Recording(at.path, rows, frames, made_from)
+    if again or not at.path.exists():
+        start = random_packing(n, phi[0], seed, particles, dimension)
+        _record(lambda session: recording.begin(session, settings, start, to), to, progress)
+    else:
+        recording.require_same(to, settings, dimension)
+        if not recording.is_finished(at.path):
+            _record(lambda session: recording.resume(session, at.path)[0], to, progress)
+    return RunFile(*at)
+
+
+def resume(file: str | Path, *, progress: bool = True) -> RunFile:
+    """Go on with a compression that was cut off, as it was set; a finished one is loaded.
+
+    Parameters
+    ----------
+    file : path
+        Of a run of `compress` or `slow_compress`.
+    progress : bool
+        Whether a bar on standard error says how far it is.
+
+    Returns
+    -------
+    RunFile
+
+    Raises
+    ------
+    FileFormatError, OSError
+        If it is no such file, or not to be read.
+    """
+    path = Path(file)
+    stored = read_attributes(path)
+    if not stored.get("finished"):
+        if "flow_steps" in stored:
+            _record_slowly(path, progress)
+        else:
+            to = Recording(path, int(stored["rows"]), int(stored["frames"]))
+            _record(lambda session: recording.resume(session, path)[0], to, progress)
+    return RunFile(path)
+
+
+def _record(start: Any, to: Recording, progress: bool) -> None:
+    """Run to the end; `start` makes the run in a session."""
+    with Session() as session:
+        run = start(session)
+        bar = Bar("step", run.last_step, session.step)
+        told = lambda row: (row.step, f"phi {row.observables['phi']:.4f}")  # noqa: E731
+        follow(recording.record(run, to), bar, told, shown=progress)
+
+
+def slow_compress(
+    particles: Particles | None = None,
+    *,
+    n: int = 256,
+    phi: tuple[float, float] = (0.8, 0.9),
+    kappa: float | Sequence[tuple[float, float]] = 1e-8,
+    p_end: float = math.inf,
+    seed: int = 1,
+    start: Packing | str | Path | None = None,
+    method: str = "tr-bdf2",
+    tolerance: float = 1e-3,
+    largest_drop: float = math.inf,
+    file: str | Path | None = None,
+    again: bool = False,
+    progress: bool = True,
+) -> RunFile:
+    """Compress particles in the plane through jamming at any rate, however slow, by implicit steps.
+
+    Parameters
+    ----------
+    particles : Particles
+        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+    n : int
+        Number of particles.
+    phi : (float, float)
+        Packing fractions at which a fast compression in LAMMPS ends and this one begins, and to reach.
+    kappa : float, [1/time], or sequence of (float, float)
+        Rate: the box shrinks with dL/dt = -kappa L. Or pairs of a packing fraction and the rate from
+        there on, ascending.
+    p_end : float, [energy / length^2]
+        It also ends where this pressure is reached.
+    seed : int
+        Of the random start.
+    start : Packing or path, optional
+        What to begin with; of a path, its last frame.
+    method : {"tr-bdf2", "sdirk2", ...}
+        A name of `jamshape.flow.implicit.METHODS`.
+    tolerance : float
+        Local error of a step over the typical overlap.
+    largest_drop : float
+        Part of the elastic energy that one step may lose, so that plastic events are resolved in time.
+    file, again, progress
+        As of `compress`.
+
+    Returns
+    -------
+    RunFile
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, the file holds another run, or neither particles nor a start
+        is given.
+    PluginError
+        If the fast compression finds no LAMMPS or no plugin for it.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> run = js.slow_compress(rods, n=16, phi=(0.7, 0.72), kappa=1e-6, progress=False)
+    >>> round(float(run.phi[-1]), 6)
+    0.72
+    """
+    at = place(file, "slow.h5")
+    rates = kappa if isinstance(kappa, int | float) else tuple(kappa)
+    protocol = Protocol(
+        rates, phi[1], p_end, tolerance, largest_drop=largest_drop, method=method
+    )
+    if at.path.exists() and not again:
+        slow_recording.require_same(at.path, protocol)
+    else:
+        first, made_from = _slow_start(particles, (n, phi[0], seed), start)
+        slow_recording.begin(at.path, first, protocol, made_from)
+    if not slow_recording.is_finished(at.path):
+        _record_slowly(at.path, progress)
+    return RunFile(*at)
+
+
+def _slow_start(
+    particles: Particles | None,
+    numbers: tuple[int, float, int],
+    start: Packing | str | Path | None,
+) -> tuple[Packing, dict[str, Any]]:
+    """Take or make the start of n, phi and a seed, and say what it was made from."""
+    if isinstance(start, Packing):
+        results = getattr(start, "results", {})
+        return start, _known(results, start) | {"start": str(getattr(start, "file", None) or "")}
+    if start is not None:
+        packing = read_packing(start)
+        return packing, _known(read_attributes(start), packing) | {"start": str(start)}
+    if particles is None:
+        msg = "there are neither particles nor a start, expected one of them"
+        raise ValueError(msg)
+    n, phi, seed = numbers
+    random = random_packing(n, _PHI_RANDOM, seed, particles)
+    return compressed_start(random, phi), dict(particles.told) | {"n": n, "seed": seed}
+
+
+def _known(results: Any, start: Packing) -> dict[str, Any]:
+    """Pick what is said of the particles of a start."""
+    own: Iterable[str] = (parameter.name for parameter in start.shape.parameters)
+    names = (*own, "size_ratio", "kinds", "seed")
+    return {name: results[name] for name in names if name in results} | {"n": start.n}
+
+
+def _record_slowly(path: Path, progress: bool) -> None:
+    end = float(read_attributes(path)["phi_end"])
+    bar = Bar("1e-6 phi", round(_PER_PHI * end))
+
+    def told(step: Step) -> tuple[int, str]:
+        return round(_PER_PHI * step.phi), f"phi {step.phi:.6f} p {step.pressure:.3e}"
+
+    follow(slow_recording.record(path), bar, told, shown=progress)

@@ -1,0 +1,117 @@
+"""Mechanically stable packings at a chosen energy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from jamshape.front.packing import MeasuredPacking
+from jamshape.front.progress import Bar, follow, place
+from jamshape.protocols.defaults import recipe_for
+from jamshape.protocols.make import Progress, is_done, make, require_same
+from jamshape.shapes.particles import Particles
+
+
+def make_packing(
+    particles: Particles,
+    *,
+    n: int | None = None,
+    dimension: int | None = None,
+    seed: int = 1,
+    u0: float | None = None,
+    accuracy: float | None = None,
+    tolerance: float | None = None,
+    way: str | None = None,
+    phi_start: float | None = None,
+    kappa: float | None = None,
+    p_end: float | None = None,
+    protocol: int | None = None,
+    phi_thermal: float | None = None,
+    n_sweeps: int | None = None,
+    delta_phi: float | None = None,
+    file: str | Path | None = None,
+    again: bool = False,
+    progress: bool = True,
+) -> MeasuredPacking:
+    """Make one mechanically stable packing: compress, lead it to an energy, measure.
+
+    Parameters
+    ----------
+    particles : Particles
+        Such as ``Spherocylinders(alpha=4)``.
+    n : int, optional
+        Number of particles; 256 in 2D, 400 in 3D when left out.
+    dimension : {2, 3}, optional
+        That of the shape's paper when left out.
+    seed : int
+        Of all that is random.
+    u0 : float, [energy / length^D], optional
+        Elastic energy over the box's area (volume) to lead the packing to, which says how far above
+        jamming it is; 1e-15 when left out, or 0 for the way by steps: the first jammed packing as it is.
+    accuracy : float, optional
+        Of \\|u - u0\\| / u0; 1e-7 when left out.
+    tolerance : float, optional
+        Largest net force and torque on a particle over the mean force of a bond; 1e-8 when left out, or
+        1e-4 for the way by steps without an energy.
+    way : {"dynamics", "steps"}, optional
+        To jamming: by slow compression in LAMMPS (Marschall & Teitel 2018, Sec. III B), usual in 2D, or
+        by quasistatic steps (Yuan et al. 2019, Sec. 2.2), usual in 3D.
+    phi_start : float, optional
+        Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D when left out.
+    kappa : float, [1/time], optional
+        Of the way by dynamics: the slowest compression rate; 4e-7 when left out.
+    p_end : float, [energy / length^D], optional
+        Of that way: the pressure to compress to at that rate; 1e-3 when left out.
+    protocol : {1, 2}, optional
+        Of the way by steps: 2 with Monte Carlo of hard particles on the way, which orders them.
+    phi_thermal, n_sweeps : float, int, optional
+        Of protocol 2: packing fraction and sweeps of the Monte Carlo; 0.55 and 100000 when left out.
+    delta_phi : float, optional
+        Of the way by steps: the step of the packing fraction; 1e-3 when left out.
+    file : path, optional
+        H5MD file of the packing. One of this recipe is loaded from it, one that was cut off goes on from
+        files beside it, and one of another recipe is refused. Without it nothing is kept but the result.
+    again : bool
+        Make it anew, whatever is there.
+    progress : bool
+        Whether a bar on standard error says how far it is.
+
+    Returns
+    -------
+    MeasuredPacking
+        Its ``results["outcome"]`` says whether forces balance to the tolerance.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range or none of the way, or the file holds another packing.
+    TargetError
+        If the energy is not reached.
+    PluginError
+        If the way by dynamics finds no LAMMPS or no plugin for it.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
+    >>> abs(packing.u / 1e-8 - 1) < 1e-6
+    True
+    """
+    recipe = recipe_for(
+        particles, dimension, way, seed, n=n, u0=u0, accuracy=accuracy, tolerance=tolerance,
+        phi_start=phi_start, kappa=kappa, p_end=p_end, protocol=protocol,
+        phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi,
+    )  # fmt: skip
+    at = place(file, "packing.h5")
+    if again or not is_done(at.path):
+        steps = make(recipe, at.path, again=again)
+        follow(steps, Bar("row"), _told, shown=progress)
+    else:
+        require_same(at.path, recipe)
+    packing = MeasuredPacking.read(at.path)
+    # A file that goes with its folder is nothing to name.
+    return packing if at.folder is None else MeasuredPacking.of(packing, packing.results)
+
+
+def _told(at: Progress) -> tuple[None, str]:
+    text = f"{at.stage} phi {at.phi:.6f} u {at.energy_density:.2e} res {at.residual:.1e}"
+    return None, text

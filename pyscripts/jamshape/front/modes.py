@@ -1,0 +1,161 @@
+"""Modes of vibration of a packing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jamshape.arrays import FloatArray
+from jamshape.front.packing import MeasuredPacking
+from jamshape.landscape import Landscape, State
+from jamshape.packing import Packing
+from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.sets import TOLD, to_store
+from jamshape.vibration.sparse_modes import lowest as lowest_modes
+from jamshape.vibration.spectrum import spectrum
+from jamshape.vibration.table import ModeTable, read_modes, tabulate, write_modes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of a packing by ascending eigenvalue, with what is known of each.
+
+    Parameters
+    ----------
+    table : ModeTable
+        All columns; ``modes["participation"]`` looks one up.
+    about : mapping of str to number or str
+        What is known of the packing.
+    packing : MeasuredPacking, optional
+        None of modes that were read from a file.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
+    >>> modes = js.modes(packing)
+    >>> len(modes), len(modes.in_band("translation")), len(modes.in_band("high"))
+    (48, 2, 46)
+    >>> modes
+    <48 modes (0 low, 0 middle, 46 high) of 16 of 16 particles held by 47 bonds: z = 5.875>
+    """
+
+    table: ModeTable
+    about: dict[str, Any]
+    packing: MeasuredPacking | None = None
+    file: Path | None = None
+
+    @classmethod
+    def read(cls, path: Path) -> Modes:
+        """Read modes from a file; errors as `read_modes`."""
+        table = read_modes(path)
+        return cls(table, dict(table.attributes), None, path)
+
+    @property
+    def eigenvalues(self) -> FloatArray:
+        """(k,) eigenvalues of the dynamical matrix, ascending, [energy / length^2]."""
+        return self.table["eigenvalues"]
+
+    @property
+    def omega(self) -> FloatArray:
+        """(k,) frequencies, the roots of the eigenvalues' sizes with the eigenvalues' signs."""
+        return self.table["omega"]
+
+    @property
+    def participation(self) -> FloatArray:
+        """(k,) participation ratios: 1 where all particles move alike, 1/N where one does."""
+        return self.table["participation"]
+
+    @property
+    def vectors(self) -> FloatArray:
+        """(n, k) unit columns in the coordinates of ``table.coordinates``."""
+        return self.table.vectors
+
+    def __getitem__(self, name: str) -> Any:
+        return self.table[name]
+
+    def __len__(self) -> int:
+        return len(self.table["eigenvalues"])
+
+    def in_band(self, name: str) -> Any:
+        """Rows of the modes of a band: translation, low, middle or high."""
+        return self.table.in_band(name)
+
+    def plot(self, axes: Axes | None = None, **look: Any) -> Axes:
+        """Draw the density of their frequencies; arguments as `jamshape.plot`."""
+        from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows modes
+
+        return plot(self, axes, **look)
+
+    def save(self, path: str | Path) -> None:
+        """Write them to an HDF5 file, replacing what is there."""
+        write_modes(path, self.table, self.about, vectors=True)
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{len(self.in_band(name))} {name}" for name in TOLD)
+        a = self.table.attributes
+        of = f"{a['n_backbone']} of {a['n']} particles held by {a['n_bonds']} bonds"
+        bands = f" ({counts})" if len(self) == a["n_modes"] else f" of {a['n_modes']}"
+        return f"<{len(self)} modes{bands} of {of}: z = {a['z']:.4g}>"
+
+    def _repr_html_(self) -> str:
+        from jamshape.front.pictures import html  # noqa: PLC0415 - only notebooks ask
+
+        return html(self)
+
+
+def modes(
+    packing: Packing | str | Path,
+    *,
+    lowest: int | None = None,
+    rotation: str = "half_length",
+    least_force: float = 0.0,
+    force: bool = False,
+) -> Modes:
+    """Find the modes of vibration of a packing (Marschall & Teitel 2018, Sec. III D).
+
+    Parameters
+    ----------
+    packing : Packing or path
+        At a minimum of its energy, as `make_packing` leaves it.
+    lowest : int, optional
+        Only so many of the softest modes, by a sparse method; all when left out.
+    rotation : {"half_length", "radius"}
+        What a radian counts for as a length.
+    least_force : float
+        Leave out contacts weaker than so many mean bond forces; 1e-4 leaves out those that only graze.
+    force : bool
+        Also where the packing is no minimum.
+
+    Returns
+    -------
+    Modes
+        Each eigenvalue with its sign, the bound of its error, participation, kind of motion and band.
+
+    Raises
+    ------
+    NotAtMinimumError
+        If forces do not balance, unless `force` is given.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
+    >>> softest = js.modes(packing, lowest=4)
+    >>> softest.omega.shape
+    (4,)
+    """
+    if not isinstance(packing, Packing):
+        packing = MeasuredPacking.read(Path(packing))
+    measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
+    landscape, state = Landscape(measured), State.of(measured)
+    scope = Scope(rotation, least_force, force=force)
+    matrix = dynamical_matrix(landscape, state, scope)
+    found = lowest_modes(matrix, lowest) if lowest else spectrum(matrix)
+    table = tabulate(landscape, state, matrix, found)
+    asked = {"rotation": rotation, "least_force": least_force}
+    return Modes(table, to_store(measured.results, measured) | asked, measured)

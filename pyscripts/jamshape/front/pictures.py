@@ -1,0 +1,121 @@
+"""Pictures of packings, runs and modes, in figures and in notebooks."""
+
+from __future__ import annotations
+
+import base64
+import html as markup
+import io
+from typing import TYPE_CHECKING, Any
+
+from jamshape.contacts import Contacts
+from jamshape.drawing.modes import draw_density
+from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
+from jamshape.drawing.pictures import title_of
+from jamshape.drawing.pressure import draw_pressure
+from jamshape.front.modes import Modes
+from jamshape.front.packing import MeasuredPacking
+from jamshape.front.run import RunFile
+from jamshape.measures.runs import read_run
+from jamshape.packing import Packing
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+
+_INCHES = {"packing": (5.0, 5.4), "curve": (5.0, 3.6)}
+_DPI = 100
+
+
+def plot(thing: Packing | RunFile | Modes, axes: Axes | None = None, *, color: str = "kind") -> Axes:
+    """Draw a packing, the pressure of a run, or the density of modes.
+
+    Parameters
+    ----------
+    thing : Packing, RunFile or Modes
+    axes : matplotlib Axes, optional
+        Where to draw; a new figure of `matplotlib.pyplot` when left out.
+    color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}
+        What the colours of a packing's particles tell.
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Raises
+    ------
+    TypeError
+        If it is none of the three.
+    ValueError
+        If the packing's dimension knows no such order.
+
+    Examples
+    --------
+    >>> import matplotlib
+    >>> matplotlib.use("agg")  # without a screen
+    >>> import jamshape as js
+    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
+    >>> js.plot(packing).get_title()
+    '$\\\\alpha=1$    $N=16$    ...'
+    """
+    if axes is None:
+        import matplotlib.pyplot as plt  # noqa: PLC0415 - not needed where axes are given
+
+        axes = plt.figure(figsize=_size(thing), layout="constrained").add_subplot()
+    _draw(thing, axes, color)
+    return axes
+
+
+def html(thing: MeasuredPacking | RunFile | Modes) -> str:
+    """Show it in a notebook: what it is, and a picture."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - only notebooks ask
+
+    figure = Figure(figsize=_size(thing), layout="constrained")
+    _draw(thing, figure.add_subplot(), "kind")
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=_DPI)
+    picture = base64.b64encode(stream.getvalue()).decode()
+    image = f'<img alt="picture" src="data:image/png;base64,{picture}"/>'
+    return f"<div><code>{markup.escape(repr(thing))}</code><br/>{image}</div>"
+
+
+def _size(thing: Any) -> tuple[float, float]:
+    return _INCHES["packing" if isinstance(thing, Packing) else "curve"]
+
+
+def _draw(thing: Any, axes: Axes, color: str) -> None:
+    for kind, draw in _DRAWN.items():
+        if isinstance(thing, kind):
+            draw(thing, axes, color)
+            return
+    msg = f"a {type(thing).__name__} was given, expected a packing, a run or modes"
+    raise TypeError(msg)
+
+
+def _packing(packing: Packing, axes: Axes, color: str) -> None:
+    measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
+    found: Contacts = measured.contacts()
+    colored, scale = colorings([found], color)
+    draw_packing(axes, found, colored[0], Look(color))
+    axes.set_title(title_of(found), fontsize=9, linespacing=1.4)
+    add_legend(axes, colored[0])
+    if scale:
+        figure: Any = axes.figure
+        figure.colorbar(scale.mapped, ax=axes, shrink=0.8).set_label(scale.label)
+
+
+def _run(run: RunFile, axes: Axes, color: str) -> None:
+    del color
+    draw_pressure(axes, read_run(run.file))
+
+
+def _modes(modes: Modes, axes: Axes, color: str) -> None:
+    del color
+    draw_density(axes, modes.table)
+
+
+_DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {
+    Packing: _packing,
+    RunFile: _run,
+    Modes: _modes,
+}

@@ -1,0 +1,117 @@
+"""A compression and its file: p(phi), frames, the onset of jamming."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.files.h5md import count_frames, read_attributes, read_observables, read_style
+from jamshape.front.packing import MeasuredPacking
+from jamshape.measures.onset import OnsetFit, fit_onset
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False)
+class RunFile:
+    """A compression in its H5MD file.
+
+    Parameters
+    ----------
+    file : Path
+    folder : object, optional
+        What removes the file when nobody needs this any more, of runs that were given none.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> run = js.compress(js.Spherocylinders(), n=16, phi=(0.3, 0.5), kappa=1e-3, progress=False)
+    >>> run.phi[0] < run.phi[-1], run.packing().n, len(run)
+    (True, 16, 21)
+    >>> run.onset() is None  # no jamming yet
+    True
+    """
+
+    file: Path
+    folder: Any = None
+
+    @cached_property
+    def about(self) -> dict[str, Any]:
+        """What it is of and how it was set: attributes of its file."""
+        return read_attributes(self.file)
+
+    @cached_property
+    def observables(self) -> dict[str, FloatArray]:
+        """(T, ...) arrays by name, a row for each sample, such as ``z``, ``u`` and ``S_2``."""
+        return read_observables(self.file)
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Look up an observable by its name."""
+        return self.observables[name]
+
+    @property
+    def phi(self) -> FloatArray:
+        """(T,) packing fractions."""
+        return self["phi"]
+
+    @property
+    def pressure(self) -> FloatArray:
+        """(T,) pressures, [energy / length^D]."""
+        return self["pressure"]
+
+    @property
+    def kappa(self) -> float:
+        """Compression rate at the end, [1/time]."""
+        return float(np.ravel(self.about["kappa"])[-1])
+
+    def onset(self) -> OnsetFit | None:
+        """Fit phi_J of this rate, where the pressure begins; None where it does not rise.
+
+        Returns
+        -------
+        OnsetFit or None
+            ``phi_J`` and ``phi_J_error``; see `jamshape.measures.onset.fit_onset`.
+        """
+        try:
+            return fit_onset(self.phi, self.pressure)
+        except ValueError:  # it ends below jamming
+            return None
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return count_frames(self.file)
+
+    def packing(self, frame: int = -1) -> MeasuredPacking:
+        """Read a frame, counted from 0, or with negative numbers from the end."""
+        return MeasuredPacking.read(self.file, frame)
+
+    def __iter__(self) -> Iterator[MeasuredPacking]:
+        return map(self.packing, range(len(self)))
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw its pressure; arguments as `jamshape.plot`."""
+        from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows runs
+
+        return plot(self, axes)
+
+    def __repr__(self) -> str:
+        shape, dimension = read_style(self.file)
+        end = f"phi = {self.phi[-1]:.5g}, pressure = {self.pressure[-1]:.3g}"
+        state = "" if self.about.get("finished") else ", not finished"
+        n = self.about.get("n") or self.packing().n
+        return (
+            f"<Run of {n} {shape}s in {dimension}D at kappa = {self.kappa:g}: {len(self)} frames to"
+            f" {end}{state}, in {self.file}>"
+        )
+
+    def _repr_html_(self) -> str:
+        from jamshape.front.pictures import html  # noqa: PLC0415 - only notebooks ask
+
+        return html(self)
