@@ -9,7 +9,16 @@ from jamshape.vibration.statistics import density_of_states, mean_in_bins
 from jamshape.vibration.table import ModeTable
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def draw_density(axes: Axes, table: ModeTable) -> None:
+    """Draw the density of frequencies of stable modes."""
+    bins = density_of_states(table["omega"][~table["is_translation"]])
+    filled = bins.n_modes > 0
+    axes.loglog(bins.omega[filled], bins.density[filled], "o", mfc="none")
+    axes.set(xlabel=r"$\omega$", ylabel=r"$D(\omega)$")
 
 
 def mode_figure(table: ModeTable, title: str) -> Figure:
@@ -20,9 +29,8 @@ def mode_figure(table: ModeTable, title: str) -> Figure:
     bins = density_of_states(omega[~table["is_translation"]])
     figure = Figure(figsize=(6, 8), dpi=150, layout="constrained")
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
-    filled = bins.n_modes > 0
-    top.loglog(bins.omega[filled], bins.density[filled], "o", mfc="none")
-    top.set(title=title, ylabel=r"$D(\omega)$")
+    draw_density(top, table)
+    top.set(title=title, xlabel="")
     participation = mean_in_bins(table["participation"], omega, bins.edges)
     middle.loglog(bins.omega, participation, "o", mfc="none")
     middle.set_ylabel(r"$P(\omega)$")

@@ -33,8 +33,8 @@ class Picture(NamedTuple):
     """A packing with what is said of it."""
 
     found: Contacts
-    numbers: list[str]
-    """For the title."""
+    more: list[str]
+    """For the title, beside what is said of every packing."""
     report: dict[str, Any]
 
 
@@ -75,15 +75,11 @@ def read_picture(path: Path, frame: int = -1, sides: int | None = None, color: s
     told |= {"n": packing.n, "rattlers": counts.n_rattlers, "contacts": len(network.pairs)}
     told |= {"phi": packing.phi, "u": u, "z": counts.z}
     known_order = order(packing) if color in ORDER else {}
-    numbers = [rf"$N={packing.n}$", rf"$\phi={packing.phi:.5f}$"]
-    numbers += [rf"$u={scientific(u)}$", f"$z={counts.z:.3f}$"]
-    numbers += [f"step {packing.step}"] * (packing.step > 0)
-    numbers += [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
+    more = [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
     if "protocol" in known:
-        numbers.append(f"protocol {known['protocol']}")
-    return Picture(
-        Contacts(packing, network, find_rattlers(packing, network)), numbers, told | known_order
-    )
+        more.append(f"protocol {known['protocol']}")
+    found = Contacts(packing, network, find_rattlers(packing, network))
+    return Picture(found, more, told | known_order)
 
 
 def draw_pictures(pictures: Sequence[Picture], look: Look) -> Drawn:
@@ -98,7 +94,9 @@ def draw_pictures(pictures: Sequence[Picture], look: Look) -> Drawn:
     figure, panels = _make_panels(pictures, with_bar=scale is not None)
     for axes, one, colors in zip(panels, pictures, colored, strict=False):
         draw_packing(axes, one.found, colors, look)
-        axes.set_title(_title(one, narrow=len(pictures) > 1), fontsize=9, linespacing=1.4)
+        axes.set_title(
+            title_of(one.found, one.more, narrow=len(pictures) > 1), fontsize=9, linespacing=1.4
+        )
         add_legend(axes, colors)
     for axes in panels[len(pictures) :]:
         axes.set_axis_off()
@@ -115,14 +113,30 @@ def save_pictures(figure: Figure, pictures: Sequence[Picture], out: PathLike, dp
         figure.savefig(out, dpi=dpi, bbox_inches="tight", pad_inches=0.05)
 
 
-def _title(one: Picture, *, narrow: bool) -> str:
-    """Name the particles, if they are few kinds, and what was counted; narrow ones in more lines."""
-    packing, gap = one.found.packing, "    "
+def title_of(found: Contacts, more: Sequence[str] = (), *, narrow: bool = False) -> str:
+    """Name the particles, if they are few kinds, and what was counted.
+
+    Parameters
+    ----------
+    found : Contacts
+    more : sequence of str
+        To say at its end.
+    narrow : bool
+        Whether it stands above a narrow panel, and so in more lines.
+    """
+    packing, gap = found.packing, "    "
+    u, z = (
+        float(found.network.energy.sum()) / packing.box.volume,
+        coordination(packing, found.network).z,
+    )
     kinds, shape = kinds_of(packing), packing.shape
     known = [f"{shape.name}s"] * (not is_told_by_parameters(shape))
     known += [kinds.title] * (0 < len(kinds.parameters) < MANY_KINDS)
-    lines = [gap.join(one.numbers[:2]), gap.join(one.numbers[2:])]
-    lines = lines if narrow else [gap.join(one.numbers)]
+    where = gap.join([rf"$N={packing.n}$", rf"$\phi={packing.phi:.5f}$"])
+    counted = [rf"$u={scientific(u)}$", f"$z={z:.3f}$"]
+    counted += [f"step {packing.step}"] * (packing.step > 0)
+    lines = [where, gap.join([*counted, *more])]
+    lines = lines if narrow else [gap.join(lines)]
     return "\n".join([", ".join(known)] * (known != []) + lines)
 
 
