@@ -2,171 +2,18 @@
 
     python analysis/modes.py PACKING.h5 --out modes.h5
 
-Eigenvalues of the dynamical matrix with signs and error bounds, bands and their counts, participation,
-kinds of motion and elastic moduli, to HDF5 (see jamshape.vibration.table). PACKING is H5MD as make_packing.py
-writes it, of any shape. Needs no LAMMPS. The last line of standard output is one JSON object.
+The same as ``jamshape modes``; --help tells the options.
 """
 
-from __future__ import annotations
+import sys
 
-import math
-from argparse import ArgumentParser, Namespace
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-
-from jamshape.command import parser_of, report, run
-from jamshape.drawing.mode_axes import COMPONENTS, packing_text
-from jamshape.files.sets import PackingFile
-from jamshape.landscape import Landscape, State
-from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
-from jamshape.vibration.sets import TOLD, to_store
-from jamshape.vibration.sparse_modes import lowest, near
-from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
-from jamshape.vibration.statistics import (
-    Redundancy,
-    density_of_states,
-    mean_in_bins,
-    redundancies,
-)
-from jamshape.vibration.table import BANDS, ModeTable, tabulate, write_modes
-
-SHOWN = 12  # modes of the printed table
-FEW = 20  # modes found by the sparse method
-KINDS = ("rotation", "parallel", "perpendicular")
-
-
-def parser() -> ArgumentParser:
-    """Describe the command line."""
-    found = parser_of(__doc__, "modes.h5")
-    found.add_argument("packing", type=Path, metavar="PACKING.h5")
-    found.add_argument("--plot", type=Path, help="D(omega), participation and kinds of motion")
-    found.add_argument("--method", choices=[*METHODS, "sparse"], default="projected")
-    found.add_argument("--lowest", type=int, metavar="K", help="only the K softest, sparse")
-    found.add_argument("--near", type=float, metavar="OMEGA", help="K modes near it instead")
-    counts = "what a radian counts for (%(default)s)"
-    scales = ("half_length", "radius")
-    found.add_argument("--rotation", choices=scales, default=scales[0], help=counts)
-    weak = (
-        "leave out contacts weaker than X mean bond forces; 1e-4 leaves out those that only graze"
+try:
+    from jamshape.commands import start
+except ImportError as error:
+    sys.exit(
+        f"modes.py: {error} in {sys.executable}, expected a Python with jamshape;"
+        " run ./run setup in the repository, then use .venv/bin/python"
     )
-    found.add_argument("--least-force", type=float, default=0.0, metavar="X", help=weak)
-    found.add_argument("--vectors", action="store_true", help="store the modes themselves")
-    found.add_argument("--force", action="store_true", help="also where the state is no minimum")
-    return found
-
-
-def summary_of(table: ModeTable) -> dict[str, Any]:
-    """Count the bands and average their frequencies; unstable modes are counted, not averaged."""
-    found: dict[str, Any] = {}
-    for name in TOLD:
-        rows = table.in_band(name)
-        omega, sign = table["omega"][rows], table["sign"][rows]
-        found[name] = {
-            "modes": len(rows),
-            "fraction": len(rows) / table.attributes["n_modes"],
-            "negative": int((sign < 0).sum()),
-            "unsure": int((sign == 0).sum()),
-            "mean_omega": omega[omega > 0].mean() if (omega > 0).any() else None,
-            **{kind: table[kind][rows].mean() if len(rows) else None for kind in KINDS},
-        }
-    return found
-
-
-def show(table: ModeTable, bands: dict[str, Any]) -> None:
-    """Print counts, bands and the lowest modes."""
-    a = table.attributes
-    counted = f"{a['n_modes']} coordinates, {a['n_bonds']} bonds"
-    print(f"{a['n_backbone']} of {a['n']} particles, {counted}")
-    print(
-        f"z = {a['z']:.4f}, residual {a['residual']:.2g}; {a['method']}, {a['wall_seconds']:.3g} s"
-    )
-    if "rank" in a:
-        show_bands(table, bands)
-    print("lambda          sign  bound     of state  P       par.   perp.  rot.   band")
-    for k in np.flatnonzero(~table["is_translation"])[:SHOWN]:
-        kinds = " ".join(f"{table[n][k]:6.3f}" for n in ("parallel", "perpendicular", "rotation"))
-        errors = f"{table.bound[k]:.2e}  {table['state_error'][k]:.2e}"
-        start = f"{table['eigenvalues'][k]:14.6e} {table['sign'][k]:4d}  {errors}"
-        print(f"{start}  {table['participation'][k]:.4f} {kinds}  {BANDS[table['band'][k]]}")
-    keys = ("bulk_modulus", "pure_shear_modulus", "simple_shear_modulus", "pressure")
-    print(", ".join(f"{key.replace('_', ' ')} {a[key]:.5g}" for key in keys))
-
-
-def show_bands(table: ModeTable, bands: dict[str, Any]) -> None:
-    """Print the counts of a whole spectrum, beside those that are expected."""
-    a = table.attributes
-    print(f"rank of H {a['rank']} = N_c - {a['n_self_stress']}; N z / 2 = {a['high_expected']:g}")
-    print(f"modes below: {a['n_floppy']} and {a['n_translations']} translations;", end=" ")
-    print(f"N (z_iso - z) / 2 = {a['low_expected']:g}; {a['n_grazing']} bonds only graze")
-    print("band      modes  fraction  negative  unsure  mean omega")
-    for name, b in bands.items():
-        omega = math.nan if b["mean_omega"] is None else b["mean_omega"]
-        row = f"{name:8} {b['modes']:6} {b['fraction']:9.5f} {b['negative']:9} {b['unsure']:7}"
-        print(f"{row} {omega:11.4g}")
-
-
-def draw(table: ModeTable, title: str, out: Path) -> None:
-    """Draw the density of states, the participation ratio and the kinds of motion."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed without --plot
-
-    omega = table["omega"]
-    bins = density_of_states(omega[~table["is_translation"]])
-    figure = Figure(figsize=(6, 8), dpi=150, layout="constrained")
-    top, middle, bottom = figure.subplots(3, 1, sharex=True)
-    filled = bins.n_modes > 0
-    top.loglog(bins.omega[filled], bins.density[filled], "o", mfc="none")
-    top.set(title=title, ylabel=r"$D(\omega)$")
-    participation = mean_in_bins(table["participation"], omega, bins.edges)
-    middle.loglog(bins.omega, participation, "o", mfc="none")
-    middle.set_ylabel(r"$P(\omega)$")
-    for kind, (marker, color, label) in COMPONENTS.items():
-        if table[kind].any():
-            values = mean_in_bins(table[kind], omega, bins.edges)
-            bottom.semilogx(bins.omega, values, marker[0], color=color, mfc="none", label=label)
-    bottom.set(xlabel=r"$\omega$", ylabel="share of the motion")
-    bottom.legend()
-    figure.savefig(out)
-
-
-def find(matrix: DynamicalMatrix, options: Namespace) -> Spectrum:
-    """Find the modes that were asked for, by the method that was."""
-    if options.method != "sparse" and not options.lowest:
-        return spectrum(matrix, options.method)
-    if options.near is None:
-        return lowest(matrix, options.lowest or FEW)
-    return near(matrix, options.lowest or FEW, options.near**2)
-
-
-def tell_redundant(sets: list[Redundancy], ids: Any) -> list[list[int]]:
-    """Print where bonds are redundant; return the IDs of the particles."""
-    found = [[int(ids[p]) for p in one.particles] for one in sets]
-    for one, own in zip(sets, found, strict=True):
-        print(f"redundant bonds among particles {own}: {one.n_states} more states of self stress")
-    return found
-
-
-def main(options: Namespace) -> None:
-    """Read, assemble, solve, write, report."""
-    file = PackingFile.read(options.packing)
-    packing = file.packing()
-    landscape, state = Landscape(packing), State.of(packing)
-    scope = Scope(options.rotation, options.least_force, force=options.force)
-    matrix = dynamical_matrix(landscape, state, scope)
-    table = tabulate(landscape, state, matrix, find(matrix, options))
-    asked = {"rotation": options.rotation, "least_force": options.least_force}
-    stored = to_store(file.attributes, packing) | asked
-    write_modes(options.out, table, stored, vectors=options.vectors)
-    bands = summary_of(table)
-    show(table, bands)
-    extra = table.attributes.get("n_self_stress", 1) > 1
-    redundant = tell_redundant(redundancies(matrix) if extra else [], packing.id)
-    if options.plot:
-        draw(table, packing_text(file), options.plot)
-    told = {"out": options.out, "bands": bands, **table.attributes}
-    report(told | {"redundant": redundant})
-
 
 if __name__ == "__main__":
-    run(parser(), main)
+    start("modes")

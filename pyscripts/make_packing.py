@@ -1,56 +1,19 @@
 """Make one mechanically stable packing of any shape: compress, find its energy, measure, store as H5MD.
 
-    python pyscripts/make_packing.py --shape spherocylinder --alpha 4 --n 256 --seed 1 --u0 1e-15 --out packing.h5
-    python pyscripts/make_packing.py --shape superellipsoid --p 1.5 --w1 1 --w2 1 --n 400 --protocol 1 --seed 1 --out packing.h5
-    python pyscripts/make_packing.py --kind alpha=0,share=0.5 --kind alpha=4,size=1.4,share=0.5 --n 256 --out mixture.h5
+    python pyscripts/make_packing.py --alpha 4 --n 256 --seed 1 --u0 1e-15 --out packing.h5
 
-In 2D as Marschall & Teitel 2018: compressed by LAMMPS, led to the energy density u0. In 3D as Yuan et al.
-2019: compressed by quasistatic steps to the first packing with U/N > 1e-10, and to u0 if given.
-
-The last line of standard output is one JSON object; the exit code is 0 only if the minimum was
-reached. Beside the result lies, until it is done, all that is needed to go on: a run that was killed does
-so when started again.
+The same as ``jamshape pack``; --help tells the options.
 """
 
-from __future__ import annotations
+import sys
 
-from argparse import ArgumentParser, Namespace
-from pathlib import Path
-
-from tqdm import tqdm
-
-from jamshape.command import parser_of, report, run
-from jamshape.protocols.command_line import add_recipe_options, recipe_of
-from jamshape.protocols.make import is_done, make, require_same, summary_of
-
-
-def options_of() -> ArgumentParser:
-    """Make the parser."""
-    parser = parser_of(__doc__)
-    add_recipe_options(parser)
-    parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
-    parser.add_argument("--again", action="store_true", help="make it anew if it is there")
-    return parser
-
-
-def main(options: Namespace) -> int:
-    """Make the packing unless it is there; return the exit code."""
-    recipe = recipe_of(options)
-    if options.again or not is_done(options.out):
-        options.out.parent.mkdir(parents=True, exist_ok=True)
-        steps = make(recipe, options.out, again=options.again)
-        with tqdm(steps, unit="row", mininterval=1) as bar:
-            for at in bar:
-                text = (
-                    f"{at.stage} phi {at.phi:.6f} u {at.energy_density:.2e} res {at.residual:.1e}"
-                )
-                bar.set_postfix_str(text, refresh=False)
-    else:
-        require_same(options.out, recipe)
-    found = summary_of(options.out)
-    report(found)
-    return 0 if found["reached"] else 1
-
+try:
+    from jamshape.commands import start
+except ImportError as error:
+    sys.exit(
+        f"make_packing.py: {error} in {sys.executable}, expected a Python with jamshape;"
+        " run ./run setup in the repository, then use .venv/bin/python"
+    )
 
 if __name__ == "__main__":
-    run(options_of(), main)
+    start("pack")

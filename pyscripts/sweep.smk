@@ -27,5 +27,5 @@ rule packing:
     threads: 1
     shell:
         # A minimum that was not quite reached is a file all the same, and says so.
-        "OMP_NUM_THREADS=1 {sys.executable} pyscripts/make_packing.py --alpha {wildcards.alpha} "
+        "OMP_NUM_THREADS=1 {sys.executable} -m jamshape pack --alpha {wildcards.alpha} "
         "--seed {wildcards.seed} {OPTIONS} --out {output} || test -s {output}"

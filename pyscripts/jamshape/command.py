@@ -1,4 +1,4 @@
-"""How scripts parse, report and end.
+"""How scripts and commands parse, report and end; the standard library is all that it needs.
 
 A script's docstring is its help, the last line of its standard output one JSON object, and what it says of wrong
 input one sentence on standard error after its name::
@@ -16,14 +16,18 @@ import json
 import math
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-import numpy as np
-
 # What wrong input, missing files and searches without an end raise, each with one sentence.
 PROBLEMS = (OSError, ValueError, RuntimeError)
+
+SET_UP = "run ./run setup in the repository, then use .venv/bin/python"
+"""What to do where something that jamshape needs is not there."""
+
+_INTERRUPTED = 130  # as shells tell that a program was ended by Ctrl-C
 
 
 def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser:
@@ -56,7 +60,7 @@ def plain(value: Any) -> Any:
 
     NaN and infinity become null, named tuples objects, arrays and other tuples lists, paths text.
     """
-    if isinstance(value, np.generic | np.ndarray):
+    if hasattr(value, "tolist"):  # arrays and numbers of numpy
         return plain(value.tolist())
     if hasattr(value, "_asdict"):
         return plain(value._asdict())
@@ -72,10 +76,48 @@ def plain(value: Any) -> Any:
 def run(parser: ArgumentParser, main: Callable[[Namespace], int | None]) -> NoReturn:
     """Parse the command line, run a script and end with the exit code that it returns.
 
-    After one of `PROBLEMS` its sentence is printed and the exit code is 1.
+    Problems end as `sentences` tells.
     """
     options = parser.parse_args()
-    try:
+    with sentences(parser.prog):
         sys.exit(main(options))
+
+
+@contextmanager
+def sentences(name: str, go_on: str = "it may be started again") -> Iterator[None]:
+    """End the program with one sentence after its name where its body raises what users may meet.
+
+    The exit code is 1 after one of `PROBLEMS` or where a module is missing, and 130 after Ctrl-C.
+
+    Parameters
+    ----------
+    name : str
+        Of the program, as it was called.
+    go_on : str
+        How to go on after Ctrl-C.
+    """
+    try:
+        yield
     except PROBLEMS as error:
-        sys.exit(f"{parser.prog}: {error}")
+        sys.exit(f"{name}: {error}")
+    except ImportError as error:
+        sys.exit(f"{name}: {what_is_missing(error)}")
+    except KeyboardInterrupt:
+        # Below a bar of progress.
+        print(f"\n{name}: interrupted; {go_on}", file=sys.stderr)
+        sys.exit(_INTERRUPTED)
+
+
+def what_is_missing(error: ImportError) -> str:
+    """Say in one sentence what could not be imported and what to do.
+
+    Examples
+    --------
+    >>> what_is_missing(ModuleNotFoundError("No module named 'numpy'", name="numpy"))  # doctest: +ELLIPSIS
+    "No module named 'numpy' in ..., expected a Python with all that jamshape needs; run ./run setup ..."
+    """
+    # Sentences of our own say what to do themselves.
+    said = " ".join(str(error).split())
+    if not (error.name or error.path):
+        return said
+    return f"{said} in {sys.executable}, expected a Python with all that jamshape needs; {SET_UP}"

@@ -61,7 +61,7 @@ def mixture(shape, dimension):
 
 def test_help(help_of):
     said = help_of(SCRIPT)
-    for words in ("python analysis/draw.py", "Marschall & Teitel", "Yuan", "--color", "--frame"):
+    for words in ("analysis/draw.py FILE", "Marschall & Teitel", "Yuan", "--color", "--frame"):
         assert words in said
 
 

@@ -39,10 +39,10 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | RunFil
     Examples
     --------
     >>> import jamshape as js
-    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
-    >>> js.save("packing.h5", packing)
-    >>> js.load("packing.h5").n
-    16
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
+    >>> js.load("packing.h5")
+    <Packing of 16 spherocylinders in 2D: phi = 0.884959, pressure = 8.706e-05, u = 1e-08, z = 5.875, rattlers = 0, in packing.h5>
     """
     path = Path(path)
     if path.suffix == ".gsd":
@@ -84,7 +84,8 @@ def save(path: str | Path, packing: Packing) -> None:
     Examples
     --------
     >>> import jamshape as js
-    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> js.save("packing.data", packing)
     """
     path = Path(path)

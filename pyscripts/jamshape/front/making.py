@@ -92,7 +92,8 @@ def make_packing(
     Examples
     --------
     >>> import jamshape as js
-    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> abs(packing.u / 1e-8 - 1) < 1e-6
     True
     """

@@ -36,7 +36,8 @@ class Modes:
     Examples
     --------
     >>> import jamshape as js
-    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> modes = js.modes(packing)
     >>> len(modes), len(modes.in_band("translation")), len(modes.in_band("high"))
     (48, 2, 46)
@@ -144,7 +145,8 @@ def modes(
     Examples
     --------
     >>> import jamshape as js
-    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> softest = js.modes(packing, lowest=4)
     >>> softest.omega.shape
     (4,)

@@ -38,7 +38,8 @@ class MeasuredPacking(Packing):
     Examples
     --------
     >>> import jamshape as js
-    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> packing.z, packing.results["outcome"]
     (5.875, 'converged')
     >>> packing.contacts()

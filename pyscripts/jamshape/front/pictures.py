@@ -7,10 +7,9 @@ import html as markup
 import io
 from typing import TYPE_CHECKING, Any
 
-from jamshape.contacts import Contacts
 from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
-from jamshape.drawing.pictures import title_of
+from jamshape.drawing.pictures import picture_of, title_of
 from jamshape.drawing.pressure import draw_pressure
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
@@ -54,9 +53,11 @@ def plot(thing: Packing | RunFile | Modes, axes: Axes | None = None, *, color: s
     >>> import matplotlib
     >>> matplotlib.use("agg")  # without a screen
     >>> import jamshape as js
-    >>> packing = js.make_packing(js.Spherocylinders(alpha=1), n=16, u0=1e-8, progress=False)
-    >>> js.plot(packing).get_title()
-    '$\\\\alpha=1$    $N=16$    ...'
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
+    >>> axes = js.plot(packing)
+    >>> "N=16" in axes.get_title()
+    True
     """
     if axes is None:
         import matplotlib.pyplot as plt  # noqa: PLC0415 - not needed where axes are given
@@ -94,10 +95,10 @@ def _draw(thing: Any, axes: Axes, color: str) -> None:
 
 def _packing(packing: Packing, axes: Axes, color: str) -> None:
     measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
-    found: Contacts = measured.contacts()
-    colored, scale = colorings([found], color)
-    draw_packing(axes, found, colored[0], Look(color))
-    axes.set_title(title_of(found), fontsize=9, linespacing=1.4)
+    picture = picture_of(measured.contacts(), measured.results, color)
+    colored, scale = colorings([picture.found], color)
+    draw_packing(axes, picture.found, colored[0], Look(color))
+    axes.set_title(title_of(picture, narrow=True), fontsize=9, linespacing=1.4)
     add_legend(axes, colored[0])
     if scale:
         figure: Any = axes.figure
@@ -112,6 +113,8 @@ def _run(run: RunFile, axes: Axes, color: str) -> None:
 def _modes(modes: Modes, axes: Axes, color: str) -> None:
     del color
     draw_density(axes, modes.table)
+    known = modes.table.attributes
+    axes.set_title(f"{len(modes)} modes, $N={known['n']}$, $z={known['z']:.3f}$", fontsize=9)
 
 
 _DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {

@@ -1,0 +1,6 @@
+"""``python -m jamshape`` is the command ``jamshape``."""
+
+from jamshape.commands import main
+
+if __name__ == "__main__":
+    main()

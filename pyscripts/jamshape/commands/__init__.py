@@ -1,0 +1,120 @@
+"""The command ``jamshape``: one module here for each subcommand, loaded when it is asked for.
+
+Each module has ``options_of()``, which makes the parser, ``main(options)``, which returns the exit code, and may
+have ``GO_ON``, which says how to go on after Ctrl-C. What is in this file needs the standard library alone, and
+knows no words that an old Python does not, so that ``jamshape --help`` is quick and a Python in which nothing is
+set up is told what to do.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.metadata
+import sys
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+from jamshape.command import SET_UP, sentences
+
+COMMANDS = {
+    "compress": "compress particles through jamming; record p(phi) and snapshots",
+    "pack": "make one mechanically stable packing at a chosen energy",
+    "slow": "compress at any rate, however slow, in the plane; record p(phi)",
+    "sweep": "make many packings on all cores",
+    "modes": "find the modes of vibration of a packing, and its moduli",
+    "draw": "draw packings",
+    "info": "tell what a file is, what is in it and how to go on with it",
+    "export": "write packings for other programs, such as OVITO and MDAnalysis",
+    "initial": "make a random start without overlaps, for a deck or for Python",
+    "plugin": "tell where the LAMMPS plugin is, and how a deck loads it",
+}
+"""Subcommands, each a module of this package, and what they do."""
+
+OLDEST_PYTHON = (3, 11)
+
+_NAME = "jamshape"
+_WRONG_USE = 2  # as of argparse
+
+_HELP = """\
+usage: {name} COMMAND [OPTIONS]
+
+Jamming of soft, frictionless, athermal particles that are not round.
+
+commands:
+{commands}
+
+options:
+  -h, --help  show this text
+  --version   show the version
+
+{name} COMMAND --help tells the options of a command, with examples. The last line that most commands print is one
+JSON object; what takes long goes on when it is started again."""
+
+
+class _Called(NamedTuple):
+    """How a subcommand was called."""
+
+    name: str
+    """Before its sentences."""
+    words: str
+    """In the examples of its help."""
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run the command line ``jamshape COMMAND ...`` and end with its exit code."""
+    given = sys.argv[1:] if arguments is None else arguments
+    first = given[0] if given else ""
+    if first in COMMANDS:
+        called = f"{_NAME} {first}"
+        _run(first, given[1:], _Called(called, called))
+    if first in {"-h", "--help", "--version"}:
+        print(_version() if first == "--version" else _help())
+        sys.exit(0)
+    print(f"{_NAME}: {_unknown(first)}" if first else _help(), file=sys.stderr)
+    sys.exit(_WRONG_USE)
+
+
+def start(command: str) -> NoReturn:
+    """Run a script that is a subcommand with a name of its own."""
+    script = sys.argv[0]
+    _run(command, sys.argv[1:], _Called(Path(script).name, f"python {script}"))
+
+
+def _run(command: str, arguments: list[str], called: _Called) -> NoReturn:
+    with sentences(called.name):
+        _require_python()
+        module = importlib.import_module(f"{__name__}.{command}")
+    parser = module.options_of()
+    parser.prog = called.name
+    parser.description = parser.description.replace(f"{_NAME} {command} ", f"{called.words} ")
+    options = parser.parse_args(arguments)
+    with sentences(called.name, *([module.GO_ON] if hasattr(module, "GO_ON") else [])):
+        sys.exit(module.main(options))
+
+
+def _require_python() -> None:
+    """Refuse a Python that is too old for the rest."""
+    if sys.version_info < OLDEST_PYTHON:
+        found, least = (".".join(map(str, v[:2])) for v in (sys.version_info, OLDEST_PYTHON))
+        msg = f"{sys.executable} is Python {found}, expected {least} or newer; {SET_UP}"
+        raise RuntimeError(msg)
+
+
+def _help() -> str:
+    width = max(map(len, COMMANDS))
+    rows = [f"  {name:{width}}  {does}" for name, does in COMMANDS.items()]
+    return _HELP.format(name=_NAME, commands="\n".join(rows))
+
+
+def _version() -> str:
+    try:
+        return f"{_NAME} {importlib.metadata.version(_NAME)}"
+    except importlib.metadata.PackageNotFoundError:
+        return f"{_NAME}, which is not installed: {SET_UP}"
+
+
+def _unknown(command: str) -> str:
+    """Say that there is no such command, and which were meant."""
+    close = difflib.get_close_matches(command, COMMANDS) or list(COMMANDS)
+    return f"there is no command {command!r}, expected {' or '.join(close)}; see {_NAME} --help"

@@ -1,0 +1,61 @@
+"""Draw packings of any shape, in the plane and in space.
+
+    jamshape draw FILE [MORE ...] [--frame -1] [--color kind] --out packing.png
+
+FILE is H5MD, a LAMMPS dump or a data file. In the plane black lines are along the spines, red dots where particles
+touch; in space each particle whose centre is in the box is drawn whole, seen from afar. Colours tell the kinds of
+particles, with rattlers in grey (unless all are); the order of the particles in contact with each, green to red as it
+grows and grey without contacts: nematic (S2), tetratic (S4, in the plane), cubatic (C4, in space); the orientation;
+or the packing (one). As Fig. 7 of Marschall & Teitel, PRE 97, 012905, and Figs. 2, 4 b, c and 8 b of Yuan,
+VanderWerf, Shattuck & O'Hern, Soft Matter (2019). The last line of standard output is one JSON object with what
+was counted.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+import numpy as np
+
+from jamshape.command import parser_of, report
+from jamshape.drawing.colors import CHOICES
+from jamshape.drawing.packing import Look
+from jamshape.drawing.pictures import draw_pictures, read_picture, save_pictures
+
+
+def options_of() -> ArgumentParser:
+    """Make the parser."""
+    parser = parser_of(__doc__, "packing.png")
+    parser.add_argument(
+        "files", type=Path, nargs="+", metavar="FILE", help="H5MD, dumps, data files"
+    )
+    parser.add_argument("--frame", type=int, default=-1, help="negative: from the end (-1)")
+    parser.add_argument("--color", choices=CHOICES, default="kind", help="by what (%(default)s)")
+    sides = "points of a side-to-side contact; auto: as the file says, or else 2 (auto)"
+    parser.add_argument("--sides", choices=("auto", "1", "2"), default="auto", help=sides)
+    up, around = "of the eye in space, degrees (%(default)s)", "of it about z (%(default)s)"
+    parser.add_argument("--height", type=float, default=22, help=up)
+    parser.add_argument("--turn", type=float, default=-58, help=around)
+    finer = "of meshes in space, 1 to 4; each makes four triangles of one (3, or 2 for many)"
+    parser.add_argument("--level", type=int, choices=range(1, 5), help=finer)
+    parser.add_argument("--dpi", type=int, default=200, help="dots per inch (%(default)s)")
+    return parser
+
+
+def main(options: Namespace) -> None:
+    """Read, find the contacts, draw, report."""
+    sides = None if options.sides == "auto" else int(options.sides)
+    how = options.frame, sides, options.color
+    pictures = [read_picture(path, *how) for path in options.files]
+    look = Look(options.color, options.height, options.turn, options.level or 0)
+    figure, colored = draw_pictures(pictures, look)
+    save_pictures(figure, pictures, options.out, options.dpi)
+    rows = [one.report for one in pictures]
+    for row, colors in zip(rows, colored, strict=True):
+        if len(colors.values):
+            row["mean_local"] = (
+                np.nanmean(colors.values) if np.isfinite(colors.values).any() else None
+            )
+    # The numbers of a single packing stand at the top.
+    report({"out": options.out, **(rows[0] if len(rows) == 1 else {}), "packings": rows})

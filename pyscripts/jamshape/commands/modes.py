@@ -1,0 +1,141 @@
+"""Find the modes of a packing: Sec. III D of Marschall & Teitel, PRE 97, 012905.
+
+    jamshape modes PACKING.h5 --out modes.h5
+
+Eigenvalues of the dynamical matrix with signs and error bounds, bands and their counts, participation,
+kinds of motion and elastic moduli, to HDF5 (see jamshape.vibration.table). PACKING is H5MD as `jamshape pack`
+writes it, of any shape. Needs no LAMMPS. The last line of standard output is one JSON object.
+"""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jamshape.command import parser_of, report
+from jamshape.drawing.mode_axes import packing_text
+from jamshape.drawing.modes import mode_figure
+from jamshape.files.sets import PackingFile
+from jamshape.landscape import Landscape, State
+from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
+from jamshape.vibration.sets import TOLD, to_store
+from jamshape.vibration.sparse_modes import lowest, near
+from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
+from jamshape.vibration.statistics import Redundancy, redundancies
+from jamshape.vibration.table import BANDS, ModeTable, tabulate, write_modes
+
+SHOWN = 12  # modes of the printed table
+FEW = 20  # modes found by the sparse method
+KINDS = ("rotation", "parallel", "perpendicular")
+
+
+def options_of() -> ArgumentParser:
+    """Make the parser."""
+    parser = parser_of(__doc__, "modes.h5")
+    parser.add_argument("packing", type=Path, metavar="PACKING.h5")
+    parser.add_argument("--plot", type=Path, help="D(omega), participation and kinds of motion")
+    parser.add_argument("--method", choices=[*METHODS, "sparse"], default="projected")
+    parser.add_argument("--lowest", type=int, metavar="K", help="only the K softest, sparse")
+    parser.add_argument("--near", type=float, metavar="OMEGA", help="K modes near it instead")
+    counts = "what a radian counts for (%(default)s)"
+    scales = ("half_length", "radius")
+    parser.add_argument("--rotation", choices=scales, default=scales[0], help=counts)
+    weak = (
+        "leave out contacts weaker than X mean bond forces; 1e-4 leaves out those that only graze"
+    )
+    parser.add_argument("--least-force", type=float, default=0.0, metavar="X", help=weak)
+    parser.add_argument("--vectors", action="store_true", help="store the modes themselves")
+    parser.add_argument("--force", action="store_true", help="also where the state is no minimum")
+    return parser
+
+
+def summary_of(table: ModeTable) -> dict[str, Any]:
+    """Count the bands and average their frequencies; unstable modes are counted, not averaged."""
+    found: dict[str, Any] = {}
+    for name in TOLD:
+        rows = table.in_band(name)
+        omega, sign = table["omega"][rows], table["sign"][rows]
+        found[name] = {
+            "modes": len(rows),
+            "fraction": len(rows) / table.attributes["n_modes"],
+            "negative": int((sign < 0).sum()),
+            "unsure": int((sign == 0).sum()),
+            "mean_omega": omega[omega > 0].mean() if (omega > 0).any() else None,
+            **{kind: table[kind][rows].mean() if len(rows) else None for kind in KINDS},
+        }
+    return found
+
+
+def show(table: ModeTable, bands: dict[str, Any]) -> None:
+    """Print counts, bands and the lowest modes."""
+    a = table.attributes
+    counted = f"{a['n_modes']} coordinates, {a['n_bonds']} bonds"
+    print(f"{a['n_backbone']} of {a['n']} particles, {counted}")
+    print(
+        f"z = {a['z']:.4f}, residual {a['residual']:.2g}; {a['method']}, {a['wall_seconds']:.3g} s"
+    )
+    if "rank" in a:
+        show_bands(table, bands)
+    print("lambda          sign  bound     of state  P       par.   perp.  rot.   band")
+    for k in np.flatnonzero(~table["is_translation"])[:SHOWN]:
+        kinds = " ".join(f"{table[n][k]:6.3f}" for n in ("parallel", "perpendicular", "rotation"))
+        errors = f"{table.bound[k]:.2e}  {table['state_error'][k]:.2e}"
+        start = f"{table['eigenvalues'][k]:14.6e} {table['sign'][k]:4d}  {errors}"
+        print(f"{start}  {table['participation'][k]:.4f} {kinds}  {BANDS[table['band'][k]]}")
+    keys = ("bulk_modulus", "pure_shear_modulus", "simple_shear_modulus", "pressure")
+    print(", ".join(f"{key.replace('_', ' ')} {a[key]:.5g}" for key in keys))
+
+
+def show_bands(table: ModeTable, bands: dict[str, Any]) -> None:
+    """Print the counts of a whole spectrum, beside those that are expected."""
+    a = table.attributes
+    print(f"rank of H {a['rank']} = N_c - {a['n_self_stress']}; N z / 2 = {a['high_expected']:g}")
+    print(f"modes below: {a['n_floppy']} and {a['n_translations']} translations;", end=" ")
+    print(f"N (z_iso - z) / 2 = {a['low_expected']:g}; {a['n_grazing']} bonds only graze")
+    print("band      modes  fraction  negative  unsure  mean omega")
+    for name, b in bands.items():
+        omega = math.nan if b["mean_omega"] is None else b["mean_omega"]
+        row = f"{name:8} {b['modes']:6} {b['fraction']:9.5f} {b['negative']:9} {b['unsure']:7}"
+        print(f"{row} {omega:11.4g}")
+
+
+def find(matrix: DynamicalMatrix, options: Namespace) -> Spectrum:
+    """Find the modes that were asked for, by the method that was."""
+    if options.method != "sparse" and not options.lowest:
+        return spectrum(matrix, options.method)
+    if options.near is None:
+        return lowest(matrix, options.lowest or FEW)
+    return near(matrix, options.lowest or FEW, options.near**2)
+
+
+def tell_redundant(sets: list[Redundancy], ids: Any) -> list[list[int]]:
+    """Print where bonds are redundant; return the IDs of the particles."""
+    found = [[int(ids[p]) for p in one.particles] for one in sets]
+    for one, own in zip(sets, found, strict=True):
+        print(f"redundant bonds among particles {own}: {one.n_states} more states of self stress")
+    return found
+
+
+def main(options: Namespace) -> None:
+    """Read, assemble, solve, write, report."""
+    file = PackingFile.read(options.packing)
+    packing = file.packing()
+    landscape, state = Landscape(packing), State.of(packing)
+    scope = Scope(options.rotation, options.least_force, force=options.force)
+    matrix = dynamical_matrix(landscape, state, scope)
+    table = tabulate(landscape, state, matrix, find(matrix, options))
+    asked = {"rotation": options.rotation, "least_force": options.least_force}
+    stored = to_store(file.attributes, packing) | asked
+    write_modes(options.out, table, stored, vectors=options.vectors)
+    bands = summary_of(table)
+    show(table, bands)
+    extra = table.attributes.get("n_self_stress", 1) > 1
+    redundant = tell_redundant(redundancies(matrix) if extra else [], packing.id)
+    if options.plot:
+        mode_figure(table, packing_text(file)).savefig(options.plot)
+    told = {"out": options.out, "bands": bands, **table.attributes}
+    report(told | {"redundant": redundant})

@@ -1,0 +1,54 @@
+"""Make one mechanically stable packing of any shape: compress, find its energy, measure, store as H5MD.
+
+    jamshape pack --shape spherocylinder --alpha 4 --n 256 --seed 1 --u0 1e-15 --out packing.h5
+    jamshape pack --shape superellipsoid --p 1.5 --w1 1 --w2 1 --n 400 --protocol 1 --seed 1 --out packing.h5
+    jamshape pack --kind alpha=0,share=0.5 --kind alpha=4,size=1.4,share=0.5 --n 256 --out mixture.h5
+
+In 2D as Marschall & Teitel 2018: compressed by LAMMPS, led to the energy density u0. In 3D as Yuan et al.
+2019: compressed by quasistatic steps to the first packing with U/N > 1e-10, and to u0 if given.
+
+The last line of standard output is one JSON object; the exit code is 0 only if the minimum was
+reached. Beside the result lies, until it is done, all that is needed to go on: a run that was killed does
+so when started again.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from tqdm import tqdm
+
+from jamshape.command import parser_of, report
+from jamshape.protocols.command_line import add_recipe_options, recipe_of
+from jamshape.protocols.make import is_done, make, require_same, summary_of
+
+GO_ON = "the same command goes on from the files beside the result"
+
+
+def options_of() -> ArgumentParser:
+    """Make the parser."""
+    parser = parser_of(__doc__)
+    add_recipe_options(parser)
+    parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
+    parser.add_argument("--again", action="store_true", help="make it anew if it is there")
+    return parser
+
+
+def main(options: Namespace) -> int:
+    """Make the packing unless it is there; return the exit code."""
+    recipe = recipe_of(options)
+    if options.again or not is_done(options.out):
+        options.out.parent.mkdir(parents=True, exist_ok=True)
+        steps = make(recipe, options.out, again=options.again)
+        with tqdm(steps, unit="row", mininterval=1) as bar:
+            for at in bar:
+                text = (
+                    f"{at.stage} phi {at.phi:.6f} u {at.energy_density:.2e} res {at.residual:.1e}"
+                )
+                bar.set_postfix_str(text, refresh=False)
+    else:
+        require_same(options.out, recipe)
+    found = summary_of(options.out)
+    report(found)
+    return 0 if found["reached"] else 1

@@ -1,0 +1,43 @@
+"""The modes of one packing in a figure: density of states, participation and kinds of motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from jamshape.drawing.mode_axes import COMPONENTS
+from jamshape.vibration.statistics import density_of_states, mean_in_bins
+from jamshape.vibration.table import ModeTable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def draw_density(axes: Axes, table: ModeTable) -> None:
+    """Draw the density of frequencies of stable modes."""
+    bins = density_of_states(table["omega"][~table["is_translation"]])
+    filled = bins.n_modes > 0
+    axes.loglog(bins.omega[filled], bins.density[filled], "o", mfc="none")
+    axes.set(xlabel=r"$\omega$", ylabel=r"$D(\omega)$")
+
+
+def mode_figure(table: ModeTable, title: str) -> Figure:
+    """Draw the density of states, the participation ratio and the kinds of motion over frequency."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed where nothing is drawn
+
+    omega = table["omega"]
+    bins = density_of_states(omega[~table["is_translation"]])
+    figure = Figure(figsize=(6, 8), dpi=150, layout="constrained")
+    top, middle, bottom = figure.subplots(3, 1, sharex=True)
+    draw_density(top, table)
+    top.set(title=title, xlabel="")
+    participation = mean_in_bins(table["participation"], omega, bins.edges)
+    middle.loglog(bins.omega, participation, "o", mfc="none")
+    middle.set_ylabel(r"$P(\omega)$")
+    for kind, (marker, color, label) in COMPONENTS.items():
+        if table[kind].any():
+            values = mean_in_bins(table[kind], omega, bins.edges)
+            bottom.semilogx(bins.omega, values, marker[0], color=color, mfc="none", label=label)
+    bottom.set(xlabel=r"$\omega$", ylabel="share of the motion")
+    bottom.legend()
+    return figure

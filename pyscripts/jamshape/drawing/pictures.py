@@ -1,0 +1,170 @@
+"""Figures of packings side by side, each with what was counted of it."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from jamshape.contacts import Contacts
+from jamshape.drawing.colors import ORDER, Coloring, Scale
+from jamshape.drawing.kinds import kinds_of
+from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
+from jamshape.drawing.space import save_smooth
+from jamshape.drawing.text import is_told_by_parameters, scientific
+from jamshape.files.h5md import FileFormatError, PathLike, read_attributes
+from jamshape.files.lammps_text import read_any
+from jamshape.measures.minimum import order
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+COLUMNS = 3
+INCHES = (7.0, 5.0, 4.0)  # of the longer edge of a panel, for one column, two, three
+MANY_KINDS = 3  # of which the title names no parameters
+ROOM = (0.75, 1.4)  # above and below a panel, for words, of one and of several
+
+
+class Picture(NamedTuple):
+    """A packing with what is said of it."""
+
+    found: Contacts
+    more: list[str]
+    """For the title, beside what is said of every packing."""
+    report: dict[str, Any]
+
+
+class Drawn(NamedTuple):
+    """A figure of packings and the colours of their particles."""
+
+    figure: Figure
+    colorings: list[Coloring]
+
+
+def read_picture(path: Path, frame: int = -1, sides: int | None = None, color: str = "") -> Picture:
+    """Read a packing, find its contacts and count.
+
+    Parameters
+    ----------
+    path : Path
+        H5MD, a LAMMPS dump or a data file.
+    frame : int
+        From 0; negative ones count from the end.
+    sides : int, optional
+        Bonds of a side-to-side contact; None for what the file says, or else 2.
+    color : str
+        What it will be coloured by; kinds of order are told with the numbers.
+
+    Raises
+    ------
+    FileFormatError, ValueError, OSError
+        As `read_any`.
+    """
+    packing = read_any(path, frame)
+    known: dict[str, Any] = {"sides": 2, "k_e": 1.0}
+    with contextlib.suppress(FileFormatError):  # dumps and data files have no attributes
+        known |= read_attributes(path)
+    found = Contacts.of(packing, known["k_e"], sides or known["sides"])
+    picture = picture_of(found, known, color)
+    return picture._replace(report={"packing": path} | picture.report)
+
+
+def picture_of(found: Contacts, known: Mapping[str, Any], color: str = "") -> Picture:
+    """Count what is in a packing of which something is known; arguments as `read_picture`."""
+    packing, counts = found.packing, found.counts
+    u = float(found.energy.sum()) / packing.box.volume
+    told = {"shape": packing.shape_style, "dimension": packing.dimension}
+    told |= {"n": packing.n, "rattlers": counts.n_rattlers, "contacts": len(found)}
+    told |= {"phi": packing.phi, "u": u, "z": counts.z}
+    known_order = order(packing) if color in ORDER else {}
+    numbers = [rf"$N={packing.n}$", rf"$\phi={packing.phi:.5f}$"]
+    numbers += [rf"$u={scientific(u)}$", f"$z={counts.z:.3f}$"]
+    numbers += [f"step {packing.step}"] * (packing.step > 0)
+    numbers += [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
+    if "protocol" in known:
+        numbers.append(f"protocol {known['protocol']}")
+    return Picture(found, numbers, told | known_order)
+
+
+def draw_pictures(pictures: Sequence[Picture], look: Look) -> Drawn:
+    """Draw packings in panels of one figure, with one scale of order.
+
+    Raises
+    ------
+    ValueError
+        If a packing's dimension knows no such order.
+    """
+    colored, scale = colorings([one.found for one in pictures], look.color)
+    figure, panels = _make_panels(pictures, with_bar=scale is not None)
+    for axes, one, colors in zip(panels, pictures, colored, strict=False):
+        draw_packing(axes, one.found, colors, look)
+        axes.settitle_of(
+            title_of(one.found, one.more, narrow=len(pictures) > 1), fontsize=9, linespacing=1.4
+        )
+        add_legend(axes, colors)
+    for axes in panels[len(pictures) :]:
+        axes.set_axis_off()
+    if scale:
+        _add_bar(figure, panels, scale)
+    return Drawn(figure, colored)
+
+
+def save_pictures(figure: Figure, pictures: Sequence[Picture], out: PathLike, dpi: int) -> None:
+    """Write a figure of packings; those in space with smooth edges."""
+    if any(one.found.packing.dimension == 3 for one in pictures):
+        save_smooth(figure, Path(out), dpi)
+    else:
+        figure.savefig(out, dpi=dpi, bbox_inches="tight", pad_inches=0.05)
+
+
+def title_of(found: Contacts, more: Sequence[str] = (), *, narrow: bool = False) -> str:
+    """Name the particles, if they are few kinds, and what was counted.
+
+    Parameters
+    ----------
+    found : Contacts
+    more : sequence of str
+        To say at its end.
+    narrow : bool
+        Whether it stands above a narrow panel, and so in more lines.
+    """
+    packing, gap = found.packing, "    "
+    u, z = (
+        float(found.network.energy.sum()) / packing.box.volume,
+        coordination(packing, found.network).z,
+    )
+    kinds, shape = kinds_of(packing), packing.shape
+    known = [f"{shape.name}s"] * (not is_told_by_parameters(shape))
+    known += [kinds.title] * (0 < len(kinds.parameters) < MANY_KINDS)
+    where = gap.join([rf"$N={packing.n}$", rf"$\phi={packing.phi:.5f}$"])
+    counted = [rf"$u={scientific(u)}$", f"$z={z:.3f}$"]
+    counted += [f"step {packing.step}"] * (packing.step > 0)
+    lines = [where, gap.join([*counted, *more])]
+    lines = lines if narrow else [gap.join(lines)]
+    return "\n".join([", ".join(known)] * (known != []) + lines)
+
+
+def _make_panels(pictures: Sequence[Picture], *, with_bar: bool) -> tuple[Figure, Any]:
+    """Make a figure with a panel for each packing, as long and wide as its box."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
+
+    columns = min(COLUMNS, len(pictures))
+    rows = -(-len(pictures) // columns)
+    shapes = [
+        one.found.packing.box.edges[:2] for one in pictures if one.found.packing.dimension == 2
+    ]
+    ratios = [edges / edges.max() for edges in shapes] or [np.ones(2)]
+    width, height = INCHES[columns - 1] * np.max(ratios, axis=0)
+    size = (columns * width + 0.1 + 0.7 * with_bar, rows * (height + ROOM[len(pictures) > 1]))
+    figure = Figure(figsize=size)
+    figure.set_layout_engine("constrained", h_pad=0.1, w_pad=0.06)
+    return figure, figure.subplots(rows, columns, squeeze=False).ravel()
+
+
+def _add_bar(figure: Figure, panels: Any, scale: Scale) -> None:
+    """Explain the colours of local order."""
+    bar = figure.colorbar(scale.mapped, ax=list(panels), fraction=0.04, pad=0.02, shrink=0.8)
+    bar.set_label(scale.label)

@@ -1,0 +1,61 @@
+"""Every public name of the front door, and of what stands behind it, has an example, and all of them run."""
+
+import ast
+import doctest
+import importlib
+import inspect
+import pkgutil
+from pathlib import Path
+
+import pytest
+
+import jamshape
+
+FOLDER = Path(jamshape.__file__).parent
+
+
+def modules():
+    """All modules but the compiled one."""
+    found = pkgutil.walk_packages([str(FOLDER)], "jamshape.")
+    return ["jamshape", *(m.name for m in found if not m.name.split(".")[-1].startswith("_"))]
+
+
+def with_examples():
+    def text(name):
+        relative = name.split(".")[1:]
+        path = FOLDER.joinpath(*relative)
+        return (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+
+    return [name for name in modules() if ">>> " in text(name)]
+
+
+@pytest.fixture(scope="module")
+def in_a_folder(tmp_path_factory):
+    """A working directory that all examples share: one makes a packing, others load it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("examples"))
+        patch.setenv("MPLBACKEND", "agg")
+        yield
+
+
+@pytest.mark.parametrize("name", with_examples())
+@pytest.mark.usefixtures("in_a_folder")
+def test_examples_run(name):
+    found = doctest.testmod(importlib.import_module(name), optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert found.attempted
+    assert not found.failed
+
+
+def public():
+    stub = ast.parse((FOLDER / "__init__.pyi").read_text())
+    return [a.name for node in stub.body if isinstance(node, ast.ImportFrom) for a in node.names]
+
+
+def test_the_list_of_names_is_what_is_there():
+    assert sorted(public()) == sorted(jamshape.__all__)
+
+
+@pytest.mark.parametrize("name", public())
+def test_every_public_name_is_told_with_an_example(name):
+    text = inspect.getdoc(getattr(jamshape, name))
+    assert ">>> " in text
