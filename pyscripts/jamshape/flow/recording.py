@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from jamshape.files.h5md import (
@@ -111,21 +112,24 @@ def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
 
 
 def record(run: CompressionRun, to: Recording) -> Iterator[Row]:
-    """Run to the end, writing each sample to the file before it is yielded."""
+    """Run to the end and yield each sample, which is in the file within about a second.
+
+    What a restart file goes on from is there before it: all samples before its step.
+    """
     writer = RunWriter.open(to.path)
     whole = run.settings.steps(float(read_attributes(to.path)["phi_start"]), writer.first.dimension)
     every = max(1, whole // to.rows)
     per_frame = every * max(1, to.rows // to.frames)
-    name_of_error = "local_error" if run.settings.chooses_steps else "step_error"
     run.keep_restarts(per_frame, to.restart_prefix)
+    rows = _Rows(writer, "local_error" if run.settings.chooses_steps else "step_error")
 
     def keep(sample: Row) -> Row:
-        if sample.step % per_frame == 0 or sample.step == run.last_step:
-            writer.append(run.packing(), sample.observables)
-        else:
-            writer.append_observables(sample.step, sample.time, sample.observables)
-        error = sample.observables[name_of_error]
-        writer.append_report(sample.step, sample.wall_seconds, error)
+        rows.add(sample)
+        is_frame = sample.step % per_frame == 0 or sample.step == run.last_step
+        if is_frame or rows.is_late or (sample.step + every) % per_frame == 0:
+            rows.write()
+        if is_frame:
+            writer.append(run.packing())
         return sample
 
     # A restart file is older than the row of its step, which a kill may have cut off.
@@ -133,7 +137,38 @@ def record(run: CompressionRun, to: Recording) -> Iterator[Row]:
         yield keep(run.sample())
     for sample in run.samples(every):
         yield keep(sample)
+    rows.write()
     writer.set_attributes({"finished": True})
+
+
+class _Rows:
+    """Samples on their way to the file: to open it for each one would take longer than small runs do."""
+
+    _SECONDS = 1.0
+
+    def __init__(self, writer: RunWriter, error: str) -> None:
+        self._writer, self._error = writer, error
+        self._rows: list[Row] = []
+        self._written = perf_counter()
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the last ones have waited long enough."""
+        return perf_counter() - self._written > self._SECONDS
+
+    def add(self, row: Row) -> None:
+        self._rows.append(row)
+
+    def write(self) -> None:
+        """Write what is there."""
+        rows, self._rows, self._written = self._rows, [], perf_counter()
+        if rows:
+            steps, times = [row.step for row in rows], [row.time for row in rows]
+            columns = {k: [row.observables[k] for row in rows] for k in rows[0].observables}
+            self._writer.append_series(steps, times, columns)
+            self._writer.append_report(
+                steps, [row.wall_seconds for row in rows], columns[self._error]
+            )
 
 
 def summary_of(path: Path) -> dict[str, object]:

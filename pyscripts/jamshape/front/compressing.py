@@ -91,9 +91,9 @@ def compress(
     --------
     >>> import jamshape as js
     >>> rods = js.Spherocylinders(alpha=4)
-    >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, progress=False)
-    >>> bool(run.pressure[-1] > 1e-3)
-    True
+    >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
+    >>> run
+    <Run of 24 spherocylinders in 2D at kappa = 0.001: 21 frames to phi = 0.95, pressure = 0.0454, in run.h5>
     """
     at = place(file, "run.h5")
     integrator = integrator or ("rkc2" if dt is None else "heun")
@@ -132,6 +132,14 @@ def resume(file: str | Path, *, progress: bool = True) -> RunFile:
     ------
     FileFormatError, OSError
         If it is no such file, or not to be read.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> rods = js.Spherocylinders(alpha=4)
+    >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
+    >>> js.resume("run.h5").about["finished"]
+    True
     """
     path = Path(file)
     stored = read_attributes(path)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
-from jamshape.drawing.pictures import picture_of, title_of
+from jamshape.drawing.pictures import title_of
 from jamshape.drawing.pressure import draw_pressure
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
@@ -95,10 +95,10 @@ def _draw(thing: Any, axes: Axes, color: str) -> None:
 
 def _packing(packing: Packing, axes: Axes, color: str) -> None:
     measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
-    picture = picture_of(measured.contacts(), measured.results, color)
-    colored, scale = colorings([picture.found], color)
-    draw_packing(axes, picture.found, colored[0], Look(color))
-    axes.set_title(title_of(picture, narrow=True), fontsize=9, linespacing=1.4)
+    found = measured.contacts()
+    colored, scale = colorings([found], color)
+    draw_packing(axes, found, colored[0], Look(color))
+    axes.set_title(title_of(found, narrow=True), fontsize=9, linespacing=1.4)
     add_legend(axes, colored[0])
     if scale:
         figure: Any = axes.figure

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 import warnings
+import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -50,18 +52,26 @@ def follow(
             line.update(1 if done is None else done - line.n)
 
 
+class Folder:
+    """A temporary folder that goes with the last who holds this."""
+
+    def __init__(self) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix="jamshape-"))
+        self._end = weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
+
+
 class Place(NamedTuple):
     """A file, and the folder that goes when nobody needs it any more."""
 
     path: Path
-    folder: tempfile.TemporaryDirectory[str] | None = None
+    folder: Folder | None = None
 
 
 def place(file: str | Path | None, name: str) -> Place:
     """Make room for a file; without one, in a folder of its own that goes with the result."""
     if file is None:
-        folder = tempfile.TemporaryDirectory(prefix="jamshape-")
-        return Place(Path(folder.name) / name, folder)
+        folder = Folder()
+        return Place(folder.path / name, folder)
     path = Path(file)
     path.parent.mkdir(parents=True, exist_ok=True)
     return Place(path)

@@ -32,11 +32,12 @@ class RunFile:
     Examples
     --------
     >>> import jamshape as js
-    >>> run = js.compress(js.Spherocylinders(), n=16, phi=(0.3, 0.5), kappa=1e-3, progress=False)
-    >>> run.phi[0] < run.phi[-1], run.packing().n, len(run)
-    (True, 16, 21)
-    >>> run.onset() is None  # no jamming yet
-    True
+    >>> rods = js.Spherocylinders(alpha=4)
+    >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
+    >>> run.phi.shape, len(run), run.packing().n
+    ((401,), 21, 24)
+    >>> round(float(run.phi[-1]), 6), round(run.onset().phi_J, 2)
+    (0.95, 0.67)
     """
 
     file: Path

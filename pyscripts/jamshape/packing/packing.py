@@ -38,6 +38,12 @@ class Box:
     ------
     ValueError
         If D is neither 2 nor 3, a number is not finite, or an edge is not positive.
+
+    Examples
+    --------
+    >>> from jamshape import Box
+    >>> Box(lo=[0, 0], edges=[10, 12]).volume
+    120.0
     """
 
     lo: FloatArray
@@ -101,6 +107,16 @@ class Packing:
     ValueError
         If shapes disagree, a number is not finite, a diameter is not positive, an exponent is not
         above 1/2, an ID is there twice, or the diameters are not those of the shape style.
+
+    Examples
+    --------
+    >>> from jamshape import Box, Packing
+    >>> rod_and_disc = Packing(
+    ...     position=[[2, 5], [8, 5]], orientation=[0, 0], diameters=[[5, 1, 1], [1, 1, 1]],
+    ...     species=[1, 2], id=[1, 2], box=Box(lo=[0, 0], edges=[10, 10]),
+    ... )
+    >>> round(rod_and_disc.phi, 4)
+    0.0557
     """
 
     position: FloatArray

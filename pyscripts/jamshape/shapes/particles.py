@@ -45,6 +45,12 @@ class Kind:
     ------
     ValueError
         If a number is out of its range.
+
+    Examples
+    --------
+    >>> from jamshape import Kind, Particles
+    >>> discs, rods = Kind({"alpha": 0}, share=3), Kind({"alpha": 4}, size=1.4)
+    >>> mixture = Particles.mixture("spherocylinder", [discs, rods])
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)

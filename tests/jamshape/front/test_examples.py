@@ -4,7 +4,7 @@ import ast
 import doctest
 import importlib
 import inspect
-import pkgutil
+import re
 from pathlib import Path
 
 import pytest
@@ -12,21 +12,14 @@ import pytest
 import jamshape
 
 FOLDER = Path(jamshape.__file__).parent
-
-
-def modules():
-    """All modules but the compiled one."""
-    found = pkgutil.walk_packages([str(FOLDER)], "jamshape.")
-    return ["jamshape", *(m.name for m in found if not m.name.split(".")[-1].startswith("_"))]
+EXAMPLE = re.compile(r"^ *>>> ", re.MULTILINE)
 
 
 def with_examples():
-    def text(name):
-        relative = name.split(".")[1:]
-        path = FOLDER.joinpath(*relative)
-        return (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
-
-    return [name for name in modules() if ">>> " in text(name)]
+    """All modules that have one."""
+    files = [f for f in sorted(FOLDER.rglob("*.py")) if EXAMPLE.search(f.read_text())]
+    parts = [("jamshape", *f.relative_to(FOLDER).with_suffix("").parts) for f in files]
+    return [".".join(p).removesuffix(".__init__") for p in parts]
 
 
 @pytest.fixture(scope="module")
