@@ -64,6 +64,7 @@ __all__ = [
     "Series",
     "count_frames",
     "read_attributes",
+    "read_creator",
     "read_format_version",
     "read_observables",
     "read_packing",
@@ -181,6 +182,13 @@ def read_format_version(path: PathLike) -> int:
     """Read which names a file uses; errors as `read_packing`."""
     with layout.opened(path) as file:
         return int(layout.require_item(file, "h5md/creator").attrs.get("format_version", 1))
+
+
+def read_creator(path: PathLike) -> str:
+    """Read which version of jamshape wrote a file; errors as `read_packing`."""
+    with layout.opened(path) as file:
+        version = layout.require_item(file, "h5md/creator").attrs.get("version", b"unknown")
+        return version.decode() if isinstance(version, bytes) else str(version)
 
 
 def read_observables(path: PathLike) -> dict[str, NDArray[Any]]:

@@ -1,0 +1,235 @@
+"""What is in a file, whatever it is: found by its content, never by its name."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.contacts import coordination, find_contacts, find_rattlers
+from jamshape.contacts.network import sum_forces
+from jamshape.drawing.kinds import kinds_of
+from jamshape.files.h5md import (
+    HDF5_SIGNATURE,
+    count_frames,
+    read_attributes,
+    read_creator,
+    read_format_version,
+    read_observables,
+    read_packing,
+    read_report,
+)
+from jamshape.files.lammps_text import iter_dump, read_data
+from jamshape.files.sets import REACHED
+from jamshape.packing import Packing
+from jamshape.vibration.sets import TOLD, of_packing
+from jamshape.vibration.table import ModeTable, holds_modes, read_modes
+
+_RESTART = b"LammpS RestartT\0"
+_STATE = ("phi", "pressure", "u", "z", "rattlers")
+_MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "outcome")
+
+
+class _Stored(NamedTuple):
+    """How a file of particles is called, what tells it from others, and how to go on with it."""
+
+    kind: str
+    mark: str
+    """An attribute that only files of this kind have."""
+    go_on: str
+    """Where it is not finished."""
+
+
+_OTHER_COMMAND = "start the command that makes {result} again, which goes on from this file"
+
+# The first that fits.
+_STORED = (
+    _Stored("search for an energy", "search_step", _OTHER_COMMAND),
+    _Stored("steps on the way to a packing", "loose_phi", _OTHER_COMMAND),
+    _Stored("slow run", "flow_steps", "start the command that began it again"),
+    _Stored("compression on the way to a packing", "restart_step", _OTHER_COMMAND),
+    _Stored("run", "finished", "jamshape compress --resume --out {path}"),
+    _Stored("packing", "", ""),
+)
+
+# Of files beside a packing that is not made yet.
+_ENDS = (".search.h5", ".path.h5", ".run.h5")
+
+
+def contents_of(path: Path) -> dict[str, Any]:
+    """Tell what is in a file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    dict
+        ``kind``, and what is known of it: names of the shape, numbers, ``kinds`` with how many there are
+        of each, ``finished``, ``go_on`` with what to do where it is not finished.
+
+    Raises
+    ------
+    FileFormatError
+        If it is damaged.
+    ValueError
+        If it is none of ours.
+    OSError
+        If it cannot be read.
+    """
+    with path.open("rb") as file:
+        start = file.read(4096)
+    for fits, tell in _READERS:
+        if fits(start):
+            return {"file": path, **tell(path)}
+    msg = (
+        f"{path} is no file that jamshape knows, expected a packing, a run or modes in HDF5, or a data,"
+        " dump or restart file of LAMMPS"
+    )
+    raise ValueError(msg)
+
+
+def _hdf5(path: Path) -> dict[str, Any]:
+    return _modes(read_modes(path)) if holds_modes(path) else _particles(path)
+
+
+def _particles(path: Path) -> dict[str, Any]:
+    """Tell of H5MD."""
+    known, packing = read_attributes(path), read_packing(path)
+    stored = next(one for one in _STORED if not one.mark or one.mark in known)
+    found: dict[str, Any] = {"kind": stored.kind, **_of_packing(packing)}
+    found |= _state(packing, _measured(path, known), known)
+    found |= _picked(known, _MADE) | {"finished": bool(known.get("finished", not stored.mark))}
+    if "kappa" in found:
+        found["kappa"] = np.ravel(found["kappa"])[-1].item()
+    if "outcome" in known:
+        found["reached"] = known["outcome"] in REACHED
+    found |= {"frames": count_frames(path), **_cost(path, known)}
+    found |= {"format_version": read_format_version(path), "jamshape_version": read_creator(path)}
+    if not found["finished"]:
+        found["go_on"] = stored.go_on.format(path=path, result=_result_of(path))
+    return found
+
+
+def _of_packing(packing: Packing) -> dict[str, Any]:
+    """Tell of the particles and the box."""
+    kinds = kinds_of(packing)
+    numbers = range(kinds.of.max() + 1) if len(kinds.parameters) else ()
+    rows = []
+    for number in numbers:
+        own = kinds.of == number
+        row = packing.diameters[own][0], float(packing.exponent[own][0])
+        parameters, size = packing.shape.parameters_of(*row)
+        rows.append({**parameters, "size": size, "count": int(own.sum())})
+    found = {"shape": packing.shape_style, "dimension": packing.dimension, "n": packing.n}
+    found |= {"kinds": rows, "unit": packing.shape.unit, "box": packing.box.edges.tolist()}
+    return found | ({"step": packing.step, "time": packing.time} if packing.step else {})
+
+
+def _measured(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
+    """Read the numbers of a state that a file holds: the last ones of a run."""
+    rows = {name: value for name, value in read_observables(path).items() if value.ndim == 1}
+    found = {name: float(value[-1]) for name, value in rows.items() if len(value)}
+    return _picked(found | dict(known) | {"rattlers": _rattlers(found, known)}, _STATE)
+
+
+def _rattlers(found: Mapping[str, Any], known: Mapping[str, Any]) -> int | None:
+    number = known.get("n_rattlers", found.get("rattlers"))
+    return None if number is None else int(number)
+
+
+def _state(
+    packing: Packing, measured: Mapping[str, Any], known: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Give the numbers of a state, those that are not stored from its contacts."""
+    if all(name in measured for name in _STATE):
+        return dict(measured)
+    law = {"k_e": 1.0, "sides": 2} | dict(known or {})
+    network = find_contacts(packing, float(law["k_e"]), int(law["sides"]))
+    counts, sums = coordination(packing, network), sum_forces(packing, network)
+    u = float(network.energy.sum()) / packing.box.volume
+    found = {"phi": packing.phi, "pressure": sums.pressure, "u": u, "z": counts.z}
+    found["rattlers"] = int(find_rattlers(packing, network).sum())
+    return found | dict(measured)
+
+
+def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
+    """Tell the error reached and the time it took."""
+    report = read_report(path)
+    found: dict[str, Any] = {}
+    if len(report.step):
+        found = {"error": float(report.error[-1]), "wall_seconds": float(report.wall_seconds[-1])}
+        found["rows"] = len(report.step)
+    for name in ("wall_seconds", "flow_wall_seconds"):
+        found |= {"wall_seconds": float(known[name])} if name in known else {}
+    return found | ({"error": float(known["residual"])} if "residual" in known else {})
+
+
+def _result_of(path: Path) -> Path:
+    """Name the packing that a file lies beside."""
+    for end in _ENDS:
+        if path.name.endswith(end):
+            return path.with_name(path.name.removesuffix(end))
+    return Path("its packing")
+
+
+def _modes(table: ModeTable) -> dict[str, Any]:
+    """Tell of modes."""
+    known, own = of_packing(table), table.attributes
+    found: dict[str, Any] = {"kind": "modes", "dimension": table.coordinates.dimension}
+    found |= _picked(known, ("shape", "phi", "u", *_MADE))
+    found |= _picked(own, ("n", "n_modes", "z", "pressure", "method", "wall_seconds"))
+    found |= {"modes": len(table["eigenvalues"]), "rattlers": own["n"] - own["n_backbone"]}
+    found |= {"error": own["residual"], "vectors": table.vectors.shape[1] > 0}
+    return found | {"bands": {name: len(table.in_band(name)) for name in TOLD}, "finished": True}
+
+
+def _dump(path: Path) -> dict[str, Any]:
+    for frames, packing in enumerate(iter_dump(path), 1):
+        last, count = packing, frames
+    return _text("LAMMPS dump", last) | {"frames": count}
+
+
+def _data(path: Path) -> dict[str, Any]:
+    return _text("LAMMPS data file", read_data(path)) | {"frames": 1}
+
+
+def _text(kind: str, packing: Packing) -> dict[str, Any]:
+    return {"kind": kind, **_of_packing(packing), **_state(packing, {}), "finished": True}
+
+
+def _restart(path: Path) -> dict[str, Any]:
+    """Read the head of a restart file: numbered entries, of which the first are always these."""
+    content = path.read_bytes()[len(_RESTART) :]
+    entries: list[Any] = []
+    at = 8  # behind the order of bytes and the version of the format
+    for kind in "siiiisqi":
+        at += 4  # the number of the entry
+        if kind == "s":
+            (length,) = struct.unpack_from("=i", content, at)
+            entries.append(content[at + 4 : at + 3 + length].decode())
+            at += 4 + length
+        else:
+            entries += struct.unpack_from(f"={kind}", content, at)
+            at += struct.calcsize(f"={kind}")
+    known = {"lammps": entries[0], "step": entries[6], "dimension": entries[7]}
+    go_on = f"lmp -in DECK -var restart {path}, with all other settings as before"
+    if path.suffix in {".a", ".b"} and (run := path.with_suffix("").with_suffix("")).exists():
+        go_on = f"jamshape compress --resume --out {run}"
+    return {"kind": "LAMMPS restart file", **known, "finished": False, "go_on": go_on}
+
+
+def _picked(known: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    return {name: known[name] for name in names if known.get(name) is not None}
+
+
+_READERS: tuple[tuple[Callable[[bytes], bool], Callable[[Path], dict[str, Any]]], ...] = (
+    (lambda start: start.startswith(HDF5_SIGNATURE), _hdf5),
+    (lambda start: start.startswith(b"ITEM: "), _dump),
+    (lambda start: start.startswith(_RESTART), _restart),
+    (lambda start: b" atoms" in start and b"xlo xhi" in start, _data),
+)

@@ -1,0 +1,103 @@
+"""Tell what a file is: a packing, a run, modes, or a data, dump or restart file of LAMMPS.
+
+    jamshape info packing.h5
+
+Says which particles are in it, how they were made and how good the result is, whether it is finished, and how to go
+on where it is not. The last line of standard output is one JSON object.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from jamshape.command import parser_of, report
+from jamshape.commands.contents import contents_of
+
+# Lines of what is known; each part is said where its number is there.
+_LINES = {
+    "particles": ("{n} {shape}s in {dimension}D", "{kinds_text}"),
+    "box": ("{box_text}",),
+    "state": (
+        "phi {phi:.8g}",
+        "pressure {pressure:.4g}",
+        "u {u:.4g}",
+        "z {z:.5g}",
+        "{rattlers} rattlers",
+    ),
+    "made with": (
+        "seed {seed}",
+        "kappa {kappa:g}",
+        "u0 {u0:g}",
+        "protocol {protocol}",
+        "phi from {phi_start:g}",
+        "to {phi_end:g}",
+    ),
+    "modes": ("{modes} of {n_modes}", "{bands_text}", "by the method {method!r}"),
+    "holds": ("{frames} frames", "{rows} rows of error and time", "step {step}", "time {time:.6g}"),
+    "error": ("{error_of} {error:.2g}",),
+    "took": ("{wall_seconds:.3g} s",),
+    "written by": (
+        "LAMMPS of {lammps}",
+        "jamshape {jamshape_version}",
+        "format {format_version}",
+    ),
+    "go on with": ("{go_on}",),
+}
+
+_NET_FORCE = "largest net force over the mean force of a bond:"
+_ERRORS = {"packing": _NET_FORCE, "modes": _NET_FORCE}
+
+
+def options_of() -> ArgumentParser:
+    """Make the parser."""
+    parser = parser_of(__doc__)
+    parser.add_argument("file", type=Path, metavar="FILE", help="any file of jamshape or LAMMPS")
+    return parser
+
+
+def main(options: Namespace) -> None:
+    """Read, tell, report."""
+    found = contents_of(options.file)
+    print(f"{options.file}: {_title(found)}")
+    for line in lines_of(found):
+        print(f"  {line}")
+    report(found)
+
+
+def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
+    """Say what is known, a line for each subject."""
+    known = {name: value for name, value in found.items() if value is not None}
+    known["error_of"] = _ERRORS.get(found["kind"], "of the last step:")
+    known |= (
+        {"box_text": " x ".join(f"{edge:.6g}" for edge in found["box"])} if "box" in found else {}
+    )
+    if found.get("kinds"):
+        known["kinds_text"] = "; ".join(_kind(kind, found["unit"]) for kind in found["kinds"])
+    if "bands" in found:
+        known["bands_text"] = ", ".join(f"{count} {name}" for name, count in found["bands"].items())
+    for subject, parts in _LINES.items():
+        said = [text for text in (_filled(part, known) for part in parts) if text]
+        if said:
+            yield f"{subject + ':':12} {', '.join(said)}"
+
+
+def _filled(part: str, known: Mapping[str, Any]) -> str:
+    try:
+        return part.format_map(known)
+    except KeyError:  # it is not known
+        return ""
+
+
+def _title(found: Mapping[str, Any]) -> str:
+    state = "" if found["finished"] else ", not finished"
+    return f"{found['kind']}{', ' * ('outcome' in found)}{found.get('outcome', state)}"
+
+
+def _kind(kind: Mapping[str, Any], unit: str) -> str:
+    numbers = [
+        f"{name} {value:.4g}" for name, value in kind.items() if name not in {"size", "count"}
+    ]
+    return f"{kind['count']} with {', '.join(numbers)}, {unit} = {kind['size']:.4g}"
