@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import FloatArray
+from jamshape.arrays import BoolArray, FloatArray
 from jamshape.drawing.kinds import kinds_of
 from jamshape.drawing.styles import GREEN, KINDS, RATTLER, RED, YELLOW
 from jamshape.contacts import Contacts
@@ -83,9 +83,13 @@ def order_of(found: Contacts, name: str) -> FloatArray:
 
 def by_kind(found: Contacts) -> Coloring:
     """Colour by kind; rattlers are grey, unless all are."""
+    return of_kinds(found.packing, found.rattlers)
+
+
+def of_kinds(packing: Packing, rattlers: BoolArray) -> Coloring:
+    """Colour by kind; the (N,) rattlers are grey, unless all are."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgb  # noqa: PLC0415 - not for --help
 
-    packing, rattlers = found.packing, found.rattlers
     kinds = kinds_of(packing)
     palette = np.array([to_rgb(c) for c in KINDS])
     if len(kinds.labels) == 1:

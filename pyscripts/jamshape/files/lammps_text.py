@@ -6,7 +6,11 @@ goes through its quaternion, and an edge of the box, which goes through its uppe
 exact where the lower corner is 0 or half an edge below it).
 
 Neither format names the shape style: the first shape of `jamshape.shapes.table` that can have such
-diameters is taken; use ``packing.with_(shape_style=...)`` for another one.
+diameters, and an exponent where the file tells one, is taken; use ``packing.with_(shape_style=...)`` for
+another one.
+
+Dumps tell the exponent p twice: in a column ``exponent``, to all digits, and as 1/p in
+``SuperquadricRoundness.Phi`` and ``.Theta``, which OVITO draws the bodies from. Data files tell none.
 """
 
 from __future__ import annotations
@@ -29,6 +33,8 @@ _POSITION = ("x", "y", "z")
 _IMAGE = ("ix", "iy", "iz")
 _QUATERNION = ("quatw", "quati", "quatj", "quatk")
 _DIAMETERS = ("shapex", "shapey", "shapez")
+_EXPONENT = ("exponent",)
+_ROUNDNESS = ("SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta")  # names that OVITO knows
 _DUMP_COLUMNS = ("id", "type", *_POSITION, *_QUATERNION, *_DIAMETERS)
 _ATOMS = ("id", "type", "ellipsoidflag", "density", *_POSITION)
 _ELLIPSOIDS = ("id", *_DIAMETERS, *_QUATERNION)
@@ -116,9 +122,10 @@ def iter_dump(path: PathLike, dimension: int | None = None) -> Iterator[Packing]
     ----------
     path : path-like
         Of ``dump custom`` with the columns ``id type x y z quatw quati quatj quatk shapex shapey
-        shapez`` in any order, ``ix iy iz`` if wanted, and others, which are ignored. Quaternions
-        and shapes may come from a compute of their name, ``compute quatw all property/atom
-        quatw`` and the column ``c_quatw``, and so on.
+        shapez`` in any order, ``ix iy iz`` and ``exponent`` if wanted, and others, which are ignored.
+        Quaternions and shapes may come from a compute of their name, ``compute quatw all
+        property/atom quatw`` and the column ``c_quatw``, and so on; the exponent from a variable.
+        Without it, p is 1 over ``SuperquadricRoundness.Phi``, if that is there.
     dimension : {2, 3, None}
         As in `read_data`.
 
@@ -215,6 +222,7 @@ def _packing(frame: _Frame, dimension: int | None) -> Packing:
         raise ValueError(msg)
     lo, hi = frame.bounds[:dimension].T
     has_image = set(_IMAGE) <= set(frame.columns)
+    exponent = _exponent(frame.columns)
     return Packing(
         position=stack(_POSITION[:dimension]),
         orientation=angle_from_quaternion(quaternion) if dimension == 2 else quaternion,
@@ -223,10 +231,24 @@ def _packing(frame: _Frame, dimension: int | None) -> Packing:
         id=_whole(frame.columns["id"]),
         image=_whole(stack(_IMAGE[:dimension])) if has_image else np.empty((0, 0), np.int64),
         box=Box(lo=lo, edges=hi - lo),
-        shape_style=guess_shape_style(diameters),
+        shape_style=guess_shape_style(diameters, has_exponent=len(exponent) > 0),
+        exponent=exponent,
         step=frame.step,
         time=frame.time,
     )
+
+
+def _exponent(columns: Mapping[str, FloatArray]) -> FloatArray:
+    """(N,) exponents; empty if the file tells none."""
+    if set(_EXPONENT) <= set(columns):
+        return columns["exponent"]
+    if not set(_ROUNDNESS) <= set(columns):
+        return np.empty(0)
+    phi, theta = (columns[name] for name in _ROUNDNESS)
+    if not ((phi > 0) & (phi == theta)).all():
+        msg = f"{' and '.join(_ROUNDNESS)} differ or are not positive, expected both to be 1/p"
+        raise ValueError(msg)
+    return np.asarray(1 / phi)
 
 
 def _whole(column: FloatArray) -> IntArray:
@@ -333,7 +355,7 @@ def _dump_frame(title: str, lines: TextIO) -> _Frame:
 def _plain_name(column: str) -> str:
     """`quatw` for `c_quatw`, the only name that a LAMMPS before ``dump_modify colname`` can give."""
     name = column[2:] if column[:2] in {"c_", "f_", "v_"} else column
-    return name if name in (*_QUATERNION, *_DIAMETERS) else column
+    return name if name in (*_QUATERNION, *_DIAMETERS, *_EXPONENT) else column
 
 
 def _take(lines: TextIO, n: int) -> list[str]:
@@ -349,8 +371,8 @@ def _dump_columns(names: Sequence[str], rows: Sequence[str]) -> dict[str, FloatA
     if missing:
         msg = f"columns {' '.join(missing)!r} are missing, expected {' '.join(_DUMP_COLUMNS)!r}"
         raise ValueError(msg)
-    image = [name for name in _IMAGE if name in names]
-    return _columns(rows, names, [*_DUMP_COLUMNS, *image])
+    others = [name for name in (*_IMAGE, *_EXPONENT, *_ROUNDNESS) if name in names]
+    return _columns(rows, names, [*_DUMP_COLUMNS, *others])
 
 
 def _dump_bounds(item: Sequence[str]) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.shapes.mesh import SurfaceMesh, arc, revolved
 from jamshape.shapes.shape import ElongatedShape, Parameter
+from jamshape.shapes.solid import Balls
 
 
 class Dimer(ElongatedShape):
@@ -47,6 +48,12 @@ class Dimer(ElongatedShape):
         normal = np.concatenate([part, part[::-1] * [-1, 1]])
         centre = np.repeat([[-A, 0.0], [A, 0.0]], len(part), axis=0)
         return revolved(radius * normal + centre, normal, 8 * 2**level)
+
+    def solid(self, diameters: FloatArray, exponent: float) -> Balls:
+        """As `Shape.solid`."""
+        del exponent
+        A = self.spine(diameters)
+        return Balls(np.array([[-A, 0.0, 0.0], [A, 0.0, 0.0]]), float(diameters[1]) / 2)
 
     @staticmethod
     def _waist(radius: float, A: float) -> float:

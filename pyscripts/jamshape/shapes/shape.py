@@ -16,6 +16,7 @@ import numpy as np
 if TYPE_CHECKING:
     from jamshape.arrays import FloatArray, IntArray
     from jamshape.shapes.mesh import SurfaceMesh
+    from jamshape.shapes.solid import Solid
 
 
 class Parameter(NamedTuple):
@@ -128,6 +129,10 @@ class Shape(ABC):
     @abstractmethod
     def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
         """Cover a particle in space with triangles, in body coordinates."""
+
+    @abstractmethod
+    def solid(self, diameters: FloatArray, exponent: float) -> Solid:
+        """Describe a particle to programs that do not know the shape."""
 
     def spine(self, diameters: FloatArray) -> float:
         """Half length of the line along the body's x that tells its direction; 0 for none."""

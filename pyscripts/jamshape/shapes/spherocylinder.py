@@ -13,6 +13,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.shapes.mesh import SurfaceMesh, arc, revolved
 from jamshape.shapes.shape import ElongatedShape, Interaction, Style
+from jamshape.shapes.solid import RoundedSegment
 
 
 class Spherocylinder(ElongatedShape):
@@ -47,3 +48,8 @@ class Spherocylinder(ElongatedShape):
         normal = np.concatenate([cap * [-1, 1], cap[::-1]])
         ends = np.repeat([[-A, 0.0], [A, 0.0]], len(cap), axis=0)
         return revolved(radius * normal + ends, normal, 8 * 2**level)
+
+    def solid(self, diameters: FloatArray, exponent: float) -> RoundedSegment:
+        """As `Shape.solid`."""
+        del exponent
+        return RoundedSegment(self.spine(diameters), float(diameters[1]) / 2)

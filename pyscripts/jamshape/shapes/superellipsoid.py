@@ -14,6 +14,7 @@ from jamshape.arrays import FloatArray
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.roundness import asphericity, axes_from, reduced_aspect_ratio
 from jamshape.shapes.shape import Interaction, Parameter, Shape, Style
+from jamshape.shapes.solid import Superquadric
 from jamshape.shapes.superellipsoid_surface import surface_mesh
 
 
@@ -96,3 +97,7 @@ class Superellipsoid(Shape):
     def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
         """As `Shape.surface`."""
         return surface_mesh(diameters / 2, exponent, level)
+
+    def solid(self, diameters: FloatArray, exponent: float) -> Superquadric:
+        """As `Shape.solid`."""
+        return Superquadric(diameters / 2, 1 / exponent)

@@ -39,8 +39,10 @@ def shape_named(name: str) -> Shape:
     return SHAPES[name]
 
 
-def guess_shape_style(diameters: FloatArray) -> str:
+def guess_shape_style(diameters: FloatArray, *, has_exponent: bool = False) -> str:
     """Name the first shape of the table that (N, 3) diameters without a name can be those of.
+
+    With `has_exponent` it is the first one that has an exponent.
 
     Several shapes may have the same diameters, so that a reader who knows better must say so.
 
@@ -50,7 +52,7 @@ def guess_shape_style(diameters: FloatArray) -> str:
         If they are those of no shape.
     """
     for name, shape in SHAPES.items():
-        if shape.fits(diameters):
+        if shape.fits(diameters) and shape.has_exponent >= has_exponent:
             return name
     msg = f"diameters such as {diameters[0].tolist()} are those of no shape, expected positive lengths"
     raise ValueError(msg)

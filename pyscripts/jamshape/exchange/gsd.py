@@ -1,0 +1,196 @@
+"""GSD files of the HOOMD schema, which HOOMD-blue, freud, OVITO, fresnel and MDAnalysis read.
+
+A frame is a packing in a box around 0, which is 0 high in 2D. Every species is a type, or several where its
+particles differ; `particles/type_shapes` says what each looks like: a sphere, an ellipsoid, a union of spheres,
+or else a mesh whose corners lie on the surface. (GSD could call a rod a polyhedron of two corners with a rounding
+radius. OVITO reads that only along z, which is not where the orientation of our rods points.)
+
+GSD keeps single precision. So a frame logs all that the packing holds once more under `log/jamshape` and
+`log/particles/jamshape`, and is read back from there to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from jamshape.exchange.fields import (
+    alike,
+    box_fields,
+    centered,
+    packing_of,
+    particle_fields,
+)
+from jamshape.exchange.tools import tool
+from jamshape.files.layout import FileFormatError, PathLike, replacing
+from jamshape.packing import Packing
+from jamshape.shapes.mesh import SurfaceMesh
+from jamshape.shapes.solid import Balls, Solid, Superquadric
+
+_LOG, _PARTICLES = "jamshape/", "particles/jamshape/"
+
+# Levels of meshes: fine for a few types, coarse for many, so that files stay small.
+_FINE, _FEW, _COARSE, _MANY = 3, 8, 1, 64
+
+
+def write_gsd(path: PathLike, packings: Packing | Sequence[Packing]) -> None:
+    """Write packings as the frames of a GSD file, replacing it only when all is written.
+
+    Parameters
+    ----------
+    path : path-like
+    packings : Packing or sequence of Packing
+        Frame by frame, all in 2D or all in 3D.
+
+    Raises
+    ------
+    ValueError
+        If there is no packing, or some are in 2D and some in 3D.
+    ImportError
+        If gsd is not installed.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from jamshape.exchange.gsd import read_gsd, write_gsd
+    >>> from jamshape.protocols.random_start import random_packing
+    >>> packing = random_packing(n=8, phi=0.3, seed=1)
+    >>> path = getfixture("tmp_path") / "rods.gsd"
+    >>> write_gsd(path, packing)
+    >>> bool((read_gsd(path).position == packing.position).all())
+    True
+    """
+    frames = [packings] if isinstance(packings, Packing) else list(packings)
+    dimensions = sorted({packing.dimension for packing in frames})
+    if len(dimensions) != 1:
+        msg = f"the packings are in {dimensions} dimensions, expected one or more of one dimension"
+        raise ValueError(msg)
+    hoomd = tool("gsd.hoomd", "gsd")
+    rests = any(packing.has_rests for packing in frames)
+    with replacing(path) as temporary, hoomd.open(str(temporary), "w") as file:
+        for packing in frames:
+            file.append(_frame(hoomd, packing, rests=rests))
+
+
+def read_gsd(path: PathLike, frame: int = -1) -> Packing:
+    """Read one frame of a file that `write_gsd` wrote, to the last bit.
+
+    Parameters
+    ----------
+    path : path-like
+    frame : int
+        From 0; negative ones count from the end.
+
+    Raises
+    ------
+    FileFormatError
+        If it is no such file.
+    ValueError
+        If there is no such frame.
+    ImportError
+        If gsd is not installed.
+    OSError
+        If the file cannot be opened.
+    """
+    hoomd = tool("gsd.hoomd", "gsd")
+    try:
+        file = hoomd.open(str(path), "r")
+    except RuntimeError as error:
+        msg = f"{path}: {error}, expected a GSD file; write it with write_gsd"
+        raise FileFormatError(msg) from error
+    with file:
+        if not -len(file) <= frame < len(file):
+            msg = f"{path}: has {len(file)} frames, expected frame {frame} to be one of them"
+            raise ValueError(msg)
+        return _packing(path, file[frame % len(file)])
+
+
+def _frame(hoomd: Any, packing: Packing, *, rests: bool) -> Any:
+    """Make a frame; with rests where another frame of the file has some."""
+    seen, frame = centered(packing), hoomd.Frame()
+    kinds = alike(packing, packing.species)
+    frame.configuration.step = packing.step
+    frame.configuration.dimensions = packing.dimension
+    frame.configuration.box = [*seen.edges, 0, 0, 0]
+    frame.particles.N = packing.n
+    frame.particles.position = seen.position
+    frame.particles.image = seen.image
+    frame.particles.orientation = packing.quaternions
+    frame.particles.typeid = kinds.of
+    species = packing.species[kinds.first]
+    frame.particles.types = _names([str(k) for k in species])
+    level = _FINE if len(species) <= _FEW else _COARSE + (len(species) <= _MANY)
+    frame.particles.type_shapes = [_type_shape(packing, i, level) for i in kinds.first]
+    exact = {_PARTICLES + name: x for name, x in particle_fields(packing, rests=rests).items()}
+    exact |= {_LOG + name: x for name, x in box_fields(packing, rests=rests).items()}
+    exact[_LOG + "time"] = np.array([packing.time])
+    frame.log = {**exact, _LOG + "shape_style": packing.shape_style}
+    return frame
+
+
+def _names(species: list[str]) -> list[str]:
+    """Name types by their species, with a number where a species has several."""
+    seen: dict[str, int] = {}
+    names = []
+    for name in species:
+        seen[name] = seen.get(name, 0) + 1
+        names.append(name if species.count(name) == 1 else f"{name}.{seen[name]}")
+    return names
+
+
+def _type_shape(packing: Packing, i: int, level: int) -> dict[str, Any]:
+    """Describe a particle by the words of `particles/type_shapes`."""
+    if packing.is_round[i]:
+        return {"type": "Sphere", "diameter": float(packing.diameters[i, 0])}
+    body = (packing.diameters[i], float(packing.exponent[i]))
+    known = _described(packing.shape.solid(*body))
+    return known or _mesh(packing.shape.surface(*body, level))
+
+
+@singledispatch
+def _described(solid: Solid) -> dict[str, Any]:
+    """Describe a body exactly; empty where GSD cannot."""
+    del solid
+    return {}
+
+
+@_described.register
+def _(solid: Superquadric) -> dict[str, Any]:
+    axes = dict(zip("abc", solid.semi_axes.tolist(), strict=True))
+    return {"type": "Ellipsoid", **axes} if solid.roundness == 1 else {}
+
+
+@_described.register
+def _(solid: Balls) -> dict[str, Any]:
+    centers = solid.centers.tolist()
+    diameters = [2 * solid.radius] * len(centers)
+    return {"type": "SphereUnion", "diameters": diameters, "centers": centers}
+
+
+def _mesh(surface: SurfaceMesh) -> dict[str, Any]:
+    corners = [[float(f"{x:.7g}") for x in corner] for corner in surface.vertices.tolist()]
+    return {"type": "Mesh", "vertices": corners, "indices": surface.triangles.tolist()}
+
+
+def _packing(path: PathLike, frame: Any) -> Packing:
+    logged: Mapping[str, Any] = frame.log
+    prefixes = (_LOG, _PARTICLES)
+    found = {
+        name.removeprefix(prefix): value
+        for name, value in logged.items()
+        for prefix in prefixes
+        if name.startswith(prefix)
+    }
+    try:
+        style, time = str(found.pop("shape_style")), float(found.pop("time")[0])
+        return packing_of(found, style, int(frame.configuration.step), time)
+    except (KeyError, TypeError) as error:
+        msg = f"{path}: holds no log/jamshape of a packing, expected a file of write_gsd"
+        raise FileFormatError(msg) from error
+    except ValueError as error:
+        msg = f"{path}: {error}; write it again"
+        raise FileFormatError(msg) from error

@@ -1,0 +1,182 @@
+"""Packings and runs in MDAnalysis, which knows three dimensions only.
+
+Planar packings lie at z = 0 of a box of unit height. The file is H5MD like ours, with its particles under the name
+that MDAnalysis looks for, and says that a length is an Angstrom and a time a picosecond: MDAnalysis knows no others,
+and so takes our numbers as they are.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jamshape.exchange.fields import in_space
+from jamshape.exchange.tools import tool
+from jamshape.files import layout
+from jamshape.files.h5md import count_frames, read_packing
+from jamshape.files.layout import PathLike, replacing
+from jamshape.packing import Packing
+
+if TYPE_CHECKING:
+    import h5py
+
+Source = Packing | Sequence[Packing] | PathLike
+
+_HEIGHT = 1.0  # of planar boxes, [length]
+_ELEMENTS = ("position", "box/edges")
+_GROUP = "particles/trajectory"  # the name with which MDAnalysis needs no topology to count
+
+
+def to_mdanalysis(source: Source, path: PathLike | None = None) -> Any:
+    """Hand packings to MDAnalysis.
+
+    Parameters
+    ----------
+    source : Packing, sequence of Packing, or path of one of our H5MD files
+        A run gives a trajectory of all its frames.
+    path : path-like, optional
+        Where `write_mdanalysis` shall write the trajectory, which a Universe that is copied or sent to other
+        processes needs; in memory when left out.
+
+    Returns
+    -------
+    MDAnalysis.Universe
+        An atom a particle, each a residue of its own, in the order of the packing: `ids` and `resids` are our IDs,
+        `types` our species, `names` and `resnames` the shape, `radii` those of the spheres around the particles,
+        [length], `masses` their areas (volumes). `trajectory.ts.data` holds `orientation`, (N, 4) quaternions
+        w i j k, and the step.
+
+    Raises
+    ------
+    ImportError
+        If MDAnalysis is not installed.
+    FileFormatError, OSError
+        As `read_packing`.
+    ValueError
+        If there is no packing, or frames differ in their particles.
+
+    Examples
+    --------
+    >>> from jamshape.exchange.mdanalysis import to_mdanalysis
+    >>> from jamshape.protocols.random_start import random_packing
+    >>> universe = to_mdanalysis(random_packing(n=8, phi=0.3, seed=1))
+    >>> len(universe.atoms), float(universe.dimensions[2])
+    (8, 1.0)
+    """
+    analysis = tool("MDAnalysis", "MDAnalysis")
+    trajectory: Any = None
+    if path is None:
+        trajectory = layout.hdf5().File(io.BytesIO(), "w")
+        first = _write(trajectory, source)
+    else:
+        first, trajectory = write_mdanalysis(path, source), str(path)
+    universe = analysis.Universe.empty(
+        first.n, n_residues=first.n, atom_resindex=np.arange(first.n), residue_segindex=None
+    )
+    for name, values in _topology(first).items():
+        universe.add_TopologyAttr(name, values)
+    # `load_new` takes an open file for a list of files.
+    universe.trajectory = analysis.coordinates.H5MD.H5MDReader(trajectory)
+    return universe
+
+
+def write_mdanalysis(path: PathLike, source: Source) -> Packing:
+    """Write packings as a trajectory that ``MDAnalysis.Universe(path, format="H5MD")`` opens.
+
+    Parameters
+    ----------
+    path : path-like
+        Replaced only when all is written; the ending ``.h5md`` tells MDAnalysis the format.
+    source : as `to_mdanalysis`
+
+    Returns
+    -------
+    Packing
+        The first frame.
+
+    Raises
+    ------
+    FileFormatError, OSError, ValueError
+        As `to_mdanalysis`.
+    """
+    with replacing(path) as temporary, layout.hdf5().File(temporary, "w") as file:
+        return _write(file, source)
+
+
+def _frames(source: Source) -> Iterator[Packing]:
+    if isinstance(source, Packing):
+        yield source
+    elif isinstance(source, Sequence) and not isinstance(source, str):
+        yield from source
+    else:
+        yield from (read_packing(source, k) for k in range(count_frames(source)))
+
+
+def _write(file: h5py.File, source: Source) -> Packing:
+    """Write all frames and return the first one."""
+    frames = _frames(source)
+    first = next(frames, None)
+    if first is None:
+        msg = "there is no packing, expected at least one"
+        raise ValueError(msg)
+    layout.write_metadata(file)
+    group = file.create_group(_GROUP)
+    clock = group.create_group("position")
+    layout.create_clock(clock)
+    orientation = file.create_group("observables/orientation")
+    elements = {"position": clock, "box/edges": group.create_group("box/edges")}
+    for name, element in (*elements.items(), ("orientation", orientation)):
+        layout.create_rows(element, "value", _values(first)[name])
+        if element is not clock:
+            element["step"], element["time"] = clock["step"], clock["time"]
+    elements["orientation"] = orientation
+    group["box"].attrs["dimension"] = 3
+    group["box"].attrs["boundary"] = np.array([b"periodic"] * 3)
+    clock["time"].attrs["unit"] = "ps"
+    for name in _ELEMENTS:
+        elements[name]["value"].attrs["unit"] = "Angstrom"
+    for k, packing in enumerate(itertools.chain([first], frames)):
+        _require_same(first, packing, k)
+        for name, value in _values(packing).items():
+            layout.put(elements[name]["value"], k, value)
+        layout.put(clock["time"], k, packing.time)
+        layout.put(clock["step"], k, packing.step)
+    return first
+
+
+def _values(packing: Packing) -> dict[str, Any]:
+    """Give what a frame holds; the box begins at 0, as MDAnalysis has it."""
+    edges = in_space(packing.box.edges)
+    return {
+        "position": in_space(packing.position - packing.box.lo),
+        "box/edges": np.where(edges > 0, edges, _HEIGHT),
+        "orientation": packing.quaternions,
+    }
+
+
+def _require_same(first: Packing, packing: Packing, frame: int) -> None:
+    for name in ("dimension", "id"):
+        if not np.array_equal(getattr(first, name), getattr(packing, name)):
+            msg = (
+                f"frame {frame} differs from the first one in {name}, expected the same particles in"
+                " the same order (Packing.sorted_by_id)"
+            )
+            raise ValueError(msg)
+
+
+def _topology(packing: Packing) -> dict[str, Any]:
+    n, name = packing.n, packing.shape_style
+    return {
+        "names": [name] * n,
+        "types": packing.species.astype(str).tolist(),
+        "ids": packing.id,
+        "radii": packing.outer_radius,
+        "masses": packing.measures,
+        "resids": packing.id,
+        "resnames": [name] * n,
+        "segids": ["packing"],
+    }

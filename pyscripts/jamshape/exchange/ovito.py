@@ -1,0 +1,237 @@
+"""Packings in OVITO, each particle drawn as the body that it is and coloured by its kind.
+
+Rods are spherocylinders there, whose axis is the body's z: their orientation is ours after a quarter turn that brings
+z to x. Superellipsoids are superquadrics, other bodies meshes in units of their size. OVITO keeps orientations and
+shapes in single precision; so the doubles go along as properties whose names begin with "Jamshape", and
+`from_ovito` reads them.
+"""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.drawing.colors import of_kinds
+from jamshape.drawing.kinds import kinds_of
+from jamshape.exchange.fields import (
+    PARTICLE_RESTS,
+    alike,
+    in_space,
+    packing_of,
+    particle_fields,
+    turned,
+)
+from jamshape.exchange.tools import tool
+from jamshape.files.layout import FileFormatError
+from jamshape.packing import Packing
+from jamshape.shapes.solid import RoundedSegment, Solid, Superquadric
+
+_PREFIX = "Jamshape "
+_OWN = ("position", "id")  # what OVITO holds in full itself
+
+_Z_TO_X = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)  # w i j k
+_STILL = (1.0, 0.0, 0.0, 0.0)
+
+_LEVEL = 3  # of meshes
+_DIGITS = 9  # in which bodies of one mesh agree
+
+
+class _Glyph(NamedTuple):
+    """How OVITO draws a body."""
+
+    name: str
+    """Of `ParticlesVis.Shape`."""
+    aspherical_shape: tuple[float, ...] = ()
+    roundness: float | None = None
+    first_turned: tuple[float, float, float, float] = _STILL
+
+
+@singledispatch
+def _glyph(solid: Solid) -> _Glyph:
+    """Tell how OVITO draws a body: by triangles unless it has a glyph for it."""
+    del solid
+    return _Glyph("Mesh")
+
+
+@_glyph.register
+def _(solid: RoundedSegment) -> _Glyph:
+    shape = (solid.radius, solid.radius, 2 * solid.half_length)
+    return _Glyph(solid.GLYPH, shape, first_turned=_Z_TO_X)
+
+
+@_glyph.register
+def _(solid: Superquadric) -> _Glyph:
+    return _Glyph(solid.GLYPH, tuple(solid.semi_axes.tolist()), solid.roundness)
+
+
+def to_ovito(packing: Packing, rattlers: BoolArray | None = None) -> Any:
+    """Hand a packing to OVITO.
+
+    Parameters
+    ----------
+    packing : Packing
+    rattlers : (N,) array of bool, optional
+        Drawn in grey, as `find_rattlers` finds them.
+
+    Returns
+    -------
+    ovito.data.DataCollection
+        To draw it, make it the source of a pipeline:
+        ``Pipeline(source=StaticSource(data=to_ovito(packing)))``. Particle types are the kinds of our pictures,
+        with their colours.
+
+    Raises
+    ------
+    ImportError
+        If OVITO is not installed.
+    """
+    data = tool("ovito.data", "ovito").DataCollection()
+    vis = tool("ovito.vis", "ovito")
+    _add_cell(data, packing)
+    particles = data.create_particles(count=packing.n)
+    particles.create_property("Position", data=in_space(packing.position))
+    particles.create_property("Particle Identifier", data=packing.id)
+    _add_bodies(particles, packing)
+    _add_types(particles, packing, vis)
+    _add_colors(particles, packing, np.zeros(packing.n, bool) if rattlers is None else rattlers)
+    for name, values in particle_fields(packing, rests=packing.has_rests).items():
+        if name not in _OWN:
+            title = _PREFIX + name.replace("_", " ")
+            particles.create_property(title, data=values)
+    data.attributes["Timestep"], data.attributes["Time"] = packing.step, packing.time
+    data.attributes[_PREFIX + "shape style"] = packing.shape_style
+    for axis, rest in zip("xyz", packing.edges_rest.tolist(), strict=False):
+        data.attributes[f"{_PREFIX}edges rest {axis}"] = rest
+    return data
+
+
+def from_ovito(data: Any) -> Packing:
+    """Read a packing that `to_ovito` made back, with positions and box as they are in OVITO now.
+
+    Parameters
+    ----------
+    data : ovito.data.DataCollection
+
+    Raises
+    ------
+    FileFormatError
+        If it lacks what `to_ovito` writes, or is no packing any more.
+    """
+    particles, cell = data.particles, data.cell
+    try:
+        D = 2 if cell.is2D else 3
+        matrix = np.asarray(cell[...])
+        fields = {
+            "position": np.asarray(particles["Position"][...])[:, :D],
+            "id": np.asarray(particles["Particle Identifier"][...]),
+            "lo": matrix[:D, 3],
+            "edges": np.diag(matrix[:D, :D]),
+        }
+        names = ("orientation", "diameters", "exponent", "species", "image", *PARTICLE_RESTS)
+        for name in names:
+            title = _PREFIX + name.replace("_", " ")
+            if name not in PARTICLE_RESTS or title in particles:
+                fields[name] = np.asarray(particles[title][...])
+        known = data.attributes
+        rests = [float(known[f"{_PREFIX}edges rest {axis}"]) for axis in "xyz"[:D]]
+        fields["edges_rest"] = np.array(rests)
+        style = str(known[_PREFIX + "shape style"])
+        return packing_of(fields, style, int(known["Timestep"]), float(known["Time"]))
+    except (KeyError, AttributeError, TypeError) as error:
+        msg = f"the data of OVITO lack {error}, expected what to_ovito made"
+        raise FileFormatError(msg) from error
+
+
+def _add_cell(data: Any, packing: Packing) -> None:
+    """Add the box; planar ones are as high as they are drawn, around z = 0."""
+    D = packing.dimension
+    matrix = np.zeros((3, 4))
+    matrix[2, 2:] = 1.0, -0.5
+    matrix[:D, :D] = np.diag(packing.box.edges)
+    matrix[:D, 3] = packing.box.lo
+    cell = data.create_cell(matrix, pbc=(True, True, D == 3))
+    cell.is2D = D == 2
+
+
+def _glyphs(packing: Packing) -> tuple[list[_Glyph], IntArray]:
+    """Give the glyph of each body, and which one a particle has."""
+    bodies = alike(packing)
+    rows = zip(packing.diameters[bodies.first], packing.exponent[bodies.first], strict=True)
+    return [_glyph(packing.shape.solid(d, float(p))) for d, p in rows], bodies.of
+
+
+def _add_bodies(particles: Any, packing: Packing) -> None:
+    """Add sizes and orientations."""
+    glyphs, of = _glyphs(packing)
+    quaternions = turned(packing.quaternions, glyphs[0].first_turned)
+    particles.create_property("Orientation", data=quaternions[:, [1, 2, 3, 0]])
+    if not glyphs[0].aspherical_shape:
+        particles.create_property("Radius", data=_known_sizes(packing).size)
+        return
+    shapes = np.array([glyph.aspherical_shape for glyph in glyphs])
+    particles.create_property("Aspherical Shape", data=shapes[of])
+    if glyphs[0].roundness is not None:
+        roundness = np.array([glyph.roundness for glyph in glyphs])[of]
+        particles.create_property("Superquadric Roundness", data=np.tile(roundness, (2, 1)).T)
+
+
+class _Known(NamedTuple):
+    """What tells the particles of a shape."""
+
+    parameters: FloatArray
+    """(N, P), as many digits as tell bodies of one mesh."""
+    size: FloatArray
+    """(N,), [length], in whose units those of equal parameters are one body."""
+
+
+def _known_sizes(packing: Packing) -> _Known:
+    bodies = alike(packing)
+    rows = zip(packing.diameters[bodies.first], packing.exponent[bodies.first], strict=True)
+    found = [packing.shape.parameters_of(d, float(p)) for d, p in rows]
+    names = [parameter.name for parameter in packing.shape.parameters]
+    parameters = np.array([[of[name] for name in names] for of, _ in found])
+    sizes = np.array([size for _, size in found])
+    return _Known(np.round(parameters, _DIGITS)[bodies.of], sizes[bodies.of])
+
+
+def _add_types(particles: Any, packing: Packing, vis: Any) -> None:
+    """Add a type for each kind, or for each species where there are too many kinds, and each mesh."""
+    known = _known_sizes(packing)
+    kinds = kinds_of(packing)
+    key = np.column_stack([kinds.of if kinds.labels else packing.species, known.parameters])
+    _, first, types = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    types = types.ravel()
+    listed = particles.create_property("Particle Type", data=types + 1)
+    colors = of_kinds(packing, np.zeros(packing.n, bool)).rgb
+    glyph = _glyph(packing.shape.solid(packing.diameters[0], float(packing.exponent[0])))
+    for k, i in enumerate(first.tolist()):
+        own = listed.add_type_id(k + 1, particles)
+        sizes = known.size[types == k]
+        span = "..".join(dict.fromkeys(f"{x:.3g}" for x in (sizes.min(), sizes.max())))
+        words = [
+            f"{p.name} {x:.3g}"
+            for p, x in zip(packing.shape.parameters, known.parameters[i], strict=True)
+        ]
+        own.name = ", ".join([*words, f"{packing.shape.unit} {span}"])
+        own.color = tuple(colors[i])
+        own.shape = getattr(vis.ParticlesVis.Shape, glyph.name)
+        if not glyph.aspherical_shape:
+            own.mesh, own.radius = _mesh(packing, i), 1.0
+
+
+def _mesh(packing: Packing, i: int) -> Any:
+    """Make the mesh of a particle in units of its size."""
+    surface = packing.shape.surface(packing.diameters[i], float(packing.exponent[i]), _LEVEL)
+    mesh = tool("ovito.data", "ovito").TriangleMesh()
+    mesh.set_vertices(surface.vertices / _known_sizes(packing).size[i])
+    mesh.set_faces(surface.triangles)
+    return mesh
+
+
+def _add_colors(particles: Any, packing: Packing, rattlers: BoolArray) -> None:
+    """Add colours of particles where types do not tell them."""
+    if rattlers.any() or not kinds_of(packing).labels:
+        particles.create_property("Color", data=of_kinds(packing, rattlers).rgb)

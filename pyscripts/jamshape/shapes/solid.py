@@ -1,0 +1,44 @@
+"""Bodies in the words of other programs, which know none of our shapes: what `Shape.solid` answers.
+
+All are in body coordinates, and lengths in those of the packing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from jamshape.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class RoundedSegment:
+    """All points within a radius of a segment along x; a sphere where its half length is 0."""
+
+    half_length: float
+    radius: float
+    GLYPH: ClassVar[str] = "Spherocylinder"
+    """As OVITO calls it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Superquadric:
+    """|x/a|^(2/e) + |y/b|^(2/e) + |z/c|^(2/e) = 1 with the roundness e: 1 for ellipsoids, 0 for boxes."""
+
+    semi_axes: FloatArray
+    """(3,)"""
+    roundness: float
+    GLYPH: ClassVar[str] = "Sphere"
+    """As OVITO calls it, which makes it rounder or less by another property."""
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Several balls of one radius."""
+
+    centers: FloatArray
+    """(K, 3)"""
+    radius: float
+
+
+Solid = RoundedSegment | Superquadric | Balls
