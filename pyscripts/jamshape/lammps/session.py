@@ -115,13 +115,13 @@ class Session:
             path = Path(folder) / "start.data"
             rank = 1 + np.argsort(np.argsort(packing.id))
             write_data(path, packing.with_(species=types, id=rank))
-            self.commands(f"read_data {path}")
+            self.commands(f'read_data "{path}"')
         self.commands(_POSES)
 
     def load_restart(self, path: str | Path, like: Packing | None = None) -> None:
         """Read a restart file into a fresh instance, of the particles of a packing."""
         self._like = like
-        self.commands(f"{_ATOMS}\nread_restart {path}\n{_POSES}")
+        self.commands(f'{_ATOMS}\nread_restart "{path}"\n{_POSES}')
 
     def interact(self, law: Interaction) -> None:
         """Set the pair style of the particles that were loaded."""
