@@ -43,7 +43,7 @@ from tqdm import tqdm
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, plain, report, run
-from jamshape.lammps.session import plugin_path
+from jamshape.lammps.plugin import plugin_path
 
 Row = dict[str, Any]
 

@@ -13,6 +13,9 @@
 
 #include <string>
 
+#define JAMSHAPE_QUOTED(x) #x
+#define JAMSHAPE_TEXT(x) JAMSHAPE_QUOTED(x)
+
 namespace {
 
 using LAMMPS_NS::LAMMPS;
@@ -46,6 +49,10 @@ extern "C" {
 /// The LAMMPS version that this binary was compiled for, as an integer such as 20210929. (A
 /// variable, so that a test can pretend to be another build.)
 int jamshape_built_for = JAMSHAPE_LAMMPS_VERSION;
+
+/// The same as text that can be found in the file, which nothing but LAMMPS can load.
+extern const char jamshape_label[];
+const char jamshape_label[] = "jamshape plugin for LAMMPS " JAMSHAPE_TEXT(JAMSHAPE_LAMMPS_VERSION);
 
 /// Adds the styles of this plugin to a LAMMPS instance; stops it with one sentence when it is of
 /// another version than the one compiled for, whose objects are laid out differently.

@@ -15,7 +15,8 @@ import numpy as np
 
 from jamshape import contacts
 from jamshape.files.lammps_text import write_data
-from jamshape.lammps.session import Session, plugin_path
+from jamshape.lammps.plugin import plugin_path
+from jamshape.lammps.session import Session
 from jamshape.packing import Box, Packing, angle_from_quaternion
 
 REPOSITORY = Path(__file__).parents[2]

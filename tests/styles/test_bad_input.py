@@ -313,7 +313,8 @@ def test_late_list_rebuilds_are_set_right(tmp_path):
 def test_another_version_of_lammps_is_refused():
     code = """
 import ctypes
-from jamshape.lammps.session import Session, plugin_path
+from jamshape.lammps.plugin import plugin_path
+from jamshape.lammps.session import Session
 Session().close()
 plugin = ctypes.CDLL(str(plugin_path()))
 ctypes.c_int.in_dll(plugin, "jamshape_built_for").value = 20200101

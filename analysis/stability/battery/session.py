@@ -18,7 +18,8 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.files.lammps_text import write_data
-from jamshape.lammps.session import Session, plugin_path
+from jamshape.lammps.plugin import plugin_path
+from jamshape.lammps.session import Session
 from jamshape.packing import Packing
 from jamshape.shapes.shape import Interaction
 

@@ -186,12 +186,12 @@ class CompressionRun:
 
     def keep_restarts(self, every: int, path: Path) -> None:
         """Write restart files `path`.a and `path`.b in turn, every so many steps."""
-        self.session.commands(f"restart {every} {path}.a {path}.b")
+        self.session.commands(f'restart {every} "{path}.a" "{path}.b"')
 
     def write_restart(self, path: Path) -> None:
         """Write a LAMMPS restart file of the present state."""
         # It moves atoms into the box and orders them anew, which neighbour lists must follow.
-        self.session.commands(f"write_restart {path}\nrun 0 post no")
+        self.session.commands(f'write_restart "{path}"\nrun 0 post no')
 
     def samples(self, every: int) -> Iterator[Row]:
         """Run to the end and yield a row at each multiple of `every` steps, and at the end."""

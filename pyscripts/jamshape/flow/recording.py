@@ -34,7 +34,7 @@ class Recording:
     Parameters
     ----------
     path
-        The file; restart files lie beside it, as ``path.restart.a`` and ``.b``.
+        The file; until the run is finished restart files lie beside it, as ``path.restart.a`` and ``.b``.
     rows, frames
         How many samples of the observables and how many snapshots, over the whole run.
     attributes
@@ -59,12 +59,20 @@ class Recording:
         FileNotFoundError
             When there is none.
         """
-        paths = [Path(f"{self.restart_prefix}.{end}") for end in "ab"]
+        paths = self._restart_files()
         found = [path for path in paths if path.is_file()]
         if not found:
             msg = f"Found neither {paths[0]} nor {paths[1].name}, expected one: start anew."
             raise FileNotFoundError(msg)
         return max(found, key=lambda path: path.stat().st_mtime)
+
+    def forget_restarts(self) -> None:
+        """Remove the restart files, which a finished run does not need."""
+        for path in self._restart_files():
+            path.unlink(missing_ok=True)
+
+    def _restart_files(self) -> list[Path]:
+        return [Path(f"{self.restart_prefix}.{end}") for end in "ab"]
 
 
 def is_finished(path: Path) -> bool:
@@ -139,6 +147,7 @@ def record(run: CompressionRun, to: Recording) -> Iterator[Row]:
         yield keep(sample)
     rows.write()
     writer.set_attributes({"finished": True})
+    to.forget_restarts()
 
 
 class _Rows:

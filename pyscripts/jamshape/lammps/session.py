@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jamshape.files.lammps_text import write_data
+from jamshape.lammps.plugin import PluginError, plugin_path
 from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import guess_shape_style
@@ -30,32 +31,6 @@ _POSES = """compute orient all property/atom quatw quati quatj quatk
 # Of the smallest diameter.
 _SKIN = 0.3
 _WIDEST_BIN = 50.0
-
-PLUGIN_NAME = "jamshape_plugin.so"
-
-
-class PluginError(RuntimeError):
-    """LAMMPS or the compiled plugin is missing."""
-
-
-def plugin_path() -> Path:
-    """Path of the compiled plugin of this installation.
-
-    Raises
-    ------
-    PluginError
-        When the installation has none, because it was built without LAMMPS.
-    """
-    from jamshape import _contact  # noqa: PLC0415 - the plugin is installed beside the bindings
-
-    path = Path(str(_contact.__file__)).with_name(PLUGIN_NAME)
-    if not path.is_file():
-        msg = (
-            f"Found no LAMMPS plugin at {path}, expected one: install lammps, liblammps-dev and "
-            "python3-lammps, then install jamshape again."
-        )
-        raise PluginError(msg)
-    return path
 
 
 class Session:
@@ -140,13 +115,13 @@ class Session:
             path = Path(folder) / "start.data"
             rank = 1 + np.argsort(np.argsort(packing.id))
             write_data(path, packing.with_(species=types, id=rank))
-            self.commands(f"read_data {path}")
+            self.commands(f'read_data "{path}"')
         self.commands(_POSES)
 
     def load_restart(self, path: str | Path, like: Packing | None = None) -> None:
         """Read a restart file into a fresh instance, of the particles of a packing."""
         self._like = like
-        self.commands(f"{_ATOMS}\nread_restart {path}\n{_POSES}")
+        self.commands(f'{_ATOMS}\nread_restart "{path}"\n{_POSES}')
 
     def interact(self, law: Interaction) -> None:
         """Set the pair style of the particles that were loaded."""

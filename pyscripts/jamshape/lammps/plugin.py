@@ -1,0 +1,109 @@
+"""Where this installation keeps what stock LAMMPS needs: the compiled plugin and the decks."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+PLUGIN_NAME = "jamshape_plugin.so"
+LOADER_NAME = "load_plugin.lmp"
+
+# The plugin says it of itself: outside LAMMPS it cannot be loaded and asked.
+_LABEL = re.compile(rb"jamshape plugin for LAMMPS (\d+)\0")
+
+
+class PluginError(RuntimeError):
+    """LAMMPS, the compiled plugin or its decks are missing."""
+
+
+def plugin_path() -> Path:
+    """Path of the compiled plugin of this installation.
+
+    Raises
+    ------
+    PluginError
+        When the installation has none, because it was built without LAMMPS.
+
+    Examples
+    --------
+    >>> plugin_path().name
+    'jamshape_plugin.so'
+    """
+    path = _folder_of_binaries() / PLUGIN_NAME
+    if not path.is_file():
+        msg = (
+            f"Found no LAMMPS plugin at {path}, expected one: install lammps, liblammps-dev and "
+            "python3-lammps, then install jamshape again."
+        )
+        raise PluginError(msg)
+    return path
+
+
+def decks_path() -> Path:
+    """Folder of the input decks of this installation, or of the clone that Python imports.
+
+    Raises
+    ------
+    PluginError
+        When there is none.
+
+    Examples
+    --------
+    >>> (decks_path() / "compress_spherocylinder.in").is_file()
+    True
+    """
+    installed = _folder_of_binaries() / "inputs"
+    cloned = Path(__file__).parents[3] / "inputs"
+    for folder in (installed, cloned):
+        if (folder / LOADER_NAME).is_file():
+            return folder
+    msg = f"Found no {LOADER_NAME} in {installed}, expected one: install jamshape again."
+    raise PluginError(msg)
+
+
+def load_script_path() -> Path:
+    """Path of `load_plugin.lmp`, which a deck includes before its first pair style.
+
+    Raises
+    ------
+    PluginError
+        When there is none.
+
+    Examples
+    --------
+    >>> load_script_path().name
+    'load_plugin.lmp'
+    """
+    return decks_path() / LOADER_NAME
+
+
+def built_for(plugin: Path | None = None) -> int:
+    """LAMMPS version that a plugin was compiled for, as an integer such as 20210929.
+
+    Parameters
+    ----------
+    plugin
+        The compiled file; that of this installation when left out.
+
+    Raises
+    ------
+    PluginError
+        When there is no plugin, or when the file is something else.
+
+    Examples
+    --------
+    >>> built_for() > 20200000
+    True
+    """
+    path = plugin or plugin_path()
+    found = _LABEL.search(path.read_bytes())
+    if found is None:
+        msg = f"Found no label of jamshape in {path}, expected one: install jamshape again."
+        raise PluginError(msg)
+    return int(found[1])
+
+
+def _folder_of_binaries() -> Path:
+    from jamshape import _contact  # noqa: PLC0415 - the plugin is installed beside the bindings
+
+    return Path(str(_contact.__file__)).parent
