@@ -13,10 +13,10 @@ from argparse import Namespace
 from typing import Any
 
 from jamshape.command import parser_of, report, run
+from jamshape.contacts import Contacts
 from jamshape.drawing.packing import add_legend, colorings, draw_packing
 from jamshape.drawing.space import save_smooth
 from jamshape.drawing.text import counted, system_labels
-from jamshape.contacts import Contacts
 from jamshape.files.sets import Choice, Groups, choose, read_groups
 
 PAPER_ALPHAS = (0.01, 4.0)

@@ -136,8 +136,8 @@ def lead_all(discs: list[PackingFile], options: Namespace) -> tuple[list[Packing
 
 def overlap_over_limit(file: PackingFile) -> float:
     """Compare the mean overlap of bonds with A^2/d, above which two bonds side to side become one."""
-    packing, network, _ = file.contacts()
-    bonds = network.bonds
+    found = file.contacts()
+    packing, network, bonds = found.packing, found.network, found.network.bonds
     A = packing.half_length[network.pairs[bonds.contact]].min(axis=1)
     return float(np.mean((bonds.reach - bonds.distance) * bonds.reach / A**2))
 

@@ -17,7 +17,7 @@ _load, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
 
 def __getattr__(name):  # type: ignore[no-untyped-def]
     if name == "__version__":
-        from importlib.metadata import PackageNotFoundError, version
+        from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415 - slow
 
         try:
             return version(__name__)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import BoolArray, FloatArray
+from jamshape.contacts import Contacts
 from jamshape.drawing.kinds import kinds_of
 from jamshape.drawing.styles import GREEN, KINDS, RATTLER, RED, YELLOW
-from jamshape.contacts import Contacts
 from jamshape.measures.local_order import NAMES, local_order
 from jamshape.packing import Packing
 

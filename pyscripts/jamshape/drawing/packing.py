@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray
+from jamshape.contacts import Contacts
 from jamshape.drawing import plane, space
 from jamshape.drawing.colors import (
     ORDER,
@@ -18,7 +19,6 @@ from jamshape.drawing.colors import (
     order_of,
 )
 from jamshape.drawing.styles import KINDS
-from jamshape.contacts import Contacts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

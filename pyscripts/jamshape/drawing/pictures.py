@@ -80,13 +80,10 @@ def picture_of(found: Contacts, known: Mapping[str, Any], color: str = "") -> Pi
     told |= {"n": packing.n, "rattlers": counts.n_rattlers, "contacts": len(found)}
     told |= {"phi": packing.phi, "u": u, "z": counts.z}
     known_order = order(packing) if color in ORDER else {}
-    numbers = [rf"$N={packing.n}$", rf"$\phi={packing.phi:.5f}$"]
-    numbers += [rf"$u={scientific(u)}$", f"$z={counts.z:.3f}$"]
-    numbers += [f"step {packing.step}"] * (packing.step > 0)
-    numbers += [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
+    more = [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
     if "protocol" in known:
-        numbers.append(f"protocol {known['protocol']}")
-    return Picture(found, numbers, told | known_order)
+        more.append(f"protocol {known['protocol']}")
+    return Picture(found, more, told | known_order)
 
 
 def draw_pictures(pictures: Sequence[Picture], look: Look) -> Drawn:
@@ -101,9 +98,8 @@ def draw_pictures(pictures: Sequence[Picture], look: Look) -> Drawn:
     figure, panels = _make_panels(pictures, with_bar=scale is not None)
     for axes, one, colors in zip(panels, pictures, colored, strict=False):
         draw_packing(axes, one.found, colors, look)
-        axes.settitle_of(
-            title_of(one.found, one.more, narrow=len(pictures) > 1), fontsize=9, linespacing=1.4
-        )
+        title = title_of(one.found, one.more, narrow=len(pictures) > 1)
+        axes.set_title(title, fontsize=9, linespacing=1.4)
         add_legend(axes, colors)
     for axes in panels[len(pictures) :]:
         axes.set_axis_off()
@@ -132,15 +128,12 @@ def title_of(found: Contacts, more: Sequence[str] = (), *, narrow: bool = False)
         Whether it stands above a narrow panel, and so in more lines.
     """
     packing, gap = found.packing, "    "
-    u, z = (
-        float(found.network.energy.sum()) / packing.box.volume,
-        coordination(packing, found.network).z,
-    )
+    u = float(found.energy.sum()) / packing.box.volume
     kinds, shape = kinds_of(packing), packing.shape
     known = [f"{shape.name}s"] * (not is_told_by_parameters(shape))
     known += [kinds.title] * (0 < len(kinds.parameters) < MANY_KINDS)
     where = gap.join([rf"$N={packing.n}$", rf"$\phi={packing.phi:.5f}$"])
-    counted = [rf"$u={scientific(u)}$", f"$z={z:.3f}$"]
+    counted = [rf"$u={scientific(u)}$", f"$z={found.z:.3f}$"]
     counted += [f"step {packing.step}"] * (packing.step > 0)
     lines = [where, gap.join([*counted, *more])]
     lines = lines if narrow else [gap.join(lines)]

@@ -32,5 +32,7 @@ def draw_onset(axes: Axes, run: Run, color: str) -> None:
     found = Mean(*fit[:2]).tex
     rate = scientific(run.ensemble.kappa)
     text = rf"onset at this rate, $\phi_J(\kappa={rate})={found}$"
-    axes.plot([fit.phi_J, run.phi[fit.last]], [0, rise], "k", lw=1, zorder=3, label="line to the onset")
+    axes.plot(
+        [fit.phi_J, run.phi[fit.last]], [0, rise], "k", lw=1, zorder=3, label="line to the onset"
+    )
     axes.plot(fit.phi_J, 0, "o", color=color, mec="k", ms=5, zorder=4, ls="", label=text)

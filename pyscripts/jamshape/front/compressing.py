@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from jamshape.files.h5md import read_attributes, read_packing, require_attributes
+from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.flow import recording, slow_recording
-from jamshape.flow.compression import Compression
+from jamshape.flow.compression import Compression, Row
 from jamshape.flow.implicit import Protocol, Step
 from jamshape.flow.recording import Recording
 from jamshape.front.progress import Bar, follow, place
@@ -157,8 +157,11 @@ def _record(start: Any, to: Recording, progress: bool) -> None:
     with Session() as session:
         run = start(session)
         bar = Bar("step", run.last_step, session.step)
-        told = lambda row: (row.step, f"phi {row.observables['phi']:.4f}")  # noqa: E731
-        follow(recording.record(run, to), bar, told, shown=progress)
+        follow(recording.record(run, to), bar, _told, shown=progress)
+
+
+def _told(row: Row) -> tuple[int, str]:
+    return row.step, f"phi {row.observables['phi']:.4f}"
 
 
 def slow_compress(
@@ -227,9 +230,7 @@ def slow_compress(
     """
     at = place(file, "slow.h5")
     rates = kappa if isinstance(kappa, int | float) else tuple(kappa)
-    protocol = Protocol(
-        rates, phi[1], p_end, tolerance, largest_drop=largest_drop, method=method
-    )
+    protocol = Protocol(rates, phi[1], p_end, tolerance, largest_drop=largest_drop, method=method)
     if at.path.exists() and not again:
         slow_recording.require_same(at.path, protocol)
     else:

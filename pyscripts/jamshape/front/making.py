@@ -48,7 +48,7 @@ def make_packing(
         Elastic energy over the box's area (volume) to lead the packing to, which says how far above
         jamming it is; 1e-15 when left out, or 0 for the way by steps: the first jammed packing as it is.
     accuracy : float, optional
-        Of \\|u - u0\\| / u0; 1e-7 when left out.
+        Of the energy, (u - u0) / u0; 1e-7 when left out.
     tolerance : float, optional
         Largest net force and torque on a particle over the mean force of a bond; 1e-8 when left out, or
         1e-4 for the way by steps without an energy.

@@ -26,7 +26,9 @@ _INCHES = {"packing": (5.0, 5.4), "curve": (5.0, 3.6)}
 _DPI = 100
 
 
-def plot(thing: Packing | RunFile | Modes, axes: Axes | None = None, *, color: str = "kind") -> Axes:
+def plot(
+    thing: Packing | RunFile | Modes, axes: Axes | None = None, *, color: str = "kind"
+) -> Axes:
     """Draw a packing, the pressure of a run, or the density of modes.
 
     Parameters

@@ -41,7 +41,9 @@ def follow(
         Whether there is a bar at all.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # tqdm's word on notebooks without widgets; it writes text there
+        warnings.simplefilter(
+            "ignore"
+        )  # tqdm's word on notebooks without widgets; it writes text there
         from tqdm.auto import tqdm  # noqa: PLC0415 - not needed without a run
 
     settings: dict[str, Any] = {"mininterval": 1, "disable": not shown}

@@ -86,7 +86,7 @@ class RunFile:
             return None
 
     def __len__(self) -> int:
-        """Number of frames."""
+        """Count the frames."""
         return count_frames(self.file)
 
     def packing(self, frame: int = -1) -> MeasuredPacking:

@@ -38,7 +38,8 @@ def class_numbers(found: Contacts) -> dict[str, float]:
 
 def angles_of(file: PackingFile) -> FloatArray:
     """(K,) polar angles of the contacts of one packing, folded to [0, pi/2]; see `contact_angles`."""
-    return contact_angles(*file.contacts())
+    found = file.contacts()
+    return contact_angles(found.packing, found.network, found.rattlers)
 
 
 class AngleCurve(NamedTuple):
