@@ -59,7 +59,7 @@ def write_gsd(path: PathLike, packings: Packing | Sequence[Packing]) -> None:
     >>> from jamshape.exchange.gsd import read_gsd, write_gsd
     >>> from jamshape.protocols.random_start import random_packing
     >>> packing = random_packing(n=8, phi=0.3, seed=1)
-    >>> path = getfixture("tmp_path") / "rods.gsd"
+    >>> path = "rods.gsd"
     >>> write_gsd(path, packing)
     >>> bool((read_gsd(path).position == packing.position).all())
     True
