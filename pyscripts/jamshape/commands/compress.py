@@ -11,14 +11,9 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from tqdm import tqdm
-
 from jamshape.command import parser_of, report
-from jamshape.flow.compression import Compression
-from jamshape.flow.recording import Recording, begin, is_finished, record, resume, summary_of
-from jamshape.lammps.session import Session
-from jamshape.packing import Packing
-from jamshape.protocols.random_start import random_packing
+from jamshape.flow.recording import summary_of
+from jamshape.front.compressing import compress, resume
 from jamshape.shapes.command_line import add_particle_options, particles_of
 
 GO_ON = "the same command with --resume goes on from the last restart file"
@@ -50,32 +45,13 @@ def options_of() -> ArgumentParser:
     return parser
 
 
-def fresh(options: Namespace) -> tuple[Compression, Packing, Recording]:
-    """Make settings and initial state, before LAMMPS is started."""
-    names = ("kappa", "phi_end", "dt", "sides", "integrator", "tolerance")
-    settings = Compression(**{name: getattr(options, name) for name in names})
-    if settings.chooses_steps:
-        settings = settings.in_steps(options.phi_start, options.rows, options.dimension)
-    particles, at = particles_of(options), (options.n, options.phi_start, options.seed)
-    start = random_packing(*at, particles, options.dimension)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    made_from = dict(particles.told) | {"n": options.n, "seed": options.seed}
-    return settings, start, Recording(options.out, options.rows, options.frames, made_from)
-
-
-def compress(options: Namespace) -> None:
-    """Run, or go on."""
-    new = None if options.resume and options.out.exists() else fresh(options)
-    with Session() as session:
-        run_, to = (begin(session, *new), new[2]) if new else resume(session, options.out)
-        with tqdm(total=run_.last_step, initial=session.step, unit="step", mininterval=1) as bar:
-            for row in record(run_, to):
-                bar.set_postfix_str(f"phi {row.observables['phi']:.4f}", refresh=False)
-                bar.update(row.step - bar.n)
-
-
 def main(options: Namespace) -> None:
-    """Compress unless it is done, and report."""
-    if not (options.resume and is_finished(options.out)):
-        compress(options)
+    """Compress, or go on, and report."""
+    if options.resume and options.out.exists():
+        resume(options.out)
+    else:
+        names = ("n", "dimension", "kappa", "seed", "integrator", "dt", "tolerance", "sides")
+        given = {name: getattr(options, name) for name in (*names, "rows", "frames")}
+        phi = (options.phi_start, options.phi_end)
+        compress(particles_of(options), phi=phi, **given, file=options.out, again=True)
     report(summary_of(options.out))

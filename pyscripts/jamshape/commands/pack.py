@@ -17,11 +17,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from tqdm import tqdm
-
 from jamshape.command import parser_of, report
-from jamshape.protocols.command_line import add_recipe_options, recipe_of
-from jamshape.protocols.make import is_done, make, require_same, summary_of
+from jamshape.front.making import make_packing
+from jamshape.protocols.command_line import add_recipe_options, settings_of
+from jamshape.protocols.make import summary_of
+from jamshape.shapes.command_line import particles_of
 
 GO_ON = "the same command goes on from the files beside the result"
 
@@ -37,18 +37,8 @@ def options_of() -> ArgumentParser:
 
 def main(options: Namespace) -> int:
     """Make the packing unless it is there; return the exit code."""
-    recipe = recipe_of(options)
-    if options.again or not is_done(options.out):
-        options.out.parent.mkdir(parents=True, exist_ok=True)
-        steps = make(recipe, options.out, again=options.again)
-        with tqdm(steps, unit="row", mininterval=1) as bar:
-            for at in bar:
-                text = (
-                    f"{at.stage} phi {at.phi:.6f} u {at.energy_density:.2e} res {at.residual:.1e}"
-                )
-                bar.set_postfix_str(text, refresh=False)
-    else:
-        require_same(options.out, recipe)
+    settings = settings_of(options)
+    make_packing(particles_of(options), **settings, file=options.out, again=options.again)
     found = summary_of(options.out)
     report(found)
     return 0 if found["reached"] else 1

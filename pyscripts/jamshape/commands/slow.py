@@ -12,20 +12,12 @@ from __future__ import annotations
 import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
-
-from tqdm import tqdm
 
 from jamshape.command import parser_of, report
-from jamshape.files.h5md import read_attributes, read_packing
-from jamshape.flow.implicit import METHODS, Protocol
-from jamshape.flow.slow_recording import begin, is_finished, record, require_same, summary_of
-from jamshape.packing import Packing
-from jamshape.protocols.approach import compressed_start
-from jamshape.protocols.random_start import random_packing
+from jamshape.flow.implicit import METHODS
+from jamshape.flow.slow_recording import summary_of
+from jamshape.front.compressing import slow_compress
 from jamshape.shapes.command_line import add_particle_options, particles_of
-
-PHI_RANDOM = 0.4  # of the random start
 
 GO_ON = "the same command goes on from the last frame"
 
@@ -55,38 +47,12 @@ def options_of() -> ArgumentParser:
     return parser
 
 
-def protocol_of(options: Namespace) -> Protocol:
-    """Read how to compress."""
-    slowly = (options.phi_slow, options.kappa)
-    kappa = ((0.0, options.kappa_before), slowly) if options.phi_slow else options.kappa
-    return Protocol(kappa, options.phi_end, options.p_end, options.tolerance,
-                    largest_drop=options.largest_drop, method=options.method)  # fmt: skip
-
-
-def start_of(options: Namespace) -> tuple[Packing, dict[str, Any]]:
-    """Read or make the start, and say what it was made from."""
-    particles = particles_of(options)
-    made_from: dict[str, Any] = {"n": options.n, "seed": options.seed}
-    if not options.start:
-        start = random_packing(options.n, PHI_RANDOM, options.seed, particles)
-        return compressed_start(start, options.phi_start), dict(particles.told) | made_from
-    start, stored = read_packing(options.start), read_attributes(options.start)
-    known = {key: stored[key] for key in (*particles.told, "seed") if key in stored}
-    return start, known | {"n": start.n, "start": str(options.start)}
-
-
 def main(options: Namespace) -> None:
     """Begin, or go on; a finished run is left alone."""
-    protocol = protocol_of(options)
-    if options.out.exists():
-        require_same(options.out, protocol)
-    else:
-        start, made_from = start_of(options)
-        options.out.parent.mkdir(parents=True, exist_ok=True)
-        begin(options.out, start, protocol, made_from)
-    if not is_finished(options.out):
-        with tqdm(total=round(1e6 * options.phi_end), unit="1e-6 phi", mininterval=1) as bar:
-            for step in record(options.out):
-                bar.set_postfix_str(f"phi {step.phi:.6f} p {step.pressure:.3e}", refresh=False)
-                bar.update(round(1e6 * step.phi) - bar.n)
+    names = ("n", "p_end", "seed", "start", "method", "tolerance", "largest_drop")
+    given = {name: getattr(options, name) for name in names}
+    slowly = (options.phi_slow, options.kappa)
+    kappa = ((0.0, options.kappa_before), slowly) if options.phi_slow else options.kappa
+    phi = (options.phi_start, options.phi_end)
+    slow_compress(particles_of(options), phi=phi, kappa=kappa, **given, file=options.out)
     report(summary_of(options.out))
