@@ -19,6 +19,7 @@ from jamshape.files.h5md import (
 from jamshape.files.run_writer import RunWriter
 from jamshape.flow.compression import Compression, CompressionRun, Row
 from jamshape.measures.onset import fit_onset
+from jamshape.measures.runs import rate_of
 from jamshape.packing import Packing
 
 if TYPE_CHECKING:
@@ -181,12 +182,12 @@ class _Rows:
 
 
 def summary_of(path: Path) -> dict[str, object]:
-    """Summarise a run: its end and, where the pressure rises, the onset of jamming."""
-    observables = read_observables(path)
+    """Summarise a run: its end, its rate and, where the pressure rises, phi_J of that rate."""
+    observables, stored = read_observables(path), read_attributes(path)
     last: dict[str, object] = {
         name: float(observables[name][-1]) for name in ("phi", "pressure", "z", "S_2", "S_4")
     }
-    last["left_out"] = read_attributes(path).get("left_out", "")
+    last |= {"kappa": rate_of(stored), "left_out": stored.get("left_out", "")}
     try:
         fit = fit_onset(observables["phi"], observables["pressure"])
     except ValueError:  # the run ends below jamming

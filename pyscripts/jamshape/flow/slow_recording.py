@@ -14,6 +14,7 @@ from jamshape.files.run_writer import RunWriter
 from jamshape.flow.implicit import Flow, Protocol, Step, compress
 from jamshape.landscape import Landscape, State
 from jamshape.measures.onset import fit_onset
+from jamshape.measures.runs import rate_of
 from jamshape.packing import Packing
 
 # Steps between two frames, from which a run goes on.
@@ -63,10 +64,11 @@ def is_finished(path: Path) -> bool:
 
 
 def summary_of(path: Path) -> dict[str, object]:
-    """Summarise a run: its end, its cost and, where the pressure rises, the onset of jamming."""
+    """Summarise a run: its end, its cost, its last rate and, where p rises, phi_J of that rate."""
     observables, stored = read_observables(path), read_attributes(path)
     found: dict[str, object] = {"out": str(path)}
     found |= {name: float(observables[name][-1]) for name in ("phi", "pressure", "u")}
+    found["kappa"] = rate_of(stored)
     cost = ("steps", "rejected", "explicit", "evaluations", "factorisations", "wall_seconds")
     found |= {name: float(stored[f"flow_{name}"]) for name in cost}
     try:

@@ -56,7 +56,7 @@ class OnsetFit(NamedTuple):
 
     phi_J: float  # noqa: N815 - the paper's symbol
     phi_J_error: float  # noqa: N815
-    """Of the fit: from scatter, curvature and the choice of the rows, added in squares."""
+    """From scatter, curvature and the choice of the rows, added in squares."""
     slope: float
     first: int
     last: int
@@ -77,7 +77,9 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
        through it fail the last two.
     3. Of the first part that has such lines the one with the smallest error is taken, or the one
        that starts first of those nearly as good. How far off the others that overlap it put phi_J
-       adds to its error.
+       adds to its error: the root of the mean square, in which each counts with its number of rows.
+       The errors of these lines are no weights: that a stretch happens to be straight tells nothing
+       of whether it is the right one.
 
     Parameters
     ----------
@@ -255,6 +257,7 @@ def _best(lines: Sequence[OnsetFit]) -> OnsetFit:
     smallest = min(line.phi_J_error for line in lines)
     good = [line for line in lines if line.phi_J_error <= _NEARLY_BEST * smallest]
     best = min(good, key=lambda line: (line.first, -line.last))
-    phi_J, error = np.array([line[:2] for line in lines if line.first < best.last]).T
-    spread = np.sqrt(np.average((phi_J - best.phi_J) ** 2, weights=error**-2))
+    others = [line for line in lines if line.first < best.last]
+    squares = [(line.phi_J - best.phi_J) ** 2 for line in others]
+    spread = np.sqrt(np.average(squares, weights=[line.last - line.first + 1 for line in others]))
     return best._replace(phi_J_error=float(np.hypot(best.phi_J_error, spread)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -54,9 +54,20 @@ def ensemble_of(file: PackingFile) -> Ensemble:
     if missing:
         msg = f"{file.path}: has no attribute {missing[0]!r}, expected a run of compress.py"
         raise ValueError(msg)
-    kappa = float(np.ravel(file.attributes["kappa"])[-1])
+    kappa = rate_of(file.attributes)
     ratio = float(file.attributes.get("size_ratio", 1.0))
     return Ensemble(file.system(), int(file.attributes["n"]), ratio, kappa)
+
+
+def rate_of(attributes: Mapping[str, Any]) -> float:
+    """Compression rate at the end of a run, [1/time].
+
+    Examples
+    --------
+    >>> rate_of({"kappa": [[0.8, 1e-6], [0.9, 1e-8]]})  # from these packing fractions on
+    1e-08
+    """
+    return float(np.ravel(attributes["kappa"])[-1])
 
 
 def observables_of(file: PackingFile, names: Iterable[str]) -> dict[str, FloatArray]:

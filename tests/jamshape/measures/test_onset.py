@@ -95,6 +95,32 @@ def test_curve_that_stiffens_far_above():
     assert abs(fit.phi_J - PHI_J) < min(1e-3, 3 * fit.phi_J_error)
 
 
+@pytest.mark.parametrize("slope", [0.22, 0.25, 0.28, 0.35])
+def test_error_holds_the_choice_of_the_window(slope):
+    phi, bend = np.linspace(0.8, 0.9, 800), 0.86
+    p = line(np.minimum(phi, bend)) + slope * np.maximum(phi - bend, 0)
+    fit = fit_onset(phi, p)
+    assert fit.phi_J == pytest.approx(PHI_J, abs=1e-12)
+    # Both stretches are straight, so neither line has an error of its own.
+    other = bend - SLOPE / slope * (bend - PHI_J)
+    assert 0.3 < fit.phi_J_error / abs(other - PHI_J) < 1
+
+
+@pytest.mark.parametrize("seed", [8, 13, 15, 16])  # of 40, those that differ most
+def test_rows_that_are_left_out_move_it_within_its_errors(seed):
+    rng, phi = np.random.default_rng(seed), np.linspace(0.8, 0.9, 800)
+    p = rounded(phi, 2e-3)
+    for k in range(4):
+        at = 0.845 + 0.012 * k + rng.uniform(0, 0.006)
+        size, width = rng.uniform(3e-5, 3e-4), rng.uniform(1e-3, 3e-3)
+        p = p - size * (1 + np.tanh((phi - at) / width))
+    parts = [(k, start) for k in (1, 2, 4) for start in range(k)]
+    found = np.array([fit_onset(phi[s::k], p[s::k])[:2] for k, s in parts])
+    apart = found[:, None, 0] - found[None, :, 0]
+    errors = np.hypot(found[:, None, 1], found[None, :, 1])
+    assert np.sqrt(np.mean((apart / errors) ** 2)) < 1.2
+
+
 def test_few_rows_after_a_long_wait():
     phi = np.linspace(0.4, 0.86, 200)  # as many rows as the decks take: 8 above the onset
     assert fit_onset(phi, line(phi)).phi_J == pytest.approx(PHI_J, abs=1e-13)
