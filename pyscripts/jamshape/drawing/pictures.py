@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -68,17 +68,10 @@ def read_picture(path: Path, frame: int = -1, sides: int | None = None, color: s
     with contextlib.suppress(FileFormatError):  # dumps and data files have no attributes
         known |= read_attributes(path)
     found = Contacts.of(packing, known["k_e"], sides or known["sides"])
-    picture = picture_of(found, known, color)
-    return picture._replace(report={"packing": path} | picture.report)
-
-
-def picture_of(found: Contacts, known: Mapping[str, Any], color: str = "") -> Picture:
-    """Count what is in a packing of which something is known; arguments as `read_picture`."""
-    packing, counts = found.packing, found.counts
-    u = float(found.energy.sum()) / packing.box.volume
-    told = {"shape": packing.shape_style, "dimension": packing.dimension}
+    counts = found.counts
+    told = {"packing": path, "shape": packing.shape_style, "dimension": packing.dimension}
     told |= {"n": packing.n, "rattlers": counts.n_rattlers, "contacts": len(found)}
-    told |= {"phi": packing.phi, "u": u, "z": counts.z}
+    told |= {"phi": packing.phi, "u": float(found.energy.sum()) / packing.box.volume, "z": counts.z}
     known_order = order(packing) if color in ORDER else {}
     more = [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
     if "protocol" in known:
