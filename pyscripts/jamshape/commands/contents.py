@@ -12,6 +12,7 @@ import numpy as np
 from jamshape.contacts import coordination, find_contacts, find_rattlers
 from jamshape.contacts.network import sum_forces
 from jamshape.drawing.kinds import kinds_of
+from jamshape.exchange.gsd import read_gsd
 from jamshape.files.h5md import (
     HDF5_SIGNATURE,
     count_frames,
@@ -28,6 +29,7 @@ from jamshape.packing import Packing
 from jamshape.vibration.sets import TOLD, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
+_GSD = b"\xdf\x65" * 4
 _RESTART = b"LammpS RestartT\0"
 _STATE = ("phi", "pressure", "u", "z", "rattlers")
 _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "outcome")
@@ -87,8 +89,8 @@ def contents_of(path: Path) -> dict[str, Any]:
         if fits(start):
             return {"file": path, **tell(path)}
     msg = (
-        f"{path} is no file that jamshape knows, expected a packing, a run or modes in HDF5, or a data,"
-        " dump or restart file of LAMMPS"
+        f"{path} is no file that jamshape knows, expected a packing, a run or modes in HDF5, a data, dump"
+        " or restart file of LAMMPS, or a GSD file"
     )
     raise ValueError(msg)
 
@@ -198,6 +200,10 @@ def _data(path: Path) -> dict[str, Any]:
     return _text("LAMMPS data file", read_data(path)) | {"frames": 1}
 
 
+def _gsd(path: Path) -> dict[str, Any]:
+    return _text("GSD file", read_gsd(path))
+
+
 def _text(kind: str, packing: Packing) -> dict[str, Any]:
     return {"kind": kind, **_of_packing(packing), **_state(packing, {}), "finished": True}
 
@@ -231,5 +237,6 @@ _READERS: tuple[tuple[Callable[[bytes], bool], Callable[[Path], dict[str, Any]]]
     (lambda start: start.startswith(HDF5_SIGNATURE), _hdf5),
     (lambda start: start.startswith(b"ITEM: "), _dump),
     (lambda start: start.startswith(_RESTART), _restart),
+    (lambda start: start.startswith(_GSD), _gsd),
     (lambda start: b" atoms" in start and b"xlo xhi" in start, _data),
 )

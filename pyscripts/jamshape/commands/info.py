@@ -1,4 +1,4 @@
-"""Tell what a file is: a packing, a run, modes, or a data, dump or restart file of LAMMPS.
+"""Tell what a file is: a packing, a run, modes, a data, dump or restart file of LAMMPS, or a GSD file.
 
     jamshape info packing.h5
 

