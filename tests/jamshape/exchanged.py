@@ -40,27 +40,32 @@ def assert_same(a, b):
         assert getattr(a, name).tobytes() == getattr(b, name).tobytes(), name
 
 
-def touching(name, which=0, angles=(0.3, 1.2)):
-    """Two particles in the plane that just touch, the first one at the origin.
+def touching(name, orientations):
+    """Two particles that just touch, the first one at the origin.
 
     Returns
     -------
-    Packing, point of contact (2,), normal into the first one (2,)
+    Packing, point of contact (D,), normal into the first one (D,)
     """
-    particles = Particles.of(name, 1.4, **SHAPES[name].examples[which])
-    packing = random_packing(2, 0.02, 1, particles)
-    packing = packing.with_(
-        orientation=np.array(angles), box=Box(np.full(2, -20.0), np.full(2, 40.0))
-    )
+    orientations = np.array(orientations)
+    D = 2 if orientations.ndim == 1 else 3
+    particles = Particles.of(name, 1.4, **SHAPES[name].examples[0])
+    packing = random_packing(2, 0.01, 1, particles, D)
+    box = Box(np.full(D, -20.0), np.full(D, 40.0))
+    packing = packing.with_(orientation=orientations, box=box)
+    toward = np.array([0.7, 0.6, 0.4])[:D] / np.linalg.norm([0.7, 0.6, 0.4][:D])
 
     def apart(distance):
-        along = distance * np.array([np.cos(0.8), np.sin(0.8)])
-        return packing.with_(position=np.array([[0.0, 0.0], along]))
+        return packing.with_(position=np.array([np.zeros(D), distance * toward]))
 
-    near, far = packing.outer_radius.sum() * np.array([0.3, 1.1])
-    while far - near > 1e-9:
+    def touch(distance):
+        return len(find_contacts(apart(distance)).pairs) > 0
+
+    near = far = packing.outer_radius.sum()
+    while not touch(near):
+        near, far = 0.97 * near, near
+    while far - near > 1e-6:
         middle = (near + far) / 2
-        is_near = len(find_contacts(apart(middle)).pairs) > 0
-        near, far = (middle, far) if is_near else (near, middle)
+        near, far = (middle, far) if touch(middle) else (near, middle)
     bonds = find_contacts(apart(near)).bonds
     return apart(near), bonds.point[0], bonds.normal[0]
