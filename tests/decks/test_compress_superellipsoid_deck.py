@@ -51,8 +51,7 @@ def thermo_rows(out):
 
 
 def frames(out):
-    packings = [p.with_(shape_style="superellipsoid") for p in read_dump(out / "particles.dump")]
-    return [p.with_(exponent=np.full(p.n, SETTINGS["p"])) for p in packings]
+    return read_dump(out / "particles.dump")
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +77,12 @@ def test_deck_runs_from_a_dilute_random_state_to_the_end(whole):
         assert (whole / name).is_file()
 
 
+def test_dump_tells_what_the_particles_are(whole):
+    for packing in frames(whole):
+        assert packing.shape_style == "superellipsoid"
+        assert (packing.exponent == SETTINGS["p"]).all()
+
+
 def test_dump_holds_the_states_that_the_log_tells_of(whole):
     rows, packings = thermo_rows(whole), frames(whole)
     assert 15 < len(packings) < 25
@@ -91,9 +96,11 @@ def test_dump_holds_the_states_that_the_log_tells_of(whole):
         np.testing.assert_allclose(rows["u"][row] * packing.box.volume, found["energy"], rtol=1e-6)
     titles = [line for line in (whole / "particles.dump").read_text().splitlines()
               if line.startswith("ITEM: ATOMS")]  # fmt: skip
-    assert {title.strip() for title in titles} == {
-        "ITEM: ATOMS id type x y z quatw quati quatj quatk shapex shapey shapez ix iy iz"
-    }
+    roundness = "SuperquadricRoundness.Phi SuperquadricRoundness.Theta"
+    columns = (
+        f"id type x y z quatw quati quatj quatk shapex shapey shapez exponent {roundness} ix iy iz"
+    )
+    assert {title.strip() for title in titles} == {f"ITEM: ATOMS {columns}"}
 
 
 def test_pressure_ends_the_run(whole, tmp_path):

@@ -11,7 +11,7 @@ GSD keeps single precision. So a frame logs all that the packing holds once more
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import singledispatch
 from typing import Any
 
@@ -36,14 +36,14 @@ _LOG, _PARTICLES = "jamshape/", "particles/jamshape/"
 _FINE, _FEW, _COARSE, _MANY = 3, 8, 1, 64
 
 
-def write_gsd(path: PathLike, packings: Packing | Sequence[Packing]) -> None:
+def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
     """Write packings as the frames of a GSD file, replacing it only when all is written.
 
     Parameters
     ----------
     path : path-like
-    packings : Packing or sequence of Packing
-        Frame by frame, all in 2D or all in 3D.
+    packings : Packing or iterable of Packing
+        Frame by frame, all in 2D or all in 3D; a run that `jamshape.load` gave is one.
 
     Raises
     ------
@@ -59,9 +59,8 @@ def write_gsd(path: PathLike, packings: Packing | Sequence[Packing]) -> None:
     >>> from jamshape.exchange.gsd import read_gsd, write_gsd
     >>> from jamshape.protocols.random_start import random_packing
     >>> packing = random_packing(n=8, phi=0.3, seed=1)
-    >>> path = "rods.gsd"
-    >>> write_gsd(path, packing)
-    >>> bool((read_gsd(path).position == packing.position).all())
+    >>> write_gsd("rods.gsd", packing)
+    >>> bool((read_gsd("rods.gsd").position == packing.position).all())
     True
     """
     frames = [packings] if isinstance(packings, Packing) else list(packings)

@@ -7,9 +7,14 @@ and so takes our numbers as they are.
 
 from __future__ import annotations
 
-import io
+import atexit
 import itertools
-from collections.abc import Iterator, Sequence
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,10 +29,11 @@ from jamshape.packing import Packing
 if TYPE_CHECKING:
     import h5py
 
-Source = Packing | Sequence[Packing] | PathLike
+Source = Packing | Iterable[Packing] | PathLike
 
 _HEIGHT = 1.0  # of planar boxes, [length]
 _ELEMENTS = ("position", "box/edges")
+_numbers = itertools.count()  # of temporary files
 _GROUP = "particles/trajectory"  # the name with which MDAnalysis needs no topology to count
 
 
@@ -36,11 +42,11 @@ def to_mdanalysis(source: Source, path: PathLike | None = None) -> Any:
 
     Parameters
     ----------
-    source : Packing, sequence of Packing, or path of one of our H5MD files
+    source : Packing, iterable of Packing, or path of one of our H5MD files
         A run gives a trajectory of all its frames.
     path : path-like, optional
-        Where `write_mdanalysis` shall write the trajectory, which a Universe that is copied or sent to other
-        processes needs; in memory when left out.
+        Where `write_mdanalysis` shall write the trajectory; in a temporary folder, until this process ends, when
+        left out.
 
     Returns
     -------
@@ -68,19 +74,15 @@ def to_mdanalysis(source: Source, path: PathLike | None = None) -> Any:
     (8, 1.0)
     """
     analysis = tool("MDAnalysis", "MDAnalysis")
-    trajectory: Any = None
     if path is None:
-        trajectory = layout.hdf5().File(io.BytesIO(), "w")
-        first = _write(trajectory, source)
-    else:
-        first, trajectory = write_mdanalysis(path, source), str(path)
+        path = _temporary_folder() / f"{next(_numbers)}.h5md"
+    first = write_mdanalysis(path, source)
     universe = analysis.Universe.empty(
         first.n, n_residues=first.n, atom_resindex=np.arange(first.n), residue_segindex=None
     )
     for name, values in _topology(first).items():
         universe.add_TopologyAttr(name, values)
-    # `load_new` takes an open file for a list of files.
-    universe.trajectory = analysis.coordinates.H5MD.H5MDReader(trajectory)
+    universe.load_new(str(path), format="H5MD")
     return universe
 
 
@@ -107,13 +109,21 @@ def write_mdanalysis(path: PathLike, source: Source) -> Packing:
         return _write(file, source)
 
 
+@cache
+def _temporary_folder() -> Path:
+    """Make a folder that is removed when the process ends: MDAnalysis opens a file anew for each loop over it."""
+    folder = tempfile.mkdtemp(prefix="jamshape-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
 def _frames(source: Source) -> Iterator[Packing]:
     if isinstance(source, Packing):
         yield source
-    elif isinstance(source, Sequence) and not isinstance(source, str):
-        yield from source
-    else:
+    elif isinstance(source, str | os.PathLike):
         yield from (read_packing(source, k) for k in range(count_frames(source)))
+    else:
+        yield from source
 
 
 def _write(file: h5py.File, source: Source) -> Packing:

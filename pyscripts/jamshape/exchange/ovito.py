@@ -35,7 +35,7 @@ _OWN = ("position", "id")  # what OVITO holds in full itself
 _Z_TO_X = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)  # w i j k
 _STILL = (1.0, 0.0, 0.0, 0.0)
 
-_LEVEL = 3  # of meshes
+_LEVEL = 4  # of meshes
 _DIGITS = 9  # in which bodies of one mesh agree
 
 

@@ -23,10 +23,9 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
 H5MD asks. `step` is written last and counts the rows: what an interrupted append has left beyond
 it is neither read nor kept.
 
-MDAnalysis reads such files in 3D (``H5MDReader(path, convert_units=False)``); it refuses any box
-that is not three-dimensional, so 2D files, which hold honest (T, N, 2) positions, are for h5py and
-the other H5MD tools. It pairs row i of each observable with frame i, whatever their steps, and
-fails on an observable with fewer rows than there are frames.
+MDAnalysis refuses any box that is not three-dimensional, pairs row i of each observable with frame
+i, whatever their steps, and fails on an observable with fewer rows than there are frames;
+`jamshape.exchange.mdanalysis` writes what it opens.
 
 Names are those of `jamshape.files.vocabulary`: files of earlier versions, which called a pressure or an
 exponent `p`, are read as if they were written today, and gone on with under the new names.

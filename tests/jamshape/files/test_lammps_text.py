@@ -314,3 +314,54 @@ def test_lammps_reads_our_data_file_and_we_read_its_files(tmp_path, dimension):
         # LAMMPS normalises quaternions as it reads them.
         np.testing.assert_allclose(found.orientation, expected.orientation, rtol=0, atol=1e-15)
         assert_identical(found.with_(orientation=expected.orientation), expected)
+
+
+ROUNDNESS = ["SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta"]
+
+
+def dump_of_bodies(packing, columns):
+    """As decks of bodies with an exponent write it, with 1/p computed in LAMMPS."""
+    plain = dump_frame(packing)
+    given = dict.fromkeys(ROUNDNESS, 1 / packing.exponent)
+    given |= dict.fromkeys(("exponent", "v_exponent"), packing.exponent)
+    head, rows = plain.split("shapez \n")
+    more = zip(*(given[name] for name in columns), strict=True)
+    lines = [f"{row}{' '.join(f'{x:.17g}' for x in numbers)} \n" for row, numbers in
+             zip(rows.splitlines(), more, strict=True)]  # fmt: skip
+    return f"{head}shapez {' '.join(columns)} \n{''.join(lines)}"
+
+
+def bodies(dimension):
+    p = 0.5 + np.random.default_rng(5).random(len(NASTY))
+    return nasty_packing(dimension, exponent=p, shape_style="superellipsoid").sorted_by_id()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("column", ["exponent", "v_exponent"])
+def test_a_dump_tells_the_exponent_to_the_last_bit(path, dimension, column):
+    expected = bodies(dimension)
+    path.write_text(dump_of_bodies(expected, [column, *ROUNDNESS]))
+    [found] = read_dump(path)
+    assert found.shape_style == "superellipsoid"
+    np.testing.assert_array_equal(found.exponent, expected.exponent)
+    assert len(set(found.exponent)) > 1
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_roundness_alone_tells_the_exponent_to_rounding(path, dimension):
+    expected = bodies(dimension)
+    path.write_text(dump_of_bodies(expected, ROUNDNESS))
+    [found] = read_dump(path)
+    assert found.shape_style == "superellipsoid"
+    np.testing.assert_allclose(found.exponent, expected.exponent, rtol=3e-16)
+
+
+def test_bodies_of_two_roundnesses_are_refused(path):
+    text = dump_of_bodies(bodies(3), ROUNDNESS)
+    head, tail = text.split("Theta \n")
+    first, rest = tail.split("\n", 1)
+    path.write_text(f"{head}Theta \n{first.rsplit(' ', 2)[0]} 0.25 \n{rest}")
+    with pytest.raises(
+        FileFormatError, match="differ or are not positive, expected both to be 1/p"
+    ):
+        read_dump(path)

@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+from exchanged import PLACES, mixed
+from scenes import pressed, scaled
+
+from jamshape.contacts import find_contacts
+from jamshape.exchange.mdanalysis import to_mdanalysis, write_mdanalysis
+from jamshape.files.run_writer import RunWriter
+
+MDAnalysis = pytest.importorskip("MDAnalysis")
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:MDAnalysis")
+
+TIMES = [0.0, 0.3, 2.0]
+
+
+def run(dimension):
+    """Frames in a box that shrinks, at times that are not evenly spaced."""
+    first = pressed(dimension=dimension).with_(time=0.0)
+    return [
+        scaled(first, 1 - 0.01 * k).with_(step=10 * k, time=time) for k, time in enumerate(TIMES)
+    ]
+
+
+@pytest.fixture
+def run_file(tmp_path, request):
+    frames = run(request.param)
+    writer = RunWriter.create(tmp_path / "run.h5", frames[0], observables={"phi": frames[0].phi})
+    for packing in frames[1:]:
+        writer.append(packing)
+    return tmp_path / "run.h5", frames
+
+
+def assert_is_the_run(universe, frames):
+    assert universe.trajectory.n_frames == len(frames)
+    for packing, ts in zip(frames, universe.trajectory, strict=True):
+        D = packing.dimension
+        assert (ts.time, ts.data["step"]) == (packing.time, packing.step)
+        height = [1.0] * (3 - D)
+        np.testing.assert_allclose(ts.dimensions, [*packing.box.edges, *height, 90, 90, 90])
+        expected = packing.position - packing.box.lo
+        np.testing.assert_allclose(ts.positions[:, :D], expected, rtol=1e-6, atol=1e-5)
+        assert not ts.positions[:, D:].any()
+        np.testing.assert_array_equal(ts.data["orientation"], packing.quaternions)
+
+
+@pytest.mark.parametrize("run_file", [2, 3], indirect=True)
+def test_a_run_file_is_a_trajectory_of_all_its_frames(run_file):
+    path, frames = run_file
+    assert_is_the_run(to_mdanalysis(path), frames)
+    assert_is_the_run(to_mdanalysis(str(path)), frames)
+    assert_is_the_run(to_mdanalysis(frames), frames)
+
+
+@pytest.mark.parametrize("run_file", [2, 3], indirect=True)
+def test_mdanalysis_opens_the_written_file_by_itself(run_file, tmp_path):
+    path, frames = run_file
+    write_mdanalysis(tmp_path / "run.h5md", path)
+    assert_is_the_run(MDAnalysis.Universe(tmp_path / "run.h5md", to_guess=()), frames)
+    universe = to_mdanalysis(path, tmp_path / "again.h5md")
+    assert_is_the_run(universe.copy(), frames)
+
+
+@pytest.mark.parametrize(("name", "dimension"), PLACES)
+def test_the_topology_names_the_particles(name, dimension):
+    packing = mixed(name, dimension)
+    atoms = to_mdanalysis(packing).atoms
+    np.testing.assert_array_equal(atoms.ids, packing.id)
+    np.testing.assert_array_equal(atoms.resids, packing.id)
+    assert atoms.types.tolist() == packing.species.astype(str).tolist()
+    assert set(atoms.names) == set(atoms.resnames) == {name}
+    np.testing.assert_array_equal(atoms.radii, packing.outer_radius)
+    np.testing.assert_array_equal(atoms.masses, packing.measures)
+    chosen = atoms.select_atoms("type 1")
+    np.testing.assert_array_equal(chosen.ids, packing.id[packing.species == 1])
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_distances_around_the_box_are_those_of_our_contacts(dimension):
+    packing = pressed(dimension=dimension)
+    network = find_contacts(packing)
+    distance = np.linalg.norm(network.separation, axis=1)
+    near = distance < packing.box.edges.min() / 2
+    assert network.shift[near].any()
+    atoms = to_mdanalysis(packing).atoms
+    i, j = network.pairs[near].T
+    found = MDAnalysis.lib.distances.calc_bonds(
+        atoms.positions[i], atoms.positions[j], box=atoms.dimensions
+    )
+    np.testing.assert_allclose(found, distance[near], rtol=1e-5)
+
+
+def test_frames_of_other_particles_are_refused(tmp_path):
+    packing = mixed("dimer", 2)
+    with pytest.raises(ValueError, match="frame 1 differs from the first one in id"):
+        write_mdanalysis(tmp_path / "x.h5md", [packing, packing.sorted_by_id()])
+    with pytest.raises(ValueError, match="there is no packing"):
+        write_mdanalysis(tmp_path / "x.h5md", [])
+    assert not list(tmp_path.iterdir())
