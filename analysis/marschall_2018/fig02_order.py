@@ -83,6 +83,8 @@ def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
         axes.set(xlabel=r"packing fraction $\phi$", ylabel=ylabel)
         axes.tick_params(labelleft=True)
     panels[0].set_ylim(bottom=0)
+    if any(curve.samples > 1 for curve in curves.values()):
+        panels[0].plot([], [], "|", color="0.3", label="standard error of the mean")
     handles = panels[0].get_legend_handles_labels()
     place: dict[str, Any] = {"loc": "outside upper center", "ncols": 3, "frameon": False}
     figure.legend(*handles, title=ensembles_title(curves), **SMALL_TEXT, **place)

@@ -22,7 +22,15 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.text import ensemble_text, system_text
+from jamshape.drawing.axes import SMALL_TEXT
+from jamshape.drawing.text import (
+    counted,
+    ensemble_text,
+    onset_symbol,
+    pressure_unit,
+    scientific,
+    system_text,
+)
 from jamshape.files.h5md import read_attributes
 from jamshape.files.sets import PackingFile, System
 from jamshape.measures.averages import Mean, mean
@@ -33,6 +41,9 @@ if TYPE_CHECKING:
 
 # Packing fractions where runs are averaged and compared.
 GRID = 1000
+
+# Of the logarithmic axis of pressure, over the largest.
+LEAST = 1e-6
 
 # Of Heun's method, whose evaluations are compared.
 HEUN_DT = 0.01
@@ -116,30 +127,37 @@ def draw(rates: list[Rate], packings: dict[Place, list[float]], out: Path) -> No
             for k, of in enumerate(own):
                 draw_pressures(axis, of, f"C{k}")
             draw_onsets(axis, own, packings.get(place, []))
-        title = ensemble_text(own[0].runs[0].ensemble, ["n"])
-        linear.set(title=title, ylabel="pressure $p$")
-        logarithmic.set(xlabel=r"packing fraction $\phi$", ylabel="pressure $p$", yscale="log")
-        linear.legend(title=r"$\kappa$ (samples)", fontsize=7)
+        label = rf"pressure $p$  ${pressure_unit([place.system])}$"
+        linear.set(ylabel=label)
+        linear.set_title(ensemble_text(own[0].runs[0].ensemble, ["n", "size_ratio"]), fontsize=9)
+        logarithmic.set(xlabel=r"packing fraction $\phi$", ylabel=label, yscale="log")
+        logarithmic.set_ylim(
+            bottom=LEAST * max(one.pressure.max() for of in own for one in of.runs)
+        )
+        linear.legend(title="thick: mean, thin: each sample", **SMALL_TEXT)
     figure.savefig(out)
 
 
 def draw_pressures(axis: Axes, of: Rate, color: str) -> None:
     """Draw the samples thin, their mean thick."""
+    text = rf"$\kappa={scientific(of.kappa)}$, {counted(len(of.runs), 'sample')}"
     if len(of.runs) > 1:
         for one in of.runs:
             axis.plot(one.phi, one.pressure, "-", color=color, lw=0.4, alpha=0.5)
-    axis.plot(*of.pressure(), "-", color=color, lw=1.2, label=f"{of.kappa:g} ({len(of.runs)})")
+    axis.plot(*of.pressure(), "-", color=color, lw=1.2, label=text)
 
 
 def draw_onsets(axis: Axes, own: list[Rate], packings: list[float]) -> None:
     """Mark phi_J of the slowest rate that has one, and of packings."""
-    fitted = [of.onset() for of in own if of.onsets]
+    fitted = [of for of in own if of.onsets]
     if fitted:
-        label = rf"$\phi_J$ = {fitted[-1].value:.5f}, fit"
-        axis.axvline(fitted[-1].value, color="k", ls="--", lw=0.8, label=label)
+        onset = fitted[-1].onset()
+        label = rf"${onset_symbol(fitted[-1].kappa)}={onset.tex}$"
+        axis.axvline(onset.value, color="k", ls="--", lw=0.8, label=label)
     if packings:
-        value = mean(packings).value
-        axis.axvline(value, color="k", ls=":", lw=0.8, label=rf"$\phi_J$ = {value:.5f}, energy")
+        found = mean(packings)
+        label = rf"$\phi_J={found.tex}$, from $u_0$ to 0"
+        axis.axvline(found.value, color="k", ls=":", lw=0.8, label=label)
 
 
 def read_packings(paths: list[Path]) -> dict[Place, list[float]]:

@@ -2,9 +2,10 @@
 
     python analysis/marschall_2018/fig04_pressure.py RUN.h5 [MORE.h5 ...] --out pressure.png
 
-At the jamming packing fraction phi_J of a run of pyscripts/compress.py the line through its pressure
-just above the onset leads to zero. The last line of standard output is one JSON object with each
-phi_J and, if the runs differ in nothing but their seed, the mean.
+On the left all of each run of pyscripts/compress.py, on the right its onset: the line through its pressure just
+above leads to zero at phi_J(kappa), the jamming packing fraction at the rate of the run, which rises as kappa
+falls. Its error holds how far other stretches of the same curve put it. The last line of standard output is one
+JSON object with each phi_J, its rate and, if the runs differ in nothing but their seed, the mean.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.text import ensemble_text, pressure_unit
+from jamshape.drawing.text import ensemble_text, onset_symbol, pressure_unit
 from jamshape.files.sets import of_paper
 from jamshape.measures.averages import Mean, mean
 from jamshape.measures.onset import OnsetFit
@@ -35,8 +36,10 @@ def mean_phi_J(runs: list[Run]) -> Mean | None:
 
 
 def label(one: Run) -> str:
-    """Name a run and its onset."""
-    return f"{one.path.stem}: " + (f"${Mean(*one.fit[:2]).tex}$" if one.fit else "none")
+    """Name a run and its onset at its rate."""
+    symbol = onset_symbol(one.ensemble.kappa)
+    found = f"${symbol}={Mean(*one.fit[:2]).tex}$" if one.fit else f"no ${symbol}$"
+    return f"{one.path.stem}: {found}"
 
 
 def draw_onsets(axes: Axes, runs: list[Run]) -> None:
@@ -47,6 +50,9 @@ def draw_onsets(axes: Axes, runs: list[Run]) -> None:
         axes.plot([fit.phi_J, one.phi[fit.last]], [0, rise], "k", lw=1, zorder=3)
         axes.plot(fit.phi_J, 0, "o", color=f"C{k}", mec="k", ms=5, zorder=4)
     if fits:
+        axes.plot(
+            [], [], "ko-", lw=1, ms=5, mfc="none", label=r"line that leads to $\phi_J(\kappa)$"
+        )
         axes.margins(x=0.3, y=0.3)
         axes.set(xlim=axes.get_xlim(), ylim=(-0.03 * axes.get_ylim()[1], None))
 
@@ -66,15 +72,20 @@ def draw(runs: list[Run], average: Mean | None, options: Namespace) -> None:
     paper = {PAPER_PHI_J.get(s.number("alpha")) for s in systems if of_paper(s)} - {None}
     for axes in (whole, onset):
         for phi in paper:
-            axes.axvline(phi, color="0.4", ls=":", lw=1, label=f"{phi} quasistatic (paper)")
+            text = rf"paper, $N=1024$: $\phi_J(\kappa\to 0)={phi}$"
+            axes.axvline(phi, color="0.4", ls=":", lw=1, label=text)
         unit = pressure_unit(systems)
         axes.set(xlabel=r"packing fraction $\phi$", ylabel=rf"pressure $p$  ${unit}$")
     whole.set_ylim(bottom=1e-6 * max(one.pressure.max() for one in runs) or None)
-    whole.set_title("; ".join(dict.fromkeys(ensemble_text(one.ensemble) for one in runs)), size=8)
+    names = ("n", "size_ratio", "kappa")
+    titles = dict.fromkeys(ensemble_text(one.ensemble, names) for one in runs)
+    figure.suptitle("\n".join(titles), size=9)
     if average:
-        title = rf"$\phi_J = {average.tex}$, mean of {average.samples}"
-        onset.set_title(title, size=9)
-    onset.legend(title=r"$\phi_J$", loc="upper left", fontsize=7, title_fontsize=8)
+        title = f"${onset_symbol(runs[0].ensemble.kappa)}={average.tex}$"
+        onset.set_title(f"{title}, mean of {average.samples}", size=9)
+    onset.legend(
+        title=r"onsets at the rate of each run", loc="upper left", fontsize=7, title_fontsize=8
+    )
     figure.savefig(options.out)
 
 
@@ -84,7 +95,10 @@ def main(options: Namespace) -> None:
     average = mean_phi_J(runs)
     draw(runs, average, options)
     none = dict.fromkeys(OnsetFit._fields)
-    fits = [{"run": one.path, **(one.fit._asdict() if one.fit else none)} for one in runs]
+    fits = [
+        {"run": one.path, "kappa": one.ensemble.kappa, **(one.fit._asdict() if one.fit else none)}
+        for one in runs
+    ]
     phi_J, error, _ = average or (None, None, 0)
     report({"out": options.out, "runs": fits, "mean": phi_J, "error": error})
     if problems := [one.problem for one in runs if one.problem]:

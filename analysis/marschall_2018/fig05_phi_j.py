@@ -3,8 +3,8 @@
     python analysis/marschall_2018/fig05_phi_j.py SWEEP [MORE.h5 ...] --out phi_j.png
 
 phi_J is known in three ways: of each packing, led from its energy density u0 to zero; and of the run
-at finite rate before it, where there is one, led from its pressure to zero as in the paper, once as the box
-closes and once as it opens again. Those two tell what the rate does: they rise as kappa falls. Any shapes with
+at finite rate kappa before it, where there is one, led from its pressure to zero as in the paper, once as the box
+closes and once as it opens again: phi_J(kappa). Those two tell what the rate does: they rise as kappa falls. Any shapes with
 an aspect ratio alpha may be given, each is a curve. The last line of standard output is one JSON object with
 the averages over samples.
 """
@@ -35,8 +35,8 @@ from jamshape.measures.averages import Mean, mean
 PAPER = {0.0: Mean(0.8412, 0.0005), 1.0: Mean(0.8875), 4.0: Mean(0.866)}
 WAYS = {
     "phi_J": ("o-", r"$\phi_J$ from $u_0$ to 0"),
-    "phi_J_compression": ("s", r"$\phi_J$ from $p$ to 0, compression"),
-    "phi_J_opening": ("^", r"$\phi_J$ from $p$ to 0, opening again"),
+    "phi_J_compression": ("s", r"$\phi_J(\kappa)$ from $p$ to 0, compression"),
+    "phi_J_opening": ("^", r"$\phi_J(\kappa)$ from $p$ to 0, opening again"),
 }
 
 Averages = dict[str, dict[float, Mean]]

@@ -14,9 +14,10 @@ from typing import Any
 
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import Contacts
+from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.packing import add_legend, colorings, draw_packing
 from jamshape.drawing.space import save_smooth
-from jamshape.drawing.text import counted, system_labels
+from jamshape.drawing.text import counted
 from jamshape.files.sets import Choice, Groups, choose, read_groups
 
 PAPER_ALPHAS = (0.01, 4.0)
@@ -24,7 +25,7 @@ INCHES, ROOM = 5.0, 0.9  # of a panel, and below it
 COLUMNS, MOST = 3, 2
 
 
-def draw(found: list[Contacts], labels: list[str], options: Namespace) -> None:
+def draw(found: list[Contacts], names: list[str], options: Namespace) -> None:
     """Draw one packing for each system."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
@@ -36,8 +37,8 @@ def draw(found: list[Contacts], labels: list[str], options: Namespace) -> None:
         (colored,), _ = colorings([one], "kind")
         draw_packing(axes, one, colored)
         packing = one.packing
-        text = rf"({chr(97 + k % 26)}) {labels[k]},  $N={packing.n}$,  $\phi={packing.phi:.4f}$,  "
-        axes.set_title(text + counted(int(one.rattlers.sum()), "rattler"), fontsize=10)
+        counts = rf"$\phi={packing.phi:.4f}$, {counted(int(one.rattlers.sum()), 'rattler')}"
+        axes.set_title(f"({chr(97 + k % 26)}) {names[k]}, {counts}", fontsize=9)
         add_legend(axes, colored)
     for axes in panels[len(found) :]:
         axes.set_axis_off()
@@ -58,7 +59,7 @@ def main(options: Namespace) -> None:
     groups = chosen(read_groups(options.files, same=()), options.alpha)
     files = [files[0] for files in groups.values()]
     found = [file.contacts() for file in files]
-    draw(found, list(system_labels(groups).values()), options)
+    draw(found, [packing_text(file) for file in files], options)
     rows: list[dict[str, Any]] = [
         system.report()
         | {"file": file.path, "seed": file.number("seed"), "n": one.packing.n}

@@ -38,6 +38,8 @@ PAPER_RATTLERS = {0.01: 34.0, 1.0: 0.0, 4.0: 1.2}
 FITTED = 4  # of the smallest alpha, as in the paper
 MARKS = {"z": ("o", r"\langle z_J\rangle"), "z_single": ("D", r"\langle\tilde z_J\rangle")}
 
+SIDES = {"z": "side-to-side as two", "z_single": "side-to-side as one"}
+
 Averages = dict[float, Mean]
 
 
@@ -97,7 +99,9 @@ def draw(curves: dict[System, Found], title: str, options: Namespace) -> None:
         for way, (name, (marker, symbol)) in enumerate(MARKS.items()):
             tint, text = color(2 * k + way), f", {labels[system]}" * (labels[system] != "")
             style: dict[str, Any] = {"fmt": marker, "color": tint, "mfc": "none"}
-            error_bars(linear, found.z[name], discs, **style, label=f"${symbol}${text}")
+            error_bars(
+                linear, found.z[name], discs, **style, label=f"${symbol}$, {SIDES[name]}{text}"
+            )
             style["label"] = f"${symbol} - {limit}${text}"
             error_bars(logarithmic, above(found.z[name], limit), None, **style)
             draw_fit(logarithmic, found.fits[name], tint)
@@ -123,7 +127,7 @@ def draw_fit(axes: Axes, fitted: Fitted, tint: str) -> None:
     if law:
         alpha = np.geomspace(fitted.alphas[0] / 2, fitted.alphas[-1] * 2, 100)
         alpha = alpha[law.at(alpha) > 0]
-        text = rf"${law.a:.2f} {law.b:+.2f}\,\alpha^{{{law.x:.2f}}}$"
+        text = rf"fit, ${law.a:.2f} {law.b:+.2f}\,\alpha^{{{law.x:.2f}}}$"
         axes.plot(alpha, law.at(alpha), color=tint, lw=1, label=text)
 
 
@@ -142,7 +146,7 @@ def finish(axes: Axes, isostatic: list[int], title: str) -> None:
     note |= {"ha": "right", "transform": axes.get_yaxis_transform()}
     for level in sorted(set(isostatic)):
         axes.axhline(level, color="0.5", ls="--", lw=1, zorder=0)
-        axes.text(0.98, level, "isostatic", **note)
+        axes.text(0.98, level, "isostatic: twice the degrees of freedom", **note)
     axes.set_ylim(top=max(max(isostatic) + 0.25, axes.get_ylim()[1]))
     axes.set_ylabel("contacts per particle at jamming")
     place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0, 0.92)}

@@ -24,7 +24,7 @@ from jamshape.drawing.mode_axes import (
     modes_parser,
     tables_asked,
 )
-from jamshape.drawing.text import samples_text, system_labels
+from jamshape.drawing.text import samples_text, systems_text
 from jamshape.vibration.sets import TOLD, Key, Tables, band_means, every, n_of
 from jamshape.vibration.table import ModeTable
 
@@ -57,7 +57,7 @@ def draw(tables: Tables, options: Namespace) -> None:
 
     figure = Figure(figsize=(7, 1.4 + 2.4 * len(tables)), dpi=200, layout="constrained")
     rows = add_sides(figure, tables, len(tables))
-    edges, labels = bin_edges(every(tables)), system_labels({key.system for key in tables})
+    edges = bin_edges(every(tables))
     thin: dict[str, Any] = {"mfc": "none", "ms": 4, "lw": 0.8, "elinewidth": 0.8, "capsize": 1.5}
     for row, (key, samples) in zip(rows, tables.items(), strict=True):
         for name, (marker, color, text) in COMPONENTS.items():
@@ -67,7 +67,8 @@ def draw(tables: Tables, options: Namespace) -> None:
         for axes in row.each():
             axes.set_ylim(-0.04, 1.04)
         row.first.set_ylabel("share of the motion")
-        title = f"{labels[key.system]}, {energy_text(key.u0)}, {samples_text(n_of(tables), {key: samples})}"
+        told = [energy_text(key.u0), samples_text(n_of(tables), {key: samples})]
+        title = ", ".join([systems_text([key.system]), *told])
         row.stable.set_title(title, fontsize=8, loc="right")
     draw_legend(rows[0].stable, next(iter(tables.values())))
     figure.savefig(options.out)

@@ -142,19 +142,22 @@ def draw(file: PackingFile, table: ModeTable, modes: list[int], options: Namespa
         axes.set_axis_off()
     if table.coordinates.is_rotation.any():
         add_color_bar(figure.colorbar(bodies, ax=list(panels), aspect=30, shrink=0.75, pad=0.01))
-    add_arrow(panels[-1])
+    add_key(panels[len(modes) - 1], with_rattlers=not held.all())
     figure.suptitle(packing_text(file), fontsize=9)
     figure.savefig(options.out)
 
 
-def add_arrow(axes: Axes) -> None:
-    """Say what arrows are, below a panel."""
+def add_key(axes: Axes, *, with_rattlers: bool) -> None:
+    """Say what arrows, thick outlines and grey are, below a panel."""
     arrow = {"arrowstyle": "-|>", "lw": 1.2, "color": "k", "shrinkA": 0, "shrinkB": 0}
     ends = ((1.0, -0.035), (1.0 - LONGEST, -0.035))
     axes.annotate("", *ends, xycoords="axes fraction", arrowprops=arrow)
     label: dict[str, Any] = {"ha": "right", "va": "center", "fontsize": 8}
     text = "displacement: largest motion"
     axes.text(1.0 - LONGEST - 0.02, -0.035, text, transform=axes.transAxes, **label)
+    others = "thick outline: moves most" + ", grey: rattlers" * with_rattlers
+    label |= {"ha": "left", "transform": axes.transAxes}
+    axes.text(0.0, -0.035, others, **label)
 
 
 def add_color_bar(bar: Any) -> None:

@@ -74,7 +74,7 @@ def guides(axes: Axes, curves: Curves) -> None:
     note: dict[str, Any] = {"fontsize": 8, "ha": "left", "va": "center"}
     for power, y in ((2, 30.0 * max(stiff) * x**2), (4, 1e-7 * (x / x[1]) ** 4)):
         axes.plot(x, y, "k-", lw=1.2)
-        axes.text(x[1] * 1.15, y[1], rf"$\delta^{power}$", **note)
+        axes.text(x[1] * 1.15, y[1], rf"$\sim\delta^{power}$", **note)
 
 
 def draw_curve(top: Axes, bottom: Axes, curve: Curve, **style: Any) -> None:

@@ -21,7 +21,7 @@ from jamshape.command import report, run
 from jamshape.drawing.axes import energy_label, log_bars
 from jamshape.drawing.mode_axes import frequency_unit, modes_parser, tables_asked
 from jamshape.drawing.styles import BLUE, RED
-from jamshape.drawing.text import range_text, system_labels
+from jamshape.drawing.text import range_text, systems_text
 from jamshape.files.sets import System, of_paper
 from jamshape.measures.averages import Mean, mean
 from jamshape.vibration.sets import Tables, n_of, seed_of, sizes, stable, unstable
@@ -176,12 +176,11 @@ def draw(found: dict[System, Ladder], tables: Tables, options: Namespace) -> Non
 
     figure = Figure(figsize=(0.9 + 3.4 * len(found), 3.9), dpi=200, layout="constrained")
     panels = figure.subplots(1, len(found), sharey=True, squeeze=False)[0]
-    labels = system_labels(found)
     for axes, (system, ladder) in zip(panels, found.items(), strict=True):
         for band in STYLES:
             draw_band(axes, Band(band, ladder))
         many = range_text((len(samples) for samples in ladder.values()), "sample")
-        title = f"{labels[system]}, $N={n_of(tables)}$, {many}"
+        title = f"{systems_text([system])}\n$N={n_of(tables)}$, {many}"
         axes.set(xscale="log", yscale="log", xlabel=energy_label([system]))
         axes.legend(title=title, title_fontsize=8, fontsize=7, frameon=False, loc="upper left")
     guides(panels)
@@ -199,7 +198,7 @@ def guides(panels: Any) -> None:
         for exponent, text in ((0.25, "1/4"), (0.5, "1/2")):
             y = low / 50 * (u / u[0]) ** exponent
             axes.plot(u, y, "k-", lw=1.2)
-            axes.text(u[1] * 1.4, y[1], text, fontsize=8, va="center")
+            axes.text(u[1] * 1.3, y[1], rf"$u^{{{text}}}$", fontsize=8, va="center")
         axes.set_xlim(left, right)
 
 

@@ -11,16 +11,15 @@ these numbers beside the paper's.
 from __future__ import annotations
 
 from argparse import Namespace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import energy_label
+from jamshape.drawing.axes import SMALL_TEXT, energy_label
 from jamshape.drawing.styles import PAPER_STYLE, color, marked
-from jamshape.drawing.text import counted, system_labels
-from jamshape.files.sets import System, finished, of_paper
+from jamshape.drawing.text import bars_text, counted, system_labels, systems_text
+from jamshape.files.sets import PackingFile, System, finished, of_paper
 from jamshape.measures.averages import Mean, mean
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ Samples = dict[int, dict[float, float]]
 Ladder = dict[System, Samples]
 
 
-def read_ladder(paths: list[Path]) -> Ladder:
+def read_ladder(files: list[PackingFile]) -> Ladder:
     """Read phi - phi_J of packings in equilibrium.
 
     Raises
@@ -50,7 +49,7 @@ def read_ladder(paths: list[Path]) -> Ladder:
         If there is no sample at two energies.
     """
     rows: dict[tuple[System, int], dict[float, tuple[float, float]]] = {}
-    for file in finished(paths):
+    for file in files:
         of = file.system(), int(file.number("seed"))
         phi = file.number("phi"), file.number("phi_J")
         rows.setdefault(of, {})[file.number("u0")] = phi
@@ -61,7 +60,7 @@ def read_ladder(paths: list[Path]) -> Ladder:
             above = {u: phi - phi_J for u, (phi, _) in sorted(points.items())}
             ladder.setdefault(system, {})[seed] = above
     if not ladder:
-        places = ", ".join(map(str, paths))
+        places = ", ".join(dict.fromkeys(str(file.path) for file in files))
         msg = f"{places}: no sample at two energies, expected energy_ladder.py's"
         raise ValueError(msg)
     return ladder
@@ -107,7 +106,7 @@ def draw_paper(panels: list[Axes], stars: dict[float, float], tint: str) -> None
     panels[1].plot(x, y / x**EXPONENT, "*", color=tint, **STAR)
 
 
-def draw(ladder: Ladder, options: Namespace) -> None:
+def draw(ladder: Ladder, n: str, options: Namespace) -> None:
     """Draw phi - phi_J on the left, without its trend on the right."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
@@ -131,7 +130,8 @@ def draw(ladder: Ladder, options: Namespace) -> None:
     right.set_ylabel(r"$(\phi-\phi_J)\;/\;u^{1/2}$")
     low, high = right.get_ylim()
     right.set_ylim(low - 0.2 * (high - low), high + 0.2 * (high - low))
-    left.legend(fontsize=8, frameon=False, loc="upper left")
+    title = f"{systems_text(ladder)}\n{n}" + bars_text(ladder)
+    left.legend(title=title, frameon=False, loc="upper left", **SMALL_TEXT)
     figure.savefig(options.out)
 
 
@@ -146,8 +146,9 @@ def row_of(system: System, samples: Samples) -> dict[str, Any]:
 
 def main(options: Namespace) -> None:
     """Read, average, fit, draw, report."""
-    ladder = read_ladder(options.files)
-    draw(ladder, options)
+    files = finished(options.files)
+    ladder, sizes = read_ladder(files), sorted({file.packing().n for file in files})
+    draw(ladder, f"$N={' and '.join(map(str, sizes))}$", options)
     rows = [row_of(system, samples) for system, samples in ladder.items()]
     report({"out": options.out, "jamming_distance": rows})
 

@@ -179,7 +179,7 @@ def main(options: Namespace) -> int:
         found["kolmogorov_distance"] = distance(groups.values())
     if "from_discs" in groups:
         curves = {NAMES[name]: angle_curve(options.alpha, of) for name, of in groups.items()}
-        title = rf"$\alpha={options.alpha:g}$, {conditions_alone(groups)}"
+        title = conditions_alone(groups)
         found["out"] = options.out / "singular_limit.png"
         contact_angle_figure(curves, title).savefig(found["out"])
     report(found)

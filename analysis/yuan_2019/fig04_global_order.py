@@ -63,6 +63,7 @@ def draw(every: Groups, at_random: dict[str, float], options: Namespace) -> None
     flat.axvline(1, color="0.8", lw=0.8, ls=":", zorder=0)
     beta_axis(flat.xaxis)
     family_legend(flat, groups, conditions_text(every), loc="outside right center")
+    both.plot([], [], "o", color="0.4", ms=2.5, label="small: single packings")
     both.legend(fontsize=8, loc="best")
     figure.savefig(options.out)
 

@@ -56,9 +56,11 @@ def draw_z(groups: Groups, panels: list[Axes]) -> None:
         axes.set_xscale("symlog", linthresh=LOG_BELOW, linscale=0.3)
         axes.set_xlim(-LOG_BELOW / 4, max(0.4, axes.get_xlim()[1]))
         axes.set_xlabel(r"asphericity $\mathcal{A}$")
-        title = conditions_text(shown) if shown else ""
-        family_legend(axes, shown, title, loc="best")
+        text = "with an axis of symmetry" if symmetric else "without"
+        axes.set_title(text, fontsize=9)
+        axes.legend(loc="lower right", fontsize=8)
     panels[0].set_ylabel("contacts per particle $z_J$")
+    family_legend(panels[0], groups, conditions_text(groups), loc="outside right center")
 
 
 def draw(groups: Groups, options: Namespace) -> None:
@@ -69,7 +71,7 @@ def draw(groups: Groups, options: Namespace) -> None:
         figure = Figure(figsize=(7.4, 4.4), dpi=200, layout="constrained")
         draw_phi(groups, figure.subplots())
     else:
-        figure = Figure(figsize=(9, 4.2), dpi=200, layout="constrained")
+        figure = Figure(figsize=(11, 4.2), dpi=200, layout="constrained")
         draw_z(groups, list(figure.subplots(1, 2)))
     figure.savefig(options.out)
 

@@ -51,6 +51,9 @@ def draw_bands(axes: Axes, A: Averages, phi: Averages) -> None:
     beta_axis(axes.xaxis)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)
+    else:
+        axes.set(xticks=[], yticks=[])
+        axes.text(0.5, 0.5, r"no shape with $p\leq 1$", transform=axes.transAxes, ha="center")
 
 
 def draw_map(figure: Any, axes: Axes, A: Averages, phi: Averages) -> bool:
@@ -63,7 +66,8 @@ def draw_map(figure: Any, axes: Axes, A: Averages, phi: Averages) -> bool:
         draw_contours(axes, x, y, z)
     dots = axes.scatter(x, y, c=z, cmap="viridis", s=60, edgecolors="k", linewidths=0.6, zorder=3)
     figure.colorbar(dots, ax=axes, label=r"$\phi_J$")
-    axes.axhline(1, **PAPER_LINE)
+    axes.axhline(1, **PAPER_LINE, label=r"$\beta=1$")
+    axes.legend(fontsize=8)
     axes.set_xlabel(r"asphericity $\mathcal{A}$")
     beta_axis(axes.yaxis)
     return contours
@@ -89,7 +93,7 @@ def draw(groups: Groups, options: Namespace) -> bool:
     left, right = figure.subplots(1, 2)
     A, phi = averages(groups, "asphericity"), averages(groups, "phi_J")
     draw_bands(left, A, phi)
-    left.set_title(conditions_text(groups), fontsize=9)
+    figure.suptitle(conditions_text(groups), fontsize=9)
     contours = draw_map(figure, right, A, phi)
     figure.savefig(options.out)
     return contours

@@ -59,6 +59,8 @@ def draw(tables: Tables, title: str, options: Namespace) -> None:
         if end:
             top.plot(end, size[end - 1], "o", color=color, ms=5, mec="k", mew=0.6)
         bottom.plot(place, smooth(table["rotation"][rows]), "-", color=color, lw=1.0)
+    top.plot([], [], "o", color="w", ms=5, mec="k", mew=0.6, label="last quartic mode")
+    top.plot([], [], ":", color="0.4", lw=1.3, label=r"dotted: $-\lambda_i$, where $\lambda_i<0$")
     unit = unit_text(tables)
     top.set(yscale="log", ylabel=rf"$\lambda_i\;[k_e/{unit}^2]$")
     bottom.set(xlabel="mode $i$", ylabel="share of rotation", ylim=(-0.03, 1.03))

@@ -47,7 +47,7 @@ def draw(groups: Groups, counts: Counts, options: Namespace) -> None:
     bottom.set(xlabel=r"$d_f(N-N_r)-N_q-(D-1)$", ylabel="difference")
     largest = max(abs(bottom.get_ylim()[0]), abs(bottom.get_ylim()[1]), 3)
     bottom.set_ylim(-largest, largest)
-    family_legend(top, groups, conditions_text(groups), loc="upper left")
+    family_legend(top, groups, conditions_text(groups, bars=False), loc="upper left")
     figure.savefig(options.out)
 
 

@@ -19,8 +19,9 @@ from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.families import label, mark
+from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.styles import PAPER_LINE, RED
-from jamshape.drawing.text import pressure_unit, unit_text
+from jamshape.drawing.text import pressure_unit, systems_text, unit_text
 from jamshape.files.sets import PackingFile, System, read_groups
 from jamshape.vibration.energy_along import EnergyAlong, quartic_crossover
 from jamshape.vibration.quartic import along, found_modes, quartic_count
@@ -111,8 +112,12 @@ def draw_energies(axes: Axes, found: Followed) -> None:
     unit = unit_text([found.name.system])
     axes.set(xscale="log", yscale="log", xlabel=rf"amplitude $\delta\;/\;{unit}$")
     z = found.file.number("z")
-    axes.set_title(f"{found.name.label}, $N={n:g}$, $z_J={z:.2f}$", fontsize=9)
+    axes.set_title(f"{packing_text(found.file)}, $z_J={z:.2f}$", fontsize=8)
     draw_powers(axes, found, n)
+    for line, tint, text in (("-", "0.3", "below the gap"), ("--", RED, "above it")):
+        axes.plot([], [], line, color=tint, lw=1.3, label=f"modes {text}")
+    axes.plot([], [], "o", color="w", ms=5, mec="k", mew=0.6, label=r"crossover $\delta^*$")
+    axes.legend(fontsize=7, loc="lower right")
 
 
 def draw_powers(axes: Axes, found: Followed, n: float) -> None:
@@ -150,6 +155,8 @@ def draw_crossovers(axes: Axes, every: list[Followed]) -> None:
     x, middle = np.array([low, high]), (np.sqrt(low * high), np.sqrt(np.prod(axes.get_ylim())))
     axes.plot(x, middle[1] * np.sqrt(x / middle[0]), **PAPER_LINE, label=r"$\sqrt{P}$")
     axes.set_xlim(low, high)
+    axes.xaxis.set_minor_formatter("")
+    axes.set_title(f"{systems_text(systems)}\nbars: smallest and largest", fontsize=8)
     axes.legend(fontsize=7)
 
 

@@ -39,7 +39,7 @@ def draw(groups: Groups, options: Namespace) -> None:
             (axes_from(np.ones_like(long), long), long, RED, "prolate"),
         ):
             shown = color if p == 1 else "0.6"
-            text = f"{name} ellipsoids" if p == 1 else f"{name}, $p={BOX:g}$"
+            text = f"any {name} ellipsoid" if p == 1 else f"{name}, $p={BOX:g}$"
             A = asphericity(bodies, p)
             axes.plot(A, values, style, color=shown, lw=1, zorder=0, label=text)
     known = averages(groups, "asphericity")
@@ -48,7 +48,7 @@ def draw(groups: Groups, options: Namespace) -> None:
     largest = max(0.36, 1.05 * max(m.value for m in known.values()))
     axes.set(xlim=(-0.01, largest), xlabel=r"asphericity $\mathcal{A}$")
     beta_axis(axes.yaxis)
-    family_legend(axes, groups, conditions_text(groups), loc="outside right center")
+    family_legend(axes, groups, conditions_text(groups, bars=False), loc="outside right center")
     figure.savefig(options.out)
 
 

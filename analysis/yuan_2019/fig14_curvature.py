@@ -68,22 +68,25 @@ def draw(groups: Groups, known: Curvatures, options: Namespace) -> None:
     figure = Figure(figsize=(11.5, 4.2), dpi=200, layout="constrained")
     left, right = figure.subplots(1, 2)
     z, shades = averages(groups, "z"), colormaps["turbo"](np.linspace(0.05, 0.95, len(known)))
+    named: set[System] = set()
     for shade, (system, values) in zip(shades, known.items(), strict=True):
         style: dict[str, Any] = mark(system) | {"color": shade}
         if family(system) != SPHERES and (values > 0).any():
             draw_distribution(left, values, label=label(system), **style)
+            named.add(system)
         quarter, half, rest = np.quantile(values, (0.25, 0.5, 0.75))
         bars = [[half - quarter], [rest - half]]
         style |= {"ls": "none", "ms": 6, "capsize": 2, "elinewidth": 0.8}
-        right.errorbar([z[system].value], [half], bars, **style)
+        name = "" if system in named else label(system)
+        right.errorbar([z[system].value], [half], bars, **style, label=name)
     left.set(xscale="log", yscale="log", ylabel="$P(K_G)$")
     left.set_xlabel(r"$K_G=\bar K_G\,(abc)^{2/3}$ at contacts")
-    if left.get_legend_handles_labels()[0]:
-        text: dict[str, Any] = {"title_fontsize": 8, "fontsize": 8, "loc": "outside right center"}
-        figure.legend(title=f"$(p, w_1, w_2)$\n{conditions_text(groups)}", **text)
     right.set(yscale="log", xlabel="contacts per particle $z_J$")
     right.set_ylabel("median and quartiles of $K_G$")
-    right.axhline(1, color="0.8", lw=0.8, ls=":", zorder=0)
+    right.axhline(1, color="0.8", lw=0.8, ls=":", zorder=0, label="spheres")
+    text: dict[str, Any] = {"title_fontsize": 8, "fontsize": 8, "loc": "outside right center"}
+    title = f"$(p, w_1, w_2)$ of {conditions_text(groups, bars=False)}"
+    figure.legend(title=title, **text)
     figure.savefig(options.out)
 
 

@@ -109,7 +109,7 @@ def test_the_bonds_asked_for_are_shown(report, tmp_path, sides, points):
     write_data(tmp_path / "packing.data", packing())
     report(SCRIPT, tmp_path / "packing.data", "--sides", sides, "--out", tmp_path / "p.png")
     red = is_color(image(tmp_path / "p.png"), rgb(CONTACT)).any(axis=0)
-    assert np.count_nonzero(np.diff(red.astype(int)) == 1) == points
+    assert np.count_nonzero(np.diff(red.astype(int)) == 1) == points + 1, "and one in the legend"
 
 
 @pytest.mark.parametrize("A", [0.0, 1e-3, 6.0])

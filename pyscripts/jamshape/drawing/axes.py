@@ -41,7 +41,7 @@ def label_alpha_axis(axes: Axes, discs: float | None) -> None:
     ticks = [10.0**k for k in decades]
     minor = [m * 10.0**k for k in range(-9, 3) for m in range(2, 10)]
     minor = [tick for tick in minor if discs * 2 < tick < high]
-    axes.set_xticks([discs, *ticks], ["0", *[f"$10^{{{k}}}$" for k in decades]])
+    axes.set_xticks([discs, *ticks], ["0\nround", *[f"$10^{{{k}}}$" for k in decades]])
     axes.set_xticks(minor, [""] * len(minor), minor=True)
     axes.set_xlim(low, high)
     axes.axvline(discs * 2, color="0.8", lw=0.8, ls=":", zorder=0)

@@ -56,7 +56,8 @@ class Scale(NamedTuple):
         colors = LinearSegmentedColormap.from_list("order", [GREEN, YELLOW, RED])
         known = values[np.isfinite(values)]
         end = max(float(known.max(initial=_LEAST)), _LEAST)
-        return cls(ORDER[name], ScalarMappable(Normalize(0.0, end), colors))
+        grey = ", grey without contacts" * (len(known) < len(values))
+        return cls(ORDER[name] + grey, ScalarMappable(Normalize(0.0, end), colors))
 
     def rgb(self, values: FloatArray) -> FloatArray:
         """(N, 3) colours, grey where order is not known."""
@@ -117,13 +118,16 @@ def _ends(size: FloatArray, palette: FloatArray) -> list[tuple[str, FloatArray]]
 def by_direction(packing: Packing) -> Coloring:
     """Colour by direction: in space x, y, z as red, green, blue; in the plane around a circle."""
     directors = packing.directors
-    names, marked = ["x", "y", "z"], np.eye(3)
+    names, marked = ["along x", "along y", "along z"], np.eye(3)
     if packing.dimension == 2:
-        names, angle = ["0", "45", "90", "135 degrees"], np.pi / 4 * np.arange(4)
+        names = [f"direction {angle} degrees" for angle in (0, 45, 90, 135)]
+        angle = np.pi / 4 * np.arange(4)
         marked = np.column_stack([np.cos(angle), np.sin(angle)])
     known = np.isfinite(directors).all(axis=1, keepdims=True)
     rgb = np.where(known, _hues(directors), _UNKNOWN)
-    return Coloring(rgb, list(zip(names, _hues(marked), strict=True)), np.empty(0))
+    legend = list(zip(names, _hues(marked), strict=True))
+    legend += [("no direction", np.full(3, _UNKNOWN))] * (not known.all())
+    return Coloring(rgb, legend, np.empty(0))
 
 
 def _hues(directors: FloatArray) -> FloatArray:

@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 
 
 def contact_angle_figure(curves: Mapping[str, AngleCurve], title: str) -> Figure:
-    """Draw P(phi) of each, by its name, with a band of one standard error."""
+    """Draw P(phi) of each, by its name, with a band of one standard error on both sides."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(6, 4.3), dpi=200, layout="constrained")
     axes = figure.subplots()
     for k, (name, found) in enumerate(curves.items()):
         _draw_curve(axes, found, color(k), f"{name} ({counted(found.samples, 'sample')})")
+    if any(found.samples > 1 for found in curves.values()):
+        axes.fill_between([], [], color="0.5", alpha=0.25, lw=0, label="standard error")
     axes.axhline(1 / np.pi, color="0.4", ls=":", lw=1, label=r"discs, $1/\pi$", zorder=0)
     seen = np.concatenate([found.density[found.density > 0] for found in curves.values()])
     axes.set_yscale("log")

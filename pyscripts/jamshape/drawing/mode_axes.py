@@ -17,10 +17,13 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of
 from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED, color
 from jamshape.drawing.text import (
+    attributes_text,
+    bars_text,
     samples_text,
     scientific,
     short,
     system_labels,
+    systems_text,
     unit_text,
 )
 from jamshape.files.sets import PackingFile
@@ -100,15 +103,16 @@ def key_labels(keys: Collection[Key]) -> dict[Key, str]:
 
 def energy_text(u0: float) -> str:
     """Name an energy density."""
-    return rf"$u={scientific(u0)}$" if u0 else "first jammed"
+    return attributes_text({"u0": u0})[0]
 
 
 def legend_title(tables: Tables) -> str:
-    """Name N, the number of samples, and the system or the energy where all curves have one."""
-    systems, energies = {key.system: None for key in tables}, {key.u0 for key in tables}
-    named = list(system_labels(systems).values()) * (len(systems) == 1 and len(tables) > 1)
-    named += map(energy_text, energies if len(energies) == 1 else [])
-    return ", ".join([*named, samples_text(n_of(tables), tables)])
+    """Say above what the packings are of, and below N, samples, and the energy where all have one."""
+    energies = {key.u0 for key in tables}
+    told = [samples_text(n_of(tables), tables)]
+    told += map(energy_text, energies if len(energies) == 1 else [])
+    text = f"{systems_text(key.system for key in tables)}\n{', '.join(told)}"
+    return text + bars_text(tables)
 
 
 def frequency_unit(keys: Iterable[Key]) -> str:
@@ -118,11 +122,11 @@ def frequency_unit(keys: Iterable[Key]) -> str:
 
 def packing_text(file: PackingFile) -> str:
     """Name one packing by its system, N, energy and seed, as far as its file tells."""
-    known, shape = file.attributes, file.system()
+    known = file.attributes
     told = [f"$N={known['n']}$"] if "n" in known else []
-    told += [energy_text(known["u0"])] if "u0" in known else []
+    told += attributes_text(known)
     told += [f"seed {known['seed']}"] if "seed" in known else []
-    return ", ".join([*system_labels([shape]).values(), *told])
+    return f"{systems_text([file.system()])}\n{', '.join(told)}"
 
 
 def bin_edges(tables: Iterable[ModeTable], per_decade: int = PER_DECADE) -> FloatArray:

@@ -98,14 +98,15 @@ def inches_of(axes: Axes) -> FloatArray:
 
 
 def add_legend(axes: Axes, colored: Coloring) -> None:
-    """Name the colours below a picture, if they are those of kinds or directions."""
+    """Name below a picture what its lines and dots are, and its colours but those of a scale."""
     from matplotlib.patches import Patch  # noqa: PLC0415 - not needed for --help
 
-    if not colored.legend:
+    handles: list[Any] = [Patch(fc=rgb, ec="k", lw=0.5, label=text) for text, rgb in colored.legend]
+    handles += axes.get_legend_handles_labels()[0]
+    if not handles:
         return
-    handles = [Patch(fc=rgb, ec="k", lw=0.5, label=text) for text, rgb in colored.legend]
     # A sign is about 0.055 inch wide, and TeX has more signs than are seen.
-    longest = 0.04 * max(len(text) for text, _ in colored.legend) + 0.6
+    longest = 0.04 * max(len(handle.get_label()) for handle in handles) + 0.6
     columns = max(1, min(len(handles), int(inches_of(axes)[0] / longest)))
     place: dict[str, Any] = {
         "loc": "upper center",

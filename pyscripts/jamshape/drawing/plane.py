@@ -122,7 +122,9 @@ def draw_spines(axes: Axes, packing: Packing, line: float) -> None:
     from matplotlib.collections import LineCollection  # noqa: PLC0415 - not needed for --help
 
     at = images(packing.position, packing.outer_radius, packing.box)
-    axes.add_collection(LineCollection(list(spines(packing, at)), colors="k", lw=line))
+    lines = list(spines(packing, at))
+    if lines:
+        axes.add_collection(LineCollection(lines, colors="k", lw=line, label="spines"))
 
 
 def draw_contacts(axes: Axes, packing: Packing, network: ContactNetwork, dot: float) -> None:
@@ -131,7 +133,10 @@ def draw_contacts(axes: Axes, packing: Packing, network: ContactNetwork, dot: fl
 
     point = network.bonds.point
     at = images(point, np.full(len(point), dot), packing.box)
-    axes.add_collection(PolyCollection(discs(at.center, dot), facecolors=CONTACT, lw=0))
+    if len(point):
+        dots = discs(at.center, dot)
+        axes.add_collection(PolyCollection(dots, facecolors=CONTACT, lw=0))
+        axes.plot([], [], "o", color=CONTACT, ms=4, label="points of contact")
 
 
 def show_box(axes: Axes, lo: FloatArray, edges: FloatArray) -> None:

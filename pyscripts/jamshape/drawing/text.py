@@ -6,14 +6,16 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence, Sized
 from typing import Any
 
+import numpy as np
+
 from jamshape.files.sets import PackingFile, System, conditions, n_of
 from jamshape.measures.runs import Ensemble
 from jamshape.shapes.particles import parse_kind
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import SHAPES, shape_named
 
-_NUMBERS = {"n": "N", "size_ratio": "R_b/R_s", "kappa": r"\kappa"}
-_SYMBOLS = {"u0": "u_0", "kappa": r"\kappa"}
+_NUMBERS = {"n": "N", "size_ratio": "R_b/R_s", "kappa": r"\kappa", "u0": "u_0"}
+_OF_ENSEMBLES = ("n", "size_ratio", "kappa")
 
 
 def scientific(value: float) -> str:
@@ -48,19 +50,78 @@ def samples_text(n: int, groups: Mapping[Any, Sized]) -> str:
     return rf"$N={n}$, {many}" + " each" * (len(groups) > 1)
 
 
-def conditions_text(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
-    """Name N, the number of samples, and the energy and compression rate that all packings share."""
-    return ", ".join([samples_text(n_of(groups), groups), *_shared(groups)])
+def conditions_text(groups: Mapping[Any, Sequence[PackingFile]], *, bars: bool = True) -> str:
+    """Say above a figure of packings what they are of, and below N, samples, energy and rate.
+
+    The energy density and the compression rate are those that all share, if they do. What bars are is
+    said last, if they are drawn and there are several samples.
+    """
+    return _titled(groups, samples_text(n_of(groups), groups)) + bars_text(groups) * bars
+
+
+def bars_text(groups: Mapping[Any, Sized]) -> str:
+    """Say what bars are, in a line of its own, where there are several samples."""
+    return "\nbars: standard error of the mean" * any(len(of) > 1 for of in groups.values())
 
 
 def conditions_alone(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
     """Say the same without the number of samples, for legends that tell it of each curve."""
-    return ", ".join([f"$N={n_of(groups)}$", *_shared(groups)])
+    return _titled(groups, f"$N={n_of(groups)}$")
 
 
-def _shared(groups: Mapping[Any, Sequence[PackingFile]]) -> list[str]:
+def _titled(groups: Mapping[Any, Sequence[PackingFile]], count: str) -> str:
     known = conditions(groups)
-    return [rf"${_SYMBOLS[name]}={scientific(known[name])}$" for name in _SYMBOLS if name in known]
+    first = [systems_text(file.system() for of in groups.values() for file in of)]
+    first += [_told("size_ratio", known)] * ("size_ratio" in known)
+    return "\n".join([", ".join(first), ", ".join([count, *attributes_text(known)])])
+
+
+def attributes_text(known: Mapping[str, Any]) -> list[str]:
+    r"""Write the energy density and the compression rate that a file tells, as far as it does.
+
+    Examples
+    --------
+    >>> attributes_text({"n": 64, "kappa": 2e-6})
+    ['$\\kappa=2\\times 10^{-6}$']
+    """
+    return [_told(name, known) for name in ("u0", "kappa") if name in known]
+
+
+def _told(name: str, known: Mapping[str, Any]) -> str:
+    """Write a number with its symbol; of rates that follow each other the last."""
+    value = float(np.ravel(known[name])[-1])
+    if name == "u0" and value == 0:
+        return "first jammed"
+    small = name in {"u0", "kappa"}
+    return f"${_NUMBERS[name]}={scientific(value) if small else f'{value:g}'}$"
+
+
+def systems_text(systems: Iterable[System]) -> str:
+    """Name what systems are of: shape, dimension, and parameters or from where to where these go."""
+    found = list(dict.fromkeys(systems))
+    shapes, dimensions, protocols = (
+        sorted({getattr(system, name) for system in found})
+        for name in ("shape", "dimension", "protocol")
+    )
+    parts = [f"{' and '.join(f'{name}s' for name in shapes)} in "]
+    parts[0] += " and ".join(f"{D}D" for D in dimensions)
+    if len(found) == 1:
+        parts.append(system_text(found[0]))
+    elif len(shapes) == 1:
+        parts += _ranges(found)
+    parts += [protocol_text(found[0])] * (len(protocols) == 1 and protocols != [0])
+    return ", ".join(filter(None, parts))
+
+
+def _ranges(systems: Sequence[System]) -> list[str]:
+    """Write the parameters of systems of one shape, or from where to where they go."""
+    texts = []
+    for parameter in shape_named(systems[0].shape).parameters:
+        values = [system.number(parameter.name) for system in systems]
+        low, high = min(values), max(values)
+        if not any(map(math.isnan, values)):
+            texts.append(f"${parameter.symbol}={low:g}$" + f" to ${high:g}$" * (low < high))
+    return texts
 
 
 def system_text(system: System) -> str:
@@ -112,8 +173,8 @@ def system_labels(systems: Collection[System]) -> dict[System, str]:
 
 def ensemble_text(ensemble: Ensemble, names: Iterable[str] = ("n", "kappa")) -> str:
     """Name an ensemble of compressions by its system and the numbers of these names."""
-    told = [_number(ensemble, name) for name in names]
-    return ", ".join(filter(None, [system_text(ensemble.system), *told]))
+    told = [_told(name, ensemble._asdict()) for name in names]
+    return ", ".join([systems_text([ensemble.system]), *told])
 
 
 def ensemble_labels(ensembles: Collection[Ensemble]) -> dict[Ensemble, str]:
@@ -121,7 +182,7 @@ def ensemble_labels(ensembles: Collection[Ensemble]) -> dict[Ensemble, str]:
     systems, differ = _differing(ensembles)
     labels = {}
     for e in ensembles:
-        told = [_number(e, name) for name in differ]
+        told = [_told(name, e._asdict()) for name in differ]
         labels[e] = ", ".join([*told, *[systems[e.system]] * (len(systems) > 1)])
     return labels
 
@@ -130,20 +191,26 @@ def ensembles_title(ensembles: Collection[Ensemble]) -> str:
     """Name what ensembles of compressions have in common."""
     systems, differ = _differing(ensembles)
     first = next(iter(ensembles))
-    told = [_number(first, name) for name in _NUMBERS if name not in differ]
-    return ", ".join([*[systems[first.system]] * (len(systems) == 1), *told])
-
-
-def _number(ensemble: Ensemble, name: str) -> str:
-    """Write one number of an ensemble with its symbol."""
-    value = getattr(ensemble, name)
-    return f"${_NUMBERS[name]}={scientific(value) if name == 'kappa' else f'{value:g}'}$"
+    told = [_told(name, first._asdict()) for name in _OF_ENSEMBLES if name not in differ]
+    return ", ".join([systems_text(systems), *told])
 
 
 def _differing(ensembles: Collection[Ensemble]) -> tuple[dict[System, str], list[str]]:
     """Labels of the systems, and names of the numbers that ensembles differ in, with N."""
     systems = system_labels({e.system: None for e in ensembles})
-    return systems, [k for k in _NUMBERS if k == "n" or len({getattr(e, k) for e in ensembles}) > 1]
+    several = [k for k in _OF_ENSEMBLES if len({getattr(e, k) for e in ensembles}) > 1]
+    return systems, ["n"] * ("n" not in several) + several
+
+
+def onset_symbol(kappa: float) -> str:
+    r"""Write phi_J of runs at a finite rate, which is less than that of slower ones.
+
+    Examples
+    --------
+    >>> onset_symbol(2e-6)
+    '\\phi_J(\\kappa=2\\times 10^{-6})'
+    """
+    return rf"\phi_J(\kappa={scientific(kappa)})"
 
 
 def unit_text(systems: Iterable[System]) -> str:

@@ -93,8 +93,10 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     Returns
     -------
     OnsetFit
-        Its error says nothing of other samples, which differ by more, and nothing of the rate:
-        phi_J rises as kappa falls, until kappa is about 1e-9.
+        It is phi_J at the rate of this compression: it rises as kappa falls, until kappa is about
+        1e-9. The error says nothing of that, and nothing of other samples, which differ by more. Nor
+        does it know of stretches with fewer rows than a line needs: where samples of p are so far
+        apart that the first of them is missed, phi_J is that of a later one.
 
     Raises
     ------

@@ -28,6 +28,12 @@ class Parameter(NamedTuple):
     option: str
     """Its name on command lines and in names of files."""
 
+    @property
+    def symbol(self) -> str:
+        """In TeX, without dollars."""
+        texts = {"alpha": r"\alpha", "exponent": "p", "w1": "w_1", "w2": "w_2"}
+        return texts.get(self.name, self.name)
+
 
 class Style(NamedTuple):
     """How LAMMPS is told of a packing's interactions."""
@@ -141,8 +147,7 @@ class Shape(ABC):
 
     def label(self, parameters: Mapping[str, float]) -> str:
         """Write parameters in TeX, for a legend."""
-        texts = {"alpha": r"\alpha", "exponent": "p", "w1": "w_1", "w2": "w_2"}
-        told = [f"{texts.get(p.name, p.name)}={parameters[p.name]:g}" for p in self.parameters]
+        told = [f"{p.symbol}={parameters[p.name]:g}" for p in self.parameters]
         return f"${', '.join(told)}$"
 
     def stem(self, parameters: Mapping[str, float]) -> str:

@@ -71,4 +71,4 @@ def test_mixtures_are_named_by_their_kinds():
 def test_ensembles_of_compressions():
     slow, fast = (Ensemble(RODS, 64, 1.4, kappa) for kappa in (1e-8, 1e-6))
     assert ensemble_labels([slow, fast])[slow] == r"$N=64$, $\kappa=10^{-8}$"
-    assert ensembles_title([slow, fast]) == r"$\alpha=4$, $R_b/R_s=1.4$"
+    assert ensembles_title([slow, fast]) == r"spherocylinders in 2D, $\alpha=4$, $R_b/R_s=1.4$"
