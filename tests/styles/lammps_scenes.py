@@ -67,7 +67,7 @@ def after_restart(skin=0.3):
 
 
 def load_plugin():
-    return f"include {REPOSITORY / 'inputs' / 'load_plugin.lmp'}"
+    return f'include "{REPOSITORY}/inputs/load_plugin.lmp"'
 
 
 def scene(packing, data, *, newton="on", extra="", **forces):

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.files.lammps_text import write_data
+from jamshape.lammps.plugin import load_script_path
 from jamshape.packing import Packing
 from jamshape.shapes.shape import Interaction
 
@@ -87,7 +88,7 @@ def ours(sides: int, atoms: str, nve: str) -> Style:
         types = packing.shape.style(packing, Interaction(1.0, sides)).types
         write_data(path, packing.with_(species=types))
 
-    load = f"{atoms}\ninclude {ROOT}/inputs/load_plugin.lmp"
+    load = f'{atoms}\ninclude "{load_script_path()}"'
     return Style(load, pair, write, nve, is_ours=True)
 
 

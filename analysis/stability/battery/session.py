@@ -18,12 +18,11 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.files.lammps_text import write_data
-from jamshape.lammps.plugin import plugin_path
+from jamshape.lammps.plugin import load_script_path, plugin_path
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
 from jamshape.shapes.shape import Interaction
 
-ROOT = Path(__file__).resolve().parents[3]
 SKIN = 0.3
 
 _MPIRUN = ("mpirun", "--mca", "mpi_yield_when_idle", "1", "--oversubscribe", "-np")
@@ -144,7 +143,7 @@ def run_alone(packing: Packing, text: str, folder: Path, ranks: int = 1) -> str:
     types = packing.shape.style(packing, Interaction()).types
     write_data(data, packing.with_(species=types))
     lines = f"""
-        include {ROOT / "inputs" / "load_plugin.lmp"}
+        include "{load_script_path()}"
         units lj
         dimension {packing.dimension}
         atom_style ellipsoid

@@ -102,6 +102,7 @@ def require_same(to: Recording, settings: Compression, dimension: int) -> None:
 def begin(session: Session, settings: Compression, start: Packing, to: Recording) -> CompressionRun:
     """Start a compression and its file."""
     run = CompressionRun(session, settings, start)
+    to.forget_restarts()  # of another run, which was cut off and is begun anew
     attributes = dataclasses.asdict(settings) | dict(to.attributes)
     attributes |= {"phi_start": start.phi, "rows": to.rows, "frames": to.frames, "finished": False}
     attributes["left_out"] = session.left_out()
