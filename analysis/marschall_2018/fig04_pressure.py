@@ -11,9 +11,10 @@ JSON object with each phi_J, its rate and, if the runs differ in nothing but the
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jamshape.command import parser_of, report, run
+from jamshape.drawing.axes import SMALL_TEXT
 from jamshape.drawing.text import ensemble_text, onset_symbol, pressure_unit
 from jamshape.files.sets import of_paper
 from jamshape.measures.averages import Mean, mean
@@ -61,7 +62,8 @@ def draw(runs: list[Run], average: Mean | None, options: Namespace) -> None:
     """Draw all of each curve on the left; on the right the onsets with their lines."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    figure = Figure(figsize=(8, 3.7), dpi=200, layout="constrained")
+    lines = 4 + min(len(runs), NAMED) / 2
+    figure = Figure(figsize=(8, 3.7 + 0.17 * lines), dpi=200, layout="constrained")
     whole, onset = figure.subplots(1, 2)
     draw_onsets(onset, runs)
     for k, one in enumerate(runs):
@@ -83,9 +85,9 @@ def draw(runs: list[Run], average: Mean | None, options: Namespace) -> None:
     if average:
         title = f"${onset_symbol(runs[0].ensemble.kappa)}={average.tex}$"
         onset.set_title(f"{title}, mean of {average.samples}", size=9)
-    onset.legend(
-        title=r"onsets at the rate of each run", loc="upper left", fontsize=7, title_fontsize=8
-    )
+    place: dict[str, Any] = {"loc": "outside lower center", "ncols": 2, "frameon": False}
+    handles = onset.get_legend_handles_labels()
+    figure.legend(*handles, title="onsets, each at the rate of its run", **SMALL_TEXT, **place)
     figure.savefig(options.out)
 
 

@@ -90,7 +90,7 @@ def draw(curves: dict[System, Found], title: str, options: Namespace) -> None:
     """Draw z on the left, what it is above its limit on logarithmic axes on the right."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    figure = Figure(figsize=(9, 4), dpi=200, layout="constrained")
+    figure = Figure(figsize=(11, 4), dpi=200, layout="constrained")
     linear, logarithmic = figure.subplots(1, 2)
     discs = discs_at([*PAPER, *(alpha for found in curves.values() for alpha in found.z["z"])])
     labels = system_labels(curves)
@@ -99,18 +99,17 @@ def draw(curves: dict[System, Found], title: str, options: Namespace) -> None:
         for way, (name, (marker, symbol)) in enumerate(MARKS.items()):
             tint, text = color(2 * k + way), f", {labels[system]}" * (labels[system] != "")
             style: dict[str, Any] = {"fmt": marker, "color": tint, "mfc": "none"}
-            error_bars(
-                linear, found.z[name], discs, **style, label=f"${symbol}$, {SIDES[name]}{text}"
-            )
-            style["label"] = f"${symbol} - {limit}${text}"
+            label = f"${symbol}$, {SIDES[name]}{text}"
+            error_bars(linear, found.z[name], discs, **style, label=label)
             error_bars(logarithmic, above(found.z[name], limit), None, **style)
             draw_fit(logarithmic, found.fits[name], tint)
     if any(of_paper(system) for system in curves):
         draw_paper(linear, logarithmic, discs)
-    finish(linear, [2 * limit_of_turning(system) for system in curves], title)
+    finish(linear, [2 * limit_of_turning(system) for system in curves])
     logarithmic.set_yscale("log", nonpositive="clip")
-    logarithmic.set_ylabel("contacts per particle above those of round ones")
-    logarithmic.legend(fontsize=8, loc="lower right")
+    limits = " or ".join(map(str, sorted({round_z(system) for system in curves})))
+    logarithmic.set_ylabel(f"contacts above the {limits} of round particles")
+    figure.legend(title=title, loc="outside right center", **SMALL_TEXT)
     label_alpha_axis(linear, discs)
     label_alpha_axis(logarithmic, None)
     figure.savefig(options.out)
@@ -134,14 +133,14 @@ def draw_fit(axes: Axes, fitted: Fitted, tint: str) -> None:
 def draw_paper(linear: Axes, logarithmic: Axes, discs: float) -> None:
     """Draw the numbers of the paper."""
     error_bars(linear, PAPER, discs, **PAPER_STYLE)
-    error_bars(logarithmic, above(PAPER, 4), None, **PAPER_STYLE)
+    error_bars(logarithmic, above(PAPER, 4), None, **PAPER_STYLE | {"label": ""})
     low, high = PAPER_LIMIT - PAPER_LIMIT_ERROR, PAPER_LIMIT + PAPER_LIMIT_ERROR
     limit = r"$\langle z_J\rangle - 4$ at $\alpha\to 0$, paper"
     logarithmic.axhspan(low, high, color=SKY, alpha=0.3, lw=0, label=limit, zorder=0)
 
 
-def finish(axes: Axes, isostatic: list[int], title: str) -> None:
-    """Mark isostatic contact numbers, and explain marks."""
+def finish(axes: Axes, isostatic: list[int]) -> None:
+    """Mark isostatic contact numbers."""
     note: dict[str, Any] = {"fontsize": 8, "color": "0.3", "va": "bottom"}
     note |= {"ha": "right", "transform": axes.get_yaxis_transform()}
     for level in sorted(set(isostatic)):
@@ -149,8 +148,6 @@ def finish(axes: Axes, isostatic: list[int], title: str) -> None:
         axes.text(0.98, level, "isostatic: twice the degrees of freedom", **note)
     axes.set_ylim(top=max(max(isostatic) + 0.25, axes.get_ylim()[1]))
     axes.set_ylabel("contacts per particle at jamming")
-    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0, 0.92)}
-    axes.legend(title=title, **SMALL_TEXT, **place)
 
 
 def rows(system: System, found: Found) -> list[dict[str, Any]]:

@@ -72,12 +72,13 @@ def draw(system: System, known: Averages, title: str, options: Namespace) -> Non
     """Draw classes on the left and flat contacts on the right."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    figure = Figure(figsize=(9, 3.9), dpi=200, layout="constrained")
+    figure = Figure(figsize=(9, 4.4), dpi=200, layout="constrained")
     classes, flat = figure.subplots(1, 2, sharex=True)
     discs = discs_at([*known, *PAPER_FLAT])
     draw_all(classes, known, discs, STYLES)
     classes.set_ylabel("fraction of contact bonds")
-    classes.legend(title=title, **SMALL_TEXT)
+    figure.suptitle(title, fontsize=8)
+    classes.legend(**SMALL_TEXT)
     draw_all(flat, known, discs, FLAT_STYLES)
     if of_paper(system):
         draw_paper(flat, known, discs)

@@ -20,7 +20,7 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT, log_bars
 from jamshape.drawing.styles import marked
-from jamshape.drawing.text import conditions_alone, counted, system_labels
+from jamshape.drawing.text import bars_text, conditions_alone, counted, system_labels
 from jamshape.files.h5md import read_observables
 from jamshape.files.sets import Choice, PackingFile, System, choose, conditions, read_groups
 from jamshape.measures.averages import standard_error
@@ -75,7 +75,7 @@ def draw(residuals: dict[str, Values], title: str, options: Namespace) -> None:
     """Draw both distributions."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    figure = Figure(figsize=(9, 3.9), dpi=200, layout="constrained")
+    figure = Figure(figsize=(9, 4.4), dpi=200, layout="constrained")
     panels = figure.subplots(1, 2)
     for axes, (name, values) in zip(panels, residuals.items(), strict=True):
         bins, labels = decade_bins(values), system_labels(values)
@@ -89,7 +89,8 @@ def draw(residuals: dict[str, Values], title: str, options: Namespace) -> None:
             if known:
                 label = f"{labels[system]} ({counted(len(known), 'sample')})"
                 draw_curve(axes, known, bins, label=label, **marked(k, "-"))
-        axes.legend(title=title, **SMALL_TEXT)
+        axes.legend(**SMALL_TEXT)
+    figure.suptitle(title + bars_text(values), fontsize=8)
     figure.savefig(options.out)
 
 

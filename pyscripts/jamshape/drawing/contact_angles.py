@@ -30,12 +30,13 @@ def contact_angle_figure(curves: Mapping[str, AngleCurve], title: str) -> Figure
     axes.axhline(1 / np.pi, color="0.4", ls=":", lw=1, label=r"discs, $1/\pi$", zorder=0)
     seen = np.concatenate([found.density[found.density > 0] for found in curves.values()])
     axes.set_yscale("log")
-    axes.set(xlim=(0, 180), ylim=(max(seen.min() / 1.6, 3e-3), 4 * seen.max()))
+    axes.set(xlim=(0, 180), ylim=(max(seen.min() / 1.6, 3e-3), 8 * seen.max()))
     axes.set_xticks(range(0, 181, 30))
     axes.set_xlabel(r"angle $\varphi$ from the spine  [degrees]")
     axes.set_ylabel(r"density of contacts $P(\varphi)$  [1/rad]")
     place: dict[str, Any] = {"alignment": "left", "loc": "upper left", "frameon": False}
-    axes.legend(title=title, title_fontsize=8, fontsize=8, **place)
+    axes.legend(fontsize=8, **place)
+    axes.set_title(title, fontsize=8)
     _draw_particle(axes.inset_axes((0.72, 0.72, 0.26, 0.26)))
     return figure
 

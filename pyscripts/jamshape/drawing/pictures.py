@@ -14,7 +14,7 @@ from jamshape.drawing.colors import ORDER, Coloring, Scale
 from jamshape.drawing.kinds import kinds_of
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.space import save_smooth
-from jamshape.drawing.text import is_told_by_parameters, scientific
+from jamshape.drawing.text import attributes_text, scientific
 from jamshape.files.h5md import FileFormatError, PathLike, read_attributes
 from jamshape.files.lammps_text import read_any
 from jamshape.measures.minimum import order
@@ -73,7 +73,8 @@ def read_picture(path: Path, frame: int = -1, sides: int | None = None, color: s
     told |= {"n": packing.n, "rattlers": counts.n_rattlers, "contacts": len(found)}
     told |= {"phi": packing.phi, "u": float(found.energy.sum()) / packing.box.volume, "z": counts.z}
     known_order = order(packing) if color in ORDER else {}
-    more = [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
+    more = attributes_text(known)
+    more += [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
     if "protocol" in known:
         more.append(f"protocol {known['protocol']}")
     return Picture(found, more, told | known_order)
@@ -123,14 +124,14 @@ def title_of(found: Contacts, more: Sequence[str] = (), *, narrow: bool = False)
     packing, gap = found.packing, "    "
     u = float(found.energy.sum()) / packing.box.volume
     kinds, shape = kinds_of(packing), packing.shape
-    known = [f"{shape.name}s"] * (not is_told_by_parameters(shape))
+    known = [f"{shape.name}s in {packing.dimension}D"]
     known += [kinds.title] * (0 < len(kinds.parameters) < MANY_KINDS)
     where = gap.join([rf"$N={packing.n}$", rf"$\phi={packing.phi:.5f}$"])
     counted = [rf"$u={scientific(u)}$", f"$z={found.z:.3f}$"]
     counted += [f"step {packing.step}"] * (packing.step > 0)
     lines = [where, gap.join([*counted, *more])]
     lines = lines if narrow else [gap.join(lines)]
-    return "\n".join([", ".join(known)] * (known != []) + lines)
+    return "\n".join([", ".join(known), *lines])
 
 
 def _make_panels(pictures: Sequence[Picture], *, with_bar: bool) -> tuple[Figure, Any]:

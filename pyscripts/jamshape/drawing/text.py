@@ -72,7 +72,7 @@ def conditions_alone(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
 def _titled(groups: Mapping[Any, Sequence[PackingFile]], count: str) -> str:
     known = conditions(groups)
     first = [systems_text(file.system() for of in groups.values() for file in of)]
-    first += [_told("size_ratio", known)] * ("size_ratio" in known)
+    first += [_told(name, known) for name in ("size_ratio",) if name in known]
     return "\n".join([", ".join(first), ", ".join([count, *attributes_text(known)])])
 
 
