@@ -26,13 +26,11 @@ def options_of() -> ArgumentParser:
     for name, default, meaning in (
         ("--n", 256, "particles"),
         ("--dimension", 2, "2 or 3"),
-        ("--kappa", 1e-4, "compression rate"),
+        ("--kappa", 1e-5, "compression rate"),
         ("--phi-start", 0.4, "packing fraction of the random start"),
         ("--phi-end", 0.9, "packing fraction to reach"),
-        ("--integrator", "heun", "heun, heun/adaptive or rkc2"),
-        ("--dt", 0.05, "time step of heun"),
-        ("--tolerance", 1e-4, "of the others: local error over the typical overlap"),
-        ("--sides", 1, "bonds of a side-to-side contact, 1 or 2"),
+        ("--sides", 2, "bonds of a side-to-side contact; 1 in the dynamics of Marschall & Teitel"),
+        ("--tolerance", 1e-4, "of rkc2 and heun/adaptive: local error over the typical overlap"),
         ("--seed", 1, "of the random start"),
         ("--rows", 400, "samples of p(phi)"),
         ("--frames", 20, "snapshots"),
@@ -40,6 +38,9 @@ def options_of() -> ArgumentParser:
         parser.add_argument(
             name, type=type(default), default=default, help=f"{meaning} ({default})"
         )
+    usual = "rkc2; heun with --dt or --sides 1"
+    parser.add_argument("--integrator", help=f"heun, heun/adaptive or rkc2 ({usual})")
+    parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
     parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
     parser.add_argument("--resume", action="store_true", help="go on after a kill")
     return parser

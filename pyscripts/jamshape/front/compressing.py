@@ -30,12 +30,12 @@ def compress(
     n: int = 256,
     dimension: int = 2,
     phi: tuple[float, float] = (0.4, 0.9),
-    kappa: float = 1e-6,
+    kappa: float = 1e-5,
     seed: int = 1,
+    sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
     tolerance: float = 1e-4,
-    sides: int = 1,
     rows: int = 400,
     frames: int = 20,
     file: str | Path | None = None,
@@ -57,15 +57,16 @@ def compress(
         Rate: the box shrinks with dL/dt = -kappa L.
     seed : int
         Of the random start.
+    sides : {1, 2}
+        Bonds of a side-to-side contact of rods. The paper's dynamics has one, on which parallel rods
+        chatter, so that small steps are needed; with two they rest, as in minima and modes.
     integrator : {"rkc2", "heun/adaptive", "heun"}, optional
         The paper's is ``heun``, with equal time steps; the others choose their own. ``rkc2``, the
-        fastest, when left out, and ``heun`` where `dt` is given.
+        fastest, when left out, and ``heun`` where there is one bond or `dt` is given.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 when left out.
     tolerance : float
         Of the others: local error of a step over the typical overlap.
-    sides : {1, 2}
-        Bonds of a side-to-side contact; the paper's dynamics has one.
     rows, frames : int
         How many samples of p(phi) and how many snapshots to keep.
     file : path, optional
@@ -93,10 +94,10 @@ def compress(
     >>> rods = js.Spherocylinders(alpha=4)
     >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
     >>> run
-    <Run of 24 spherocylinders in 2D at kappa = 0.001: 21 frames to phi = 0.95, pressure = 0.0454, in run.h5>
+    <Run of 24 spherocylinders in 2D at kappa = 0.001: 21 frames to phi = 0.95, pressure = 0.054, in run.h5>
     """
     at = place(file, "run.h5")
-    integrator = integrator or ("rkc2" if dt is None else "heun")
+    integrator = integrator or ("rkc2" if dt is None and sides == 2 else "heun")
     settings = Compression(
         kappa, phi[1], 0.05 if dt is None else dt, sides, integrator=integrator, tolerance=tolerance
     )

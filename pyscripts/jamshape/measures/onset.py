@@ -78,8 +78,7 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     3. Of the first part that has such lines the one with the smallest error is taken, or the one
        that starts first of those nearly as good. How far off the others that overlap it put phi_J
        adds to its error: the root of the mean square, in which each counts with its number of rows.
-       The errors of these lines are no weights: that a stretch happens to be straight tells nothing
-       of whether it is the right one.
+       A stretch that happens to be straighter than others is no more right, and counts no more.
 
     Parameters
     ----------
