@@ -128,7 +128,9 @@ def _frame(hoomd: Any, packing: Packing, *, rests: bool) -> Any:
     exact = {_PARTICLES + name: x for name, x in particle_fields(packing, rests=rests).items()}
     exact |= {_LOG + name: x for name, x in box_fields(packing, rests=rests).items()}
     exact[_LOG + "time"] = np.array([packing.time])
-    frame.log = {**exact, _LOG + "shape_style": packing.shape_style}
+    # As numbers: OVITO before 3.17 fails on texts.
+    exact[_LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
+    frame.log = exact
     return frame
 
 
@@ -203,7 +205,7 @@ def _packing(path: PathLike, frame: Any) -> Packing:
         if name.startswith(prefix)
     }
     try:
-        style, time = str(found.pop("shape_style")), float(found.pop("time")[0])
+        style, time = bytes(found.pop("shape_style")).decode(), float(found.pop("time")[0])
         return packing_of(found, style, int(frame.configuration.step), time)
     except (KeyError, TypeError) as error:
         msg = f"{path}: holds no log/jamshape of a packing, expected a file of write_gsd"
