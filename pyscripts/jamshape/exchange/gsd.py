@@ -12,8 +12,8 @@ GSD keeps single precision. So a frame logs all that the packing holds once more
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import singledispatch
-from typing import Any
+from functools import lru_cache, singledispatch
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from jamshape.files.layout import FileFormatError, PathLike, replacing
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.solid import Balls, Solid, Superquadric
+from jamshape.shapes.table import shape_named
 
 _LOG, _PARTICLES = "jamshape/", "particles/jamshape/"
 
@@ -123,11 +124,13 @@ def _frame(hoomd: Any, packing: Packing, *, rests: bool) -> Any:
     species = packing.species[kinds.first]
     frame.particles.types = _names([str(k) for k in species])
     level = _FINE if len(species) <= _FEW else _COARSE + (len(species) <= _MANY)
-    frame.particles.type_shapes = [_type_shape(packing, i, level) for i in kinds.first]
+    frame.particles.type_shapes = [_type_shape(_Body.of(packing, i, level)) for i in kinds.first]
     exact = {_PARTICLES + name: x for name, x in particle_fields(packing, rests=rests).items()}
     exact |= {_LOG + name: x for name, x in box_fields(packing, rests=rests).items()}
     exact[_LOG + "time"] = np.array([packing.time])
-    frame.log = {**exact, _LOG + "shape_style": packing.shape_style}
+    # As numbers: OVITO before 3.17 fails on texts.
+    exact[_LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
+    frame.log = exact
     return frame
 
 
@@ -141,13 +144,30 @@ def _names(species: list[str]) -> list[str]:
     return names
 
 
-def _type_shape(packing: Packing, i: int, level: int) -> dict[str, Any]:
+class _Body(NamedTuple):
+    """What the words for a body depend on."""
+
+    style: str
+    diameters: tuple[float, ...]
+    exponent: float
+    is_round: bool
+    level: int
+
+    @classmethod
+    def of(cls, packing: Packing, i: int, level: int) -> _Body:
+        sizes = tuple(packing.diameters[i].tolist())
+        is_round = bool(packing.is_round[i])
+        return cls(packing.shape_style, sizes, float(packing.exponent[i]), is_round, level)
+
+
+@lru_cache(maxsize=4096)  # frames of a run have the same particles
+def _type_shape(body: _Body) -> dict[str, Any]:
     """Describe a particle by the words of `particles/type_shapes`."""
-    if packing.is_round[i]:
-        return {"type": "Sphere", "diameter": float(packing.diameters[i, 0])}
-    body = (packing.diameters[i], float(packing.exponent[i]))
-    known = _described(packing.shape.solid(*body))
-    return known or _mesh(packing.shape.surface(*body, level))
+    if body.is_round:
+        return {"type": "Sphere", "diameter": body.diameters[0]}
+    shape, diameters = shape_named(body.style), np.array(body.diameters)
+    known = _described(shape.solid(diameters, body.exponent))
+    return known or _mesh(shape.surface(diameters, body.exponent, body.level))
 
 
 @singledispatch
@@ -185,7 +205,7 @@ def _packing(path: PathLike, frame: Any) -> Packing:
         if name.startswith(prefix)
     }
     try:
-        style, time = str(found.pop("shape_style")), float(found.pop("time")[0])
+        style, time = bytes(found.pop("shape_style")).decode(), float(found.pop("time")[0])
         return packing_of(found, style, int(frame.configuration.step), time)
     except (KeyError, TypeError) as error:
         msg = f"{path}: holds no log/jamshape of a packing, expected a file of write_gsd"
