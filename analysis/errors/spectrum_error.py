@@ -25,7 +25,9 @@ from studies.shown import Point, curves, figure_of
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.command import parser_of, report, run
+from jamshape.drawing.mode_axes import packing_text
 from jamshape.files.h5md import read_packing
+from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape
 from jamshape.packing import Box, Packing, State
 from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix
@@ -149,7 +151,8 @@ def show(rows: list[dict[str, Any]], tiles: list[dict[str, Any]]) -> None:
 
 def draw(rows: list[dict[str, Any]], tiles: list[dict[str, Any]], out: Path) -> None:
     """Draw errors and growth."""
-    figure = figure_of(11, 4.5)
+    titles = {packing_text(PackingFile.read(Path(row["packing"]))) for row in rows}
+    figure = figure_of(11, 4.5, "\n".join(sorted(text.replace("\n", ", ") for text in titles)))
     left, right = figure.subplots(1, 2)
     draw_errors(left, rows)
     draw_growth(right, rows, tiles)

@@ -49,8 +49,17 @@ LEAST = 1e-6
 HEUN_DT = 0.01
 
 TABLE = (
-    *("system", "N", "kappa", "samples", "evaluations", "Heun's over these", "seconds", "phi_J"),
-    *("phi_J less that of the slowest", "p above phi_J over that of the slowest, less 1"),
+    *(
+        "system",
+        "N",
+        "kappa",
+        "samples",
+        "evaluations",
+        "Heun's over these",
+        "seconds",
+        "phi_J(kappa)",
+    ),
+    *("phi_J(kappa) less that of the slowest", "p above phi_J over that of the slowest, less 1"),
 )
 
 

@@ -90,7 +90,7 @@ def draw(curves: dict[System, Found], title: str, options: Namespace) -> None:
     """Draw z on the left, what it is above its limit on logarithmic axes on the right."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
-    figure = Figure(figsize=(11, 4), dpi=200, layout="constrained")
+    figure = Figure(figsize=(10.5, 4.4), dpi=200, layout="constrained")
     linear, logarithmic = figure.subplots(1, 2)
     discs = discs_at([*PAPER, *(alpha for found in curves.values() for alpha in found.z["z"])])
     labels = system_labels(curves)
@@ -109,7 +109,8 @@ def draw(curves: dict[System, Found], title: str, options: Namespace) -> None:
     logarithmic.set_yscale("log", nonpositive="clip")
     limits = " or ".join(map(str, sorted({round_z(system) for system in curves})))
     logarithmic.set_ylabel(f"contacts above the {limits} of round particles")
-    figure.legend(title=title, loc="outside right center", **SMALL_TEXT)
+    figure.suptitle(title, fontsize=8)
+    figure.legend(loc="outside right center", **SMALL_TEXT)
     label_alpha_axis(linear, discs)
     label_alpha_axis(logarithmic, None)
     figure.savefig(options.out)

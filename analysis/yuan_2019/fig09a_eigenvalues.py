@@ -64,7 +64,8 @@ def draw(tables: Tables, title: str, options: Namespace) -> None:
     unit = unit_text(tables)
     top.set(yscale="log", ylabel=rf"$\lambda_i\;[k_e/{unit}^2]$")
     bottom.set(xlabel="mode $i$", ylabel="share of rotation", ylim=(-0.03, 1.03))
-    figure.legend(title=title, loc="outside right upper", frameon=False, **SMALL_TEXT)
+    figure.suptitle(title, fontsize=8)
+    figure.legend(loc="outside right upper", frameon=False, **SMALL_TEXT)
     figure.savefig(options.out)
 
 

@@ -100,9 +100,10 @@ def draw_energies(axes: Axes, found: Followed) -> None:
 
     n = found.file.number("n")
     shades = colormaps["viridis"](np.linspace(0.0, 0.85, max(len(found.quartic), 1)))
-    for color, energy in zip(shades, found.quartic.values(), strict=False):
+    for color, (mode, energy) in zip(shades, found.quartic.items(), strict=False):
         size = energy.mean_energy / n
-        axes.plot(energy.delta, np.where(size > 0, size, np.nan), "-", color=color, lw=1.3)
+        line: dict[str, Any] = {"color": color, "lw": 1.3, "label": f"mode {mode}, below the gap"}
+        axes.plot(energy.delta, np.where(size > 0, size, np.nan), "-", **line)
         end = quartic_crossover(energy)
         if np.isfinite(end):
             at = np.interp(np.log(end), np.log(energy.delta), size)
@@ -114,10 +115,9 @@ def draw_energies(axes: Axes, found: Followed) -> None:
     z = found.file.number("z")
     axes.set_title(f"{packing_text(found.file)}, $z_J={z:.2f}$", fontsize=8)
     draw_powers(axes, found, n)
-    for line, tint, text in (("-", "0.3", "below the gap"), ("--", RED, "above it")):
-        axes.plot([], [], line, color=tint, lw=1.3, label=f"modes {text}")
+    axes.plot([], [], "--", color=RED, lw=1.1, label="modes above it")
     axes.plot([], [], "o", color="w", ms=5, mec="k", mew=0.6, label=r"crossover $\delta^*$")
-    axes.legend(fontsize=7, loc="lower right")
+    axes.legend(fontsize=6, loc="lower right")
 
 
 def draw_powers(axes: Axes, found: Followed, n: float) -> None:

@@ -85,8 +85,8 @@ def draw(groups: Groups, known: Curvatures, options: Namespace) -> None:
     right.set_ylabel("median and quartiles of $K_G$")
     right.axhline(1, color="0.8", lw=0.8, ls=":", zorder=0, label="spheres")
     text: dict[str, Any] = {"title_fontsize": 8, "fontsize": 8, "loc": "outside right center"}
-    title = f"$(p, w_1, w_2)$ of {conditions_text(groups, bars=False)}"
-    figure.legend(title=title, **text)
+    figure.suptitle(conditions_text(groups, bars=False), fontsize=8)
+    figure.legend(title="$(p, w_1, w_2)$", **text)
     figure.savefig(options.out)
 
 

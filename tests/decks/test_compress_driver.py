@@ -38,6 +38,7 @@ def whole(tmp_path_factory):
 def test_a_run_reaches_its_end_and_reports_it(whole):
     out, report = whole
     assert report["phi"] == pytest.approx(0.86, abs=1e-4)
+    assert report["kappa"] == read_attributes(out)["kappa"]
     assert report["left_out"].startswith("energy and virial of steps without output, the third")
     assert read_packing(out).phi == pytest.approx(report["phi"], rel=1e-12)
     observables, history = read_observables(out), read_report(out)

@@ -104,7 +104,9 @@ def is_front_door(name):
 
 
 def test_functions_are_short(measured):
-    lengths = {name: lines(n) for name, n in functions(LIBRARY, ANALYSIS) if not is_front_door(name)}
+    lengths = {
+        name: lines(n) for name, n in functions(LIBRARY, ANALYSIS) if not is_front_door(name)
+    }
     values = list(lengths.values())
     measured(median_lines=median(values), p90_lines=quantiles(values, n=10)[-1])
     assert {name: n for name, n in lengths.items() if n > LONGEST} == {}

@@ -6,8 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from figures import NO_PACKINGS, require_told
+from matplotlib.figure import Figure
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
+PAPERS = ("marschall_2018", "yuan_2019")
 
 
 @pytest.fixture
@@ -28,11 +31,25 @@ def here(monkeypatch):
 
 
 @pytest.fixture
-def report(here, capsys):
-    """Run a script that must succeed; return its last line, which is JSON without NaN."""
+def report(here, capsys, monkeypatch):
+    """Run a script that must succeed; return its last line, which is JSON without NaN.
+
+    A figure of a paper, whichever test draws it, must tell what it is of and what its colours are.
+    """
+    figures, save = [], Figure.savefig
+
+    def saved(figure, *arguments, **options):
+        save(figure, *arguments, **options)
+        figures.append(figure)
+
+    monkeypatch.setattr(Figure, "savefig", saved)
 
     def reported(script, *arguments):
+        figures.clear()
         assert here(script, *arguments) == 0
+        if Path(script).parent.name in PAPERS and Path(script).stem not in NO_PACKINGS:
+            for figure in figures:
+                require_told(script, figure)
         last = capsys.readouterr().out.splitlines()[-1]
         return json.loads(last, parse_constant=pytest.fail)
 

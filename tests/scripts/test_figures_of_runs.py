@@ -87,7 +87,7 @@ def test_pressure_of_one_run(report, tmp_path):
     assert found["out"] == str(out)
     assert (found["mean"], found["error"]) == (None, None)
     (fit,) = found["runs"]
-    assert fit["run"] == str(run_file)
+    assert (fit["run"], fit["kappa"]) == (str(run_file), 1e-6)
     assert fit["phi_J"] == pytest.approx(PHI_J, abs=1e-12)
     assert fit["slope"] == pytest.approx(0.2, rel=1e-9)
     assert 0 < fit["phi_J_error"] < 1e-9

@@ -106,7 +106,7 @@ def mark(system: System) -> dict[str, Any]:
 
 
 def family_legend(axes: Axes, systems: Iterable[System], title: str, loc: str = "best") -> None:
-    """Explain the marks that were drawn; "outside ..." is beside all axes of the figure."""
+    """Explain the marks that were drawn; "outside ..." is beside all axes, and the title above them."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - not needed for --help and for errors
 
     handles: dict[str, Line2D] = {}
@@ -115,5 +115,8 @@ def family_legend(axes: Axes, systems: Iterable[System], title: str, loc: str = 
         handles.setdefault(text, Line2D([], [], ls="none", ms=6, label=text, **mark(system)))
     known, _ = axes.get_legend_handles_labels()
     every = [*handles.values(), *known]
-    where: Any = axes.figure if loc.startswith("outside") else axes
-    where.legend(handles=every, title=title, title_fontsize=8, fontsize=8, loc=loc)
+    outside, figure = loc.startswith("outside"), axes.figure
+    where: Any = figure if outside else axes
+    where.legend(handles=every, fontsize=8, loc=loc)
+    set_title: Any = figure.suptitle if outside else axes.set_title
+    set_title(title, fontsize=8)

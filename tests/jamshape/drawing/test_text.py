@@ -1,6 +1,7 @@
 import pytest
 
 from jamshape.drawing.text import (
+    attributes_text,
     ensemble_labels,
     ensembles_title,
     range_text,
@@ -9,6 +10,7 @@ from jamshape.drawing.text import (
     short,
     system_labels,
     system_text,
+    systems_text,
     unit_text,
 )
 from jamshape.files.sets import System
@@ -48,6 +50,22 @@ def test_labels_tell_what_differs():
     assert system_labels([RODS.without("alpha")]) == {RODS.without("alpha"): ""}
     assert unit_text([RODS]) == "(2R)"
     assert unit_text([RODS, BALLS]) == r"(\mathrm{length})"
+
+
+def test_titles_tell_all_that_systems_are_of():
+    assert systems_text([RODS]) == r"spherocylinders in 2D, $\alpha=4$"
+    several = [RODS, RODS._replace(parameters=(("alpha", 0.01),), dimension=3)]
+    assert systems_text(several) == r"spherocylinders in 2D and 3D, $\alpha=0.01$ to $4$"
+    assert systems_text([BALLS]) == "superellipsoids in 3D, $p=1.5, w_1=1, w_2=1$, protocol 1"
+    assert systems_text([RODS, BALLS]) == "spherocylinders and superellipsoids in 2D and 3D"
+
+
+def test_energy_and_rate_are_told_as_far_as_they_are_known():
+    assert attributes_text({"n": 3}) == []
+    assert attributes_text({"u0": 0.0, "kappa": [[0.8, 1e-6], [0.9, 1e-8]]}) == [
+        "first jammed",
+        r"$\kappa=10^{-8}$",
+    ]
 
 
 def test_what_is_unusual_is_named():
