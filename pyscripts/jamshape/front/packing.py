@@ -138,7 +138,7 @@ class MeasuredPacking(Packing):
         """Give an `ovito.data.DataCollection`; see `jamshape.exchange.ovito.to_ovito`."""
         from jamshape.exchange.ovito import to_ovito  # noqa: PLC0415 - ovito may be missing
 
-        return to_ovito(self)
+        return to_ovito(self, self.rattlers)
 
     def to_mdanalysis(self) -> Any:
         """Give an `MDAnalysis.Universe`; see `jamshape.exchange.mdanalysis.to_mdanalysis`."""
