@@ -76,8 +76,9 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
        soon after. So the rounded foot that a finite rate of compression makes is left out: lines
        through it fail the last two.
     3. Of the first part that has such lines the one with the smallest error is taken, or the one
-       that starts first of those nearly as good. How far off the others that overlap it put phi_J
-       adds to its error: the root of the mean square, in which each counts with its number of rows.
+       that starts first of those nearly as good. How far off the others put phi_J that overlap it, or
+       that lie before it in another part, adds to its error: the root of the mean square, in which
+       each counts with its number of rows.
        A stretch that happens to be straighter than others is no more right, and counts no more.
 
     Parameters
@@ -130,16 +131,18 @@ def _first_best(
     """Choose among the lines of the first part that has any; None if none has."""
     x, y, weight = data
     chords = _Chords(x, y, [pair for part in parts for pair in _pairs(y, part)])
-    for min_slope, part in itertools.product(_MIN_SLOPES, parts):
-        lines = [
-            line
+    found = [
+        [
+            (line, line.slope / chords.steepest(_CHORD_END * y[last]))
             for first, last in _pairs(y, part)
-            if y[last] - y[first] >= min_rise
-            and (line := _line(x, y, weight, first, last))
-            and line.slope >= min_slope * chords.steepest(_CHORD_END * y[last])
+            if y[last] - y[first] >= min_rise and (line := _line(x, y, weight, first, last))
         ]
-        if lines:
-            return _best(lines)
+        for part in parts
+    ]
+    others = [line for lines in found for line, slope in lines if slope >= _MIN_SLOPES[-1]]
+    for min_slope, lines in itertools.product(_MIN_SLOPES, found):
+        if chosen := [line for line, slope in lines if slope >= min_slope]:
+            return _best(chosen, others)
     return None
 
 
@@ -253,12 +256,12 @@ def _line(
     return OnsetFit(phi_J, max(float(error), _ROUNDING * abs(phi_J)), slope, first, last)
 
 
-def _best(lines: Sequence[OnsetFit]) -> OnsetFit:
-    """Choose one, and add to its error how far off the others that overlap it put phi_J."""
+def _best(lines: Sequence[OnsetFit], others: Sequence[OnsetFit]) -> OnsetFit:
+    """Choose one, and add to its error how far off the others that do not start after it put phi_J."""
     smallest = min(line.phi_J_error for line in lines)
     good = [line for line in lines if line.phi_J_error <= _NEARLY_BEST * smallest]
     best = min(good, key=lambda line: (line.first, -line.last))
-    others = [line for line in lines if line.first < best.last]
+    others = [line for line in others if line.first < best.last]
     squares = [(line.phi_J - best.phi_J) ** 2 for line in others]
     spread = np.sqrt(np.average(squares, weights=[line.last - line.first + 1 for line in others]))
     return best._replace(phi_J_error=float(np.hypot(best.phi_J_error, spread)))
