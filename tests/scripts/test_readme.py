@@ -44,7 +44,9 @@ def test_it_is_a_screen_and_a_half():
 
 @pytest.mark.lammps
 def test_ten_lines_of_python_make_a_packing_and_pictures(folder):
-    numbers = [float(x) for x in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", (folder / "said.txt").read_text())]
+    numbers = [
+        float(x) for x in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", (folder / "said.txt").read_text())
+    ]
     phi_J, phi, pressure, z = numbers[:4]
     assert 0.7 < phi_J < 0.9
     assert 0.7 < phi < 0.9

@@ -88,6 +88,11 @@ def require_same(to: Recording, settings: Compression, dimension: int) -> None:
     ------
     ValueError
     """
+    if "finished" not in read_attributes(to.path):
+        msg = (
+            f"{to.path} holds no compression, expected one; write to another file, or make it again"
+        )
+        raise ValueError(msg)
     expected = dataclasses.asdict(settings) | dict(to.attributes)
     require_attributes(to.path, expected | {"rows": to.rows, "frames": to.frames}, "a compression")
     found = read_style(to.path)[1]

