@@ -78,8 +78,7 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     3. Of the first part that has such lines the one with the smallest error is taken, or the one
        that starts first of those nearly as good. How far off the others put phi_J that overlap it, or
        that lie before it in another part, adds to its error: the root of the mean square, in which
-       each counts with its number of rows.
-       A stretch that happens to be straighter than others is no more right, and counts no more.
+       each counts with its number of rows, not more where it happens to be straighter.
 
     Parameters
     ----------
