@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import jamshape as js
 from jamshape.files.h5md import FileFormatError
@@ -49,7 +50,7 @@ def test_a_name_loads_what_it_needs_and_no_more(name, unneeded):
 
 
 def test_a_name_that_is_not_there_is_an_attribute_error():
-    with pytest.raises(AttributeError, match="attribute compres$"):
+    with pytest.raises(AttributeError, match=r"attribute compres$"):
         js.compres  # noqa: B018
 
 
@@ -197,8 +198,6 @@ def test_notebooks_show_a_picture_without_pyplot(run):
 @pytest.mark.lammps
 @pytest.mark.parametrize("color", ["kind", "orientation", "nematic"])
 def test_plots_are_drawn_where_they_shall_be(run, color):
-    from matplotlib.figure import Figure
-
     axes = Figure().add_subplot()
     assert js.plot(run.packing(), axes, color=color) is axes
     assert "N=16" in axes.get_title()
@@ -206,8 +205,6 @@ def test_plots_are_drawn_where_they_shall_be(run, color):
 
 
 def test_what_cannot_be_drawn_is_named():
-    from matplotlib.figure import Figure
-
     with pytest.raises(TypeError, match="a float was given, expected a packing, a run or modes"):
         js.plot(1.0, Figure().add_subplot())
 
