@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from jamshape.lammps.session import Session
 
 
+_SUMMARY = ("phi", "pressure", "z", "S_2", "S_4")
+
+
 @dataclass(frozen=True)
 class Recording:
     """What a compression leaves in its H5MD file.
@@ -190,9 +193,8 @@ class _Rows:
 def summary_of(path: Path) -> dict[str, object]:
     """Summarise a run: its end, its rate and, where the pressure rises, phi_J of that rate."""
     observables, stored = read_observables(path), read_attributes(path)
-    last: dict[str, object] = {
-        name: float(observables[name][-1]) for name in ("phi", "pressure", "z", "S_2", "S_4")
-    }
+    names = [name for name in _SUMMARY if name in observables]  # slow runs count no contacts
+    last: dict[str, object] = {name: float(observables[name][-1]) for name in names}
     last |= {"kappa": rate_of(stored), "left_out": stored.get("left_out", "")}
     try:
         fit = fit_onset(observables["phi"], observables["pressure"])

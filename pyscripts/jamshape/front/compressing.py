@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
 from jamshape.flow import recording, slow_recording
 from jamshape.flow.compression import Compression, Row
 from jamshape.flow.implicit import Protocol, Step
@@ -144,6 +144,9 @@ def resume(file: str | Path, *, progress: bool = True) -> RunFile:
     """
     path = Path(file)
     stored = read_attributes(path)
+    if not {"rows", "flow_steps"} & stored.keys():
+        msg = f"{path} holds no compression, expected a file of compress or slow_compress"
+        raise FileFormatError(msg)
     if not stored.get("finished"):
         if "flow_steps" in stored:
             _record_slowly(path, progress)

@@ -45,6 +45,15 @@ def test_a_finished_packing_is_not_made_again(tiny, jamshape):
     assert (folder / "packing.h5").stat().st_mtime_ns == before
 
 
+def test_what_is_no_run_is_not_gone_on_with(tiny, jamshape):
+    folder, said = tiny
+    again = jamshape("compress", "--resume", "--out", folder / "slow.h5")
+    assert again.report["phi"] == said["slow.h5"].report["phi"]
+    refused = jamshape("compress", "--resume", "--out", folder / "packing.h5").code
+    assert refused.startswith("jamshape compress: ")
+    assert "holds no compression, expected" in refused
+
+
 def interrupted(out, *options):
     """Begin a compression, press Ctrl-C when it can go on from there, and return what it said."""
     command = [sys.executable, "-m", "jamshape", "compress", "--out", str(out), *options]
