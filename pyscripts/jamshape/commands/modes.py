@@ -20,16 +20,13 @@ from jamshape.command import parser_of, report
 from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.modes import mode_figure
 from jamshape.files.sets import PackingFile
-from jamshape.landscape import Landscape, State
-from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
-from jamshape.vibration.sets import TOLD, to_store
-from jamshape.vibration.sparse_modes import lowest, near
-from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
+from jamshape.front.modes import modes
+from jamshape.vibration.sets import TOLD
+from jamshape.vibration.spectrum import METHODS
 from jamshape.vibration.statistics import Redundancy, redundancies
-from jamshape.vibration.table import BANDS, ModeTable, tabulate, write_modes
+from jamshape.vibration.table import BANDS, ModeTable
 
 SHOWN = 12  # modes of the printed table
-FEW = 20  # modes found by the sparse method
 KINDS = ("rotation", "parallel", "perpendicular")
 
 
@@ -103,15 +100,6 @@ def show_bands(table: ModeTable, bands: dict[str, Any]) -> None:
         print(f"{row} {omega:11.4g}")
 
 
-def find(matrix: DynamicalMatrix, options: Namespace) -> Spectrum:
-    """Find the modes that were asked for, by the method that was."""
-    if options.method != "sparse" and not options.lowest:
-        return spectrum(matrix, options.method)
-    if options.near is None:
-        return lowest(matrix, options.lowest or FEW)
-    return near(matrix, options.lowest or FEW, options.near**2)
-
-
 def tell_redundant(sets: list[Redundancy], ids: Any) -> list[list[int]]:
     """Print where bonds are redundant; return the IDs of the particles."""
     found = [[int(ids[p]) for p in one.particles] for one in sets]
@@ -121,21 +109,19 @@ def tell_redundant(sets: list[Redundancy], ids: Any) -> list[list[int]]:
 
 
 def main(options: Namespace) -> None:
-    """Read, assemble, solve, write, report."""
-    file = PackingFile.read(options.packing)
-    packing = file.packing()
-    landscape, state = Landscape(packing), State.of(packing)
-    scope = Scope(options.rotation, options.least_force, force=options.force)
-    matrix = dynamical_matrix(landscape, state, scope)
-    table = tabulate(landscape, state, matrix, find(matrix, options))
-    asked = {"rotation": options.rotation, "least_force": options.least_force}
-    stored = to_store(file.attributes, packing) | asked
-    write_modes(options.out, table, stored, vectors=options.vectors)
+    """Find, write, report."""
+    names = ("lowest", "near", "method", "rotation", "least_force", "force")
+    found = modes(options.packing, **{name: getattr(options, name) for name in names})
+    table, packing, matrix = found.table, found.packing, found.matrix
+    assert packing is not None
+    assert matrix is not None
+    found.save(options.out, vectors=options.vectors)
     bands = summary_of(table)
     show(table, bands)
     extra = table.attributes.get("n_self_stress", 1) > 1
     redundant = tell_redundant(redundancies(matrix) if extra else [], packing.id)
     if options.plot:
+        file = PackingFile.read(options.packing)
         mode_figure(table, packing_text(file)).savefig(options.plot)
     told = {"out": options.out, "bands": bands, **table.attributes}
     report(told | {"redundant": redundant})

@@ -10,14 +10,17 @@ from jamshape.arrays import FloatArray
 from jamshape.front.packing import MeasuredPacking
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
-from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
 from jamshape.vibration.sets import TOLD, to_store
 from jamshape.vibration.sparse_modes import lowest as lowest_modes
-from jamshape.vibration.spectrum import spectrum
+from jamshape.vibration.sparse_modes import near as modes_near
+from jamshape.vibration.spectrum import Spectrum, spectrum
 from jamshape.vibration.table import ModeTable, read_modes, tabulate, write_modes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+FEW = 20  # modes that the sparse method finds where nobody says how many
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +35,10 @@ class Modes:
         What is known of the packing.
     packing : MeasuredPacking, optional
         None of modes that were read from a file.
+    file : Path, optional
+        Where they were read from.
+    matrix : DynamicalMatrix, optional
+        Whose modes they are; None of modes that were read from a file.
 
     Examples
     --------
@@ -49,6 +56,7 @@ class Modes:
     about: dict[str, Any]
     packing: MeasuredPacking | None = None
     file: Path | None = None
+    matrix: DynamicalMatrix | None = None
 
     @classmethod
     def read(cls, path: Path) -> Modes:
@@ -92,9 +100,9 @@ class Modes:
 
         return plot(self, axes, **look)
 
-    def save(self, path: str | Path) -> None:
-        """Write them to an HDF5 file, replacing what is there."""
-        write_modes(path, self.table, self.about, vectors=True)
+    def save(self, path: str | Path, *, vectors: bool = True) -> None:
+        """Write them to an HDF5 file, with or without their vectors, replacing what is there."""
+        write_modes(path, self.table, self.about, vectors=vectors)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(self.in_band(name))} {name}" for name in TOLD)
@@ -113,6 +121,8 @@ def modes(
     packing: Packing | str | Path,
     *,
     lowest: int | None = None,
+    near: float | None = None,
+    method: str = "projected",
     rotation: str = "half_length",
     least_force: float = 0.0,
     force: bool = False,
@@ -125,6 +135,11 @@ def modes(
         At a minimum of its energy, as `make_packing` leaves it.
     lowest : int, optional
         Only so many of the softest modes, by a sparse method; all when left out.
+    near : float, [sqrt(energy) / length], optional
+        As many modes as `lowest` says, or 20, whose frequencies are nearest to this one.
+    method : {"projected", "refined", "plain", "first_order", "sparse"}
+        Of the whole spectrum; see `jamshape.vibration.spectrum.spectrum`. ``sparse`` finds 20 modes
+        where nobody says how many.
     rotation : {"half_length", "radius"}
         What a radian counts for as a length.
     least_force : float
@@ -157,7 +172,19 @@ def modes(
     landscape, state = Landscape(measured), State.of(measured)
     scope = Scope(rotation, least_force, force=force)
     matrix = dynamical_matrix(landscape, state, scope)
-    found = lowest_modes(matrix, lowest) if lowest else spectrum(matrix)
+    found = _found(matrix, method, lowest, near)
     table = tabulate(landscape, state, matrix, found)
     asked = {"rotation": rotation, "least_force": least_force}
-    return Modes(table, to_store(measured.results, measured) | asked, measured)
+    about = to_store(measured.results, measured) | asked
+    return Modes(table, about, measured, matrix=matrix)
+
+
+def _found(
+    matrix: DynamicalMatrix, method: str, lowest: int | None, near: float | None
+) -> Spectrum:
+    """Find the modes that were asked for, by the method that was."""
+    if near is not None:
+        return modes_near(matrix, lowest or FEW, near**2)
+    if method == "sparse" or lowest:
+        return lowest_modes(matrix, lowest or FEW)
+    return spectrum(matrix, method)
