@@ -14,6 +14,7 @@ from jamshape.arrays import BoolArray
 from jamshape.contacts import Contacts
 from jamshape.contacts.network import sum_forces
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
+from jamshape.files.sets import REACHED
 from jamshape.packing import Packing
 
 if TYPE_CHECKING:
@@ -154,6 +155,8 @@ class MeasuredPacking(Packing):
         known = (("pressure", "pressure"), ("u", "u"), ("z", "z"), ("n_rattlers", "rattlers"))
         numbers = {name: self.results.get(key) for key, name in known}
         said += [f"{k} = {v:.4g}" for k, v in numbers.items() if _is_number(v)]
+        outcome = self.results.get("outcome", REACHED[0])
+        said += [f"{outcome}: forces do not balance"] * (outcome not in REACHED)
         said += [f"in {self.file}"] * (self.file is not None)
         what = f"{self.n} {self.shape.name}s in {self.dimension}D"
         return f"<Packing of {what}: {', '.join(said)}>"

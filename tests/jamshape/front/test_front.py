@@ -227,3 +227,11 @@ def test_a_slow_run_of_nothing_is_refused(tmp_path):
     with pytest.raises(ValueError, match="neither particles nor a start"):
         js.slow_compress(file=tmp_path / "slow.h5")
     assert not (tmp_path / "slow.h5").exists()
+
+
+@pytest.mark.lammps
+def test_a_packing_whose_forces_do_not_balance_says_so(run):
+    packing = run.packing()
+    stalled = js.MeasuredPacking.of(packing, {"outcome": "stalled"})
+    assert "stalled: forces do not balance" in repr(stalled)
+    assert "balance" not in repr(js.MeasuredPacking.of(packing, {"outcome": "sliding"}))
