@@ -122,6 +122,6 @@ def main(options: Namespace) -> None:
     redundant = tell_redundant(redundancies(matrix) if extra else [], packing.id)
     if options.plot:
         file = PackingFile.read(options.packing)
-        mode_figure(table, packing_text(file)).savefig(options.plot)
+        mode_figure(found.told, packing_text(file)).savefig(options.plot)
     told = {"out": options.out, "bands": bands, **table.attributes}
     report(told | {"redundant": redundant})

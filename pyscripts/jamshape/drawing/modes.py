@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from jamshape.drawing.mode_axes import COMPONENTS
+from jamshape.drawing.mode_axes import COMPONENTS, frequency_unit
+from jamshape.vibration.sets import key_of
 from jamshape.vibration.statistics import density_of_states, mean_in_bins
 from jamshape.vibration.table import ModeTable
 
@@ -18,7 +19,8 @@ def draw_density(axes: Axes, table: ModeTable) -> None:
     bins = density_of_states(table["omega"][~table["is_translation"]])
     filled = bins.n_modes > 0
     axes.loglog(bins.omega[filled], bins.density[filled], "o", mfc="none")
-    axes.set(xlabel=r"$\omega$", ylabel=r"$D(\omega)$")
+    unit = frequency_unit([key_of(table)])
+    axes.set(xlabel=rf"frequency $\omega$  ${unit}$", ylabel=r"density of states $D(\omega)$")
 
 
 def mode_figure(table: ModeTable, title: str) -> Figure:
@@ -30,14 +32,16 @@ def mode_figure(table: ModeTable, title: str) -> Figure:
     figure = Figure(figsize=(6, 8), dpi=150, layout="constrained")
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     draw_density(top, table)
-    top.set(title=title, xlabel="")
+    top.set_title(title)
+    frequency = top.get_xlabel()
+    top.set_xlabel("")
     participation = mean_in_bins(table["participation"], omega, bins.edges)
     middle.loglog(bins.omega, participation, "o", mfc="none")
-    middle.set_ylabel(r"$P(\omega)$")
+    middle.set_ylabel(r"participation $P(\omega)$")
     for kind, (marker, color, label) in COMPONENTS.items():
         if table[kind].any():
             values = mean_in_bins(table[kind], omega, bins.edges)
             bottom.semilogx(bins.omega, values, marker[0], color=color, mfc="none", label=label)
-    bottom.set(xlabel=r"$\omega$", ylabel="share of the motion")
+    bottom.set(xlabel=frequency, ylabel="share of the motion")
     bottom.legend()
     return figure

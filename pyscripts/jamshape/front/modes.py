@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,6 +63,11 @@ class Modes:
         """Read modes from a file; errors as `read_modes`."""
         table = read_modes(path)
         return cls(table, dict(table.attributes), None, path)
+
+    @property
+    def told(self) -> ModeTable:
+        """The table with all that is known of the packing among its attributes, as in a file."""
+        return replace(self.table, attributes=self.about | self.table.attributes)
 
     @property
     def eigenvalues(self) -> FloatArray:

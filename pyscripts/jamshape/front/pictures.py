@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-_INCHES = {"packing": (5.0, 5.4), "curve": (5.0, 3.6)}
+_INCHES = {"packing": (5.0, 5.8), "curve": (5.0, 3.6)}
 _DPI = 100
 
 
@@ -76,7 +76,7 @@ def html(thing: MeasuredPacking | RunFile | Modes) -> str:
     figure = Figure(figsize=_size(thing), layout="constrained")
     _draw(thing, figure.add_subplot(), "kind")
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=_DPI)
+    figure.savefig(stream, format="png", dpi=_DPI, bbox_inches="tight")
     picture = base64.b64encode(stream.getvalue()).decode()
     image = f'<img alt="picture" src="data:image/png;base64,{picture}"/>'
     return f"<div><code>{markup.escape(repr(thing))}</code><br/>{image}</div>"
@@ -114,7 +114,7 @@ def _run(run: RunFile, axes: Axes, color: str) -> None:
 
 def _modes(modes: Modes, axes: Axes, color: str) -> None:
     del color
-    draw_density(axes, modes.table)
+    draw_density(axes, modes.told)
     known = modes.table.attributes
     axes.set_title(f"{len(modes)} modes, $N={known['n']}$, $z={known['z']:.3f}$", fontsize=9)
 

@@ -35,7 +35,8 @@ def test_classes_and_flat_contacts_of_a_packing(files):
 
 def test_angles_are_averaged_over_samples(files):
     curve = angle_curve(1.0, files)
-    angles = [contact_angles(*file.contacts()) for file in files]
+    contacts = [file.contacts() for file in files]
+    angles = [contact_angles(one.packing, one.network, one.rattlers) for one in contacts]
     assert (curve.samples, curve.n_contacts) == (2, sum(map(len, angles)) // 2)
     area = (curve.density * np.diff(np.radians(curve.edges))).sum()
     assert area == pytest.approx(1.0)
