@@ -101,26 +101,29 @@ def assert_one_sentence(failed, words):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--u0", "-1"), "u0 is -1.0, expected a positive number"),
+        (("--u0", "-1"), "u0 is -1.0, expected 0 or an energy density from 1e-20 to 0.01"),
         (
             ("--u0", "0"),
             "there is no energy to reach, expected one after a compression by dynamics (u0)",
         ),
-        (("--u0", "nan"), "u0 is nan, expected a positive number"),
-        (("--n", "0"), "n is 0, expected at least one particle"),
-        (("--n", "-5"), "n is -5, expected at least one particle"),
+        (("--u0", "nan"), "u0 is nan, expected 0 or an energy density"),
+        (("--n", "0"), "n is 0, expected a whole number of particles from 1"),
+        (("--n", "-5"), "n is -5, expected a whole number of particles from 1"),
         (("--alpha", "-1"), "alpha is -1.0"),
         (("--alpha", "nan"), "alpha is nan"),
         (
             ("--size-ratio", "-1.4"),
-            "size_ratio is -1.4, expected big over small, finite and at least 1",
+            "size_ratio is -1.4, expected big over small from 1 to 10",
         ),
         (
             ("--size-ratio", "inf"),
-            "size_ratio is inf, expected big over small, finite and at least 1",
+            "size_ratio is inf, expected big over small from 1 to 10",
         ),
-        (("--kappa", "1"), "kappa is 1.0, expected at most"),
-        (("--phi-start", "nan"), "phi_start is nan, expected a packing fraction between 0 and 1"),
+        (("--kappa", "1e-2"), "kappa is 0.01, expected at most"),
+        (
+            ("--phi-start", "nan"),
+            "phi_start is nan, expected a packing fraction from 1e-06 to 0.999",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path):

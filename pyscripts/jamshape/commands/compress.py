@@ -3,7 +3,8 @@
     jamshape compress --alpha 4 --n 1024 --kappa 1e-6 --phi-start 0.4 --phi-end 0.9 --out run.h5
 
 The last line of standard output is one JSON object. With --resume a killed run goes on from its
-last restart file, with the settings it began with, and a finished one is left alone.
+last restart file, with the settings it began with, and a finished one is left alone. A file that is
+there is replaced only with --again.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from jamshape.checks import require_free
 from jamshape.command import parser_of, report
 from jamshape.flow.recording import summary_of
 from jamshape.front.compressing import compress, resume
@@ -42,7 +44,9 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--integrator", help=f"heun, heun/adaptive or rkc2 ({usual})")
     parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
     parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
-    parser.add_argument("--resume", action="store_true", help="go on after a kill")
+    begin = parser.add_mutually_exclusive_group()
+    begin.add_argument("--resume", action="store_true", help="go on after a kill")
+    begin.add_argument("--again", action="store_true", help="begin anew where --out is there")
     return parser
 
 
@@ -51,8 +55,9 @@ def main(options: Namespace) -> None:
     if options.resume and options.out.exists():
         resume(options.out)
     else:
+        require_free(options.out, again=options.again, go_on="--resume to go on with it, ")
         names = ("n", "dimension", "kappa", "seed", "integrator", "dt", "tolerance", "sides")
         given = {name: getattr(options, name) for name in (*names, "rows", "frames")}
         phi = (options.phi_start, options.phi_end)
-        compress(particles_of(options), phi=phi, **given, file=options.out, again=True)
+        compress(particles_of(options), phi=phi, **given, file=options.out, again=options.again)
     report(summary_of(options.out))

@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from jamshape.checks import require_free, require_other_file
 from jamshape.command import report
 from jamshape.contacts import Contacts
 from jamshape.exchange.gsd import write_gsd
@@ -91,12 +92,16 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--to", choices=FORMATS, help="format (as --out ends)")
     parser.add_argument("--out", type=Path, required=True, help="file to write")
     parser.add_argument("--frame", type=int, help="one frame, negative: from the end (all)")
+    parser.add_argument("--again", action="store_true", help="replace an H5MD file that is there")
     return parser
 
 
 def main(options: Namespace) -> None:
     """Read, write, report."""
+    require_other_file(options.out, [options.file])
     name = options.to or _format_of(options.out)
+    # What other programs read is made again in a moment; a packing may be the work of hours.
+    require_free(options.out, again=options.again or name != "h5")
     chosen = FORMATS[name]
     frame = -1 if options.frame is None and not chosen.holds_many else options.frame
     packings = frames_of(options.file, frame)

@@ -11,6 +11,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from pathlib import Path
 
+from jamshape.checks import require_free
 from jamshape.command import parser_of, report
 from jamshape.files.h5md import write_packing
 from jamshape.files.lammps_text import write_data
@@ -35,6 +36,7 @@ def options_of() -> ArgumentParser:
         required=True,
         help=".data for a LAMMPS data file, .h5 for an H5MD packing",
     )
+    parser.add_argument("--again", action="store_true", help="replace an H5MD file that is there")
     return parser
 
 
@@ -44,6 +46,8 @@ def main(options: Namespace) -> None:
     if writer is None:
         msg = f"--out is {options.out}, expected a name that ends in .data or .h5"
         raise ValueError(msg)
+    # A data file may be written anew; a packing in H5MD may be the work of hours.
+    require_free(options.out, again=options.again or options.out.suffix == ".data")
     particles, dimension = particles_of(options), options.dimension
     packing = random_packing(options.n, options.phi, options.seed, particles, dimension)
     writer(options.out, packing)

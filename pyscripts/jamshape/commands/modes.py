@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from jamshape.checks import require_other_file
 from jamshape.command import parser_of, report
 from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.modes import mode_figure
 from jamshape.files.sets import PackingFile
-from jamshape.front.modes import modes
+from jamshape.front.modes import modes, require_modes_file
 from jamshape.vibration.sets import TOLD
 from jamshape.vibration.spectrum import METHODS
 from jamshape.vibration.statistics import Redundancy, redundancies
@@ -110,6 +111,9 @@ def tell_redundant(sets: list[Redundancy], ids: Any) -> list[list[int]]:
 
 def main(options: Namespace) -> None:
     """Find, write, report."""
+    require_modes_file(options.out, [options.packing])
+    if options.plot:
+        require_other_file(options.plot, [options.packing, options.out])
     names = ("lowest", "near", "method", "rotation", "least_force", "force")
     found = modes(options.packing, **{name: getattr(options, name) for name in names})
     table, packing, matrix = found.table, found.packing, found.matrix

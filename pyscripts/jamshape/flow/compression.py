@@ -9,6 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from jamshape.checks import MOST_STEPS, require_number, require_one_of, require_positive
 from jamshape.packing import Packing
 from jamshape.shapes.shape import Interaction
 
@@ -25,6 +26,9 @@ _PACKING = {
 _FLOW = {"strain": 1, "lambda_max": 2, "dt_max": 3, "evaluations": 5, "step_error": 7}
 _SUBSTEPS = {"substeps": 8, "rejected": 9, "forced": 10, "substep": 11, "substep_shortest": 12,
              "local_error": 13, "stages": 14, "overlap_length": 15}  # fmt: skip
+
+INTEGRATORS = ("heun", "heun/adaptive", "rkc2")
+"""Those that `fix overdamped/affine` knows; all but the first choose their own steps."""
 
 _LONGEST_RUN = 1_000_000_000  # steps in one `run` command, which counts in 32 bits
 
@@ -46,14 +50,15 @@ class Compression:
     k_e, k_d
         Stiffness [energy] and drag [energy time / length^(D + 2)].
     integrator
-        A name that `fix overdamped/affine` knows; all but ``heun`` choose their own steps.
+        One of `INTEGRATORS`.
     tolerance
         Of those: local error over the typical overlap.
 
     Raises
     ------
     ValueError
-        If a rate, step, stiffness, drag or tolerance is not positive, or `sides` neither 1 nor 2.
+        If a rate, step, stiffness, drag or tolerance is not positive, `sides` neither 1 nor 2, or there
+        is no such integrator.
     """
 
     kappa: float = 1e-4
@@ -66,17 +71,14 @@ class Compression:
     tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.kappa) and self.kappa != 0):
-            msg = f"kappa is {self.kappa}, expected a rate other than zero."
+        if require_number("kappa", self.kappa) == 0:
+            msg = f"kappa is {self.kappa}, expected a rate other than zero"
             raise ValueError(msg)
-        for name in ("phi_end", "dt", "k_e", "k_d", "tolerance"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                msg = f"{name} is {value}, expected a positive number."
-                raise ValueError(msg)
-        if self.sides not in (1, 2):
-            msg = f"sides is {self.sides}, expected 1 or 2."
-            raise ValueError(msg)
+        numbers = ("phi_end", "dt", "k_e", "k_d", "tolerance")
+        require_positive(**{name: getattr(self, name) for name in numbers})
+        require_one_of("sides", self.sides, (1, 2))
+        # It is a word of LAMMPS's input, and may come from a file.
+        require_one_of("integrator", self.integrator, INTEGRATORS)
 
     @property
     def chooses_steps(self) -> bool:
@@ -89,9 +91,21 @@ class Compression:
         return dataclasses.replace(self, dt=strain / (self.kappa * steps))
 
     def steps(self, phi: float, dimension: int = 2) -> int:
-        """Count the time steps from packing fraction `phi` to `phi_end`."""
-        strain = math.log(self.phi_end / phi)
-        return max(0, math.ceil(strain / (dimension * self.kappa * self.dt) - 1e-6))
+        """Count the time steps from packing fraction `phi` to `phi_end`.
+
+        Raises
+        ------
+        ValueError
+            If there are more than anyone can wait for.
+        """
+        strain, of_a_step = math.log(self.phi_end / phi), dimension * self.kappa * self.dt
+        if abs(strain) > MOST_STEPS * abs(of_a_step):
+            msg = (
+                f"kappa = {self.kappa:g} and dt = {self.dt:g} take more than {MOST_STEPS:g} steps from"
+                f" phi = {phi:g} to {self.phi_end:g}, expected a larger rate or time step"
+            )
+            raise ValueError(msg)
+        return max(0, math.ceil(strain / of_a_step - 1e-6))
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray
+from jamshape.checks import require_one_of, require_positive
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
 from jamshape.landscape.newton import Factorisation
 from jamshape.landscape.vicinity import Stage, Units, Vicinity
@@ -117,19 +118,25 @@ class Protocol:
     method: str = "tr-bdf2"
 
     def __post_init__(self) -> None:
-        for name in ("phi_end", "p_end", "tolerance", "k_d", "largest_strain", "largest_drop"):
-            if not getattr(self, name) > 0:
-                msg = f"{name} is {getattr(self, name)}, expected a positive number"
-                raise ValueError(msg)
-        phis, rates = zip(*self.rates, strict=True)
-        if not all(math.isfinite(rate) and rate > 0 for rate in rates):
+        names = ("phi_end", "tolerance", "k_d", "largest_strain")
+        # What is infinite is no bound.
+        bounds = [name for name in ("p_end", "largest_drop") if getattr(self, name) != math.inf]
+        require_positive(**{name: getattr(self, name) for name in (*names, *bounds)})
+        self._require_rates()
+        require_one_of("the method", self.method, METHODS)
+
+    def _require_rates(self) -> None:
+        try:
+            phis, rates = zip(*self.rates, strict=True)
+            valid = all(math.isfinite(phi) and 0 < rate < math.inf for phi, rate in self.rates)
+        except (TypeError, ValueError):
+            msg = f"kappa is {self.kappa!r}, expected a rate, or pairs of a packing fraction and a rate"
+            raise ValueError(msg) from None
+        if not (rates and valid):
             msg = f"kappa is {self.kappa}, expected positive rates"
             raise ValueError(msg)
         if list(phis) != sorted(set(phis)):
             msg = f"kappa is {self.kappa}, expected ascending packing fractions"
-            raise ValueError(msg)
-        if self.method not in METHODS:
-            msg = f"the method is {self.method!r}, expected one of {', '.join(METHODS)}"
             raise ValueError(msg)
 
     @property

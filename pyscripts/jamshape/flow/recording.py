@@ -8,6 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from jamshape.checks import require_stated
 from jamshape.files.h5md import (
     read_attributes,
     read_observables,
@@ -43,12 +44,20 @@ class Recording:
         How many samples of the observables and how many snapshots, over the whole run.
     attributes
         Stored with the run, beside its settings: what made the initial state.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range.
     """
 
     path: Path
     rows: int = 400
     frames: int = 20
     attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_stated(rows=self.rows, frames=self.frames)
 
     @property
     def restart_prefix(self) -> Path:
@@ -123,7 +132,7 @@ def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
     stored = read_attributes(path)
     names = {f.name for f in dataclasses.fields(Compression)} & set(stored)
     settings = Compression(**{name: stored[name] for name in names})
-    to = Recording(path, int(stored["rows"]), int(stored["frames"]))
+    to = Recording(path, stored["rows"], stored["frames"])
     run = CompressionRun(session, settings, read_packing(path, 0), to.newest_restart())
     RunWriter.open(path).truncate(session.step)
     return run, to

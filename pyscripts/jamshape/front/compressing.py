@@ -7,6 +7,14 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from jamshape.checks import (
+    Range,
+    require_in,
+    require_one_of,
+    require_path_for_lammps,
+    require_rising,
+    require_stated,
+)
 from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
 from jamshape.flow import recording, slow_recording
 from jamshape.flow.compression import Compression, Row
@@ -21,6 +29,7 @@ from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
 
 _PHI_RANDOM = 0.4  # of the random start of a slow compression
+_PHI_SLOW = Range(0.41, 2.0, "a packing fraction above that of the random start, which is 0.4,")
 _PER_PHI = 1_000_000  # what the bar of one counts
 
 
@@ -96,13 +105,20 @@ def compress(
     >>> run
     <Run of 24 spherocylinders in 2D at kappa = 0.001: 21 frames to phi = 0.95, pressure = 0.054, in run.h5>
     """
-    at = place(file, "run.h5")
+    require_rising(*phi)
+    require_stated(n=n, seed=seed, kappa=kappa, tolerance=tolerance, rows=rows, frames=frames)
+    require_one_of("dimension", dimension, (2, 3))
+    if dt is not None:
+        require_stated(dt=dt)
     integrator = integrator or ("rkc2" if dt is None and sides == 2 else "heun")
     settings = Compression(
         kappa, phi[1], 0.05 if dt is None else dt, sides, integrator=integrator, tolerance=tolerance
     )
     if settings.chooses_steps:
         settings = settings.in_steps(phi[0], rows, dimension)
+    settings.steps(phi[0], dimension)  # refuses what does not end
+    at = place(file, "run.h5")
+    require_path_for_lammps(at.path)  # restart files lie beside it
     made_from = dict(particles.told) | {"n": n, "seed": seed}
     to = Recording(at.path, rows, frames, made_from)
     if again or not at.path.exists():
@@ -144,14 +160,15 @@ def resume(file: str | Path, *, progress: bool = True) -> RunFile:
     """
     path = Path(file)
     stored = read_attributes(path)
-    if not {"rows", "flow_steps"} & stored.keys():
+    if not ({"rows", "frames"} <= stored.keys() or "flow_steps" in stored):
         msg = f"{path} holds no compression, expected a file of compress or slow_compress"
         raise FileFormatError(msg)
     if not stored.get("finished"):
         if "flow_steps" in stored:
             _record_slowly(path, progress)
         else:
-            to = Recording(path, int(stored["rows"]), int(stored["frames"]))
+            require_path_for_lammps(path)
+            to = Recording(path, stored["rows"], stored["frames"])
             _record(lambda session: recording.resume(session, path)[0], to, progress)
     return RunFile(path)
 
@@ -232,13 +249,22 @@ def slow_compress(
     >>> round(float(run.phi[-1]), 6)
     0.72
     """
-    at = place(file, "slow.h5")
+    require_stated(n=n, seed=seed, phi_end=phi[1], tolerance=tolerance, largest_drop=largest_drop)
     rates = kappa if isinstance(kappa, int | float) else tuple(kappa)
     protocol = Protocol(rates, phi[1], p_end, tolerance, largest_drop=largest_drop, method=method)
+    for _, rate in protocol.rates:
+        require_stated(kappa=rate)
+    if start is None:
+        require_rising(*phi)
+        require_in("phi_start", phi[0], _PHI_SLOW)
+    at = place(file, "slow.h5")
     if at.path.exists() and not again:
         slow_recording.require_same(at.path, protocol)
     else:
         first, made_from = _slow_start(particles, (n, phi[0], seed), start)
+        if not first.phi < protocol.phi_end:
+            msg = f"the start has phi = {first.phi:.6g}, expected one below phi_end = {protocol.phi_end:g}"
+            raise ValueError(msg)
         slow_recording.begin(at.path, first, protocol, made_from)
     if not slow_recording.is_finished(at.path):
         _record_slowly(at.path, progress)

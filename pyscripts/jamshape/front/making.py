@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from jamshape.checks import require_path, require_path_for_lammps
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Bar, follow, place
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Progress, is_done, make, require_same
+from jamshape.protocols.recipe import Dynamics
 from jamshape.shapes.particles import Particles
 
 
@@ -103,6 +105,7 @@ def make_packing(
         phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi,
     )  # fmt: skip
     at = place(file, "packing.h5")
+    (require_path_for_lammps if isinstance(recipe.way, Dynamics) else require_path)(at.path)
     if again or not is_done(at.path):
         steps = make(recipe, at.path, again=again)
         follow(steps, Bar("row"), _told, shown=progress)

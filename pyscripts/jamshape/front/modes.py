@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jamshape.arrays import FloatArray
+from jamshape.checks import Range, require_in, require_one_of, require_other_file
 from jamshape.front.packing import MeasuredPacking
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
@@ -14,11 +16,16 @@ from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
 from jamshape.vibration.sets import TOLD, to_store
 from jamshape.vibration.sparse_modes import lowest as lowest_modes
 from jamshape.vibration.sparse_modes import near as modes_near
-from jamshape.vibration.spectrum import Spectrum, spectrum
-from jamshape.vibration.table import ModeTable, read_modes, tabulate, write_modes
+from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
+from jamshape.vibration.table import ModeTable, holds_modes, read_modes, tabulate, write_modes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+_SPARSE = "sparse"
+_LOWEST = Range(1, 10**6, "modes", whole=True)
+_NEAR = Range(0.0, 1e6, "a frequency")
+_LEAST_FORCE = Range(0.0, 100.0, "mean forces of a bond")
 
 FEW = 20  # modes that the sparse method finds where nobody says how many
 
@@ -106,7 +113,15 @@ class Modes:
         return plot(self, axes, **look)
 
     def save(self, path: str | Path, *, vectors: bool = True) -> None:
-        """Write them to an HDF5 file, with or without their vectors, replacing what is there."""
+        """Write them to an HDF5 file, with or without their vectors, replacing modes that are there.
+
+        Raises
+        ------
+        ValueError
+            If the file is there and holds anything else, such as the packing.
+        """
+        read = [self.packing.file] if self.packing and self.packing.file else []
+        require_modes_file(Path(path), read)
         write_modes(path, self.table, self.about, vectors=vectors)
 
     def __repr__(self) -> str:
@@ -120,6 +135,26 @@ class Modes:
         from jamshape.front.pictures import html  # noqa: PLC0415 - only notebooks ask
 
         return html(self)
+
+
+def require_modes_file(out: Path, read: Sequence[Path] = ()) -> None:
+    """Refuse to write modes over anything but modes.
+
+    Parameters
+    ----------
+    out : Path
+        Where to write.
+    read : sequence of Path
+        What they are found from.
+
+    Raises
+    ------
+    ValueError
+    """
+    require_other_file(out, read)
+    if out.exists() and not holds_modes(out):
+        msg = f"{out} is there and holds no modes, expected another file to write to, or remove it"
+        raise ValueError(msg)
 
 
 def modes(
@@ -159,6 +194,8 @@ def modes(
 
     Raises
     ------
+    ValueError
+        If a number is out of its range, or there is no such method.
     NotAtMinimumError
         If forces do not balance, unless `force` is given.
 
@@ -171,6 +208,13 @@ def modes(
     >>> softest.omega.shape
     (4,)
     """
+    require_one_of("the method", method, (*METHODS, _SPARSE))
+    require_one_of("rotation", rotation, ("half_length", "radius"))
+    require_in("least_force", least_force, _LEAST_FORCE)
+    if lowest is not None:
+        require_in("lowest", lowest, _LOWEST)
+    if near is not None:
+        require_in("near", near, _NEAR)
     if not isinstance(packing, Packing):
         packing = MeasuredPacking.read(Path(packing))
     measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
@@ -190,6 +234,6 @@ def _found(
     """Find the modes that were asked for, by the method that was."""
     if near is not None:
         return modes_near(matrix, lowest or FEW, near**2)
-    if method == "sparse" or lowest:
+    if method == _SPARSE or lowest:
         return lowest_modes(matrix, lowest or FEW)
     return spectrum(matrix, method)

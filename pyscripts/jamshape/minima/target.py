@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from jamshape.arrays import FloatArray
+from jamshape.checks import require_positive
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.landscape.newton import Regularised
@@ -85,11 +86,8 @@ class Target:
     method: str = "auto"
 
     def __post_init__(self) -> None:
-        for name in ("u0", "accuracy", "tolerance", "step"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                msg = f"{name} is {value}, expected a positive number"
-                raise ValueError(msg)
+        numbers = ("u0", "accuracy", "tolerance", "step")
+        require_positive(**{name: getattr(self, name) for name in numbers})
 
     def is_met(self, u: float) -> bool:
         """Whether an energy density is u0."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from jamshape.checks import require_positive
 from jamshape.flow.compression import Compression, CompressionRun, Row
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
@@ -66,11 +67,7 @@ class Approach:
     strain: float = 5e-5
 
     def __post_init__(self) -> None:
-        for name in ("kappa", "kappa_start", "p_flow", "p_end", "p_open", "dt", "strain"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                msg = f"{name} is {value}, expected a positive number"
-                raise ValueError(msg)
+        require_positive(**vars(self))
         if self.kappa > self.kappa_start:
             msg = f"kappa is {self.kappa}, expected at most kappa_start = {self.kappa_start}"
             raise ValueError(msg)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from jamshape.checks import RANGES, require_one_of, require_stated
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
@@ -88,11 +89,10 @@ def recipe_for(
     >>> recipe_for(Particles.of(alpha=4.0), n=64).target.u0
     1e-15
     """
-    dimension = dimension or particles.shape.dimension
+    dimension = particles.shape.dimension if dimension is None else dimension
+    require_one_of("dimension", dimension, (2, 3))
     way = way or ("steps" if dimension == 3 or given.get("protocol") else "dynamics")
-    if way not in {"dynamics", "steps"}:
-        msg = f"the way is {way!r}, expected 'dynamics' or 'steps'"
-        raise ValueError(msg)
+    require_one_of("the way", way, ("dynamics", "steps"))
     get = _values(given, way, dimension)
     target = Target(get["u0"], get["accuracy"], get["tolerance"]) if get["u0"] else None
     if way == "dynamics":
@@ -106,9 +106,7 @@ def recipe_for(
 
 
 def _thermal(get: dict[str, Any]) -> Thermalisation | None:
-    if get["protocol"] not in {1, 2}:
-        msg = f"protocol is {get['protocol']}, expected 1 or 2"
-        raise ValueError(msg)
+    require_one_of("protocol", get["protocol"], (1, 2))
     thermal = Thermalisation(get["phi_thermal"], get["n_sweeps"])
     return thermal if get["protocol"] == 2 else None
 
@@ -124,4 +122,5 @@ def _values(given: dict[str, Any], way: str, dimension: int) -> dict[str, Any]:
             msg = f"{name} is no setting of the way by {way}, expected another way or setting"
             raise ValueError(msg)
     kept = {name: value for name, value in given.items() if value is not None}
+    require_stated(**{name: value for name, value in kept.items() if name in RANGES})
     return {name: one.usual(way, dimension) for name, one in known.items()} | kept

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from jamshape.checks import require_positive
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Minimum, Outcome, Stop, minimise
 from jamshape.packing import State
@@ -50,11 +51,7 @@ class Quasistatic:
     method: str = "lbfgs"
 
     def __post_init__(self) -> None:
-        for name in ("step", "energy", "tolerance"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                msg = f"{name} is {value}, expected a positive number"
-                raise ValueError(msg)
+        require_positive(step=self.step, energy=self.energy, tolerance=self.tolerance)
         if not self.closeness > 1:
             msg = f"closeness is {self.closeness}, expected a factor above 1"
             raise ValueError(msg)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.checks import RANGES, require_in, require_one_of, require_stated
 from jamshape.contacts import NearPairs, PairArrays, Spheres, each_once, near_pairs
 from jamshape.packing import Box, Packing, State
 from jamshape.shapes.particles import Particles
@@ -99,15 +100,9 @@ def _unplaced(
 ) -> tuple[Packing, np.random.Generator]:
     """Draw particles, still without poses, in a box of one unit."""
     particles, dimension = of
-    if not 0 < phi < 1:
-        msg = f"phi is {phi}, expected a packing fraction between 0 and 1"
-        raise ValueError(msg)
-    if dimension not in {2, 3}:
-        msg = f"dimension is {dimension}, expected 2 or 3"
-        raise ValueError(msg)
-    if seed < 0:
-        msg = f"seed is {seed}, expected an integer from 0"
-        raise ValueError(msg)
+    require_in("phi", phi, RANGES["phi_start"])
+    require_one_of("dimension", dimension, (2, 3))
+    require_stated(n=n, seed=seed)
     rng = np.random.default_rng(seed)
     sizes = particles.sample(n, rng)
     no_turn = np.eye(1, 4)[0]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from jamshape.arrays import FloatArray
+from jamshape.checks import require_one_of, require_stated
 from jamshape.files.h5md import read_packing
 from jamshape.minima.target import Target
 from jamshape.packing import Packing
@@ -40,10 +41,7 @@ class Thermalisation:
     n_sweeps: int = 100_000
 
     def __post_init__(self) -> None:
-        if not (0 < self.phi < 1 and self.n_sweeps >= 0):
-            found = f"the Monte Carlo has phi = {self.phi} and {self.n_sweeps} sweeps"
-            msg = f"{found}, expected 0 < phi < 1 and sweeps from 0"
-            raise ValueError(msg)
+        require_stated(phi_thermal=self.phi, n_sweeps=self.n_sweeps)
 
 
 @dataclass(frozen=True)
@@ -143,15 +141,8 @@ class Recipe:
     target: Target | None = field(default_factory=Target)
 
     def __post_init__(self) -> None:
-        if self.n < 1:
-            msg = f"n is {self.n}, expected at least one particle"
-            raise ValueError(msg)
-        if self.dimension not in {2, 3}:
-            msg = f"dimension is {self.dimension}, expected 2 or 3"
-            raise ValueError(msg)
-        if not 0 < self.phi_start < 1:
-            msg = f"phi_start is {self.phi_start}, expected a packing fraction between 0 and 1"
-            raise ValueError(msg)
+        require_stated(n=self.n, seed=self.seed, phi_start=self.phi_start)
+        require_one_of("dimension", self.dimension, (2, 3))
         thermal = self.way.thermal if isinstance(self.way, Steps) else None
         if thermal and not self.phi_start < thermal.phi:
             found = f"phi_start is {self.phi_start} and the Monte Carlo runs at {thermal.phi}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.checks import RANGES, require_in, require_stated
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import DEFAULT, shape_named
 
@@ -59,10 +59,7 @@ class Kind:
     spread: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (0 < self.size < math.inf and 0 < self.share < math.inf and 0 <= self.spread < 10):
-            found = f"size, share and spread of a kind are {self.size}, {self.share}, {self.spread}"
-            msg = f"{found}, expected sizes and shares above 0 and spreads from 0 to 10"
-            raise ValueError(msg)
+        require_stated(size=self.size, share=self.share, spread=self.spread)
 
 
 @dataclass(frozen=True)
@@ -116,9 +113,7 @@ class Particles:
         """
         its = shape_named(shape) if isinstance(shape, str) else shape
         ratio = its.size_ratio if size_ratio is None else size_ratio
-        if not 1 <= ratio < math.inf:
-            msg = f"size_ratio is {ratio}, expected big over small, finite and at least 1"
-            raise ValueError(msg)
+        require_stated(size_ratio=ratio)
         chosen = _with_defaults(its, parameters)
         sizes = [1.0] if ratio == 1 else [1.0, ratio]
         is_plain = its.size_ratio == 1 == ratio
@@ -138,6 +133,8 @@ class Particles:
         if not kinds:
             msg = "a mixture has no kinds, expected at least one"
             raise ValueError(msg)
+        big, small = max(k.size for k in kinds), min(k.size for k in kinds)
+        require_in("the largest size over the smallest", big / small, RANGES["size_ratio"])
         full = [Kind(_with_defaults(its, k.parameters), k.size, k.share, k.spread) for k in kinds]
         told = {"kinds": "; ".join(map(_text, full))}
         return cls(its, _draw_of(its, full), told)
@@ -165,9 +162,7 @@ class Particles:
         ValueError
             If n < 1, or the draw is not n particles of the shape.
         """
-        if n < 1:
-            msg = f"n is {n}, expected at least one particle"
-            raise ValueError(msg)
+        require_stated(n=n)
         sizes = self.draw(n, rng)
         expected = {"diameters": (n, 3), "exponent": (n,), "species": (n,)}
         for name, shape in expected.items():

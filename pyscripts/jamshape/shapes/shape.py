@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from jamshape.checks import require_stated
+
 if TYPE_CHECKING:
     from jamshape.arrays import FloatArray, IntArray
     from jamshape.shapes.mesh import SurfaceMesh
@@ -177,9 +179,7 @@ class ElongatedShape(Shape):
     ) -> tuple[FloatArray, FloatArray]:
         """As `Shape.sizes`."""
         alpha = parameters["alpha"]
-        if not 0 <= alpha < np.inf:
-            msg = f"alpha is {alpha}, expected A / R, 0 for discs or above"
-            raise ValueError(msg)
+        require_stated(alpha=alpha)
         radius = 0.5 * size
         half_length = alpha * radius
         long = 2 * (half_length + radius)

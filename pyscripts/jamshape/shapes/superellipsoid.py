@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from jamshape.arrays import FloatArray
+from jamshape.checks import require_stated
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.roundness import asphericity, axes_from, reduced_aspect_ratio
 from jamshape.shapes.shape import Interaction, Parameter, Shape, Style
@@ -50,11 +51,9 @@ class Superellipsoid(Shape):
         self, parameters: Mapping[str, float], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """As `Shape.sizes`."""
-        axes = axes_from(parameters["w1"], parameters["w2"])
-        p = float(parameters["exponent"])
-        if not (np.isfinite(p) and p > 0.5):
-            msg = f"the exponent is {p}, expected p > 0.5, for which bodies are convex"
-            raise ValueError(msg)
+        w1, w2, p = (float(parameters[name]) for name in ("w1", "w2", "exponent"))
+        require_stated(p=p, w1=w1, w2=w2)
+        axes = axes_from(w1, w2)
         return size[:, None] * (2 * axes), np.full(len(size), p)
 
     def parameters_of(

@@ -77,9 +77,9 @@ def test_options_name_particles_as_python_does():
         (("--p", "2"), "--p is no option of spherocylinders, expected --alpha"),
         (("--kind", "beta=2"), "beta is no parameter of spherocylinders, expected alpha"),
         (("--kind", "alpha=2", "--alpha", "3"), "kinds and other sizes were given, expected"),
-        (("--kind", "alpha=2,share=0"), "expected sizes and shares above 0"),
-        (("--kind", "alpha=2,spread=-1"), "and spreads from 0 to 10"),
-        (("--alpha", "-1"), r"alpha is -1\.0, expected A / R"),
+        (("--kind", "alpha=2,share=0"), r"share is 0\.0, expected a share from 1e-06 to 1e\+06"),
+        (("--kind", "alpha=2,spread=-1"), r"spread is -1\.0, expected a spread from 0 to 1"),
+        (("--alpha", "-1"), r"alpha is -1\.0, expected 0 or A / R from 1e-06 to 100"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(options, sentence, capsys):

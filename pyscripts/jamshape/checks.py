@@ -1,0 +1,251 @@
+"""Checks of numbers, names and paths that come from options, files and Python.
+
+Each refuses with one sentence: what was found, what was expected. The standard library is all that it needs.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import unicodedata
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+
+class Range(NamedTuple):
+    """Numbers that a setting may have."""
+
+    low: float
+    high: float
+    meaning: str = "a number"
+    also: tuple[float, ...] = ()
+    """What else it may be, such as 0."""
+    whole: bool = False
+    """Whether it counts something."""
+
+
+_COUNT = 1_000_000
+
+RANGES = {
+    "n": Range(1, 10_000_000, "particles", whole=True),
+    "seed": Range(0, 2**63 - 1, "a seed", whole=True),
+    "rows": Range(1, _COUNT, "samples", whole=True),
+    "frames": Range(1, _COUNT, "snapshots", whole=True),
+    "kappa": Range(1e-14, 0.1, "a rate"),
+    "dt": Range(1e-6, 10.0, "a time step"),
+    "phi_start": Range(1e-6, 0.999, "a packing fraction"),
+    "phi_end": Range(1e-6, 2.0, "a packing fraction"),
+    "p_end": Range(1e-12, 1.0, "a pressure"),
+    "tolerance": Range(1e-14, 1.0, "an error"),
+    "accuracy": Range(1e-15, 0.5, "an error"),
+    "u0": Range(1e-20, 0.01, "an energy density", also=(0.0,)),
+    "largest_drop": Range(1e-6, 1.0, "a part of the energy", also=(math.inf,)),
+    "phi_thermal": Range(1e-6, 0.999, "a packing fraction"),
+    "n_sweeps": Range(0, 10**9, "sweeps", whole=True),
+    "delta_phi": Range(1e-8, 0.1, "a step of the packing fraction"),
+    "alpha": Range(1e-6, 100.0, "A / R", also=(0.0,)),
+    "p": Range(0.55, 10.0, "an exponent"),
+    "w1": Range(0.1, 1.0, "a/b"),
+    "w2": Range(1.0, 10.0, "c/b"),
+    "size_ratio": Range(1.0, 10.0, "big over small"),
+    "size": Range(0.01, 100.0, "a size"),
+    "share": Range(1e-6, 1e6, "a share"),
+    "spread": Range(0.0, 1.0, "a spread"),
+}
+"""What users may ask for, in the units of the papers: the ranges in which it was tried. Decks have the same."""
+
+MOST_STEPS = 10**12
+"""Of a run: more would not end in a year, whatever the machine."""
+
+
+def require_number(name: str, value: Any) -> float:
+    """Refuse what is no finite number; return it as a float.
+
+    Examples
+    --------
+    >>> require_number("dt", 0.5)
+    0.5
+    >>> require_number("dt", "4; ls")
+    Traceback (most recent call last):
+    ValueError: dt is '4; ls', expected a finite number
+    """
+    if not (_is_a(numbers.Real, value) and math.isfinite(value)):
+        msg = f"{name} is {_said(value)}, expected a finite number"
+        raise ValueError(msg)
+    return float(value)
+
+
+def require_positive(**values: Any) -> None:
+    """Refuse what is no finite number above 0.
+
+    Examples
+    --------
+    >>> require_positive(dt=0.0)
+    Traceback (most recent call last):
+    ValueError: dt is 0.0, expected a positive number
+    """
+    for name, value in values.items():
+        if not (_is_a(numbers.Real, value) and math.isfinite(value) and value > 0):
+            msg = f"{name} is {_said(value)}, expected a positive number"
+            raise ValueError(msg)
+
+
+def require_stated(**values: Any) -> None:
+    """Refuse numbers that are out of their `RANGES`, by their names there.
+
+    Raises
+    ------
+    ValueError
+
+    Examples
+    --------
+    >>> require_stated(n=256, kappa=1e-6)
+    >>> require_stated(kappa=-1.0)
+    Traceback (most recent call last):
+    ValueError: kappa is -1.0, expected a rate from 1e-14 to 0.1
+    """
+    for name, value in values.items():
+        require_in(name, value, RANGES[name])
+
+
+def require_in(name: str, value: Any, allowed: Range) -> None:
+    """Refuse a number that is out of a range, or none.
+
+    Raises
+    ------
+    ValueError
+    """
+    kind = numbers.Integral if allowed.whole else numbers.Real
+    if _is_a(kind, value) and (allowed.low <= value <= allowed.high or value in allowed.also):
+        return
+    msg = f"{name} is {_said(value)}, expected {_described(allowed)}"
+    raise ValueError(msg)
+
+
+def require_rising(phi_start: Any, phi_end: Any) -> None:
+    """Refuse a compression that would not compress.
+
+    Examples
+    --------
+    >>> require_rising(0.9, 0.4)
+    Traceback (most recent call last):
+    ValueError: phi_start is 0.9 and phi_end 0.4, expected an end above the start
+    """
+    require_stated(phi_start=phi_start, phi_end=phi_end)
+    if not phi_start < phi_end:
+        msg = f"phi_start is {phi_start} and phi_end {phi_end}, expected an end above the start"
+        raise ValueError(msg)
+
+
+def require_one_of(name: str, value: Any, table: Iterable[Any]) -> None:
+    """Refuse what is not in a table.
+
+    Examples
+    --------
+    >>> require_one_of("integrator", "euler", ("heun", "rkc2"))
+    Traceback (most recent call last):
+    ValueError: integrator is 'euler', expected one of heun, rkc2
+    """
+    names = list(table)
+    if not ((isinstance(value, str) or _is_a(numbers.Real, value)) and value in names):
+        texts = [name for name in names if isinstance(name, str)]
+        known = f"one of {', '.join(texts)}" if texts else " or ".join(map(str, names))
+        msg = f"{name} is {_said(value)}, expected {known}"
+        raise ValueError(msg)
+
+
+# LAMMPS reads the names of files as words of its input: these would end a word or stand for something.
+_TAKEN = {'"': "a double quote", "$": "a dollar", "*": "an asterisk", "%": "a percent sign"}
+
+
+def require_path_for_lammps(path: Path) -> None:
+    """Refuse a path that LAMMPS cannot be told.
+
+    Examples
+    --------
+    >>> require_path_for_lammps(Path("runs/my run.h5"))
+    >>> require_path_for_lammps(Path("runs/$HOME.h5"))
+    Traceback (most recent call last):
+    ValueError: the path 'runs/$HOME.h5' holds a dollar, which LAMMPS cannot take; choose another name
+    """
+    require_path(path)
+    text = str(path)
+    for sign, called in _TAKEN.items():
+        if sign in text:
+            msg = f"the path {text!r} holds {called}, which LAMMPS cannot take; choose another name"
+            raise ValueError(msg)
+
+
+def require_path(path: Path) -> None:
+    r"""Refuse a path with characters that end a line or are none.
+
+    Examples
+    --------
+    >>> require_path(Path("a\nb"))
+    Traceback (most recent call last):
+    ValueError: the path 'a\nb' holds a control character, expected letters and signs; choose another name
+    """
+    if any(unicodedata.category(sign) in {"Cc", "Cs"} for sign in str(path)):
+        msg = (
+            f"the path {str(path)!r} holds a control character, expected letters and signs;"
+            " choose another name"
+        )
+        raise ValueError(msg)
+
+
+def require_other_file(out: Path, inputs: Sequence[Path]) -> None:
+    """Refuse to write over a file that is read.
+
+    Raises
+    ------
+    ValueError
+    """
+    require_path(out)
+    if out.is_dir():
+        msg = f"{out} is a folder, expected the name of a file to write"
+        raise ValueError(msg)
+    for path in inputs:
+        if out.exists() and path.exists() and out.samefile(path):
+            msg = f"{out} is what is read and would be replaced, expected another file to write to"
+            raise ValueError(msg)
+
+
+def require_free(out: Path, *, again: bool, go_on: str = "") -> None:
+    """Refuse to replace a file that nobody said to replace.
+
+    Parameters
+    ----------
+    out : Path
+    again : bool
+        Whether somebody did, by the option ``--again``.
+    go_on : str
+        What else may be done with a file that is there.
+
+    Raises
+    ------
+    ValueError
+    """
+    require_path(out)
+    if out.exists() and not again:
+        msg = f"{out} is there, expected another --out, {go_on}or --again to replace it"
+        raise ValueError(msg)
+
+
+def _is_a(kind: type, value: Any) -> bool:
+    """Whether it is a number of a kind; what is true or false is none."""
+    return isinstance(value, kind) and type(value) is not bool
+
+
+def _described(allowed: Range) -> str:
+    words = [f"{value:g} or" for value in allowed.also]
+    low, high = (f"{v}" if allowed.whole else f"{v:g}" for v in (allowed.low, allowed.high))
+    whole = "a whole number of " if allowed.whole and not allowed.meaning.startswith("a ") else ""
+    return " ".join([*words, f"{whole}{allowed.meaning} from {low} to {high}"])
+
+
+def _said(value: Any) -> str:
+    """Show a value in one line."""
+    text = value if isinstance(value, numbers.Real) else repr(value)
+    said = str(text)
+    return said if len(said) <= 80 else f"{said[:77]}..."
