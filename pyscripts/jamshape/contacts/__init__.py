@@ -1,7 +1,14 @@
 """Near pairs, contacts, forces and rattlers of a packing."""
 
 from jamshape.contacts.found import Contacts
-from jamshape.contacts.near import NearPairs, PairArrays, Spheres, each_once, near_pairs
+from jamshape.contacts.near import (
+    NearPairs,
+    PairArrays,
+    Spheres,
+    Surroundings,
+    each_once,
+    near_pairs,
+)
 from jamshape.contacts.network import (
     Bonds,
     ContactKind,
@@ -27,6 +34,7 @@ __all__ = [
     "PairArrays",
     "Pairs",
     "Spheres",
+    "Surroundings",
     "coordination",
     "each_once",
     "find_contacts",

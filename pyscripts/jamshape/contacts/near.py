@@ -71,19 +71,61 @@ def near_pairs(first: Spheres, second: Spheres, box: Box) -> NearPairs:
     NearPairs
         In no particular order; a row of `first` that also stands in `second` meets itself.
     """
-    edges, both = box.edges, (first, second)
-    turns = [np.floor((s.centre - box.lo) / edges).astype(np.int64) for s in both]
-    inside = [s.centre - box.lo - turn * edges for s, turn in zip(both, turns, strict=True)]
-    bounds = [(1 + _BOUNDING_MARGIN) * s.radius for s in both]
-    reach = bounds[0].max(initial=0) + bounds[1].max(initial=0)
-    owner, shift = _images_near_box(inside[1], edges, reach)
-    near = cKDTree(inside[0]).sparse_distance_matrix(
-        cKDTree(inside[1][owner] + shift * edges), reach, output_type="ndarray"
-    )
-    i, j = near["i"], owner[near["j"]]
-    keep = near["v"] < bounds[0][i] + bounds[1][j]
-    i, j, shift = i[keep], j[keep], shift[near["j"][keep]]
-    return NearPairs(i, j, shift + turns[0][i] - turns[1][j])
+    reach = sum(_bound(spheres).max(initial=0) for spheres in (first, second))
+    return Surroundings(second, box, reach).near(first)
+
+
+class Surroundings:
+    """Spheres with all their periodic images within reach of the box, in a tree that is made once.
+
+    Parameters
+    ----------
+    spheres : Spheres
+    box : Box
+    reach : float, [length]
+        At least the largest sum of two radii that will be asked for.
+    """
+
+    def __init__(self, spheres: Spheres, box: Box, reach: float) -> None:
+        self.box, self._bound = box, _bound(spheres)
+        inside, self._turn = self._inside(spheres)
+        self._owner, self._shift = _images_near_box(inside, box.edges, reach)
+        self._tree = cKDTree(inside[self._owner] + self._shift * box.edges)
+
+    def near(self, first: Spheres) -> NearPairs:
+        """Find all pairs of other spheres and these that overlap; as `near_pairs`."""
+        inside, turn = self._inside(first)
+        bound = _bound(first)
+        reach = bound.max(initial=0) + self._bound.max(initial=0)
+        near = cKDTree(inside).sparse_distance_matrix(self._tree, reach, output_type="ndarray")
+        return self._kept(near["i"], near["j"], near["v"], (bound, turn))
+
+    def nearest(self, first: Spheres, most: int) -> NearPairs:
+        """Find of these pairs those with the centres nearest to each other sphere's, at most so many of each."""
+        inside, turn = self._inside(first)
+        apart, image = self._tree.query(inside, np.arange(1, 1 + most))
+        i, k = np.nonzero(np.isfinite(apart))
+        return self._kept(i, image[i, k], apart[i, k], (_bound(first), turn))
+
+    def _kept(
+        self, i: IntArray, image: IntArray, apart: FloatArray, first: tuple[FloatArray, IntArray]
+    ) -> NearPairs:
+        """Keep pairs of spheres, of bounds and turns `first`, and images that overlap."""
+        bound, turn = first
+        keep = apart < bound[i] + self._bound[self._owner[image]]
+        i, image = i[keep], image[keep]
+        j = self._owner[image]
+        return NearPairs(i, j, self._shift[image] + turn[i] - self._turn[j])
+
+    def _inside(self, spheres: Spheres) -> tuple[FloatArray, IntArray]:
+        """Centres in [0, edge), and how many edges they were moved."""
+        from_corner = spheres.centre - self.box.lo
+        turn = np.floor(from_corner / self.box.edges).astype(np.int64)
+        return from_corner - turn * self.box.edges, turn
+
+
+def _bound(spheres: Spheres) -> FloatArray:
+    return (1 + _BOUNDING_MARGIN) * spheres.radius
 
 
 def each_once(near: NearPairs) -> NearPairs:

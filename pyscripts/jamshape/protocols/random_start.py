@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.checks import RANGES, require_in, require_one_of, require_stated
-from jamshape.contacts import NearPairs, PairArrays, Spheres, each_once, near_pairs
-from jamshape.packing import Box, Packing, State
+from jamshape.contacts import (
+    NearPairs,
+    PairArrays,
+    Spheres,
+    Surroundings,
+    each_once,
+    near_pairs,
+)
+from jamshape.packing import Box, Packing
 from jamshape.shapes.particles import Particles
+from jamshape.shapes.shape import Interaction
 
 # Trial placements in all: a few seconds for 1000 particles.
 _ATTEMPTS, _ATTEMPTS_PER_PARTICLE = 200_000, 500
@@ -22,8 +31,11 @@ _MOST_PAIRS = 2**19
 # This share of the particles competes in one go: few enough that the longest stay ahead.
 _COMPETING = 1 / 16
 
-# Trials are tested against one such part of the placed particles after another: most fail early.
-_PARTS = 4
+# Trials are first tested against so many particles whose centres are nearest: most fail there.
+_NEAREST = 4
+
+# A tree of placed particles that is at most so many times larger than the next one is joined with it.
+_TREES_APART = 4
 
 # Directions in which the longest particle is tried in a box shorter than it.
 _DIRECTIONS = 4096
@@ -132,8 +144,33 @@ def _longest_first(packing: Packing) -> Packing:
     return packing.with_(**{k: getattr(packing, k)[order] for k in names})
 
 
+class _Poses(NamedTuple):
+    """Particles somewhere in the box, any of them any number of times."""
+
+    which: IntArray
+    """(M,) rows of all particles."""
+    position: FloatArray
+    """(M, D)"""
+
+    def take(self, rows: IntArray) -> _Poses:
+        return _Poses(self.which[rows], self.position[rows])
+
+    def joined(self, other: _Poses) -> _Poses:
+        return _Poses(*(np.concatenate(both) for both in zip(self, other, strict=True)))
+
+
+class _Placed(NamedTuple):
+    """Some of the particles whose poses are final, in a tree."""
+
+    poses: _Poses
+    around: Surroundings
+
+
 class _Insertion:
     """Particles on their way into the box.
+
+    What one batch of trials costs does not grow with the number of particles: those that are placed
+    are in trees of sizes far apart, of which the small ones are joined as they come.
 
     Parameters
     ----------
@@ -147,6 +184,7 @@ class _Insertion:
         self.rng = rng
         self.radius = self.particles.outer_radius
         self.waiting = np.arange(particles.n)  # poses of all others are final
+        self.placed: list[_Placed] = []
 
         reach = 2 * self.radius[0]
         pairs_per_trial = particles.n * np.prod(2 * reach / particles.box.edges)
@@ -200,67 +238,95 @@ class _Insertion:
             **{name: getattr(self.particles, name)[order] for name in names},
         )
 
-    def _trials(self, index: IntArray) -> Packing:
+    def _trials(self, index: IntArray) -> _Poses:
         """Put the particles `index`, any of them any number of times, anywhere in the box."""
-        box, names = self.particles.box, ("diameters", "exponent", "species")
-        return Packing(
-            position=box.edges * self.rng.random((len(index), box.dimension)),
-            orientation=self.orientation[index],
-            **{name: getattr(self.particles, name)[index] for name in names},
-            id=1 + np.arange(len(index)),
-            box=box,
-            shape_style=self.particles.shape_style,
-        )
+        box = self.particles.box
+        return _Poses(index, box.edges * self.rng.random((len(index), box.dimension)))
 
     def _place(self, index: IntArray) -> int:
         """Try each of the particles `index` once anywhere; return how many found a place."""
         trials = self._trials(index)
-        free = self._clear_of_placed(trials, index)
+        free = self._clear_of_placed(trials)
         if not len(free):
             return 0
         _, first_of_particle = np.unique(index[free], return_index=True)
-        free = free[first_of_particle]
-        free = free[self._clear_of_earlier(_taken(trials, free))]
-        self.position[index[free]] = trials.position[free]
-        self.waiting = np.setdiff1d(self.waiting, index[free])
-        return len(free)
+        found = trials.take(free[first_of_particle])
+        found = found.take(self._clear_of_earlier(found))
+        self._keep(found)
+        return len(found.which)
 
-    def _clear_of_own_images(self, trials: Packing) -> IntArray:
-        n, n_shifts = trials.n, len(self.own_shifts)
+    def _clear_of_own_images(self, trials: _Poses) -> IntArray:
+        n, n_shifts = len(trials.which), len(self.own_shifts)
         index = np.repeat(np.arange(n), n_shifts)
         images = NearPairs(index, index, np.tile(self.own_shifts, (n, 1)))
-        return np.setdiff1d(np.arange(n), _overlapping(images, trials).first)
+        return np.setdiff1d(np.arange(n), self._overlapping(images, trials).first)
 
-    def _clear_of_placed(self, trials: Packing, index: IntArray) -> IntArray:
-        """Find the trials, of the particles `index`, that overlap none of those that are placed."""
-        free = np.arange(len(index))
-        placed = np.delete(np.arange(self.particles.n), self.waiting)
-        for part in np.array_split(placed, _PARTS):
-            if not (len(part) and len(free)):
-                continue
-            both = _joined(_taken(trials, free), _taken(self._placed, part))
-            around, others = self._around(both, 0, len(free)), self._around(both, len(free), both.n)
-            near = near_pairs(around, others, both.box)
-            near = near._replace(second=near.second + len(free))
-            free = np.delete(free, _overlapping(near, both).first)
+    def _clear_of_placed(self, trials: _Poses) -> IntArray:
+        """Find the trials that overlap none of the particles that are placed."""
+        free = np.arange(len(trials.which))
+        for placed in self.placed:
+            if len(free):
+                free = free[self._clear_of(placed, trials.take(free))]
         return free
 
-    @property
-    def _placed(self) -> Packing:
-        return self.particles.with_(position=self.position, orientation=self.orientation)
+    def _clear_of(self, placed: _Placed, trials: _Poses) -> IntArray:
+        """Find the trials that overlap none of some placed particles."""
+        near = placed.around.nearest(self._around(trials), _NEAREST)
+        free = self._clear_of_pairs(near, placed, trials)
+        if not len(free):
+            return free
+        near = placed.around.near(self._around(trials.take(free)))
+        return free[self._clear_of_pairs(near, placed, trials.take(free))]
 
-    @staticmethod
-    def _around(packing: Packing, first: int, last: int) -> Spheres:
-        return Spheres(packing.position[first:last], packing.outer_radius[first:last])
+    def _clear_of_pairs(self, near: NearPairs, placed: _Placed, trials: _Poses) -> IntArray:
+        """Find the trials that overlap in none of the pairs with placed particles."""
+        n = len(trials.which)
+        rows, second = np.unique(near.second, return_inverse=True)
+        both = trials.joined(placed.poses.take(rows))
+        hits = self._overlapping(near._replace(second=second + n), both)
+        return np.delete(np.arange(n), hits.first)
 
-    def _clear_of_earlier(self, trials: Packing) -> BoolArray:
-        around = self._around(trials, 0, trials.n)
-        hits = _overlapping(each_once(near_pairs(around, around, trials.box)), trials)
-        clear = np.ones(trials.n, dtype=np.bool_)
+    def _keep(self, found: _Poses) -> None:
+        """Let particles stay where they are; all of them are among the first that wait."""
+        self.position[found.which] = found.position
+        end = 1 + np.searchsorted(self.waiting, found.which.max())
+        behind = self.waiting[:end][~np.isin(self.waiting[:end], found.which)]
+        self.waiting = self.waiting[len(found.which) :]
+        self.waiting[: len(behind)] = behind
+        while self.placed and len(self.placed[-1].poses.which) <= _TREES_APART * len(found.which):
+            found = self.placed.pop().poses.joined(found)
+        reach = 3 * self.radius[0]  # a margin over two radii
+        around = Surroundings(self._around(found), self.particles.box, reach)
+        self.placed.append(_Placed(found, around))
+
+    def _around(self, poses: _Poses) -> Spheres:
+        return Spheres(poses.position, self.radius[poses.which])
+
+    def _clear_of_earlier(self, trials: _Poses) -> IntArray:
+        around = self._around(trials)
+        near = each_once(near_pairs(around, around, self.particles.box))
+        hits = self._overlapping(near, trials)
+        clear = np.ones(len(trials.which), dtype=np.bool_)
         for i, j in zip(hits.first, hits.second, strict=True):  # ascending in i, and i < j
             if clear[i]:
                 clear[j] = False
-        return clear
+        return np.flatnonzero(clear)
+
+    def _overlapping(self, near: NearPairs, poses: _Poses) -> NearPairs:
+        """Keep of pairs of these poses those whose surfaces overlap."""
+        if not len(near.first):
+            return near
+        particles, index = self.particles, poses.which
+        sizes = (particles.diameters[index], particles.exponent[index])
+        bodies = particles.shape.compiled(sizes, particles.dimension, Interaction())
+        turned = self.orientation[index].reshape(len(index), -1)
+        position, orientation, edges = (
+            np.stack([x, np.zeros_like(x)]) for x in (poses.position, turned, particles.box.edges)
+        )
+        pairs = np.column_stack([near.first, near.second])
+        arrays = PairArrays(position, orientation, edges, pairs, near.shift)
+        hit: BoolArray = bodies.overlaps(*arrays)
+        return near.take(hit)
 
     def _stalled(self, n_attempts: int) -> InsertionError:
         if len(self.waiting) == self.particles.n:
@@ -284,26 +350,6 @@ class _Insertion:
             f" own periodic images in a box of edge {edge:.3g}: start at phi <= {_SAFE * fits:.2g}"
             " and compress from there, or take more particles"
         )
-
-
-def _taken(packing: Packing, rows: IntArray) -> Packing:
-    """Select particles by row; numbered anew. At least one."""
-    names = ("position", "orientation", "diameters", "exponent", "species", "image")
-    picked = {name: getattr(packing, name)[rows] for name in names}
-    return packing.with_(**picked, id=1 + np.arange(len(rows)))
-
-
-def _joined(first: Packing, second: Packing) -> Packing:
-    """Put the particles of two packings into one box."""
-    names = ("position", "orientation", "diameters", "exponent", "species", "image")
-    both = {k: np.concatenate([getattr(p, k) for p in (first, second)]) for k in names}
-    return first.with_(**both, id=1 + np.arange(first.n + second.n))
-
-
-def _overlapping(near: NearPairs, packing: Packing) -> NearPairs:
-    """Keep the pairs whose surfaces overlap."""
-    hit: BoolArray = packing.compiled().overlaps(*PairArrays.of(State.of(packing), near))
-    return near.take(hit)
 
 
 def _random_orientations(n: int, dimension: int, rng: np.random.Generator) -> FloatArray:
