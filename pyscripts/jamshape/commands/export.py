@@ -60,8 +60,10 @@ def _write_h5(path: Path, packings: Sequence[Packing]) -> None:
     results = getattr(first, "results", {})
     # What is said of a run is not true of its frames alone.
     write_packing(path, first, {} if _OF_A_RUN in results else results)
-    for packing in others:
-        RunWriter.open(path).append(packing)
+    if others:
+        with RunWriter.open(path) as writer:
+            for packing in others:
+                writer.append(packing)
 
 
 def _write_data(path: Path, packings: Sequence[Packing]) -> None:

@@ -25,7 +25,8 @@ from jamshape.exchange.fields import (
     particle_fields,
 )
 from jamshape.exchange.tools import tool
-from jamshape.files.layout import FileFormatError, PathLike, replacing
+from jamshape.files.disk import PathLike, replacing
+from jamshape.files.layout import FileFormatError
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.solid import Balls, Solid, Superquadric

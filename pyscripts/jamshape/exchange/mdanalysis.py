@@ -22,8 +22,8 @@ import numpy as np
 from jamshape.exchange.fields import in_space
 from jamshape.exchange.tools import tool
 from jamshape.files import layout
+from jamshape.files.disk import PathLike
 from jamshape.files.h5md import count_frames, read_packing
-from jamshape.files.layout import PathLike, replacing
 from jamshape.packing import Packing
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def write_mdanalysis(path: PathLike, source: Source) -> Packing:
     FileFormatError, OSError, ValueError
         As `to_mdanalysis`.
     """
-    with replacing(path) as temporary, layout.hdf5().File(temporary, "w") as file:
+    with layout.written(path) as file:
         return _write(file, source)
 
 
@@ -152,9 +152,8 @@ def _write(file: h5py.File, source: Source) -> Packing:
     for k, packing in enumerate(itertools.chain([first], frames)):
         _require_same(first, packing, k)
         for name, value in _values(packing).items():
-            layout.put(elements[name]["value"], k, value)
-        layout.put(clock["time"], k, packing.time)
-        layout.put(clock["step"], k, packing.step)
+            layout.extend_dataset(elements[name]["value"], k, value[None])
+        layout.extend(clock, {"time": np.array([packing.time]), "step": np.array([packing.step])})
     return first
 
 

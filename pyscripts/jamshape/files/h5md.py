@@ -35,7 +35,7 @@ The specification: https://nongnu.org/h5md/h5md.html
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,13 +43,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jamshape.files import layout
+from jamshape.files.disk import PathLike, replacing
 from jamshape.files.layout import (
     HDF5_SIGNATURE,
     FileFormatError,
-    PathLike,
     Report,
     Series,
-    replacing,
 )
 from jamshape.files.vocabulary import FORMAT_VERSION, renamed
 from jamshape.packing import Packing
@@ -72,6 +71,7 @@ __all__ = [
     "read_style",
     "replacing",
     "require_attributes",
+    "write_frames",
     "write_packing",
 ]
 
@@ -81,6 +81,7 @@ def write_packing(
     packing: Packing,
     attributes: Mapping[str, Any] | None = None,
     observables: Mapping[str, ArrayLike] | None = None,
+    report: tuple[ArrayLike, ArrayLike, ArrayLike] | None = None,
 ) -> None:
     """Write a packing, replacing the file at `path` only when all is written.
 
@@ -92,6 +93,8 @@ def write_packing(
     observables : mapping of str to array_like of numbers, optional
         Each is stored as one row at the packing's step and time: scalars as float64, arrays in
         their own type. NaN may stand for what is not defined.
+    report : three array_like of (T,) numbers, optional
+        The convergence history: step, wall seconds, error.
 
     Raises
     ------
@@ -100,15 +103,26 @@ def write_packing(
     OSError
         If the file cannot be written.
     """
-    with replacing(path) as temporary, layout.hdf5().File(temporary, "w") as file:
-        layout.write_metadata(file)
-        layout.create_particles(file.create_group("particles/all"), packing)
-        layout.append_frame(file["particles/all"], packing)
-        group = file.create_group("observables")
-        layout.append_observables(group, packing.step, packing.time, observables or {})
-        layout.set_attributes(file.create_group("parameters"), attributes or {})
-        for name, dtype in layout.REPORT.items():
-            layout.create_rows(file.require_group("report"), name, np.zeros((), dtype))
+    with layout.written(path) as file:
+        layout.create_file(file, packing, attributes or {}, observables or {})
+        if report is not None:
+            steps, seconds, errors = map(np.asarray, report)
+            layout.extend(file["report"], {"wall_seconds": seconds, "error": errors, "step": steps})
+
+
+def write_frames(
+    path: PathLike, frames: Sequence[Packing], attributes: Mapping[str, Any] | None = None
+) -> None:
+    """Write packings of the same particles as the frames of a run, with the steps 0, 1, 2, ...
+
+    Errors are those of `write_packing`.
+    """
+    with layout.written(path) as file:
+        layout.create_file(file, frames[0].with_(step=0), attributes or {}, {})
+        for step, frame in enumerate(frames[1:], start=1):
+            rests = frame.has_rests or "position_rest" in file["particles/all"]
+            rows = layout.frames_table(frame.with_(step=step), rests=rests)
+            layout.append_table(file, layout.FRAMES, rows)
 
 
 def read_packing(path: PathLike, frame: int = -1) -> Packing:

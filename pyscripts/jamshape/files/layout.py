@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.metadata
-import os
+import io
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.files.disk import PathLike, store
+from jamshape.files.journal import Pending, Table, read_journal
+from jamshape.files.rows import Columns, Stored, as_column, gathered, table
 from jamshape.files.vocabulary import FORMAT_VERSION, RENAMED, former
 from jamshape.packing import Box, Packing
 
@@ -20,8 +24,6 @@ if TYPE_CHECKING:
     import h5py
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-
-PathLike = str | os.PathLike[str]
 
 # Large enough for a long series to be a few chunks, small enough to keep a packing's file small.
 _CHUNK_BYTES = 1024
@@ -33,6 +35,9 @@ RESTS = {
     "edges_rest": "box/edges_rest",
 }
 REPORT = {"step": np.int64, "wall_seconds": np.float64, "error": np.float64}
+# Tables of a journal.
+FRAMES, OBSERVABLES, REPORT_TABLE = "frames", "observables", "report"
+_TOKEN = "journal"  # the attribute of a file that has one
 
 
 class FileFormatError(ValueError):
@@ -61,21 +66,6 @@ class Report(NamedTuple):
     """(T,) relative errors, in the meaning of whoever wrote them."""
 
 
-@contextmanager
-def replacing(path: PathLike) -> Iterator[Path]:
-    """Give a temporary path in the folder of `path`, which takes its place if the body succeeds.
-
-    If the body raises, the temporary file is removed and what stood at `path` still stands.
-    """
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        yield temporary
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 def hdf5() -> Any:
     """Import h5py here, so that text files and the rest of the library need no HDF5."""
     import h5py  # noqa: PLC0415
@@ -83,22 +73,90 @@ def hdf5() -> Any:
     return h5py
 
 
+class Image(io.BytesIO):
+    """An HDF5 file in memory, which HDF5 cannot fail to write.
+
+    Its closing crashes where a disk is full; so it never writes to one.
+    """
+
+    def __init__(self, path: PathLike, data: bytes = b"") -> None:
+        super().__init__(data)
+        self._path = path
+
+    def __repr__(self) -> str:
+        """Give the path, which h5py takes as the name of the file."""
+        return str(self._path)
+
+
+@contextmanager
+def written(path: PathLike) -> Iterator[h5py.File]:
+    """Give an empty HDF5 file, which replaces the one at `path` if the body succeeds.
+
+    Raises
+    ------
+    OSError
+        One sentence, if it cannot be written.
+    """
+    image = Image(path)
+    with hdf5().File(image, "w") as file:
+        yield file
+    store(path, image.getbuffer())
+
+
+@contextmanager
+def rewritten(path: PathLike) -> Iterator[h5py.File]:
+    """Give a copy of an HDF5 file to change, which replaces it if the body succeeds; errors as `opened`."""
+    with readable(path):
+        image = Image(path, Path(path).read_bytes())
+        with hdf5().File(image, "r+") as file:
+            check_h5md(file)
+            yield file
+    store(path, image.getbuffer())
+
+
 @contextmanager
 def opened(path: PathLike) -> Iterator[h5py.File]:
-    """Open for reading; what HDF5 says of damaged content becomes a FileFormatError."""
+    """Open for reading, with the rows that are in the journal still.
+
+    What HDF5 says of damaged content becomes a FileFormatError, what it says of locks a sentence.
+    """
+    with readable(path), _with_journal(path) as file:
+        check_h5md(file)
+        yield file
+
+
+@contextmanager
+def readable(path: PathLike) -> Iterator[None]:
+    """Refuse what is no HDF5 file, and turn what HDF5 says of damaged ones into a FileFormatError."""
     with Path(path).open("rb") as raw:
         if raw.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
             msg = f"{path}: is not an HDF5 file, expected one written by jamshape"
             raise FileFormatError(msg)
     try:
-        with hdf5().File(path, "r") as file:
-            check_h5md(file)
-            yield file
+        yield
+    except BlockingIOError as error:
+        msg = f"{path}: another program has it open to write, expected to read it; close it there"
+        raise OSError(errno.EAGAIN, msg) from error
     except (OSError, RuntimeError, KeyError) as error:
         if isinstance(error, OSError) and error.errno is not None:
-            raise  # the system's own, such as a lock, and not a matter of content
+            raise  # the system's own, and not a matter of content
         msg = f"{path}: is truncated or damaged, expected a complete HDF5 file; write it again"
         raise FileFormatError(msg) from error
+
+
+def _with_journal(path: PathLike) -> h5py.File:
+    """Open a file, in memory if there are rows to add."""
+    pending = read_journal(path)
+    while pending:
+        file = hdf5().File(Image(path, Path(path).read_bytes()), "r+")
+        if fold(file, pending):
+            return file
+        file.close()
+        # Its rows have been folded already, unless a writer has begun another journal meanwhile.
+        before, pending = pending.token, read_journal(path)
+        if pending and pending.token == before:
+            break
+    return hdf5().File(path, "r")
 
 
 def check_h5md(file: h5py.File) -> None:
@@ -158,6 +216,12 @@ def rename_observables(file: h5py.File) -> None:
     require_item(file, "h5md/creator").attrs["format_version"] = FORMAT_VERSION
 
 
+def has_todays_names(file: h5py.File) -> bool:
+    """Whether a file is not one of an earlier version."""
+    version = require_item(file, "h5md/creator").attrs.get("format_version", 1)
+    return bool(version >= FORMAT_VERSION)
+
+
 def read_rows(file: h5py.File, name: str) -> Series:
     """Read an observable with its steps and times."""
     element = f"observables/{name}"
@@ -183,6 +247,25 @@ def write_metadata(file: h5py.File) -> None:
     creator.attrs["name"] = np.bytes_("jamshape")
     creator.attrs["version"] = np.bytes_(version)
     creator.attrs["format_version"] = FORMAT_VERSION
+
+
+def create_file(
+    file: h5py.File,
+    packing: Packing,
+    attributes: Mapping[str, Any],
+    observables: Mapping[str, ArrayLike],
+) -> None:
+    """Write a packing, or the first frame of a run, into an empty file."""
+    write_metadata(file)
+    create_particles(file.create_group("particles/all"), packing)
+    file.create_group("observables")
+    for name, dtype in REPORT.items():
+        create_rows(file.require_group("report"), name, np.zeros((), dtype))
+    append_table(file, FRAMES, frames_table(packing, rests=packing.has_rests))
+    columns = {name: as_column(value) for name, value in observables.items()}
+    Stored().check_observables(packing.step, columns)
+    append_table(file, OBSERVABLES, table([packing.step], [packing.time], columns))
+    set_attributes(file.create_group("parameters"), attributes)
 
 
 def frame_values(packing: Packing, *, rests: bool) -> dict[str, NDArray[Any]]:
@@ -217,13 +300,12 @@ def create_particles(group: h5py.Group, packing: Packing) -> None:
     group["box"].attrs["boundary"] = np.array([b"periodic"] * packing.dimension)
 
 
-def create_rests(group: h5py.Group, packing: Packing, n: int) -> None:
-    """Create the elements of rests, zero in the n frames that are there."""
-    for name, path in RESTS.items():
-        element = group.create_group(path)
-        create_rows(element, "value", getattr(packing, name))
-        element["value"].resize(n, axis=0)
-        element["step"], element["time"] = group["position/step"], group["position/time"]
+def create_rest(group: h5py.Group, path: str, row: NDArray[Any], n: int) -> None:
+    """Create an element of rests, zero in the n frames that are there."""
+    element = group.create_group(path)
+    create_rows(element, "value", row)
+    element["value"].resize(n, axis=0)
+    element["step"], element["time"] = group["position/step"], group["position/time"]
 
 
 def create_clock(group: h5py.Group) -> None:
@@ -245,49 +327,85 @@ def create_rows(group: h5py.Group, name: str, row: NDArray[Any]) -> None:
     )
 
 
-def append_frame(group: h5py.Group, packing: Packing) -> None:
-    """Write a frame after the last one."""
-    position = group["position"]
-    n = len(position["step"])
-    if packing.has_rests and "position_rest" not in group:
-        create_rests(group, packing, n)
-    for name, value in frame_values(packing, rests="position_rest" in group).items():
-        put(group[name]["value"], n, value)
-    put(position["time"], n, packing.time)
-    put(position["step"], n, packing.step)
+def fold(file: h5py.File, pending: Pending | None) -> bool:
+    """Append the rows of a journal, if it goes on from this file."""
+    if not pending or token_of(file) != pending.token:
+        return False
+    tables, attributes = gathered(pending.records)
+    for name, rows in tables:
+        append_table(file, name, rows)
+    file["parameters"].attrs.update(attributes)
+    return True
 
 
-def append_observables(
-    group: h5py.Group, step: int, time: float, observables: Mapping[str, ArrayLike]
-) -> None:
-    """Write a row of each observable after the last one."""
-    rows = {name: as_row(value) for name, value in observables.items()}
-    for name, row in rows.items():
-        check_observable(group, name, row)
-        if name in group:
-            check_after(name, group[name], step)
-    for name, row in rows.items():
-        if name not in group:
-            create_rows(group.create_group(name), "value", row)
-            create_clock(group[name])
-        element = group[name]
-        n = len(element["step"])
-        put(element["value"], n, row)
-        put(element["time"], n, time)
-        put(element["step"], n, step)
+def token_of(file: h5py.File) -> str | None:
+    """Tell the name of the state of a file, if it has one."""
+    token: str | None = file.attrs.get(_TOKEN)
+    return token
 
 
-def as_row(value: ArrayLike) -> NDArray[Any]:
-    """Turn a value into what a row holds."""
-    array = np.asarray(value)
-    # A first value that happens to be an integer must not make a series of integers.
-    return array.astype(np.float64) if array.ndim == 0 and array.dtype.kind in "biuf" else array
+def set_token(file: h5py.File, token: str | None) -> None:
+    """Name the state of a file from which a journal goes on; None where there is no journal."""
+    if token:
+        file.attrs[_TOKEN] = token
+    elif _TOKEN in file.attrs:
+        del file.attrs[_TOKEN]
 
 
-def put(dataset: h5py.Dataset, index: int, row: ArrayLike) -> None:
-    """Write a row at the end."""
-    dataset.resize(index + 1, axis=0)
-    dataset[index] = row
+def append_table(file: h5py.File, name: str, rows: Table) -> None:
+    """Write rows after the last ones of the frames, the observables or the report."""
+    columns = {key: rows[key] for key in rows.dtype.names or ()}
+    if name == REPORT_TABLE:
+        extend(file["report"], columns)
+        return
+    clock = {key: columns.pop(key) for key in ("time", "step")}
+    if name == FRAMES:
+        _append_frames(file["particles/all"], clock, columns)
+        return
+    for key, column in columns.items():
+        group = file["observables"]
+        if key not in group:
+            create_rows(group.create_group(key), "value", column[0])
+            create_clock(group[key])
+        extend(group[key], {"value": column, **clock})
+
+
+def _append_frames(group: h5py.Group, clock: Columns, columns: Columns) -> None:
+    n = len(group["position/step"])
+    for key, column in columns.items():
+        if key not in group:
+            create_rest(group, key, column[0], n)
+        extend_dataset(group[key]["value"], n, column)
+    extend(group["position"], clock)
+
+
+def frames_table(packing: Packing, *, rests: bool) -> Table:
+    """Put a frame into a table of one row."""
+    columns = {name: value[None] for name, value in frame_values(packing, rests=rests).items()}
+    return table([packing.step], [packing.time], columns)
+
+
+def extend(group: h5py.Group, columns: Columns) -> None:
+    """Write rows after the last one, over what an interrupted writer of earlier versions left there."""
+    n = len(group["step"])
+    for name, column in columns.items():
+        extend_dataset(group[name], n, column)
+
+
+def extend_dataset(dataset: h5py.Dataset, n: int, rows: NDArray[Any]) -> None:
+    """Write rows after the first n."""
+    dataset.resize(n + len(rows), axis=0)
+    dataset[n:] = rows
+
+
+def truncate_all(file: h5py.File, step: int) -> None:
+    """Drop all frames, observables and rows of the report after a step."""
+    frames = file["particles/all"]
+    names = ("position", "orientation", "image", "box/edges", "box/lo", *RESTS.values())
+    values = [frames[name]["value"] for name in names if name in frames]
+    truncate(step, frames["position"], values)
+    for element in (*file["observables"].values(), file["report"]):
+        truncate(step, element)
 
 
 def truncate(step: int, clock: h5py.Group, others: Iterable[h5py.Dataset] = ()) -> None:
@@ -297,33 +415,8 @@ def truncate(step: int, clock: h5py.Group, others: Iterable[h5py.Dataset] = ()) 
         dataset.resize(n, axis=0)
 
 
-def check_after(name: str, element: h5py.Group, step: int) -> None:
-    """Refuse a step that is not after the last one."""
-    stored = element["step"]
-    if len(stored) and step <= stored[-1]:
-        msg = f"{name} is stored up to step {stored[-1]}, expected a step after it, found {step}"
-        raise ValueError(msg)
-
-
-def check_observable(group: h5py.Group, name: str, row: NDArray[Any]) -> None:
-    """Refuse an observable of a bad name, or of another type than before."""
-    if not name or "/" in name or name == ".":
-        msg = f"observable is named {name!r}, expected a name without '/'"
-        raise ValueError(msg)
-    if row.dtype.kind not in "biuf":
-        msg = f"observable {name!r} has dtype {row.dtype}, expected numbers"
-        raise ValueError(msg)
-    if name not in group:
-        return
-    stored = group[name]["value"]
-    if (row.dtype, row.shape) != (stored.dtype, stored.shape[1:]):
-        expected = f"{stored.dtype} {stored.shape[1:]}"
-        msg = f"observable {name!r} is {row.dtype} {row.shape}, expected {expected} as before"
-        raise ValueError(msg)
-
-
-def set_attributes(group: h5py.Group, attributes: Mapping[str, Any]) -> None:
-    """Set attributes, of types that HDF5 can hold."""
+def check_attributes(attributes: Mapping[str, Any]) -> None:
+    """Refuse what HDF5 cannot hold as an attribute."""
     for name, value in attributes.items():
         array = np.asarray(value)
         if array.dtype.kind not in "biuf" and not isinstance(value, str):
@@ -333,6 +426,11 @@ def set_attributes(group: h5py.Group, attributes: Mapping[str, Any]) -> None:
             found = f"attribute {name!r} has {array.nbytes} bytes"
             msg = f"{found}, expected at most {_ATTRIBUTE_BYTES}; store it as an observable"
             raise ValueError(msg)
+
+
+def set_attributes(group: h5py.Group, attributes: Mapping[str, Any]) -> None:
+    """Set attributes, of types that HDF5 can hold."""
+    check_attributes(attributes)
     group.attrs.update(attributes)
 
 

@@ -1,27 +1,40 @@
-"""Appending to the file of a run."""
+"""Appending to the file of a run, which survives whatever ends the process."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from time import perf_counter
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.files import layout
-from jamshape.files.h5md import read_packing, write_packing
-from jamshape.files.layout import PathLike
+from jamshape.files.disk import PathLike, real
+from jamshape.files.h5md import read_packing
+from jamshape.files.journal import Journal, Table, new_token
+from jamshape.files.rows import ATTRIBUTES, Columns, Stored, as_column, beside, check_after, table
 from jamshape.packing import Packing
 
 if TYPE_CHECKING:
     import h5py
 
+# Rows are folded into the HDF5 file when they are this part of it, so that all folding together writes
+# a few times its final size; and only after so many times the seconds that folding took last.
+_PART = 0.25
+_PAUSE = 200
+_SECONDS = 0.05  # about what it takes, where it was not measured yet
+
 
 class RunWriter:
-    """Appends to the file of a run, which is opened, flushed and closed at each call.
+    """Appends to the file of a run: rows to its journal, which are folded into the file now and then.
 
-    So the file is closed and readable however the process ends between two calls.
+    The file is whole at every moment, and what is read with `jamshape.files.h5md` has all rows; other
+    programs see those that were folded, all of them once the writer is closed. Nobody else can write the
+    run until then. It is a context manager, which closes it.
 
     Parameters
     ----------
@@ -30,13 +43,22 @@ class RunWriter:
 
     Raises
     ------
-    FileFormatError, OSError
+    FileFormatError
         As `read_packing`.
+    OSError
+        If the file is not there, is written by another process, or cannot be written.
     """
 
     def __init__(self, path: PathLike) -> None:
         self.path = Path(path)
         self.first = read_packing(path, 0)
+        self._journal = Journal(path)
+        try:
+            if not self._goes_on():
+                self._fold()
+        except BaseException:
+            self._journal.close(and_remove=False)
+            raise
 
     @classmethod
     def create(
@@ -45,18 +67,55 @@ class RunWriter:
         first: Packing,
         attributes: Mapping[str, Any] | None = None,
         observables: Mapping[str, ArrayLike] | None = None,
-    ) -> RunWriter:
+    ) -> Self:
         """Write the file with its first frame, as `write_packing`, and return its writer."""
-        write_packing(path, first, attributes, observables)
-        return cls(path)
+        journal, writer = Journal(path), cls.__new__(cls)
+        writer.path, writer.first, writer._journal = Path(path), first, journal
+        try:
+            with writer._replacing(layout.written(path)) as file:
+                layout.create_file(file, first, attributes or {}, observables or {})
+        except BaseException:
+            journal.close(and_remove=not real(path).exists())
+            raise
+        return writer
 
     @classmethod
-    def open(cls, path: PathLike) -> RunWriter:
+    def open(cls, path: PathLike) -> Self:
         """Return a writer that appends to an existing file, under today's names."""
-        writer = cls(path)
-        with writer._file() as file:
-            layout.rename_observables(file)
-        return writer
+        return cls(path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is None:
+            self.close()
+            return
+        with suppress(OSError):  # rows are safe in the journal; the first error is the one to tell
+            self.close()
+
+    def close(self) -> None:
+        """Fold all rows into the file and let others write it.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written; the rows stay in the journal.
+        """
+        if self._journal.is_closed:
+            return
+        try:
+            if not self._journal.is_empty:
+                self._fold(is_last=True)
+        except BaseException:
+            self._journal.close(and_remove=False)
+            raise
+        self._journal.close(and_remove=True)
 
     def append(self, packing: Packing, observables: Mapping[str, ArrayLike] | None = None) -> None:
         """Append a frame, and observables at its step and time.
@@ -68,16 +127,26 @@ class RunWriter:
             not after the last one.
         """
         self._check_same_particles(packing)
-        with self._file() as file:
-            frames, step, time = file["particles/all"], packing.step, packing.time
-            layout.check_after("position", frames["position"], step)
-            layout.append_observables(file["observables"], step, time, observables or {})
-            layout.append_frame(frames, packing)
+        step, stored = packing.step, self._stored
+        check_after("position", stored.frame, step)
+        columns = {name: as_column(value) for name, value in (observables or {}).items()}
+        stored.check_observables(step, columns)
+        has_rests = stored.has_rests or packing.has_rests
+        tables = {layout.FRAMES: layout.frames_table(packing, rests=has_rests)}
+        if columns:
+            tables[layout.OBSERVABLES] = table([step], [packing.time], columns)
+        self._append(tables)
+        stored.frame, stored.has_rests = step, has_rests
+        stored.add_observables(step, columns)
 
     def append_observables(
-        self, step: int, time: float, observables: Mapping[str, ArrayLike]
+        self,
+        step: int,
+        time: float,
+        observables: Mapping[str, ArrayLike],
+        report: tuple[float, float] | None = None,
     ) -> None:
-        """Append observables between frames.
+        """Append observables between frames, and wall seconds and error to the report.
 
         Raises
         ------
@@ -85,13 +154,14 @@ class RunWriter:
             If the step is not after the last one of the same observable, or its type or shape
             has changed.
         """
-        with self._file() as file:
-            layout.append_observables(file["observables"], step, time, observables)
+        columns = {name: as_column(value) for name, value in observables.items()}
+        tables = self._reported(step, *report) if report else {}
+        self._append_columns([step], [time], columns, tables)
 
     def append_series(
         self, steps: ArrayLike, times: ArrayLike, observables: Mapping[str, ArrayLike]
     ) -> None:
-        """Append (T,) rows of scalar observables at once, which costs little more than one.
+        """Append (T,) rows of scalar observables at once.
 
         Raises
         ------
@@ -103,22 +173,10 @@ class RunWriter:
         if any(column.shape != steps.shape for column in (times, *columns.values())):
             msg = f"{self.path}: rows of a series differ in length, expected {steps.shape}"
             raise ValueError(msg)
-        if not len(steps):
-            return
         if (np.diff(steps) <= 0).any():
             msg = f"{self.path}: the steps of a series do not ascend, expected ascending ones"
             raise ValueError(msg)
-        with self._file() as file:
-            group = file["observables"]
-            first = {name: column[0] for name, column in columns.items()}
-            layout.append_observables(group, int(steps[0]), float(times[0]), first)
-            for name, column in columns.items():
-                rows = {"value": column, "time": times, "step": steps}
-                for part, row in rows.items():
-                    dataset = group[name][part]
-                    n = len(dataset)
-                    dataset.resize(n + len(row) - 1, axis=0)
-                    dataset[n:] = row[1:]
+        self._append_columns(steps, times, columns, {})
 
     def append_report(self, step: ArrayLike, wall_seconds: ArrayLike, error: ArrayLike) -> None:
         """Append one row, or (T,) rows at once, to the convergence history.
@@ -128,19 +186,7 @@ class RunWriter:
         ValueError
             If the lengths differ, or the steps, with those stored, ever decrease.
         """
-        steps, seconds, errors = np.broadcast_arrays(
-            *map(np.atleast_1d, (step, wall_seconds, error))
-        )
-        with self._file() as file:
-            report = file["report"]
-            n = len(report["step"])
-            if (np.diff([*report["step"][max(n - 1, 0) : n], *steps]) < 0).any():
-                msg = f"{self.path}: the report's steps decrease, expected ascending steps"
-                raise ValueError(msg)
-            rows = {"error": errors, "wall_seconds": seconds, "step": steps}
-            for name, row in rows.items():
-                report[name].resize(n + len(row), axis=0)
-                report[name][n:] = row
+        self._append(self._reported(step, wall_seconds, error))
 
     def truncate(self, step: int) -> None:
         """Drop all frames, observables and report rows after `step`, to resume from there.
@@ -153,21 +199,91 @@ class RunWriter:
         if step < self.first.step:
             msg = f"{self.path}: starts at step {self.first.step}, expected to keep step {step}"
             raise ValueError(msg)
-        with self._file() as file:
-            frames = file["particles/all"]
-            names = layout.frame_values(self.first, rests="position_rest" in frames)
-            values = [frames[name]["value"] for name in names]
-            layout.truncate(step, frames["position"], values)
-            for element in (*file["observables"].values(), file["report"]):
-                layout.truncate(step, element)
+        self._fold(up_to=step)
 
     def set_attributes(self, attributes: Mapping[str, Any]) -> None:
         """Set attributes, replacing those of the same name; errors as `write_packing`."""
-        with self._file() as file:
-            layout.set_attributes(file["parameters"], attributes)
+        layout.check_attributes(attributes)
+        texts = {name: value for name, value in attributes.items() if isinstance(value, str)}
+        numbers = {k: np.asarray(v)[None] for k, v in attributes.items() if k not in texts}
+        self._append({ATTRIBUTES: beside(numbers)} if numbers else {}, texts)
 
-    def _file(self) -> h5py.File:
-        return layout.hdf5().File(self.path, "r+")
+    def _append_columns(
+        self, steps: ArrayLike, times: ArrayLike, columns: Columns, more: Mapping[str, Table]
+    ) -> None:
+        steps = np.asarray(steps, np.int64)
+        if len(steps) and columns:
+            self._stored.check_observables(int(steps[0]), columns)
+            self._append({layout.OBSERVABLES: table(steps, times, columns), **more})
+            self._stored.add_observables(int(steps[-1]), columns)
+
+    def _reported(
+        self, step: ArrayLike, wall_seconds: ArrayLike, error: ArrayLike
+    ) -> dict[str, Table]:
+        """Check rows of the report."""
+        given = np.broadcast_arrays(*map(np.atleast_1d, (step, wall_seconds, error)))
+        columns = dict(zip(layout.REPORT, given, strict=True))
+        steps, last = columns["step"], self._stored.report
+        if (np.diff(steps, prepend=steps[:1] if last is None else last) < 0).any():
+            msg = f"{self.path}: the report's steps decrease, expected ascending steps"
+            raise ValueError(msg)
+        return {layout.REPORT_TABLE: beside(columns, layout.REPORT)} if len(steps) else {}
+
+    def _append(self, tables: Mapping[str, Table], texts: Mapping[str, str] | None = None) -> None:
+        if not tables and not texts:
+            return
+        self._journal.append(tables, texts or {})
+        if layout.REPORT_TABLE in tables:
+            self._stored.report = int(tables[layout.REPORT_TABLE]["step"][-1])
+        if self._journal.length > _PART * self._bytes and perf_counter() > self._fold_after:
+            self._fold()
+
+    def _fold(self, *, up_to: int | None = None, is_last: bool = False) -> None:
+        """Put the rows of the journal into the file, and drop those after a step."""
+        with self._replacing(layout.rewritten(self.path), is_last=is_last) as file:
+            self._add_pending(file)
+            layout.rename_observables(file)
+            if up_to is not None:
+                layout.truncate_all(file, up_to)
+
+    def _goes_on(self) -> bool:
+        """Begin an empty journal from the file as it is, if a writer left it ready for that."""
+        if self._journal.read():
+            return False
+        with layout.opened(self.path) as file:
+            token = layout.token_of(file)
+            if not token or not layout.has_todays_names(file):
+                return False
+            self._stored = Stored.of(file)
+        self._begin(token, _SECONDS)
+        return True
+
+    def _begin(self, token: str, seconds: float) -> None:
+        """Begin an empty journal, after so many seconds of writing the file."""
+        self._journal.begin(token)
+        self._bytes = self.path.stat().st_size
+        self._fold_after = perf_counter() + _PAUSE * seconds
+
+    def _add_pending(self, file: h5py.File) -> None:
+        pending = self._journal.read()
+        is_own = layout.fold(file, pending)
+        if self._journal.length and not is_own:
+            msg = (
+                f"{self.path}: another program has replaced this file, expected to be the only one"
+                " that writes it; write to another file"
+            )
+            raise layout.FileFormatError(msg)
+
+    @contextmanager
+    def _replacing(self, change: Any, *, is_last: bool = False) -> Iterator[h5py.File]:
+        """Replace the file by a changed one, from which an empty journal goes on."""
+        began, token = perf_counter(), None if is_last else new_token()
+        with change as file:
+            yield file
+            layout.set_token(file, token)
+            self._stored = Stored.of(file)
+        if token:
+            self._begin(token, perf_counter() - began)
 
     def _check_same_particles(self, packing: Packing) -> None:
         for name in ("dimension", "shape_style", "id", "species", "diameters", "exponent"):

@@ -149,7 +149,7 @@ class CompressionRun:
     ) -> None:
         self.session, self.settings = session, settings
         self._began = perf_counter()
-        self._time, self._step_of_time = 0.0, 0
+        self._time, self._step_of_time, self._evaluations = 0.0, 0, 0.0
         if restart is None:
             session.load(start)
         else:
@@ -187,25 +187,27 @@ class CompressionRun:
     def change(self, kappa: float | None = None, dt: float | None = None) -> None:
         """Go on with another rate or time step."""
         self._time, self._step_of_time = self.time, self.session.step
+        self._evaluations = self.measure()["evaluations"]
         old = self.settings
         self.settings = dataclasses.replace(old, kappa=kappa or old.kappa, dt=dt or old.dt)
         self.session.commands(
             f"unfix flow\n{self._fix()}\ntimestep {self.settings.dt!r}\nrun 0 post no"
         )
 
+    def count_from(self, evaluations: float) -> None:
+        """Go on counting evaluations of the forces from those of an earlier process."""
+        self._evaluations = evaluations
+
     @property
     def time(self) -> float:
         """Since the start, also if the time step has changed."""
         return self._time + (self.session.step - self._step_of_time) * self.settings.dt
 
-    def keep_restarts(self, every: int, path: Path) -> None:
-        """Write restart files `path`.a and `path`.b in turn, every so many steps."""
-        self.session.commands(f'restart {every} "{path}.a" "{path}.b"')
-
     def write_restart(self, path: Path) -> None:
-        """Write a LAMMPS restart file of the present state."""
-        # It moves atoms into the box and orders them anew, which neighbour lists must follow.
-        self.session.commands(f'write_restart "{path}"\nrun 0 post no')
+        """Write a LAMMPS restart file of the present state; errors as `Session.write_restart`."""
+        self.session.write_restart(path)
+        # That moves atoms into the box and orders them anew, which neighbour lists must follow.
+        self.session.commands("run 0 post no")
 
     def samples(self, every: int) -> Iterator[Row]:
         """Run to the end and yield a row at each multiple of `every` steps, and at the end."""
@@ -232,6 +234,7 @@ class CompressionRun:
         found = {name: float(values[column]) for name, column in _PACKING.items()}
         flow = _FLOW | _SUBSTEPS if self.settings.chooses_steps else _FLOW
         found |= {name: float(lmp.extract_fix("flow", 0, 1, k)) for name, k in flow.items()}
+        found["evaluations"] += self._evaluations
         return found
 
     def packing(self) -> Packing:

@@ -5,18 +5,18 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from jamshape.checks import require_stated
 from jamshape.files.h5md import (
+    FileFormatError,
     read_attributes,
     read_observables,
-    read_packing,
     read_series,
     read_style,
     require_attributes,
 )
+from jamshape.files.restarts import RestartFiles
 from jamshape.files.run_writer import RunWriter
 from jamshape.flow.compression import Compression, CompressionRun, Row
 from jamshape.measures.onset import fit_onset
@@ -39,7 +39,7 @@ class Recording:
     Parameters
     ----------
     path
-        The file; until the run is finished restart files lie beside it, as ``path.restart.a`` and ``.b``.
+        The file; until the run is finished restart files lie beside it, as ``path.restart.a`` and ``.b``, and its journal.
     rows, frames
         How many samples of the observables and how many snapshots, over the whole run.
     attributes
@@ -60,32 +60,9 @@ class Recording:
         require_stated(rows=self.rows, frames=self.frames)
 
     @property
-    def restart_prefix(self) -> Path:
-        """Path of the restart files without their last letter."""
-        return self.path.with_name(self.path.name + ".restart")
-
-    def newest_restart(self) -> Path:
-        """Find the last restart file of a run that was killed.
-
-        Raises
-        ------
-        FileNotFoundError
-            When there is none.
-        """
-        paths = self._restart_files()
-        found = [path for path in paths if path.is_file()]
-        if not found:
-            msg = f"Found neither {paths[0]} nor {paths[1].name}, expected one: start anew."
-            raise FileNotFoundError(msg)
-        return max(found, key=lambda path: path.stat().st_mtime)
-
-    def forget_restarts(self) -> None:
-        """Remove the restart files, which a finished run does not need."""
-        for path in self._restart_files():
-            path.unlink(missing_ok=True)
-
-    def _restart_files(self) -> list[Path]:
-        return [Path(f"{self.restart_prefix}.{end}") for end in "ab"]
+    def restarts(self) -> RestartFiles:
+        """The restart files."""
+        return RestartFiles(self.path.with_name(self.path.name + ".restart"))
 
 
 def is_finished(path: Path) -> bool:
@@ -119,84 +96,83 @@ def require_same(to: Recording, settings: Compression, dimension: int) -> None:
 def begin(session: Session, settings: Compression, start: Packing, to: Recording) -> CompressionRun:
     """Start a compression and its file."""
     run = CompressionRun(session, settings, start)
-    to.forget_restarts()  # of another run, which was cut off and is begun anew
+    to.restarts.forget()  # of another run, which was cut off and is begun anew
+    run.write_restart(to.restarts.next())
     attributes = dataclasses.asdict(settings) | dict(to.attributes)
     attributes |= {"phi_start": start.phi, "rows": to.rows, "frames": to.frames, "finished": False}
     attributes["left_out"] = session.left_out()
-    RunWriter.create(to.path, run.packing(), attributes, run.measure())
+    RunWriter.create(to.path, run.packing(), attributes, run.measure()).close()
     return run
 
 
 def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
-    """Go on with a compression that was killed, from its last restart file, as it was set."""
+    """Go on with a compression that was killed, from its newest whole restart file, as it was set.
+
+    Without any it begins anew from its first frame.
+
+    Raises
+    ------
+    FileFormatError
+        If rows between the last one and the restart file are not there.
+    """
     stored = read_attributes(path)
     names = {f.name for f in dataclasses.fields(Compression)} & set(stored)
     settings = Compression(**{name: stored[name] for name in names})
     to = Recording(path, stored["rows"], stored["frames"])
-    run = CompressionRun(session, settings, read_packing(path, 0), to.newest_restart())
-    RunWriter.open(path).truncate(session.step)
+    with RunWriter.open(path) as writer:
+        run = CompressionRun(session, settings, writer.first, to.restarts.newest())
+        last = int(read_series(path, "pressure").step[-1])
+        if session.step > last + _every(run, to, writer.first, stored):
+            msg = (
+                f"{path}: has rows up to step {last}, expected those up to step {session.step} of its"
+                " restart file; bring its journal back beside it, or make it again"
+            )
+            raise FileFormatError(msg)
+        writer.truncate(session.step)
+    counted = read_observables(path).get("evaluations")
+    if session.step and counted is not None:
+        run.count_from(float(counted[-1]))
     return run, to
 
 
 def record(run: CompressionRun, to: Recording) -> Iterator[Row]:
-    """Run to the end and yield each sample, which is in the file within about a second.
+    """Run to the end and yield each sample, which is in the file by then.
 
-    What a restart file goes on from is there before it: all samples before its step.
+    What a restart file goes on from is there before it: all samples up to its step.
     """
-    writer = RunWriter.open(to.path)
-    whole = run.settings.steps(float(read_attributes(to.path)["phi_start"]), writer.first.dimension)
-    every = max(1, whole // to.rows)
-    per_frame = every * max(1, to.rows // to.frames)
-    run.keep_restarts(per_frame, to.restart_prefix)
-    rows = _Rows(writer, "local_error" if run.settings.chooses_steps else "step_error")
+    stored, last = read_attributes(to.path), read_series(to.path, "pressure").step[-1]
+    with RunWriter.open(to.path) as writer:
+        every = _every(run, to, writer.first, stored)
+        per_frame = every * max(1, to.rows // to.frames)
 
-    def keep(sample: Row) -> Row:
-        rows.add(sample)
-        is_frame = sample.step % per_frame == 0 or sample.step == run.last_step
-        if is_frame or rows.is_late or (sample.step + every) % per_frame == 0:
-            rows.write()
-        if is_frame:
-            writer.append(run.packing())
-        return sample
+        def keep(sample: Row) -> Row:
+            _write_row(writer, sample)
+            is_last = sample.step == run.last_step
+            if is_last or sample.step % per_frame == 0:
+                writer.append(run.packing())
+            if not is_last and sample.step % per_frame == 0:
+                run.write_restart(to.restarts.next())
+            return sample
 
-    # A restart file is older than the row of its step, which a kill may have cut off.
-    if run.session.step > read_series(to.path, "pressure").step[-1]:
-        yield keep(run.sample())
-    for sample in run.samples(every):
-        yield keep(sample)
-    rows.write()
-    writer.set_attributes({"finished": True})
-    to.forget_restarts()
+        # A restart file of an earlier version is older than the row of its step.
+        if run.session.step > last:
+            yield keep(run.sample())
+        for sample in run.samples(every):
+            yield keep(sample)
+        writer.set_attributes({"finished": True})
+    to.restarts.forget()
 
 
-class _Rows:
-    """Samples on their way to the file: to open it for each one would take longer than small runs do."""
+def _every(run: CompressionRun, to: Recording, first: Packing, stored: Mapping[str, Any]) -> int:
+    """Count the steps from row to row."""
+    whole = run.settings.steps(float(stored["phi_start"]), first.dimension)
+    return max(1, whole // to.rows)
 
-    _SECONDS = 1.0
 
-    def __init__(self, writer: RunWriter, error: str) -> None:
-        self._writer, self._error = writer, error
-        self._rows: list[Row] = []
-        self._written = perf_counter()
-
-    @property
-    def is_late(self) -> bool:
-        """Whether the last ones have waited long enough."""
-        return perf_counter() - self._written > self._SECONDS
-
-    def add(self, row: Row) -> None:
-        self._rows.append(row)
-
-    def write(self) -> None:
-        """Write what is there."""
-        rows, self._rows, self._written = self._rows, [], perf_counter()
-        if rows:
-            steps, times = [row.step for row in rows], [row.time for row in rows]
-            columns = {k: [row.observables[k] for row in rows] for k in rows[0].observables}
-            self._writer.append_series(steps, times, columns)
-            self._writer.append_report(
-                steps, [row.wall_seconds for row in rows], columns[self._error]
-            )
+def _write_row(writer: RunWriter, row: Row) -> None:
+    found = row.observables
+    error = found["local_error" if "local_error" in found else "step_error"]
+    writer.append_observables(row.step, row.time, found, (row.wall_seconds, error))
 
 
 def summary_of(path: Path) -> dict[str, object]:

@@ -45,7 +45,7 @@ def begin(
     flow = Flow(State.of(start))
     stored |= dict(attributes or {}) | {"phi_start": start.phi, "finished": False}
     first = start.with_(step=0, time=0.0)
-    RunWriter.create(path, _as_frame(flow, first), stored | _counts(flow))
+    RunWriter.create(path, _as_frame(flow, first), stored | _counts(flow)).close()
 
 
 def require_same(path: Path, protocol: Protocol) -> None:
@@ -87,19 +87,19 @@ def record(path: Path) -> Iterator[Step]:
         After each accepted step; rows are in the file with the next frame.
     """
     stored = read_attributes(path)
-    writer = RunWriter.open(path)
-    writer.truncate(int(stored["flow_steps"]))
-    protocol, flow = _protocol(stored), _flow(path, stored)
-    landscape = Landscape(read_packing(path, 0))
+    protocol, landscape = _protocol(stored), Landscape(read_packing(path, 0))
     rows: list[Step] = []
-    for step in compress(landscape, flow, protocol):
-        rows.append(step)
-        if step.step % STEPS_PER_FRAME == 0:
+    with RunWriter.open(path) as writer:
+        writer.truncate(int(stored["flow_steps"]))
+        flow = _flow(path, stored)
+        for step in compress(landscape, flow, protocol):
+            rows.append(step)
+            if step.step % STEPS_PER_FRAME == 0:
+                _keep(writer, rows, flow, landscape.particles)
+            yield step
+        if rows:
             _keep(writer, rows, flow, landscape.particles)
-        yield step
-    if rows:
-        _keep(writer, rows, flow, landscape.particles)
-    writer.set_attributes({"finished": True})
+        writer.set_attributes({"finished": True})
 
 
 def _keep(writer: RunWriter, rows: list[Step], flow: Flow, like: Packing) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import errno
+import os
 import subprocess
 import tempfile
 from pathlib import Path
@@ -11,7 +13,9 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from jamshape.files.disk import replacing
 from jamshape.files.lammps_text import write_data
+from jamshape.files.restarts import is_whole
 from jamshape.lammps.plugin import PluginError, plugin_path
 from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.shapes.shape import Interaction
@@ -121,7 +125,23 @@ class Session:
     def load_restart(self, path: str | Path, like: Packing | None = None) -> None:
         """Read a restart file into a fresh instance, of the particles of a packing."""
         self._like = like
-        self.commands(f'{_ATOMS}\nread_restart "{path}"\n{_POSES}')
+        # Through a descriptor, as LAMMPS reads `$`, `*` and `%` in names in ways of its own.
+        with Path(path).open("rb") as file:
+            self.commands(f"{_ATOMS}\nread_restart /dev/fd/{file.fileno()}\n{_POSES}")
+
+    def write_restart(self, path: Path) -> None:
+        """Write a restart file of the present state, which takes its place when it is whole.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written; LAMMPS itself does not notice a disk that is full.
+        """
+        with replacing(path) as temporary:
+            with temporary.open("wb") as file:
+                self.commands(f"write_restart /dev/fd/{file.fileno()}")
+            if not is_whole(temporary):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
     def interact(self, law: Interaction) -> None:
         """Set the pair style of the particles that were loaded."""

@@ -12,7 +12,6 @@ import numpy as np
 from jamshape.arrays import BoolArray, FloatArray
 from jamshape.contacts import Contacts
 from jamshape.files.h5md import read_attributes, write_packing
-from jamshape.files.run_writer import RunWriter
 from jamshape.landscape import Landscape
 from jamshape.measures.contact_statistics import contact_scale, residuals
 from jamshape.measures.order import orientational_order
@@ -54,9 +53,8 @@ def write_minimum(
     """Write a packing with everything that was measured on it."""
     packing = minimum.state.packing(landscape.particles)
     measured = measure(landscape, minimum)
-    write_packing(path, packing, dict(attributes) | measured.attributes, measured.observables)
-    steps, seconds, errors = thinned(minimum.history)
-    RunWriter.open(path).append_report(steps, seconds, errors)
+    told, report = dict(attributes) | measured.attributes, thinned(minimum.history)
+    write_packing(path, packing, told, measured.observables, report)
 
 
 def measure(landscape: Landscape, minimum: Minimum) -> Measured:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import glob
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ from jamshape.files.h5md import (
     read_packing,
     require_attributes,
 )
+from jamshape.files.journal import remove_run
+from jamshape.files.restarts import is_whole
 from jamshape.files.run_writer import RunWriter
-from jamshape.flow.compression import CompressionRun, Row
+from jamshape.flow.compression import CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.landscape import Landscape
 from jamshape.measures.onset import OnsetFit, fit_onset
@@ -27,6 +30,7 @@ from jamshape.protocols.making import Progress
 from jamshape.protocols.recipe import Dynamics, Recipe
 
 _ROWS_PER_RESTART = 50
+_OF_RESTART = ("restart_step", "restart_time", "rate", "dt")
 
 
 class ByDynamics:
@@ -45,10 +49,11 @@ class ByDynamics:
         assert isinstance(recipe.way, Dynamics)
         self.recipe, self.approach = recipe, recipe.way.approach
         self.run_file = out.with_name(out.name + ".run.h5")
+        self._newest: dict[str, float] = {}
 
     def forget(self) -> None:
         """Remove what an earlier call has left."""
-        self.run_file.unlink(missing_ok=True)
+        remove_run(self.run_file)
         self._forget_restarts()
 
     def require_own(self) -> None:
@@ -70,17 +75,16 @@ class ByDynamics:
         if self.recipe.target:
             require_reachable(Landscape(self.recipe.start()), self.recipe.target)
         with Session() as session:
-            run, writer = self._resumed(session) or self._begun(session)
-            rows: list[Row] = []
-            for row in approach(run, self.approach):
-                rows.append(row)
-                if len(rows) == _ROWS_PER_RESTART:
-                    self._keep(run, writer, rows)
-                found = row.observables
-                yield Progress("compression", found["phi"], found["u"], found["fmax"])
-            _write_rows(writer, rows)
-            writer.append(run.packing())
-        writer.set_attributes({"finished": True})
+            run = self._resumed(session) or self._begun(session)
+            with RunWriter.open(self.run_file) as writer:
+                for count, row in enumerate(approach(run, self.approach), start=1):
+                    found = row.observables
+                    writer.append_observables(row.step, row.time, found)
+                    if count % _ROWS_PER_RESTART == 0:
+                        self._keep(run, writer)
+                    yield Progress("compression", found["phi"], found["u"], found["fmax"])
+                writer.append(run.packing())
+                writer.set_attributes({"finished": True})
         self._forget_restarts()
 
     def landscape(self) -> Landscape:
@@ -112,47 +116,65 @@ class ByDynamics:
     def _restart(self, step: int) -> Path:
         return self.run_file.with_suffix(f".restart{step}")
 
-    def _forget_restarts(self, but: int | None = None) -> None:
-        """Remove all restart files, or all but one."""
-        for path in self.run_file.parent.glob(self.run_file.with_suffix(".restart*").name):
-            if but is None or path != self._restart(but):
+    def _forget_restarts(self, *but: int) -> None:
+        """Remove all restart files, or all but some."""
+        kept = [self._restart(step) for step in but]
+        name = glob.escape(self.run_file.with_suffix(".restart").name)
+        for path in self.run_file.parent.glob(f"{name}*"):
+            if path not in kept:
                 path.unlink()
 
-    def _keep(self, run: CompressionRun, writer: RunWriter, rows: list[Row]) -> None:
-        last = rows[-1]
-        run.write_restart(self._restart(last.step))
-        _write_rows(writer, rows)
-        rate = {"rate": run.settings.kappa, "dt": run.settings.dt}
-        writer.set_attributes({"restart_step": last.step, "restart_time": last.time, **rate})
-        self._forget_restarts(but=last.step)
+    def _keep(self, run: CompressionRun, writer: RunWriter) -> None:
+        """Write a restart file; the one before it stays, too."""
+        run.write_restart(self._restart(run.session.step))
+        older, self._newest = self._newest, _of_restart(run)
+        writer.set_attributes(self._newest | {f"older_{k}": v for k, v in older.items()})
+        self._forget_restarts(run.session.step, int(older["restart_step"]))
 
-    def _begun(self, session: Session) -> tuple[CompressionRun, RunWriter]:
+    def _begun(self, session: Session) -> CompressionRun:
+        self._forget_restarts()
         run = begin_approach(session, self.recipe.start(), self.approach)
-        attributes = self.recipe.attributes() | {"finished": False, "restart_step": -1}
-        return run, RunWriter.create(self.run_file, run.packing(), attributes)
+        run.write_restart(self._restart(run.session.step))
+        self._newest = _of_restart(run)
+        attributes = self.recipe.attributes() | {"finished": False} | self._newest
+        RunWriter.create(self.run_file, run.packing(), attributes).close()
+        return run
 
-    def _resumed(self, session: Session) -> tuple[CompressionRun, RunWriter] | None:
+    def _resumed(self, session: Session) -> CompressionRun | None:
+        """Go on from the newest restart file that is whole, if there is one."""
         if not self.run_file.exists():
             return None
         stored = read_attributes(self.run_file)
-        restart = self._restart(stored.get("restart_step", -1))
-        if not restart.exists():
-            return None
-        like = read_packing(self.run_file, 0)
-        run = resume_approach(session, restart, like, stored)
-        writer = RunWriter.open(self.run_file)
-        writer.truncate(session.step)
-        return run, writer
+        older = {name: stored.get(f"older_{name}") for name in _OF_RESTART}
+        for of in (stored, older):
+            step = of.get("restart_step")
+            if step is not None and is_whole(self._restart(int(step))):
+                return self._gone_on(session, of)
+        return None
+
+    def _gone_on(self, session: Session, of: Mapping[str, Any]) -> CompressionRun:
+        step = int(of["restart_step"])
+        with RunWriter.open(self.run_file) as writer:
+            run = resume_approach(session, self._restart(step), writer.first, of)
+            writer.truncate(step)
+        self._newest = {name: float(of[name]) for name in _OF_RESTART}
+        counted = read_observables(self.run_file).get("evaluations")
+        if counted is not None:
+            run.count_from(float(counted[-1]))
+        return run
+
+
+def _of_restart(run: CompressionRun) -> dict[str, float]:
+    """Tell what a restart file does not."""
+    settings = run.settings
+    return {
+        "restart_step": run.session.step,
+        "restart_time": run.time,
+        "rate": settings.kappa,
+        "dt": settings.dt,
+    }
 
 
 def is_compressed(run: Path) -> bool:
     """Whether the file holds a compression that reached its end."""
     return run.exists() and bool(read_attributes(run).get("finished"))
-
-
-def _write_rows(writer: RunWriter, rows: list[Row]) -> None:
-    """Write the rows and forget them."""
-    if rows:
-        columns = {name: [row.observables[name] for row in rows] for name in rows[0].observables}
-        writer.append_series([row.step for row in rows], [row.time for row in rows], columns)
-        rows.clear()

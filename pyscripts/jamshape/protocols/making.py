@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jamshape.files.h5md import read_attributes, read_packing
-from jamshape.files.run_writer import RunWriter
+from jamshape.files.h5md import read_attributes, read_packing, write_frames
+from jamshape.files.journal import remove_run
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum
 from jamshape.minima.target import Search, Target, direct
@@ -61,7 +61,7 @@ class SearchFile:
 
     def forget(self) -> None:
         """Remove it."""
-        self.path.unlink(missing_ok=True)
+        remove_run(self.path)
 
 
 def lead(
@@ -94,12 +94,7 @@ def write_states(
     path: Path, states: list[State], like: Packing, attributes: Mapping[str, Any]
 ) -> None:
     """Write states as the frames of one file, which replaces the one that is there when it is whole."""
-    temporary = path.with_name(path.name + ".new")
-    frames = [state.packing(like).with_(step=k) for k, state in enumerate(states)]
-    writer = RunWriter.create(temporary, frames[0], attributes)
-    for frame in frames[1:]:
-        writer.append(frame)
-    temporary.replace(path)
+    write_frames(path, [state.packing(like) for state in states], attributes)
 
 
 def _same(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:

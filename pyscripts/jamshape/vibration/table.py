@@ -20,7 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jamshape.arrays import FloatArray, IntArray
-from jamshape.files.h5md import FileFormatError, PathLike, replacing
+from jamshape.files import layout
+from jamshape.files.disk import PathLike
+from jamshape.files.h5md import FileFormatError
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.elasticity import moduli
 from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
@@ -161,7 +163,7 @@ def write_modes(
         If the file cannot be written.
     """
     c = table.coordinates
-    with replacing(path) as temporary, _h5py().File(temporary, "w") as file:
+    with layout.written(path) as file:
         for name in _COLUMNS:
             file[f"modes/{name}"] = table[name]
         if vectors:
@@ -184,7 +186,7 @@ def read_modes(path: PathLike) -> ModeTable:
         If it cannot be opened.
     """
     try:
-        with _h5py().File(path, "r") as file:
+        with layout.hdf5().File(path, "r") as file:
             return _read(file)
     except (KeyError, RuntimeError) as error:
         msg = f"{path}: is no complete file of modes, expected one written by analysis/modes.py"
@@ -193,7 +195,7 @@ def read_modes(path: PathLike) -> ModeTable:
 
 def holds_modes(path: PathLike) -> bool:
     """Whether an HDF5 file is one of `write_modes`, complete or not; OSError if it cannot be opened."""
-    with _h5py().File(path, "r") as file:
+    with layout.hdf5().File(path, "r") as file:
         return "modes" in file
 
 
@@ -208,10 +210,3 @@ def _read(file: h5py.File) -> ModeTable:
         k: v.item() if hasattr(v, "item") else v for k, v in file["parameters"].attrs.items()
     }
     return ModeTable(columns, stored, coordinates, file["singular_values"][()], attributes)
-
-
-def _h5py() -> Any:
-    # Imported here so that the rest of the library needs no HDF5.
-    import h5py  # noqa: PLC0415
-
-    return h5py

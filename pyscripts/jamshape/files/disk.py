@@ -1,0 +1,99 @@
+"""Files that are replaced as a whole: what stood there before stands until the new one is safe on the disk.
+
+A file is written under a temporary name in the same folder, ``.NAME.HOST.PID.tmp``, and takes its place by a
+rename. A process that is killed leaves its temporary file behind; the next one that writes the same file
+removes it.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+PathLike = str | os.PathLike[str]
+
+# What a disk or a folder may have against being written to.
+_REFUSALS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO}
+
+_END = ".tmp"
+
+
+@contextmanager
+def replacing(path: PathLike) -> Iterator[Path]:
+    """Give a temporary path in the folder of `path`, which takes its place if the body succeeds.
+
+    If the body raises, the temporary file is removed and what stood at `path` still stands. Where `path`
+    is a link, what it leads to is replaced.
+
+    Raises
+    ------
+    OSError
+        One sentence, if the disk is full, or the folder is not there or not to be written to.
+    """
+    place = real(path)
+    _remove_leftovers(place)
+    temporary = place.with_name(f"{_prefix(place)}{os.getpid()}{_END}")
+    with refusals(path, temporary):
+        try:
+            yield temporary
+            temporary.replace(place)
+        finally:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def store(path: PathLike, data: bytes | memoryview) -> None:
+    """Write a whole file, on the disk before it takes its place; errors as `replacing`."""
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextmanager
+def refusals(path: PathLike, temporary: Path) -> Iterator[None]:
+    """Say in one sentence that a disk or a folder refuses to take a file."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _REFUSALS and error.filename != str(temporary):
+            raise
+        msg = (
+            f"{path}: cannot be written ({error.strerror}), expected a folder with room that may be"
+            " written to; make room or choose another, what was there before is as it was"
+        )
+        refusal = OSError(msg)
+        refusal.errno = error.errno  # for those who ask; the sentence is all that is printed
+        raise refusal from error
+
+
+def real(path: PathLike) -> Path:
+    """Follow links, so that all names of a file have the same temporary files and journal beside it."""
+    return Path(os.path.realpath(path))
+
+
+def _prefix(place: Path) -> str:
+    return f".{place.name}.{os.uname().nodename}."
+
+
+def _remove_leftovers(place: Path) -> None:
+    """Remove temporary files of processes of this machine that are no more."""
+    prefix = _prefix(place)
+    with suppress(OSError):  # of folders that are not there, of which the writer tells
+        for name in (path.name for path in place.parent.iterdir()):
+            pid = name.removeprefix(prefix).removesuffix(_END)
+            if name == f"{prefix}{pid}{_END}" and pid.isdecimal() and not _is_alive(int(pid)):
+                (place.parent / name).unlink(missing_ok=True)
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):
+        return True
+    return True

@@ -1,0 +1,149 @@
+"""Rows on their way to the file of a run: checked against what is stored, and as tables for the journal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jamshape.files.journal import Record, Table
+
+if TYPE_CHECKING:
+    import h5py
+
+Columns = Mapping[str, NDArray[Any]]
+"""Arrays (T, ...) by name."""
+
+
+class Kind(NamedTuple):
+    """Of an observable: what a row is, and the step of the last one."""
+
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+    last: int | None
+
+
+@dataclass
+class Stored:
+    """What is in the file of a run so far, as far as it decides which rows may follow."""
+
+    frame: int | None = None
+    """Step of the last one."""
+    report: int | None = None
+    observables: dict[str, Kind] = field(default_factory=dict)
+    has_rests: bool = False
+
+    @classmethod
+    def of(cls, file: h5py.File) -> Stored:
+        """Look into a file."""
+
+        def last(group: h5py.Group) -> int | None:
+            steps = group["step"]
+            return int(steps[-1]) if len(steps) else None
+
+        def kind(group: h5py.Group) -> Kind:
+            value = group["value"]
+            return Kind(value.dtype, value.shape[1:], last(group))
+
+        return cls(
+            last(file["particles/all/position"]),
+            last(file["report"]),
+            {name: kind(group) for name, group in file["observables"].items()},
+            "position_rest" in file["particles/all"],
+        )
+
+    def check_observables(self, step: int, columns: Columns) -> None:
+        """Refuse rows that begin at a step unless they can follow.
+
+        Raises
+        ------
+        ValueError
+        """
+        for name, column in columns.items():
+            self._check_kind(name, column)
+            if name in self.observables:
+                check_after(name, self.observables[name].last, step)
+
+    def add_observables(self, step: int, columns: Columns) -> None:
+        """Note that these are stored up to a step."""
+        for name, column in columns.items():
+            self.observables[name] = Kind(column.dtype, column.shape[1:], step)
+
+    def _check_kind(self, name: str, column: NDArray[Any]) -> None:
+        if not name or "/" in name or name == ".":
+            msg = f"observable is named {name!r}, expected a name without '/'"
+            raise ValueError(msg)
+        if column.dtype.kind not in "biuf":
+            msg = f"observable {name!r} has dtype {column.dtype}, expected numbers"
+            raise ValueError(msg)
+        stored = self.observables.get(name)
+        if stored and (column.dtype, column.shape[1:]) != stored[:2]:
+            expected = f"{stored.dtype} {stored.shape}"
+            found = f"{column.dtype} {column.shape[1:]}"
+            msg = f"observable {name!r} is {found}, expected {expected} as before"
+            raise ValueError(msg)
+
+
+def check_after(name: str, last: int | None, step: int) -> None:
+    """Refuse a step that is not after the last one."""
+    if last is not None and step <= last:
+        msg = f"{name} is stored up to step {last}, expected a step after it, found {step}"
+        raise ValueError(msg)
+
+
+def as_column(value: ArrayLike) -> NDArray[Any]:
+    """Turn the value of an observable into a column of one row."""
+    array = np.asarray(value)
+    # A first value that happens to be an integer must not make a series of integers.
+    if array.ndim == 0 and array.dtype.kind in "biuf":
+        array = array.astype(np.float64)
+    return array[None]
+
+
+def table(steps: ArrayLike, times: ArrayLike, columns: Columns) -> Table:
+    """Put columns side by side, after their steps and times."""
+    return beside({"step": np.asarray(steps, np.int64), "time": np.asarray(times), **columns})
+
+
+def beside(columns: Columns, types: Mapping[str, Any] | None = None) -> Table:
+    """Put columns side by side, of their own types or of others."""
+    dtype = np.dtype(
+        [(name, (types or {}).get(name, c.dtype), c.shape[1:]) for name, c in columns.items()]
+    )
+    rows = np.empty(len(next(iter(columns.values()))), dtype)
+    for name, column in columns.items():
+        rows[name] = column
+    return rows
+
+
+class Gathered(NamedTuple):
+    """All rows of a journal, in tables as long as may be."""
+
+    tables: list[tuple[str, Table]]
+    attributes: dict[str, Any]
+
+
+ATTRIBUTES = "attributes"
+"""The table of attributes that are numbers; it has one row."""
+
+
+def gathered(records: Iterable[Record]) -> Gathered:
+    """Join the rows of records, in order for each table; later attributes replace earlier ones."""
+    runs: dict[str, list[list[Table]]] = {}
+    attributes: dict[str, Any] = {}
+    for record in records:
+        attributes |= record.texts
+        for name, rows in record.tables.items():
+            if name == ATTRIBUTES:
+                attributes |= {key: rows[key][0] for key in rows.dtype.names or ()}
+                continue
+            known = runs.setdefault(name, [])
+            if known and known[-1][0].dtype == rows.dtype:
+                known[-1].append(rows)
+            else:
+                known.append([rows])
+    tables = [(name, np.concatenate(run)) for name, known in runs.items() for run in known]
+    return Gathered(tables, attributes)
