@@ -54,7 +54,7 @@ def test_samples_that_fail_are_listed_and_do_not_stop_the_others(swept):
     for seed in (1, 2):
         (complaint,) = (c for c in report["failed"] if f"_seed{seed}.h5" in c)
         assert complaint.startswith("alpha1e+06_seed")
-        assert "periodic images" in complaint
+        assert "alpha is 1000000.0, expected" in complaint
         assert complaint in done.stderr
     assert "Traceback" not in done.stderr
 
