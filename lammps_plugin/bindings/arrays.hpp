@@ -2,6 +2,10 @@
 
 #include "contact/math/vec.hpp"
 
+#include "text.hpp"
+
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <initializer_list>
 #include <memory>
@@ -67,6 +71,57 @@ template <int D, class S> void write_vec(const Vec<D, S> &v, double *to)
 inline void require(bool condition, const std::string &sentence)
 {
   if (!condition) throw std::invalid_argument(sentence);
+}
+
+inline bool are_finite(const double *from, std::size_t n)
+{
+  return std::all_of(from, from + n, [](double x) { return std::isfinite(x); });
+}
+
+/// Whether an angle or a quaternion, of any length, turns a particle somewhere.
+template <int D> bool is_turn(const double *from)
+{
+  if (D == 2) return std::isfinite(from[0]);
+  const double size = norm_sq(read_vec<4>(from));
+  return size > 0.0 && std::isfinite(size);
+}
+
+/// Throws where any of n numbers is none: contacts of such particles would be dropped in silence.
+inline void require_finite(const double *from, std::size_t n, const char *name)
+{
+  const double *const end = from + n;
+  const double *const bad = std::find_if(from, end, [](double x) { return !std::isfinite(x); });
+  if (bad == end) return;
+  throw std::invalid_argument("number " + std::to_string(bad - from) + " of " + name + " is " +
+                              shown(*bad) + ", expected a finite one: find where it comes from.");
+}
+
+template <class Array> void require_finite(const Array &array, const char *name)
+{
+  require_finite(array.data(), array.size(), name);
+}
+
+inline void require_finite(double number, const char *name)
+{
+  require(std::isfinite(number), name + (" is " + shown(number)) + ", expected a finite number.");
+}
+
+/// Throws unless all of D edges of a box are lengths.
+inline void require_edges(const double *edges, std::size_t D)
+{
+  const double *const end = edges + D;
+  require(std::all_of(edges, end, [](double x) { return x > 0.0 && std::isfinite(x); }),
+          "edges hold what is no length, expected positive ones.");
+}
+
+/// Throws unless n orientations, angles or quaternions, turn a particle somewhere.
+inline void require_orientations(const double *from, std::size_t n, std::size_t D)
+{
+  require_finite(from, D == 2 ? n : 4 * n, "orientation");
+  for (std::size_t i = 0; D == 3 && i < n; ++i) {
+    require(is_turn<3>(from + 4 * i), "the quaternion of particle " + std::to_string(i) +
+                                          " has no direction, expected one of length 1.");
+  }
 }
 
 }  // namespace jamshape

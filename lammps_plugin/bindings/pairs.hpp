@@ -36,6 +36,11 @@ struct PairArrays {
     require(orientation.shape(0) == 2 && orientation.shape(1) == N &&
                 orientation.shape(2) == (D == 2 ? 1 : 4),
             "orientation has no shape (2, N, 1) in 2D or (2, N, 4) in 3D.");
+    require_finite(position, "position");
+    require_finite(orientation, "orientation");
+    require_orientations(orientation.data(), N, D);
+    require_finite(edges, "edges");
+    require_edges(edges.data(), D);
     require_pairs(pairs, shift, D, N);
   }
 

@@ -17,6 +17,11 @@ namespace {
 
 using Bodies = Array2<double>;
 
+void require_body(bool condition, std::size_t n, const char *otherwise)
+{
+  if (!condition) throw std::invalid_argument("body " + std::to_string(n) + " " + otherwise);
+}
+
 /// Rows of spherocylinders: shape and pose as they are, also where no quaternion gives such an
 /// axis.
 struct SpherocylinderRows {
@@ -24,8 +29,13 @@ struct SpherocylinderRows {
   static constexpr std::size_t COLUMNS_2D = 6, COLUMNS_3D = 8;
   static constexpr const char *RULE = "6 (2D) or 8 (3D): centre, axis, half_length, radius.";
 
-  template <int D> static SpherocylinderBody<D> read(const double *row, std::size_t)
+  template <int D> static SpherocylinderBody<D> read(const double *row, std::size_t n)
   {
+    const double half_length = row[2 * D], radius = row[2 * D + 1];
+    require_body(half_length >= 0.0 && std::isfinite(half_length) && radius > 0.0 &&
+                     std::isfinite(radius),
+                 n, "is no such shape: a rod has a half length of at least 0 and a radius.");
+    require_body(are_finite(row, 2 * D), n, "is nowhere: its centre or axis is not finite.");
     return {read_vec<D>(row), read_vec<D>(row + D), row[2 * D], row[2 * D + 1]};
   }
 };
@@ -41,9 +51,12 @@ struct SuperellipsoidRows {
     const double *turn = row + D, *axes = turn + (D == 2 ? 1 : 4);
     const Vec<3> semi_axes{{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}};
     const auto shape = Model::shape_from(semi_axes, axes[D]);
-    require(shape.has_value(), "body " + std::to_string(n) +
-                                   " is no such shape: a superellipsoid has positive semi-axes "
-                                   "and an exponent p above 0.5.");
+    require_body(
+        shape.has_value(), n,
+        "is no such shape: a superellipsoid has positive semi-axes and an exponent p above "
+        "0.5.");
+    require_body(are_finite(row, D) && is_turn<D>(turn), n,
+                 "is nowhere: its centre or orientation is not finite, or the quaternion zero.");
     auto body = Model::body<D>(*shape);
     body.centre = read_vec<D>(row);
     Model::turn_to<D>(body, orientation<D>(turn));
@@ -176,6 +189,7 @@ nb::dict superellipsoid_scales(const Bodies &bodies_i, const Bodies &bodies_j,
               (normals->shape(0) == pairs.size() &&
                normals->shape(1) == static_cast<std::size_t>(pairs.dimension())),
           "normals have no shape (M, D).");
+  if (normals.has_value()) require_finite(*normals, "normals");
   return in_dimension(pairs.dimension(), [&](auto D) { return scales<D>(pairs, normals); });
 }
 

@@ -14,6 +14,9 @@ nb::object find_rattlers(std::size_t n_particles, int dimension, const Array2<st
           "contacts need pairs (M, 2), normals (M, 3) and flat (M, 2).");
   require(normals.shape(0) == n_edges && flat.shape(0) == n_edges,
           "pairs, normals and flat differ in length.");
+  require(dimension == 2 || dimension == 3,
+          "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
+  require_finite(normals, "normals");
   std::vector<ContactEdge> edges;
   for (std::size_t e = 0; e < n_edges; ++e) {
     const std::int64_t i = pairs.data()[2 * e], j = pairs.data()[2 * e + 1];

@@ -7,6 +7,7 @@
 #include "bindings/pairs.hpp"
 #include "text.hpp"
 
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,7 +17,8 @@ namespace jamshape {
 /// The law of contacts from what Python gives.
 template <class Model> typename Model::Law law_of(double k_e, int sides)
 {
-  require(k_e > 0.0, "k_e is " + shown(k_e) + ", expected a positive energy.");
+  require(k_e > 0.0 && std::isfinite(k_e),
+          "k_e is " + shown(k_e) + ", expected a positive energy.");
   require(sides == 1 || sides == 2, "sides is " + std::to_string(sides) + ", expected 1 or 2.");
   return Model::law(k_e, static_cast<Sides>(sides));
 }

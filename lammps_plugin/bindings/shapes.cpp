@@ -116,6 +116,7 @@ template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
   def_over_pairs<double>(
       of, "near",
       [](Self self, const PairArrays &arrays, double margin) {
+        require_finite(margin, "margin");
         return each_pair(self, arrays,
                          [&](const auto &of, std::size_t p) { return of.are_closer(p, margin); });
       },

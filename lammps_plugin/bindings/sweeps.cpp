@@ -20,6 +20,9 @@ struct HardPoses {
     require(position.shape(0) == N && position.shape(1) == D, "position has no shape (N, D).");
     require(orientation.shape(0) == N && orientation.shape(1) == (D == 2 ? 1 : 4),
             "orientation has no shape (N, 1) in 2D or (N, 4) in 3D.");
+    require_finite(position, "position");
+    require_orientations(orientation.data(), N, D);
+    require_edges(edges.data(), D);
   }
 
   template <int D> Quaternion orientation_of(std::size_t i) const
@@ -46,6 +49,16 @@ HardParticles<Model, D> placed(const ShapeOf<Model> &of, const HardPoses &poses,
           "the box is shorter than two particles, expected at least that for Monte Carlo.");
   require(!particles.any_overlap(), "particles overlap, expected a start without overlaps.");
   return particles;
+}
+
+/// Throws unless moves go no farther than the shortest edge of the box.
+template <int D> void require_moves(const Moves &moves, const Vec<D> &edges)
+{
+  const double shortest = *std::min_element(edges.c, edges.c + D);
+  require(moves.shift >= 0.0 && moves.shift <= shortest,
+          "shift is " + shown(moves.shift) + ", expected at most the shortest edge of the box, " +
+              shown(shortest) + ".");
+  require_finite(moves.turn, "turn");
 }
 
 template <class Model, int D>
@@ -81,6 +94,7 @@ void export_sweeps()
            double turn, std::size_t n_sweeps, std::uint64_t seed) {
           return of.in_space([&](auto D) {
             auto particles = placed<Model, D>(of, {position, orientation, edges}, seed);
+            require_moves({shift, turn}, read_vec<D>(edges.data()));
             Tally tally;
             for (std::size_t n = 0; n < n_sweeps; ++n) tally += particles.sweep({shift, turn});
             nb::dict result = poses_of<Model, D>(particles, of.n());

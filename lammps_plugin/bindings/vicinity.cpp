@@ -39,23 +39,45 @@ struct CoordinateArrays {
     require(column.shape(0) == N && column.shape(1) == 3 && rotation_length.shape(0) == N &&
                 turning_radius.shape(0) == N,
             "column, rotation_length and turning_radius have no shapes (N, 3), (N,) and (N,).");
+    require_finite(rotation_length, "rotation_length");
+    require_finite(turning_radius, "turning_radius");
     const std::int64_t *const first = column.data(), *const last = first + column.size();
-    const std::int64_t highest = first == last ? -1 : *std::max_element(first, last);
     std::vector<double> per_length;
     for (std::size_t i = 0; i < N; ++i) {
       const double length = rotation_length.data()[i];
       per_length.push_back(length > 0.0 ? 1.0 / length : 0.0);
     }
     const double *const radius = turning_radius.data();
-    return {static_cast<std::size_t>(highest + 1), {first, last}, per_length, {radius, radius + N}};
+    return {number_of_columns(first, last), {first, last}, per_length, {radius, radius + N}};
+  }
+
+ private:
+  /// Throws unless each of so many coordinates is a column of one particle.
+  static std::size_t number_of_columns(const std::int64_t *first, const std::int64_t *last)
+  {
+    std::vector<std::int64_t> numbers;
+    std::copy_if(first, last, std::back_inserter(numbers), [](std::int64_t c) { return c != -1; });
+    std::sort(numbers.begin(), numbers.end());
+    for (std::size_t n = 0; n < numbers.size(); ++n) {
+      require(numbers[n] == static_cast<std::int64_t>(n),
+              "column does not number the coordinates, expected each of 0, 1, ... once, or -1.");
+    }
+    return numbers.size();
   }
 };
 
 void check_poses(const PoseArrays &poses, std::size_t N)
 {
-  require(poses.position.size() == 4 * N && poses.orientation.size() == 2 * N &&
-              poses.edges.size() == 4,
+  const auto has_shape = [&](const Array3<double> &of, std::size_t columns) {
+    return of.shape(0) == 2 && of.shape(1) == N && of.shape(2) == columns;
+  };
+  require(has_shape(poses.position, 2) && has_shape(poses.orientation, 1) &&
+              poses.edges.shape(0) == 2 && poses.edges.shape(1) == 2,
           "position, orientation and edges have no shapes (2, N, 2), (2, N, 1) and (2, 2).");
+  require_finite(poses.position, "position");
+  require_finite(poses.orientation, "orientation");
+  require_finite(poses.edges, "edges");
+  require_edges(poses.edges.data(), 2);
 }
 
 template <class Model>
@@ -65,6 +87,7 @@ void take(Vicinity<Model> &of, const Array2<std::int64_t> &pairs, const Array2<s
   check_poses(then, of.n_particles());
   require(of.has_base(), "there is no base yet, expected move_to before.");
   require_pairs(pairs, shift, 2, of.n_particles());
+  require_finite(hold.c, 3, "wide, reach and skin");
   of.take({{pairs.data(), pairs.data() + pairs.size()},
            {shift.data(), shift.data() + shift.size()},
            then.sum(),
@@ -79,6 +102,9 @@ Displacement checked(const Vicinity<Model> &of, const Array1<double> &x, double 
   require(x.shape(0) == of.n(), "x has " + std::to_string(x.shape(0)) +
                                     " components, expected one for each of " +
                                     std::to_string(of.n()) + " coordinates.");
+  require(of.has_base(), "there is no base yet, expected move_to before.");
+  require_finite(x, "x");
+  require_finite(strain, "strain");
   return {x.data(), strain};
 }
 
@@ -169,7 +195,12 @@ StageEnd solve_stage(Vicinity<Model> &of, const PosedStage &stage, const Factors
        {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
     require(static_cast<std::size_t>(part->size()) == of.n(),
             "a part of a stage has another length than there are coordinates.");
+    require_finite(*part, "a part of a stage");
   }
+  require_finite(stage.equation.strain, "strain");
+  require(of.has_base(), "there is no base yet, expected move_to before.");
+  require(!factors || factors->size() == of.n(),
+          "the factors are of another number of coordinates.");
   const auto renewed = [&](const Displacement &at) { renew(array_of(at.x, of.n()), at.strain); };
   return StageSolver<Model>(of, stage.equation, stage.units, stage.limits, renewed)
       .solve(stage.guess, stage.other, factors);
@@ -232,13 +263,24 @@ template <class AnyFactors> nb::object solve(const AnyFactors &factors, const Ar
   return solution.release();
 }
 
+/// Whether these are starts of columns and rows of a square sparse matrix (CSC).
+bool are_columns(const Array1<int> &start, const Array1<int> &row)
+{
+  if (start.shape(0) == 0) return false;
+  const int *const first = start.data(), *const last = first + start.shape(0) - 1;
+  const auto n = static_cast<int>(last - first);
+  return *first == 0 && static_cast<std::size_t>(*last) == row.shape(0) &&
+         std::is_sorted(first, last + 1) &&
+         std::all_of(row.data(), row.data() + row.shape(0), [n](int r) { return r >= 0 && r < n; });
+}
+
 void make_factors(SymmetricFactors *place, const Array1<int> &start, const Array1<int> &row,
                   const Array1<double> &value)
 {
-  const int n = static_cast<int>(start.shape(0)) - 1;
-  require(n >= 0 && row.shape(0) == value.shape(0) &&
-              static_cast<std::size_t>(start.data()[n]) == row.shape(0),
+  require(are_columns(start, row) && row.shape(0) == value.shape(0),
           "start, row and value are not the columns of a sparse matrix.");
+  require_finite(value, "value");
+  const int n = static_cast<int>(start.shape(0)) - 1;
   const UpperTriangle matrix = Eigen::Map<const UpperTriangle>(
       n, n, static_cast<Eigen::Index>(row.shape(0)), start.data(), row.data(), value.data());
   const Order order = sparse_order(matrix);

@@ -86,7 +86,7 @@ template <class Model> class StageSolver {
     Vector before = Vector::Zero(guess.size());
     for (; directions < DIRECTIONS && !at.sums.is_refused(); ++directions) {
       const Correction correction = correction_at(at);
-      if (!factors) break;
+      if (!factors || !correction.step.allFinite()) break;
       if (correction.size <= limits.accuracy) {
         at.x += correction.step;
         return end(std::move(at), true);

@@ -50,8 +50,9 @@ template <class Model, int D> class HardParticles {
       reach = std::max(reach, 2.0 * radius[i]);
     }
     std::size_t n_cells = 1;
+    const double most = 1.0 + 2.0 * std::pow(bodies.size(), 1.0 / D);  // few cells are empty
     for (int k = 0; k < D; ++k) {
-      count[k] = std::max<std::size_t>(1, static_cast<std::size_t>(edges[k] / reach));
+      count[k] = static_cast<std::size_t>(std::clamp(edges[k] / reach, 1.0, most));
       n_cells *= count[k];
     }
     members.resize(n_cells);
@@ -180,8 +181,8 @@ template <class Model, int D> class HardParticles {
   {
     std::array<std::size_t, D> cell;
     for (int k = 0; k < D; ++k) {
-      const auto along = static_cast<std::size_t>(count[k] * (x[k] / edges[k]));
-      cell[k] = std::min(along, count[k] - 1);
+      const double along = static_cast<double>(count[k]) * (x[k] / edges[k]);
+      cell[k] = static_cast<std::size_t>(std::clamp(along, 0.0, count[k] - 1.0));
     }
     return cell;
   }

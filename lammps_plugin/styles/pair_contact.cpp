@@ -247,6 +247,22 @@ void PairContact::require_same_bound(int i, const Vec<3> &semi_axes) const
                         "do not use 'pre no' in the run after changing shapes.");
 }
 
+/// Contacts of a particle that is nowhere would be dropped in silence.
+void PairContact::require_numbers(int n) const
+{
+  for (int i = 0; i < n; ++i) {
+    const double *const x = atom->x[i];
+    const Quaternion q = particles.orientation(i);
+    if (std::isfinite(x[0] + x[1] + x[2] + q.w + q.i + q.j + q.k)) continue;
+    error->one(FLERR, "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+                          " at " + shown(x[0]) + " " + shown(x[1]) + " " + shown(x[2]) +
+                          " with quaternion " + shown(q.w) + " " + shown(q.i) + " " + shown(q.j) +
+                          " " + shown(q.k) +
+                          ", expected finite numbers: use a smaller timestep, or correct its "
+                          "start.");
+  }
+}
+
 void PairContact::require_in_plane(int n) const
 {
   for (int i = 0; i < n; ++i) {

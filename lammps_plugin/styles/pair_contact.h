@@ -116,6 +116,7 @@ class PairContact : public LAMMPS_NS::Pair {
   [[noreturn]] void stop_at_crossing(int i, int j);
   [[noreturn]] void stop_at_unconverged(int i, int j);
   void require_same_bound(int i, const Vec<3> &semi_axes) const;
+  void require_numbers(int n) const;
   void require_in_plane(int n) const;
 
   /// At the first evaluation of a run: tells the log what was left out, when that has changed.

@@ -287,6 +287,7 @@ template <class Model> class PairContactOf : public PairContact {
   template <int D> void choose_pairs()
   {
     Bodies<D> &bodies = all<D>();
+    require_numbers(atom->nlocal);
     if (D == 2 && any_turns) require_in_plane(atom->nlocal);
     first.assign(1, 0);
     partner.clear();
@@ -315,8 +316,9 @@ template <class Model> class PairContactOf : public PairContact {
     for (int k = 0; k < D; ++k) bodies.box_then[k] = domain->prd[k];
   }
 
-  /// Whether two particles may have come closer by the margin: their own motion on top of the box's
-  /// affine one, which takes a gap g to at least (1 - strain) g - strain * (sum of bounding radii).
+  /// Whether two particles may have come closer by the margin, or a pose is no number: their own
+  /// motion on top of the box's affine one, which takes a gap g to at least (1 - strain) g - strain
+  /// * (sum of bounding radii).
   template <int D> bool have_outrun_margin()
   {
     const Bodies<D> &bodies = all<D>();
@@ -329,8 +331,7 @@ template <class Model> class PairContactOf : public PairContact {
     }
     const double left =
         margin - strain * (cutforce + margin) - BodiesOf<Model, D>::POSE_ERROR * cutforce;
-    if (left <= 0.0) return true;
-    double most_sq = 0.0;
+    if (!(left > 0.0)) return true;
     for (std::size_t i = 0; i < bodies.then.size(); ++i) {
       const Body<D> &now = bodies.now[i];
       const auto &then = bodies.now.pose_of(i, bodies.then[i]);
@@ -338,9 +339,9 @@ template <class Model> class PairContactOf : public PairContact {
       for (int k = 0; k < D; ++k) {
         shift[k] = now.centre[k] - centre[k] - scale[k] * (then.centre[k] - centre[k]);
       }
-      most_sq = std::max(most_sq, Model::template motion_sq<D>(shift, now, then));
+      if (!(4.0 * Model::template motion_sq<D>(shift, now, then) < left * left)) return true;
     }
-    return 4.0 * most_sq >= left * left;
+    return false;
   }
 
   /* ---------------------------------------------------------------------- */

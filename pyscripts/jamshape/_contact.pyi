@@ -139,6 +139,10 @@ class SymmetricFactors:
     ) -> None: ...
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
+class BlockFactors:
+    n_negative: int
+    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]: ...
+
 class StageUnits:
     force: float
     energy: float
@@ -170,7 +174,7 @@ class Stage:
 class StageEnd:
     x: NDArray[np.float64]
     sums: tuple[float, NDArray[np.float64], float, float, int, int, int]
-    factors: SymmetricFactors | None
+    factors: BlockFactors | None
     evaluations: int
     factorisations: int
     directions: int
@@ -206,10 +210,14 @@ class _Vicinity:
         x: NDArray[np.float64],
         strain: float,
         diagonal: NDArray[np.float64],
-    ) -> SymmetricFactors: ...
+    ) -> BlockFactors: ...
     def solve_stage(
         self,
         stage: Stage,
-        factors: SymmetricFactors | None,
+        factors: BlockFactors | None,
         renew: Callable[[NDArray[np.float64], float], None],
     ) -> StageEnd: ...
+
+class SpherocylindersVicinity(_Vicinity): ...
+class SuperellipsoidsVicinity(_Vicinity): ...
+class DimersVicinity(_Vicinity): ...

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 RUN = Path(__file__).parents[2] / "run"
-PARTS = ("setup", "demo", "test", "lint")
+PARTS = ("setup", "demo", "test", "lint", "sanitize")
 
 
 def run(*words):
@@ -25,7 +25,7 @@ def test_unknown_words_are_refused():
     done = run("sing")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.strip() == (
-        "./run: there is no 'sing', expected setup, demo, test or lint; ./run shows what they do."
+        "./run: there is no 'sing', expected setup, demo, test, lint or sanitize; ./run shows what they do."
     )
 
 

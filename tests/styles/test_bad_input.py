@@ -177,6 +177,30 @@ def test_unset_coefficients_are_noticed(tmp_path):
     assert error_of(done) == "All pair coeffs are not set"
 
 
+# --- particles that are nowhere --------------------------------------------------------------------
+
+
+NO_NUMBER = "variable no atom 1e308*1e308-1e308*1e308"
+
+
+@pytest.mark.parametrize(
+    ("change", "run", "found"),
+    [
+        ("x v_no", "run 1 pre no", r"at -?nan 2 0 with quaternion \S+ 0 0 \S+"),
+        ("y v_no", "run 1 pre no", r"at 0\.5 -?nan 0 with quaternion \S+ 0 0 \S+"),
+        ("quat 0 0 1 v_no", "run 1 pre no", r"at 0\.5 2 0 with quaternion -?nan .*"),
+        ("quat 0 0 1 v_no", "run 0", r"at 0\.5 2 0 with quaternion -?nan .*"),
+    ],
+)
+def test_a_particle_that_is_nowhere_stops_the_run(change, run, found, sentence_of):
+    commands = f"pair_coeff * * 1.0\nrun 0\n{NO_NUMBER}\nset atom 2 {change}\n{run}"
+    assert re.fullmatch(
+        f"pair_style spherocylinder/harmonic found atom 2 {found}, expected finite numbers: use a "
+        "smaller timestep, or correct its start.",
+        sentence_of(commands),
+    )
+
+
 # --- particles -----------------------------------------------------------------------------------
 
 

@@ -93,5 +93,10 @@ template <int N, class S = double> struct Dual {
 
 template <int N, class S> S value_of(const Dual<N, S> &x) { return x.value; }
 template <int N, class S> Dual<N, S> constant(const Dual<N, S> &x) { return x.value; }
+template <int N, class S> Dual<N, S> with_value(Dual<N, S> x, const S &value)
+{
+  x.value = value;
+  return x;
+}
 
 }  // namespace jamshape

@@ -25,4 +25,8 @@ template <class S> using ValueOf = decltype(value_of(std::declval<S>()));
 inline double constant(double x) { return x; }
 inline long double constant(long double x) { return x; }
 
+/// A scalar moved to another value within its rounding: a dual number keeps its derivatives.
+inline double with_value(double, double value) { return value; }
+inline long double with_value(long double, long double value) { return value; }
+
 }  // namespace jamshape

@@ -154,7 +154,8 @@ bool are_plainly_whole(const SpinePair<D, S> &p, const S &overlap, double reach)
 }
 
 /// Overlaps a of the nearer end, b of the farther one, their mean m, and a - m: from the difference
-/// of the feet, since the overlaps differ by less than they round.
+/// of the feet, since the overlaps differ by less than they round. By definition b <= a, which
+/// rounding is not to deny where a power of b / a is taken: the power may be 1e12.
 template <class S> struct EndOverlaps {
   S a, b, mean, drop;
 
@@ -168,6 +169,19 @@ template <class S> struct EndOverlaps {
     mean = 0.5 * (a + b);
     const Vec<D, S> step = (far.s - near.s) * p.u_i - (far.t - near.t) * p.u_j;
     drop = 0.5 * inverse_reach * dot(step, far.delta + near.delta) / (far_distance + distance);
+    drop = with_value(drop, std::max<ValueOf<S>>(value_of(drop), 0.0));
+  }
+
+  /// b / a, and its logarithm, of two overlaps above zero.
+  S ratio() const
+  {
+    const S quotient = b / a;
+    return with_value(quotient, std::min<ValueOf<S>>(value_of(quotient), 1.0));
+  }
+  S log_ratio() const
+  {
+    const S lost = 2.0 * drop / a;
+    return lost < 0.5 ? log1p(-lost) : log(ratio());
   }
 };
 
@@ -181,8 +195,7 @@ template <class S> struct SecondBond {
   SecondBond(const Harmonic &law, const EndOverlaps<S> &of, const S &weight, const S &wide)
   {
     const S E_b = law.energy(of.b), f_b = law.energy_gradient(of.b);
-    const S ratio = of.b / of.a,
-            log_ratio = ratio < 0.5 ? log(ratio) : log1p(-2.0 * of.drop / of.a);
+    const S ratio = of.ratio(), log_ratio = of.log_ratio();
     const S excess = (1.0 - weight) * wide;  // of the power, times the weight
     const S grown = expm1(excess / weight * log_ratio);
     const S whole = E_b + E_b * grown;
@@ -210,7 +223,8 @@ template <int D, class S> struct SideToSide {
 
   bool has_second() const
   {
-    return overlap.b > 0.0 && depth.two_bonds > 0.0 && second.value > LEAST_WEIGHT;
+    return overlap.a > 0.0 && overlap.b > 0.0 && depth.two_bonds > 0.0 &&
+           second.value > LEAST_WEIGHT;
   }
   bool has_mean() const { return mean.value > 0.0 && depth.two_bonds < 1.0; }
   bool has_two_whole_bonds() const

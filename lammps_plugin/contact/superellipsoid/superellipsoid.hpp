@@ -31,6 +31,9 @@ inline constexpr double USELESS = 1e-6;
 /// of a length; as reach 1 / |grad_r x|, so that the stiffness is epsilon / reach^2 as of other
 /// laws; as distance reach times x, so that 1 - distance / reach is the overlap. For two spheres of
 /// contact distance d the distance is r / 2, and reach d / 2 where they touch.
+///
+/// Where two faces lie on each other, the scale hardly depends on the point of tangency: a relative
+/// error of it, `error`, leaves lever arms open by error^(1/2p) of the semi-axes.
 template <int D, class S> class SuperellipsoidContact {
  public:
   using Found = Contact<D, S, 1>;

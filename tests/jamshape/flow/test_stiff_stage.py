@@ -105,4 +105,6 @@ def test_factors_of_what_is_not_finite_are_refused(jammed):
     posed = Posed(*jammed, 1.0)
     with pytest.raises(ValueError, match="not a number"):
         posed.vicinity.factorise(np.zeros(posed.n), 0.0, np.full(posed.n, np.nan))
-    assert not posed.solve(np.full(posed.n, np.nan), np.full(posed.n, np.nan)).solved
+    for guesses in ((np.nan, 0.0), (0.0, np.nan)):
+        with pytest.raises(ValueError, match="a part of a stage is nan"):
+            posed.solve(*(np.full(posed.n, guess) for guess in guesses))

@@ -1,0 +1,291 @@
+"""What the compiled module is given is checked: sizes, indices and that numbers are numbers.
+
+What passes unchecked ends in SIGSEGV, or in contacts that are dropped in silence.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from jamshape import _contact
+
+BAD_NUMBERS = (np.nan, np.inf, -np.inf)
+N = 3
+SHAPES = {
+    _contact.Spherocylinders: (4.0, 2.0, 2.0),
+    _contact.Superellipsoids: (4.0, 2.0, 3.0),
+    _contact.Dimers: (4.0, 2.0, 2.0),
+}
+every_shape = pytest.mark.parametrize("shape", list(SHAPES), ids=lambda x: x.__name__)
+in_each_space = pytest.mark.parametrize("dimension", [2, 3])
+
+
+def particles(shape, dimension, k_e=1.0):
+    return shape(np.tile(SHAPES[shape], (N, 1)), np.ones(N), dimension, k_e, 1)
+
+
+def poses(dimension):
+    """Three particles of which the first two touch, as doubles alone."""
+    position = np.zeros((N, dimension))
+    position[:, 0] = 0.0, 3.5, 9.0
+    turn = np.zeros((N, 1)) if dimension == 2 else np.tile([1.0, 0.0, 0.0, 0.0], (N, 1))
+    return {"position": position, "orientation": turn, "edges": np.full(dimension, 30.0)}
+
+
+def split(of):
+    return {name: np.stack([x, np.zeros_like(x)]) for name, x in of.items()}
+
+
+def arguments(dimension):
+    pairs = np.array([[0, 1], [1, 2]])
+    return split(poses(dimension)) | {
+        "pairs": pairs, "shift": np.zeros((len(pairs), dimension), np.int64)
+    }  # fmt: skip
+
+
+OVER_PAIRS = ("contacts", "sums", "derivatives", "overlaps", "near")
+
+
+def call(of, method, given):
+    more = {"margin": 0.1} if method == "near" else {}
+    return getattr(of, method)(**given, **more)
+
+
+@every_shape
+@in_each_space
+@pytest.mark.parametrize("method", OVER_PAIRS)
+@pytest.mark.parametrize("name", ["position", "orientation", "edges"])
+def test_poses_that_are_no_numbers_are_refused(shape, dimension, method, name):
+    of, given = particles(shape, dimension), arguments(dimension)
+    call(of, method, given)
+    for bad in BAD_NUMBERS:
+        for part in range(2):
+            spoilt = given[name].copy()
+            spoilt[part].flat[-1] = bad
+            with pytest.raises(
+                ValueError, match=f"of {name} is -?(nan|inf), expected a finite one"
+            ):
+                call(of, method, given | {name: spoilt})
+
+
+@every_shape
+@in_each_space
+def test_what_is_no_box_orientation_or_pair_is_refused(shape, dimension):
+    of, given = particles(shape, dimension), arguments(dimension)
+    no_turn = given["orientation"].copy()
+    no_turn[0, 1] = 0.0
+    wrong = [
+        ({"edges": 0.0 * given["edges"]}, "edges hold what is no length"),
+        ({"edges": given["edges"][:1].copy()}, r"no shape \(2, D\)"),
+        ({"pairs": given["pairs"] + 2}, "a particle that does not exist"),
+        ({"pairs": given["pairs"] - 1}, "a particle that does not exist"),
+        ({"shift": given["shift"][:1]}, "pairs and shift"),
+        ({"position": given["position"][:, :2].copy()}, "position has no shape"),
+    ]
+    if dimension == 3:
+        wrong.append(({"orientation": no_turn}, "the quaternion of particle 1 has no direction"))
+    for change, sentence in wrong:
+        with pytest.raises(ValueError, match=sentence):
+            of.sums(**given | change)
+    for margin in BAD_NUMBERS:
+        with pytest.raises(ValueError, match="margin is"):
+            of.near(**given, margin=margin)
+    for k_e in (0.0, -1.0, *BAD_NUMBERS):
+        with pytest.raises(ValueError, match="k_e is"):
+            particles(shape, dimension, k_e)
+
+
+@every_shape
+@in_each_space
+def test_sweeps_of_particles_that_are_nowhere_are_refused(shape, dimension):
+    of, given = particles(shape, dimension), poses(dimension)
+    given["position"][:, 0] = 0.0, 10.0, 20.0
+    moves = {"shift": 0.1, "turn": 0.1, "n_sweeps": 1, "seed": 1}
+    assert of.sweeps(**given, **moves)["tried"] == N
+    for name in given:
+        for bad in BAD_NUMBERS:
+            spoilt = given[name].copy()
+            spoilt.flat[0] = bad
+            with pytest.raises(ValueError, match=r"finite|no length"):
+                of.sweeps(**given | {name: spoilt}, **moves)
+    for bad in (0.0, -1.0):
+        with pytest.raises(ValueError, match="no length"):
+            of.sweeps(**given | {"edges": np.full(dimension, bad)}, **moves)
+    for name, wrong in (("shift", (-0.1, 31.0, *BAD_NUMBERS)), ("turn", BAD_NUMBERS)):
+        for bad in wrong:
+            with pytest.raises(ValueError, match=f"{name} is"):
+                of.sweeps(**given, **moves | {name: bad})
+
+
+@in_each_space
+def test_sweeps_keep_to_a_box_however_wide_it_is(dimension):
+    of, given = particles(_contact.Spherocylinders, dimension), poses(dimension)
+    given["position"][:, 0] = 0.0, 10.0, 20.0
+    for edge in (1e9, 1e300):
+        given["edges"] = np.full(dimension, edge)
+        found = of.sweeps(**given, shift=edge, turn=1.0, n_sweeps=5, seed=1)
+        assert np.all((found["position"] >= 0.0) & (found["position"] <= edge))
+        assert found["accepted"] > 0
+
+
+# --- probes ------------------------------------------------------------------------------------
+
+
+@in_each_space
+def test_bodies_that_are_nowhere_are_refused(dimension):
+    rods = np.zeros((2, 2 * dimension + 2))
+    rods[:, dimension], rods[:, -2:] = 1.0, (2.0, 1.0)
+    rods[1, 0] = 5.5  # two half lengths of 2 and two radii of 1 away, less 0.5
+    turn = [0.3] if dimension == 2 else [1.0, 0.0, 0.0, 0.0]
+    boxes = np.tile([0.0] * dimension + turn + [1.0] * dimension + [2.0], (2, 1))
+    boxes[1, 0] = 1.5
+
+    def of_rods(i, j):
+        _contact.spine_distances(i, j)
+        return _contact.spherocylinder_contacts(i, j, 1.0, 2)
+
+    def of_boxes(i, j):
+        _contact.superellipsoid_scales(i, j)
+        return _contact.superellipsoid_contacts(i, j, 1.0)
+
+    for probe, rows in ((of_rods, rods), (of_boxes, boxes)):
+        assert probe(rows[:1], rows[1:])["status"][0] == 1
+        for column in range(rows.shape[1]):
+            for bad in BAD_NUMBERS:
+                spoilt = rows.copy()
+                spoilt[1, column] = bad
+                for pair in ((spoilt[:1], spoilt[1:]), (spoilt[1:], spoilt[:1])):
+                    with pytest.raises(ValueError, match=r"body 0 is (nowhere|no such shape)"):
+                        probe(*pair)
+    for bad in (-1.0, 0.0):
+        spoilt = rods.copy()
+        spoilt[0, -1] = bad
+        with pytest.raises(ValueError, match="no such shape"):
+            of_rods(spoilt[:1], spoilt[1:])
+    with pytest.raises(ValueError, match="of normals is nan"):
+        _contact.superellipsoid_scales(boxes[:1], boxes[1:], np.full((1, dimension), np.nan))
+
+
+def test_a_network_of_contacts_that_is_none_is_refused():
+    given = [3, 2, np.array([[0, 1]]), np.array([[1.0, 0.0, 0.0]]), np.zeros((1, 2), bool)]
+    assert _contact.find_rattlers(*given).all()
+    for at, bad, sentence in (
+        (1, 4, "dimension is 4"),
+        (2, np.array([[0, 3]]), "does not exist"),
+        (2, np.array([[-1, 0]]), "does not exist"),
+        (3, np.array([[np.nan, 0.0, 0.0]]), "of normals is nan"),
+        (4, np.zeros((2, 2), bool), "differ in length"),
+    ):
+        with pytest.raises(ValueError, match=sentence):
+            _contact.find_rattlers(*given[:at], bad, *given[at + 1 :])
+
+
+# --- matrices and landscapes -------------------------------------------------------------------
+
+
+def test_a_matrix_whose_columns_are_none_is_refused():
+    start, row = np.array([0, 1, 3], np.int32), np.array([0, 0, 1], np.int32)
+    value = np.array([2.0, 1.0, 2.0])
+    factors = _contact.SymmetricFactors(start, row, value)
+    assert factors.solve(np.ones((1, 2))) == pytest.approx(np.full((1, 2), 1 / 3))
+    with pytest.raises(ValueError, match="right has another length"):
+        factors.solve(np.ones((1, 3)))
+    columns = "not the columns of a sparse matrix"
+    for starts in ([], [0, 5, 3], [0, -7, 3], [1, 1, 3], [0, 1, 2], [0, 1, 4], [0, 10**9, 3]):
+        with pytest.raises(ValueError, match=columns):
+            _contact.SymmetricFactors(np.array(starts, np.int32), row, value)
+    for rows in ([0, 0, 2], [0, -1, 1], [0, 0, 10**9]):
+        with pytest.raises(ValueError, match=columns):
+            _contact.SymmetricFactors(start, np.array(rows, np.int32), value)
+    with pytest.raises(ValueError, match=columns):
+        _contact.SymmetricFactors(start, row, value[:2])
+    for bad in BAD_NUMBERS:
+        with pytest.raises(ValueError, match="number 1 of value is"):
+            _contact.SymmetricFactors(start, row, np.array([2.0, bad, 2.0]))
+
+
+COLUMN = np.arange(9).reshape(N, 3)
+
+
+def vicinity(column=COLUMN, length=1.0):
+    lengths = np.full(N, length)
+    return particles(_contact.Spherocylinders, 2).vicinity(column, lengths, lengths)
+
+
+def about_a_base():
+    of, given = vicinity(), arguments(2)
+    pairs = given.pop("pairs"), given.pop("shift")
+    of.move_to(**given)
+    of.take_pairs(**given, pairs=pairs[0], shift=pairs[1], wide=1.0, reach=9.0, skin=0.5)
+    return of, given, {"pairs": pairs[0], "shift": pairs[1], "wide": 1.0, "reach": 9.0, "skin": 0.5}
+
+
+def test_coordinates_that_are_not_numbered_once_each_are_refused():
+    for wrong in (COLUMN + 1, COLUMN - 2, COLUMN // 2, COLUMN * 1000):
+        with pytest.raises(ValueError, match="column does not number the coordinates"):
+            vicinity(wrong)
+    with pytest.raises(ValueError, match="have no shapes"):
+        vicinity(COLUMN[:2])
+    for bad in BAD_NUMBERS:
+        with pytest.raises(ValueError, match="of rotation_length is"):
+            vicinity(length=bad)
+
+
+def test_a_landscape_without_a_base_has_no_energy():
+    of, x = vicinity(), np.zeros(9)
+    for ask in (of.move, lambda *at: of.evaluate(*at, False)):
+        with pytest.raises(ValueError, match="there is no base yet"):
+            ask(x, 0.0)
+    with pytest.raises(ValueError, match="there is no base yet"):
+        of.solve_stage(stage(), None, lambda *_: None)
+
+
+@pytest.mark.parametrize("bad", BAD_NUMBERS)
+def test_points_of_a_landscape_that_are_no_numbers_are_refused(bad):
+    of, given, pairs = about_a_base()
+    x, y = np.zeros(9), np.zeros(9)
+    assert of.evaluate(x, 0.0, False) is not None
+    y[4] = bad
+    for ask in (of.move, lambda *at: of.evaluate(*at, False)):
+        with pytest.raises(ValueError, match="number 4 of x is"):
+            ask(y, 0.0)
+        with pytest.raises(ValueError, match="strain is"):
+            ask(x, bad)
+    with pytest.raises(ValueError, match="expected one for each of 9"):
+        of.evaluate(x[:8], 0.0, False)
+    for name in given:
+        spoilt = given[name].copy()
+        spoilt.flat[1] = bad
+        for ask, more in ((of.move_to, {}), (of.take_pairs, pairs)):
+            with pytest.raises(ValueError, match=f"of {name} is"):
+                ask(**given | {name: spoilt}, **more)
+    for name in ("wide", "reach", "skin"):
+        with pytest.raises(ValueError, match="of wide, reach and skin is"):
+            of.take_pairs(**given, **pairs | {name: bad})
+
+
+def stage(**parts):
+    units = _contact.StageUnits(1.0, 1.0, 1.0, N)
+    given = {"drag": np.ones(9), "centre": np.zeros(9), "guess": np.zeros(9), "other": np.zeros(9)}
+    given |= {"strain": 0.0, "extended": False} | parts
+    return _contact.Stage(units=units, limits=_contact.StageLimits(1e-9, 0.1, 0.1), **given)
+
+
+def test_stages_and_factors_of_another_size_are_refused():
+    of, _, _ = about_a_base()
+    end = of.solve_stage(stage(), None, lambda *_: None)
+    assert end.solved
+    for name in ("drag", "centre", "guess", "other"):
+        with pytest.raises(ValueError, match="a part of a stage has another length"):
+            of.solve_stage(stage(**{name: np.zeros(8)}), None, lambda *_: None)
+        with pytest.raises(ValueError, match="a part of a stage is nan"):
+            of.solve_stage(stage(**{name: np.full(9, np.nan)}), None, lambda *_: None)
+    held = vicinity(np.where(COLUMN < 6, COLUMN, -1))
+    given = arguments(2)
+    pairs = {"pairs": given.pop("pairs"), "shift": given.pop("shift")}
+    held.move_to(**given)
+    held.take_pairs(**given, **pairs, wide=1.0, reach=9.0, skin=0.5)
+    fewer = held.factorise(np.zeros(6), 0.0, np.ones(6))
+    with pytest.raises(ValueError, match="factors are of another number of coordinates"):
+        of.solve_stage(stage(), fewer, lambda *_: None)
