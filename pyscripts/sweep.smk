@@ -6,6 +6,8 @@
 # Without an executor it runs here. Every packing is one job of one core; what is there is not made again.
 import sys
 
+from jamshape.shapes.shape import in_name
+
 OUT = config.get("out", "sweep")
 ALPHA = str(config.get("alpha", "0 0.01 1 4")).split()
 SEEDS = range(1, int(config.get("samples", 6)) + 1)
@@ -18,7 +20,7 @@ OPTIONS = " ".join(
 
 rule all:
     input:
-        [f"{OUT}/alpha{float(alpha):g}_seed{seed}.h5" for alpha in ALPHA for seed in SEEDS],
+        [f"{OUT}/alpha{in_name(float(alpha))}_seed{seed}.h5" for alpha in ALPHA for seed in SEEDS],
 
 
 rule packing:

@@ -68,6 +68,8 @@ def test_names_of_files_and_labels_tell_parameters_apart(name):
     for text in (shape.stem, shape.label):
         assert len({text(parameters) for parameters in sets}) == len(sets)
     assert all(not set("/ \\") & set(shape.stem(parameters)) for parameters in sets)
+    close = [{p: value * (1 + 1e-7 * k) for p, value in sets[0].items()} for k in range(3)]
+    assert len({shape.stem(parameters) for parameters in close}) == 3
     for parameter in shape.parameters:
         with pytest.raises(ValueError, match="expected"):
             Particles.of(name, **{parameter.name: -1.0})

@@ -23,6 +23,7 @@ from jamshape.minima import Outcome, Stop, minimise
 from jamshape.minima.target import Search, Target, TargetError, direct
 from jamshape.packing import Packing
 from jamshape.protocols.make import is_done
+from jamshape.shapes.shape import in_name
 
 # What must agree in the packing and in a rung that is there already.
 _IDENTITY = (
@@ -92,7 +93,7 @@ def climb(
 
 def rung_path(source: Path, u0: float, folder: Path) -> Path:
     """Name the file of one rung."""
-    return folder / f"{source.stem}_u{u0:g}.h5"
+    return folder / f"{source.stem}_u{in_name(u0)}.h5"
 
 
 def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: Target) -> Rung:

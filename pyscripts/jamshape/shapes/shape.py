@@ -21,6 +21,18 @@ if TYPE_CHECKING:
     from jamshape.shapes.solid import Solid
 
 
+def in_name(number: float) -> str:
+    """Write a number in the name of a file: with six digits if these are all, else with as many as it has.
+
+    Examples
+    --------
+    >>> in_name(4.0), in_name(1e6), in_name(1.0000001)
+    ('4', '1e+06', '1.0000001')
+    """
+    short = f"{number:g}"
+    return short if float(short) == number else repr(float(number))
+
+
 class Parameter(NamedTuple):
     """A number that describes a particle beside its size, such as an aspect ratio."""
 
@@ -154,7 +166,7 @@ class Shape(ABC):
 
     def stem(self, parameters: Mapping[str, float]) -> str:
         """Name files of packings of such particles."""
-        numbers = [f"{p.option}{parameters[p.name]:g}" for p in self.parameters]
+        numbers = [p.option + in_name(parameters[p.name]) for p in self.parameters]
         return "_".join([self.name, *numbers])
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.shapes.mesh import SurfaceMesh, arc, revolved
-from jamshape.shapes.shape import ElongatedShape, Interaction, Style
+from jamshape.shapes.shape import ElongatedShape, Interaction, Style, in_name
 from jamshape.shapes.solid import RoundedSegment
 
 
@@ -31,7 +31,7 @@ class Spherocylinder(ElongatedShape):
 
     def stem(self, parameters: Mapping[str, float]) -> str:
         """As `Shape.stem`."""
-        return f"alpha{parameters['alpha']:g}"
+        return "alpha" + in_name(parameters["alpha"])
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
         """As `Shape.outline`."""

@@ -14,7 +14,7 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import require_stated
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.roundness import asphericity, axes_from, reduced_aspect_ratio
-from jamshape.shapes.shape import Interaction, Parameter, Shape, Style
+from jamshape.shapes.shape import Interaction, Parameter, Shape, Style, in_name
 from jamshape.shapes.solid import Superquadric
 from jamshape.shapes.superellipsoid_surface import surface_mesh
 
@@ -85,7 +85,8 @@ class Superellipsoid(Shape):
 
     def stem(self, parameters: Mapping[str, float]) -> str:
         """As `Shape.stem`."""
-        return "p{exponent:g}_w{w1:g}_{w2:g}".format(**parameters)
+        exponent, w1, w2 = (in_name(parameters[p.name]) for p in self.parameters)
+        return f"p{exponent}_w{w1}_{w2}"
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
         """As `Shape.outline`."""
