@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from jamshape.flow import recording, slow_recording
 from jamshape.flow.compression import Compression, Row
 from jamshape.flow.implicit import Protocol, Step
 from jamshape.flow.recording import Recording
-from jamshape.front.progress import Bar, follow, place
+from jamshape.front.progress import Told, follow, place
 from jamshape.front.run import RunFile
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
@@ -30,7 +30,6 @@ from jamshape.shapes.particles import Particles
 
 _PHI_RANDOM = 0.4  # of the random start of a slow compression
 _PHI_SLOW = Range(0.41, 2.0, "a packing fraction above that of the random start, which is 0.4,")
-_PER_PHI = 1_000_000  # what the bar of one counts
 
 
 def compress(
@@ -177,12 +176,21 @@ def _record(start: Any, to: Recording, progress: bool) -> None:
     """Run to the end; `start` makes the run in a session."""
     with Session() as session:
         run = start(session)
-        bar = Bar("step", run.last_step, session.step)
-        follow(recording.record(run, to), bar, _told, shown=progress)
+        phi_start = float(read_attributes(to.path)["phi_start"])
+        told = _told(phi_start, run.settings.phi_end)
+        begun = told(run.sample()).part
+        follow(recording.record(run, to), told, shown=progress, begun=begun or 0.0)
 
 
-def _told(row: Row) -> tuple[int, str]:
-    return row.step, f"phi {row.observables['phi']:.4f}"
+def _told(phi_start: float, phi_end: float) -> Callable[[Row], Told]:
+    """Return what says how far a compression is: the strain that is done of the whole one."""
+
+    def told(row: Row) -> Told:
+        phi, pressure = row.observables["phi"], row.observables["pressure"]
+        part = min(1.0, math.log(phi / phi_start) / math.log(phi_end / phi_start))
+        return Told("compression", f"phi {phi:.4f} of {phi_end:g}, pressure {pressure:.2e}", part)
+
+    return told
 
 
 def slow_compress(
@@ -299,10 +307,16 @@ def _known(results: Any, start: Packing) -> dict[str, Any]:
 
 
 def _record_slowly(path: Path, progress: bool) -> None:
-    end = float(read_attributes(path)["phi_end"])
-    bar = Bar("1e-6 phi", round(_PER_PHI * end))
+    stored = read_attributes(path)
+    first, end = float(stored["phi_start"]), float(stored["phi_end"])
+    until = f" or {stored['p_end']:.3g}" if math.isfinite(stored["p_end"]) else ""
 
-    def told(step: Step) -> tuple[int, str]:
-        return round(_PER_PHI * step.phi), f"phi {step.phi:.6f} p {step.pressure:.3e}"
+    def part_at(phi: float) -> float:
+        return min(1.0, (phi - first) / (end - first))
 
-    follow(slow_recording.record(path), bar, told, shown=progress)
+    def told(step: Step) -> Told:
+        where = f"phi {step.phi:.6f} of {end:g}, pressure {step.pressure:.3e}{until}"
+        return Told("slow compression", f"{where}, step {step.dt:.1e}", part_at(step.phi))
+
+    begun = part_at(read_packing(path).phi)
+    follow(slow_recording.record(path), told, shown=progress, begun=begun)

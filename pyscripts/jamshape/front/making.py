@@ -6,9 +6,9 @@ from pathlib import Path
 
 from jamshape.checks import require_path, require_path_for_lammps
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.progress import Bar, follow, place
+from jamshape.front.progress import Told, follow, place
 from jamshape.protocols.defaults import recipe_for
-from jamshape.protocols.make import Progress, is_done, make, require_same
+from jamshape.protocols.make import Progress, is_done, make, require_same, tidy
 from jamshape.protocols.recipe import Dynamics
 from jamshape.shapes.particles import Particles
 
@@ -108,14 +108,14 @@ def make_packing(
     (require_path_for_lammps if isinstance(recipe.way, Dynamics) else require_path)(at.path)
     if again or not is_done(at.path):
         steps = make(recipe, at.path, again=again)
-        follow(steps, Bar("row"), _told, shown=progress)
+        follow(steps, _told, shown=progress)
     else:
         require_same(at.path, recipe)
+        tidy(recipe, at.path)
     packing = MeasuredPacking.read(at.path)
     # A file that goes with its folder is nothing to name.
     return packing if at.folder is None else MeasuredPacking.of(packing, packing.results)
 
 
-def _told(at: Progress) -> tuple[None, str]:
-    text = f"{at.stage} phi {at.phi:.6f} u {at.energy_density:.2e} res {at.residual:.1e}"
-    return None, text
+def _told(at: Progress) -> Told:
+    return Told(at.phase, f"phi {at.phi:.6f}, {at.text}", at.part)

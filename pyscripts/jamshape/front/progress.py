@@ -1,9 +1,11 @@
-"""Bars that say how far a run is, in terminals and notebooks, and where runs without a file live."""
+"""What a long run says of how far it is, in terminals, notebooks and logs, and where runs without a file live."""
 
 from __future__ import annotations
 
 import shutil
+import sys
 import tempfile
+import time
 import warnings
 import weakref
 from collections.abc import Callable, Iterator
@@ -12,46 +14,143 @@ from typing import Any, NamedTuple, TypeVar
 
 _Step = TypeVar("_Step")
 
+# Between two lines of a log, and between two looks of a bar, in seconds.
+_LOG_SECONDS = 10.0
+_BAR_SECONDS = 1.0
 
-class Bar(NamedTuple):
-    """What a bar says."""
+# What a bar says where it is known how much remains, and where it is not.
+_WITH_REST = "{desc}:{percentage:5.1f} %|{bar}| [{elapsed}, remain {remaining}]{postfix}"
+_WITHOUT_REST = "{desc} [{elapsed}]{postfix}"
 
-    unit: str
-    total: int | None = None
-    begun: int = 0
-    """How much of it was done before."""
+
+class Told(NamedTuple):
+    """How far a run is."""
+
+    phase: str
+    """In words, such as ``compression``."""
+    text: str
+    """Where it is."""
+    part: float | None = None
+    """Of the phase, from 0 to 1; None where nobody can tell."""
+    aside: str | None = None
+    """A sentence to say once."""
 
 
 def follow(
-    steps: Iterator[_Step],
-    bar: Bar,
-    told: Callable[[_Step], tuple[int | None, str]],
-    *,
-    shown: bool = True,
+    steps: Iterator[_Step], told: Callable[[_Step], Told], *, shown: bool = True, begun: float = 0.0
 ) -> None:
-    """Go through all steps of a run, showing a bar on standard error.
+    """Go through all steps of a run and say on standard error how far it is.
+
+    There is a bar in terminals and notebooks, and elsewhere, as in the log of a batch job, a line every ten
+    seconds. What remains is estimated where the part that is done is known.
 
     Parameters
     ----------
     steps : iterator
-    bar : Bar
     told : callable
-        Says of a step how much is done, or None to count steps, and what to write beside the bar.
+        Says of a step how far it is.
     shown : bool
-        Whether there is a bar at all.
+        Whether anything is said at all.
+    begun : float
+        The part of the first phase that was done before.
     """
+    line = (_Bar if _is_looked_at() else _Log)(begun) if shown else None
+    try:
+        for step in steps:
+            at = told(step)
+            if line:
+                line.say(at)
+    finally:
+        if line:
+            line.end()
+
+
+def _is_looked_at() -> bool:
+    """Whether standard error is a terminal or in a notebook."""
+    return sys.stderr.isatty() or "ipykernel" in sys.modules
+
+
+def _tqdm() -> Any:
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore"
-        )  # tqdm's word on notebooks without widgets; it writes text there
+        # Its word on notebooks without widgets; it writes text there.
+        warnings.simplefilter("ignore")
         from tqdm.auto import tqdm  # noqa: PLC0415 - not needed without a run
 
-    settings: dict[str, Any] = {"mininterval": 1, "disable": not shown}
-    with tqdm(total=bar.total, initial=bar.begun, unit=bar.unit, **settings) as line:
-        for step in steps:
-            done, text = told(step)
-            line.set_postfix_str(text, refresh=False)
-            line.update(1 if done is None else done - line.n)
+    return tqdm
+
+
+class _Bar:
+    """A bar that fills in each phase."""
+
+    def __init__(self, begun: float) -> None:
+        self._begun, self._phase = begun, ""
+        self._line: Any = None
+
+    def say(self, at: Told) -> None:
+        if at.phase != self._phase:
+            self._begin(at)
+        if at.aside:
+            self._line.write(at.aside, file=sys.stderr)
+        self._line.set_postfix_str(at.text, refresh=False)
+        self._line.update(1 if at.part is None else at.part - self._line.n)
+
+    def end(self) -> None:
+        if self._line is not None:
+            self._line.close()
+
+    def _begin(self, at: Told) -> None:
+        self.end()
+        knows = at.part is not None
+        self._line = _tqdm()(
+            desc=at.phase,
+            total=1.0 if knows else None,
+            initial=self._begun,
+            mininterval=_BAR_SECONDS,
+            bar_format=_WITH_REST if knows else _WITHOUT_REST,
+        )
+        self._phase, self._begun = at.phase, 0.0
+
+
+class _Log:
+    """Lines, the first at once, then one in a while, and the last."""
+
+    def __init__(self, begun: float) -> None:
+        self._first, self._phase = begun, ""
+        self._began = self._written = -_LOG_SECONDS
+        self._waiting: Told | None = None
+
+    def say(self, at: Told) -> None:
+        now = time.perf_counter()
+        if at.phase != self._phase:
+            self.end()
+            self._first = self._first if not self._phase else 0.0
+            self._phase, self._began, self._written = at.phase, now, -_LOG_SECONDS
+        if at.aside:
+            print(at.aside, file=sys.stderr)
+        self._waiting = at
+        if now - self._written >= _LOG_SECONDS:
+            self._write()
+
+    def end(self) -> None:
+        if self._waiting:
+            self._write()
+
+    def _write(self) -> None:
+        at, self._waiting = self._waiting, None
+        assert at is not None
+        self._written = time.perf_counter()
+        seconds = self._written - self._began
+        print(f"{at.phase}: {_how_far(at, self._first, seconds)}{at.text}", file=sys.stderr)
+
+
+def _how_far(at: Told, first: float, seconds: float) -> str:
+    """Say the part that is done, how long it took, and how long the rest will if it goes on like this."""
+    interval = _tqdm().format_interval
+    if at.part is None:
+        return f"[{interval(seconds)}] "
+    here = at.part - first
+    rest = interval(seconds * (1 - at.part) / here) if here > 0 and seconds > 1 else "?"
+    return f"{100 * at.part:.1f} % [{interval(seconds)}, remain {rest}] "
 
 
 class Folder:

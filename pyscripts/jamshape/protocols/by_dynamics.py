@@ -78,14 +78,23 @@ class ByDynamics:
             run = self._resumed(session) or self._begun(session)
             with RunWriter.open(self.run_file) as writer:
                 for count, row in enumerate(approach(run, self.approach), start=1):
-                    found = row.observables
-                    writer.append_observables(row.step, row.time, found)
+                    writer.append_observables(row.step, row.time, row.observables)
                     if count % _ROWS_PER_RESTART == 0:
                         self._keep(run, writer)
-                    yield Progress("compression", found["phi"], found["u"], found["fmax"])
+                    yield self._progress(row.observables)
                 writer.append(run.packing())
                 writer.set_attributes({"finished": True})
         self._forget_restarts()
+
+    def _progress(self, found: Mapping[str, float]) -> Progress:
+        """Tell the pressure and the rate, and where they are to get to."""
+        pressure, rate, aim = found["pressure"], found["kappa"], self.approach
+        where = (found["phi"], found["u"])
+        if rate < 0:
+            text = f"pressure {pressure:.2e} down to {aim.p_open:.0e}"
+            return Progress("compression", "opening of the box", *where, text)
+        text = f"pressure {pressure:.2e} up to {aim.p_end:.0e} at rate {rate:.1e} down to {aim.kappa:.0e}"
+        return Progress("compression", "compression", *where, text)
 
     def landscape(self) -> Landscape:
         """Landscape of the packing."""

@@ -93,16 +93,23 @@ class BySteps:
     def _compress(self, phi: float) -> Iterator[Progress]:
         while self.compression.minimum is None and self.compression.phi < phi:
             step = next(compress(self._landscape, self.compression, self.protocol))
-            history = step.history
             self._store()
-            yield Progress(
-                "compression", step.phi, history.energy_density[-1], history.residual[-1]
-            )
+            yield self._progress(step, phi)
+
+    def _progress(self, step: QuasistaticRun, phi: float) -> Progress:
+        """Tell the energy and the step, and where they are to get to."""
+        u = step.history.energy_density[-1]
+        energy = u * step.state.volume / self.recipe.n
+        text = f"U/N {energy:.1e} of {self.protocol.energy:.0e}, next step {step.step:.1e}"
+        aim = f"to phi = {phi:g}" if math.isfinite(phi) else "to jamming"
+        return Progress("compression", f"compression {aim}", step.phi, u, text)
 
     def _thermalise(self, thermal: Thermal, n_sweeps: int) -> Iterator[Progress]:
         for at in equilibrate(thermal, n_sweeps, self.recipe.seed):
             self._store()
-            yield Progress(f"sweep {at.n_done}", at.packing.phi, 0.0, at.acceptance)
+            text = f"sweep {at.n_done} of {n_sweeps}, acceptance {at.acceptance:.2f}"
+            part = at.n_done / n_sweeps
+            yield Progress("Monte Carlo", "Monte Carlo", at.packing.phi, 0.0, text, part)
         start = State.of(thermal.packing)
         self.compression = QuasistaticRun.of(self._landscape, start, self.protocol)
         self.is_thermalised = True

@@ -29,6 +29,7 @@ __all__ = [
     "make",
     "require_same",
     "summary_of",
+    "tidy",
 ]
 
 
@@ -56,7 +57,7 @@ def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress
         As `Recipe.start` and `target.direct`, or if another packing was being made there.
     """
     began = time.perf_counter()
-    way = ByDynamics(recipe, out) if isinstance(recipe.way, Dynamics) else BySteps(recipe, out)
+    way = _way(recipe, out)
     try:
         way.require_own()
     except ValueError:
@@ -65,7 +66,7 @@ def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress
         way.forget()
     yield from way.steps()
     landscape, minimum = way.landscape(), way.minimum
-    search = SearchFile(out.with_name(out.name + ".search.h5"), recipe)
+    search = _search(recipe, out)
     if recipe.target:
         minimum = yield from lead(landscape, way.state(), recipe.target, search)
     assert minimum is not None
@@ -73,8 +74,21 @@ def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress
     seconds = attributes.pop("seconds_before", 0.0) + time.perf_counter() - began
     attributes |= {"wall_seconds": seconds, "evaluations": landscape.evaluations}
     write_minimum(out, landscape, minimum, attributes)
-    search.forget()
-    way.done()
+    tidy(recipe, out)
+
+
+def tidy(recipe: Recipe, out: Path) -> None:
+    """Remove what was there to go on from beside a finished packing, which a kill may have left."""
+    _search(recipe, out).forget()
+    _way(recipe, out).done()
+
+
+def _way(recipe: Recipe, out: Path) -> ByDynamics | BySteps:
+    return ByDynamics(recipe, out) if isinstance(recipe.way, Dynamics) else BySteps(recipe, out)
+
+
+def _search(recipe: Recipe, out: Path) -> SearchFile:
+    return SearchFile(out.with_name(out.name + ".search.h5"), recipe)
 
 
 def is_done(out: Path) -> bool:

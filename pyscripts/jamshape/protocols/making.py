@@ -10,7 +10,7 @@ from typing import Any
 from jamshape.files.h5md import read_attributes, read_packing, write_frames
 from jamshape.files.journal import remove_run
 from jamshape.landscape import Landscape
-from jamshape.minima import Minimum
+from jamshape.minima import History, Minimum
 from jamshape.minima.target import Search, Target, direct
 from jamshape.packing import Packing, State
 from jamshape.protocols.recipe import Recipe
@@ -18,12 +18,30 @@ from jamshape.protocols.recipe import Recipe
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the making of a packing is."""
+    """Where the making of a packing is.
+
+    Parameters
+    ----------
+    stage
+        "compression", "Monte Carlo" or "search".
+    phase
+        Part of the stage, and what it aims at, in words.
+    phi
+        Packing fraction.
+    energy_density
+        u, [energy / length^D].
+    text
+        What else there is to say, with what it is to become.
+    part
+        Of the phase, from 0 to 1; None where nobody can tell.
+    """
 
     stage: str
+    phase: str
     phi: float
     energy_density: float
-    residual: float
+    text: str
+    part: float | None = None
 
 
 @dataclass(eq=False)
@@ -84,10 +102,16 @@ def lead(
         if at.minimum is None:
             file.write(at, landscape.particles)
         history = at.history
-        phi = area / at.state.volume
-        yield Progress("search", phi, history.energy_density[-1], history.residual[-1])
+        yield _searching(area / at.state.volume, history, target)
     assert search.minimum is not None
     return search.minimum
+
+
+def _searching(phi: float, history: History, target: Target) -> Progress:
+    u, residual = history.energy_density[-1], history.residual[-1]
+    ratio = f"u/u0 {u / target.u0:.3g}" if u > 0 else "unjammed"
+    text = f"u {u:.2e}, {ratio}, residual {residual:.1e} of {target.tolerance:.0e}"
+    return Progress("search", f"search for u0 = {target.u0:g}", phi, u, text)
 
 
 def write_states(

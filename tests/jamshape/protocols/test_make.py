@@ -7,6 +7,7 @@ import pytest
 from mixtures import bidisperse, monodisperse
 from squeezed import squeezed
 
+import jamshape as js
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.files.run_writer import RunWriter
@@ -365,3 +366,13 @@ def test_a_start_that_cannot_be_placed_leaves_no_file(tmp_path):
     with pytest.raises((ValueError, InsertionError)):
         next(make(sample, tmp_path / "packing.h5"))
     assert not list(tmp_path.iterdir())
+
+
+def test_what_a_kill_after_the_last_write_leaves_goes_with_the_next_call(tmp_path):
+    out = tmp_path / "packing.h5"
+    rods, tiny = js.Spherocylinders(alpha=1), {"n": 12, "u0": 1e-6, "way": "steps", "file": out}
+    made = js.make_packing(rods, **tiny, phi_start=0.5, delta_phi=0.02, progress=False)
+    search_of(out).touch()
+    again = js.make_packing(rods, **tiny, phi_start=0.5, delta_phi=0.02, progress=False)
+    assert [path.name for path in tmp_path.iterdir()] == [out.name]
+    np.testing.assert_array_equal(made.position, again.position)

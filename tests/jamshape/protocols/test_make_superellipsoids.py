@@ -101,14 +101,15 @@ def test_protocol_2_thermalises_and_goes_on_from_where_it_was(tmp_path, monkeypa
     monkeypatch.setattr("jamshape.protocols.by_steps._STORE_SECONDS", 0.0)
     way = Steps(COARSE.quasistatic, Thermalisation(0.4, 200))
     sample = Recipe(superellipsoids(1.5), 40, 3, phi_start=0.3, way=way, target=Target(1e-10))
-    stages = [at.stage.split()[0] for at in make(sample, tmp_path / "whole.h5")]
-    first, last = stages.index("sweep"), len(stages) - stages[::-1].index("sweep")
+    stages = [at.stage for at in make(sample, tmp_path / "whole.h5")]
+    first, last = stages.index("Monte Carlo"), len(stages) - stages[::-1].index("Monte Carlo")
     assert set(stages[:first]) == set(stages[last:]) - {"search"} == {"compression"}
     for k, at in enumerate(make(sample, tmp_path / "cut.h5")):
         if k == first + 7:
-            assert at.stage == "sweep 80"
+            assert at.part == 80 / 200
+            assert at.text.startswith("sweep 80 of 200, acceptance 0.")
             break
-    seen = [at.stage.split()[0] for at in make(sample, tmp_path / "cut.h5")]
+    seen = [at.stage for at in make(sample, tmp_path / "cut.h5")]
     assert 0 < len(seen) < len(stages)
     one, other = (read_packing(tmp_path / f"{name}.h5") for name in ("whole", "cut"))
     np.testing.assert_array_equal(one.position, other.position)
