@@ -1,6 +1,11 @@
+import contextlib
+import fcntl
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -14,9 +19,12 @@ FAST = ("--n", "16", "--kappa", "1e-5", "--p-end", "3e-4", "--phi-start", "0.55"
 IMPOSSIBLE = "1e6"  # so long that it meets its own images in any direction
 
 
+def command(out, *options):
+    return [sys.executable, str(DRIVER), *options, *FAST, "--jobs", "2", "--out", str(out)]
+
+
 def run(out, *options):
-    command = [sys.executable, str(DRIVER), *options, *FAST, "--jobs", "2", "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command(out, *options), capture_output=True, text=True, check=False)
     return done, json.loads(done.stdout.splitlines()[-1]) if done.stdout else None
 
 
@@ -85,3 +93,92 @@ def test_a_damaged_file_is_listed_and_does_not_stop_the_others(tmp_path):
     assert report is not None, done.stderr
     assert report["made"] == 0
     assert {c.split("_")[0] for c in report["failed"]} == {"alpha0", "alpha1e+06"}
+
+
+def processes_that_name(folder):
+    """Numbers of the processes whose command lines hold a path in the folder."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            if str(folder).encode() in path.read_bytes():
+                found.append(int(path.parent.name))
+    return set(found)
+
+
+def wait_until(condition, seconds):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+@pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="needs /proc")
+@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
+def test_a_sweep_that_is_killed_alone_leaves_no_process_and_goes_on(tmp_path, ending, measured):
+    samples = ("--alpha", "0", "1", "--samples", "2")
+    with subprocess.Popen(
+        command(tmp_path, *samples),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as sweep:
+        # One sample is done, others are under way.
+        wait_until(lambda: len(list(tmp_path.glob("alpha*_seed?.h5"))) >= 1, 60)
+        wait_until(lambda: len(processes_that_name(tmp_path)) >= 2, 60)
+        os.kill(sweep.pid, ending)
+        killed = time.monotonic()
+    wait_until(lambda: not processes_that_name(tmp_path), 5)
+    measured(seconds_until_all_have_ended=time.monotonic() - killed)
+    finished = {name: at for name, at in times(tmp_path).items() if name.count(".") == 1}
+    done, report = run(tmp_path, *samples)
+    assert (done.returncode, report["made"], report["failed"]) == (0, 4, []), done.stderr
+    after = times(tmp_path)
+    assert {name: after[name] for name in finished} == finished
+    assert not list(tmp_path.glob("*.search.h5"))
+
+
+def test_names_of_files_keep_all_digits_and_options_given_twice_add_up(tmp_path):
+    done, report = run(
+        tmp_path, *("--alpha", "1", "1.0000001", "1e0", "--alpha", "1e6", "--samples", "1")
+    )
+    assert report["made"] == 2
+    assert {c.split(":")[0] for c in report["failed"]} == {"alpha1e+06_seed1.h5"}
+    found = {p.name: read_attributes(p)["alpha"] for p in tmp_path.glob("alpha*_seed1.h5")}
+    assert found == {"alpha1_seed1.h5": 1.0, "alpha1.0000001_seed1.h5": 1.0000001}
+    assert "packings: 100.0 %" in done.stderr
+    assert "3 of 3, 1 failed" in done.stderr
+
+
+def test_a_sample_that_another_process_makes_is_told(tmp_path):
+    log = tmp_path / "alpha0_seed1.log"
+    with log.open("a") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        done, report = run(tmp_path, "--alpha", "0", "--samples", "1")
+    assert done.returncode == 1
+    (complaint,) = report["failed"]
+    assert complaint == (
+        "alpha0_seed1.h5: another process is making it, expected none; wait until it ends"
+    )
+    assert {path.name for path in tmp_path.iterdir()} == {log.name}
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--samples", "0"), "--samples is 0, expected at least 1"),
+        (("--samples", "-2"), "--samples is -2, expected at least 1"),
+        (("--samples", "1", "--jobs", "0"), "--jobs is 0, expected at least 1"),
+        (
+            ("--seed", "3"),
+            "--seed is 3, which means nothing to a sweep: its samples have the seeds",
+        ),
+        (("--see", "1"), "--seed is 1, which means nothing to a sweep"),
+        (("--no-such", "1"), "unrecognized arguments: --no-such 1"),
+    ],
+)
+def test_what_means_nothing_is_refused_before_anything_is_made(tmp_path, options, words):
+    line = [sys.executable, str(DRIVER), "--alpha", "1", *options, "--out", str(tmp_path / "none")]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert words in done.stderr.splitlines()[-1]
+    assert not list(tmp_path.iterdir())

@@ -4,8 +4,8 @@
     jamshape sweep --superellipsoid 1 0.6 1 --superellipsoid 1.5 1 1 --samples 5 --n 400 --out sweep3d/
     jamshape sweep --kind alpha=0 --kind alpha=4,size=1.4 --samples 5 --n 256 --out mixtures/
 
-Each sample is one run of `jamshape pack` in a process of its own, one a core. Started again after a kill it
-goes on: packings that are there are not made again, those under way go on from their own files, and those of
+Each sample is one run of `jamshape pack` in a process of its own, one a core, which ends with the sweep,
+however that ends. Started again after a kill it goes on: packings that are there are not made again, those under way go on from their own files, and those of
 other parameters are refused. A sample that fails is listed, the others go on. The last line of standard output is one JSON
 object; the exit code is 0 only if all samples are there. For clusters see pyscripts/sweep.smk.
 """
@@ -13,25 +13,33 @@ object; the exit code is 0 only if all samples are there. For clusters see pyscr
 from __future__ import annotations
 
 import concurrent.futures
+import fcntl
 import os
+import signal
 import subprocess
 import sys
+import threading
+import time
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
-
-from tqdm import tqdm
+from typing import IO, Any, NamedTuple
 
 from jamshape.command import report
+from jamshape.commands import main as command
 from jamshape.commands import pack
+from jamshape.front.progress import Told, follow
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import DEFAULT, SHAPES, shape_named
 
 # -P: what lies in the working directory is no module of ours.
-_PACK = (sys.executable, "-P", "-m", "jamshape", "pack")
+_PACK = (sys.executable, "-P", "-c", "from jamshape.commands.sweep import sample; sample()")
 
 # One core a process: threads of BLAS would only wait for each other.
 _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+# How long a sample waits for another process that is making it, such as one whose sweep was just killed.
+_PATIENCE = 5.0
 
 GO_ON = "the same command goes on from the files of the packings"
 
@@ -42,6 +50,9 @@ class _Parser(ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         options, extra = super().parse_known_args(args, namespace)
         options.extra = extra
+        for name in ("samples", "jobs"):
+            if getattr(options, name) < 1:
+                self.error(f"--{name} is {getattr(options, name)}, expected at least 1")
         if not particles(options):
             self.error("no particles were given, expected --alpha, --kind or the name of a shape")
         self._require_options_of_a_packing(options)
@@ -51,6 +62,12 @@ class _Parser(ArgumentParser):
         """Refuse what no packing can be made with, before many are begun."""
         parser = pack.options_of()
         parser.prog = self.prog
+        given = parser.parse_args(["--out", "of a sample", *options.extra], Namespace(seed=None))
+        if given.seed is not None:
+            self.error(
+                f"--seed is {given.seed}, which means nothing to a sweep: its samples have the"
+                " seeds 1 to that of --samples"
+            )
         for particle in particles(options):
             parser.parse_args(arguments_of(particle, 1, options))
 
@@ -62,7 +79,9 @@ def options_of() -> ArgumentParser:
         formatter_class=RawDescriptionHelpFormatter,
         epilog="Other options (--n, --u0, --kappa ...) are those of jamshape pack.",
     )
-    parser.add_argument("--alpha", type=float, nargs="+", default=[], help="aspect ratios A/R")
+    parser.add_argument(
+        "--alpha", type=float, nargs="+", action="extend", default=[], help="aspect ratios A/R"
+    )
     parser.add_argument("--shape", choices=SHAPES, default=DEFAULT, help="of --alpha and --kind")
     parser.add_argument("--kind", action="append", default=[], help="one mixture, of these kinds")
     for shape in SHAPES.values():
@@ -89,7 +108,7 @@ class Particle(NamedTuple):
 
 
 def particles(options: Namespace) -> list[Particle]:
-    """List the particles that are asked for."""
+    """List the particles that are asked for, each once."""
     shape = shape_named(options.shape)
     found = [particle_of(shape, {"alpha": alpha}) for alpha in options.alpha]
     for other in SHAPES.values():
@@ -99,7 +118,7 @@ def particles(options: Namespace) -> list[Particle]:
     if options.kind:
         kinds = [text for kind in options.kind for text in ("--kind", kind)]
         found.append(Particle("mixture", ["--shape", shape.name, *kinds]))
-    return found
+    return list({particle.name: particle for particle in found}.values())
 
 
 def particle_of(shape: Shape, parameters: dict[str, float]) -> Particle:
@@ -121,14 +140,44 @@ def arguments_of(particle: Particle, seed: int, options: Namespace) -> list[str]
     return [*particle.arguments, "--seed", str(seed), "--out", str(out), *options.extra]
 
 
-def make(particle: Particle, seed: int, options: Namespace) -> str | None:
+class Leash(NamedTuple):
+    """A pipe that nobody writes to: it ends for the samples, which read it, when the sweep does."""
+
+    read: int
+    write: int
+
+    @classmethod
+    def new(cls) -> Leash:
+        """Make one."""
+        return cls(*os.pipe())
+
+    def let_go(self) -> None:
+        """End all samples."""
+        os.close(self.write)
+
+
+def sample() -> None:
+    """Make one sample in a process of its own, which ends with the sweep that holds its standard input."""
+
+    def end_with_the_sweep() -> None:
+        os.read(0, 1)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    threading.Thread(target=end_with_the_sweep, daemon=True).start()
+    command(["pack", *sys.argv[1:]])
+
+
+def make(particle: Particle, seed: int, options: Namespace, leash: Leash) -> str | None:
     """Make one sample; return its complaint if it fails."""
     out = file_of(particle, seed, options)
     log = out.with_suffix(".log")
     with log.open("a") as errors:
+        if not _is_ours(errors):
+            return f"{out.name}: another process is making it, expected none; wait until it ends"
         done = subprocess.run(
             [*_PACK, *arguments_of(particle, seed, options)],
             check=False,
+            stdin=leash.read,
             stdout=subprocess.PIPE,
             stderr=errors,
             env=os.environ | _ONE_THREAD | {"PYTHONPATH": _python_path()},
@@ -139,27 +188,57 @@ def make(particle: Particle, seed: int, options: Namespace) -> str | None:
     return f"{out.name}: {last[-1] if last else f'exit code {done.returncode}'}"
 
 
+def _is_ours(log: IO[str]) -> bool:
+    """Lock the log of a sample, for as long as it is open here or in the process that makes the sample."""
+    until = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.05)
+        except OSError:  # a file system without locks
+            return True
+        else:
+            return True
+
+
 def _python_path() -> str:
     """Folders in which a process finds this jamshape before any other."""
     before = os.environ.get("PYTHONPATH")
     return os.pathsep.join([str(Path(__file__).parents[2]), *([before] if before else [])])
 
 
+def made(options: Namespace) -> Iterator[str | None]:
+    """Make all samples, and yield the complaint of each, or None, when it ends."""
+    samples = [(p, s) for s in range(1, options.samples + 1) for p in particles(options)]
+    leash = Leash.new()
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        runs = [pool.submit(make, particle, seed, options, leash) for particle, seed in samples]
+        try:
+            for run in concurrent.futures.as_completed(runs):
+                yield run.result()
+        except BaseException:
+            leash.let_go()
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
 def main(options: Namespace) -> int:
     """Run all samples; return the exit code."""
     options.out.mkdir(parents=True, exist_ok=True)
-    samples = [(p, s) for s in range(1, options.samples + 1) for p in particles(options)]
-    failures = []
-    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        runs = [pool.submit(make, particle, seed, options) for particle, seed in samples]
-        try:
-            for run in tqdm(concurrent.futures.as_completed(runs), total=len(runs), unit="packing"):
-                if complaint := run.result():
-                    failures.append(complaint)
-                    tqdm.write(complaint, file=sys.stderr)
-        except KeyboardInterrupt:  # those under way end by themselves
-            pool.shutdown(cancel_futures=True)
-            raise
-    done = len(samples) - len(failures)
-    report({"out": options.out, "made": done, "failed": failures})
+    total, done = options.samples * len(particles(options)), 0
+    failures: list[str] = []
+
+    def told(complaint: str | None) -> Told:
+        nonlocal done
+        done += 1
+        if complaint:
+            failures.append(complaint)
+        failed = f", {len(failures)} failed" if failures else ""
+        return Told("packings", f"{done} of {total}{failed}", done / total, complaint)
+
+    follow(made(options), told)
+    report({"out": options.out, "made": total - len(failures), "failed": failures})
     return 1 if failures else 0
