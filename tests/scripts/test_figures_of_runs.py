@@ -46,6 +46,7 @@ def compression(path, seed=1, shift=0.0, ends=(0.8, 0.9), slope=0.2, **attribute
     rows = {"phi": phi, "pressure": slope * np.maximum(phi - PHI_J - shift, 0)}
     rows |= {name: np.full(81, value) for name, value in S.items()}
     writer.append_series(steps, steps / 3, rows)
+    writer.close()
     return path
 
 

@@ -202,6 +202,7 @@ def compressed(recipe, out, packing):
     rows = {"phi": phi, "pressure": 0.0 * phi, "kappa": np.ones(20)}
     writer.append_series(np.arange(20), np.arange(20.0), rows)
     writer.set_attributes(recipe.attributes() | {"finished": True})
+    writer.close()
 
 
 @TYPICAL_ONES

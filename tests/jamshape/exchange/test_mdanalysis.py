@@ -28,6 +28,7 @@ def run_file(tmp_path, request):
     writer = RunWriter.create(tmp_path / "run.h5", frames[0], observables={"phi": frames[0].phi})
     for packing in frames[1:]:
         writer.append(packing)
+    writer.close()
     return tmp_path / "run.h5", frames
 
 

@@ -34,6 +34,7 @@ def folder(request, tmp_path, monkeypatch):
     writer = RunWriter.create(tmp_path / "run.h5", first, told, {"phi": first.phi, "pressure": 0.1})
     for k in (1, 2):
         writer.append(scaled(first, 1 - 0.01 * k).with_(step=k, time=float(k)))
+    writer.close()
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

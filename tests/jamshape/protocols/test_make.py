@@ -56,6 +56,7 @@ def compressed(out, packing=None):
         np.arange(60), np.arange(60.0), {"phi": phi, "pressure": p, "kappa": kappa}
     )
     writer.set_attributes(RECIPE.attributes() | {"finished": True})
+    writer.close()
 
 
 def assert_same_result(out, expected):
@@ -226,7 +227,8 @@ def test_the_compression_of_another_mixture_is_refused(tmp_path):
     sample = replace(RECIPE, particles=monodisperse(1.0))
     out = tmp_path / "packing.h5"
     compressed(out)
-    RunWriter.open(run_of(out)).set_attributes(sample.attributes())
+    with RunWriter.open(run_of(out)) as writer:
+        writer.set_attributes(sample.attributes())
     assert "expected those of another mixture" in refused(sample, out)
 
 
@@ -329,9 +331,9 @@ def test_a_file_that_is_no_finished_packing_is_neither_done_nor_replaced(tmp_pat
 def test_a_run_without_its_end_is_not_compressed(tmp_path):
     run = tmp_path / "run.h5"
     assert not is_compressed(run)
-    RunWriter.create(run, start(), {"finished": False})
+    writer = RunWriter.create(run, start(), {"finished": False})
     assert not is_compressed(run)
-    RunWriter.open(run).set_attributes({"finished": True})
+    writer.set_attributes({"finished": True})
     assert is_compressed(run)
     assert not is_done(tmp_path / "none.h5")
 
