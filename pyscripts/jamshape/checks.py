@@ -34,7 +34,7 @@ RANGES = {
     "frames": Range(1, _COUNT, "snapshots", whole=True),
     "kappa": Range(1e-14, 0.1, "a rate"),
     "dt": Range(1e-6, 10.0, "a time step"),
-    "phi_start": Range(1e-6, 0.999, "a packing fraction"),
+    "phi_start": Range(1e-9, 0.999, "a packing fraction"),
     "phi_end": Range(1e-6, 2.0, "a packing fraction"),
     "p_end": Range(1e-12, 1.0, "a pressure"),
     "tolerance": Range(1e-14, 1.0, "an error"),
@@ -167,13 +167,13 @@ def require_path_for_lammps(path: Path) -> None:
     >>> require_path_for_lammps(Path("runs/my run.h5"))
     >>> require_path_for_lammps(Path("runs/$HOME.h5"))
     Traceback (most recent call last):
-    ValueError: the path 'runs/$HOME.h5' holds a dollar, which LAMMPS cannot take; choose another name
+    ValueError: the path 'runs/$HOME.h5' holds a dollar, which LAMMPS cannot take, expected another name
     """
     require_path(path)
     text = str(path)
     for sign, called in _TAKEN.items():
         if sign in text:
-            msg = f"the path {text!r} holds {called}, which LAMMPS cannot take; choose another name"
+            msg = f"the path {text!r} holds {called}, which LAMMPS cannot take, expected another name"
             raise ValueError(msg)
 
 

@@ -122,7 +122,7 @@ def assert_one_sentence(failed, words):
         (("--kappa", "1e-2"), "kappa is 0.01, expected at most"),
         (
             ("--phi-start", "nan"),
-            "phi_start is nan, expected a packing fraction from 1e-06 to 0.999",
+            "phi_start is nan, expected a packing fraction from 1e-09 to 0.999",
         ),
     ],
 )

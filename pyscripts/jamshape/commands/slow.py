@@ -13,6 +13,7 @@ import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from jamshape.checks import RANGES, Range, require_in
 from jamshape.command import parser_of, report
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.slow_recording import summary_of
@@ -20,6 +21,9 @@ from jamshape.front.compressing import slow_compress
 from jamshape.shapes.command_line import add_particle_options, particles_of
 
 GO_ON = "the same command goes on from the last frame"
+
+
+_PHI_SLOW = Range(1e-6, 2.0, "a packing fraction", also=(0.0,))
 
 
 def options_of() -> ArgumentParser:
@@ -49,6 +53,8 @@ def options_of() -> ArgumentParser:
 
 def main(options: Namespace) -> None:
     """Begin, or go on; a finished run is left alone."""
+    require_in("--phi-slow", options.phi_slow, _PHI_SLOW)
+    require_in("--kappa-before", options.kappa_before, RANGES["kappa"])
     names = ("n", "p_end", "seed", "start", "method", "tolerance", "largest_drop")
     given = {name: getattr(options, name) for name in names}
     slowly = (options.phi_slow, options.kappa)

@@ -258,6 +258,8 @@ def slow_compress(
     0.72
     """
     require_stated(n=n, seed=seed, phi_end=phi[1], tolerance=tolerance, largest_drop=largest_drop)
+    if p_end != math.inf:
+        require_stated(p_end=p_end)
     rates = kappa if isinstance(kappa, int | float) else tuple(kappa)
     protocol = Protocol(rates, phi[1], p_end, tolerance, largest_drop=largest_drop, method=method)
     for _, rate in protocol.rates:

@@ -194,8 +194,8 @@ def read_modes(path: PathLike) -> ModeTable:
 
 
 def holds_modes(path: PathLike) -> bool:
-    """Whether an HDF5 file is one of `write_modes`, complete or not; OSError if it cannot be opened."""
-    with layout.hdf5().File(path, "r") as file:
+    """Whether an HDF5 file is one of `write_modes`, complete or not; errors as `read_modes`."""
+    with layout.readable(path), layout.hdf5().File(path, "r") as file:
         return "modes" in file
 
 

@@ -1,0 +1,207 @@
+"""Commands and figures with input that is none: one sentence, no zero exit, nothing written, nothing replaced."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from jamshape import commands
+
+ANALYSIS = Path(__file__).parents[2] / "analysis"
+
+# Of no meaning for any number that is not counted in shares or angles.
+NO_NUMBERS = ("-1", "nan", "1e300", "x")
+NO_COUNTS = ("-1", "0", "1.5", "99999999999")
+
+COMPRESS = "compress --n 8 --kappa 1e-2 --phi-start 0.3 --phi-end 0.32 --out new.h5"
+PACK = "pack --n 8 --out new.h5"
+STEPS = "pack --way steps --n 8 --out new.h5"
+SLOW = "slow --n 8 --phi-end 0.85 --out new.h5"
+INITIAL = "initial --n 8 --phi 0.2 --out new.data"
+
+
+def each(start, options, values):
+    return [
+        (f"{start} {option} {value}", option.strip("-")) for option in options for value in values
+    ]
+
+
+CASES = [
+    *each(COMPRESS, ["--kappa", "--phi-start", "--phi-end", "--dt", "--tolerance", "--alpha", "--size-ratio"],
+          [*NO_NUMBERS, "inf"]),
+    *each(COMPRESS, ["--n", "--rows", "--frames"], NO_COUNTS),
+    *each(COMPRESS, ["--kappa", "--dt"], ["0", "1e-300", "1e3"]),
+    *each(COMPRESS, ["--sides", "--dimension"], ["0", "4", "x"]),
+    *each(COMPRESS, ["--seed"], ["-1", "1.5", "99999999999999999999"]),
+    *each(COMPRESS, ["--alpha"], ["1e5", "1e-9"]),
+    *each(COMPRESS, ["--size-ratio"], ["0.5", "11"]),
+    *each(f"{COMPRESS} --shape superellipsoid --dimension 3", ["--p", "--w1", "--w2"],
+          ["0", "-1", "nan", "1e4"]),
+    *each(f"{COMPRESS} --shape superellipsoid", ["--w1"], ["1.1"]),
+    *each(f"{COMPRESS} --shape superellipsoid", ["--w2"], ["0.9"]),
+    *each(f"{COMPRESS} --shape superellipsoid", ["--p"], ["0.5"]),
+    (f"{COMPRESS} --shape dimer --alpha 0", "alpha is 0"),
+    (f"{COMPRESS} --shape cube", "invalid choice"),
+    (f"{COMPRESS} --p 2", "--p is no option"),
+    (f"{COMPRESS} --kind alpha", "a kind is 'alpha'"),
+    (f"{COMPRESS} --kind beta=1", "beta is no parameter"),
+    (f"{COMPRESS} --kind alpha=1,size=-1", "size is -1"),
+    (f"{COMPRESS} --kind alpha=1,size=nan", "size is nan"),
+    (f"{COMPRESS} --kind alpha=1,share=0", "share is 0"),
+    (f"{COMPRESS} --kind alpha=1,spread=7", "spread is 7"),
+    (f"{COMPRESS} --kind size=1 --kind size=20", "largest size over the smallest"),
+    (f"{COMPRESS} --kind alpha=1 --alpha 4", "kinds and other sizes"),
+    (f"{COMPRESS} --integrator euler", "integrator is 'euler'"),
+    (f"{COMPRESS} --integrator 'heun\nshell touch X'", r"integrator is 'heun\\nshell touch X'"),
+    (f"{COMPRESS} --phi-end 0.3", "an end above the start"),
+    (f"{COMPRESS} --phi-start 0.9 --phi-end 1", "stalled at phi"),
+    (f"{COMPRESS} --dt 1e-6 --kappa 1e-14", "more than 1e.12 steps"),
+    (f"{COMPRESS} --kapa 1", "unrecognized arguments"),
+    (f"{COMPRESS} --again --resume", "not allowed with"),
+    ("compress --n 8", "required: --out"),
+    *((f"compress --n 8 --out {name}", "is there, expected another --out")
+      for name in ("start.h5", "run.h5", "text.h5", "start.data", "'a folder'")),
+    *((f"compress --n 8 --out '{name}'", "LAMMPS cannot take, expected")
+      for name in ("$HOME.h5", "a*.h5", 'a"b.h5', "$(touch X).h5", "50%.h5")),
+    ("compress --n 8 --out 'a\nb.h5'", "control character"),
+    ("compress --n 8 --out text.h5/new.h5", "text.h5"),
+    *((f"compress --resume --out {name}", words) for name, words in (
+        ("start.h5", "holds no compression"), ("other.h5", "expected"), ("empty.h5", "expected"),
+        ("text.h5", "expected"), ("cut.h5", "expected"), ("start.data", "expected"),
+        ("'a folder'", "folder"),
+        ("newline.h5", "integrator is"), ("euler.h5", "integrator is"), ("backwards.h5", "kappa is nan"),
+        ("sides.h5", "sides is 7"), ("no_rows.h5", "rows is 0"), ("no_frames.h5", "frames is -3"),
+        ("words.h5", "dt is"), ("stiff.h5", "k_e is"))),
+    *each(PACK, ["--kappa", "--p-end", "--u0", "--accuracy", "--tolerance", "--phi-start", "--alpha"],
+          [*NO_NUMBERS, "inf"]),
+    *each(PACK, ["--n"], NO_COUNTS),
+    *each(PACK, ["--seed", "--dimension"], ["-1", "x"]),
+    *each(STEPS, ["--delta-phi", "--phi-start", "--u0"], NO_NUMBERS),
+    *each(f"{STEPS} --protocol 2", ["--phi-thermal"], NO_NUMBERS),
+    *each(f"{STEPS} --protocol 2", ["--n-sweeps"], ["-1", "1.5", "99999999999"]),
+    (f"{STEPS} --protocol 3", "protocol is 3"),
+    (f"{STEPS} --protocol 2 --phi-thermal 0.2", "a start at a smaller packing fraction"),
+    (f"{STEPS} --kappa 1e-6", "no setting of the way"),
+    (f"{PACK} --delta-phi 1e-3", "no setting of the way"),
+    (f"{PACK} --way walking", "invalid choice"),
+    (f"{PACK} --u0 0", "no energy to reach"),
+    (f"{PACK} --u0 0.01", "take another u0"),
+    (f"{PACK} --kappa 1e-2", "at most kappa_start"),
+    *((f"pack --n 8 --out {name}", "expected") for name in ("start.h5", "run.h5", "text.h5", "empty.h5")),
+    ("pack --n 8 --out 'a folder'", "folder"),
+    ("pack --n 8 --out '$(touch X).h5'", "LAMMPS cannot take, expected"),
+    ("pack --way steps --n 8 --out 'a\nb.h5'", "control character"),
+    *each(SLOW, ["--kappa", "--phi-start", "--phi-end", "--tolerance", "--largest-drop", "--p-end", "--alpha"],
+          NO_NUMBERS),
+    *each(f"{SLOW} --phi-slow 0.82", ["--kappa-before"], ["0", *NO_NUMBERS]),
+    *each(SLOW, ["--n"], NO_COUNTS),
+    *each(SLOW, ["--phi-slow"], ["nan", "-1", "x"]),
+    (f"{SLOW} --phi-end 0.5", "an end above the start"),
+    (f"{SLOW} --phi-start 0.1", "above that of the random start"),
+    (f"{SLOW} --method euler", "invalid choice"),
+    (f"{SLOW} --start none.h5", "none.h5"),
+    (f"{SLOW} --start text.h5", "text.h5"),
+    ("slow --start start.h5 --phi-end 0.2 --out new.h5", "expected one below phi_end"),
+    *((f"slow --n 8 --out {name}", "expected") for name in ("start.h5", "text.h5", "empty.h5")),
+    *each(INITIAL, ["--phi", "--alpha"], [*NO_NUMBERS, "inf"]),
+    *each(INITIAL, ["--n"], NO_COUNTS),
+    *each(INITIAL, ["--seed"], ["-1", "x"]),
+    ("initial --n 8 --out new.txt", "ends in .data or .h5"),
+    ("initial --n 8 --out start.h5", "--again"),
+    ("initial --n 8 --out none/new.data", "none"),
+    ("modes start.h5 --out start.h5", "would be replaced"),
+    ("modes start.h5 --out run.h5", "holds no modes"),
+    ("modes start.h5 --out text.h5", "expected"),
+    ("modes start.h5 --out new.h5", "expected"),
+    ("modes start.h5 --out new.h5 --plot start.h5", "would be replaced"),
+    ("modes none.h5 --out new.h5", "none.h5"),
+    ("modes text.h5 --out new.h5", "text.h5"),
+    ("modes start.h5 --out new.h5 --method exact", "invalid choice"),
+    ("modes start.h5 --out new.h5 --rotation turns", "invalid choice"),
+    *each("modes start.h5 --force --out new.h5", ["--lowest"], ["0", "-1", "x", "99999999999"]),
+    *each("modes start.h5 --force --out new.h5", ["--near", "--least-force"], ["nan", "-1", "x", "inf"]),
+    ("draw start.h5 --out start.h5", "would be replaced"),
+    ("draw start.h5 --out new.nothing", "supported formats"),
+    ("draw start.h5 --out none/new.png", "none"),
+    *((f"draw {name} --out new.png", name) for name in ("none.h5", "text.h5", "other.h5", "empty.h5", "cut.dump")),
+    *each("draw start.h5 --out new.png", ["--dpi"], ["0", "-1", "x", "100000"]),
+    *each("draw start.h5 --out new.png", ["--height", "--turn"], ["nan", "inf", "x"]),
+    *each("draw start.h5 --out new.png", ["--level", "--sides", "--color"], ["9", "none"]),
+    ("draw start.h5 --out new.png --frame 7", "frame"),
+    ("draw start.h5 --out new.png --color cubatic", "cubatic"),
+    ("export start.h5 --out start.h5", "would be replaced"),
+    ("export start.h5 --out run.h5", "--again"),
+    ("export start.h5 --out new.png", "jamshape draw"),
+    ("export start.h5 --out new.data --to cif", "invalid choice"),
+    ("export run.h5 --out new.data --frame 99", "frame"),
+    *((f"export {name} --out new.data", name) for name in ("none.h5", "text.h5", "other.h5", "empty.h5", "text.data")),
+    *((f"info {name}", name) for name in ("none.h5", "text.h5", "empty.h5", "cut.h5", "other.h5")),
+    ("info 'a folder'", "folder"),
+    ("sweep --out new --samples 1", "no particles were given"),
+    ("sweep --out new --alpha x", "invalid float"),
+    ("sweep --out new --alpha 1 --kapa 1", "unrecognized arguments"),
+    ("sweep --out new --superellipsoid 1", "expected 3"),
+    ("sing", "there is no command"),
+    ("", "usage"),
+]  # fmt: skip
+
+
+def refusal_of(end):
+    """Exit code and what was said with it."""
+    said = end.value.code
+    return (1, said) if isinstance(said, str) else (said, "")
+
+
+def require_sentence(code, said, words):
+    # A bar that has not begun to move says nothing.
+    lines = [line for line in said.splitlines() if line.strip() and "row/s]" not in line]
+    sentence = lines[-1]
+    assert code not in {0, None}, said
+    assert "Traceback" not in said
+    assert code == 2 or len(lines) == 1, said  # argparse shows the usage before it
+    told = sentence.replace("_", "-").lower()
+    assert re.search(words, sentence) or words.replace("_", "-").lower() in told, sentence
+    assert len(sentence) < 400
+
+
+@pytest.mark.lammps
+@pytest.mark.usefixtures("place")
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(("arguments", "words"), CASES, ids=[case[0] for case in CASES])
+def test_a_command_refuses(arguments, words, capfd):
+    with pytest.raises(SystemExit) as end:
+        commands.main(shlex.split(arguments))
+    code, text = refusal_of(end)
+    said = capfd.readouterr().err + text
+    if words == "usage":
+        assert code == 2
+        assert words in said
+    else:
+        require_sentence(code, said, words)
+
+
+# All that read files and draw; what else they take is checked as of commands.
+FIGURES = sorted((ANALYSIS / "marschall_2018").glob("fig*.py"))
+FIGURES += sorted((ANALYSIS / "yuan_2019").glob("fig*.py"))
+NOT_OF_FILES = {"fig02_shapes"}
+
+
+@pytest.mark.usefixtures("place")
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", ["none.h5", "text.h5", "other.h5", "'a folder'"])
+@pytest.mark.parametrize("path", FIGURES, ids=lambda path: path.stem)
+def test_a_figure_refuses(path, name, capfd, monkeypatch):
+    if path.stem in NOT_OF_FILES:
+        name = f"--shape {name}"
+    words = shlex.split(f"{path} {name} --out new.png")
+    monkeypatch.setattr(sys, "argv", words)
+    monkeypatch.setattr(sys, "path", [str(path.parent), *sys.path])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(path), run_name="__main__")
+    code, text = refusal_of(end)
+    require_sentence(code, capfd.readouterr().err + text, "expected|No such|no |not |invalid")

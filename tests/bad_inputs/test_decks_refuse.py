@@ -1,0 +1,114 @@
+"""Decks with settings that are none: one sentence of all ranks, exit code 1, nothing run, nothing written."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from jamshape.checks import RANGES
+
+sys.path.append(str(Path(__file__).parents[1] / "styles"))
+
+from lammps_scenes import ENVIRONMENT, MPIRUN, REPOSITORY
+
+pytestmark = pytest.mark.lammps
+
+INPUTS = REPOSITORY / "inputs"
+RODS, BODIES = "compress_spherocylinder", "compress_superellipsoid"
+RELAXED = "minimize_spherocylinder"
+
+CASES = [
+    (RODS, ["kapa", "1e-6"], "no setting kapa, expected kappa"),
+    (RODS, ["epsilon", "1"], "no setting epsilon"),
+    (RODS, ["kappa", "0"], "kappa is '0', expected"),
+    (RODS, ["kappa", "nan"], "kappa is 'nan'"),
+    (RODS, ["alpha", "4;touch X"], "alpha is '4;touch X'"),
+    (RODS, ["alpha", "$(touch X)"], r"alpha is '\?\(touch X\)'"),
+    (RODS, ["alpha", "1e5"], "alpha is '1e5', expected 0 or a number from 1e-06 to 100"),
+    (RODS, ["n", "0"], "n is '0', expected a whole number"),
+    (RODS, ["n", "16\nshell touch X"], "n is '16.nshell touch X'"),
+    (RODS, ["rows", "0"], "rows is '0'"),
+    (RODS, ["frames", "0"], "frames is '0'"),
+    (RODS, ["dt", "1e-300"], "dt is '1e-300'"),
+    (RODS, ["seed", "-1"], "seed is '-1'"),
+    (RODS, ["sides", "three"], "sides is 'three', expected one or two"),
+    (RODS, ["integrator", "heun\nshell touch X"], "integrator is"),
+    (RODS, ["phi_end", "0.4"], "phi_start is 0.4 and phi_end 0.4, expected an end above the start"),
+    (RODS, ["phi_start", "0.8"], "stalled at phi"),
+    (RODS, ["data", "none;touch X"], "Found no file none;touch X"),
+    (RODS, ["out", ""], "out is ''"),
+    (BODIES, ["p", "0.5"], "p is '0.5', expected a number from 0.55 to 10"),
+    (BODIES, ["w1", "1.5"], "w1 is '1.5'"),
+    (BODIES, ["w2", "`touch X`"], "w2 is '`touch X`'"),
+    (RELAXED, ["maxiter", "-5"], "maxiter is '-5'"),
+]  # fmt: skip
+AT_ONCE = ["phi_start", "0.8"]
+
+
+def lmp(folder, deck, *words, ranks=1):
+    several = [*MPIRUN, "-np", str(ranks)] if ranks > 1 else []
+    return subprocess.run(
+        [*several, "lmp", "-in", INPUTS / f"{deck}.in", *words], cwd=folder, env=os.environ | ENVIRONMENT,
+        text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60, check=False,
+    )  # fmt: skip
+
+
+def variables(*pairs):
+    return [word for name, value in pairs for word in ("-var", name, value)]
+
+
+@pytest.mark.parametrize(("deck", "given", "words"), CASES, ids=str)
+def test_a_deck_refuses(deck, given, words, tmp_path):
+    state = [("restart", __file__)] if deck == RELAXED else []
+    ranks = 2 if given[0] in {"alpha", "phi_start"} else 1
+    done = lmp(tmp_path, deck, *variables(given, *state), ranks=ranks)
+    [sentence] = re.findall("^.*(?:ERROR|Error|Traceback).*$", done.stdout, re.MULTILINE)
+    assert sentence.startswith("ERROR: ")
+    assert re.search(words, sentence)
+    assert done.returncode == 1
+    # Whether rods find room is known only where they are put.
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left <= ({"runs"} if given == AT_ONCE else set())
+
+
+STRANGE = "x;touch X $(touch X) `touch X` \"q\" 'r' [a] *b* é#&%"
+
+
+def test_a_folder_of_any_name_works(tmp_path):
+    settings = [("n", "16"), ("kappa", "1e-2"), ("dt", "0.1"), ("phi_end", "0.6")]
+    done = lmp(tmp_path, RODS, *variables(*settings, ("out", STRANGE)))
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert [path.name for path in tmp_path.iterdir()] == [STRANGE]
+    assert (tmp_path / STRANGE / "final.restart").is_file()
+    for path in (tmp_path / STRANGE).iterdir():
+        assert path.name != "X"
+
+
+def ranges_of_decks():
+    """Tables that are in the Python of the decks."""
+    text = (INPUTS / "check_settings.lmp").read_text()
+    tables = text[text.index("jamshape_whole =") : text.index("jamshape_words =")]
+    found = {}
+    exec(tables, found)  # noqa: S102 - our own deck
+    return found["jamshape_whole"], found["jamshape_ranges"]
+
+
+def test_decks_have_the_ranges_of_the_library():
+    whole, ranges = ranges_of_decks()
+    shared = (whole.keys() | ranges.keys()) & RANGES.keys()
+    assert {"n", "alpha", "p", "w1", "w2", "kappa", "dt", "phi_start", "phi_end"} <= shared
+    for name in shared - {"seed"}:  # LAMMPS's are shorter
+        allowed = RANGES[name]
+        assert (whole | ranges)[name] == (allowed.low, allowed.high, *allowed.also)
+
+
+def test_every_setting_of_a_deck_is_checked():
+    whole, ranges = ranges_of_decks()
+    for deck in INPUTS.glob("*.in"):
+        own = set(re.findall(r"^variable +(\w+) +index", deck.read_text(), re.MULTILINE))
+        assert own <= whole.keys() | ranges.keys() | {"integrator", "sides", "out"}
