@@ -13,6 +13,7 @@ import pytest
 
 from jamshape.contacts import network as contacts
 from jamshape.files.lammps_text import read_any, read_data, read_dump
+from jamshape.files.restarts import is_whole
 
 sys.path.append(str(Path(__file__).parents[1] / "styles"))
 
@@ -141,6 +142,12 @@ def test_two_ranks_agree_until_rounding_has_grown(whole, tmp_path):
     np.testing.assert_allclose(two["p"][early], one["p"][early], rtol=1e-6)
 
 
+def dump_steps(path):
+    """Steps of the frames of a dump."""
+    lines = path.read_text().splitlines()
+    return [int(lines[k + 1]) for k, line in enumerate(lines) if line == "ITEM: TIMESTEP"]
+
+
 # --- kill and go on ------------------------------------------------------------------------------
 
 
@@ -162,15 +169,23 @@ def test_run_goes_on_after_a_kill(ranks_after, tmp_path):
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     with process:
-        wait_for((killed / "restart.b").exists, process)
-        size = (whole / "final.restart").stat().st_size
-        wait_for(lambda: (killed / "restart.b").stat().st_size == size, process)
+        # restart.b is there from the beginning, restart.a from the first frame on.
+        wait_for(lambda: is_whole(killed / "restart.a"), process)
         process.kill()
     assert not (killed / "final.restart").exists()
     halfway = read_any(killed / "particles.dump")  # readable before the run has ended
 
     newest = max(killed.glob("restart.?"), key=lambda path: path.stat().st_mtime_ns)
+    if ranks_after == 1:  # as killed while it wrote
+        newest.write_bytes(newest.read_bytes()[:-3])
+        for name, rest in (("particles", "ITEM: TIM"), ("contacts", "ITEM: TIMESTEP\n99999999")):
+            with (killed / f"{name}.dump").open("a") as file:
+                file.write(rest)
+        newest = killed
     run_deck(killed, ranks_after, restart=newest, data=whole / "initial.data", **slow)
+    for name in ("particles.dump", "contacts.dump"):
+        steps = [dump_steps(folder / name) for folder in (killed, whole)]
+        assert steps[0] == steps[1]
     expected = {frame.step: frame for frame in read_dump(whole / "particles.dump")}
     frames = read_dump(killed / "particles.dump")
     assert {frame.step for frame in frames} == expected.keys()
@@ -185,6 +200,9 @@ def test_run_goes_on_after_a_kill(ranks_after, tmp_path):
     one, two = thermo_rows(whole), thermo_rows(killed)
     np.testing.assert_array_equal(one["step"], two["step"])
     np.testing.assert_allclose(two["p"], one["p"], rtol=1e-6, atol=1e-12)
+    # Each process begins with some evaluations, from which it estimates the largest time step.
+    assert np.all(np.diff(two["evaluations"]) > 0)
+    np.testing.assert_allclose(two["evaluations"], one["evaluations"], rtol=0, atol=40)
 
 
 def test_deck_takes_data_of_your_own(whole, tmp_path):

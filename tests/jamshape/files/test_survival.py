@@ -66,7 +66,7 @@ def require_prefix(path, most=ROWS):
     np.testing.assert_array_equal(report.step, np.arange(1, last + 1))
     frames = count_frames(path)
     assert frames in {last // 3 + 1, (last - 1) // 3 + 1}
-    for k in range(frames):
+    for k in {*range(min(frames, 5)), frames - 1}:
         assert_identical(read_packing(path, k), frame(3 * k))
     # Rows and attributes are records of their own, and so are rows that are dropped to go on.
     assert last - 1 <= stored["seen"] <= last + 2
@@ -242,7 +242,7 @@ def write_until_killed(path):
 
 @pytest.mark.parametrize("kills", KILLS)
 def test_no_kill_damages_a_run(kills, tmp_path, measured):
-    path, random, rows, longest = tmp_path / "killed.h5", np.random.default_rng(1), 0, 400
+    path, random, rows, longest = tmp_path / "killed.h5", np.random.default_rng(1), 0, 100
     for _ in range(kills):
         process = os.fork()
         if not process:
