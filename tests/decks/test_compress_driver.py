@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
+from jamshape.files.restarts import RestartFiles
 
 pytestmark = pytest.mark.lammps
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "compress.py"
 SMALL = ("--n", "48", "--kappa", "3e-4", "--dt", "0.1", "--phi-end", "0.86", "--rows", "60")
 
-# Counted, or last estimated, since the process began: not properties of the state.
-OF_THE_PROCESS = {"evaluations", "lambda_max", "dt_max", "step_error"}
+# Last estimated since the process began: not properties of the state.
+OF_THE_PROCESS = {"lambda_max", "dt_max", "step_error"}
 
 
 def command(out, *options):
@@ -66,7 +67,8 @@ def test_integrators_that_choose_their_steps_take_rows_as_steps(tmp_path):
     assert again.returncode == 0
 
 
-def test_a_killed_run_goes_on_as_if_nothing_had_happened(whole, tmp_path):
+@pytest.mark.parametrize("broken", [False, True])
+def test_a_killed_run_goes_on_as_if_nothing_had_happened(broken, whole, tmp_path):
     out = tmp_path / "killed.h5"
     with subprocess.Popen(
         command(out), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
@@ -76,6 +78,9 @@ def test_a_killed_run_goes_on_as_if_nothing_had_happened(whole, tmp_path):
             time.sleep(0.005)
         going.send_signal(signal.SIGKILL)
     assert not read_attributes(out)["finished"]
+    if broken:  # the newest restart file, as if it had been killed while it was written
+        newest = RestartFiles(Path(f"{out}.restart")).newest()
+        newest.write_bytes(newest.read_bytes()[:-5])
     resumed = run(out, "--resume")
     assert resumed.returncode == 0, resumed.stderr
     for name, values in read_observables(whole[0]).items():
@@ -85,6 +90,22 @@ def test_a_killed_run_goes_on_as_if_nothing_had_happened(whole, tmp_path):
     one, other = read_packing(whole[0]), read_packing(out)
     np.testing.assert_allclose(other.position, one.position, rtol=0, atol=1e-10)
     np.testing.assert_allclose(other.orientation, one.orientation, rtol=0, atol=1e-10)
+    assert [path.name for path in tmp_path.iterdir()] == ["killed.h5"]
+
+
+def test_a_run_without_restart_files_begins_anew(whole, tmp_path):
+    out = tmp_path / "killed.h5"
+    with subprocess.Popen(
+        command(out), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+    ) as going:
+        deadline = time.monotonic() + 60
+        while not out.exists() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        going.send_signal(signal.SIGKILL)
+    RestartFiles(Path(f"{out}.restart")).forget()
+    assert run(out, "--resume").returncode == 0
+    expected = read_observables(whole[0])["phi"]
+    np.testing.assert_allclose(read_observables(out)["phi"], expected, rtol=1e-12)
 
 
 def test_a_finished_run_is_left_alone(whole):

@@ -97,11 +97,12 @@ def begin(session: Session, settings: Compression, start: Packing, to: Recording
     """Start a compression and its file."""
     run = CompressionRun(session, settings, start)
     to.restarts.forget()  # of another run, which was cut off and is begun anew
+    first = run.measure()
     run.write_restart(to.restarts.next())
     attributes = dataclasses.asdict(settings) | dict(to.attributes)
     attributes |= {"phi_start": start.phi, "rows": to.rows, "frames": to.frames, "finished": False}
     attributes["left_out"] = session.left_out()
-    RunWriter.create(to.path, run.packing(), attributes, run.measure()).close()
+    RunWriter.create(to.path, run.packing(), attributes, first).close()
     return run
 
 
@@ -130,7 +131,7 @@ def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
             raise FileFormatError(msg)
         writer.truncate(session.step)
     counted = read_observables(path).get("evaluations")
-    if session.step and counted is not None:
+    if counted is not None:
         run.count_from(float(counted[-1]))
     return run, to
 
