@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from jamshape.files import layout
 from jamshape.files.disk import PathLike, real
 from jamshape.files.h5md import read_packing
-from jamshape.files.journal import Journal, Table, new_token
+from jamshape.files.journal import Journal, Table, journal_of, new_token
 from jamshape.files.rows import ATTRIBUTES, Columns, Stored, as_column, beside, check_after, table
 from jamshape.packing import Packing
 
@@ -27,6 +27,18 @@ if TYPE_CHECKING:
 _PART = 0.25
 _PAUSE = 200
 _SECONDS = 0.05  # about what it takes, where it was not measured yet
+
+
+def fold(path: PathLike) -> None:
+    """Bring into the file of a finished run the rows that a kill left in its journal.
+
+    Raises
+    ------
+    FileFormatError, OSError
+        As `RunWriter`.
+    """
+    if journal_of(path).exists():
+        RunWriter.open(path).close()
 
 
 class RunWriter:

@@ -16,6 +16,7 @@ from jamshape.checks import (
     require_stated,
 )
 from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
+from jamshape.files.run_writer import fold
 from jamshape.flow import recording, slow_recording
 from jamshape.flow.compression import Compression, Row
 from jamshape.flow.implicit import Protocol, Step
@@ -127,6 +128,7 @@ def compress(
         recording.require_same(to, settings, dimension)
         if not recording.is_finished(at.path):
             _record(lambda session: recording.resume(session, at.path)[0], to, progress)
+    fold(at.path)
     return RunFile(*at)
 
 
@@ -169,6 +171,7 @@ def resume(file: str | Path, *, progress: bool = True) -> RunFile:
             require_path_for_lammps(path)
             to = Recording(path, stored["rows"], stored["frames"])
             _record(lambda session: recording.resume(session, path)[0], to, progress)
+    fold(path)
     return RunFile(path)
 
 
@@ -278,6 +281,7 @@ def slow_compress(
         slow_recording.begin(at.path, first, protocol, made_from)
     if not slow_recording.is_finished(at.path):
         _record_slowly(at.path, progress)
+    fold(at.path)
     return RunFile(*at)
 
 

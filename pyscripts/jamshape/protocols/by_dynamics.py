@@ -17,7 +17,7 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.journal import remove_run
 from jamshape.files.restarts import is_whole
-from jamshape.files.run_writer import RunWriter
+from jamshape.files.run_writer import RunWriter, fold
 from jamshape.flow.compression import CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.landscape import Landscape
@@ -71,6 +71,7 @@ class ByDynamics:
     def steps(self) -> Iterator[Progress]:
         """Compress, going on with what an earlier call has left."""
         if is_compressed(self.run_file):
+            fold(self.run_file)
             return
         if self.recipe.target:
             require_reachable(Landscape(self.recipe.start()), self.recipe.target)
@@ -168,7 +169,7 @@ class ByDynamics:
             writer.truncate(step)
         self._newest = {name: float(of[name]) for name in _OF_RESTART}
         counted = read_observables(self.run_file).get("evaluations")
-        if counted is not None:
+        if counted is not None and len(counted):  # none before the first row
             run.count_from(float(counted[-1]))
         return run
 

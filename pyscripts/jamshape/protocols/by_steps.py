@@ -131,6 +131,7 @@ class BySteps:
             "n_sweeps_done": self.thermal.n_done if self.thermal else -1,
             "move_size": self.thermal.size if self.thermal else 0.0,
             "seconds_before": self.seconds_before + now - self._began,
+            "evaluations": self._landscape.evaluations,
         }
         write_states(self.file, states, like, attributes)
 
@@ -146,6 +147,7 @@ class BySteps:
         )
         self.is_thermalised = bool(stored["is_thermalised"])
         self.seconds_before = float(stored["seconds_before"])
+        self._landscape.evaluations = int(stored.get("evaluations", 0))
         if stored["n_sweeps_done"] >= 0:
             packing, n_done = read_packing(self.file, 2), int(stored["n_sweeps_done"])
             self.thermal = Thermal(packing, n_done, float(stored["move_size"]))

@@ -51,13 +51,14 @@ class SearchFile:
     path: Path
     recipe: Recipe
 
-    def read(self) -> Search | None:
-        """Read the search, if it is there and of this recipe."""
+    def read(self, landscape: Landscape) -> Search | None:
+        """Read the search, if it is there and of this recipe; the landscape goes on counting."""
         if not self.path.exists():
             return None
         stored = read_attributes(self.path)
         if not _same(stored, self.recipe.attributes()):
             return None
+        landscape.evaluations = int(stored.get("evaluations", 0))
         opening = int(stored["opening"])
         return Search(
             state=State.of(read_packing(self.path, 1)),
@@ -67,15 +68,17 @@ class SearchFile:
             opening=None if opening < 0 else bool(opening),
         )
 
-    def write(self, search: Search, like: Packing) -> None:
+    def write(self, search: Search, landscape: Landscape) -> None:
         """Write a search between two minimisations: its states are two frames."""
         attributes = self.recipe.attributes() | {
             "search_step": search.step,
             "loose_in_a_row": search.loose_in_a_row,
             "opening": -1 if search.opening is None else int(search.opening),
             "has_loose": search.loose is not None,
+            "evaluations": landscape.evaluations,
         }
-        write_states(self.path, [search.loose or search.state, search.state], like, attributes)
+        states = [search.loose or search.state, search.state]
+        write_states(self.path, states, landscape.particles, attributes)
 
     def forget(self) -> None:
         """Remove it."""
@@ -96,11 +99,11 @@ def lead(
     -------
     Minimum
     """
-    search = file.read() or Search(start, target.step)
+    search = file.read(landscape) or Search(start, target.step)
     area = float(landscape.particles.measures.sum())
     for at in direct(landscape, search, target):
         if at.minimum is None:
-            file.write(at, landscape.particles)
+            file.write(at, landscape)
         history = at.history
         yield _searching(area / at.state.volume, history, target)
     assert search.minimum is not None

@@ -1,0 +1,171 @@
+"""Runs that are killed at moments that nobody chose, and what is left of them.
+
+Commands run in processes forked from one that has imported everything, so that hundreds of kills take minutes and
+nearly all of them fall into the work itself.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+from lammps_scenes import REPOSITORY, command_line, environment
+
+# The time that something took, which differs from run to run, and the history of a search, which is that
+# of the process that ended it.
+CLOCKS = {"wall_seconds", "flow_wall_seconds"}
+OF_THE_PROCESS = ("report/",)
+
+_SECONDS = 120
+_PRELOADED = ("jamshape.commands." + name for name in ("compress", "pack", "slow", "sweep"))
+
+
+def forked(words, log, patches=()):
+    """Run the command jamshape in a process of its own, with other values of some constants."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(_PRELOADED))
+    process = context.Process(
+        target=_command, args=([str(word) for word in words], str(log), patches)
+    )
+    process.start()
+    return process
+
+
+def _command(words, log, patches):
+    from jamshape.commands import main  # noqa: PLC0415 - in the process that is to be killed
+
+    file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+    os.dup2(file, 1)
+    os.dup2(file, 2)
+    sys.stdout, sys.stderr = (os.fdopen(k, "w", buffering=1, closefd=False) for k in (1, 2))
+    for name, value in patches:
+        module, constant = name.rsplit(".", 1)
+        setattr(importlib.import_module(module), constant, value)
+    main(words)
+
+
+class _Deck:
+    """The stock lmp with a deck, in the manners of a process of multiprocessing."""
+
+    def __init__(self, words, log):
+        with Path(log).open("ab") as file:
+            self._process = subprocess.Popen(
+                command_line(*words), cwd=REPOSITORY, env=environment(), stdout=file, stderr=file
+            )
+        self.pid = self._process.pid
+
+    def join(self, seconds):
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+
+    @property
+    def exitcode(self):
+        return self._process.poll()
+
+
+def deck(words, log):
+    """Run a deck in LAMMPS."""
+    return _Deck(words, log)
+
+
+def ended(process, after=_SECONDS):
+    """Wait until a process has ended and return its exit code, or kill it after some seconds."""
+    process.join(after)
+    if process.exitcode is None:
+        os.kill(process.pid, signal.SIGKILL)
+        process.join(_SECONDS)
+    return process.exitcode
+
+
+def uninterrupted(case, folder):
+    """Run a case to its end; return how long that took."""
+    folder.mkdir()
+    began = time.monotonic()
+    code = ended(case.start(folder))
+    assert code == 0, said(folder)
+    return time.monotonic() - began
+
+
+def killed(case, folder, seconds, kills, seed):
+    """Run a case, which takes so many seconds, kill it several times on the way, and let it end; count kills.
+
+    After each kill all files are looked at.
+    """
+    folder.mkdir()
+    rng, count = random.Random(seed), 0
+    for _ in range(kills):
+        code = ended(case.start(folder), rng.uniform(0, seconds))
+        if code != -signal.SIGKILL:
+            assert code == 0, said(folder)
+            break
+        count += 1
+        require_whole(folder)
+    finished = finished_files(folder)
+    assert ended(case.start(folder)) == 0, said(folder)
+    for path, before in finished.items():
+        assert stamp(path) == before, f"{path.name} was finished and was made again"
+    return count
+
+
+def require_whole(folder):
+    """Every HDF5 file opens and can be read to its end."""
+    for path in folder.rglob("*.h5"):
+        with h5py.File(path) as file:
+            file.visititems(lambda _, part: part[()] if isinstance(part, h5py.Dataset) else None)
+
+
+def finished_files(folder):
+    """Find packings that are finished, with when they were written."""
+    found = {}
+    for path in folder.rglob("*.h5"):
+        with h5py.File(path) as file:
+            if "outcome" in file["parameters"].attrs:
+                found[path] = stamp(path)
+    return found
+
+
+def stamp(path):
+    return path.stat().st_mtime_ns, path.read_bytes()
+
+
+def said(folder):
+    return (folder / "said.log").read_text()[-2000:]
+
+
+def contents(path):
+    """All numbers of an HDF5 file by name, but for those of clocks."""
+    found = {}
+
+    def take(name, part):
+        if name.split("/")[-1] in CLOCKS or name.startswith(OF_THE_PROCESS):
+            return
+        for key, value in part.attrs.items():
+            if key not in CLOCKS:
+                found[f"{name}@{key}"] = np.asarray(value)
+        if isinstance(part, h5py.Dataset):
+            found[name] = part[()]
+
+    with h5py.File(path) as file:
+        file.visititems(take)
+    return found
+
+
+def differences(one, other):
+    """Names of what differs by a bit between two files."""
+    a, b = contents(one), contents(other)
+    return sorted(a.keys() ^ b.keys()) + [k for k in a.keys() & b.keys() if not _same(a[k], b[k])]
+
+
+def _same(a, b):
+    numbers = all(np.asarray(x).dtype.kind == "f" for x in (a, b))
+    return np.array_equal(a, b, equal_nan=numbers)
