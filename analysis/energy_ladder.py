@@ -54,8 +54,12 @@ def row_of(rung: Rung) -> dict[str, Any]:
 
 def main(options: Namespace) -> int:
     """Climb all ladders; return the exit code."""
-    options.out.mkdir(parents=True, exist_ok=True)
     target = Target(options.u0[0], options.accuracy, options.tolerance)
+    for source in options.packings:
+        if not source.is_file():
+            msg = f"{source} does not exist, expected a packing of make_packing.py"
+            raise ValueError(msg)
+    options.out.mkdir(parents=True, exist_ok=True)
     rows = []
     total = len(options.packings) * len(set(options.u0))
     with tqdm(total=total, unit="packing") as bar:

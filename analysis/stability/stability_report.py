@@ -130,10 +130,15 @@ def asked(options: argparse.Namespace) -> list[str]:
     ValueError
         If there is none.
     """
+    try:
+        wanted = re.compile(options.only)
+    except re.error as error:
+        msg = f"--only {options.only!r} is no pattern ({error}), expected a regular expression"
+        raise ValueError(msg) from None
     found = [
         label
         for label, case in _cases().items()
-        if re.search(options.only, label) and not (options.quick and case.heavy)
+        if wanted.search(label) and not (options.quick and case.heavy)
     ]
     if not found:
         msg = f"no case is called {options.only!r}, expected part of a name such as 'own images'"
@@ -143,10 +148,10 @@ def asked(options: argparse.Namespace) -> list[str]:
 
 def main(options: argparse.Namespace) -> int:
     """Run what is asked for and not there; return the exit code."""
+    labels = asked(options)
     options.out.mkdir(parents=True, exist_ok=True)
     path, out = options.out / "verdicts.json", options.out / "report.md"
     records: dict[str, dict[str, Any]] = json.loads(path.read_text()) if path.exists() else {}
-    labels = asked(options)
     # What failed is looked at again: it may have been mended.
     todo = [x for x in labels if options.again or not records.get(x, {}).get("holds")]
     found = verdicts(todo, options.out / "lammps.log")

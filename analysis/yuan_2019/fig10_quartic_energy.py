@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from jamshape.checks import Range, require_in
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.families import label, mark
 from jamshape.drawing.mode_axes import packing_text
@@ -198,6 +199,7 @@ def row_of(found: Followed) -> dict[str, Any]:
 
 def main(options: Namespace) -> None:
     """Read, follow, draw, report."""
+    require_in("--modes", options.modes, Range(1, 10**6, "modes", whole=True))
     groups = read_groups(options.files)
     files = [file for files in groups.values() for file in files]
     every = [follow(file, options.modes) for file in tqdm(files, unit="packing")]

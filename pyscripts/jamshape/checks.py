@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import numbers
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -52,6 +52,11 @@ RANGES = {
     "size": Range(0.01, 100.0, "a size"),
     "share": Range(1e-6, 1e6, "a share"),
     "spread": Range(0.0, 1.0, "a spread"),
+    "samples": Range(1, _COUNT, "samples", whole=True),
+    "pairs": Range(1, 10**9, "pairs", whole=True),
+    "dpi": Range(1, 4000, "dots", whole=True),
+    "follow": Range(0, _COUNT, "modes", whole=True),
+    "largest": Range(0.0, 100.0, "a bound"),
 }
 """What users may ask for, in the units of the papers: the ranges in which it was tried. Decks have the same."""
 
@@ -107,6 +112,29 @@ def require_stated(**values: Any) -> None:
     """
     for name, value in values.items():
         require_in(name, value, RANGES[name])
+
+
+def require_options(given: Mapping[str, Any]) -> None:
+    """Refuse options that are out of the range of their name, and numbers that are none whatever their name.
+
+    Raises
+    ------
+    ValueError
+
+    Examples
+    --------
+    >>> require_options({"kappas": [1e-6, -1.0], "out": "a.png", "seed": None})
+    Traceback (most recent call last):
+    ValueError: kappa is -1.0, expected a rate from 1e-14 to 0.1
+    """
+    for option, values in given.items():
+        for value in values if isinstance(values, list) else [values]:
+            name = option if option in RANGES else option.removesuffix("s")
+            if name in RANGES and _is_a(numbers.Real, value):
+                require_in(name, value, RANGES[name])
+            elif _is_a(numbers.Real, value) and math.isnan(value):
+                msg = f"{option} is nan, expected a number"
+                raise ValueError(msg)
 
 
 def require_in(name: str, value: Any, allowed: Range) -> None:
@@ -173,7 +201,9 @@ def require_path_for_lammps(path: Path) -> None:
     text = str(path)
     for sign, called in _TAKEN.items():
         if sign in text:
-            msg = f"the path {text!r} holds {called}, which LAMMPS cannot take, expected another name"
+            msg = (
+                f"the path {text!r} holds {called}, which LAMMPS cannot take, expected another name"
+            )
             raise ValueError(msg)
 
 

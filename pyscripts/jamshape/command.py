@@ -21,6 +21,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
+from jamshape.checks import require_options
+
 # What wrong input, missing files and searches without an end raise, each with one sentence.
 PROBLEMS = (OSError, ValueError, RuntimeError)
 
@@ -76,10 +78,11 @@ def plain(value: Any) -> Any:
 def run(parser: ArgumentParser, main: Callable[[Namespace], int | None]) -> NoReturn:
     """Parse the command line, run a script and end with the exit code that it returns.
 
-    Problems end as `sentences` tells.
+    Numbers are checked by their names before. Problems end as `sentences` tells.
     """
     options = parser.parse_args()
     with sentences(parser.prog):
+        require_options(vars(options))
         sys.exit(main(options))
 
 

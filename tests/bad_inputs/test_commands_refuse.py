@@ -157,9 +157,12 @@ def refusal_of(end):
     return (1, said) if isinstance(said, str) else (said, "")
 
 
+BAR = re.compile(r"(\b0row|\| 0/\d+) \[")
+
+
 def require_sentence(code, said, words):
     # A bar that has not begun to move says nothing.
-    lines = [line for line in said.splitlines() if line.strip() and "row/s]" not in line]
+    lines = [line for line in said.splitlines() if line.strip() and not BAR.search(line)]
     sentence = lines[-1]
     assert code not in {0, None}, said
     assert "Traceback" not in said
@@ -191,6 +194,52 @@ FIGURES += sorted((ANALYSIS / "yuan_2019").glob("fig*.py"))
 NOT_OF_FILES = {"fig02_shapes"}
 
 
+OPTIONS = [
+    ("energy_ladder.py start.h5 --u0 -1 --out new", "u0 is -1"),
+    ("energy_ladder.py start.h5 --u0 1e-9 --accuracy 0 --out new", "accuracy is 0"),
+    ("energy_ladder.py none.h5 --u0 1e-9 --out new", "none.h5"),
+    ("marschall_2018/fig07_snapshots.py start.h5 --dpi 0 --out new.png", "dpi is 0"),
+    ("marschall_2018/fig08_contact_number.py start.h5 --largest nan --out new.png", "largest is nan"),
+    ("marschall_2018/fig12_modes.py start.h5 --mode -1000 --out new.png", "expected"),
+    ("marschall_2018/singular_limit.py --n 0 --out new", "n is 0"),
+    ("marschall_2018/singular_limit.py --samples 0 --out new", "samples is 0"),
+    ("marschall_2018/singular_limit.py --alpha -1 --out new", "alpha is -1"),
+    ("marschall_2018/singular_limit.py --kappa 0 --out new", "kappa is 0"),
+    ("yuan_2019/fig02_shapes.py --shape 1 2 3 --out new.png", "w1 = 2.0"),
+    ("yuan_2019/fig02_shapes.py --dpi 0 --out new.png", "dpi is 0"),
+    ("yuan_2019/fig09b_quartic_modes.py start.h5 --follow -1 --out new.png", "follow is -1"),
+    ("yuan_2019/fig10_quartic_energy.py start.h5 --modes 0 --out new.png", "modes is 0"),
+    ("errors/contact_error.py --pairs 0 --out new", "pairs is 0"),
+    ("errors/contact_error.py --seed -1 --out new", "seed is -1"),
+    ("errors/heun_error.py --n 0 --out new", "n is 0"),
+    ("errors/integrator_error.py --kappa -1 --out new", "kappa is -1"),
+    ("errors/integrator_error.py --n 0 --out new", "n is 0"),
+    ("errors/minimiser_error.py --seconds nan --out new", "seconds is nan"),
+    ("errors/stiff_error.py --kappas 0 --out new", "kappa is 0"),
+    ("errors/spectrum_error.py none.h5 --out new.png", "none.h5"),
+    ("stability/stability_report.py --only ( --out new", "is no pattern"),
+    ("stability/stability_report.py --only xyzzy --out new", "no case is called"),
+]  # fmt: skip
+
+
+def run_script(words, monkeypatch):
+    path = Path(words[0])
+    monkeypatch.setattr(sys, "argv", words)
+    monkeypatch.setattr(sys, "path", [str(path.parent), *sys.path])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(path), run_name="__main__")
+    return refusal_of(end)
+
+
+@pytest.mark.usefixtures("place")
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(("arguments", "words"), OPTIONS, ids=[case[0] for case in OPTIONS])
+def test_a_script_refuses(arguments, words, capfd, monkeypatch):
+    script, *options = shlex.split(arguments)
+    code, text = run_script([str(ANALYSIS / script), *options], monkeypatch)
+    require_sentence(code, capfd.readouterr().err + text, words)
+
+
 @pytest.mark.usefixtures("place")
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["none.h5", "text.h5", "other.h5", "'a folder'"])
@@ -198,10 +247,6 @@ NOT_OF_FILES = {"fig02_shapes"}
 def test_a_figure_refuses(path, name, capfd, monkeypatch):
     if path.stem in NOT_OF_FILES:
         name = f"--shape {name}"
-    words = shlex.split(f"{path} {name} --out new.png")
-    monkeypatch.setattr(sys, "argv", words)
-    monkeypatch.setattr(sys, "path", [str(path.parent), *sys.path])
-    with pytest.raises(SystemExit) as end:
-        runpy.run_path(str(path), run_name="__main__")
-    code, text = refusal_of(end)
+    words = [str(path), *shlex.split(f"{name} --out new.png")]
+    code, text = run_script(words, monkeypatch)
     require_sentence(code, capfd.readouterr().err + text, "expected|No such|no |not |invalid")

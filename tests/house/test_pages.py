@@ -54,7 +54,7 @@ def test_layers_of_the_page_are_those_that_are_checked():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     [contract] = [c for c in settings["tool"]["importlinter"]["contracts"] if c["type"] == "layers"]
     checked = [layer.replace(" | ", ", ") for layer in reversed(contract["layers"])]
-    [block] = [b for b in ARCHITECTURE.split("```") if b.strip().startswith("arrays")]
+    [block] = [b for b in ARCHITECTURE.split("```") if b.strip().startswith("checks")]
     assert [layer.strip() for layer in block.split("<-")] == checked
 
 

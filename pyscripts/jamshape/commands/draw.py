@@ -18,13 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from jamshape.checks import Range, require_in, require_other_file
+from jamshape.checks import Range, require_in, require_other_file, require_stated
 from jamshape.command import parser_of, report
 from jamshape.drawing.colors import CHOICES
 from jamshape.drawing.packing import Look
 from jamshape.drawing.pictures import draw_pictures, read_picture, save_pictures
 
-_DPI = Range(1, 4000, "dots", whole=True)
 _ANGLE = Range(-360.0, 360.0, "degrees")
 
 
@@ -50,7 +49,7 @@ def options_of() -> ArgumentParser:
 def main(options: Namespace) -> None:
     """Read, find the contacts, draw, report."""
     require_other_file(options.out, options.files)
-    require_in("--dpi", options.dpi, _DPI)
+    require_stated(dpi=options.dpi)
     for name in ("height", "turn"):
         require_in(f"--{name}", getattr(options, name), _ANGLE)
     sides = None if options.sides == "auto" else int(options.sides)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from battery.case import Case
 from jamshape.landscape import Landscape, State
 from jamshape.protocols.random_start import random_packing
@@ -12,18 +14,26 @@ from jamshape.shapes.particles import Particles
 
 PART = "random start"
 
+_N = 12
+
 
 def start_error(alpha: float, size_ratio: float, phi: float, dimension: int) -> float:
     """Energy of a random start, which must be 0, and the error of its packing fraction."""
-    particles = Particles.of("spherocylinder", size_ratio, alpha=alpha)
-    packing = random_packing(12, phi, 1, particles, dimension)
+    packing = random_packing(_N, phi, 1, _mixed(alpha, size_ratio), dimension)
     energy = Landscape(packing).evaluate(State.of(packing)).energy
     return max(energy, abs(packing.phi / phi - 1))
 
 
+def _mixed(alpha: float, size_ratio: float) -> Particles:
+    """Take as many small as big ones, one by one: their sizes may differ by more than those of options."""
+    size = np.repeat([1.0, size_ratio], _N // 2)
+    diameters = np.column_stack([(1 + alpha) * size, size, size])
+    return Particles.given("spherocylinder", diameters, species=np.repeat([1, 2], _N // 2))
+
+
 def too_dense(alpha: float, phi: float) -> str:
     """Ask for what random insertion cannot reach."""
-    random_packing(12, phi, 1, Particles.of("spherocylinder", alpha=alpha))
+    random_packing(_N, phi, 1, Particles.of("spherocylinder", alpha=alpha))
     return "no sentence"
 
 
