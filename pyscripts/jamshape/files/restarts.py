@@ -46,7 +46,8 @@ class RestartFiles:
     def forget(self) -> None:
         """Remove them."""
         for path in self._paths():
-            path.unlink(missing_ok=True)
+            if path.exists():  # a disk that is read-only does not even unlink what is not there
+                path.unlink()
 
     def _paths(self) -> list[Path]:
         return [self.prefix.with_name(f"{self.prefix.name}.{end}") for end in "ab"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import errno
 import os
 import subprocess
 import tempfile
@@ -13,9 +12,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from jamshape.files.disk import replacing
+from jamshape.files.disk import store
 from jamshape.files.lammps_text import write_data
-from jamshape.files.restarts import is_whole
 from jamshape.lammps.plugin import PluginError, plugin_path
 from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.shapes.shape import Interaction
@@ -135,13 +133,12 @@ class Session:
         Raises
         ------
         OSError
-            If it cannot be written; LAMMPS itself does not notice a disk that is full.
+            One sentence, if it cannot be written.
         """
-        with replacing(path) as temporary:
-            with temporary.open("wb") as file:
-                self.commands(f"write_restart /dev/fd/{file.fileno()}")
-            if not is_whole(temporary):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        # First in memory: on a full disk LAMMPS would end this process.
+        with open(os.memfd_create("restart"), "rb") as file:  # noqa: PTH123 - it has no path
+            self.commands(f"write_restart /dev/fd/{file.fileno()}")
+            store(path, file.read())
 
     def interact(self, law: Interaction) -> None:
         """Set the pair style of the particles that were loaded."""
