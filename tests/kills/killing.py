@@ -107,7 +107,7 @@ def killed(case, folder, seconds, kills, seed):
         code = ended(case.start(folder), rng.uniform(0, seconds))
         if code != -signal.SIGKILL:
             assert code == 0, said(folder)
-            break
+            return count
         count += 1
         require_whole(folder)
     finished = finished_files(folder)
