@@ -75,11 +75,13 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
         packing, n = thermal.packing, min(_SWEEPS, n_sweeps - thermal.n_done)
         block = np.random.SeedSequence([seed, thermal.n_done]).generate_state(1, np.uint64)[0]
         bodies = packing.compiled()
+        # Moves that are longer than the box lead nowhere else.
+        longest = float(packing.box.edges.min())
         found = bodies.sweeps(
             packing.position - packing.box.lo,
             packing.orientation.reshape(packing.n, -1),
             packing.box.edges,
-            thermal.size * float(bodies.inner_radius.min()),
+            min(thermal.size * float(bodies.inner_radius.min()), longest),
             min(thermal.size, 1.0),
             n,
             int(block),
