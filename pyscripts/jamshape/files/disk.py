@@ -45,12 +45,16 @@ def replacing(path: PathLike) -> Iterator[Path]:
                 temporary.unlink(missing_ok=True)
 
 
-def store(path: PathLike, data: bytes | memoryview) -> None:
-    """Write a whole file, on the disk before it takes its place; errors as `replacing`."""
+def store(path: PathLike, data: bytes | memoryview, *, wait: bool = True) -> None:
+    """Write a whole file, on the disk before it takes its place; errors as `replacing`.
+
+    What is of use for a short time only need not wait for the disk, and survives kills just as well.
+    """
     with replacing(path) as temporary, temporary.open("wb") as file:
         file.write(data)
         file.flush()
-        os.fsync(file.fileno())
+        if wait:
+            os.fsync(file.fileno())
 
 
 @contextmanager

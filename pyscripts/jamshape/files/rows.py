@@ -19,11 +19,18 @@ Columns = Mapping[str, NDArray[Any]]
 
 
 class Kind(NamedTuple):
-    """Of an observable: what a row is, and the step of the last one."""
+    """What a row of an observable is."""
 
     dtype: np.dtype[Any]
     shape: tuple[int, ...]
-    last: int | None
+
+
+class Scalars(NamedTuple):
+    """Observables that were last stored in one row, all of them numbers."""
+
+    names: tuple[str, ...]
+    dtype: np.dtype[Any]
+    """Of the row."""
 
 
 @dataclass
@@ -34,7 +41,10 @@ class Stored:
     """Step of the last one."""
     report: int | None = None
     observables: dict[str, Kind] = field(default_factory=dict)
+    last: dict[str, int] = field(default_factory=dict)
+    """Step of the last row of each observable that has one."""
     has_rests: bool = False
+    scalars: Scalars | None = None
 
     @classmethod
     def of(cls, file: h5py.File) -> Stored:
@@ -46,12 +56,15 @@ class Stored:
 
         def kind(group: h5py.Group) -> Kind:
             value = group["value"]
-            return Kind(value.dtype, value.shape[1:], last(group))
+            return Kind(value.dtype, value.shape[1:])
 
+        groups = dict(file["observables"])
+        steps = {name: last(group) for name, group in groups.items()}
         return cls(
             last(file["particles/all/position"]),
             last(file["report"]),
-            {name: kind(group) for name, group in file["observables"].items()},
+            {name: kind(group) for name, group in groups.items()},
+            {name: step for name, step in steps.items() if step is not None},
             "position_rest" in file["particles/all"],
         )
 
@@ -64,13 +77,39 @@ class Stored:
         """
         for name, column in columns.items():
             self._check_kind(name, column)
-            if name in self.observables:
-                check_after(name, self.observables[name].last, step)
+            check_after(name, self.last.get(name), step)
 
     def add_observables(self, step: int, columns: Columns) -> None:
         """Note that these are stored up to a step."""
         for name, column in columns.items():
-            self.observables[name] = Kind(column.dtype, column.shape[1:], step)
+            self.observables[name] = Kind(column.dtype, column.shape[1:])
+        self.note(step, columns)
+        scalar = Kind(np.dtype(np.float64), ())
+        self.scalars = None
+        if all(self.observables[name] == scalar for name in columns):
+            empty = np.empty(0)
+            self.scalars = Scalars(
+                tuple(columns), table([], [], dict.fromkeys(columns, empty)).dtype
+            )
+
+    def note(self, step: int, names: Iterable[str]) -> None:
+        """Note the last step of observables whose kinds are known."""
+        self.last.update(dict.fromkeys(names, step))
+
+    def next_row(
+        self, step: int, time: float, observables: Mapping[str, ArrayLike]
+    ) -> Table | None:
+        """Make the row that is as the last one, of a later step; None if it is another one.
+
+        The rows of a compression are all of this kind, and checking each anew would take longer than a
+        small run may.
+        """
+        known, values = self.scalars, observables.values()
+        if known is None or tuple(observables) != known.names or {*map(type, values)} != {float}:
+            return None
+        if step <= max(self.last[name] for name in known.names):
+            return None
+        return np.array([(step, time, *values)], known.dtype)
 
     def _check_kind(self, name: str, column: NDArray[Any]) -> None:
         if not name or "/" in name or name == ".":
@@ -80,7 +119,7 @@ class Stored:
             msg = f"observable {name!r} has dtype {column.dtype}, expected numbers"
             raise ValueError(msg)
         stored = self.observables.get(name)
-        if stored and (column.dtype, column.shape[1:]) != stored[:2]:
+        if stored and (column.dtype, column.shape[1:]) != stored:
             expected = f"{stored.dtype} {stored.shape}"
             found = f"{column.dtype} {column.shape[1:]}"
             msg = f"observable {name!r} is {found}, expected {expected} as before"

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 _PART = 0.25
 _PAUSE = 200
 _SECONDS = 0.05  # about what it takes, where it was not measured yet
+_REPORT = np.dtype(list(layout.REPORT.items()))
 
 
 def fold(path: PathLike) -> None:
@@ -166,9 +167,17 @@ class RunWriter:
             If the step is not after the last one of the same observable, or its type or shape
             has changed.
         """
-        columns = {name: as_column(value) for name, value in observables.items()}
-        tables = self._reported(step, *report) if report else {}
-        self._append_columns([step], [time], columns, tables)
+        row, tables = self._stored.next_row(step, time, observables), {}
+        if report and (row is None or step < (self._stored.report or 0)):
+            tables = self._reported(step, *report)
+        elif report:
+            tables = {layout.REPORT_TABLE: np.array([(step, *report)], _REPORT)}
+        if row is None:
+            columns = {name: as_column(value) for name, value in observables.items()}
+            self._append_columns([step], [time], columns, tables)
+        else:
+            self._append({layout.OBSERVABLES: row, **tables})
+            self._stored.note(step, observables)
 
     def append_series(
         self, steps: ArrayLike, times: ArrayLike, observables: Mapping[str, ArrayLike]

@@ -138,7 +138,7 @@ class Session:
         # First in memory: on a full disk LAMMPS would end this process.
         with open(os.memfd_create("restart"), "rb") as file:  # noqa: PTH123 - it has no path
             self.commands(f"write_restart /dev/fd/{file.fileno()}")
-            store(path, file.read())
+            store(path, file.read(), wait=False)
 
     def interact(self, law: Interaction) -> None:
         """Set the pair style of the particles that were loaded."""
