@@ -67,7 +67,8 @@ def follow(
 
 def _is_looked_at() -> bool:
     """Whether standard error is a terminal or in a notebook."""
-    return sys.stderr.isatty() or "ipykernel" in sys.modules
+    shell = sys.modules.get("IPython")
+    return sys.stderr.isatty() or (shell is not None and shell.get_ipython() is not None)
 
 
 def _tqdm() -> Any:

@@ -148,7 +148,7 @@ def test_senseless_recipes_are_refused(numbers, sentence):
 def test_senseless_monte_carlo_is_refused():
     with pytest.raises(ValueError, match="expected a start at a smaller packing fraction"):
         Recipe(way=Steps(thermal=Thermalisation(0.3)), phi_start=0.3)
-    with pytest.raises(ValueError, match="phi_thermal is .*, expected a packing fraction from"):
+    with pytest.raises(ValueError, match=r"phi_thermal is .*, expected a packing fraction from"):
         Thermalisation(1.5)
 
 
