@@ -115,9 +115,9 @@ def test_discs_are_made_where_none_are_given(report, problem, tmp_path):
     ("arguments", "words"),
     [
         (("--alpha", 0), "alpha is 0.0, expected A / R above 0"),
-        (("--alpha", "nan"), "alpha is nan, expected A / R above 0"),
-        (("--seed", -1), "seed is -1, expected an integer from 0"),
-        (("--samples", 0), "samples is 0, expected at least 1"),
+        (("--alpha", "nan"), "alpha is nan, expected 0 or A / R from"),
+        (("--seed", -1), "seed is -1, expected a seed from 0"),
+        (("--samples", 0), "samples is 0, expected a whole number of samples from 1"),
         (("none",), "No such file"),
     ],
 )
