@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,10 @@ from jamshape.packing import Box, Packing, State
 
 # Bounding spheres are larger by this fraction, so that rounding never drops a contact.
 _BOUNDING_MARGIN = 1e-9
+
+# Among so many times more spheres each one is sought by itself: to go through two trees at once pays where both
+# are as dense.
+_MANY_MORE = 8
 
 
 class Spheres(NamedTuple):
@@ -97,6 +102,13 @@ class Surroundings:
         inside, turn = self._inside(first)
         bound = _bound(first)
         reach = bound.max(initial=0) + self._bound.max(initial=0)
+        if _MANY_MORE * len(inside) < self._tree.n:
+            found = self._tree.query_ball_point(inside, reach, return_sorted=False)
+            count = np.fromiter(map(len, found), np.int64, len(found))
+            i = np.repeat(np.arange(len(inside)), count)
+            image = np.fromiter(itertools.chain.from_iterable(found), np.int64, len(i))
+            apart = np.linalg.norm(inside[i] - self._tree.data[image], axis=1)
+            return self._kept(i, image, apart, (bound, turn))
         near = cKDTree(inside).sparse_distance_matrix(self._tree, reach, output_type="ndarray")
         return self._kept(near["i"], near["j"], near["v"], (bound, turn))
 

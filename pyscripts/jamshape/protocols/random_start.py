@@ -257,6 +257,8 @@ class _Insertion:
 
     def _clear_of_own_images(self, trials: _Poses) -> IntArray:
         n, n_shifts = len(trials.which), len(self.own_shifts)
+        if not n_shifts:
+            return np.arange(n)
         index = np.repeat(np.arange(n), n_shifts)
         images = NearPairs(index, index, np.tile(self.own_shifts, (n, 1)))
         return np.setdiff1d(np.arange(n), self._overlapping(images, trials).first)
