@@ -121,17 +121,19 @@ def _compress(run: CompressionRun, settings: Approach) -> Iterator[Row]:
         # Fast rates pass states that nobody looks at.
         finer = math.sqrt(settings.kappa / run.settings.kappa)
         sample = _advance(run, settings, min(settings.strain / finer, _LARGEST_STRAIN))
-        yield sample
         kappa, pressure = run.settings.kappa, sample.observables["pressure"]
-        if kappa == settings.kappa and pressure >= settings.p_end:
-            return
-        if kappa > settings.kappa and pressure >= settings.p_flow:
+        is_jammed = kappa == settings.kappa and pressure >= settings.p_end
+        # Before the row is told: a restart file that is written at it goes on with what comes next.
+        if is_jammed:
+            run.change(kappa=-settings.kappa)
+        elif kappa > settings.kappa and pressure >= settings.p_flow:
             run.change(kappa=max(kappa / 2, settings.kappa))
+        yield sample
+        if is_jammed:
+            return
 
 
 def _open(run: CompressionRun, settings: Approach) -> Iterator[Row]:
-    if run.settings.kappa > 0:
-        run.change(kappa=-settings.kappa)
     pressure = run.measure()["pressure"]
     while pressure > settings.p_open:
         # Near jamming the pressure is about 0.3 (phi - phi_J): go a part of the way.

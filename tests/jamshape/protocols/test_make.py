@@ -378,3 +378,28 @@ def test_what_a_kill_after_the_last_write_leaves_goes_with_the_next_call(tmp_pat
     again = js.make_packing(rods, **tiny, phi_start=0.5, delta_phi=0.02, progress=False)
     assert [path.name for path in tmp_path.iterdir()] == [out.name]
     np.testing.assert_array_equal(made.position, again.position)
+
+
+@pytest.mark.parametrize("which", ["first change of the rate", "last row before the opening"])
+def test_a_kill_where_the_rate_changes_is_gone_on_from_to_the_bit(tmp_path, monkeypatch, which):
+    sample = Recipe(bidisperse(0.0), n=16, phi_start=0.6, target=Target(1e-6), way=FAST)
+    usual, whole, cut = (tmp_path / f"{name}.h5" for name in ("usual", "whole", "cut"))
+    for _ in make(sample, usual):
+        pass
+    kappa = read_observables(run_of(usual))["kappa"]
+    changes = np.flatnonzero(np.diff(kappa))
+    row = changes[0] if which.startswith("first") else np.flatnonzero(kappa > 0)[-1]
+    # A restart file at this very row, which orders particles anew.
+    monkeypatch.setattr("jamshape.protocols.by_dynamics._ROWS_PER_RESTART", int(row) + 1)
+    for _ in make(sample, whole):
+        pass
+    going = make(sample, cut)
+    for _ in range(row + 1):
+        next(going)
+    going.close()
+    for _ in make(sample, cut):
+        pass
+    one, other = (read_observables(run_of(path)) for path in (whole, cut))
+    for name in ("kappa", "phi", "pressure"):
+        np.testing.assert_array_equal(other[name], one[name])
+    np.testing.assert_array_equal(read_packing(cut).position, read_packing(whole).position)
