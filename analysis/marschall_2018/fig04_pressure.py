@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT
+from jamshape.drawing.pressure import draw_onset, onset_text
 from jamshape.drawing.text import ensemble_text, onset_symbol, pressure_unit
 from jamshape.files.sets import of_paper
 from jamshape.measures.averages import Mean, mean
@@ -36,21 +37,11 @@ def mean_phi_J(runs: list[Run]) -> Mean | None:
     return mean(found)
 
 
-def label(one: Run) -> str:
-    """Name a run and its onset at its rate."""
-    symbol = onset_symbol(one.ensemble.kappa)
-    found = f"${symbol}={Mean(*one.fit[:2]).tex}$" if one.fit else f"no ${symbol}$"
-    return f"{one.path.stem}: {found}"
-
-
 def draw_onsets(axes: Axes, runs: list[Run]) -> None:
     """Draw the lines that lead to the onsets, and what is around them."""
-    fits = [(k, one, one.fit) for k, one in enumerate(runs) if one.fit]
-    for k, one, fit in fits:
-        rise = fit.slope * (one.phi[fit.last] - fit.phi_J)
-        axes.plot([fit.phi_J, one.phi[fit.last]], [0, rise], "k", lw=1, zorder=3)
-        axes.plot(fit.phi_J, 0, "o", color=f"C{k}", mec="k", ms=5, zorder=4)
-    if fits:
+    for k, one in enumerate(runs):
+        draw_onset(axes, one, f"C{k}")
+    if any(one.fit for one in runs):
         axes.plot(
             [], [], "ko-", lw=1, ms=5, mfc="none", label=r"line that leads to $\phi_J(\kappa)$"
         )
@@ -67,7 +58,8 @@ def draw(runs: list[Run], average: Mean | None, options: Namespace) -> None:
     whole, onset = figure.subplots(1, 2)
     draw_onsets(onset, runs)
     for k, one in enumerate(runs):
-        text = label(one) if len(runs) <= NAMED else f"{len(runs)} runs" * (k == 0)
+        named = f"{one.path.stem}: {onset_text(one)}"
+        text = named if len(runs) <= NAMED else f"{len(runs)} runs" * (k == 0)
         whole.semilogy(one.phi, one.pressure, color=f"C{k}", lw=1)
         onset.plot(one.phi, one.pressure, ".-", color=f"C{k}", ms=3, lw=0.5, label=text)
     systems = [one.ensemble.system for one in runs]

@@ -44,10 +44,6 @@ RANGES = {
     "phi_thermal": Range(1e-6, 0.999, "a packing fraction"),
     "n_sweeps": Range(0, 10**9, "sweeps", whole=True),
     "delta_phi": Range(1e-8, 0.1, "a step of the packing fraction"),
-    "alpha": Range(1e-6, 100.0, "A / R", also=(0.0,)),
-    "p": Range(0.55, 10.0, "an exponent"),
-    "w1": Range(0.1, 1.0, "a/b"),
-    "w2": Range(1.0, 10.0, "c/b"),
     "size_ratio": Range(1.0, 10.0, "big over small"),
     "size": Range(0.01, 100.0, "a size"),
     "share": Range(1e-6, 1e6, "a share"),
@@ -58,7 +54,8 @@ RANGES = {
     "follow": Range(0, _COUNT, "modes", whole=True),
     "largest": Range(0.0, 100.0, "a bound"),
 }
-"""What users may ask for, in the units of the papers: the ranges in which it was tried. Decks have the same."""
+"""What users may ask for, in the units of the papers: the ranges in which it was tried; those of shapes are their
+`Parameter`s. Decks have the same."""
 
 MOST_STEPS = 10**12
 """Of a run: more would not end in a year, whatever the machine."""

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from jamshape.checks import RANGES
+from jamshape.shapes.table import SHAPES
 
 sys.path.append(str(Path(__file__).parents[1] / "styles"))
 
@@ -100,10 +101,14 @@ def ranges_of_decks():
 
 def test_decks_have_the_ranges_of_the_library():
     whole, ranges = ranges_of_decks()
-    shared = (whole.keys() | ranges.keys()) & RANGES.keys()
+    parameters = [
+        p for name in ("spherocylinder", "superellipsoid") for p in SHAPES[name].parameters
+    ]
+    stated = RANGES | {p.option: p.allowed for p in parameters}
+    shared = (whole.keys() | ranges.keys()) & stated.keys()
     assert {"n", "alpha", "p", "w1", "w2", "kappa", "dt", "phi_start", "phi_end"} <= shared
     for name in shared - {"seed"}:  # LAMMPS's are shorter
-        allowed = RANGES[name]
+        allowed = stated[name]
         assert (whole | ranges)[name] == (allowed.low, allowed.high, *allowed.also)
 
 

@@ -25,6 +25,8 @@ from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
 from jamshape.protocols.random_start import random_packing
 from jamshape.protocols.recipe import Recipe, Thermalisation
+from jamshape.shapes.particles import Particles
+from jamshape.shapes.table import SHAPES
 
 NAN = math.nan
 RODS = js.Spherocylinders(alpha=1)
@@ -73,6 +75,11 @@ def cases():
     for name, allowed in RANGES.items():
         for value in (allowed.low - 1, allowed.high * 2 + 1, NAN, "1", None):
             yield f"range of {name}: {value}", partial(require_stated, **{name: value})
+    for shape in SHAPES.values():
+        for p in shape.parameters:
+            for value in (p.allowed.low - 1, p.allowed.high * 2 + 1, NAN):
+                what = f"range of {p.name} of {shape.name}s: {value}"
+                yield what, partial(Particles.of, shape, **{p.name: value})
     yield from {
         "compress phi falls": compress(phi=(0.4, 0.3)),
         "compress phi one": compress(phi=(0.4, 0.4)),
@@ -179,3 +186,7 @@ def test_what_is_in_range_is_not_refused():
             require_stated(**{name: value})
         number = np.int64 if allowed.whole else np.float64
         require_stated(**{name: number(allowed.low)})
+    for shape in SHAPES.values():
+        for p in shape.parameters:
+            for value in (p.allowed.low, p.allowed.high, *p.allowed.also):
+                Particles.of(shape, **{p.name: value})

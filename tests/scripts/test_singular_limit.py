@@ -115,7 +115,7 @@ def test_discs_are_made_where_none_are_given(report, problem, tmp_path):
     ("arguments", "words"),
     [
         (("--alpha", 0), "alpha is 0.0, expected A / R above 0"),
-        (("--alpha", "nan"), "alpha is nan, expected 0 or A / R from"),
+        (("--alpha", "nan"), "alpha is nan, expected a number"),
         (("--seed", -1), "seed is -1, expected a seed from 0"),
         (("--samples", 0), "samples is 0, expected a whole number of samples from 1"),
         (("none",), "No such file"),

@@ -9,12 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.contacts import coordination, find_contacts, find_rattlers
-from jamshape.contacts.network import sum_forces
 from jamshape.drawing.kinds import kinds_of
 from jamshape.exchange.gsd import read_gsd
 from jamshape.files.h5md import (
-    HDF5_SIGNATURE,
     count_frames,
     read_attributes,
     read_creator,
@@ -25,12 +22,12 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.lammps_text import iter_dump, read_data
 from jamshape.files.sets import REACHED
+from jamshape.files.signature import DATA, DUMP, GSD, HDF5, RESTART, SIGNATURES, format_of
+from jamshape.front.packing import MeasuredPacking
 from jamshape.packing import Packing
 from jamshape.vibration.sets import TOLD, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
-_GSD = b"\xdf\x65" * 4
-_RESTART = b"LammpS RestartT\0"
 _STATE = ("phi", "pressure", "u", "z", "rattlers")
 _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "outcome")
 
@@ -83,11 +80,8 @@ def contents_of(path: Path) -> dict[str, Any]:
     OSError
         If it cannot be read.
     """
-    with path.open("rb") as file:
-        start = file.read(4096)
-    for fits, tell in _READERS:
-        if fits(start):
-            return {"file": path, **tell(path)}
+    if tell := _READERS.get(format_of(path)):
+        return {"file": path, **tell(path)}
     msg = (
         f"{path} is no file that jamshape knows, expected a packing, a run or modes in HDF5, a data, dump"
         " or restart file of LAMMPS, or a GSD file"
@@ -150,13 +144,9 @@ def _state(
     """Give the numbers of a state, those that are not stored from its contacts."""
     if all(name in measured for name in _STATE):
         return dict(measured)
-    law = {"k_e": 1.0, "sides": 2} | dict(known or {})
-    network = find_contacts(packing, float(law["k_e"]), int(law["sides"]))
-    counts, sums = coordination(packing, network), sum_forces(packing, network)
-    u = float(network.energy.sum()) / packing.box.volume
-    found = {"phi": packing.phi, "pressure": sums.pressure, "u": u, "z": counts.z}
-    found["rattlers"] = int(find_rattlers(packing, network).sum())
-    return found | dict(measured)
+    of = MeasuredPacking.of(packing, known)
+    found = {"phi": of.phi, "pressure": of.pressure, "u": of.u, "z": of.z}
+    return found | {"rattlers": int(of.rattlers.sum())} | dict(measured)
 
 
 def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
@@ -210,7 +200,7 @@ def _text(kind: str, packing: Packing) -> dict[str, Any]:
 
 def _restart(path: Path) -> dict[str, Any]:
     """Read the head of a restart file: numbered entries, of which the first are always these."""
-    content = path.read_bytes()[len(_RESTART) :]
+    content = path.read_bytes()[len(SIGNATURES[RESTART]) :]
     entries: list[Any] = []
     at = 8  # behind the order of bytes and the version of the format
     for kind in "siiiisqi":
@@ -233,10 +223,10 @@ def _picked(known: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     return {name: known[name] for name in names if known.get(name) is not None}
 
 
-_READERS: tuple[tuple[Callable[[bytes], bool], Callable[[Path], dict[str, Any]]], ...] = (
-    (lambda start: start.startswith(HDF5_SIGNATURE), _hdf5),
-    (lambda start: start.startswith(b"ITEM: "), _dump),
-    (lambda start: start.startswith(_RESTART), _restart),
-    (lambda start: start.startswith(_GSD), _gsd),
-    (lambda start: b" atoms" in start and b"xlo xhi" in start, _data),
-)
+_READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
+    HDF5: _hdf5,
+    DUMP: _dump,
+    RESTART: _restart,
+    GSD: _gsd,
+    DATA: _data,
+}

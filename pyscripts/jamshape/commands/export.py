@@ -23,15 +23,13 @@ from jamshape.exchange.gsd import write_gsd
 from jamshape.exchange.mdanalysis import write_mdanalysis
 from jamshape.exchange.ovito import to_ovito
 from jamshape.exchange.tools import tool
-from jamshape.files.h5md import write_packing
 from jamshape.files.lammps_text import read_dump, write_data
 from jamshape.files.run_writer import RunWriter
+from jamshape.files.signature import DUMP, format_of
 from jamshape.front.files import load
+from jamshape.front.packing import MeasuredPacking
 from jamshape.front.run import RunFile
 from jamshape.packing import Packing
-
-_DUMP_SIGNATURE = b"ITEM: "
-_OF_A_RUN = "finished"  # an attribute
 
 _PICTURES = {".png", ".pdf", ".svg", ".jpg"}
 
@@ -57,9 +55,7 @@ def _write_session(path: Path, packings: Sequence[Packing]) -> None:
 
 def _write_h5(path: Path, packings: Sequence[Packing]) -> None:
     first, *others = packings
-    results = getattr(first, "results", {})
-    # What is said of a run is not true of its frames alone.
-    write_packing(path, first, {} if _OF_A_RUN in results else results)
+    MeasuredPacking.of(first, getattr(first, "results", {})).save(path)
     if others:
         with RunWriter.open(path) as writer:
             for packing in others:
@@ -128,14 +124,9 @@ def frames_of(path: Path, frame: int | None) -> Sequence[Packing]:
     if isinstance(found, RunFile):
         return list(found)
     if isinstance(found, Packing):
-        return read_dump(path) if frame is None and _is_dump(path) else [found]
+        return read_dump(path) if frame is None and format_of(path) == DUMP else [found]
     msg = f"{path} holds modes, expected a packing or a run"
     raise ValueError(msg)
-
-
-def _is_dump(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(len(_DUMP_SIGNATURE)) == _DUMP_SIGNATURE
 
 
 def _format_of(out: Path) -> str:

@@ -77,15 +77,3 @@ def alike(packing: Packing, *more: NDArray[Any]) -> Alike:
     rows = np.column_stack([*more, packing.diameters, packing.exponent])
     _, first, of = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     return Alike(first, of.ravel())
-
-
-def turned(quaternions: FloatArray, by: tuple[float, float, float, float]) -> FloatArray:
-    """(N, 4) quaternions w i j k of bodies that were first turned by another one."""
-    w, i, j, k = quaternions.T
-    W, I, J, K = by
-    return np.column_stack([
-        w * W - i * I - j * J - k * K,
-        w * I + i * W + j * K - k * J,
-        w * J - i * K + j * W + k * I,
-        w * K + i * J - j * I + k * W,
-    ])  # fmt: skip

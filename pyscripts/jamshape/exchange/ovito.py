@@ -22,11 +22,11 @@ from jamshape.exchange.fields import (
     in_space,
     packing_of,
     particle_fields,
-    turned,
 )
 from jamshape.exchange.tools import tool
 from jamshape.files.layout import FileFormatError
 from jamshape.packing import Packing
+from jamshape.packing.rotation import product
 from jamshape.shapes.solid import RoundedSegment, Solid, Superquadric
 
 _PREFIX = "Jamshape "
@@ -166,7 +166,7 @@ def _glyphs(packing: Packing) -> tuple[list[_Glyph], IntArray]:
 def _add_bodies(particles: Any, packing: Packing) -> None:
     """Add sizes and orientations."""
     glyphs, of = _glyphs(packing)
-    quaternions = turned(packing.quaternions, glyphs[0].first_turned)
+    quaternions = product(packing.quaternions, glyphs[0].first_turned)
     particles.create_property("Orientation", data=quaternions[:, [1, 2, 3, 0]])
     if not glyphs[0].aspherical_shape:
         particles.create_property("Radius", data=_known_sizes(packing).size)
@@ -219,14 +219,14 @@ def _add_types(particles: Any, packing: Packing, vis: Any) -> None:
         own.color = tuple(colors[i])
         own.shape = getattr(vis.ParticlesVis.Shape, glyph.name)
         if not glyph.aspherical_shape:
-            own.mesh, own.radius = _mesh(packing, i), 1.0
+            own.mesh, own.radius = _mesh(packing, i, known.size[i]), 1.0
 
 
-def _mesh(packing: Packing, i: int) -> Any:
+def _mesh(packing: Packing, i: int, size: float) -> Any:
     """Make the mesh of a particle in units of its size."""
     surface = packing.shape.surface(packing.diameters[i], float(packing.exponent[i]), _LEVEL)
     mesh = tool("ovito.data", "ovito").TriangleMesh()
-    mesh.set_vertices(surface.vertices / _known_sizes(packing).size[i])
+    mesh.set_vertices(surface.vertices / size)
     mesh.set_faces(surface.triangles)
     return mesh
 

@@ -45,7 +45,6 @@ from numpy.typing import ArrayLike, NDArray
 from jamshape.files import layout
 from jamshape.files.disk import PathLike, replacing
 from jamshape.files.layout import (
-    HDF5_SIGNATURE,
     FileFormatError,
     Report,
     Series,
@@ -55,7 +54,6 @@ from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT
 
 __all__ = [
-    "HDF5_SIGNATURE",
     "FileFormatError",
     "PathLike",
     "Report",

@@ -24,7 +24,8 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray
-from jamshape.files.h5md import HDF5_SIGNATURE, FileFormatError, PathLike, read_packing, replacing
+from jamshape.files.h5md import FileFormatError, PathLike, read_packing, replacing
+from jamshape.files.signature import DUMP, HDF5, format_of
 from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.shapes.table import guess_shape_style
 
@@ -177,11 +178,10 @@ def read_any(path: PathLike, frame: int = -1) -> Packing:
     OSError
         If the file cannot be opened.
     """
-    with Path(path).open("rb") as file:
-        start = file.read(len(HDF5_SIGNATURE))
-    if start == HDF5_SIGNATURE:
+    found_format = format_of(path)
+    if found_format == HDF5:
         return read_packing(path, frame)
-    frames = iter_dump(path) if start.startswith(b"ITEM: ") else iter([read_data(path)])
+    frames = iter_dump(path) if found_format == DUMP else iter([read_data(path)])
     if frame >= 0:
         found = list(itertools.islice(frames, frame, frame + 1))
     else:

@@ -17,13 +17,13 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.disk import PathLike, store
 from jamshape.files.journal import Pending, Table, read_journal
 from jamshape.files.rows import Columns, Stored, as_column, gathered, table
+from jamshape.files.signature import HDF5, format_of
 from jamshape.files.vocabulary import FORMAT_VERSION, RENAMED, former
 from jamshape.packing import Box, Packing
 
 if TYPE_CHECKING:
     import h5py
 
-HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 # Large enough for a long series to be a few chunks, small enough to keep a packing's file small.
 _CHUNK_BYTES = 1024
@@ -128,10 +128,9 @@ def opened(path: PathLike) -> Iterator[h5py.File]:
 @contextmanager
 def readable(path: PathLike) -> Iterator[None]:
     """Refuse what is no HDF5 file, and turn what HDF5 says of damaged ones into a FileFormatError."""
-    with Path(path).open("rb") as raw:
-        if raw.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
-            msg = f"{path}: is not an HDF5 file, expected one written by jamshape"
-            raise FileFormatError(msg)
+    if format_of(path) != HDF5:
+        msg = f"{path}: is not an HDF5 file, expected one written by jamshape"
+        raise FileFormatError(msg)
     try:
         yield
     except BlockingIOError as error:

@@ -6,8 +6,10 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-# LAMMPS writes this at the beginning and again at the end.
-_MAGIC = b"LammpS RestartT\0"
+from jamshape.files.signature import RESTART, SIGNATURES
+
+# LAMMPS writes it at the end, too.
+_MAGIC = SIGNATURES[RESTART]
 
 
 def is_whole(path: Path) -> bool:

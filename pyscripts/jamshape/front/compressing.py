@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from jamshape.flow import recording, slow_recording
 from jamshape.flow.compression import Compression, Row
 from jamshape.flow.implicit import Protocol, Step
 from jamshape.flow.recording import Recording
+from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow, place
 from jamshape.front.run import RunFile
 from jamshape.lammps.session import Session
@@ -126,9 +127,7 @@ def compress(
         _record(lambda session: recording.begin(session, settings, start, to), to, progress)
     else:
         recording.require_same(to, settings, dimension)
-        if not recording.is_finished(at.path):
-            _record(lambda session: recording.resume(session, at.path)[0], to, progress)
-    fold(at.path)
+        resume(at.path, progress=progress)
     return RunFile(*at)
 
 
@@ -279,9 +278,7 @@ def slow_compress(
             msg = f"the start has phi = {first.phi:.6g}, expected one below phi_end = {protocol.phi_end:g}"
             raise ValueError(msg)
         slow_recording.begin(at.path, first, protocol, made_from)
-    if not slow_recording.is_finished(at.path):
-        _record_slowly(at.path, progress)
-    fold(at.path)
+    resume(at.path, progress=progress)
     return RunFile(*at)
 
 
@@ -291,12 +288,11 @@ def _slow_start(
     start: Packing | str | Path | None,
 ) -> tuple[Packing, dict[str, Any]]:
     """Take or make the start of n, phi and a seed, and say what it was made from."""
-    if isinstance(start, Packing):
-        results = getattr(start, "results", {})
-        return start, _known(results, start) | {"start": str(getattr(start, "file", None) or "")}
+    if isinstance(start, str | Path):
+        start = MeasuredPacking.read(Path(start))
     if start is not None:
-        packing = read_packing(start)
-        return packing, _known(read_attributes(start), packing) | {"start": str(start)}
+        known = start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
+        return start, _known(known) | {"start": str(known.file or "")}
     if particles is None:
         msg = "there are neither particles nor a start, expected one of them"
         raise ValueError(msg)
@@ -305,10 +301,10 @@ def _slow_start(
     return compressed_start(random, phi), dict(particles.told) | {"n": n, "seed": seed}
 
 
-def _known(results: Any, start: Packing) -> dict[str, Any]:
+def _known(start: MeasuredPacking) -> dict[str, Any]:
     """Pick what is said of the particles of a start."""
-    own: Iterable[str] = (parameter.name for parameter in start.shape.parameters)
-    names = (*own, "size_ratio", "kinds", "seed")
+    own = [parameter.name for parameter in start.shape.parameters]
+    names, results = (*own, "size_ratio", "kinds", "seed"), start.results
     return {name: results[name] for name in names if name in results} | {"n": start.n}
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from jamshape.files.h5md import HDF5_SIGNATURE, read_attributes
+from jamshape.files.h5md import read_attributes
 from jamshape.files.lammps_text import read_any, write_data
+from jamshape.files.signature import GSD, HDF5, format_of
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.run import RunFile
@@ -45,11 +46,12 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | RunFil
     <Packing of 16 spherocylinders in 2D: phi = 0.884959, pressure = 8.706e-05, u = 1e-08, z = 5.875, rattlers = 0, in packing.h5>
     """
     path = Path(path)
-    if path.suffix == ".gsd":
+    found = format_of(path)
+    if found == GSD:
         from jamshape.exchange.gsd import read_gsd  # noqa: PLC0415 - gsd may be missing
 
         return MeasuredPacking.of(read_gsd(path, -1 if frame is None else frame), file=path)
-    if not _is_hdf5(path):
+    if found != HDF5:
         packing = read_any(path, -1 if frame is None else frame)
         return MeasuredPacking.of(packing, file=path)
     if holds_modes(path):
@@ -57,11 +59,6 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | RunFil
     if frame is None and "finished" in read_attributes(path):
         return RunFile(path)
     return MeasuredPacking.read(path, -1 if frame is None else frame)
-
-
-def _is_hdf5(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE
 
 
 def save(path: str | Path, packing: Packing) -> None:

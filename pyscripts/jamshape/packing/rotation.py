@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray
 
@@ -70,3 +72,15 @@ def across(axis: FloatArray) -> FloatArray:
     first = np.cross(axis, least)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(axis, first)], axis=1)
+
+
+def product(p: ArrayLike, q: ArrayLike) -> NDArray[Any]:
+    """Multiply (N, 4) quaternions w i j k, or one with all: bodies that were turned by q, turned by p."""
+    pw, pi, pj, pk = np.asarray(p).T
+    qw, qi, qj, qk = np.asarray(q).T
+    return np.column_stack([
+        pw * qw - pi * qi - pj * qj - pk * qk,
+        pw * qi + pi * qw + pj * qk - pk * qj,
+        pw * qj - pi * qk + pj * qw + pk * qi,
+        pw * qk + pi * qj - pj * qi + pk * qw,
+    ])  # fmt: skip

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray, LongArray
 from jamshape.packing.packing import Packing
+from jamshape.packing.rotation import product
 
 _TURN = 2 * np.arccos(np.longdouble(-1))
 
@@ -92,17 +92,6 @@ def _turned(quaternion: LongArray, vector: LongArray) -> LongArray:
     angle = np.sqrt((vector**2).sum(axis=1, keepdims=True))
     axis = vector / np.where(angle > 0, angle, 1)
     half = np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=1)
-    product = _product(half, quaternion)
-    unit: LongArray = product / np.sqrt((product**2).sum(axis=1, keepdims=True))
+    turned = product(half, quaternion)
+    unit: LongArray = turned / np.sqrt((turned**2).sum(axis=1, keepdims=True))
     return unit
-
-
-def _product(p: ArrayLike, q: ArrayLike) -> LongArray:
-    pw, pi, pj, pk = np.asarray(p, np.longdouble).T
-    qw, qi, qj, qk = np.asarray(q, np.longdouble).T
-    return np.column_stack([
-        pw * qw - pi * qi - pj * qj - pk * qk,
-        pw * qi + pi * qw + pj * qk - pk * qj,
-        pw * qj - pi * qk + pj * qw + pk * qi,
-        pw * qk + pi * qj - pj * qi + pk * qw,
-    ])  # fmt: skip

@@ -5,11 +5,10 @@ They overlap where A < R. Contacts: `lammps_plugin/contact/dimer/`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from jamshape.arrays import FloatArray
+from jamshape.checks import Range
 from jamshape.shapes.mesh import SurfaceMesh, arc, revolved
 from jamshape.shapes.shape import ElongatedShape, Parameter
 from jamshape.shapes.solid import Balls
@@ -20,17 +19,14 @@ class Dimer(ElongatedShape):
 
     name = "dimer"
     compiled_name = "Dimers"
-    parameters = (Parameter("alpha", 1.0, "A/R: 1 where the discs just touch", "alpha"),)
+    # Discs that coincide would count as four bonds with each neighbour.
+    parameters = (
+        Parameter(
+            "alpha", 1.0, "A/R: 1 where the discs just touch", "alpha",
+            Range(1e-6, 100.0, "A / R above 0, since a disc is a spherocylinder,"),
+        ),
+    )  # fmt: skip
     examples = ({"alpha": 1.0}, {"alpha": 0.4}, {"alpha": 1.3})
-
-    def sizes(
-        self, parameters: Mapping[str, float], size: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """As `Shape.sizes`; discs that coincide would count as four bonds with each neighbour."""
-        if parameters["alpha"] == 0:
-            msg = "alpha is 0, expected A / R above 0: a disc is a spherocylinder of alpha 0"
-            raise ValueError(msg)
-        return super().sizes(parameters, size)
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
         """As `Shape.outline`."""

@@ -209,7 +209,8 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, f
             msg = f"{name} is no parameter of {shape.name}s, expected {', '.join(known)}"
             raise ValueError(msg)
     chosen = known | given
-    shape.sizes(chosen, np.ones(1))  # refuses what is out of range
+    for parameter in shape.parameters:
+        require_in(parameter.option, chosen[parameter.name], parameter.allowed)
     return chosen
 
 

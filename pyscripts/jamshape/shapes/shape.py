@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from jamshape.checks import require_stated
+from jamshape.checks import Range
 
 if TYPE_CHECKING:
     from jamshape.arrays import FloatArray, IntArray
@@ -41,6 +41,8 @@ class Parameter(NamedTuple):
     meaning: str
     option: str
     """Its name on command lines and in names of files."""
+    allowed: Range
+    """What users may ask for: the range in which it was tried."""
 
     @property
     def symbol(self) -> str:
@@ -173,7 +175,12 @@ class Shape(ABC):
 class ElongatedShape(Shape):
     """A shape of half length A along the body's x and radius R: diameters (2(A+R), 2R, 2R)."""
 
-    parameters = (Parameter("alpha", 4.0, "aspect ratio A/R, 0 for discs", "alpha"),)
+    parameters = (
+        Parameter(
+            "alpha", 4.0, "aspect ratio A/R, 0 for discs", "alpha",
+            Range(1e-6, 100.0, "A / R", also=(0.0,)),
+        ),
+    )  # fmt: skip
     unit = "2R"
     size_ratio = 1.4
 
@@ -190,10 +197,8 @@ class ElongatedShape(Shape):
         self, parameters: Mapping[str, float], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """As `Shape.sizes`."""
-        alpha = parameters["alpha"]
-        require_stated(alpha=alpha)
         radius = 0.5 * size
-        half_length = alpha * radius
+        half_length = parameters["alpha"] * radius
         long = 2 * (half_length + radius)
         return np.column_stack([long, 2 * radius, 2 * radius]), np.ones(len(size))
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.checks import require_stated
+from jamshape.checks import Range
 from jamshape.shapes.mesh import SurfaceMesh, arc
 from jamshape.shapes.roundness import asphericity, axes_from, reduced_aspect_ratio
 from jamshape.shapes.shape import Interaction, Parameter, Shape, Style, in_name
@@ -25,10 +25,13 @@ class Superellipsoid(Shape):
     name = "superellipsoid"
     compiled_name = "Superellipsoids"
     parameters = (
-        Parameter("exponent", 1.0, "p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1", "p"),
-        Parameter("w1", 1.0, "a/b <= 1", "w1"),
-        Parameter("w2", 1.0, "c/b >= 1", "w2"),
-    )
+        Parameter(
+            "exponent", 1.0, "p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1", "p",
+            Range(0.55, 10.0, "an exponent"),
+        ),
+        Parameter("w1", 1.0, "a/b <= 1", "w1", Range(0.1, 1.0, "a/b")),
+        Parameter("w2", 1.0, "c/b >= 1", "w2", Range(1.0, 10.0, "c/b")),
+    )  # fmt: skip
     unit = "a"
     dimension = 3
     examples = (
@@ -51,10 +54,8 @@ class Superellipsoid(Shape):
         self, parameters: Mapping[str, float], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """As `Shape.sizes`."""
-        w1, w2, p = (float(parameters[name]) for name in ("w1", "w2", "exponent"))
-        require_stated(p=p, w1=w1, w2=w2)
-        axes = axes_from(w1, w2)
-        return size[:, None] * (2 * axes), np.full(len(size), p)
+        axes = axes_from(parameters["w1"], parameters["w2"])
+        return size[:, None] * (2 * axes), np.full(len(size), parameters["exponent"])
 
     def parameters_of(
         self, diameters: FloatArray, exponent: float
