@@ -6,6 +6,8 @@ void export_sums();
 void export_derivatives();
 void export_sweeps();
 void export_vicinity(nanobind::module_ &m);
+void export_stages(nanobind::module_ &m);
+void export_descent(nanobind::module_ &m);
 void export_rattlers(nanobind::module_ &m);
 void export_probes(nanobind::module_ &m);
 }  // namespace jamshape
@@ -18,6 +20,8 @@ NB_MODULE(_contact, m)
   jamshape::export_derivatives();
   jamshape::export_sweeps();
   jamshape::export_vicinity(m);
+  jamshape::export_stages(m);
+  jamshape::export_descent(m);
   jamshape::export_rattlers(m);
   jamshape::export_probes(m);
 }

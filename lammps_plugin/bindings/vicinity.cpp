@@ -1,18 +1,21 @@
 #include "bindings/shape.hpp"
 #include "bindings/shapes.hpp"
-#include "landscape/stage.hpp"
+#include "bindings/vicinity.hpp"
 
+#include <memory>
 #include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <utility>
 
 namespace jamshape {
 
 namespace {
 
-/// Poses in the plane, each number a double and its small rest.
+/// Poses, each number a double and its small rest.
 struct PoseArrays {
-  const Array3<double> &position;     // (2, N, 2)
-  const Array3<double> &orientation;  // (2, N, 1)
-  const Array2<double> &edges;        // (2, 2)
+  const Array3<double> &position;     // (2, N, D)
+  const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
+  const Array2<double> &edges;        // (2, D)
 
   Poses sum() const
   {
@@ -21,24 +24,23 @@ struct PoseArrays {
       for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += from[sum.size() + k];
       return sum;
     };
-    const std::vector<long double> box = added(edges.data(), edges.size());
-    return {added(position.data(), position.size()),
-            added(orientation.data(), orientation.size()),
-            {{box[0], box[1]}}};
+    return {added(position.data(), position.size()), added(orientation.data(), orientation.size()),
+            added(edges.data(), edges.size())};
   }
 };
 
 /// What coordinates are, as they come from Python.
 struct CoordinateArrays {
-  const Array2<std::int64_t> &column;     // (N, 3)
+  const Array2<std::int64_t> &column;     // (N, D + rotations)
   const Array1<double> &rotation_length;  // (N,)
   const Array1<double> &turning_radius;   // (N,)
 
-  Coordinates read(std::size_t N) const
+  Coordinates read(std::size_t N, int D) const
   {
-    require(column.shape(0) == N && column.shape(1) == 3 && rotation_length.shape(0) == N &&
-                turning_radius.shape(0) == N,
-            "column, rotation_length and turning_radius have no shapes (N, 3), (N,) and (N,).");
+    require(column.shape(0) == N && column.shape(1) == (D == 2 ? 3 : 6) &&
+                rotation_length.shape(0) == N && turning_radius.shape(0) == N,
+            "column, rotation_length and turning_radius have no shapes (N, 3) or in space (N, 6),"
+            " (N,) and (N,).");
     require_finite(rotation_length, "rotation_length");
     require_finite(turning_radius, "turning_radius");
     const std::int64_t *const first = column.data(), *const last = first + column.size();
@@ -66,27 +68,29 @@ struct CoordinateArrays {
   }
 };
 
-void check_poses(const PoseArrays &poses, std::size_t N)
+void check_poses(const PoseArrays &poses, const Vicinity &about)
 {
+  const std::size_t N = about.n_particles(), D = about.dimension();
   const auto has_shape = [&](const Array3<double> &of, std::size_t columns) {
     return of.shape(0) == 2 && of.shape(1) == N && of.shape(2) == columns;
   };
-  require(has_shape(poses.position, 2) && has_shape(poses.orientation, 1) &&
-              poses.edges.shape(0) == 2 && poses.edges.shape(1) == 2,
-          "position, orientation and edges have no shapes (2, N, 2), (2, N, 1) and (2, 2).");
+  require(has_shape(poses.position, D) && has_shape(poses.orientation, D == 2 ? 1 : 4) &&
+              poses.edges.shape(0) == 2 && poses.edges.shape(1) == D,
+          D == 2
+              ? "position, orientation and edges have no shapes (2, N, 2), (2, N, 1) and (2, 2)."
+              : "position, orientation and edges have no shapes (2, N, 3), (2, N, 4) and (2, 3).");
   require_finite(poses.position, "position");
-  require_finite(poses.orientation, "orientation");
+  require_orientations(poses.orientation.data(), N, D);
   require_finite(poses.edges, "edges");
-  require_edges(poses.edges.data(), 2);
+  require_edges(poses.edges.data(), D);
 }
 
-template <class Model>
-void take(Vicinity<Model> &of, const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
+void take(Vicinity &of, const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
           const PoseArrays &then, const Vec<3> &hold)
 {
-  check_poses(then, of.n_particles());
-  require(of.has_base(), "there is no base yet, expected move_to before.");
-  require_pairs(pairs, shift, 2, of.n_particles());
+  check_poses(then, of);
+  require_base(of);
+  require_pairs(pairs, shift, of.dimension(), of.n_particles());
   require_finite(hold.c, 3, "wide, reach and skin");
   of.take({{pairs.data(), pairs.data() + pairs.size()},
            {shift.data(), shift.data() + shift.size()},
@@ -96,171 +100,71 @@ void take(Vicinity<Model> &of, const Array2<std::int64_t> &pairs, const Array2<s
           hold[2]);
 }
 
-template <class Model>
-Displacement checked(const Vicinity<Model> &of, const Array1<double> &x, double strain)
+Displacement checked(const Vicinity &of, const Array1<double> &x, double strain)
 {
   require(x.shape(0) == of.n(), "x has " + std::to_string(x.shape(0)) +
                                     " components, expected one for each of " +
                                     std::to_string(of.n()) + " coordinates.");
-  require(of.has_base(), "there is no base yet, expected move_to before.");
+  require_base(of);
   require_finite(x, "x");
   require_finite(strain, "strain");
   return {x.data(), strain};
 }
 
-nb::object array_of(const double *from, std::size_t n)
-{
-  NewArray<double> to({n});
-  std::copy_n(from, n, to.row(0));
-  return to.release();
-}
-
-nb::object tuple_of(const LandscapeSums &sums)
-{
-  return nb::make_tuple(sums.energy, array_of(sums.gradient.data(), sums.gradient.size()),
-                        sums.strain_gradient, sums.bond_force, sums.n_bonds, sums.crossing,
-                        sums.unconverged);
-}
-
-template <class Model>
-nb::object evaluate(Vicinity<Model> &of, const Array1<double> &x, double strain, bool extended)
+nb::object evaluate(Vicinity &of, const Array1<double> &x, double strain, bool extended)
 {
   const Displacement at = checked(of, x, strain);
   return of.holds(at) ? tuple_of(of.evaluate(at, extended)) : nb::none();
 }
 
-template <class Model>
-Factors factorise(Vicinity<Model> &of, const Array1<double> &x, double strain,
+std::shared_ptr<Factors> factorise(Vicinity &of, const Array1<double> &x, double strain,
                   const Array1<double> &diagonal)
 {
   require(diagonal.shape(0) == of.n(), "diagonal has another length than there are coordinates.");
   require(of.has_pairs(), "there are no pairs yet, expected take_pairs before.");
-  const Factors found = of.factorise(checked(of, x, strain), diagonal.data());
+  const auto found = of.factorise(checked(of, x, strain), vector(diagonal));
   require(found != nullptr, "the Hessian holds what is not a number.");
   return found;
 }
 
-Eigen::Map<const Eigen::VectorXd> vector(const Array1<double> &of)
-{
-  return {of.data(), static_cast<Eigen::Index>(of.shape(0))};
-}
-
-template <class Model>
-void move_to(Vicinity<Model> &of, const Array3<double> &position, const Array3<double> &orientation,
+void move_to(Vicinity &of, const Array3<double> &position, const Array3<double> &orientation,
              const Array2<double> &edges)
 {
   const PoseArrays poses{position, orientation, edges};
-  check_poses(poses, of.n_particles());
+  check_poses(poses, of);
   of.move_to(poses.sum());
 }
 
 /// Fills the doubles and their small rests of an array (2, ...).
-void split_into(NewArray<double> &to, const long double *from, std::size_t size)
+void split_into(NewArray<double> &to, const std::vector<long double> &from)
 {
-  for (std::size_t k = 0; k < size; ++k) {
+  for (std::size_t k = 0; k < from.size(); ++k) {
     to[k] = static_cast<double>(from[k]);
-    to[size + k] = static_cast<double>(from[k] - to[k]);
+    to[from.size() + k] = static_cast<double>(from[k] - to[k]);
   }
 }
 
 nb::object tuple_of(const Poses &poses)
 {
-  const std::size_t N = poses.angle.size();
-  NewArray<double> position({2, N, 2}), orientation({2, N, 1}), edges({2, 2});
-  split_into(position, poses.position.data(), 2 * N);
-  split_into(orientation, poses.angle.data(), N);
-  split_into(edges, &poses.edges[0], 2);
+  const std::size_t D = poses.edges.size(), N = poses.position.size() / D;
+  const std::size_t turns = poses.orientation.size() / std::max<std::size_t>(N, 1);
+  NewArray<double> position({2, N, D}), orientation({2, N, turns}), edges({2, D});
+  split_into(position, poses.position);
+  split_into(orientation, poses.orientation);
+  split_into(edges, poses.edges);
   return nb::make_tuple(position.release(), orientation.release(), edges.release());
 }
 
-template <class Model> nb::object move(Vicinity<Model> &of, const Array1<double> &x, double strain)
+nb::object move(Vicinity &of, const Array1<double> &x, double strain)
 {
   of.move(checked(of, x, strain));
   return tuple_of(of.poses());
 }
 
-/// A stage with its scales, and the guesses that it starts from.
-struct PosedStage {
-  Stage equation;
-  StageUnits units;
-  StageLimits limits;
-  Eigen::VectorXd guess, other;
-};
-
-template <class Model>
-StageEnd solve_stage(Vicinity<Model> &of, const PosedStage &stage, const Factors &factors,
-                     const nb::callable &renew)
-{
-  for (const auto *part :
-       {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
-    require(static_cast<std::size_t>(part->size()) == of.n(),
-            "a part of a stage has another length than there are coordinates.");
-    require_finite(*part, "a part of a stage");
-  }
-  require_finite(stage.equation.strain, "strain");
-  require(of.has_base(), "there is no base yet, expected move_to before.");
-  require(!factors || factors->size() == of.n(),
-          "the factors are of another number of coordinates.");
-  const auto renewed = [&](const Displacement &at) { renew(array_of(at.x, of.n()), at.strain); };
-  return StageSolver<Model>(of, stage.equation, stage.units, stage.limits, renewed)
-      .solve(stage.guess, stage.other, factors);
-}
-
-double size_of(const StageUnits &units, const Array1<double> &shift, const Array1<double> &force,
-               const Array1<double> &drag)
-{
-  require(shift.shape(0) == force.shape(0) && shift.shape(0) == drag.shape(0),
-          "shift, force and drag have different lengths.");
-  return units.size(vector(shift), vector(force), vector(drag));
-}
-
-void export_stages(nb::module_ &m)
-{
-  using namespace nb::literals;
-  nb::class_<StageUnits>(m, "StageUnits", "What errors of displacements are measured in.")
-      .def(nb::init<double, double, double, double>(), "force"_a, "energy"_a, "length"_a,
-           "n_particles"_a)
-      .def_ro("force", &StageUnits::force)
-      .def_ro("energy", &StageUnits::energy)
-      .def_ro("length", &StageUnits::length)
-      .def("size", &size_of, "shift"_a, "force"_a, "drag"_a,
-           "Of a displacement (n,), the force that makes it and the drag over the time.");
-  nb::class_<StageLimits>(m, "StageLimits")
-      .def(nb::init<double, double, double>(), "accuracy"_a, "longest_step"_a, "widest_turn"_a);
-  nb::class_<PosedStage>(m, "Stage", "drag (x - centre) + dU/dx = 0 in a box of given strain.")
-      .def(
-          "__init__",
-          [](PosedStage *place, double strain, const Array1<double> &drag,
-             const Array1<double> &centre, bool extended, const StageUnits &units,
-             const StageLimits &limits, const Array1<double> &guess, const Array1<double> &other) {
-            new (place) PosedStage{{strain, vector(drag), vector(centre), extended},
-                                   units,
-                                   limits,
-                                   vector(guess),
-                                   vector(other)};
-          },
-          "strain"_a, "drag"_a, "centre"_a, "extended"_a, "units"_a, "limits"_a, "guess"_a,
-          "other"_a);
-  nb::class_<StageEnd>(m, "StageEnd")
-      .def_prop_ro("x", [](const StageEnd &end) { return array_of(end.x.data(), end.x.size()); })
-      .def_prop_ro("sums", [](const StageEnd &end) { return tuple_of(end.sums); })
-      .def_ro("factors", &StageEnd::factors)
-      .def_ro("evaluations", &StageEnd::evaluations)
-      .def_ro("factorisations", &StageEnd::factorisations)
-      .def_ro("directions", &StageEnd::directions)
-      .def_ro("solved", &StageEnd::solved);
-}
-
 template <class AnyFactors> nb::object solve(const AnyFactors &factors, const Array2<double> &right)
 {
-  const std::size_t n = right.shape(1);
-  require(n == factors.size(), "right has another length than the matrix.");
-  NewArray<double> solution({right.shape(0), n});
-  for (std::size_t k = 0; k < right.shape(0); ++k) {
-    const Eigen::Map<const Eigen::VectorXd> side(right.data() + k * n, n);
-    Eigen::Map<Eigen::VectorXd>(solution.row(k), n) = factors.solve(side);
-  }
-  return solution.release();
+  require(right.shape(1) == factors.size(), "right has another length than the matrix.");
+  return solutions(right, [&](const auto &side) { return factors.solve(side); });
 }
 
 /// Whether these are starts of columns and rows of a square sparse matrix (CSC).
@@ -293,44 +197,11 @@ void make_factors(SymmetricFactors *place, const Array1<int> &start, const Array
   }
 }
 
-template <class Model> void export_vicinity_of(nb::module_ &m)
+/// A function of its own: how much is inlined into one is limited by its size.
+template <class Model, int D>
+[[gnu::noinline]] std::unique_ptr<Vicinity> vicinity_of(const ShapeOf<Model> &of, Coordinates names)
 {
-  using namespace nb::literals;
-  const std::string name = class_name<Model>() + "Vicinity";
-  nb::class_<Vicinity<Model>>(m, name.c_str())
-      .def("move_to", &move_to<Model>, "position"_a, "orientation"_a, "edges"_a,
-           "Count coordinates from these poses, doubles and their small rests.")
-      .def("move", &move<Model>, "x"_a, "strain"_a,
-           "Count coordinates from a point near the base; gives its poses as move_to takes them.")
-      .def(
-          "evaluate", &evaluate<Model>, "x"_a, "strain"_a, "extended"_a,
-          "None where the pairs no longer hold, or energy, gradient (n,), derivative by the\n"
-          "strain, sum of the magnitudes of bond forces, number of bonds, and a pair that crosses\n"
-          "and one that is unconverged, or -1.")
-      .def(
-          "stretch",
-          [](const Vicinity<Model> &of, double strain) {
-            return array_of(of.stretch(strain).data(), of.n());
-          },
-          "strain"_a, "(n,) 1 + strain for displacements, 1 for rotations.")
-      .def("factorise", &factorise<Model>, "x"_a, "strain"_a, "diagonal"_a,
-           "BlockFactors of the Hessian by these coordinates plus a diagonal (n,), shifted if\n"
-           "it is not positive definite.")
-      .def(
-          "take_pairs",
-          [](Vicinity<Model> &of, const Array3<double> &position, const Array3<double> &orientation,
-             const Array2<double> &edges, const Array2<std::int64_t> &pairs,
-             const Array2<std::int64_t> &shift, double wide, double reach, double skin) {
-            take(of, pairs, shift, {position, orientation, edges}, {{wide, reach, skin}});
-          },
-          "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "wide"_a, "reach"_a,
-          "skin"_a,
-          "All pairs of surfaces that are closer than a wide skin at these poses, and centres "
-          "than\n"
-          "reach; from them those within skin are chosen anew as particles move.")
-      .def("solve_stage", &solve_stage<Model>, "stage"_a, "factors"_a.none(), "renew"_a,
-           "The StageEnd of a Stage, with factors of an earlier one; renew(x, strain) takes pairs\n"
-           "that hold there.");
+  return std::make_unique<VicinityOf<Model, D>>(of.shapes(), std::move(names), of.law());
 }
 
 }  // namespace
@@ -343,27 +214,59 @@ void export_vicinity(nb::module_ &m)
            "Of a matrix in CSC, of which the upper triangle is read. RuntimeError if singular.")
       .def_prop_ro("n_negative", &SymmetricFactors::n_negative)
       .def("solve", &solve<SymmetricFactors>, "right"_a, "For the rows of right (k, n).");
-  nb::class_<BlockFactors>(m, "BlockFactors", "Of a positive definite matrix.")
-      .def_prop_ro("n_negative", [](const BlockFactors &) { return 0; })
-      .def("solve", &solve<BlockFactors>, "right"_a, "For the rows of right (k, n).");
+  nb::class_<Factors>(m, "Factors", "Of a positive definite matrix.")
+      .def_prop_ro("n_negative", [](const Factors &) { return 0; })
+      .def("solve", &solve<Factors>, "right"_a, "For the rows of right (k, n).");
   m.attr("LEAST_SHIFT") = LEAST_SHIFT;
-  export_stages(m);
 
-  Shapes::each([&](auto model) {
+  nb::class_<Vicinity>(m, "Vicinity", "The energy of a packing about a base.")
+      .def("move_to", &move_to, "position"_a, "orientation"_a, "edges"_a,
+           "Count coordinates from these poses, doubles and their small rests.")
+      .def("move", &move, "x"_a, "strain"_a,
+           "Count coordinates from a point near the base; gives its poses as move_to takes them.")
+      .def_prop_ro(
+          "poses", [](const Vicinity &of) { return tuple_of(of.poses()); },
+          "Of the base, as move_to takes them.")
+      .def(
+          "evaluate", &evaluate, "x"_a, "strain"_a, "extended"_a,
+          "None where the pairs no longer hold, or energy, gradient (n,), derivative by the\n"
+          "strain, sum of the magnitudes of bond forces, number of bonds, and a pair that crosses\n"
+          "and one that is unconverged, or -1.")
+      .def(
+          "stretch",
+          [](const Vicinity &of, double strain) {
+            return array_of(of.stretch(strain).data(), of.n());
+          },
+          "strain"_a, "(n,) 1 + strain for displacements, 1 for rotations.")
+      .def("factorise", &factorise, "x"_a, "strain"_a, "diagonal"_a,
+           "Factors of the Hessian by these coordinates plus a diagonal (n,), shifted if it is\n"
+           "not positive definite.")
+      .def(
+          "take_pairs",
+          [](Vicinity &of, const Array3<double> &position, const Array3<double> &orientation,
+             const Array2<double> &edges, const Array2<std::int64_t> &pairs,
+             const Array2<std::int64_t> &shift, double wide, double reach, double skin) {
+            take(of, pairs, shift, {position, orientation, edges}, {{wide, reach, skin}});
+          },
+          "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "wide"_a, "reach"_a,
+          "skin"_a,
+          "All pairs of surfaces that are closer than a wide skin at these poses, and centres "
+          "than\n"
+          "reach; from them those within skin are chosen anew as particles move.");
+
+  Shapes::each([](auto model) {
     using Model = decltype(model);
-    export_vicinity_of<Model>(m);
     class_of<Model>().def(
         "vicinity",
         [](const ShapeOf<Model> &of, const Array2<std::int64_t> &column,
            const Array1<double> &rotation_length, const Array1<double> &turning_radius) {
-          require(of.dimension() == 2, "the packing has three dimensions, expected two.");
-          return Vicinity<Model>(
-              of.shapes(), CoordinateArrays{column, rotation_length, turning_radius}.read(of.n()),
-              of.law());
+          const CoordinateArrays names{column, rotation_length, turning_radius};
+          return of.in_space(
+              [&](auto D) { return vicinity_of<Model, D>(of, names.read(of.n(), D)); });
         },
         "column"_a, "rotation_length"_a, "turning_radius"_a,
-        "The energy about a base, of particles in the plane; column (N, 3) numbers of the\n"
-        "coordinates x, y, rotation, or -1. Before anything else, move_to a base; pairs are asked\n"
+        "The energy about a base; column (N, 3), in space (N, 6), numbers of the coordinates\n"
+        "displacement, rotation, or -1. Before anything else, move_to a base; pairs are asked\n"
         "for by what evaluate gives.");
   });
 }

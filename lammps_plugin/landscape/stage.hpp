@@ -43,16 +43,15 @@ struct StageUnits {
 
 /// Correction that may be left, in these units, and how far a particle may move and turn in one.
 struct StageLimits {
-  double accuracy, longest_step, widest_turn;
+  double accuracy;
+  StepBounds step;
 };
-
-using Factors = std::shared_ptr<BlockFactors>;
 
 /// Where the solution of a stage ended: refused are guesses whose `sums` say why.
 struct StageEnd {
   Eigen::VectorXd x;
   LandscapeSums sums;
-  Factors factors;
+  std::shared_ptr<Factors> factors;
   int evaluations, factorisations, directions;
   bool solved;
 };
@@ -64,13 +63,13 @@ struct StageEnd {
 /// holds the solution steps go to and fro: it is found by bisection and kept as a stiff valley, a
 /// BFGS update of the factors (Lewis & Overton, Math. Program. 141, 135 (2013)). Stages that do not
 /// end are given up soon: half of the time, the time step was too long anyway.
-template <class Model> class StageSolver {
+class StageSolver {
  public:
   using Vector = Eigen::VectorXd;
   /// Lets the vicinity take pairs of which some hold at a displacement.
   using Renew = std::function<void(const Displacement &)>;
 
-  StageSolver(Vicinity<Model> &landscape, const Stage &equation, const StageUnits &scales,
+  StageSolver(Vicinity &landscape, const Stage &equation, const StageUnits &scales,
               const StageLimits &bounds, Renew renew) :
       about(landscape), stage(equation), units(scales), limits(bounds),
       renew_pairs(std::move(renew)), stretch(landscape.stretch(equation.strain))
@@ -79,7 +78,8 @@ template <class Model> class StageSolver {
 
   /// From a guess, or from another one if particles collide there; with factors of an earlier,
   /// similar stage, if there are any.
-  StageEnd solve(const Vector &guess, const Vector &other, Factors found)
+  StageEnd solve(const Vector &guess, const Vector &other,
+                 std::shared_ptr<Factors> found)
   {
     factors = std::move(found);
     Point at = begin(guess, other);
@@ -132,13 +132,13 @@ template <class Model> class StageSolver {
     double inverse;
   };
 
-  Vicinity<Model> &about;
+  Vicinity &about;
   const Stage &stage;
   const StageUnits &units;
   const StageLimits &limits;
   Renew renew_pairs;
   Vector stretch;
-  Factors factors;
+  std::shared_ptr<Factors> factors;
   std::vector<Kink> kinks;
   int evaluations = 0, factorisations = 0, directions = 0;
 
@@ -180,7 +180,7 @@ template <class Model> class StageSolver {
       Correction found = newton(at);
       if (found.size <= limits.accuracy) return found;
     }
-    factors = about.factorise({at.x.data(), stage.strain}, stage.drag.data());
+    factors = about.factorise({at.x.data(), stage.strain}, stage.drag);
     ++factorisations;
     return factors ? newton(at) : Correction{};
   }
@@ -204,7 +204,7 @@ template <class Model> class StageSolver {
 
   Vector shortened(const Vector &step) const
   {
-    return about.part_within(step.data(), limits.longest_step, limits.widest_turn) * step;
+    return about.part_within(step.data(), limits.step) * step;
   }
 
   bool is_past_a_kink(const Point &at, const Point &tried, const Vector &step, const Vector &before,

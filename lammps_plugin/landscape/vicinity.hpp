@@ -15,15 +15,15 @@
 
 namespace jamshape {
 
-/// Poses of N particles in the plane and the edges of the box, in long double.
+/// Poses of N particles and the edges of the box, in long double.
 struct Poses {
-  std::vector<long double> position;  // (N, 2)
-  std::vector<long double> angle;     // (N,)
-  Vec<2, long double> edges;
+  std::vector<long double> position;     // (N, D)
+  std::vector<long double> orientation;  // (N,) angles in the plane, (N, 4) quaternions in space
+  std::vector<long double> edges;        // (D,)
 };
 
-/// What coordinates are: column (N, 3) of x, y and rotation, -1 for none; rotations count as
-/// lengths, and move a surface by at most the turning radius per radian.
+/// What coordinates are: column (N, D + rotations), -1 for none; rotations count as lengths, and
+/// move a surface by at most the turning radius per radian.
 struct Coordinates {
   std::size_t n;
   std::vector<std::int64_t> column;
@@ -32,10 +32,11 @@ struct Coordinates {
 
 /// Pairs whose surfaces were closer than `skin` at some poses, and centres than `reach`.
 struct NearPairs {
-  std::vector<std::int64_t> particles, shift;  // (M, 2)
+  std::vector<std::int64_t> particles, shift;  // (M, 2), (M, D)
   Poses then;
   double skin, reach;
-  std::vector<double> to_base{};  // (N, 3) x, y and angle since `then`, apart from the box's strain
+  // From `then` to the base, apart from the box's strain: (N, D) displacements and (N,) angles.
+  std::vector<double> moved{}, turned{};
 
   PairList list() const { return {particles.size() / 2, particles.data(), shift.data()}; }
 };
@@ -44,6 +45,11 @@ struct NearPairs {
 struct Displacement {
   const double *x;  // (n,) in the coordinates
   double strain;
+};
+
+/// How far a particle may move, and turn, in one step.
+struct StepBounds {
+  double longest, widest;
 };
 
 /// Energy at a point and its derivatives. A pair that crosses or is unconverged, or -1, refuses it.
@@ -57,45 +63,106 @@ struct LandscapeSums {
   bool is_refused() const { return crossing >= 0 || unconverged >= 0; }
 };
 
-/// Energy of a packing in the plane and its derivatives as functions of n coordinates about a base,
-/// as long as a list of pairs holds: what an integrator asks for thousands of times.
-template <class Model> class Vicinity {
+/// Energy of a packing and its derivatives as functions of n coordinates about a base, as long as a
+/// list of pairs holds: what integrators and minimisers ask for thousands of times, of any shape.
+/// Before anything else, `move_to` a base and `take` pairs.
+class Vicinity {
+ public:
+  virtual ~Vicinity() = default;
+  virtual int dimension() const = 0;
+  virtual std::size_t n() const = 0;
+  virtual std::size_t n_particles() const = 0;
+  virtual bool has_base() const = 0;
+  virtual bool has_pairs() const = 0;
+  virtual const Poses &poses() const = 0;
+
+  /// From where coordinates count.
+  virtual void move_to(const Poses &poses) = 0;
+  /// To a point near the base.
+  virtual void move(const Displacement &at) = 0;
+  /// Pairs of a wide skin, from which those within a smaller one are chosen again and again.
+  virtual void take(NearPairs wider, double smaller_skin) = 0;
+  /// Whether the pairs that there are hold at a point, chosen anew if need be; if not, others are
+  /// to be taken before anything is asked for there.
+  virtual bool holds(const Displacement &at) = 0;
+
+  virtual LandscapeSums evaluate(const Displacement &at, bool extended) const = 0;
+  /// (n,) by how much a coordinate moves its particle: 1 + strain, and 1 for rotations.
+  virtual Eigen::VectorXd stretch(double strain) const = 0;
+  /// At most 1: the part of a step (n,) that moves no particle too far and turns none too wide.
+  virtual double part_within(const double *step, const StepBounds &bounds) const = 0;
+  /// The largest length of a particle's part, force or torque, of a vector (n,).
+  virtual double largest_part(const double *vector) const = 0;
+
+  /// Second derivatives by the base's coordinates, for what follows. In space at points that turn
+  /// nothing. Spines that cross add nothing.
+  virtual void differentiate(const Displacement &at) = 0;
+  /// (n,) derivative of the gradient by the strain, there.
+  virtual const Eigen::VectorXd &coupling() const = 0;
+  /// (n,) the diagonal of the Hessian there.
+  virtual Eigen::VectorXd diagonal() const = 0;
+  /// The Hessian there times a vector (n,).
+  virtual Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const = 0;
+  /// Whether `factors` are those of the Hessian, or of a matrix nearby.
+  virtual bool has_complete_factors() const = 0;
+  /// Factors of the Hessian there plus a diagonal (n,); nothing where a pivot is not positive.
+  virtual std::shared_ptr<Factors> factors(const Eigen::VectorXd &diagonal) = 0;
+
+  /// Factors at a point, with a shift, smallest by powers of ten, that leaves no pivot that is not
+  /// positive; nothing of what is not finite.
+  std::shared_ptr<Factors> factorise(const Displacement &at, const Eigen::VectorXd &added)
+  {
+    differentiate(at);
+    const Eigen::VectorXd sum = diagonal() + added;
+    const double smallest = sum.size() > 0 ? sum.minCoeff() : 1.0;
+    const double first =
+        std::max(smallest, sum.size() > 0 ? LEAST_SHIFT * sum.cwiseAbs().maxCoeff() : 1.0);
+    for (double shift = 0.0; std::isfinite(shift);) {
+      const Eigen::VectorXd shifted = added.array() + shift;
+      if (auto found = factors(shifted)) return found;
+      shift = std::max(10.0 * shift, first);
+    }
+    return nullptr;
+  }
+};
+
+/// That of one shape in D dimensions.
+template <class Model, int D> class VicinityOf : public Vicinity {
  public:
   using Shape = typename Model::Shape;
   using Law = typename Model::Law;
 
-  /// Before anything else, `move_to` a base and `take` pairs.
-  Vicinity(std::vector<Shape> particle_shapes, Coordinates names, const Law &contact_law) :
+  VicinityOf(std::vector<Shape> particle_shapes, Coordinates names, const Law &contact_law) :
       shapes(std::move(particle_shapes)), coordinates(std::move(names)), law(contact_law)
   {
   }
 
-  std::size_t n() const { return coordinates.n; }
-  std::size_t n_particles() const { return shapes.size(); }
-  bool has_base() const { return base.position.size() == 2 * shapes.size(); }
-  bool has_pairs() const { return !pairs.to_base.empty(); }
-  const Poses &poses() const { return base; }
+  int dimension() const override { return D; }
+  std::size_t n() const override { return coordinates.n; }
+  std::size_t n_particles() const override { return shapes.size(); }
+  bool has_base() const override { return base.position.size() == D * shapes.size(); }
+  bool has_pairs() const override { return !pairs.moved.empty(); }
+  const Poses &poses() const override { return base; }
 
-  /// From where coordinates count.
-  void move_to(const Poses &poses)
+  void move_to(const Poses &poses) override
   {
     base = poses;
     for (NearPairs *list : {&wide, &pairs}) {
-      if (!list->to_base.empty()) measure(*list);
+      if (!list->moved.empty()) measure(*list);
     }
   }
 
-  /// To a point near the base. Whole turns are left out: they would cost digits.
-  void move(const Displacement &at)
+  void move(const Displacement &at) override
   {
-    constexpr long double TURN = 2.0L * 3.14159265358979323846264338327950288L;
     Poses poses = moved(at);
-    for (long double &angle : poses.angle) angle -= TURN * std::rint(angle / TURN);
+    if constexpr (D == 2) {  // whole turns would cost digits
+      constexpr long double TURN = 2.0L * 3.14159265358979323846264338327950288L;
+      for (long double &angle : poses.orientation) angle -= TURN * std::rint(angle / TURN);
+    }
     move_to(poses);
   }
 
-  /// Pairs of a wide skin, from which those within a smaller one are chosen again and again.
-  void take(NearPairs wider, double smaller_skin)
+  void take(NearPairs wider, double smaller_skin) override
   {
     wide = std::move(wider);
     measure(wide);
@@ -103,9 +170,7 @@ template <class Model> class Vicinity {
     choose({std::vector<double>(n()).data(), 0.0});
   }
 
-  /// Whether the pairs that there are hold at a point, chosen anew if need be; if not, others are
-  /// to be taken before anything is asked for there.
-  bool holds(const Displacement &at)
+  bool holds(const Displacement &at) override
   {
     if (!has_pairs()) return false;
     if (!is_beyond(pairs, at)) return true;
@@ -115,72 +180,109 @@ template <class Model> class Vicinity {
     return true;
   }
 
-  LandscapeSums evaluate(const Displacement &at, bool extended) const
+  LandscapeSums evaluate(const Displacement &at, bool extended) const override
   {
     return extended ? sums<long double>(at) : sums<double>(at);
   }
 
-  /// (n,) by how much a coordinate moves its particle: 1 + strain, and 1 for rotations.
-  Eigen::VectorXd stretch(double strain) const
+  Eigen::VectorXd stretch(double strain) const override
   {
-    Eigen::VectorXd found = Eigen::VectorXd::Constant(n(), 1.0 + strain);
-    for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const std::int64_t c = coordinates.column[3 * i + 2];
-      if (c >= 0) found[c] = 1.0;
+    Eigen::VectorXd found = Eigen::VectorXd::Ones(n());
+    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
+      const std::int64_t c = coordinates.column[k];
+      if (c >= 0 && k % BLOCK < D) found[c] = 1.0 + strain;
     }
     return found;
   }
 
-  /// At most 1: the part of a step (n,) that moves no particle too far and turns none too wide.
-  double part_within(const double *step, double longest, double widest) const
+  double part_within(const double *step, const StepBounds &bounds) const override
   {
     const Displacement by{step, 0.0};
     double excess = 1.0;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const double x = component(by, i, 0), y = component(by, i, 1);
-      excess =
-          std::max({excess, std::sqrt(x * x + y * y) / longest, std::abs(turn(by, i)) / widest});
+      excess = std::max({excess, norm(shift(by, i)) / bounds.longest,
+                         std::abs(angle_of(turn(by, i))) / bounds.widest});
     }
     return 1.0 / excess;
   }
 
-  /// Factors of the Hessian by the base's coordinates plus a diagonal (n,), with a shift, smallest
-  /// by powers of ten, that leaves no negative pivot; nothing of what is not finite. Spines that
-  /// cross add nothing.
-  std::shared_ptr<BlockFactors> factorise(const Displacement &at, const double *diagonal)
+  double largest_part(const double *vector) const override
   {
-    fill_hessian(at);
-    double first = 0.0, smallest = INFINITY;
-    each_on_diagonal([&](std::int64_t c, double &value) {
-      value += diagonal[c];
-      first = std::max(first, LEAST_SHIFT * std::abs(value));
-      smallest = std::min(smallest, diagonal[c]);
-    });
-    first = std::max(first, smallest);
-    const std::shared_ptr<BlockFactors> found = spare();
-    for (double shift = 0.0; std::isfinite(shift);) {
-      if (found->factorise(hessian)) return found;
-      const double next = std::max(10.0 * shift, first);
-      each_on_diagonal([&](std::int64_t, double &value) { value += next - shift; });
-      shift = next;
+    double most = 0.0;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      double force = 0.0, torque = 0.0;
+      for (int k = 0; k < BLOCK; ++k) {
+        const double value = component({vector, 0.0}, i, k);
+        (k < D ? force : torque) += value * value;
+      }
+      most = std::max({most, force, torque});
     }
-    return nullptr;
+    return std::sqrt(most);
+  }
+
+  void differentiate(const Displacement &at) override
+  {
+    if (!pattern) find_blocks();
+    const SplitArrays poses = displaced(at);
+    const PosedPairs<Model, D, double> posed(shapes, poses.view(), pairs.list(), law);
+    const TurnedBodies<Model, D, double> turned_bodies(posed);
+    clear_hessian();
+    for (std::size_t p = 0; p < posed.size(); ++p) {
+      const Vec<D> r = posed.separation(p);
+      if (posed.contact(p, r).status != ContactStatus::TOUCHING) continue;
+      const DualContact contact = turned_bodies.contact(p);
+      if (contact.status == ContactStatus::TOUCHING) add_pair(p, r, contact, 1.0 + at.strain);
+    }
+  }
+
+  const Eigen::VectorXd &coupling() const override { return pulled; }
+
+  Eigen::VectorXd diagonal() const override
+  {
+    Eigen::VectorXd found(n());
+    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
+      const std::int64_t c = coordinates.column[k];
+      const int own = static_cast<int>(k % BLOCK);
+      if (c >= 0) found[c] = hessian.diagonal[pattern->place[k / BLOCK]](own, own);
+    }
+    return found;
+  }
+
+  Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const override
+  {
+    return product(*pattern, hessian, vector);
+  }
+
+  bool has_complete_factors() const override { return fill() == Fill::COMPLETE; }
+
+  std::shared_ptr<Factors> factors(const Eigen::VectorXd &diagonal) override
+  {
+    BlockRows<BLOCK> rows(*pattern, diagonal);
+    std::vector<BlockRow<BLOCK>> added;
+    for (std::size_t k = 0; k < pattern->size(); ++k) added.push_back(rows[k]);
+    const std::shared_ptr<BlockFactors<BLOCK>> found = spare();
+    return found->factorise(hessian, added) ? found : nullptr;
   }
 
  private:
-  static constexpr int VARIABLES = PAIR_VARIABLES<2>;
-  using DualContact = ContactOf<Model, 2, Dual<VARIABLES>>;
+  static constexpr int BLOCK = D + ROTATIONS<D>;
+  static constexpr int VARIABLES = PAIR_VARIABLES<D>;
+  using DualContact = ContactOf<Model, D, Dual<VARIABLES>>;
+  using Block = BlockOf<BLOCK>;
+
+  /// In space, elimination couples nearly all of a packing's particles: up to so many it is cheaper
+  /// than the iterations that spare it.
+  static constexpr std::size_t FEW = 150;
 
   /// Doubles and their small rests.
   struct SplitArrays {
-    std::vector<double> position[2], angle[2];
-    double edges[2][2];
+    std::vector<double> position[2], orientation[2], edges[2];
 
     SplitPoses view() const
     {
       return {{position[0].data(), position[1].data()},
-              {angle[0].data(), angle[1].data()},
-              {edges[0], edges[1]}};
+              {orientation[0].data(), orientation[1].data()},
+              {edges[0].data(), edges[1].data()}};
     }
   };
 
@@ -193,27 +295,22 @@ template <class Model> class Vicinity {
   Poses base;
   std::shared_ptr<const BlockPattern> pattern;
   std::vector<int> block;  // (M,) of each pair below the diagonal of `hessian`
-  BlockMatrix hessian;
-  std::vector<std::shared_ptr<BlockFactors>> factors;
+  BlockMatrix<BLOCK> hessian;
+  Eigen::VectorXd pulled;
+  std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
 
-  /// Each coordinate with its element on the Hessian's diagonal.
-  template <class Then> void each_on_diagonal(const Then &then)
-  {
-    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
-      const std::int64_t c = coordinates.column[k];
-      const int own = static_cast<int>(k % BLOCK);
-      if (c >= 0) then(c, hessian.diagonal[pattern->place[k / BLOCK]](own, own));
-    }
-  }
+  Fill fill() const { return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE; }
 
   template <class S> LandscapeSums sums(const Displacement &at) const
   {
     const SplitArrays poses = displaced(at);
-    const PairSums<2, S> sums =
-        sum_over(PosedPairs<Model, 2, S>(shapes, poses.view(), pairs.list(), law), shapes.size());
+    const PairSums<D, S> sums =
+        sum_over(PosedPairs<Model, D, S>(shapes, poses.view(), pairs.list(), law), shapes.size());
+    S trace = 0.0;
+    for (int k = 0; k < D; ++k) trace += sums.virial[(D + 1) * k];
     return {static_cast<double>(sums.energy),
-            gradient(sums),
-            static_cast<double>(-sums.virial[0] - sums.virial[3]),
+            gradient(sums, at),
+            static_cast<double>(-trace),
             static_cast<double>(sums.bond_force),
             sums.n_bonds,
             of_wide(sums.crossing),
@@ -223,48 +320,87 @@ template <class Model> class Vicinity {
   /// The number of a pair, or -1, as whoever gave the pairs knows it.
   std::int64_t of_wide(std::int64_t p) const { return p < 0 ? p : chosen[p]; }
 
-  template <class S> Eigen::VectorXd gradient(const PairSums<2, S> &sums) const
+  template <class S>
+  Eigen::VectorXd gradient(const PairSums<D, S> &sums, const Displacement &at) const
   {
     Eigen::VectorXd found = Eigen::VectorXd::Zero(n());
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const S turning = sums.torque[i][0] * coordinates.radians_per_length[i];
-      const S by[3] = {sums.force[i][0], sums.force[i][1], turning};
-      for (int k = 0; k < 3; ++k) {
-        const std::int64_t c = coordinates.column[3 * i + k];
-        if (c >= 0) found[c] = static_cast<double>(-by[k]);
+      const Torque<D, S> turning = by_turn(turn(at, i), sums.torque[i]);
+      for (int k = 0; k < BLOCK; ++k) {
+        const std::int64_t c = coordinates.column[BLOCK * i + k];
+        if (c < 0) continue;
+        const S by = k < D ? sums.force[i][k] : turning[k - D] * coordinates.radians_per_length[i];
+        found[c] = static_cast<double>(-by);
       }
     }
     return found;
   }
 
+  /// The torque as it acts on the rotation vector of a particle that was turned by it.
+  template <class S> static Vec<1, S> by_turn(const Vec<1> &, const Vec<1, S> &torque)
+  {
+    return torque;
+  }
+  template <class S> static Vec<3, S> by_turn(const Vec<3> &vector, const Vec<3, S> &torque)
+  {
+    if (norm_sq(vector) == 0.0) return torque;
+    return constants_of<S>(torque_on_rotation_vector(vector, doubles(torque)));
+  }
+
+  template <class S> static Vec<3> doubles(const Vec<3, S> &v)
+  {
+    return {{static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])}};
+  }
+
   void measure(NearPairs &list) const
   {
-    list.to_base.resize(3 * shapes.size());
+    list.moved.resize(D * shapes.size());
+    list.turned.resize(shapes.size());
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      for (int k = 0; k < 2; ++k) {
+      for (int k = 0; k < D; ++k) {
         const long double scale = base.edges[k] / list.then.edges[k];
-        list.to_base[3 * i + k] =
-            static_cast<double>(base.position[2 * i + k] - scale * list.then.position[2 * i + k]);
+        list.moved[D * i + k] =
+            static_cast<double>(base.position[D * i + k] - scale * list.then.position[D * i + k]);
       }
-      list.to_base[3 * i + 2] = static_cast<double>(base.angle[i] - list.then.angle[i]);
+      list.turned[i] = turned_since(list.then, i);
     }
   }
+
+  double turned_since(const Poses &then, std::size_t i) const
+  {
+    if constexpr (D == 2) {
+      return static_cast<double>(base.orientation[i] - then.orientation[i]);
+      } else {  // quaternions are apart by twice the sine of a quarter of the angle
+      long double apart = 0.0, opposite = 0.0;
+      for (std::size_t k = 4 * i; k < 4 * i + 4; ++k) {
+        const long double minus = base.orientation[k] - then.orientation[k];
+        const long double plus = base.orientation[k] + then.orientation[k];
+        apart += minus * minus;
+        opposite += plus * plus;
+      }
+      const auto chord = static_cast<double>(std::sqrt(std::min(apart, opposite)));
+      return 4.0 * std::asin(std::min(0.5 * chord, 1.0));
+    }
+  }
+
+  static double angle_of(const Vec<1> &turn) { return turn[0]; }
+  static double angle_of(const Vec<3> &turn) { return norm(turn); }
 
   /// Whether two surfaces may have come closer by the skin, or by what is left of it.
   bool is_beyond(const NearPairs &list, const Displacement &at, double kept = 0.0) const
   {
     double most = 0.0, scaled = 0.0;
     const double stretch = 1.0 + at.strain;
-    for (int k = 0; k < 2; ++k) {
+    for (int k = 0; k < D; ++k) {
       const double scale = stretch * static_cast<double>(base.edges[k] / list.then.edges[k]);
       scaled = std::max(scaled, std::abs(scale - 1.0));
     }
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      const double x = stretch * (list.to_base[3 * i] + component(at, i, 0));
-      const double y = stretch * (list.to_base[3 * i + 1] + component(at, i, 1));
-      double turned = std::abs(list.to_base[3 * i + 2] + turn(at, i));
+      Vec<D> by = shift(at, i);
+      for (int k = 0; k < D; ++k) by[k] += list.moved[D * i + k];
+      double turned = std::abs(list.turned[i] + angle_of(turn(at, i)));
       if (turned > M_PI) turned = std::abs(std::remainder(turned, 2.0 * M_PI));
-      most = std::max(most, std::sqrt(x * x + y * y) + coordinates.turning_radius[i] * turned);
+      most = std::max(most, stretch * norm(by) + coordinates.turning_radius[i] * turned);
     }
     return 2.0 * most >= list.skin - kept - scaled * list.reach;
   }
@@ -275,75 +411,92 @@ template <class Model> class Vicinity {
     pairs = {{}, {}, moved(at), skin, wide.reach - wide.skin + skin};
     chosen.clear();
     const SplitArrays poses = displaced(at);
-    const PosedPairs<Model, 2, double> posed(shapes, poses.view(), wide.list(), law);
+    const PosedPairs<Model, D, double> posed(shapes, poses.view(), wide.list(), law);
     for (std::size_t p = 0; p < posed.size(); ++p) {
       if (!posed.are_closer(p, skin)) continue;
       chosen.push_back(static_cast<std::int64_t>(p));
-      for (int k = 0; k < 2; ++k) {
-        pairs.particles.push_back(wide.particles[2 * p + k]);
-        pairs.shift.push_back(wide.shift[2 * p + k]);
-      }
+      for (int k = 0; k < 2; ++k) pairs.particles.push_back(wide.particles[2 * p + k]);
+      for (int k = 0; k < D; ++k) pairs.shift.push_back(wide.shift[D * p + k]);
     }
     measure(pairs);
     pattern = nullptr;
-    factors.clear();
+    made.clear();
   }
 
   double component(const Displacement &at, std::size_t i, int k) const
   {
-    const std::int64_t c = coordinates.column[3 * i + k];
+    const std::int64_t c = coordinates.column[BLOCK * i + k];
     return c < 0 ? 0.0 : at.x[c];
   }
 
-  double turn(const Displacement &at, std::size_t i) const
+  Vec<D> shift(const Displacement &at, std::size_t i) const
   {
-    return component(at, i, 2) * coordinates.radians_per_length[i];
+    Vec<D> by;
+    for (int k = 0; k < D; ++k) by[k] = component(at, i, k);
+    return by;
   }
 
-  long double moved(const Displacement &at, std::size_t i, int k) const
+  /// Rotation vector of a particle.
+  Torque<D> turn(const Displacement &at, std::size_t i) const
   {
-    return (1.0L + at.strain) * (base.position[2 * i + k] + component(at, i, k));
+    Torque<D> by;
+    for (int k = 0; k < ROTATIONS<D>; ++k) {
+      by[k] = component(at, i, D + k) * coordinates.radians_per_length[i];
+    }
+    return by;
   }
 
   /// Poses at a point.
   Poses moved(const Displacement &at) const
   {
     Poses poses = base;
+    const long double stretch = 1.0L + at.strain;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      for (int k = 0; k < 2; ++k) poses.position[2 * i + k] = moved(at, i, k);
-      poses.angle[i] += turn(at, i);
+      const Vec<D> by = shift(at, i);
+      for (int k = 0; k < D; ++k) {
+        poses.position[D * i + k] = stretch * (base.position[D * i + k] + by[k]);
+      }
+      turn_pose(poses, turn(at, i), i);
     }
-    for (int k = 0; k < 2; ++k) poses.edges[k] *= 1.0L + at.strain;
+    for (long double &edge : poses.edges) edge *= stretch;
     return poses;
+  }
+
+  static void turn_pose(Poses &poses, const Torque<D> &by, std::size_t i)
+  {
+    if constexpr (D == 2) {
+      poses.orientation[i] += by[0];
+    } else {
+      long double *const q = &poses.orientation[4 * i];
+      const QuaternionOf<long double> found = turned(
+          QuaternionOf<long double>{q[0], q[1], q[2], q[3]}, constants_of<long double>(by));
+      q[0] = found.w, q[1] = found.i, q[2] = found.j, q[3] = found.k;
+    }
   }
 
   SplitArrays displaced(const Displacement &at) const
   {
+    const Poses poses = moved(at);
     SplitArrays split;
-    const std::size_t N = shapes.size();
-    for (int part = 0; part < 2; ++part) {
-      split.position[part].resize(2 * N);
-      split.angle[part].resize(N);
-    }
-    const auto put = [](long double value, double &whole, double &rest) {
-      whole = static_cast<double>(value);
-      rest = static_cast<double>(value - whole);
-    };
-    for (std::size_t i = 0; i < N; ++i) {
-      for (int k = 0; k < 2; ++k) {
-        put(moved(at, i, k), split.position[0][2 * i + k], split.position[1][2 * i + k]);
-      }
-      put(base.angle[i] + turn(at, i), split.angle[0][i], split.angle[1][i]);
-    }
-    for (int k = 0; k < 2; ++k) {
-      put((1.0L + at.strain) * base.edges[k], split.edges[0][k], split.edges[1][k]);
-    }
+    put(poses.position, split.position);
+    put(poses.orientation, split.orientation);
+    put(poses.edges, split.edges);
     return split;
+  }
+
+  static void put(const std::vector<long double> &from, std::vector<double> (&to)[2])
+  {
+    for (std::vector<double> &part : to) part.resize(from.size());
+    for (std::size_t k = 0; k < from.size(); ++k) {
+      to[0][k] = static_cast<double>(from[k]);
+      to[1][k] = static_cast<double>(from[k] - to[0][k]);
+    }
   }
 
   void find_blocks()
   {
-    pattern = std::make_shared<BlockPattern>(coordinates.column, pairs.particles);
+    pattern = std::make_shared<BlockPattern>(coordinates.column, pairs.particles, shapes.size(),
+                                             fill());
     block.clear();
     for (std::size_t p = 0; p < pairs.list().n; ++p) {
       const int i = place(p, 0), j = place(p, 1);
@@ -354,22 +507,10 @@ template <class Model> class Vicinity {
   /// Row of a pair's first or second particle in `hessian`.
   int place(std::size_t p, int side) const { return pattern->place[pairs.particles[2 * p + side]]; }
 
-  void fill_hessian(const Displacement &at)
-  {
-    if (!pattern) find_blocks();
-    const SplitArrays poses = displaced(at);
-    const PosedPairs<Model, 2, double> posed(shapes, poses.view(), pairs.list(), law);
-    const TurnedBodies<Model, 2, double> turned(posed);
-    clear_hessian();
-    for (std::size_t p = 0; p < posed.size(); ++p) {
-      const DualContact contact = turned.contact(p);
-      if (contact.status == ContactStatus::TOUCHING) add_blocks(p, contact, 1.0 + at.strain);
-    }
-  }
-
   /// Zero, with 1 for each coordinate that a particle does not have.
   void clear_hessian()
   {
+    pulled = Eigen::VectorXd::Zero(n());
     hessian.diagonal.assign(shapes.size(), Block::Zero());
     hessian.below.assign(pattern->row.size(), Block::Zero());
     for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
@@ -381,7 +522,7 @@ template <class Model> class Vicinity {
   /// Second derivatives by the variables of a pair that touches.
   static Eigen::Matrix<double, VARIABLES, VARIABLES> by_variables(const DualContact &contact)
   {
-    SecondDerivatives<2, double, Model::MOST_BONDS> found{};
+    SecondDerivatives<D, double, Model::MOST_BONDS> found{};
     read_derivatives(contact, found);
     Eigen::Matrix<double, VARIABLES, VARIABLES> by;
     for (int a = 0; a < VARIABLES; ++a) {
@@ -396,21 +537,27 @@ template <class Model> class Vicinity {
     return by;
   }
 
-  void add_blocks(std::size_t p, const DualContact &contact, double stretch)
+  /// Which variable of a pair a coordinate of its first, its second particle is.
+  static constexpr int variable(int side, int k)
+  {
+    return k < D || side == 0 ? k : k + ROTATIONS<D>;
+  }
+
+  void add_pair(std::size_t p, const Vec<D> &r, const DualContact &contact, double stretch)
   {
     const auto by = by_variables(contact);
-    constexpr int variable[2][BLOCK] = {{0, 1, 2}, {0, 1, 3}};
     double scale[2][BLOCK];
     for (int side = 0; side < 2; ++side) {
-      const double along = side == 0 ? stretch : -stretch;
-      scale[side][0] = scale[side][1] = along;
-      scale[side][2] = coordinates.radians_per_length[pairs.particles[2 * p + side]];
+      const std::size_t particle = pairs.particles[2 * p + side];
+      for (int k = 0; k < BLOCK; ++k) {
+        scale[side][k] = k >= D ? coordinates.radians_per_length[particle]
+                                : (side == 0 ? stretch : -stretch);
+      }
     }
     const auto add = [&](Block &to, int rows, int columns) {
       for (int b = 0; b < BLOCK; ++b) {
         for (int a = 0; a < BLOCK; ++a) {
-          to(a, b) +=
-              scale[rows][a] * scale[columns][b] * by(variable[rows][a], variable[columns][b]);
+          to(a, b) += scale[rows][a] * scale[columns][b] * by(variable(rows, a), variable(columns, b));
         }
       }
     };
@@ -423,16 +570,26 @@ template <class Model> class Vicinity {
     } else {
       add(hessian.below[block[p]], i > j ? 0 : 1, i > j ? 1 : 0);
     }
+    // The affine strain moves i from j by r.
+    for (int side = 0; side < 2; ++side) {
+      for (int k = 0; k < BLOCK; ++k) {
+        const std::int64_t c = coordinates.column[BLOCK * pairs.particles[2 * p + side] + k];
+        if (c < 0) continue;
+        double along = 0.0;
+        for (int d = 0; d < D; ++d) along += by(variable(side, k), d) * r[d];
+        pulled[c] += scale[side][k] * along;
+      }
+    }
   }
 
   /// Factors that nobody else holds.
-  std::shared_ptr<BlockFactors> spare()
+  std::shared_ptr<BlockFactors<BLOCK>> spare()
   {
-    for (const auto &one : factors) {
+    for (const auto &one : made) {
       if (one.use_count() == 1) return one;
     }
-    factors.push_back(std::make_shared<BlockFactors>(pattern));
-    return factors.back();
+    made.push_back(std::make_shared<BlockFactors<BLOCK>>(pattern));
+    return made.back();
   }
 };
 

@@ -93,7 +93,7 @@ class _Shape:
         column: NDArray[np.int64],
         rotation_length: NDArray[np.float64],
         turning_radius: NDArray[np.float64],
-    ) -> _Vicinity: ...
+    ) -> Vicinity: ...
 
 class Spherocylinders(_Shape): ...
 class Superellipsoids(_Shape): ...
@@ -139,7 +139,7 @@ class SymmetricFactors:
     ) -> None: ...
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
-class BlockFactors:
+class Factors:
     n_negative: int
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
@@ -174,13 +174,42 @@ class Stage:
 class StageEnd:
     x: NDArray[np.float64]
     sums: tuple[float, NDArray[np.float64], float, float, int, int, int]
-    factors: BlockFactors | None
+    factors: Factors | None
     evaluations: int
     factorisations: int
     directions: int
     solved: bool
 
-class _Vicinity:
+class DescentStop:
+    def __init__(
+        self,
+        tolerance: float,
+        lowest: float,
+        evaluations: int,
+        seconds: float,
+        rounding: float,
+        longest_step: float,
+        widest_turn: float,
+    ) -> None: ...
+
+class DescentEnd:
+    outcome: str
+    sums: tuple[float, NDArray[np.float64], float, float, int, int, int]
+    rows: list[tuple[float, int, float, float]]
+    evaluations: int
+    factorisations: int
+    products: int
+
+class NewtonSystem:
+    coupling: NDArray[np.float64]
+    shift: float
+    def __init__(self, vicinity: Vicinity, shift: float) -> None: ...
+    def prepare(self) -> None: ...
+    def solve(self, right: NDArray[np.float64], accuracy: float) -> NDArray[np.float64]: ...
+    def learn(self, tries: int) -> None: ...
+
+class Vicinity:
+    poses: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
     def move_to(
         self,
         position: NDArray[np.float64],
@@ -210,14 +239,17 @@ class _Vicinity:
         x: NDArray[np.float64],
         strain: float,
         diagonal: NDArray[np.float64],
-    ) -> BlockFactors: ...
+    ) -> Factors: ...
     def solve_stage(
         self,
         stage: Stage,
-        factors: BlockFactors | None,
+        factors: Factors | None,
         renew: Callable[[NDArray[np.float64], float], None],
     ) -> StageEnd: ...
-
-class SpherocylindersVicinity(_Vicinity): ...
-class SuperellipsoidsVicinity(_Vicinity): ...
-class DimersVicinity(_Vicinity): ...
+    def descend(
+        self,
+        stop: DescentStop,
+        shift: float,
+        renew: Callable[[NDArray[np.float64], float], None],
+        tell: Callable[[tuple[float, int, float, float]], None],
+    ) -> DescentEnd: ...

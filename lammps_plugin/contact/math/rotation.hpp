@@ -3,6 +3,7 @@
 #include "contact/math/vec.hpp"
 
 #include <cmath>
+#include <type_traits>
 
 namespace jamshape {
 
@@ -51,35 +52,36 @@ template <int D, class S> Vec<D, S> long_axis(const QuaternionOf<S> &q)
   }
 }
 
-struct CosSin {
-  double cosine, sine;
+template <class S> struct CosSin {
+  S cosine, sine;
 };
 
-/// Both at once; one step of a slow flow turns particles by so little that series to rounding do.
-inline CosSin cos_sin(double x)
+/// Both at once; one step of a slow flow turns particles by so little that series to the rounding
+/// of doubles do.
+template <class S> CosSin<S> cos_sin(S x)
 {
-  if (std::abs(x) > 0.01) return {std::cos(x), std::sin(x)};
-  const double y = x * x;
+  if (!std::is_same_v<S, double> || std::abs(x) > 0.01) return {std::cos(x), std::sin(x)};
+  const S y = x * x;
   return {1.0 - y / 2.0 * (1.0 - y / 12.0 * (1.0 - y / 30.0)),
           x * (1.0 - y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0)))};
 }
 
 /// Rotation by the angle |v| about v, in space coordinates.
-inline Quaternion rotation_by(const Vec<3> &v)
+template <class S> QuaternionOf<S> rotation_by(const Vec<3, S> &v)
 {
-  const double angle = norm(v);
-  const CosSin half = cos_sin(0.5 * angle);
-  const double factor = angle > 0.0 ? half.sine / angle : 0.5;
+  const S angle = norm(v);
+  const CosSin<S> half = cos_sin(S(0.5) * angle);
+  const S factor = angle > 0.0 ? half.sine / angle : S(0.5);
   return {half.cosine, factor * v[0], factor * v[1], factor * v[2]};
 }
-inline Quaternion rotation_by(const Vec<1> &v)
+template <class S> QuaternionOf<S> rotation_by(const Vec<1, S> &v)
 {
-  const CosSin half = cos_sin(0.5 * v[0]);
-  return {half.cosine, 0.0, 0.0, half.sine};
+  const CosSin<S> half = cos_sin(S(0.5) * v[0]);
+  return {half.cosine, S(0.0), S(0.0), half.sine};
 }
 
 /// `q` turned by the rotation vector `v`. A rotation of zero returns `q` to the last bit.
-template <int M> Quaternion turned(const Quaternion &q, const Vec<M> &v)
+template <int M, class S> QuaternionOf<S> turned(const QuaternionOf<S> &q, const Vec<M, S> &v)
 {
   if (norm_sq(v) == 0.0) return q;
   return normalized(rotation_by(v) * q);

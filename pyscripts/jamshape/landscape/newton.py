@@ -10,7 +10,7 @@ import scipy.sparse
 
 from jamshape import _contact
 from jamshape.arrays import FloatArray
-from jamshape.landscape import Landscape
+from jamshape.landscape.landscape import Evaluation, Landscape
 
 # A Newton step moves no particle by more than this fraction of the smallest radius, and turns none
 # by more than this angle.
@@ -21,7 +21,7 @@ WIDEST_TURN = 0.2
 LEAST_SHIFT: float = _contact.LEAST_SHIFT
 
 # The first one, in units of k_e and `Landscape.length`.
-_FIRST_SHIFT = 1e-6
+FIRST_SHIFT = 1e-6
 
 _GROWTH = 10.0
 _DECAY = 3.0
@@ -88,12 +88,12 @@ class Factorisation:
 class Regularised:
     """Keeps the shift that makes a Hessian positive definite, from one step to the next."""
 
-    shift: float = _FIRST_SHIFT
+    shift: float = FIRST_SHIFT
 
     @classmethod
     def of(cls, landscape: Landscape) -> Regularised:
         """Begin with the same shift in all units."""
-        return cls(_FIRST_SHIFT * landscape.k_e / landscape.length**2)
+        return cls(FIRST_SHIFT * landscape.k_e / landscape.length**2)
 
     def factorise(self, matrix: Any) -> Factorisation:
         """Factorise with the least shift, by powers of ten, that leaves no negative pivot."""
@@ -114,3 +114,14 @@ class Regularised:
             self.shift /= _DECAY
         elif tries > _FAR_OFF:
             self.shift *= _GROWTH
+
+
+def least_shift(landscape: Landscape, evaluation: Evaluation) -> float:
+    """Give the shift of a Hessian's diagonal that forces as large as these ask for, [energy / length^2].
+
+    It falls with the forces, as the Levenberg-Marquardt method has it, so that Newton's method converges
+    faster than linearly, and is no larger than the first one.
+    """
+    force = float(np.abs(evaluation.gradient).max(initial=0.0))
+    first = FIRST_SHIFT * landscape.k_e / landscape.length**2
+    return max(min(first, force / landscape.length), 1e-300)

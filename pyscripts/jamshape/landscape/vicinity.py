@@ -1,7 +1,7 @@
-"""The energy landscape about one state, compiled: what an integrator asks for thousands of times.
+"""The energy landscape about one state, compiled: what integrators and minimisers ask for thousands of times.
 
 The same energy as `Landscape`, as a function of displacements from a base and of a strain; evaluations
-and factors of the Hessian cost a small part of those there. In two dimensions.
+and factors of the Hessian cost a small part of those there.
 """
 
 from __future__ import annotations
@@ -18,6 +18,20 @@ from jamshape.packing import State
 
 # Force, energy and length in which errors of displacements are measured.
 Units = _contact.StageUnits
+
+
+# When a minimisation ends, and Newton's equations.
+DescentStop = _contact.DescentStop
+NewtonSystem = _contact.NewtonSystem
+
+
+class DescentEnd(NamedTuple):
+    """Where a minimisation ended: at the base of its vicinity."""
+
+    outcome: str
+    evaluation: Evaluation
+    rows: list[tuple[float, int, float, float]]
+    """Seconds, evaluations, residual and energy density of each state on the way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +147,31 @@ class Vicinity:
             end.x, self._accepted(end.sums), found, end.factorisations, end.directions, end.solved
         )
 
+    def descend(self, stop: DescentStop, shift: float) -> DescentEnd:
+        """Minimise the energy at fixed box by Newton's method; the base moves along.
+
+        Parameters
+        ----------
+        stop : DescentStop
+        shift : float, [energy / length^2]
+            The first one of the Hessian's diagonal.
+
+        Raises
+        ------
+        CrossingError
+            If spines cross at the base.
+        ValueError
+            If a contact does not converge there.
+        """
+        end = self._compiled.descend(stop, shift, self._renew, lambda row: None)
+        self.landscape.evaluations += end.evaluations
+        self.base = State.joined(*self._compiled.poses)
+        return DescentEnd(end.outcome, self._accepted(end.sums), end.rows)
+
+    def newton(self, shift: float) -> NewtonSystem:
+        """Give Newton's equations at the base, with a first shift of the Hessian's diagonal."""
+        return NewtonSystem(self._compiled, shift)
+
     def stretch(self, strain: float) -> FloatArray:
         """(n,) 1 + strain for displacements, 1 for rotations."""
         found: FloatArray = self._compiled.stretch(strain)
@@ -149,6 +188,7 @@ class Vicinity:
         return Evaluation(energy, gradient, strain_gradient, bond_force, n_bonds)
 
     def _renew(self, x: FloatArray, strain: float) -> None:
+        self.base = State.joined(*self._compiled.poses)
         self._take(self.landscape.wide_pairs(self.at(x, strain)))
 
     def _take(self, pairs: Pairs) -> None:

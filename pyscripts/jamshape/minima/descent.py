@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jamshape.landscape import Evaluation, Landscape
+from jamshape.landscape.vicinity import DescentEnd
 from jamshape.packing import State
 
 # A method no longer gains if residual times energy did not fall by this factor in so many evaluations.
@@ -84,7 +85,13 @@ class History:
 
     def add(self, evaluations: int, residual: float, energy_density: float) -> None:
         """Append a row, now."""
-        self.wall_seconds.append(time.perf_counter() - self.began)
+        self.put(time.perf_counter() - self.began, evaluations, residual, energy_density)
+
+    def put(
+        self, seconds: float, evaluations: int, residual: float, energy_density: float
+    ) -> None:
+        """Append a row."""
+        self.wall_seconds.append(seconds)
         self.evaluations.append(evaluations)
         self.residual.append(residual)
         self.energy_density.append(energy_density)
@@ -118,9 +125,13 @@ def residual_of(landscape: Landscape, evaluation: Evaluation) -> Residual:
 
 def rounding_floor(evaluation: Evaluation, landscape: Landscape, *, extended: bool = True) -> float:
     """Residual that rounding of the coordinates alone leaves: about eps / overlap."""
+    return rounding_of_a_bond(landscape, extended=extended) / max(evaluation.bond_force, 1e-300)
+
+
+def rounding_of_a_bond(landscape: Landscape, *, extended: bool = True) -> float:
+    """Force that rounding of the coordinates makes, [energy / length]."""
     eps = float(np.finfo(np.longdouble if extended else np.float64).eps)
-    size = float(landscape.inner_radius.max())
-    return 8 * eps * landscape.k_e / (size * max(evaluation.bond_force, 1e-300))
+    return 8 * eps * landscape.k_e / float(landscape.inner_radius.max())
 
 
 class Descent:
@@ -131,7 +142,7 @@ class Descent:
     ) -> None:
         self.landscape, self.stop = landscape, stop
         unit = landscape.k_e / landscape.length**start.dimension
-        self._lowest = _LOWEST * unit if stop.lowest is None else stop.lowest
+        self.lowest = _LOWEST * unit if stop.lowest is None else stop.lowest
         self.history = history or History()
         self.state = start
         self._first_evaluation, self._began = landscape.evaluations, time.perf_counter()
@@ -145,6 +156,11 @@ class Descent:
     def evaluations(self) -> int:
         """Evaluations of all forces so far."""
         return self.landscape.evaluations - self._first_evaluation
+
+    @property
+    def seconds(self) -> float:
+        """Seconds so far."""
+        return time.perf_counter() - self._began
 
     @property
     def residual(self) -> float:
@@ -166,6 +182,15 @@ class Descent:
         self.state, self.evaluation = state, evaluation
         self.record(evaluation)
 
+    def take(self, state: State, end: DescentEnd) -> None:
+        """Accept where a compiled minimisation ended, with its history."""
+        self.state, self.evaluation = state, end.evaluation
+        rows = end.rows[1:]  # the first one is there
+        begin = time.perf_counter() - self.history.began - end.rows[-1][0]
+        before = self.landscape.evaluations - end.rows[-1][1]
+        for seconds, evaluations, residual, density in rows:
+            self.history.put(begin + seconds, before + evaluations, residual, density)
+
     def record(self, evaluation: Evaluation) -> None:
         """Add a row to the history."""
         residual = residual_of(self.landscape, evaluation).largest
@@ -178,12 +203,12 @@ class Descent:
 
     def outcome(self) -> Outcome | None:
         """Say whether it ends here, and how."""
-        if self.evaluation.energy <= self._lowest * self.state.volume:
+        if self.evaluation.energy <= self.lowest * self.state.volume:
             return Outcome.UNJAMMED
         if self.residual <= self.stop.tolerance:
             return Outcome.CONVERGED
         used_up = self.evaluations >= self.stop.evaluations
-        if used_up or time.perf_counter() - self._began >= self.stop.seconds:
+        if used_up or self.seconds >= self.stop.seconds:
             return Outcome.EXHAUSTED
         if self._patience and self.evaluations - self._last_gain > self._patience:
             return Outcome.STALLED

@@ -15,12 +15,6 @@ from jamshape.minima.newton import newton
 from jamshape.minima.paper import paper
 from jamshape.packing import State
 
-# `auto` changes from L-BFGS to Newton below this residual, or where L-BFGS no longer gains.
-_NEWTON_BELOW = 1e-2
-
-# Newton and L-BFGS take turns so many times before `auto` calls it a stall.
-_ROUNDS = 3
-
 
 def minimise(
     landscape: Landscape,
@@ -60,20 +54,6 @@ def minimise(
     return descent.minimum(METHODS[method](descent))
 
 
-def _auto(descent: Descent) -> Outcome:
-    outcome = Outcome.STALLED
-    for _ in range(_ROUNDS):
-        best = descent.residual
-        if best > _NEWTON_BELOW:
-            outcome = lbfgs(descent, _NEWTON_BELOW)
-            if outcome in {Outcome.UNJAMMED, Outcome.EXHAUSTED}:
-                return outcome
-        outcome = newton(descent)
-        if outcome is not Outcome.STALLED:
-            return outcome
-    return outcome
-
-
 def _lammps(descent: Descent) -> Outcome:
     """LAMMPS's conjugate gradients; LAMMPS is started only here."""
     from jamshape.minima.lammps_cg import descend  # noqa: PLC0415
@@ -82,7 +62,7 @@ def _lammps(descent: Descent) -> Outcome:
 
 
 METHODS: dict[str, Callable[[Descent], Outcome]] = {
-    "auto": _auto,
+    "auto": newton,
     "newton": newton,
     "lbfgs": lbfgs,
     "paper": paper,

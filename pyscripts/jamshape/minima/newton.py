@@ -1,23 +1,27 @@
-"""Newton's method."""
+"""Newton's method, compiled."""
 
 from __future__ import annotations
 
-from jamshape.landscape.newton import Regularised
-from jamshape.minima.descent import Descent, Outcome
-from jamshape.minima.line_search import limited, search_along
-
-# A stall after so many evaluations without a gain.
-_PATIENCE = 2000
+from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, least_shift
+from jamshape.landscape.vicinity import DescentStop, Vicinity
+from jamshape.minima.descent import Descent, Outcome, rounding_of_a_bond
 
 
 def newton(descent: Descent) -> Outcome:
-    """Sparse Newton steps with the analytic Hessian, shifted where it is not positive definite."""
-    descent.be_patient(_PATIENCE)
-    regularised = Regularised.of(descent.landscape)
-    while not (outcome := descent.outcome()):
-        curvature = descent.landscape.curvature(descent.state)
-        step = -regularised.factorise(curvature.hessian).solve(descent.evaluation.gradient)
-        found = search_along(descent, limited(descent.landscape, step))
-        regularised.learn(found.tries)
-        descent.move_to(found.state, found.evaluation)
-    return outcome
+    """Newton steps with the analytic Hessian, shifted where it is not positive definite."""
+    landscape, stop = descent.landscape, descent.stop
+    if outcome := descent.outcome():
+        return outcome
+    about = DescentStop(
+        tolerance=stop.tolerance,
+        lowest=descent.lowest * descent.state.volume,
+        evaluations=stop.evaluations - descent.evaluations,
+        seconds=stop.seconds - descent.seconds,
+        rounding=rounding_of_a_bond(landscape, extended=False),
+        longest_step=LONGEST_STEP * 0.5 * landscape.length,
+        widest_turn=WIDEST_TURN,
+    )
+    vicinity = Vicinity(landscape, descent.state)
+    end = vicinity.descend(about, least_shift(landscape, descent.evaluation))
+    descent.take(vicinity.base, end)
+    return Outcome(end.outcome)

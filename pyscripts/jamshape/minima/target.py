@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,9 +13,8 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import require_positive
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
-from jamshape.landscape.newton import Regularised
-from jamshape.minima.descent import Descent, History, Minimum, Outcome, Stop, residual_of
-from jamshape.minima.line_search import limited, search_along
+from jamshape.landscape.vicinity import Vicinity
+from jamshape.minima.descent import History, Minimum, Outcome, Stop, residual_of
 from jamshape.minima.minimise import minimise
 from jamshape.packing import State
 
@@ -25,13 +24,17 @@ _GOOD = 1e-2
 # One this good can follow a change of the box: rods that slide along flat sides, the faster the
 # higher the energy, have found where they stop. A move is not made if it leaves a residual above.
 _GOOD_TO_MOVE = 1e-4
-_FAR = 0.3
-_PARTS = (1.0, 0.3, 0.1, 0.01, 1e-3, 1e-4)
 
-# At u0, minima this good are kept while a better one, by that factor, is looked for in so many steps.
+# What slides leaves less than this.
 _SLIDING = 1e-5
-_GAIN = 0.7
-_SLIDING_STEPS = 100
+
+# A minimum is led to u0 through at most so many, which are as good as asked for where
+# sqrt(u) is so near, or, where one stalls, as good as that one but for this factor.
+_MOST_MINIMA = 60
+_GAIN = 1.5
+_NEAR = 0.1
+_LEAST_PART = 0.01
+_SOFT = 1e-6
 
 # At most this factor in sqrt(u), which is linear in phi - phi_J, from one step to the next.
 _LARGEST_FACTOR = 4.0
@@ -48,9 +51,6 @@ _SMALLEST_STEP = 1e-3
 # that still are particles.
 _LEAST_OVERLAP = 1e-13
 _LARGEST_OVERLAP = 0.05
-
-_PATIENCE = 1500
-
 
 class TargetError(RuntimeError):
     """No minimum of the asked energy was found; the sentence says what was."""
@@ -176,11 +176,12 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
     fine = target.strain_above_jamming(landscape)
     require_reachable(landscape, target)
     while search.minimum is None:
-        landscape.forget_pairs()  # what follows depends on `search` alone
         stop = Stop(tolerance=_GOOD, lowest=_FALLEN * target.u0)
         found = minimise(landscape, search.state, "auto", stop, search.history)
         if found.outcome is Outcome.CONVERGED:
-            jammed, found = found, _lead_to(landscape, found, target)
+            jammed = found
+            for found in _lead_to(landscape, jammed, target):
+                pass
             if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):
                 search.minimum, search.state = found, found.state
                 yield search
@@ -219,123 +220,67 @@ def require_reachable(landscape: Landscape, target: Target) -> None:
         raise ValueError(msg)
 
 
-def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Minimum:
-    """Lead a minimum to u0; unjammed if the energy falls to nothing, stalled if stuck."""
-    stop = Stop(tolerance=target.tolerance, lowest=_FALLEN * target.u0)
-    descent = Descent(landscape, start.state, stop, start.history)
-    descent.be_patient(_PATIENCE)
-    regularised, best = Regularised.of(landscape), _Best()
-    while True:
-        met = target.is_met(descent.evaluation.energy / descent.state.volume)
-        outcome = descent.outcome()
-        if outcome is Outcome.CONVERGED and met:
-            return descent.minimum(outcome)
-        if outcome not in {None, Outcome.CONVERGED}:
-            return best.minimum or descent.minimum(outcome)
-        directions = _Directions.at(descent, regularised)
-        best.offer(descent, directions, met)
-        if best.minimum and best.age > _SLIDING_STEPS:
-            return best.minimum
-        _joint_step(descent, directions, regularised, target)
+def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Iterator[Minimum]:
+    """Lead a minimum to u0, minimum by minimum; the last one is unjammed if the energy falls to nothing.
 
-
-@dataclass
-class _Best:
-    """The best minimum at u0 so far, when it takes long to find a better one."""
-
-    minimum: Minimum | None = None
-    age: int = 0
-
-    def offer(self, descent: Descent, directions: _Directions, met: bool) -> None:
-        self.age += 1
-        if not met or descent.residual > _SLIDING:
-            return
-        sliding = directions.stiff <= descent.stop.tolerance
-        outcome = Outcome.SLIDING if sliding else Outcome.STALLED
-        known = self.minimum.residual.largest if self.minimum else math.inf
-        if descent.residual < _GAIN * known:
-            self.minimum, self.age = descent.minimum(outcome), 0
-        elif sliding and self.stalled and descent.residual < known / _GAIN:
-            self.minimum = descent.minimum(outcome)
-
-    @property
-    def stalled(self) -> bool:
-        """Whether the best one has more left than what slides."""
-        return self.minimum is not None and self.minimum.outcome is Outcome.STALLED
-
-
-@dataclass(frozen=True, eq=False)
-class _Directions:
-    """Where Newton's method leads: `relax` at fixed box, and `follow` for each unit of its strain.
-
-    `energy` and `slope` are those of the minimum nearby at the present box, the slope along minima.
-    `stiff` is the residual without what lies along modes softer than the shift.
+    The box is strained to where sqrt(u), which is linear in the strain, is that of u0. Where that opens the
+    packing, parts of the strain are tried.
     """
-
-    relax: FloatArray
-    follow: FloatArray
-    energy: float
-    slope: float
-    stiff: float
-
-    @classmethod
-    def at(cls, descent: Descent, regularised: Regularised) -> _Directions:
-        evaluation = descent.evaluation
-        curvature = descent.landscape.curvature(descent.state)
-        factors = regularised.factorise(curvature.hessian)
-        right = np.column_stack([evaluation.gradient, curvature.coupling])
-        relax, follow = -factors.solve(right).T
-        stiff_part = evaluation._replace(gradient=evaluation.gradient + regularised.shift * relax)
-        return cls(
-            relax=relax,
-            follow=follow,
-            energy=evaluation.energy + 0.5 * float(evaluation.gradient @ relax),
-            slope=evaluation.strain_gradient + float(curvature.coupling @ relax),
-            stiff=residual_of(descent.landscape, stiff_part).largest,
-        )
+    jammed = _relaxed(landscape, start, target)
+    yield jammed
+    part, tolerance = 1.0, target.tolerance
+    for _ in range(_MOST_MINIMA):
+        if jammed.outcome is Outcome.STALLED:  # the next ones need be no better
+            tolerance = max(tolerance, _GAIN * jammed.residual.largest)
+        if jammed.residual.largest <= tolerance and target.is_met(jammed.energy_density):
+            break
+        strained = jammed.state.strained(part * _strain_to(jammed, target))
+        found = _relaxed(landscape, replace(jammed, state=strained), replace(target, tolerance=tolerance))
+        yield found
+        if found.outcome is not Outcome.UNJAMMED:
+            jammed, part = found, min(2 * part, 1.0)
+        elif part < _LEAST_PART:
+            return
+        else:
+            part /= 4
+    yield _judged(landscape, jammed, target)
 
 
-def _joint_step(
-    descent: Descent, directions: _Directions, regularised: Regularised, target: Target
-) -> None:
-    """Take a step of Newton's method for the coordinates and, at a minimum, the box."""
-    landscape, relax = descent.landscape, directions.relax
-    if descent.residual <= _GOOD_TO_MOVE:
-        strain = _strain_to(descent, target, directions)
-        for part in _PARTS:
-            step = relax + part * strain * directions.follow
-            small = np.array_equal(limited(landscape, step), step)
-            if small and _move(descent, part * strain, step):
-                regularised.learn(1)
-                return
-    along = search_along(descent, limited(landscape, relax))
-    regularised.learn(along.tries)
-    descent.move_to(along.state, along.evaluation)
+def _relaxed(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
+    """Minimise, well only where u is nearly u0."""
+    ratio = math.sqrt(at.evaluation.energy / at.state.volume / target.u0)
+    near = abs(ratio - 1) < _NEAR
+    tolerance = target.tolerance if near else max(target.tolerance, _GOOD_TO_MOVE)
+    stop = Stop(tolerance, lowest=_FALLEN * target.u0)
+    return minimise(landscape, at.state, "auto", stop, at.history)
 
 
-def _move(descent: Descent, strain: float, step: FloatArray) -> bool:
-    """Move box and coordinates, unless that leads far from equilibrium; say whether it did."""
-    landscape = descent.landscape
-    trial = landscape.displaced(descent.state.strained(strain), step)
-    try:
-        found = landscape.evaluate(trial, extended=descent.extended)
-    except CrossingError:
-        return False
-    if found.bond_force == 0.0 or residual_of(landscape, found).largest > _FAR:
-        return False
-    descent.move_to(trial, found)
-    return True
+def _strain_to(at: Minimum, target: Target) -> float:
+    """Strain after which sqrt(u) is that of the target, or nearer to it by a bounded factor.
 
-
-def _strain_to(descent: Descent, target: Target, directions: _Directions) -> float:
-    """Strain after which sqrt(u) is that of the target, or nearer to it by a bounded factor."""
-    volume, energy = descent.state.volume, directions.energy
-    if energy <= 0.0:
-        return 0.0
+    The energy of a minimum changes with the strain as if the particles did not move.
+    """
+    energy, volume = at.evaluation.energy, at.state.volume
     now, aim = math.sqrt(energy / volume), math.sqrt(target.u0)
     aim = min(max(aim, now / _LARGEST_FACTOR), now * _LARGEST_FACTOR)
-    per_strain = (directions.slope - descent.state.dimension * energy) / (2 * now * volume)
-    return (aim - now) / per_strain if per_strain < 0 else 0.0
+    slope = at.evaluation.strain_gradient - at.state.dimension * energy
+    return (aim - now) * 2 * now * volume / slope
+
+
+def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
+    """Say of a minimum that is not good enough whether all that is left of its forces slides.
+
+    That is so where nothing is left without what lies along modes softer than a small shift.
+    """
+    if at.residual.largest <= target.tolerance or at.residual.largest > _SLIDING:
+        return at
+    gradient = at.evaluation.gradient
+    newton = Vicinity(landscape, at.state).newton(_SOFT * landscape.k_e / landscape.length**2)
+    newton.prepare()
+    [relax] = newton.solve(-gradient[None], target.tolerance)
+    stiff = at.evaluation._replace(gradient=gradient + newton.shift * relax)
+    slides = residual_of(landscape, stiff).largest <= target.tolerance
+    return replace(at, outcome=Outcome.SLIDING if slides else Outcome.STALLED)
 
 
 def halving(
@@ -354,7 +299,6 @@ def halving(
         If lambda falls below `shortest` before u is u0.
     """
     while search.minimum is None:
-        landscape.forget_pairs()
         stop = Stop(tolerance=target.tolerance)
         found = minimise(landscape, search.state, target.method, stop, search.history)
         u = found.energy_density

@@ -118,7 +118,6 @@ def compress(
         If the start is jammed.
     """
     while compression.minimum is None:
-        landscape.forget_pairs()  # what follows depends on `compression` alone
         found = _minimised(landscape, compression, protocol)
         per_particle = found.evaluation.energy / landscape.particles.n
         if per_particle <= protocol.energy:

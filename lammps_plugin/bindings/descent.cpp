@@ -1,0 +1,122 @@
+#include "bindings/vicinity.hpp"
+#include "landscape/descent.hpp"
+
+#include <string>
+
+namespace jamshape {
+
+namespace {
+
+const char *name_of(DescentOutcome outcome)
+{
+  switch (outcome) {
+    case DescentOutcome::CONVERGED: return "converged";
+    case DescentOutcome::UNJAMMED: return "unjammed";
+    case DescentOutcome::STALLED: return "stalled";
+    default: return "exhausted";
+  }
+}
+
+nb::object tuple_of(const DescentRow &row)
+{
+  return nb::make_tuple(row.seconds, row.evaluations, row.residual, row.energy_density);
+}
+
+DescentEnd descend(Vicinity &of, const DescentStop &stop, double shift, const nb::callable &renew,
+                   const nb::callable &tell)
+{
+  require_base(of);
+  require(shift > 0.0 && std::isfinite(shift), "the shift is no positive number.");
+  Descent descent(of, stop, shift);
+  descent.renew = renewing(of, renew);
+  descent.tell = [&](const DescentRow &row) { tell(tuple_of(row)); };
+  return descent.run();
+}
+
+/// Newton's equations at the base of a vicinity, which Python keeps alive.
+class PosedNewton {
+ public:
+  PosedNewton(Vicinity &of, double shift) : about(of), system(of, shift)
+  {
+    require(shift > 0.0 && std::isfinite(shift), "the shift is no positive number.");
+  }
+
+  void prepare()
+  {
+    require_base(about);
+    require(about.has_pairs(), "there are no pairs yet, expected take_pairs before.");
+    system.prepare();
+    is_prepared = true;
+  }
+
+  nb::object coupling() const
+  {
+    require(is_prepared, "the equations are not prepared, expected prepare before.");
+    return array_of(about.coupling().data(), about.n());
+  }
+
+  nb::object solve(const Array2<double> &right, double accuracy)
+  {
+    require(is_prepared, "the equations are not prepared, expected prepare before.");
+    require(right.shape(1) == about.n(), "right has another length than there are coordinates.");
+    require_finite(right, "right");
+    return solutions(right, [&](const auto &side) { return system.solve(side, accuracy); });
+  }
+
+  void learn(int tries) { system.learn(tries); }
+  double shift() const { return system.shift; }
+
+ private:
+  Vicinity &about;
+  NewtonSystem system;
+  bool is_prepared = false;
+};
+
+}  // namespace
+
+void export_descent(nb::module_ &m)
+{
+  using namespace nb::literals;
+  nb::class_<DescentStop>(m, "DescentStop")
+      .def(
+          "__init__",
+          [](DescentStop *place, double tolerance, double lowest, std::int64_t evaluations,
+             double seconds, double rounding, double longest_step, double widest_turn) {
+            new (place) DescentStop{tolerance, lowest,   evaluations,
+                                    seconds,   rounding, {longest_step, widest_turn}};
+          },
+          "tolerance"_a, "lowest"_a, "evaluations"_a, "seconds"_a, "rounding"_a, "longest_step"_a,
+          "widest_turn"_a);
+  nb::class_<DescentEnd>(m, "DescentEnd")
+      .def_prop_ro("outcome", [](const DescentEnd &end) { return name_of(end.outcome); })
+      .def_prop_ro("sums", [](const DescentEnd &end) { return tuple_of(end.sums); })
+      .def_prop_ro("rows",
+                   [](const DescentEnd &end) {
+                     nb::list rows;
+                     for (const DescentRow &row : end.rows) rows.append(tuple_of(row));
+                     return rows;
+                   })
+      .def_ro("evaluations", &DescentEnd::evaluations)
+      .def_ro("factorisations", &DescentEnd::factorisations)
+      .def_ro("products", &DescentEnd::products);
+  nb::class_<PosedNewton>(m, "NewtonSystem",
+                          "(H + shift) x = right at the base of a vicinity, with a shift that makes\n"
+                          "the Hessian H positive definite.")
+      .def(nb::init<Vicinity &, double>(), "vicinity"_a, "shift"_a, nb::keep_alive<1, 2>())
+      .def("prepare", &PosedNewton::prepare, "Takes the Hessian at the base.")
+      .def_prop_ro("coupling", &PosedNewton::coupling,
+                   "(n,) derivative of the gradient by the strain.")
+      .def("solve", &PosedNewton::solve, "right"_a, "accuracy"_a,
+           "For the rows of right (k, n), to this part of them.")
+      .def("learn", &PosedNewton::learn, "tries"_a,
+           "Shifts less after a step that was right at once, more after one that was far off.")
+      .def_prop_ro("shift", &PosedNewton::shift);
+  nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
+      .def("descend", &descend, "stop"_a, "shift"_a, "renew"_a, "tell"_a,
+           "Minimises the energy at fixed box by Newton's method with a first shift of the\n"
+           "Hessian, the base moving along; renew(x, strain) takes pairs that hold there, and\n"
+           "tell(row) hears of a row (seconds, evaluations, residual, energy density) now and\n"
+           "then. Returns a DescentEnd.");
+}
+
+}  // namespace jamshape

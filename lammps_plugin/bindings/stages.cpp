@@ -1,0 +1,91 @@
+#include "bindings/vicinity.hpp"
+#include "landscape/stage.hpp"
+
+#include <nanobind/stl/shared_ptr.h>
+
+namespace jamshape {
+
+namespace {
+
+/// A stage with its scales, and the guesses that it starts from.
+struct PosedStage {
+  Stage equation;
+  StageUnits units;
+  StageLimits limits;
+  Eigen::VectorXd guess, other;
+};
+
+StageEnd solve_stage(Vicinity &of, const PosedStage &stage, const std::shared_ptr<Factors> &factors,
+                     const nb::callable &renew)
+{
+  for (const auto *part :
+       {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
+    require(static_cast<std::size_t>(part->size()) == of.n(),
+            "a part of a stage has another length than there are coordinates.");
+    require_finite(*part, "a part of a stage");
+  }
+  require_finite(stage.equation.strain, "strain");
+  require_base(of);
+  require(!factors || factors->size() == of.n(),
+          "the factors are of another number of coordinates.");
+  return StageSolver(of, stage.equation, stage.units, stage.limits, renewing(of, renew))
+      .solve(stage.guess, stage.other, factors);
+}
+
+double size_of(const StageUnits &units, const Array1<double> &shift, const Array1<double> &force,
+               const Array1<double> &drag)
+{
+  require(shift.shape(0) == force.shape(0) && shift.shape(0) == drag.shape(0),
+          "shift, force and drag have different lengths.");
+  return units.size(vector(shift), vector(force), vector(drag));
+}
+
+}  // namespace
+
+void export_stages(nb::module_ &m)
+{
+  using namespace nb::literals;
+  nb::class_<StageUnits>(m, "StageUnits", "What errors of displacements are measured in.")
+      .def(nb::init<double, double, double, double>(), "force"_a, "energy"_a, "length"_a,
+           "n_particles"_a)
+      .def_ro("force", &StageUnits::force)
+      .def_ro("energy", &StageUnits::energy)
+      .def_ro("length", &StageUnits::length)
+      .def("size", &size_of, "shift"_a, "force"_a, "drag"_a,
+           "Of a displacement (n,), the force that makes it and the drag over the time.");
+  nb::class_<StageLimits>(m, "StageLimits")
+      .def(
+          "__init__",
+          [](StageLimits *place, double accuracy, double longest_step, double widest_turn) {
+            new (place) StageLimits{accuracy, {longest_step, widest_turn}};
+          },
+          "accuracy"_a, "longest_step"_a, "widest_turn"_a);
+  nb::class_<PosedStage>(m, "Stage", "drag (x - centre) + dU/dx = 0 in a box of given strain.")
+      .def(
+          "__init__",
+          [](PosedStage *place, double strain, const Array1<double> &drag,
+             const Array1<double> &centre, bool extended, const StageUnits &units,
+             const StageLimits &limits, const Array1<double> &guess, const Array1<double> &other) {
+            new (place) PosedStage{{strain, vector(drag), vector(centre), extended},
+                                   units,
+                                   limits,
+                                   vector(guess),
+                                   vector(other)};
+          },
+          "strain"_a, "drag"_a, "centre"_a, "extended"_a, "units"_a, "limits"_a, "guess"_a,
+          "other"_a);
+  nb::class_<StageEnd>(m, "StageEnd")
+      .def_prop_ro("x", [](const StageEnd &end) { return array_of(end.x.data(), end.x.size()); })
+      .def_prop_ro("sums", [](const StageEnd &end) { return tuple_of(end.sums); })
+      .def_ro("factors", &StageEnd::factors)
+      .def_ro("evaluations", &StageEnd::evaluations)
+      .def_ro("factorisations", &StageEnd::factorisations)
+      .def_ro("directions", &StageEnd::directions)
+      .def_ro("solved", &StageEnd::solved);
+  nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
+      .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "renew"_a,
+           "The StageEnd of a Stage, with factors of an earlier one; renew(x, strain) takes pairs\n"
+           "that hold there.");
+}
+
+}  // namespace jamshape

@@ -1,0 +1,249 @@
+#pragma once
+
+#include "landscape/newton_system.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <Eigen/Core>
+#include <functional>
+#include <utility>
+#include <vector>
+
+namespace jamshape {
+
+/// When a minimisation ends, and what it may do.
+struct DescentStop {
+  double tolerance;          // converged below this residual
+  double lowest;             // unjammed below this energy
+  std::int64_t evaluations;  // exhausted after so many
+  double seconds;            // or so much time
+  double rounding;           // residual that doubles leave, times the mean force of a bond
+  StepBounds step;
+};
+
+enum class DescentOutcome { CONVERGED, UNJAMMED, STALLED, EXHAUSTED };
+
+/// One row for each state on the way.
+struct DescentRow {
+  double seconds;
+  std::int64_t evaluations;
+  double residual, energy_density;
+};
+
+/// Where it ended: at the base of the vicinity.
+struct DescentEnd {
+  DescentOutcome outcome;
+  LandscapeSums sums;
+  std::vector<DescentRow> rows;
+  std::int64_t evaluations;
+  int factorisations, products;
+};
+
+/// Largest net force or torque of a particle over the mean force of a bond (Marschall & Teitel
+/// 2018, App. A).
+inline double residual_of(const Vicinity &about, const LandscapeSums &sums)
+{
+  if (sums.n_bonds == 0) return 0.0;
+  return about.largest_part(sums.gradient.data()) / (sums.bond_force / sums.n_bonds);
+}
+
+/// Bracket of the zero of the slope along a line, from 0 where it is negative.
+class Bracket {
+ public:
+  explicit Bracket(double slope) : low_slope(slope) {}
+
+  /// Takes in a point and proposes the next one.
+  double next(double at, double slope)
+  {
+    double corner = NAN;
+    if (slope > 0.0) {
+      if (std::isfinite(high_slope) && high_slope > slope) {
+        corner = at - slope * (high - at) / (high_slope - slope);
+      }
+      high = at;
+      high_slope = slope;
+    } else {
+      low = at;
+      low_slope = slope;
+    }
+    if (low < corner && corner < high) {  // a little beyond, so that the contact is closed
+      return corner + 1e-3 * (high - corner);
+    }
+    const double part = -low_slope / (high_slope - low_slope);
+    return low + (high - low) * (part > CORNER ? part : 0.5);
+  }
+
+ private:
+  /// A slope that rises by more than the inverse of this does so at a corner, wherever that is.
+  static constexpr double CORNER = 0.1;
+
+  double low = 0.0, low_slope, high = INFINITY, high_slope = INFINITY;
+};
+
+/// Minimises the energy at fixed box by Newton's method; the base of the vicinity moves along.
+class Descent {
+ public:
+  using Vector = Eigen::VectorXd;
+  /// Lets the vicinity take pairs of which some hold at a displacement.
+  using Renew = std::function<void(const Displacement &)>;
+  /// Hears now and then where it is; may throw to end it.
+  using Tell = std::function<void(const DescentRow &)>;
+
+  Descent(Vicinity &landscape, const DescentStop &when, double first_shift) :
+      about(landscape), stop(when), system(landscape, first_shift)
+  {
+  }
+
+  Renew renew;
+  Tell tell;
+
+  DescentEnd run()
+  {
+    LandscapeSums sums = first();
+    if (sums.is_refused()) return end(DescentOutcome::STALLED, std::move(sums));
+    while (true) {
+      record(sums);
+      DescentOutcome outcome;
+      if (is_over(sums, outcome)) return end(outcome, std::move(sums));
+      system.prepare();
+      Vector step = -system.solve(sums.gradient, accuracy());
+      step *= about.part_within(step.data(), stop.step);
+      Line line = search_along(step, sums);
+      if (line.sums.is_refused()) return end(DescentOutcome::STALLED, std::move(sums));
+      system.learn(line.tries);
+      about.move({line.x.data(), 0.0});
+      sums = std::move(line.sums);
+    }
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// A method no longer gains if residual times energy did not fall by this factor in so many
+  /// states; either of the two may fall for long while the other does not.
+  static constexpr double GAIN = 0.7;
+  static constexpr int PATIENCE = 150;
+
+  /// Doubles are given up where rounding leaves more than this part of what there is, and of what
+  /// is to be reached.
+  static constexpr double OF_RESIDUAL = 0.01, OF_TOLERANCE = 0.1;
+
+  /// Newton's equations are solved to this part, or to the root of the residual.
+  static constexpr double COARSE = 0.1;
+
+  static constexpr int TRIES = 25;
+  static constexpr double TELL_SECONDS = 0.2;
+
+  struct Line {
+    Vector x;
+    LandscapeSums sums;
+    int tries;
+  };
+
+  Vicinity &about;
+  DescentStop stop;
+  NewtonSystem system;
+  std::vector<DescentRow> rows;
+  std::int64_t evaluations = 0;
+  double best = INFINITY;
+  std::size_t best_row = 0;
+  bool extended = false;
+  Clock::time_point began = Clock::now(), told = began;
+
+  DescentEnd end(DescentOutcome outcome, LandscapeSums sums)
+  {
+    return {outcome,     std::move(sums),       std::move(rows),
+            evaluations, system.factorisations, system.products};
+  }
+
+  double residual() const { return rows.back().residual; }
+  double accuracy() const { return std::min(COARSE, std::sqrt(residual())); }
+
+  LandscapeSums first()
+  {
+    const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
+    return evaluate(origin);
+  }
+
+  LandscapeSums evaluate(const Vector &x)
+  {
+    const Displacement at{x.data(), 0.0};
+    if (!about.holds(at)) {
+      renew(at);
+      about.holds(at);
+    }
+    ++evaluations;
+    LandscapeSums sums = about.evaluate(at, extended);
+    if (!extended && !sums.is_refused() && needs_more_digits(sums)) {
+      extended = true;
+      ++evaluations;
+      return about.evaluate(at, extended);
+    }
+    return sums;
+  }
+
+  bool needs_more_digits(const LandscapeSums &sums) const
+  {
+    if (sums.n_bonds == 0) return false;
+    const double left = stop.rounding / (sums.bond_force / sums.n_bonds);
+    return left > OF_TOLERANCE * stop.tolerance && left > OF_RESIDUAL * residual_of(about, sums);
+  }
+
+  void record(const LandscapeSums &sums)
+  {
+    const double seconds = std::chrono::duration<double>(Clock::now() - began).count();
+    double volume = 1.0;
+    for (const long double edge : about.poses().edges) volume *= static_cast<double>(edge);
+    rows.push_back({seconds, evaluations, residual_of(about, sums), sums.energy / volume});
+    const double gain = rows.back().residual * rows.back().energy_density;
+    if (gain < GAIN * best) {
+      best = gain;
+      best_row = rows.size();
+    }
+    if (std::chrono::duration<double>(Clock::now() - told).count() > TELL_SECONDS) {
+      told = Clock::now();
+      tell(rows.back());
+    }
+  }
+
+  bool is_over(const LandscapeSums &sums, DescentOutcome &outcome) const
+  {
+    if (sums.energy <= stop.lowest) {
+      outcome = DescentOutcome::UNJAMMED;
+    } else if (residual() <= stop.tolerance) {
+      outcome = DescentOutcome::CONVERGED;
+    } else if (evaluations >= stop.evaluations || rows.back().seconds >= stop.seconds) {
+      outcome = DescentOutcome::EXHAUSTED;
+    } else if (rows.size() > best_row + PATIENCE) {
+      outcome = DescentOutcome::STALLED;
+    } else {
+      return false;
+    }
+    return true;
+  }
+
+  /// Finds a point along a descent direction where the projected force has fallen to half.
+  ///
+  /// On forces, not energies, whose differences drown in rounding long before forces vanish. The
+  /// projected force is close to piecewise linear, with a corner where a contact closes that may be
+  /// ten orders of magnitude stiffer than what came before: two points beyond the corner give it.
+  Line search_along(const Vector &step, const LandscapeSums &from)
+  {
+    const double slope = from.gradient.dot(step);
+    Bracket bracket(slope);
+    double factor = 1.0;
+    for (int n = 1;; ++n) {
+      Line line{factor * step, {}, n};
+      line.sums = evaluate(line.x);
+      const bool refused = line.sums.is_refused();
+      const double here = refused ? INFINITY : line.sums.gradient.dot(step);
+      const bool is_good = std::abs(here) <= 0.5 * std::abs(slope) || (here < 0.0 && n == 1);
+      if (is_good || n >= (refused ? 2 * TRIES : TRIES)) return line;
+      factor = bracket.next(factor, here);
+    }
+  }
+};
+
+}  // namespace jamshape

@@ -1,0 +1,112 @@
+#pragma once
+
+#include "landscape/vicinity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <Eigen/Core>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+namespace jamshape {
+
+/// The equations of Newton's method at the base of a vicinity, (H + shift) x = right: the shift,
+/// which is kept from one base to the next, makes the Hessian H positive definite. Solved by
+/// factors where these are cheap, else by conjugate gradients preconditioned with incomplete ones
+/// (Nocedal & Wright, Numerical Optimization, Sec. 7.1).
+class NewtonSystem {
+ public:
+  using Vector = Eigen::VectorXd;
+
+  NewtonSystem(Vicinity &landscape, double first_shift) : shift(first_shift), about(landscape) {}
+
+  double shift;
+  int factorisations = 0, products = 0;
+
+  /// Takes the Hessian at the base; raises the shift until pivots are positive.
+  void prepare()
+  {
+    const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
+    about.differentiate({origin.data(), 0.0});
+    const double largest = about.n() > 0 ? about.diagonal().cwiseAbs().maxCoeff() : 0.0;
+    if (!std::isfinite(largest)) throw std::runtime_error("The Hessian holds what is no number.");
+    scale = largest > 0.0 ? largest : 1.0;
+    shift = std::max(shift, LEAST_SHIFT * scale);
+    factorise();
+  }
+
+  /// To an accuracy over the right-hand side, of iterations; factors know no such thing.
+  Vector solve(const Vector &right, double accuracy)
+  {
+    if (about.has_complete_factors()) return factors->solve(right);
+    while (true) {
+      Vector x = Vector::Zero(right.size());
+      if (iterate(right, accuracy * right.norm(), x)) return x;
+      shift *= GROWTH;
+      factorise();
+    }
+  }
+
+  /// Shifts less after a step that was right at once, more after one that was far off.
+  void learn(int tries)
+  {
+    if (tries == 1) shift /= DECAY;
+    if (tries > FAR_OFF) shift *= GROWTH;
+  }
+
+ private:
+  static constexpr double GROWTH = 10.0, DECAY = 3.0;
+
+  /// A step that needed more evaluations to find its length was in a wrong direction.
+  static constexpr int FAR_OFF = 6;
+
+  /// Incomplete factors are of a matrix with a shift, by the largest diagonal element, of at least
+  /// so much where pivots need one; and iterations end after so many.
+  static constexpr double INCOMPLETE = 1e-4;
+  static constexpr int ITERATIONS = 500;
+
+  Vicinity &about;
+  double scale = 1.0;
+  std::shared_ptr<Factors> factors;
+
+  void factorise()
+  {
+    const bool complete = about.has_complete_factors();
+    double added = shift;
+    while (!(factors = factors_with(added))) {
+      added = complete ? GROWTH * added : std::max(GROWTH * added, INCOMPLETE * scale);
+      if (!std::isfinite(added)) throw std::runtime_error("The Hessian has no factors.");
+    }
+    if (complete) shift = added;
+  }
+
+  std::shared_ptr<Factors> factors_with(double added)
+  {
+    ++factorisations;
+    return about.factors(Vector::Constant(static_cast<Eigen::Index>(about.n()), added));
+  }
+
+  /// Preconditioned conjugate gradients. False where the matrix is not positive definite.
+  bool iterate(const Vector &right, double remainder, Vector &x)
+  {
+    Vector rest = right, preconditioned = factors->solve(rest), along = preconditioned;
+    double product = rest.dot(preconditioned);
+    for (int k = 0; k < ITERATIONS && rest.norm() > remainder; ++k) {
+      const Vector pulled = about.times(along) + shift * along;
+      ++products;
+      const double curvature = along.dot(pulled);
+      if (!(curvature > 0.0)) return false;
+      const double length = product / curvature;
+      x += length * along;
+      rest -= length * pulled;
+      preconditioned = factors->solve(rest);
+      const double next = rest.dot(preconditioned);
+      along = preconditioned + (next / product) * along;
+      product = next;
+    }
+    return true;
+  }
+};
+
+}  // namespace jamshape
