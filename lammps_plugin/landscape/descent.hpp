@@ -1,6 +1,7 @@
 #pragma once
 
 #include "landscape/newton_system.hpp"
+#include "landscape/quasi_newton.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -20,6 +21,7 @@ struct DescentStop {
   std::int64_t evaluations;  // exhausted after so many
   double seconds;            // or so much time
   double rounding;           // residual that doubles leave, times the mean force of a bond
+  double newton_below;       // residual from which on Newton's method takes over from L-BFGS
   StepBounds step;
 };
 
@@ -82,7 +84,8 @@ class Bracket {
   double low = 0.0, low_slope, high = INFINITY, high_slope = INFINITY;
 };
 
-/// Minimises the energy at fixed box by Newton's method; the base of the vicinity moves along.
+/// Minimises the energy at fixed box: by L-BFGS, cheap where contacts come and go, and by Newton's
+/// method where they stay. The base of the vicinity moves along.
 class Descent {
  public:
   using Vector = Eigen::VectorXd;
@@ -107,12 +110,14 @@ class Descent {
       record(sums);
       DescentOutcome outcome;
       if (is_over(sums, outcome)) return end(outcome, std::move(sums));
-      system.prepare();
-      Vector step = -system.solve(sums.gradient, accuracy());
-      step *= about.part_within(step.data(), stop.step);
+      if (!by_newton && (residual() < stop.newton_below || rows.size() > best_row + SLOW)) {
+        by_newton = true;
+        best_row = rows.size();
+      }
+      const Vector step = direction(sums);
       Line line = search_along(step, sums);
       if (line.sums.is_refused()) return end(DescentOutcome::STALLED, std::move(sums));
-      system.learn(line.tries);
+      learn(line, sums);
       about.move({line.x.data(), 0.0});
       sums = std::move(line.sums);
     }
@@ -125,6 +130,12 @@ class Descent {
   /// states; either of the two may fall for long while the other does not.
   static constexpr double GAIN = 0.7;
   static constexpr int PATIENCE = 150;
+
+  /// L-BFGS gains in waves: it is given up after so many states for each particle, and more.
+  static constexpr std::size_t SLOW = 1000;
+
+  /// Its first step, over the longest.
+  static constexpr double FIRST = 0.05;
 
   /// Doubles are given up where rounding leaves more than this part of what there is, and of what
   /// is to be reached.
@@ -145,6 +156,8 @@ class Descent {
   Vicinity &about;
   DescentStop stop;
   NewtonSystem system;
+  QuasiNewton memory;
+  bool by_newton = false;
   std::vector<DescentRow> rows;
   std::int64_t evaluations = 0;
   double best = INFINITY;
@@ -160,6 +173,32 @@ class Descent {
 
   double residual() const { return rows.back().residual; }
   double accuracy() const { return std::min(COARSE, std::sqrt(residual())); }
+
+  Vector direction(const LandscapeSums &sums)
+  {
+    Vector step;
+    if (by_newton) {
+      system.prepare();
+      step = -system.solve(sums.gradient, accuracy());
+    } else if (!memory.is_empty()) {
+      step = memory.direction(sums.gradient);
+      if (!(step.dot(sums.gradient) < 0.0)) memory.forget();
+    }
+    if (!by_newton && memory.is_empty()) {
+      step = -sums.gradient;
+      step *= FIRST * stop.step.longest / about.largest_part(step.data());
+    }
+    return about.part_within(step.data(), stop.step) * step;
+  }
+
+  void learn(const Line &line, const LandscapeSums &from)
+  {
+    if (by_newton) {
+      system.learn(line.tries);
+    } else {
+      memory.learn(line.x, line.sums.gradient - from.gradient);
+    }
+  }
 
   LandscapeSums first()
   {
@@ -216,7 +255,7 @@ class Descent {
       outcome = DescentOutcome::CONVERGED;
     } else if (evaluations >= stop.evaluations || rows.back().seconds >= stop.seconds) {
       outcome = DescentOutcome::EXHAUSTED;
-    } else if (rows.size() > best_row + PATIENCE) {
+    } else if (rows.size() > best_row + PATIENCE + (by_newton ? 0 : SLOW)) {
       outcome = DescentOutcome::STALLED;
     } else {
       return false;

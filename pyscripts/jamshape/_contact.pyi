@@ -188,6 +188,7 @@ class DescentStop:
         evaluations: int,
         seconds: float,
         rounding: float,
+        newton_below: float,
         longest_step: float,
         widest_turn: float,
     ) -> None: ...

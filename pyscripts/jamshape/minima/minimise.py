@@ -11,7 +11,7 @@ from collections.abc import Callable
 from jamshape.landscape import Landscape
 from jamshape.minima.descent import Descent, History, Minimum, Outcome, Stop
 from jamshape.minima.lbfgs import lbfgs
-from jamshape.minima.newton import newton
+from jamshape.minima.newton import auto, newton
 from jamshape.minima.paper import paper
 from jamshape.packing import State
 
@@ -62,7 +62,7 @@ def _lammps(descent: Descent) -> Outcome:
 
 
 METHODS: dict[str, Callable[[Descent], Outcome]] = {
-    "auto": newton,
+    "auto": auto,
     "newton": newton,
     "lbfgs": lbfgs,
     "paper": paper,

@@ -1,14 +1,29 @@
-"""Newton's method, compiled."""
+"""L-BFGS and Newton's method, compiled beside the landscape."""
 
 from __future__ import annotations
+
+import math
 
 from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, least_shift
 from jamshape.landscape.vicinity import DescentStop, Vicinity
 from jamshape.minima.descent import Descent, Outcome, rounding_of_a_bond
 
 
+# L-BFGS, cheap while contacts come and go, gives way to Newton's method below this residual.
+_NEWTON_BELOW = 1e-2
+
+
+def auto(descent: Descent) -> Outcome:
+    """L-BFGS, and Newton's method near a minimum."""
+    return _descend(descent, _NEWTON_BELOW)
+
+
 def newton(descent: Descent) -> Outcome:
     """Newton steps with the analytic Hessian, shifted where it is not positive definite."""
+    return _descend(descent, math.inf)
+
+
+def _descend(descent: Descent, newton_below: float) -> Outcome:
     landscape, stop = descent.landscape, descent.stop
     if outcome := descent.outcome():
         return outcome
@@ -18,6 +33,7 @@ def newton(descent: Descent) -> Outcome:
         evaluations=stop.evaluations - descent.evaluations,
         seconds=stop.seconds - descent.seconds,
         rounding=rounding_of_a_bond(landscape, extended=False),
+        newton_below=newton_below,
         longest_step=LONGEST_STEP * 0.5 * landscape.length,
         widest_turn=WIDEST_TURN,
     )

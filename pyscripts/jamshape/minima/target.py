@@ -230,7 +230,8 @@ def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Iterator[M
     yield jammed
     part, tolerance = 1.0, target.tolerance
     for _ in range(_MOST_MINIMA):
-        if jammed.outcome is Outcome.STALLED:  # the next ones need be no better
+        if jammed.outcome is Outcome.STALLED and jammed.residual.largest < _SLIDING:
+            # The next ones need be no better.
             tolerance = max(tolerance, _GAIN * jammed.residual.largest)
         if jammed.residual.largest <= tolerance and target.is_met(jammed.energy_density):
             break
