@@ -126,9 +126,9 @@ class Descent {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// A method no longer gains if residual times energy did not fall by this factor in so many
-  /// states; either of the two may fall for long while the other does not.
-  static constexpr double GAIN = 0.7;
+  /// A method no longer gains if in so many states neither the energy nor the residual fell below
+  /// such a part of the lowest one; either may fall for long while the other does not.
+  static constexpr double LESS_ENERGY = 0.98, LESS_RESIDUAL = 0.7;
   static constexpr int PATIENCE = 150;
 
   /// L-BFGS gains in waves: it is given up after so many states for each particle, and more.
@@ -160,7 +160,7 @@ class Descent {
   bool by_newton = false;
   std::vector<DescentRow> rows;
   std::int64_t evaluations = 0;
-  double best = INFINITY;
+  double least_energy = INFINITY, least_residual = INFINITY;
   std::size_t best_row = 0;
   bool extended = false;
   Clock::time_point began = Clock::now(), told = began;
@@ -236,10 +236,11 @@ class Descent {
     double volume = 1.0;
     for (const long double edge : about.poses().edges) volume *= static_cast<double>(edge);
     rows.push_back({seconds, evaluations, residual_of(about, sums), sums.energy / volume});
-    const double gain = rows.back().residual * rows.back().energy_density;
-    if (gain < GAIN * best) {
-      best = gain;
+    const double left = rows.back().residual, density = rows.back().energy_density;
+    if (density < LESS_ENERGY * least_energy || left < LESS_RESIDUAL * least_residual) {
       best_row = rows.size();
+      least_energy = std::min(least_energy, density);
+      least_residual = std::min(least_residual, left);
     }
     if (std::chrono::duration<double>(Clock::now() - told).count() > TELL_SECONDS) {
       told = Clock::now();

@@ -200,8 +200,10 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     const Displacement by{step, 0.0};
     double excess = 1.0;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const double widest =
+          std::max(bounds.widest, std::min(WIDE, bounds.longest / coordinates.turning_radius[i]));
       excess = std::max({excess, norm(shift(by, i)) / bounds.longest,
-                         std::abs(angle_of(turn(by, i))) / bounds.widest});
+                         std::abs(angle_of(turn(by, i))) / widest});
     }
     return 1.0 / excess;
   }
@@ -269,6 +271,9 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   static constexpr int VARIABLES = PAIR_VARIABLES<D>;
   using DualContact = ContactOf<Model, D, Dual<VARIABLES>>;
   using Block = BlockOf<BLOCK>;
+
+  /// What is nearly round may turn so far in one step, if its surface moves no further than it may.
+  static constexpr double WIDE = 1.0;
 
   /// In space, elimination couples nearly all of a packing's particles: up to so many it is cheaper
   /// than the iterations that spare it.
