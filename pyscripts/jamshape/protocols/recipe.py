@@ -5,19 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.checks import require_one_of, require_stated
+from jamshape.checks import require_one_of, require_rising, require_stated
 from jamshape.files.h5md import read_packing
-from jamshape.minima.target import Target
+from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL
+from jamshape.minima.target import Target, direct, halving
 from jamshape.packing import Packing
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
 from jamshape.protocols.random_start import dilute_packing, random_packing
 from jamshape.shapes.particles import Particles
+
+SEARCHES = {"direct": direct, "halving": halving}
+"""Ways to lead a jammed state to an energy: ours, and that of Marschall & Teitel 2018, Sec. III C, as written."""
+
+# Paper's slowest rate; a slower one in LAMMPS does not end in a time that anybody waits for.
+_SLOWEST = 1e-10
 
 
 @dataclass(frozen=True)
@@ -44,9 +51,28 @@ class Thermalisation:
         require_stated(phi_thermal=self.phi, n_sweeps=self.n_sweeps)
 
 
+class Way(Protocol):
+    """From a random start to jamming."""
+
+    @property
+    def search(self) -> str:
+        """How the energy is looked for from there, one of `SEARCHES`."""
+
+    def start(self, recipe: Recipe) -> Packing:
+        """Make the random start."""
+
+    def attributes(self, target: Target | None) -> dict[str, Any]:
+        """Return what identifies it, to be stored."""
+
+    def require(self, recipe: Recipe) -> None:
+        """Refuse a recipe that this way cannot follow; raises ValueError."""
+
+
 @dataclass(frozen=True)
 class Steps:
     """Quasistatic steps from the random start to the first jammed packing (Yuan et al. 2019, Sec. 2.2).
+
+    These are the protocols yuan-2019-1 and, with Monte Carlo, yuan-2019-2.
 
     Parameters
     ----------
@@ -55,6 +81,8 @@ class Steps:
     thermal
         Monte Carlo before the last part of it; None for protocol 1.
     """
+
+    search: ClassVar[str] = "direct"
 
     quasistatic: Quasistatic = field(default_factory=Quasistatic)
     thermal: Thermalisation | None = None
@@ -70,10 +98,19 @@ class Steps:
 
     def attributes(self, target: Target | None) -> dict[str, Any]:
         """Return what identifies it, to be stored."""
-        found: dict[str, Any] = {"protocol": 2 if self.thermal else 1}
+        found: dict[str, Any] = {"protocol": THERMAL if self.thermal else ATHERMAL}
         if self.thermal:
             found |= {"phi_thermal": self.thermal.phi, "n_sweeps": self.thermal.n_sweeps}
         return found | {f"quasistatic_{k}": v for k, v in vars(self.compression(target)).items()}
+
+    def require(self, recipe: Recipe) -> None:
+        """Refuse a start that is denser than the Monte Carlo."""
+        if self.thermal and not recipe.phi_start < self.thermal.phi:
+            found = (
+                f"phi_start is {recipe.phi_start} and the Monte Carlo runs at {self.thermal.phi}"
+            )
+            msg = f"{found}, expected a start at a smaller packing fraction"
+            raise ValueError(msg)
 
 
 @dataclass(frozen=True)
@@ -85,6 +122,8 @@ class Dynamics:
     approach
         How to compress.
     """
+
+    search: ClassVar[str] = "direct"
 
     approach: Approach = field(default_factory=Approach)
 
@@ -99,6 +138,77 @@ class Dynamics:
         del target
         found = {f"approach_{k}": v for k, v in vars(self.approach).items()}
         return found | {"kappa": self.approach.kappa}
+
+    def require(self, recipe: Recipe) -> None:
+        """Refuse a recipe without an energy."""
+        if recipe.target is None:
+            msg = "there is no energy to reach, expected one after a compression by dynamics (u0)"
+            raise ValueError(msg)
+
+
+@dataclass(frozen=True)
+class Compressed:
+    """Compression at one rate through jamming: the protocol marschall-2018 (Sec. II and III B-C, App. A).
+
+    The energy is looked for from the first state of it that stays jammed when it is minimised; nothing opens the
+    box before.
+
+    Parameters
+    ----------
+    kappa
+        Rate, dL/dt = -kappa L (Eq. 6), [1/time]; the paper's are 1e-6 to 1e-10.
+    phi_end
+        Packing fraction where the compression ends, well above jamming.
+    search
+        One of `SEARCHES`.
+    source
+        File with the frames of such a compression, which takes its place.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, the rate below the paper's slowest, or there is no such search.
+    """
+
+    kappa: float = 1e-6
+    phi_end: float = 0.95
+    search: str = "direct"
+    source: Path | None = None
+
+    def __post_init__(self) -> None:
+        require_one_of("search", self.search, SEARCHES)
+        if self.source is not None:
+            return
+        require_stated(kappa=self.kappa, phi_end=self.phi_end)
+        if self.kappa < _SLOWEST:
+            msg = (
+                f"kappa is {self.kappa:g}, expected at least {_SLOWEST:g} in LAMMPS, the paper's slowest;"
+                " compress with jamshape slow and take its file as the start"
+            )
+            raise ValueError(msg)
+
+    def start(self, recipe: Recipe) -> Packing:
+        """Make the random start, without overlaps, or take the first frame of the file."""
+        if self.source is not None:
+            return read_packing(self.source, 0)
+        return random_packing(
+            recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension
+        )
+
+    def attributes(self, target: Target | None) -> dict[str, Any]:
+        """Return what identifies it, to be stored."""
+        del target
+        start = "" if self.source is None else self.source.name
+        told = {"kappa": self.kappa, "phi_end": self.phi_end, "start": start}
+        return {"protocol": COMPRESSED, "search": self.search} | told
+
+    def require(self, recipe: Recipe) -> None:
+        """Refuse a recipe without an energy, or that does not compress."""
+        if recipe.target is None:
+            msg = "there is no energy to reach, expected one after a compression at a rate (u0)"
+            raise ValueError(msg)
+        if self.source is None:
+            require_rising(recipe.phi_start, self.phi_end)
 
 
 @dataclass(frozen=True)
@@ -137,20 +247,13 @@ class Recipe:
     dimension: int = 2
     seed: int = 1
     phi_start: float = 0.4
-    way: Dynamics | Steps = field(default_factory=Dynamics)
+    way: Way = field(default_factory=Dynamics)
     target: Target | None = field(default_factory=Target)
 
     def __post_init__(self) -> None:
         require_stated(n=self.n, seed=self.seed, phi_start=self.phi_start)
         require_one_of("dimension", self.dimension, (2, 3))
-        thermal = self.way.thermal if isinstance(self.way, Steps) else None
-        if thermal and not self.phi_start < thermal.phi:
-            found = f"phi_start is {self.phi_start} and the Monte Carlo runs at {thermal.phi}"
-            msg = f"{found}, expected a start at a smaller packing fraction"
-            raise ValueError(msg)
-        if self.target is None and isinstance(self.way, Dynamics):
-            msg = "there is no energy to reach, expected one after a compression by dynamics (u0)"
-            raise ValueError(msg)
+        self.way.require(self)
 
     def start(self) -> Packing:
         """Make the random start; errors as `random_start.random_packing`."""
