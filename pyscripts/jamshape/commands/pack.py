@@ -6,8 +6,8 @@
     jamshape pack --protocol marschall-2018 --start slow.h5 --search halving --out packing.h5
     jamshape pack --kind alpha=0,share=0.5 --kind alpha=4,size=1.4,share=0.5 --n 256 --out mixture.h5
 
-In 2D compressed by LAMMPS and opened again, then led to the energy density u0; in 3D compressed by quasistatic
-steps to the first packing with U/N > 1e-10, and to u0 if given. --protocol makes it as a paper did, with the
+Compressed by quasistatic steps, large far from jamming, to the first jammed packing, and led to the energy
+density u0. --way takes slow compression in LAMMPS or equal steps instead; --protocol makes it as a paper did, with the
 paper's numbers: marschall-2018 by a compression at one rate and the energy of Sec. III C, yuan-2019-1 and
 yuan-2019-2 by the steps of Sec. 2.2.
 

@@ -52,15 +52,17 @@ def make_packing(
         Of all that is random; 1 when left out.
     u0 : float, [energy / length^D], optional
         Elastic energy over the box's area (volume) to lead the packing to, which says how far above
-        jamming it is; 1e-15 when left out, or 0 for the way by steps: the first jammed packing as it is.
+        jamming it is; 1e-15 in 2D and 1e-12 in 3D when left out. 0, usual for equal steps, is the first
+        jammed packing as it is.
     accuracy : float, optional
         Of the energy, (u - u0) / u0; 1e-7 when left out.
     tolerance : float, optional
         Largest net force and torque on a particle over the mean force of a bond; 1e-8 when left out, or
-        1e-4 for the way by steps without an energy.
-    way : {"dynamics", "steps"}, optional
-        To jamming: by slow compression in LAMMPS (Marschall & Teitel 2018, Sec. III B), usual in 2D, or
-        by quasistatic steps (Yuan et al. 2019, Sec. 2.2), usual in 3D.
+        1e-4 for equal steps.
+    way : {"quasistatic", "dynamics", "steps"}, optional
+        To jamming: by quasistatic steps that are large far from it, the fastest way and the usual one, by
+        slow compression in LAMMPS (Marschall & Teitel 2018, Sec. III B), or by equal quasistatic steps
+        (Yuan et al. 2019, Sec. 2.2).
     phi_start : float, optional
         Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D when left out.
     kappa : float, [1/time], optional
@@ -78,7 +80,7 @@ def make_packing(
     phi_thermal, n_sweeps : float, int, optional
         Of yuan-2019-2: packing fraction and sweeps of the Monte Carlo; 0.55 and 100000 when left out.
     delta_phi : float, optional
-        Of the way by steps: the step of the packing fraction; 1e-3 when left out.
+        The step of the packing fraction near jamming, 2e-3 when left out, or of equal steps, 1e-3.
     start : path, optional
         Of marschall-2018: a file of `compress` or `slow_compress` in place of the compression. The search
         begins at its first frame that stays jammed when it is minimised; particles, n and seed are its own.

@@ -21,7 +21,7 @@ def add_recipe_options(parser: ArgumentParser) -> None:
     add_particle_options(parser)
     group = parser.add_argument_group("how to make it")
     group.add_argument("--dimension", type=int, choices=(2, 3), help="(that of the shape's paper)")
-    group.add_argument("--way", choices=tuple(WAYS), help="to jamming (2D dynamics, 3D steps)")
+    group.add_argument("--way", choices=tuple(WAYS), help="to jamming (quasistatic)")
     group.add_argument(
         "--protocol", type=read_protocol, metavar="NAME",
         help=f"as published, in place of --way: {', '.join(PROTOCOLS)} (1 and 2 for short)",

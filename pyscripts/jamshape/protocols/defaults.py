@@ -15,6 +15,7 @@ from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
 from jamshape.protocols.recipe import (
+    Adaptive,
     Compressed,
     Dynamics,
     Recipe,
@@ -58,6 +59,9 @@ SETTINGS = (
     Setting("minimiser", str, "of the halving search: auto, or paper, newton, lbfgs, lammps"),
 )
 
+# Steps of the packing fraction grow to this far below jamming. What is led to an energy need not be balanced well before.
+_COARSE, _ROUGH = 1e-2, 1e-2
+
 _LAMBDA = 1e-6  # of the halving search, to begin with (Marschall & Teitel 2018, Sec. III C)
 
 
@@ -89,6 +93,14 @@ def _by_steps(get: Values) -> tuple[Way, Target | None]:
     return Steps(quasistatic, thermal), _target(get, min(get["tolerance"], _TIGHT))
 
 
+def _by_adaptive_steps(get: Values) -> tuple[Way, Target | None]:
+    step, tolerance = get["delta_phi"], get["tolerance"]
+    coarse = max(_COARSE, step)
+    rough = _ROUGH if get["u0"] else tolerance
+    quasistatic = Quasistatic(step=step, tolerance=rough, coarse=coarse)
+    return Adaptive(quasistatic), _target(get, tolerance)
+
+
 def _by_compression(get: Values) -> tuple[Way, Target | None]:
     way = Compressed(get["kappa"], get["phi_end"], get["search"], get["start"])
     target, minimiser = _target(get, get["tolerance"]), get["minimiser"]
@@ -116,6 +128,14 @@ _ATHERMAL = UsualWay(
 )
 
 WAYS: dict[str, UsualWay] = {
+    "quasistatic": UsualWay(
+        _by_adaptive_steps,
+        {
+            "n": 400, "phi_start": 0.1, "tolerance": 1e-8, "u0": 1e-12, "accuracy": 1e-7,
+            "delta_phi": 2e-3,
+        },
+        {"n": 256, "phi_start": 0.4, "u0": 1e-15},
+    ),
     "dynamics": UsualWay(
         _by_dynamics,
         {
@@ -125,7 +145,7 @@ WAYS: dict[str, UsualWay] = {
     ),
     "steps": _ATHERMAL,
 }  # fmt: skip
-"""Slow compression in LAMMPS; quasistatic steps. Another way is one more entry."""
+"""Quasistatic steps that adapt, the usual way; slow compression in LAMMPS; equal quasistatic steps."""
 
 PROTOCOLS: dict[str, UsualWay] = {
     COMPRESSED: UsualWay(
@@ -168,8 +188,8 @@ def recipe_for(
     dimension : {2, 3}, optional
         That of the shape's paper when left out.
     way : str, optional
-        One of `WAYS`: slow compression in LAMMPS ("dynamics"), usual in 2D, or quasistatic steps
-        ("steps"), usual in 3D.
+        One of `WAYS`: quasistatic steps that adapt ("quasistatic"), usual, slow compression in LAMMPS
+        ("dynamics"), or equal quasistatic steps ("steps").
     seed : int, optional
         Of all that is random; 1 when left out.
     protocol : str or int, optional
@@ -216,7 +236,7 @@ def recipe_for(
 def _chosen(way: str | None, protocol: int | str | None, dimension: int) -> tuple[UsualWay, str]:
     """Find the way or the protocol, and how sentences call it."""
     if protocol is None:
-        way = way or ("steps" if dimension == 3 else "dynamics")
+        way = way or "quasistatic"
         require_one_of("the way", way, WAYS)
         return WAYS[way], f"the way by {way}"
     name = protocol_named(protocol)

@@ -18,16 +18,18 @@ from jamshape.protocols.by_compression import ByCompression
 from jamshape.protocols.by_dynamics import ByDynamics
 from jamshape.protocols.by_steps import BySteps
 from jamshape.protocols.making import Making, Progress, SearchFile, lead
-from jamshape.protocols.recipe import Compressed, Dynamics, Recipe, Steps, Thermalisation, Way
+from jamshape.protocols.recipe import Adaptive, Compressed, Dynamics, Recipe, Steps, Thermalisation, Way
 
 _MAKING: dict[type[Way], Callable[[Recipe, Path], Making]] = {
     Dynamics: ByDynamics,
+    Adaptive: BySteps,
     Steps: BySteps,
     Compressed: ByCompression,
 }
 """Who goes each way."""
 
 __all__ = [
+    "Adaptive",
     "Compressed",
     "Dynamics",
     "Progress",

@@ -19,6 +19,13 @@ from jamshape.packing import State
 # A step this small leads nowhere: the energy jumps there, by a rearrangement.
 _SMALLEST_STEP = 1e-9
 
+# A long minimisation is told of and stored after so many evaluations, and given up after so many parts.
+_PART, _MOST_PARTS = 5000, 40
+
+# Steps grow after minimisations of fewer evaluations than the first, and shrink after more than the second.
+_FEW, _MANY = 40, 150
+_GROWTH = 1.5
+
 
 @dataclass(frozen=True)
 class Quasistatic:
@@ -37,6 +44,9 @@ class Quasistatic:
         net force below 1e-4, which this implies.
     method
         Minimiser.
+    coarse
+        Largest step, where minimisations take few evaluations, as they do far below jamming; steps are equal
+        when left out.
 
     Raises
     ------
@@ -48,10 +58,14 @@ class Quasistatic:
     energy: float = 1e-10
     closeness: float = 2.0
     tolerance: float = 1e-4
-    method: str = "lbfgs"
+    method: str = "auto"
+    coarse: float | None = None
 
     def __post_init__(self) -> None:
         require_positive(step=self.step, energy=self.energy, tolerance=self.tolerance)
+        if self.coarse is not None and not self.coarse >= self.step:
+            msg = f"the coarse step is {self.coarse}, expected at least the step, {self.step}"
+            raise ValueError(msg)
         if not self.closeness > 1:
             msg = f"closeness is {self.closeness}, expected a factor above 1"
             raise ValueError(msg)
@@ -81,12 +95,14 @@ class QuasistaticRun:
     loose: State | None = None
     loose_phi: float = math.nan
     minimum: Minimum | None = None
+    parts: int = 0
+    """Of the present minimisation, that are done."""
     history: History = field(default_factory=History)
 
     @classmethod
     def of(cls, landscape: Landscape, state: State, protocol: Quasistatic) -> QuasistaticRun:
         """Begin at a state."""
-        return cls(state, _phi(landscape, state), protocol.step)
+        return cls(state, _phi(landscape, state), protocol.coarse or protocol.step)
 
     def go_on(self, phi: float) -> None:
         """Compress the densest unjammed state to a packing fraction."""
@@ -110,7 +126,7 @@ def compress(
     Yields
     ------
     QuasistaticRun
-        The same object after each minimisation. The last one has a minimum.
+        The same object after each minimisation, or part of a long one. The last one has a minimum.
 
     Raises
     ------
@@ -118,10 +134,19 @@ def compress(
         If the start is jammed.
     """
     while compression.minimum is None:
+        before = landscape.evaluations
         found = _minimised(landscape, compression, protocol)
+        compression.parts += 1
+        if found.outcome is Outcome.EXHAUSTED and compression.parts < _MOST_PARTS:
+            compression.state = found.state
+            yield compression
+            continue
+        evaluations = landscape.evaluations - before + (compression.parts - 1) * _PART
+        compression.parts = 0
         per_particle = found.evaluation.energy / landscape.particles.n
         if per_particle <= protocol.energy:
             compression.loose, compression.loose_phi = found.state, compression.phi
+            compression.step = _next_step(compression.step, evaluations, protocol)
             compression.go_on(compression.phi + compression.step)
         elif compression.loose is None:
             msg = (
@@ -139,14 +164,23 @@ def compress(
         yield compression
 
 
+def _next_step(step: float, evaluations: int, protocol: Quasistatic) -> float:
+    """Adapt a step that left the packing unjammed to what its minimisation took."""
+    if protocol.coarse is None or step < protocol.step:
+        return step
+    if evaluations < _FEW:
+        return min(_GROWTH * step, protocol.coarse)
+    return max(step / 2, protocol.step) if evaluations > _MANY else step
+
+
 def _minimised(landscape: Landscape, compression: QuasistaticRun, protocol: Quasistatic) -> Minimum:
     """Minimise until forces balance, or until the state is seen to be unjammed."""
     state = compression.state
     lowest = protocol.energy * landscape.particles.n / state.volume
-    stop = Stop(tolerance=protocol.tolerance, lowest=lowest)
+    stop = Stop(tolerance=protocol.tolerance, lowest=lowest, evaluations=_PART)
     found = minimise(landscape, state, protocol.method, stop, compression.history)
-    if found.outcome is Outcome.STALLED and protocol.method != "auto":
-        return minimise(landscape, found.state, "auto", stop, compression.history)
+    if found.outcome is Outcome.STALLED and protocol.method != "newton":
+        return minimise(landscape, found.state, "newton", stop, compression.history)
     return found
 
 

@@ -101,7 +101,12 @@ class Steps:
         found: dict[str, Any] = {"protocol": THERMAL if self.thermal else ATHERMAL}
         if self.thermal:
             found |= {"phi_thermal": self.thermal.phi, "n_sweeps": self.thermal.n_sweeps}
-        return found | {f"quasistatic_{k}": v for k, v in vars(self.compression(target)).items()}
+        return found | self.steps(target)
+
+    def steps(self, target: Target | None) -> dict[str, Any]:
+        """Return what identifies its compression."""
+        settings = vars(self.compression(target))
+        return {f"quasistatic_{k}": v for k, v in settings.items() if v is not None}
 
     def require(self, recipe: Recipe) -> None:
         """Refuse a start that is denser than the Monte Carlo."""
@@ -111,6 +116,21 @@ class Steps:
             )
             msg = f"{found}, expected a start at a smaller packing fraction"
             raise ValueError(msg)
+
+
+@dataclass(frozen=True)
+class Adaptive(Steps):
+    """Quasistatic steps that are large where the packing is far from jamming: the fastest way there.
+
+    Parameters
+    ----------
+    quasistatic
+        How to compress; its `coarse` says how far steps may grow.
+    """
+
+    def attributes(self, target: Target | None) -> dict[str, Any]:
+        """Return what identifies it, to be stored."""
+        return {"way": "quasistatic"} | self.steps(target)
 
 
 @dataclass(frozen=True)
