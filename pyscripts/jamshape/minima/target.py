@@ -35,6 +35,9 @@ _GAIN = 1.5
 _NEAR = 0.1
 _LEAST_PART = 0.01
 _SOFT = 1e-6
+_CLOSE = 1e-3
+_STIFF_STEPS = 4
+_ACCURACY = 1e-9
 
 # At most this factor in sqrt(u), which is linear in phi - phi_J, from one step to the next.
 _LARGEST_FACTOR = 4.0
@@ -228,15 +231,18 @@ def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Iterator[M
     """
     jammed = _relaxed(landscape, start, target)
     yield jammed
-    part, tolerance = 1.0, target.tolerance
+    part, tolerance, aim = 1.0, target.tolerance, target.u0
     for _ in range(_MOST_MINIMA):
-        if jammed.outcome is Outcome.STALLED and jammed.residual.largest < _SLIDING:
-            # The next ones need be no better.
-            tolerance = max(tolerance, _GAIN * jammed.residual.largest)
-        if jammed.residual.largest <= tolerance and target.is_met(jammed.energy_density):
+        left, u = jammed.residual.largest, jammed.energy_density
+        if jammed.outcome is Outcome.STALLED and left < _SLIDING:
+            tolerance = max(tolerance, _GAIN * left)  # the next ones need be no better
+        if left <= tolerance and target.is_met(u):
             break
-        strained = jammed.state.strained(part * _strain_to(jammed, target))
-        found = _relaxed(landscape, replace(jammed, state=strained), replace(target, tolerance=tolerance))
+        if abs(u / target.u0 - 1) < _CLOSE:  # what minimising takes from it, as rods slide, is added
+            aim *= target.u0 / u
+        strained = jammed.state.strained(part * _strain_to(jammed, aim))
+        wanted = replace(target, tolerance=tolerance)
+        found = _relaxed(landscape, replace(jammed, state=strained), wanted)
         yield found
         if found.outcome is not Outcome.UNJAMMED:
             jammed, part = found, min(2 * part, 1.0)
@@ -256,13 +262,13 @@ def _relaxed(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
     return minimise(landscape, at.state, "auto", stop, at.history)
 
 
-def _strain_to(at: Minimum, target: Target) -> float:
-    """Strain after which sqrt(u) is that of the target, or nearer to it by a bounded factor.
+def _strain_to(at: Minimum, u0: float) -> float:
+    """Strain after which sqrt(u) is that of u0, or nearer to it by a bounded factor.
 
     The energy of a minimum changes with the strain as if the particles did not move.
     """
     energy, volume = at.evaluation.energy, at.state.volume
-    now, aim = math.sqrt(energy / volume), math.sqrt(target.u0)
+    now, aim = math.sqrt(energy / volume), math.sqrt(u0)
     aim = min(max(aim, now / _LARGEST_FACTOR), now * _LARGEST_FACTOR)
     slope = at.evaluation.strain_gradient - at.state.dimension * energy
     return (aim - now) * 2 * now * volume / slope
@@ -271,17 +277,29 @@ def _strain_to(at: Minimum, target: Target) -> float:
 def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
     """Say of a minimum that is not good enough whether all that is left of its forces slides.
 
-    That is so where nothing is left without what lies along modes softer than a small shift.
+    That is so where nothing is left without what lies along modes softer than a small shift, once all
+    stiffer ones are relaxed.
     """
     if at.residual.largest <= target.tolerance or at.residual.largest > _SLIDING:
         return at
-    gradient = at.evaluation.gradient
-    newton = Vicinity(landscape, at.state).newton(_SOFT * landscape.k_e / landscape.length**2)
-    newton.prepare()
-    [relax] = newton.solve(-gradient[None], target.tolerance)
-    stiff = at.evaluation._replace(gradient=gradient + newton.shift * relax)
-    slides = residual_of(landscape, stiff).largest <= target.tolerance
-    return replace(at, outcome=Outcome.SLIDING if slides else Outcome.STALLED)
+    vicinity = Vicinity(landscape, at.state)
+    newton = vicinity.newton(_SOFT * landscape.k_e / landscape.length**2)
+    evaluation = at.evaluation
+    for _ in range(_STIFF_STEPS):
+        newton.prepare()
+        [relax] = newton.solve(-evaluation.gradient[None], _ACCURACY)
+        stiff = evaluation._replace(gradient=evaluation.gradient + newton.shift * relax)
+        slides = residual_of(landscape, stiff).largest <= target.tolerance
+        if slides or not target.is_met(evaluation.energy / vicinity.base.volume):
+            break
+        vicinity.move(relax, 0.0)
+        evaluation = vicinity.evaluate(0 * relax, 0.0, extended=True)
+    if not slides:
+        return replace(at, outcome=Outcome.STALLED)
+    left = residual_of(landscape, evaluation)
+    return replace(
+        at, state=vicinity.base, evaluation=evaluation, outcome=Outcome.SLIDING, residual=left
+    )
 
 
 def halving(
