@@ -144,8 +144,8 @@ def write_run(
     >>> from jamshape.files.h5md import count_frames, write_run
     >>> from jamshape.protocols.random_start import random_packing
     >>> packing = random_packing(n=8, phi=0.3, seed=1)
-    >>> write_run("run.h5", [packing, packing.with_(step=5)])
-    >>> count_frames("run.h5")
+    >>> write_run("two.h5", [packing, packing.with_(step=5)])
+    >>> count_frames("two.h5")
     2
     """
     first, last = frames[0], frames[0].step
