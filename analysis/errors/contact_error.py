@@ -25,6 +25,7 @@ from tqdm import tqdm
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
+from jamshape.drawing.saving import save_figure
 from jamshape.shapes.single_pairs import (
     superellipsoid_contacts,
     superellipsoid_overlap,
@@ -142,7 +143,7 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
         axis.grid(visible=True, alpha=0.3)
     axes[1].plot([], [], "s--", color="grey", mfc="none", label="warm start")
     axes[1].legend()
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def parser() -> ArgumentParser:

@@ -28,6 +28,8 @@ from studies.shown import figure_of
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
+from jamshape.drawing.saving import save_figure
+from jamshape.files.disk import store
 
 ROOT = Path(__file__).resolve().parents[2]
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -156,7 +158,7 @@ def found_by(name: str, options: Namespace) -> dict[str, Any]:
             return found
     commands = STUDIES[name].full if options.full else STUDIES[name].short
     found = {"full": options.full, "commands": commands, **run_all(commands, folder)}
-    record.write_text(json.dumps(found, indent=1))
+    store(record, json.dumps(found, indent=1).encode())
     return found
 
 
@@ -232,7 +234,7 @@ def draw(records: dict[str, dict[str, Any]], path: Path) -> bool:
         draw_curves(axis, curves)
         axis.set_title(STUDIES[name].title, fontsize=9)
         axis.set(xlabel="run time (s)", ylabel=STUDIES[name].error)
-    figure.savefig(path)
+    save_figure(figure, path)
     return True
 
 

@@ -24,6 +24,7 @@ from studies.shown import Point, curves, figure_of, markdown
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
+from jamshape.drawing.saving import save_figure
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
@@ -145,7 +146,7 @@ def draw(rows: list[Row], n: int, path: Path) -> None:
         axis.grid(visible=True, alpha=0.3)
     axes[0].set_ylabel("relative error of p")
     axes[1].legend(loc="center right")
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def measured(folder: Path, n: int) -> tuple[list[Row], list[tuple[float, int]]]:

@@ -25,6 +25,7 @@ from studies.shown import Point, curves, figure_of, markdown
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
+from jamshape.drawing.saving import save_figure
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
@@ -182,7 +183,7 @@ def draw(rows: list[Row], path: Path) -> None:
     for axis in axes[-1]:
         axis.set_xlabel("force evaluations")
     axes[0, 0].legend(title="filled: median, open: largest", fontsize=7, title_fontsize=7)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_case(axis: Any, case: Case, rows: list[Row]) -> None:

@@ -24,6 +24,8 @@ from studies.shown import figure_of, markdown
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
+from jamshape.drawing.saving import save_figure
+from jamshape.files.disk import store
 from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape
 from jamshape.measures.minimum import write_minimum
@@ -172,7 +174,7 @@ def study(options: Namespace) -> dict[str, Row]:
         for group, method, measure, seconds in runs:
             if method not in found[group]:
                 found[group][method] = measure(method, packing, seconds)
-                path.write_text(json.dumps(found))
+                store(path, json.dumps(found).encode())
         results[name] = found | {"n": packing.n}
     return results
 
@@ -190,7 +192,7 @@ def draw(results: dict[str, Row], path: Path) -> None:
         axis.set_title(f"{label}, $N$ = {result['n']}", fontsize=9)
     axes[0].set_ylabel("largest net force / mean bond force")
     axes[0].legend(fontsize="small")
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def cells(name: str, result: Row) -> Iterator[tuple[str, ...]]:

@@ -26,6 +26,7 @@ from studies.shown import Point, curves, figure_of
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.mode_axes import packing_text
+from jamshape.drawing.saving import save_figure
 from jamshape.files.h5md import read_packing
 from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape
@@ -156,7 +157,7 @@ def draw(rows: list[dict[str, Any]], tiles: list[dict[str, Any]], out: Path) -> 
     left, right = figure.subplots(1, 2)
     draw_errors(left, rows)
     draw_growth(right, rows, tiles)
-    figure.savefig(out)
+    save_figure(figure, out)
 
 
 def draw_errors(axis: Any, rows: list[dict[str, Any]]) -> None:

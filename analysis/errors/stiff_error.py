@@ -28,6 +28,7 @@ from studies.shown import (
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
+from jamshape.drawing.saving import save_figure
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.flow.implicit import METHODS, Flow, Protocol, Step, compress
 from jamshape.lammps.session import Session
@@ -165,7 +166,7 @@ def draw(runs: list[dict[str, Any]], rows: list[Row], options: Namespace, name: 
     right.set(xlabel="processor time (s)", ylabel="relative error of p")
     left.legend(fontsize=8)
     name_median_and_largest(right)
-    figure.savefig(options.out / name)
+    save_figure(figure, options.out / name)
 
 
 def parser() -> ArgumentParser:

@@ -18,6 +18,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import counted, ensemble_labels, ensembles_title
 from jamshape.files.sets import PackingFile
 from jamshape.measures.averages import standard_error
@@ -88,7 +89,7 @@ def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
     handles = panels[0].get_legend_handles_labels()
     place: dict[str, Any] = {"loc": "outside upper center", "ncols": 3, "frameon": False}
     figure.legend(*handles, title=ensembles_title(curves), **SMALL_TEXT, **place)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def main(options: Namespace) -> None:

@@ -23,6 +23,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import (
     counted,
     ensemble_text,
@@ -144,7 +145,7 @@ def draw(rates: list[Rate], packings: dict[Place, list[float]], out: Path) -> No
             bottom=LEAST * max(one.pressure.max() for of in own for one in of.runs)
         )
         linear.legend(title="thick: mean, thin: each sample", **SMALL_TEXT)
-    figure.savefig(out)
+    save_figure(figure, out)
 
 
 def draw_pressures(axis: Axes, of: Rate, color: str) -> None:

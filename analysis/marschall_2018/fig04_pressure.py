@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT
 from jamshape.drawing.pressure import draw_onset, onset_text
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import ensemble_text, onset_symbol, pressure_unit
 from jamshape.files.sets import of_paper
 from jamshape.measures.averages import Mean, mean
@@ -80,7 +81,7 @@ def draw(runs: list[Run], average: Mean | None, options: Namespace) -> None:
     place: dict[str, Any] = {"loc": "outside lower center", "ncols": 2, "frameon": False}
     handles = onset.get_legend_handles_labels()
     figure.legend(*handles, title="onsets, each at the rate of its run", **SMALL_TEXT, **place)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def main(options: Namespace) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import discs_at, error_bars, label_alpha_axis
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import PAPER_STYLE, color
 from jamshape.drawing.text import conditions_text, system_labels
 from jamshape.files.sets import (
@@ -75,7 +76,7 @@ def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> N
     label_alpha_axis(axes, discs)
     axes.set_ylabel(r"jamming density $\langle\phi_J\rangle$")
     axes.legend(fontsize=8, frameon=False, title=conditions_text(groups), title_fontsize=8)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def rows(system: System, known: Averages) -> list[dict[str, Any]]:

@@ -16,6 +16,7 @@ from jamshape.command import parser_of, report, run
 from jamshape.contacts import Contacts
 from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.packing import add_legend, colorings, draw_packing
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.space import save_smooth
 from jamshape.drawing.text import counted
 from jamshape.files.sets import Choice, Groups, choose, read_groups
@@ -45,7 +46,7 @@ def draw(found: list[Contacts], names: list[str], options: Namespace) -> None:
     if any(one.packing.dimension == 3 for one in found):
         save_smooth(figure, options.out, options.dpi)
     else:
-        figure.savefig(options.out, dpi=options.dpi)
+        save_figure(figure, options.out, dpi=options.dpi)
 
 
 def chosen(groups: Groups, alphas: list[float]) -> Groups:

@@ -17,6 +17,7 @@ import numpy as np
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import PAPER_STYLE, SKY, color
 from jamshape.drawing.text import conditions_text, system_labels
 from jamshape.files.sets import System, conditions, curves_over, of_paper, read_groups
@@ -113,7 +114,7 @@ def draw(curves: dict[System, Found], title: str, options: Namespace) -> None:
     figure.legend(loc="outside right center", **SMALL_TEXT)
     label_alpha_axis(linear, discs)
     label_alpha_axis(logarithmic, None)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def limit_of_turning(system: System) -> int:

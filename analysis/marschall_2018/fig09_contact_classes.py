@@ -17,6 +17,7 @@ import numpy as np
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLUE, GREEN, ORANGE, PAPER_STYLE, RED
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Curve, System, conditions, of_paper, one_curve, read_groups
@@ -87,7 +88,7 @@ def draw(system: System, known: Averages, title: str, options: Namespace) -> Non
     for axes in (classes, flat):
         axes.set_ylim(-0.03, 1.03)
         label_alpha_axis(axes, discs)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def main(options: Namespace) -> None:

@@ -14,6 +14,7 @@ from argparse import Namespace
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.contact_angles import contact_angle_figure
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import conditions_alone, system_labels
 from jamshape.files.sets import Choice, choose, conditions, read_groups
 from jamshape.measures.touching import angle_curve
@@ -29,7 +30,7 @@ def main(options: Namespace) -> None:
     found = {system: angle_curve(system.number("alpha"), of) for system, of in groups.items()}
     labels = system_labels(found)
     curves = {labels[system]: curve for system, curve in found.items()}
-    contact_angle_figure(curves, conditions_alone(groups)).savefig(options.out)
+    save_figure(contact_angle_figure(curves, conditions_alone(groups)), options.out)
     rows = [
         system.report()
         | {"samples": curve.samples, "contacts": curve.n_contacts}

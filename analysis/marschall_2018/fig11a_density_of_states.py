@@ -29,6 +29,7 @@ from jamshape.drawing.mode_axes import (
     modes_parser,
     tables_asked,
 )
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import PAPER_STYLE, marked
 from jamshape.files.sets import of_paper
 from jamshape.measures.averages import mean, standard_error
@@ -103,7 +104,7 @@ def draw(tables: Tables, options: Namespace) -> None:
     title = legend_title(tables)
     row.stable.legend(loc="upper right", frameon=False, title=title, **SMALL_TEXT)
     row.first.set_ylabel(r"density of states  $D(\omega)$")
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def mark_paper(axes: Axes, tables: Tables) -> None:

@@ -27,6 +27,7 @@ from jamshape.drawing.mode_axes import (
     modes_parser,
     tables_asked,
 )
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import marked
 from jamshape.vibration.sets import Tables, band_means, every
 
@@ -53,7 +54,7 @@ def draw(tables: Tables, options: Namespace) -> None:
     row.stable.text(0.98, single / 1.08, "one coordinate", va="top", **note)
     row.first.set_ylabel(r"participation ratio  $P(\omega)$")
     draw_legend(row.stable, every(tables), title=legend_title(tables))
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def main(options: Namespace) -> None:

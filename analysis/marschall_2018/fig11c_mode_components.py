@@ -24,6 +24,7 @@ from jamshape.drawing.mode_axes import (
     modes_parser,
     tables_asked,
 )
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import samples_text, systems_text
 from jamshape.vibration.sets import TOLD, Key, Tables, band_means, every, n_of
 from jamshape.vibration.table import ModeTable
@@ -71,7 +72,7 @@ def draw(tables: Tables, options: Namespace) -> None:
         title = ", ".join([systems_text([key.system]), *told])
         row.stable.set_title(title, fontsize=8, loc="right")
     draw_legend(rows[0].stable, next(iter(tables.values())))
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def row_of(key: Key, samples: list[ModeTable]) -> dict[str, Any]:

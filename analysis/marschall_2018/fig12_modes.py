@@ -22,6 +22,7 @@ from jamshape.arrays import BoolArray, FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.mode_axes import mode_text, packing_text
 from jamshape.drawing.plane import draw_bodies, images, show_box
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import RATTLER
 from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape
@@ -144,7 +145,7 @@ def draw(file: PackingFile, table: ModeTable, modes: list[int], options: Namespa
         add_color_bar(figure.colorbar(bodies, ax=list(panels), aspect=30, shrink=0.75, pad=0.01))
     add_key(panels[len(modes) - 1], with_rattlers=not held.all())
     figure.suptitle(packing_text(file), fontsize=9)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def add_key(axes: Axes, *, with_rattlers: bool) -> None:

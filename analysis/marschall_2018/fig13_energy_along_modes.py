@@ -22,6 +22,7 @@ from tqdm import tqdm
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.mode_axes import mode_text, packing_text
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import unit_text
 from jamshape.files.sets import PackingFile
 from jamshape.vibration.energy_along import AlongModes, Crossover, EnergyAlong, fit_crossover
@@ -124,7 +125,7 @@ def draw(curves: Curves, table: ModeTable, file: PackingFile, out: Path) -> None
     text: dict[str, Any] = {"title_fontsize": 8, "fontsize": 8, "frameon": False}
     handles = top.get_legend_handles_labels()
     figure.legend(*handles, title=packing_text(file), loc="outside right upper", **text)
-    figure.savefig(out)
+    save_figure(figure, out)
 
 
 def row_of(table: ModeTable, mode: int, curve: Curve) -> dict[str, Any]:

@@ -20,6 +20,7 @@ import numpy as np
 from jamshape.command import report, run
 from jamshape.drawing.axes import energy_label, log_bars
 from jamshape.drawing.mode_axes import frequency_unit, modes_parser, tables_asked
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLUE, RED
 from jamshape.drawing.text import range_text, systems_text
 from jamshape.files.sets import System, of_paper
@@ -185,7 +186,7 @@ def draw(found: dict[System, Ladder], tables: Tables, options: Namespace) -> Non
         axes.legend(title=title, title_fontsize=8, fontsize=7, frameon=False, loc="upper left")
     guides(panels)
     panels[0].set_ylabel(rf"mean frequency  $\bar\omega\;{frequency_unit(tables)}$")
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def guides(panels: Any) -> None:

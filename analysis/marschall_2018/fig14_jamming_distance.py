@@ -17,6 +17,7 @@ import numpy as np
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT, energy_label
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import PAPER_STYLE, color, marked
 from jamshape.drawing.text import bars_text, counted, system_labels, systems_text
 from jamshape.files.sets import PackingFile, System, finished, of_paper
@@ -132,7 +133,7 @@ def draw(ladder: Ladder, n: str, options: Namespace) -> None:
     right.set_ylim(low - 0.2 * (high - low), high + 0.2 * (high - low))
     title = f"{systems_text(ladder)}\n{n}" + bars_text(ladder)
     left.legend(title=title, frameon=False, loc="upper left", **SMALL_TEXT)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def row_of(system: System, samples: Samples) -> dict[str, Any]:

@@ -19,6 +19,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT, log_bars
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import marked
 from jamshape.drawing.text import bars_text, conditions_alone, counted, system_labels
 from jamshape.files.h5md import read_observables
@@ -91,7 +92,7 @@ def draw(residuals: dict[str, Values], title: str, options: Namespace) -> None:
                 draw_curve(axes, known, bins, label=label, **marked(k, "-"))
         axes.legend(**SMALL_TEXT)
     figure.suptitle(title + bars_text(values), fontsize=8)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def quantiles(samples: list[FloatArray]) -> dict[str, float | None]:

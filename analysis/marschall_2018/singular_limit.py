@@ -26,6 +26,7 @@ from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.contact_angles import contact_angle_figure
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import conditions_alone
 from jamshape.files.h5md import require_attributes
 from jamshape.files.sets import Curve, PackingFile, is_among, one_curve, read_groups
@@ -181,7 +182,7 @@ def main(options: Namespace) -> int:
         curves = {NAMES[name]: angle_curve(options.alpha, of) for name, of in groups.items()}
         title = conditions_alone(groups)
         found["out"] = options.out / "singular_limit.png"
-        contact_angle_figure(curves, title).savefig(found["out"])
+        save_figure(contact_angle_figure(curves, title), found["out"])
     report(found)
     return 1 if failed else 0
 

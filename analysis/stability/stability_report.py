@@ -30,6 +30,7 @@ from battery.cases import all_cases
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
+from jamshape.files.disk import store
 
 
 def parser() -> argparse.ArgumentParser:
@@ -157,7 +158,7 @@ def main(options: argparse.Namespace) -> int:
     found = verdicts(todo, options.out / "lammps.log")
     for label, verdict in zip(todo, tqdm(found, total=len(todo), unit="case"), strict=True):
         records[label] = verdict._asdict()
-        path.write_text(json.dumps(records, indent=1))
+        store(path, json.dumps(records, indent=1).encode())
         out.write_text(page({x: records[x] for x in labels if x in records}))
     out.write_text(page({label: records[label] for label in labels}))
     failed = [label for label in labels if not records[label]["holds"]]

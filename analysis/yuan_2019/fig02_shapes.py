@@ -19,6 +19,7 @@ from scipy.spatial import ConvexHull
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.families import NEEDS, with_three_axes
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.space import lit, mean_normals, view
 from jamshape.drawing.styles import BODIES
 from jamshape.shapes.mesh import SurfaceMesh
@@ -109,7 +110,7 @@ def draw(shapes: list[Numbers], found: list[dict[str, Any]], options: Namespace)
         axes.set_title(text, fontsize=9, linespacing=1.4)
     for axes in panels[len(shapes) :]:
         axes.set_axis_off()
-    figure.savefig(options.out, pil_kwargs={"optimize": True})
+    save_figure(figure, options.out, pil_kwargs={"optimize": True})
 
 
 def main(options: Namespace) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import points
 from jamshape.drawing.families import NEEDS, beta, family_legend, is_axisymmetric, shape_of
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import PAPER_LINE
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, System, conditions, only, read_groups
@@ -50,7 +51,7 @@ def draw(groups: Groups, options: Namespace) -> None:
     panels[0].set_xlabel("aspect ratio $w$ of spheroids")
     panels[0].set_ylabel(r"packing fraction $\phi_J$")
     panels[1].set_xlabel("exponent $p$ of superballs")
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def main(options: Namespace) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import beta_axis, points
 from jamshape.drawing.families import NEEDS, beta, family_legend, mark
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLACK, PAPER_LINE
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, conditions, n_of, only, read_groups
@@ -65,7 +66,7 @@ def draw(every: Groups, at_random: dict[str, float], options: Namespace) -> None
     family_legend(flat, groups, conditions_text(every), loc="outside right center")
     both.plot([], [], "o", color="0.4", ms=2.5, label="small: single packings")
     both.legend(fontsize=8, loc="best")
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def main(options: Namespace) -> None:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import points
 from jamshape.drawing.families import NEEDS, SPHERES, family, family_legend, is_axisymmetric
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import PAPER_LINE, YELLOW
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, conditions, read_groups
@@ -73,7 +74,7 @@ def draw(groups: Groups, options: Namespace) -> None:
     else:
         figure = Figure(figsize=(11, 4.2), dpi=200, layout="constrained")
         draw_z(groups, list(figure.subplots(1, 2)))
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def main(options: Namespace) -> None:

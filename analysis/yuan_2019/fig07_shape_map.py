@@ -18,6 +18,7 @@ import numpy as np
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import beta_axis
 from jamshape.drawing.families import NEEDS, beta, shape_of
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLACK, COLORS, PAPER_LINE
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, System, conditions, only, read_groups
@@ -96,7 +97,7 @@ def draw(groups: Groups, options: Namespace) -> bool:
     draw_bands(left, A, phi)
     figure.suptitle(conditions_text(groups), fontsize=9)
     contours = draw_map(figure, right, A, phi)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
     return contours
 
 

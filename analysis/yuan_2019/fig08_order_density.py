@@ -15,6 +15,7 @@ from typing import Any
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import points
 from jamshape.drawing.families import family_legend, is_thermal, mark
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, PackingFile, System, conditions, only, read_groups
 from jamshape.measures.averages import averages, mean, rows
@@ -54,7 +55,7 @@ def draw(groups: Groups, options: Namespace) -> None:
     for axes in panels[:2]:
         axes.set_ylim(0, max(0.5, axes.get_ylim()[1]))
     family_legend(panels[0], groups, conditions_text(groups), loc="outside right center")
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def gains(groups: Groups) -> list[dict[str, Any]]:

@@ -22,6 +22,7 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT
 from jamshape.drawing.families import shape_of
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import conditions_alone, system_labels, unit_text
 from jamshape.files.sets import Groups, System, conditions, read_groups
 from jamshape.vibration.quartic import KEPT, by_size, kept_modes, quartic_count
@@ -66,7 +67,7 @@ def draw(tables: Tables, title: str, options: Namespace) -> None:
     bottom.set(xlabel="mode $i$", ylabel="share of rotation", ylim=(-0.03, 1.03))
     figure.suptitle(title, fontsize=8)
     figure.legend(loc="outside right upper", frameon=False, **SMALL_TEXT)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def row_of(system: System, table: ModeTable) -> dict[str, Any]:

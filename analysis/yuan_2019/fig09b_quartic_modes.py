@@ -20,6 +20,7 @@ from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.families import family_legend, mark
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, PackingFile, System, conditions, read_groups
 from jamshape.vibration.quartic import KEPT, QuarticCount, followed, kept_modes, quartic_count
@@ -48,7 +49,7 @@ def draw(groups: Groups, counts: Counts, options: Namespace) -> None:
     largest = max(abs(bottom.get_ylim()[0]), abs(bottom.get_ylim()[1]), 3)
     bottom.set_ylim(-largest, largest)
     family_legend(top, groups, conditions_text(groups, bars=False), loc="upper left")
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def row_of(file: PackingFile, count: QuarticCount) -> dict[str, Any]:

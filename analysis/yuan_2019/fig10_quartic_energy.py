@@ -21,6 +21,7 @@ from jamshape.checks import Range, require_in
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.families import label, mark
 from jamshape.drawing.mode_axes import packing_text
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import PAPER_LINE, RED
 from jamshape.drawing.text import pressure_unit, systems_text, unit_text
 from jamshape.files.sets import PackingFile, System, read_groups
@@ -173,7 +174,7 @@ def draw(every: list[Followed], options: Namespace) -> None:
         draw_energies(axes, found)
     panels[0].set_ylabel(r"$\Delta U/N\;/\;k_e$")
     draw_crossovers(panels[-1], every)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def exponents(every: list[Followed], name: Name) -> dict[str, float | None]:

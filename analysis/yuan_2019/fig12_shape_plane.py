@@ -16,6 +16,7 @@ import numpy as np
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import beta_axis, points
 from jamshape.drawing.families import NEEDS, beta, family_legend
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLUE, RED
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, conditions, read_groups
@@ -49,7 +50,7 @@ def draw(groups: Groups, options: Namespace) -> None:
     axes.set(xlim=(-0.01, largest), xlabel=r"asphericity $\mathcal{A}$")
     beta_axis(axes.yaxis)
     family_legend(axes, groups, conditions_text(groups, bars=False), loc="outside right center")
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def main(options: Namespace) -> None:

@@ -19,6 +19,7 @@ from jamshape.contacts import find_contacts
 from jamshape.drawing.axes import points
 from jamshape.drawing.colors import ORDER
 from jamshape.drawing.families import family_legend
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLACK
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, System, conditions, only, read_groups
@@ -75,7 +76,7 @@ def draw(groups: Groups, local: Columns, lost: Columns, options: Namespace) -> N
         axes.set(xlabel=ORDER[name], ylabel=GLOBAL[name])
     turning = only(groups, lambda system: any(of[system].samples for of in local.values()))
     family_legend(panels[0], turning, conditions_text(groups), loc="outside right center")
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def main(options: Namespace) -> None:

@@ -19,6 +19,7 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import find_contacts
 from jamshape.drawing.families import NEEDS, SPHERES, family, label, mark
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, PackingFile, System, conditions, read_groups
 from jamshape.measures.averages import averages
@@ -87,7 +88,7 @@ def draw(groups: Groups, known: Curvatures, options: Namespace) -> None:
     text: dict[str, Any] = {"title_fontsize": 8, "fontsize": 8, "loc": "outside right center"}
     figure.suptitle(conditions_text(groups, bars=False), fontsize=8)
     figure.legend(title="$(p, w_1, w_2)$", **text)
-    figure.savefig(options.out)
+    save_figure(figure, options.out)
 
 
 def row_of(system: System, values: FloatArray) -> dict[str, Any]:

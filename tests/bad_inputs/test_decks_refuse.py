@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from jamshape.checks import RANGES
+from jamshape.lammps.plugin import PluginError, include_line, plugin_path
 from jamshape.shapes.table import SHAPES
 
 sys.path.append(str(Path(__file__).parents[1] / "styles"))
@@ -51,10 +53,11 @@ CASES = [
 AT_ONCE = ["phi_start", "0.8"]
 
 
-def lmp(folder, deck, *words, ranks=1):
+def lmp(folder, deck, *words, ranks=1, inputs=INPUTS):
     several = [*MPIRUN, "-np", str(ranks)] if ranks > 1 else []
     return subprocess.run(
-        [*several, "lmp", "-in", INPUTS / f"{deck}.in", *words], cwd=folder, env=os.environ | ENVIRONMENT,
+        [*several, "lmp", "-in", inputs / f"{deck}.in", *words], cwd=folder,
+        env=os.environ | ENVIRONMENT | {"JAMSHAPE_PLUGIN": str(plugin_path())},
         text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60, check=False,
     )  # fmt: skip
 
@@ -88,6 +91,35 @@ def test_a_folder_of_any_name_works(tmp_path):
     assert (tmp_path / STRANGE / "final.restart").is_file()
     for path in (tmp_path / STRANGE).iterdir():
         assert path.name != "X"
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_decks_of_a_repository_of_any_name_work(ranks, tmp_path):
+    inputs = tmp_path / STRANGE / "${HOME} $n" / "inputs"
+    shutil.copytree(INPUTS, inputs)
+    settings = [("n", "16"), ("kappa", "1e-2"), ("dt", "0.1"), ("phi_end", "0.6"), ("out", "run")]
+    done = lmp(tmp_path, RODS, *variables(*settings), ranks=ranks, inputs=inputs)
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert {path.name for path in tmp_path.iterdir()} == {STRANGE, "run"}
+
+
+@pytest.mark.parametrize("name", ["a b", "$(touch X)${HOME}$n", "it's", 'a "q"', "[*]#&;`touch X`"])
+def test_the_line_that_a_deck_needs_can_be_read(name, tmp_path):
+    script = tmp_path / name / "load_plugin.lmp"
+    script.parent.mkdir()
+    script.write_bytes((INPUTS / script.name).read_bytes())
+    (tmp_path / "own.in").write_text(f"{include_line(script)}\n")
+    done = lmp(tmp_path, "own", inputs=tmp_path)
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert {path.name for path in tmp_path.iterdir()} == {name, "own.in", "log.lammps"}
+
+
+@pytest.mark.parametrize("name", ["é", 'it\'s "q"'])
+def test_a_path_that_lammps_cannot_read_in_a_deck_is_refused(name):
+    with pytest.raises(
+        PluginError, match="LAMMPS cannot read in a deck, expected a path of ASCII letters"
+    ):
+        include_line(Path("/home") / name / "load_plugin.lmp")
 
 
 def ranges_of_decks():

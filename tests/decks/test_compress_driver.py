@@ -111,10 +111,12 @@ def test_a_run_without_restart_files_begins_anew(whole, tmp_path):
 def test_a_finished_run_is_left_alone(whole):
     out, report = whole
     before = out.read_bytes()
+    Path(f"{out}.restart.a").touch()  # as killed before it could remove them
     again = run(out, "--resume")
     assert again.returncode == 0
     assert json.loads(again.stdout.splitlines()[-1]) == report
     assert out.read_bytes() == before
+    assert [path.name for path in out.parent.iterdir()] == [out.name]
 
 
 def test_a_step_past_the_stability_limit_fails_with_a_sentence_and_a_readable_file(tmp_path):

@@ -5,9 +5,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from valgrind_decks import found_in
 
 RUN = Path(__file__).parents[2] / "run"
-PARTS = ("setup", "demo", "test", "lint", "sanitize")
+PARTS = ("setup", "demo", "test", "lint", "sanitize", "valgrind")
 
 
 def run(*words):
@@ -25,8 +26,39 @@ def test_unknown_words_are_refused():
     done = run("sing")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.strip() == (
-        "./run: there is no 'sing', expected setup, demo, test, lint or sanitize; ./run shows what they do."
+        "./run: there is no 'sing', expected setup, demo, test, lint, sanitize or valgrind; ./run shows what they do."
     )
+
+
+@pytest.mark.parametrize("sign", ['"', "$", "`", ";", ":", "\\", "\n"])
+def test_a_folder_that_cmake_or_shells_misread_is_refused_before_anything_runs(sign, tmp_path):
+    folder = tmp_path / f"my{sign}clone"
+    folder.mkdir()
+    script = folder / "run"
+    script.write_bytes(RUN.read_bytes())
+    script.chmod(0o755)
+    done = subprocess.run([script, "demo"], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(
+        f"\n./run: the folder is {folder}, expected a path without quotes"
+    )
+    assert done.stderr.endswith("move it to another one.\n")
+    assert [path.name for path in folder.iterdir()] == ["run"]
+
+
+STACK = "<stack><frame><obj>{}</obj><fn>first</fn></frame><frame><obj>lmp</obj></frame></stack>"
+ERROR = "<error><kind>{}</kind><what>said</what>{}</error>"
+
+
+def test_valgrind_counts_where_the_plugin_is_on_the_stack(tmp_path):
+    stacks = [STACK.format(place) for place in ("/lib/jamshape_plugin.so", "/lib/libmpi.so")]
+    own, other = (ERROR.format("InvalidRead", stack) for stack in stacks)
+    second = ERROR.format("UninitValue", "".join(reversed(stacks)))  # where the value came from
+    report = tmp_path / "report.xml"
+    report.write_text(f"<valgrindoutput>{own}{other}{second}</valgrindoutput>")
+    ours, others = found_in(report)
+    assert (len(ours), others) == (2, 1)
+    assert ours[0].startswith("InvalidRead: said\n    first")
 
 
 def parts(command):

@@ -20,6 +20,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 from lammps_scenes import REPOSITORY, command_line, environment
+from matplotlib.image import imread
+
+from jamshape.exchange.gsd import read_gsd
+from jamshape.files.lammps_text import read_data
+from jamshape.files.restarts import is_whole
+
+# The folder, in that of a run, of what the run reads.
+GIVEN = "given"
 
 # The time that something took, which differs from run to run, and the history of a search, which is that
 # of the process that ended it.
@@ -27,13 +35,18 @@ CLOCKS = {"wall_seconds", "flow_wall_seconds"}
 OF_THE_PROCESS = ("report/",)
 
 _SECONDS = 120
-_PRELOADED = ("jamshape.commands." + name for name in ("compress", "pack", "slow", "sweep"))
+_COMMANDS = ("compress", "pack", "slow", "sweep", "modes", "draw", "export", "initial")
+_PRELOADED = [
+    *(f"jamshape.commands.{name}" for name in _COMMANDS),
+    "matplotlib.figure",
+    "matplotlib.backends.backend_agg",
+]
 
 
 def forked(words, log, patches=()):
     """Run the command jamshape in a process of its own, with other values of some constants."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(list(_PRELOADED))
+    context.set_forkserver_preload(_PRELOADED)
     process = context.Process(
         target=_command, args=([str(word) for word in words], str(log), patches)
     )
@@ -89,7 +102,8 @@ def ended(process, after=_SECONDS):
 
 def uninterrupted(case, folder):
     """Run a case to its end; return how long that took."""
-    folder.mkdir()
+    prepare(case, folder)
+    ended(forked(["--version"], folder / "said.log"))  # the process to fork from imports all that there is
     began = time.monotonic()
     code = ended(case.start(folder))
     assert code == 0, said(folder)
@@ -101,33 +115,67 @@ def killed(case, folder, seconds, kills, seed):
 
     After each kill all files are looked at.
     """
-    folder.mkdir()
+    given = prepare(case, folder)
     rng, count = random.Random(seed), 0
     for _ in range(kills):
         code = ended(case.start(folder), rng.uniform(0, seconds))
         if code != -signal.SIGKILL:
             assert code == 0, said(folder)
-            return count
+            break
         count += 1
         require_whole(folder)
-    finished = finished_files(folder)
-    assert ended(case.start(folder)) == 0, said(folder)
-    for path, before in finished.items():
-        assert stamp(path) == before, f"{path.name} was finished and was made again"
+        require_as_they_were(given, "was given and was changed")
+    else:
+        finished = finished_files(folder)
+        assert ended(case.start(folder)) == 0, said(folder)
+        require_as_they_were(finished, "was finished and was made again")
+    require_as_they_were(given, "was given and was changed")
     return count
 
 
+def prepare(case, folder):
+    """Make the folder of a run, with what the run is given to read; return these files as they are."""
+    (folder / GIVEN).mkdir(parents=True)
+    for name, write in case.given.items():
+        write(folder / GIVEN / name)
+    return {path: stamp(path) for path in (folder / GIVEN).iterdir()}
+
+
+def require_as_they_were(files, complaint):
+    for path, before in files.items():
+        assert stamp(path) == before, f"{path.name} {complaint}"
+
+
 def require_whole(folder):
-    """Every HDF5 file opens and can be read to its end."""
-    for path in folder.rglob("*.h5"):
-        with h5py.File(path) as file:
-            file.visititems(lambda _, part: part[()] if isinstance(part, h5py.Dataset) else None)
+    """Every file that is there under its name can be read to its end."""
+    for pattern, read in READERS.items():
+        for path in folder.rglob(pattern):
+            read(path)
+
+
+def _read_hdf5(path):
+    with h5py.File(path) as file:
+        file.visititems(lambda _, part: part[()] if isinstance(part, h5py.Dataset) else None)
+
+
+def _read_restart(path):
+    assert is_whole(path), f"{path} has no end"
+
+
+READERS = {
+    "*.h5": _read_hdf5,
+    "*.h5md": _read_hdf5,
+    "*.png": imread,
+    "*.data": read_data,
+    "*.gsd": read_gsd,
+    "final.restart": _read_restart,
+}
 
 
 def finished_files(folder):
     """Find packings that are finished, with when they were written."""
     found = {}
-    for path in folder.rglob("*.h5"):
+    for path in folder.glob("*.h5"):
         with h5py.File(path) as file:
             if "outcome" in file["parameters"].attrs:
                 found[path] = stamp(path)
@@ -162,6 +210,8 @@ def contents(path):
 
 def differences(one, other):
     """Names of what differs by a bit between two files."""
+    if one.suffix not in {".h5", ".h5md"}:
+        return [] if one.read_bytes() == other.read_bytes() else [one.name]
     a, b = contents(one), contents(other)
     return sorted(a.keys() ^ b.keys()) + [k for k in a.keys() & b.keys() if not _same(a[k], b[k])]
 

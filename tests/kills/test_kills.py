@@ -1,15 +1,23 @@
-"""Every driver, the sweep and the deck, killed at random moments: what they leave and where they get to."""
+"""Every command that writes and every deck, killed at random moments: what they leave and where they get to."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
-from killing import deck, differences, forked, killed, require_whole, uninterrupted
+from killing import GIVEN, deck, differences, forked, killed, require_whole, uninterrupted
 from lammps_scenes import REPOSITORY, nearest_image
+from lattices import discs
+from scenes import pressed
+from superellipsoid_packings import pressed_superellipsoids
 
-from jamshape.files.lammps_text import read_dump
+from jamshape.files.h5md import write_frames, write_packing
+from jamshape.files.lammps_text import read_dump, write_data
+from jamshape.protocols.random_start import random_packing
 
 pytestmark = pytest.mark.lammps
 
@@ -18,27 +26,80 @@ PACK = (*RODS, "--phi-start", 0.55, "--u0", 1e-6)
 DYNAMICS = (*PACK, "--kappa", 1e-5, "--p-end", 3e-4)
 STEPS = (*PACK, "--way", "steps", "--delta-phi", 2e-3)
 
+Given = Mapping[str, Callable[[Path], None]]
+"""How to write the files that a run is given, by name."""
+
+# --- what is given --------------------------------------------------------------------------------
+
+
+@cache
+def rods():
+    return pressed(n=100)
+
+
+@cache
+def bodies():
+    return pressed_superellipsoids(np.tile([1.0, 1.0, 1.5], (64, 1)), np.full(64, 1.5))
+
+
+def jammed_discs(path):
+    rows, columns = np.divmod(np.arange(144), 12)
+    position = 0.98 * np.column_stack([columns + rows % 2 / 2, rows * np.sqrt(3) / 2])
+    write_packing(path, discs(position, 0.98 * 12 * np.array([1, np.sqrt(3) / 2])), {"k_e": 1.0})
+
+
+def one_of_rods(path):
+    write_packing(path, rods())
+
+
+def one_of_bodies(path):
+    write_packing(path, bodies())
+
+
+def many_frames(path):
+    start = random_packing(100, 0.3, 1)
+    write_frames(path, [start.with_(position=start.position + k / 300) for k in range(300)])
+
+
+def data_of_rods(path):
+    write_data(path, rods())
+
+
+def data_of_bodies(path):
+    write_data(path, bodies())
+
+
+# --- commands -------------------------------------------------------------------------------------
+
 
 @dataclass(frozen=True)
 class Case:
-    """What is killed."""
+    """A command that is killed."""
 
     words: tuple
     results: tuple[str, ...]
-    """Files that are as if nothing had happened."""
+    """Files that are as if nothing had happened; the first is where to write, or else the folder of all."""
     resume: tuple = ()
     """Beside the words, where there is something to go on from."""
     patches: tuple = ()
     """Constants that are other than usual."""
+    given: Given = field(default_factory=dict)
+    beside: tuple = ()
+    """Options and the results that they name."""
 
     def require_same(self, expected, found):
         for result in self.results:
             assert not differences(expected / result, found / result)
+        left = [{path.name for path in folder.iterdir()} for folder in (expected, found)]
+        assert left[0] == left[1]
 
     def start(self, folder):
-        out = folder / (self.results[0] if len(self.results) == 1 else "")
+        out = folder / (self.results[0] if len(self.results) == 1 or self.beside else "")
         resume = self.resume if out.is_file() else ()
-        return forked([*self.words, *resume, "--out", out], folder / "said.log", self.patches)
+        read = [folder / GIVEN / name for name in self.given]
+        beside = [word if word.startswith("-") else folder / word for word in self.beside]
+        words = [*self.words, *read, *beside, *resume, "--out", out]
+        return forked(words, folder / "said.log", self.patches)
 
 
 CASES = {
@@ -66,36 +127,87 @@ CASES = {
         ("sweep", "--alpha", 0, 1, *DYNAMICS[2:], "--samples", 1, "--jobs", 2),
         tuple(f"alpha{alpha}_seed1.h5" for alpha in (0, 1)),
     ),
+    # These write at their end, or begin anew.
+    "initial": Case(("initial", "--n", 400, "--phi", 0.45), ("start.data",)),
+    "initial, H5MD": Case(("initial", "--n", 400, "--phi", 0.45, "--again"), ("start.h5",)),
+    "modes": Case(
+        ("modes", "--force", "--vectors"),
+        ("modes.h5", "modes.png"),
+        given={"packing.h5": jammed_discs},
+        beside=("--plot", "modes.png"),
+    ),
+    "draw": Case(("draw",), ("packing.png",), given={"packing.h5": one_of_rods}),
+    "draw in space": Case(
+        ("draw", "--dpi", 60, "--level", 2), ("packing.png",), given={"packing.h5": one_of_bodies}
+    ),
+    "export": Case(("export", "--again"), ("again.h5",), given={"run.h5": many_frames}),
+    "export for MDAnalysis": Case(("export",), ("run.h5md",), given={"run.h5": many_frames}),
+    "export for HOOMD": Case(("export",), ("run.gsd",), given={"run.h5": many_frames}),
 }
+
+
+# --- decks ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Deck:
     """A deck of LAMMPS that is killed."""
 
+    name: str
     settings: tuple
+    given: Given = field(default_factory=dict)
 
     def start(self, folder):
         out = folder / "out"
-        begun = any(out.glob("restart.[ab]"))
-        variables = [("out", out), *self.settings, *([("restart", out)] if begun else [])]
+        variables = [
+            ("out", out),
+            *self.settings,
+            *(("data", folder / GIVEN / x) for x in self.given),
+        ]
+        if any(out.glob("restart.[ab]")):
+            variables.append(("restart", out))
         words = [word for name, value in variables for word in ("-var", name, value)]
-        return deck(["-in", DECK, *words], folder / "said.log")
+        path = REPOSITORY / "inputs" / f"{self.name}.in"
+        return deck(["-in", path, *words], folder / "said.log")
 
     def require_same(self, expected, found):
+        self.require_same_result(expected / "out", found / "out")
+        left = [{path.name for path in (f / "out").iterdir()} for f in (expected, found)]
+        assert left[0] == left[1]
+
+    def require_same_result(self, expected, found):
         """Frames are the same to a bound: after a restart LAMMPS sums in another order."""
-        one, other = (read_dump(folder / "out" / "particles.dump") for folder in (expected, found))
+        one, other = (read_dump(folder / "particles.dump") for folder in (expected, found))
         assert [frame.step for frame in other] == [frame.step for frame in one]
         for a, b in zip(one, other, strict=True):
             np.testing.assert_array_equal(a.box.edges, b.box.edges)
             assert np.abs(nearest_image(b.position - a.position, a.box)).max() < 1e-10
             assert np.abs(np.sin((b.orientation - a.orientation) / 2)).max() < 1e-10
-        left = [{path.name for path in (f / "out").iterdir()} for f in (expected, found)]
-        assert left[0] == left[1]
 
 
-DECK = REPOSITORY / "inputs" / "compress_spherocylinder.in"
-CASES["deck"] = Deck((("n", 24), ("alpha", 1), ("kappa", 2e-4), ("phi_end", 0.86), ("dt", 0.1)))
+class Minimisation(Deck):
+    """A deck that begins anew."""
+
+    def require_same_result(self, expected, found):
+        assert not differences(expected / "final.data", found / "final.data")
+
+
+CASES |= {
+    "deck": Deck(
+        "compress_spherocylinder",
+        (("n", 24), ("alpha", 1), ("kappa", 2e-4), ("phi_end", 0.86), ("dt", 0.1)),
+    ),
+    "deck of superellipsoids": Deck(
+        "compress_superellipsoid", (("n", 24), ("kappa", 2e-4), ("phi_end", 0.7), ("dt", 0.5))
+    ),
+    "minimising deck": Minimisation("minimize_spherocylinder", (), {"start.data": data_of_rods}),
+    "minimising deck of superellipsoids": Minimisation(
+        "minimize_superellipsoid", (("maxiter", 300),), {"start.data": data_of_bodies}
+    ),
+}
+
+
+# --- kills ----------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +239,7 @@ def test_a_run_that_is_killed_ends_as_if_nothing_had_happened(whole, tmp_path, n
 
 
 # 300 in all.
-KILLS = dict.fromkeys(CASES, 54) | {"sweep": 30}
+KILLS = dict.fromkeys(CASES, 18) | {"sweep": 12}
 
 
 @pytest.mark.validate

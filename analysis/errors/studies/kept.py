@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.command import plain
+from jamshape.files.disk import store
 from jamshape.files.h5md import read_packing, write_packing
 from jamshape.files.vocabulary import renamed
 from jamshape.flow.compression import Compression, CompressionRun
@@ -18,7 +19,7 @@ from jamshape.packing import Packing
 def kept(path: Path, make: Callable[..., dict[str, Any]], *arguments: Any) -> dict[str, Any]:
     """Return what was found before, or find it."""
     if not path.exists():
-        path.write_text(json.dumps(plain(make(*arguments))))
+        store(path, json.dumps(plain(make(*arguments))).encode())
     return renamed(json.loads(path.read_text()))
 
 

@@ -23,8 +23,9 @@ from jamshape.exchange.gsd import write_gsd
 from jamshape.exchange.mdanalysis import write_mdanalysis
 from jamshape.exchange.ovito import to_ovito
 from jamshape.exchange.tools import tool
+from jamshape.files.disk import replacing
+from jamshape.files.h5md import write_run
 from jamshape.files.lammps_text import read_dump, write_data
-from jamshape.files.run_writer import RunWriter
 from jamshape.files.signature import DUMP, format_of
 from jamshape.front.files import load
 from jamshape.front.packing import MeasuredPacking
@@ -50,16 +51,17 @@ def _write_session(path: Path, packings: Sequence[Packing]) -> None:
     ovito, pipeline = tool("ovito", "ovito"), tool("ovito.pipeline", "ovito")
     data = to_ovito(packing, Contacts.of(packing).rattlers)
     pipeline.Pipeline(source=pipeline.StaticSource(data=data)).add_to_scene()
-    ovito.scene.save(str(path))
+    with replacing(path) as temporary:
+        ovito.scene.save(str(temporary))
 
 
 def _write_h5(path: Path, packings: Sequence[Packing]) -> None:
     first, *others = packings
-    MeasuredPacking.of(first, getattr(first, "results", {})).save(path)
+    measured = MeasuredPacking.of(first, getattr(first, "results", {}))
     if others:
-        with RunWriter.open(path) as writer:
-            for packing in others:
-                writer.append(packing)
+        write_run(path, packings, measured.to_store)
+    else:
+        measured.save(path)
 
 
 def _write_data(path: Path, packings: Sequence[Packing]) -> None:

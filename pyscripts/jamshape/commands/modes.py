@@ -20,6 +20,7 @@ from jamshape.checks import require_other_file
 from jamshape.command import parser_of, report
 from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.modes import mode_figure
+from jamshape.drawing.saving import save_figure
 from jamshape.files.sets import PackingFile
 from jamshape.front.modes import modes, require_modes_file
 from jamshape.vibration.sets import TOLD
@@ -126,6 +127,6 @@ def main(options: Namespace) -> None:
     redundant = tell_redundant(redundancies(matrix) if extra else [], packing.id)
     if options.plot:
         file = PackingFile.read(options.packing)
-        mode_figure(found.told, packing_text(file)).savefig(options.plot)
+        save_figure(mode_figure(found.told, packing_text(file)), options.plot)
     told = {"out": options.out, "bands": bands, **table.attributes}
     report(told | {"redundant": redundant})

@@ -19,11 +19,11 @@ from collections.abc import Sequence
 from datetime import datetime
 
 from jamshape.command import parser_of, report
-from jamshape.lammps.plugin import built_for, load_script_path, plugin_path
+from jamshape.lammps.plugin import built_for, include_line, load_script_path, plugin_path
 
 _LINES = """\
     atom_style ellipsoid
-    include "{script}"
+    {include}
 """
 
 _ASK_MODULE = """
@@ -47,14 +47,14 @@ def main(options: Namespace) -> None:
     if options.path:
         print(plugin)
         return
-    version, script = built_for(plugin), load_script_path()
+    version, script, line = built_for(plugin), load_script_path(), include_line()
     here = {"the command lmp": version_of_lmp(), "the Python module lammps": version_of_module()}
     print(f"plugin:     {plugin}")
     print(f"built for:  LAMMPS {version}")
     for name, found in here.items():
         print(f"            {name} {_compared(found, version)}")
     print(
-        f"\nlines that load it in a deck, before the first pair style:\n\n{_LINES.format(script=script)}\n"
+        f"\nlines that load it in a deck, before the first pair style:\n\n{_LINES.format(include=line)}\n"
     )
     names = dict(zip(("lmp", "module"), here.values(), strict=True))
     agrees = {found == version for found in here.values() if found}

@@ -13,6 +13,7 @@ from jamshape.contacts import Contacts
 from jamshape.drawing.colors import ORDER, Coloring, Scale
 from jamshape.drawing.kinds import kinds_of
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
+from jamshape.drawing.saving import save_figure
 from jamshape.drawing.space import save_smooth
 from jamshape.drawing.text import attributes_text, scientific
 from jamshape.files.h5md import FileFormatError, PathLike, read_attributes
@@ -107,7 +108,7 @@ def save_pictures(figure: Figure, pictures: Sequence[Picture], out: PathLike, dp
     if any(one.found.packing.dimension == 3 for one in pictures):
         save_smooth(figure, Path(out), dpi)
     else:
-        figure.savefig(out, dpi=dpi, bbox_inches="tight", pad_inches=0.05)
+        save_figure(figure, out, dpi=dpi, bbox_inches="tight", pad_inches=0.05)
 
 
 def title_of(found: Contacts, more: Sequence[str] = (), *, narrow: bool = False) -> str:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.drawing.saving import save_figure
+from jamshape.files.disk import replacing
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
 
@@ -164,7 +166,7 @@ def draw_bodies(axes: Axes, packing: Packing, colors: FloatArray, seen: tuple[Vi
 def save_smooth(figure: Figure, out: Path, dpi: int) -> None:
     """Save with the steps between faces smoothed; PNG only, other formats as they are."""
     if out.suffix.lower() != ".png":
-        figure.savefig(out, dpi=dpi)
+        save_figure(figure, out, dpi=dpi)
         return
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
     from matplotlib.image import imsave  # noqa: PLC0415
@@ -176,4 +178,5 @@ def save_smooth(figure: Figure, out: Path, dpi: int) -> None:
     height, width = (n - n % FINER for n in pixels.shape[:2])
     blocks = pixels[:height, :width].reshape(height // FINER, FINER, width // FINER, FINER, 3)
     smooth = blocks.mean(axis=(1, 3)).round().astype(np.uint8)
-    imsave(out, smooth, dpi=dpi, pil_kwargs={"optimize": True})
+    with replacing(out) as temporary:
+        imsave(temporary, smooth, format="png", dpi=dpi, pil_kwargs={"optimize": True})

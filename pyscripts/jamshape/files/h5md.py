@@ -49,6 +49,7 @@ from jamshape.files.layout import (
     Report,
     Series,
 )
+from jamshape.files.rows import check_after, check_same_particles
 from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, renamed
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT
@@ -71,6 +72,7 @@ __all__ = [
     "require_attributes",
     "write_frames",
     "write_packing",
+    "write_run",
 ]
 
 
@@ -113,14 +115,48 @@ def write_frames(
 ) -> None:
     """Write packings of the same particles as the frames of a run, with the steps 0, 1, 2, ...
 
-    Errors are those of `write_packing`.
+    Errors are those of `write_run`.
     """
+    write_run(path, [frame.with_(step=step) for step, frame in enumerate(frames)], attributes)
+
+
+def write_run(
+    path: PathLike, frames: Sequence[Packing], attributes: Mapping[str, Any] | None = None
+) -> None:
+    """Write packings as the frames of a run, replacing the file at `path` only when all are written.
+
+    Parameters
+    ----------
+    path : path-like
+    frames : sequence of Packing
+        Of the same particles, at steps that ascend.
+    attributes : mapping of str to bool, int, float, str or small array, optional
+
+    Raises
+    ------
+    ValueError
+        If the particles are not those of the first frame in the same order, or steps do not ascend.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from jamshape.files.h5md import count_frames, write_run
+    >>> from jamshape.protocols.random_start import random_packing
+    >>> packing = random_packing(n=8, phi=0.3, seed=1)
+    >>> write_run("two.h5", [packing, packing.with_(step=5)])
+    >>> count_frames("two.h5")
+    2
+    """
+    first, last = frames[0], frames[0].step
     with layout.written(path) as file:
-        layout.create_file(file, frames[0].with_(step=0), attributes or {}, {})
-        for step, frame in enumerate(frames[1:], start=1):
+        layout.create_file(file, first, attributes or {}, {})
+        for frame in frames[1:]:
+            check_same_particles(path, first, frame)
+            check_after("position", last, frame.step)
             rests = frame.has_rests or "position_rest" in file["particles/all"]
-            rows = layout.frames_table(frame.with_(step=step), rests=rests)
-            layout.append_table(file, layout.FRAMES, rows)
+            layout.append_table(file, layout.FRAMES, layout.frames_table(frame, rests=rests))
+            last = frame.step
 
 
 def read_packing(path: PathLike, frame: int = -1) -> Packing:

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jamshape.files.disk import PathLike
 from jamshape.files.journal import Record, Table
+from jamshape.packing import Packing
 
 if TYPE_CHECKING:
     import h5py
@@ -131,6 +133,17 @@ def check_after(name: str, last: int | None, step: int) -> None:
     if last is not None and step <= last:
         msg = f"{name} is stored up to step {last}, expected a step after it, found {step}"
         raise ValueError(msg)
+
+
+def check_same_particles(path: PathLike, first: Packing, packing: Packing) -> None:
+    """Refuse a frame of other particles than those of the first one."""
+    for name in ("dimension", "shape_style", "id", "species", "diameters", "exponent"):
+        if not np.array_equal(getattr(packing, name), getattr(first, name)):
+            msg = (
+                f"{path}: {name} differs from the first frame,"
+                " expected the same particles in the same order (Packing.sorted_by_id)"
+            )
+            raise ValueError(msg)
 
 
 def as_column(value: ArrayLike) -> NDArray[Any]:

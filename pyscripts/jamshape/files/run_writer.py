@@ -16,7 +16,16 @@ from jamshape.files import layout
 from jamshape.files.disk import PathLike, real
 from jamshape.files.h5md import read_packing
 from jamshape.files.journal import Journal, Table, journal_of, new_token
-from jamshape.files.rows import ATTRIBUTES, Columns, Stored, as_column, beside, check_after, table
+from jamshape.files.rows import (
+    ATTRIBUTES,
+    Columns,
+    Stored,
+    as_column,
+    beside,
+    check_after,
+    check_same_particles,
+    table,
+)
 from jamshape.packing import Packing
 
 if TYPE_CHECKING:
@@ -139,7 +148,7 @@ class RunWriter:
             If the particles are not those of the first frame in the same order, or the step is
             not after the last one.
         """
-        self._check_same_particles(packing)
+        check_same_particles(self.path, self.first, packing)
         step, stored = packing.step, self._stored
         check_after("position", stored.frame, step)
         columns = {name: as_column(value) for name, value in (observables or {}).items()}
@@ -305,12 +314,3 @@ class RunWriter:
             self._stored = Stored.of(file)
         if token:
             self._begin(token, perf_counter() - began)
-
-    def _check_same_particles(self, packing: Packing) -> None:
-        for name in ("dimension", "shape_style", "id", "species", "diameters", "exponent"):
-            if not np.array_equal(getattr(packing, name), getattr(self.first, name)):
-                msg = (
-                    f"{self.path}: {name} differs from the first frame,"
-                    " expected the same particles in the same order (Packing.sorted_by_id)"
-                )
-                raise ValueError(msg)

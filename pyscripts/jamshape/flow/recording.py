@@ -17,7 +17,7 @@ from jamshape.files.h5md import (
     require_attributes,
 )
 from jamshape.files.restarts import RestartFiles
-from jamshape.files.run_writer import RunWriter
+from jamshape.files.run_writer import RunWriter, fold
 from jamshape.flow.compression import Compression, CompressionRun, Row
 from jamshape.measures.onset import fit_onset
 from jamshape.measures.runs import rate_of
@@ -62,7 +62,23 @@ class Recording:
     @property
     def restarts(self) -> RestartFiles:
         """The restart files."""
-        return RestartFiles(self.path.with_name(self.path.name + ".restart"))
+        return _restarts_of(self.path)
+
+
+def _restarts_of(path: Path) -> RestartFiles:
+    return RestartFiles(path.with_name(path.name + ".restart"))
+
+
+def tidy(path: Path) -> None:
+    """Remove what a kill at the very end of a run has left beside its file: its journal and restart files.
+
+    Raises
+    ------
+    FileFormatError, OSError
+        As `RunWriter`.
+    """
+    fold(path)
+    _restarts_of(path).forget()
 
 
 def is_finished(path: Path) -> bool:

@@ -16,7 +16,6 @@ from jamshape.checks import (
     require_stated,
 )
 from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
-from jamshape.files.run_writer import fold
 from jamshape.flow import recording, slow_recording
 from jamshape.flow.compression import Compression, Row
 from jamshape.flow.implicit import Protocol, Step
@@ -170,7 +169,7 @@ def resume(file: str | Path, *, progress: bool = True) -> RunFile:
             require_path_for_lammps(path)
             to = Recording(path, stored["rows"], stored["frames"])
             _record(lambda session: recording.resume(session, path)[0], to, progress)
-    fold(path)
+    recording.tidy(path)
     return RunFile(path)
 
 

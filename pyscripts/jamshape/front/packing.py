@@ -121,8 +121,12 @@ class MeasuredPacking(Packing):
 
     def save(self, path: str | Path) -> None:
         """Write it with its results to an H5MD file, replacing what is there."""
-        # A frame of a run is not that run, which could be gone on with.
-        write_packing(path, self, {k: v for k, v in self.results.items() if k != "finished"})
+        write_packing(path, self, self.to_store)
+
+    @property
+    def to_store(self) -> dict[str, Any]:
+        """Give the results without what tells of a run: a frame is not that run, which could be gone on with."""
+        return {k: v for k, v in self.results.items() if k != "finished"}
 
     def to_gsd(self, path: str | Path) -> None:
         """Write it for HOOMD-blue, OVITO and freud; needs the package gsd."""

@@ -77,6 +77,36 @@ def load_script_path() -> Path:
     return decks_path() / LOADER_NAME
 
 
+def include_line(script: Path | None = None) -> str:
+    """Line of a deck that includes `load_plugin.lmp`.
+
+    Parameters
+    ----------
+    script
+        The file; that of this installation when left out.
+
+    Raises
+    ------
+    PluginError
+        When there is none, or LAMMPS could not read its path in a deck: in quotes LAMMPS changes letters that are not
+        ASCII, and there is no way to write both kinds of quotes.
+
+    Examples
+    --------
+    >>> include_line(Path("/home/you/jamshape/inputs/load_plugin.lmp"))
+    'include "/home/you/jamshape/inputs/load_plugin.lmp"'
+    """
+    path = str(script or load_script_path())
+    for quote in ('"', "'"):
+        if path.isascii() and path.isprintable() and quote not in path:
+            return f"include {quote}{path}{quote}"
+    msg = (
+        f"Found {path}, which LAMMPS cannot read in a deck, expected a path of ASCII letters with at most one kind of "
+        f"quotes: copy the file beside your deck, write 'include {LOADER_NAME}', and set JAMSHAPE_PLUGIN to the plugin."
+    )
+    raise PluginError(msg)
+
+
 def built_for(plugin: Path | None = None) -> int:
     """LAMMPS version that a plugin was compiled for, as an integer such as 20210929.
 

@@ -72,6 +72,7 @@ class ByDynamics:
         """Compress, going on with what an earlier call has left."""
         if is_compressed(self.run_file):
             fold(self.run_file)
+            self._forget_restarts()  # a kill after the end may have left some
             return
         if self.recipe.target:
             require_reachable(Landscape(self.recipe.start()), self.recipe.target)
