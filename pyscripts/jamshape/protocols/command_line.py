@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
-from jamshape.protocols.defaults import SETTINGS, recipe_for
+from jamshape.protocols.defaults import SETTINGS, WAYS, recipe_for
 from jamshape.protocols.recipe import Recipe
 from jamshape.shapes.command_line import add_particle_options, particles_of
 
@@ -16,12 +16,12 @@ def add_recipe_options(parser: ArgumentParser) -> None:
     group = parser.add_argument_group("how to make it")
     group.add_argument("--dimension", type=int, choices=(2, 3), help="(that of the shape's paper)")
     group.add_argument(
-        "--way", choices=("dynamics", "steps"),
+        "--way", choices=tuple(WAYS),
         help="to jamming: slow compression in LAMMPS (2D), or quasistatic steps (3D, or --protocol)",
     )  # fmt: skip
     group.add_argument("--seed", type=int, default=1, help="of all that is random (1)")
     for one in SETTINGS:
-        usual = {"dynamics": one.dynamics, "steps": one.steps}
+        usual = {way: table.usual.get(one.name) for way, table in WAYS.items()}
         text = ", ".join(f"{way} {value:g}" for way, value in usual.items() if value is not None)
         option = f"--{one.name.replace('_', '-')}"
         group.add_argument(option, type=one.kind, help=f"{one.meaning} ({text})")

@@ -8,7 +8,7 @@ beside the result, so that a path that was cut off goes on where it was.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,14 @@ from jamshape.files.h5md import read_attributes, require_attributes
 from jamshape.measures.minimum import summary_of, write_minimum
 from jamshape.protocols.by_dynamics import ByDynamics
 from jamshape.protocols.by_steps import BySteps
-from jamshape.protocols.making import Progress, SearchFile, lead
-from jamshape.protocols.recipe import Dynamics, Recipe, Steps, Thermalisation
+from jamshape.protocols.making import Making, Progress, SearchFile, lead
+from jamshape.protocols.recipe import Dynamics, Recipe, Steps, Thermalisation, Way
+
+_MAKING: dict[type[Way], Callable[[Recipe, Path], Making]] = {
+    Dynamics: ByDynamics,
+    Steps: BySteps,
+}
+"""Who goes each way."""
 
 __all__ = [
     "Dynamics",
@@ -83,8 +89,8 @@ def tidy(recipe: Recipe, out: Path) -> None:
     _way(recipe, out).done()
 
 
-def _way(recipe: Recipe, out: Path) -> ByDynamics | BySteps:
-    return ByDynamics(recipe, out) if isinstance(recipe.way, Dynamics) else BySteps(recipe, out)
+def _way(recipe: Recipe, out: Path) -> Making:
+    return _MAKING[type(recipe.way)](recipe, out)
 
 
 def _search(recipe: Recipe, out: Path) -> SearchFile:

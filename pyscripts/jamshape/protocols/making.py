@@ -1,11 +1,11 @@
-"""What both ways to a packing share: progress, and the search for an energy in a file."""
+"""What all ways to a packing share: what each of them offers, progress, and the search for an energy in a file."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from jamshape.files.h5md import read_attributes, read_packing, write_frames
 from jamshape.files.journal import remove_run
@@ -42,6 +42,34 @@ class Progress:
     energy_density: float
     text: str
     part: float | None = None
+
+
+class Making(Protocol):
+    """A way to jamming that is being gone, in memory and in files beside the packing."""
+
+    minimum: Minimum | None
+    """The packing, where it needs no search for an energy."""
+
+    def require_own(self) -> None:
+        """Refuse what another recipe has left; raises ValueError."""
+
+    def forget(self) -> None:
+        """Remove what an earlier call has left."""
+
+    def steps(self) -> Iterator[Progress]:
+        """Go to the end, from where an earlier call has left it."""
+
+    def landscape(self) -> Landscape:
+        """Landscape of the packing."""
+
+    def state(self) -> State:
+        """Where the search for an energy begins."""
+
+    def measured(self) -> dict[str, Any]:
+        """Return what only this way knows."""
+
+    def done(self) -> None:
+        """Remove what nobody needs beside a finished packing."""
 
 
 @dataclass(eq=False)

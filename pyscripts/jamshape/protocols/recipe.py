@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -44,6 +44,19 @@ class Thermalisation:
         require_stated(phi_thermal=self.phi, n_sweeps=self.n_sweeps)
 
 
+class Way(Protocol):
+    """From a random start to jamming."""
+
+    def start(self, recipe: Recipe) -> Packing:
+        """Make the random start."""
+
+    def attributes(self, target: Target | None) -> dict[str, Any]:
+        """Return what identifies it, to be stored."""
+
+    def require(self, recipe: Recipe) -> None:
+        """Refuse a recipe that this way cannot follow; raises ValueError."""
+
+
 @dataclass(frozen=True)
 class Steps:
     """Quasistatic steps from the random start to the first jammed packing (Yuan et al. 2019, Sec. 2.2).
@@ -75,6 +88,15 @@ class Steps:
             found |= {"phi_thermal": self.thermal.phi, "n_sweeps": self.thermal.n_sweeps}
         return found | {f"quasistatic_{k}": v for k, v in vars(self.compression(target)).items()}
 
+    def require(self, recipe: Recipe) -> None:
+        """Refuse a start that is denser than the Monte Carlo."""
+        if self.thermal and not recipe.phi_start < self.thermal.phi:
+            found = (
+                f"phi_start is {recipe.phi_start} and the Monte Carlo runs at {self.thermal.phi}"
+            )
+            msg = f"{found}, expected a start at a smaller packing fraction"
+            raise ValueError(msg)
+
 
 @dataclass(frozen=True)
 class Dynamics:
@@ -99,6 +121,12 @@ class Dynamics:
         del target
         found = {f"approach_{k}": v for k, v in vars(self.approach).items()}
         return found | {"kappa": self.approach.kappa}
+
+    def require(self, recipe: Recipe) -> None:
+        """Refuse a recipe without an energy."""
+        if recipe.target is None:
+            msg = "there is no energy to reach, expected one after a compression by dynamics (u0)"
+            raise ValueError(msg)
 
 
 @dataclass(frozen=True)
@@ -137,20 +165,13 @@ class Recipe:
     dimension: int = 2
     seed: int = 1
     phi_start: float = 0.4
-    way: Dynamics | Steps = field(default_factory=Dynamics)
+    way: Way = field(default_factory=Dynamics)
     target: Target | None = field(default_factory=Target)
 
     def __post_init__(self) -> None:
         require_stated(n=self.n, seed=self.seed, phi_start=self.phi_start)
         require_one_of("dimension", self.dimension, (2, 3))
-        thermal = self.way.thermal if isinstance(self.way, Steps) else None
-        if thermal and not self.phi_start < thermal.phi:
-            found = f"phi_start is {self.phi_start} and the Monte Carlo runs at {thermal.phi}"
-            msg = f"{found}, expected a start at a smaller packing fraction"
-            raise ValueError(msg)
-        if self.target is None and isinstance(self.way, Dynamics):
-            msg = "there is no energy to reach, expected one after a compression by dynamics (u0)"
-            raise ValueError(msg)
+        self.way.require(self)
 
     def start(self) -> Packing:
         """Make the random start; errors as `random_start.random_packing`."""
