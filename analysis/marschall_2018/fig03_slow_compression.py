@@ -174,7 +174,7 @@ def read_packings(paths: list[Path]) -> dict[Place, list[float]]:
     found: dict[Place, list[float]] = {}
     for file in map(PackingFile.read, paths):
         if "phi_J" in file.attributes:
-            system = file.system()._replace(protocol=0, n_sweeps=0)
+            system = file.system()._replace(protocol="", n_sweeps=0)
             place = Place(system, int(file.number("n")))
             found.setdefault(place, []).append(file.number("phi_J"))
     return found

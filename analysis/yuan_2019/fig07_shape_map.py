@@ -4,7 +4,7 @@
 
 Left phi_J against the reduced aspect ratio beta, in bands of asphericity A = 0.1, 0.15, 0.2, 0.25 (+- 0.025),
 without boxes (p > 1), as in the paper, and what is below; right phi_J as color against A and beta, with contours
-where there are enough shapes (10). One protocol is drawn (--protocol 1). The last line of standard output is one
+where there are enough shapes (10). One protocol is drawn (--protocol). The last line of standard output is one
 JSON object.
 """
 
@@ -21,6 +21,7 @@ from jamshape.drawing.families import NEEDS, beta, shape_of
 from jamshape.drawing.styles import BLACK, COLORS, PAPER_LINE
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, System, conditions, only, read_groups
+from jamshape.files.vocabulary import ATHERMAL, NUMBERED, read_protocol
 from jamshape.measures.averages import Mean, averages, exactly, rows
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def main(options: Namespace) -> None:
     every = read_groups(options.files, needs=(*NEEDS, "asphericity", "phi_J"))
     groups = only(every, lambda system: system.protocol == options.protocol)
     if not groups:
-        msg = f"no packing is of protocol {options.protocol}, expected one"
+        msg = f"no packing is of the protocol {options.protocol}, expected one"
         raise ValueError(msg)
     contours = draw(groups, options)
     columns = {name: averages(groups, name) for name in ("phi_J", "asphericity")}
@@ -115,5 +116,8 @@ def main(options: Namespace) -> None:
 
 if __name__ == "__main__":
     parser = parser_of(__doc__, "shape_map.png", "SWEEP")
-    parser.add_argument("--protocol", type=int, choices=(1, 2), default=1, help="(%(default)s)")
+    parser.add_argument(
+        "--protocol", type=read_protocol, choices=tuple(NUMBERED.values()), default=ATHERMAL,
+        help="or its number (%(default)s)",
+    )  # fmt: skip
     run(parser, main)

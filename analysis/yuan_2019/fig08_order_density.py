@@ -25,12 +25,12 @@ NAMES = ("phi_J", *PANELS)
 
 def particles(system: System) -> System:
     """Tell what is packed, however it was."""
-    return system._replace(protocol=0, n_sweeps=0)
+    return system._replace(protocol="", n_sweeps=0)
 
 
 def with_both(groups: Groups) -> Groups:
     """Keep shapes of both protocols, or all if there is none."""
-    protocols: dict[System, set[int]] = {}
+    protocols: dict[System, set[str]] = {}
     for system in groups:
         protocols.setdefault(particles(system), set()).add(system.protocol)
     shown = only(groups, lambda system: len(protocols[particles(system)]) > 1)

@@ -84,7 +84,7 @@ CASES = [
     *each(STEPS, ["--delta-phi", "--phi-start", "--u0"], NO_NUMBERS),
     *each(f"{STEPS} --protocol 2", ["--phi-thermal"], NO_NUMBERS),
     *each(f"{STEPS} --protocol 2", ["--n-sweeps"], ["-1", "1.5", "99999999999"]),
-    (f"{STEPS} --protocol 3", "protocol is 3"),
+    (f"{STEPS} --protocol 3", "protocol is '3'"),
     (f"{STEPS} --protocol 2 --phi-thermal 0.2", "a start at a smaller packing fraction"),
     (f"{STEPS} --kappa 1e-6", "no setting of the way"),
     (f"{PACK} --delta-phi 1e-3", "no setting of the way"),

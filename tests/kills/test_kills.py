@@ -53,6 +53,10 @@ CASES = {
         ("packing.h5",),
         patches=(("jamshape.protocols.by_steps._STORE_SECONDS", 0.0),),
     ),
+    "pack as published": Case(
+        ("pack", *PACK, "--protocol", "marschall-2018", "--kappa", 1e-4, "--search", "halving"),
+        ("packing.h5",),
+    ),
     "slow": Case(
         ("slow", *RODS, "--kappa", 1e-6, "--phi-start", 0.78, "--phi-end", 0.86),
         ("slow.h5",),

@@ -6,6 +6,7 @@ from mixtures import bidisperse, superellipsoids
 from pictures import image
 
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
+from jamshape.files.vocabulary import ATHERMAL, THERMAL
 from jamshape.minima.target import Target
 from jamshape.protocols.make import Recipe, Steps, Thermalisation, make
 from jamshape.protocols.quasistatic import Quasistatic
@@ -150,7 +151,7 @@ def test_global_order(drawn, sweep, thermal):
     assert found["one_over_sqrt_n"] == pytest.approx(1 / np.sqrt(N))
     assert found["random"]["S2"] == pytest.approx(0.19, abs=0.04)
     assert len(found["order"]) == 6
-    assert {row["protocol"] for row in found["order"]} == {1, 2}
+    assert {row["protocol"] for row in found["order"]} == {ATHERMAL, THERMAL}
 
 
 @pytest.mark.parametrize("quantity", ["phi_J", "z"])
@@ -165,7 +166,7 @@ def test_asphericity(drawn, sweep, quantity):
 def test_shape_map_and_plane(drawn, wrong, sweep, thermal):
     found = drawn(MAP, sweep)
     assert (found["contours"], len(found["shapes"])) == (False, 5)
-    assert "no packing is of protocol 2" in wrong(MAP, sweep, "--protocol", 2)
+    assert "no packing is of the protocol yuan-2019-2" in wrong(MAP, sweep, "--protocol", 2)
     assert len(drawn(MAP, sweep, thermal, "--protocol", 2)["shapes"]) == 1
     rows = rows_by_shape(drawn(PLANE, sweep)["shapes"])
     assert rows[1.0, 0.8, 1.25, 1]["beta"]["value"] == pytest.approx(1)
@@ -173,7 +174,10 @@ def test_shape_map_and_plane(drawn, wrong, sweep, thermal):
 
 def test_order_and_density_of_both_protocols(drawn, sweep, thermal):
     found = drawn(DENSITY, sweep, thermal)
-    assert {(row["exponent"], row["protocol"]) for row in found["shapes"]} == {(1.5, 1), (1.5, 2)}
+    assert {(row["exponent"], row["protocol"]) for row in found["shapes"]} == {
+        (1.5, ATHERMAL),
+        (1.5, THERMAL),
+    }
     (gain,) = found["gains"]
     of = [
         read_attributes(path)["phi_J"] for path in (sweep / "p1.5_w1_1_seed1.h5", thermal / "a.h5")

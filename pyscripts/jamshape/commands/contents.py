@@ -50,6 +50,7 @@ _STORED = (
     _Stored("steps on the way to a packing", "loose_phi", _OTHER_COMMAND),
     _Stored("slow run", "flow_steps", "start the command that began it again"),
     _Stored("compression on the way to a packing", "restart_step", _OTHER_COMMAND),
+    _Stored("compression on the way to a packing", "of_packing", _OTHER_COMMAND),
     _Stored("run", "finished", "jamshape compress --resume --out {path}"),
     _Stored("packing", "", ""),
 )

@@ -1,11 +1,15 @@
 """Make one mechanically stable packing of any shape: compress, find its energy, measure, store as H5MD.
 
     jamshape pack --shape spherocylinder --alpha 4 --n 256 --seed 1 --u0 1e-15 --out packing.h5
-    jamshape pack --shape superellipsoid --p 1.5 --w1 1 --w2 1 --n 400 --protocol 1 --seed 1 --out packing.h5
+    jamshape pack --shape superellipsoid --p 1.5 --w1 1 --w2 1 --protocol yuan-2019-1 --seed 1 --out packing.h5
+    jamshape pack --alpha 4 --n 256 --protocol marschall-2018 --out packing.h5
+    jamshape pack --protocol marschall-2018 --start slow.h5 --search halving --out packing.h5
     jamshape pack --kind alpha=0,share=0.5 --kind alpha=4,size=1.4,share=0.5 --n 256 --out mixture.h5
 
-In 2D as Marschall & Teitel 2018: compressed by LAMMPS, led to the energy density u0. In 3D as Yuan et al.
-2019: compressed by quasistatic steps to the first packing with U/N > 1e-10, and to u0 if given.
+In 2D compressed by LAMMPS and opened again, then led to the energy density u0; in 3D compressed by quasistatic
+steps to the first packing with U/N > 1e-10, and to u0 if given. --protocol makes it as a paper did, with the
+paper's numbers: marschall-2018 by a compression at one rate and the energy of Sec. III C, yuan-2019-1 and
+yuan-2019-2 by the steps of Sec. 2.2.
 
 The last line of standard output is one JSON object; the exit code is 0 only if the minimum was
 reached. Beside the result lies, until it is done, all that is needed to go on: a run that was killed does
@@ -19,9 +23,8 @@ from pathlib import Path
 
 from jamshape.command import parser_of, report
 from jamshape.front.making import make_packing
-from jamshape.protocols.command_line import add_recipe_options, settings_of
+from jamshape.protocols.command_line import add_recipe_options, asked_particles, settings_of
 from jamshape.protocols.make import summary_of
-from jamshape.shapes.command_line import particles_of
 
 GO_ON = "the same command goes on from the files beside the result"
 
@@ -38,7 +41,7 @@ def options_of() -> ArgumentParser:
 def main(options: Namespace) -> int:
     """Make the packing unless it is there; return the exit code."""
     settings = settings_of(options)
-    make_packing(particles_of(options), **settings, file=options.out, again=options.again)
+    make_packing(asked_particles(options), **settings, file=options.out, again=options.again)
     found = summary_of(options.out)
     report(found)
     return 0 if found["reached"] else 1

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.drawing.styles import BLACK, BLUE, GREEN, ORANGE, RED, SKY
 from jamshape.files.sets import System, is_among
+from jamshape.files.vocabulary import THERMAL
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import SHAPES
 
@@ -17,7 +18,6 @@ NEEDS = ("exponent", "w1", "w2")
 """Numbers that files of such shapes have."""
 
 SPHERES = "spheres"
-THERMAL = 2  # protocol
 
 # beta this near to 1 is that of self-dual ellipsoids.
 _DUAL = 0.02

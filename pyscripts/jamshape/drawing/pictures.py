@@ -76,7 +76,7 @@ def read_picture(path: Path, frame: int = -1, sides: int | None = None, color: s
     more = attributes_text(known)
     more += [rf"${name[0]}_{name[1]}={value:.3f}$" for name, value in known_order.items()]
     if "protocol" in known:
-        more.append(f"protocol {known['protocol']}")
+        more.append(str(known["protocol"]))
     return Picture(found, more, told | known_order)
 
 

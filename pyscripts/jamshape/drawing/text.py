@@ -109,7 +109,7 @@ def systems_text(systems: Iterable[System]) -> str:
         parts.append(system_text(found[0]))
     elif len(shapes) == 1:
         parts += _ranges(found)
-    parts += [protocol_text(found[0])] * (len(protocols) == 1 and protocols != [0])
+    parts += [protocol_text(found[0])] * (len(protocols) == 1 and protocols != [""])
     return ", ".join(filter(None, parts))
 
 
@@ -230,4 +230,4 @@ def pressure_unit(systems: Collection[System]) -> str:
 def protocol_text(system: System) -> str:
     """Name how the packings of a system were made."""
     sweeps = f", {system.n_sweeps} sweeps" * (system.n_sweeps > 0)
-    return f"protocol {system.protocol}{sweeps}" if system.protocol else "dynamics"
+    return f"{system.protocol}{sweeps}" if system.protocol else "dynamics"

@@ -49,7 +49,7 @@ from jamshape.files.layout import (
     Report,
     Series,
 )
-from jamshape.files.vocabulary import FORMAT_VERSION, renamed
+from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, renamed
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT
 
@@ -159,7 +159,8 @@ def read_attributes(path: PathLike) -> dict[str, Any]:
     """Read the attributes, as bool, int, float, str or array; errors as `read_packing`."""
     with layout.opened(path) as file:
         attributes = layout.require_item(file, "parameters").attrs
-        return renamed({name: layout.plain(value) for name, value in attributes.items()})
+        found = renamed({name: layout.plain(value) for name, value in attributes.items()})
+    return found | {k: protocol_named(v) for k, v in found.items() if k == "protocol"}
 
 
 def require_attributes(out: Path, expected: Mapping[str, Any], what: str = "a packing") -> None:

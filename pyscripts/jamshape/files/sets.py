@@ -18,6 +18,7 @@ import numpy as np
 from jamshape.contacts import Contacts, find_contacts, find_rattlers
 from jamshape.files import layout
 from jamshape.files.h5md import FileFormatError, read_attributes, read_observables, read_packing
+from jamshape.files.vocabulary import protocol_named
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT, shape_named
 
@@ -41,8 +42,8 @@ class System(NamedTuple):
     """Those of the shape, by name; none of a mixture, and none where files do not tell all."""
     kinds: str = ""
     """The particles of a mixture."""
-    protocol: int = 0
-    """Of quasistatic steps: 1, or 2 with Monte Carlo on the way; 0 of compressions by dynamics."""
+    protocol: str = ""
+    """The published one, by name; none of other ways to jamming."""
     n_sweeps: int = 0
     """Of Monte Carlo."""
 
@@ -141,7 +142,8 @@ def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> Syst
     told = set(names) <= attributes.keys()
     known = tuple((name, float(attributes[name])) for name in names if told)
     kinds = str(attributes.get("kinds", ""))
-    protocol, sweeps = (int(attributes.get(name, 0)) for name in ("protocol", "n_sweeps"))
+    protocol = str(protocol_named(attributes.get("protocol", "")))
+    sweeps = int(attributes.get("n_sweeps", 0))
     return System(shape, dimension, known, kinds, protocol, sweeps)
 
 
@@ -244,7 +246,7 @@ def conditions(groups: Mapping[Any, Sequence[PackingFile]]) -> dict[str, Any]:
 
 def of_paper(system: System) -> bool:
     """Whether it is what Marschall & Teitel, PRE 97, 012905, studied, whatever its parameters."""
-    return system._replace(parameters=(), protocol=0, n_sweeps=0) == System(DEFAULT, 2, ())
+    return system._replace(parameters=(), protocol="", n_sweeps=0) == System(DEFAULT, 2, ())
 
 
 def only(groups: Groups, chosen: Callable[[System], bool]) -> Groups:
@@ -270,7 +272,9 @@ def one_curve(groups: Groups, name: str) -> tuple[System, Curve]:
     """
     curves = curves_over(groups, name)
     if len(curves) > 1:
-        found = " and ".join(f"{s.shape}s in {s.dimension}D, protocol {s.protocol}" for s in curves)
+        found = " and ".join(
+            f"{s.shape}s in {s.dimension}D, protocol {s.protocol or 'none'}" for s in curves
+        )
         msg = f"packings are {found}, expected systems that differ in {name} only; give such files"
         raise ValueError(msg)
     return next(iter(curves.items()))

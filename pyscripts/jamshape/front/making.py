@@ -9,16 +9,16 @@ from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow, place
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Progress, is_done, make, require_same, tidy
-from jamshape.protocols.recipe import Dynamics
+from jamshape.protocols.recipe import Compressed, Dynamics
 from jamshape.shapes.particles import Particles
 
 
 def make_packing(
-    particles: Particles,
+    particles: Particles | None = None,
     *,
     n: int | None = None,
     dimension: int | None = None,
-    seed: int = 1,
+    seed: int | None = None,
     u0: float | None = None,
     accuracy: float | None = None,
     tolerance: float | None = None,
@@ -26,10 +26,14 @@ def make_packing(
     phi_start: float | None = None,
     kappa: float | None = None,
     p_end: float | None = None,
-    protocol: int | None = None,
+    phi_end: float | None = None,
+    protocol: int | str | None = None,
     phi_thermal: float | None = None,
     n_sweeps: int | None = None,
     delta_phi: float | None = None,
+    start: str | Path | None = None,
+    search: str | None = None,
+    minimiser: str | None = None,
     file: str | Path | None = None,
     again: bool = False,
     progress: bool = True,
@@ -38,14 +42,14 @@ def make_packing(
 
     Parameters
     ----------
-    particles : Particles
-        Such as ``Spherocylinders(alpha=4)``.
+    particles : Particles, optional
+        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given, which has its own.
     n : int, optional
-        Number of particles; 256 in 2D, 400 in 3D when left out.
+        Number of particles; 256 in 2D, 400 in 3D when left out, or that of the protocol.
     dimension : {2, 3}, optional
         That of the shape's paper when left out.
-    seed : int
-        Of all that is random.
+    seed : int, optional
+        Of all that is random; 1 when left out.
     u0 : float, [energy / length^D], optional
         Elastic energy over the box's area (volume) to lead the packing to, which says how far above
         jamming it is; 1e-15 when left out, or 0 for the way by steps: the first jammed packing as it is.
@@ -60,15 +64,29 @@ def make_packing(
     phi_start : float, optional
         Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D when left out.
     kappa : float, [1/time], optional
-        Of the way by dynamics: the slowest compression rate; 4e-7 when left out.
+        Of the way by dynamics the slowest compression rate, 4e-7 when left out; of marschall-2018 the
+        only one, 1e-6 when left out.
     p_end : float, [energy / length^D], optional
-        Of that way: the pressure to compress to at that rate; 1e-3 when left out.
-    protocol : {1, 2}, optional
-        Of the way by steps: 2 with Monte Carlo of hard particles on the way, which orders them.
+        Of the way by dynamics: the pressure to compress to at that rate; 1e-3 when left out.
+    phi_end : float, optional
+        Of marschall-2018: the packing fraction to compress to, beyond jamming; 0.95 in 2D, 0.8 in 3D when
+        left out.
+    protocol : {"marschall-2018", "yuan-2019-1", "yuan-2019-2"}, optional
+        In place of a way: as published, with the paper's numbers for what is left out (Marschall & Teitel
+        2018, Sec. II and III B-C; Yuan et al. 2019, Sec. 2.2, where 2 has Monte Carlo of hard particles on
+        the way, which orders them). 1 and 2 are short for the last two.
     phi_thermal, n_sweeps : float, int, optional
-        Of protocol 2: packing fraction and sweeps of the Monte Carlo; 0.55 and 100000 when left out.
+        Of yuan-2019-2: packing fraction and sweeps of the Monte Carlo; 0.55 and 100000 when left out.
     delta_phi : float, optional
         Of the way by steps: the step of the packing fraction; 1e-3 when left out.
+    start : path, optional
+        Of marschall-2018: a file of `compress` or `slow_compress` in place of the compression. The search
+        begins at its first frame that stays jammed when it is minimised; particles, n and seed are its own.
+    search : {"direct", "halving"}, optional
+        Of marschall-2018: how u0 is found; by ours, which leads box and particles at once (usual), or by
+        the paper's steps of the box, 1e-6 at first and halved where u crosses u0 (Sec. III C, Eq. 20).
+    minimiser : {"auto", "paper", "newton", "lbfgs", "lammps"}, optional
+        Of the halving search: "paper" is the conjugate gradients of its App. A; "auto" when left out.
     file : path, optional
         H5MD file of the packing. One of this recipe is loaded from it, one that was cut off goes on from
         files beside it, and one of another recipe is refused. Without it nothing is kept but the result.
@@ -101,11 +119,14 @@ def make_packing(
     """
     recipe = recipe_for(
         particles, dimension, way, seed, n=n, u0=u0, accuracy=accuracy, tolerance=tolerance,
-        phi_start=phi_start, kappa=kappa, p_end=p_end, protocol=protocol,
-        phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi,
+        protocol=protocol, phi_start=phi_start, kappa=kappa, p_end=p_end, phi_end=phi_end,
+        phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi, start=start,
+        search=search, minimiser=minimiser,
     )  # fmt: skip
     at = place(file, "packing.h5")
-    (require_path_for_lammps if isinstance(recipe.way, Dynamics) else require_path)(at.path)
+    (require_path_for_lammps if isinstance(recipe.way, Dynamics | Compressed) else require_path)(
+        at.path
+    )
     if again or not is_done(at.path):
         steps = make(recipe, at.path, again=again)
         follow(steps, _told, shown=progress)

@@ -21,6 +21,9 @@ from jamshape.packing import Packing
 # Of `compressed_start`.
 _KAPPA_FAST, _DT_FAST = 1e-4, 0.2
 
+# Time steps after which it has failed: days for small packings. Slower rates are those of implicit steps.
+MOST_STEPS = 1_000_000_000
+
 _NO_END = 1e3  # a packing fraction that is never reached
 
 # Time steps stay below this fraction of what is stable; denser states allow less.
@@ -55,7 +58,8 @@ class Approach:
     Raises
     ------
     ValueError
-        If a number is not positive, or `kappa` above `kappa_start`.
+        If a number is not positive, `kappa` above `kappa_start`, or so small that the pressure does not
+        rise by `p_end` in `MOST_STEPS` time steps.
     """
 
     kappa: float = 1e-7
@@ -71,6 +75,18 @@ class Approach:
         if self.kappa > self.kappa_start:
             msg = f"kappa is {self.kappa}, expected at most kappa_start = {self.kappa_start}"
             raise ValueError(msg)
+        # The pressure of a jammed state rises by about the strain of the box, in units of k_e.
+        least = self.p_end / (MOST_STEPS * self.dt)
+        if self.kappa < least:
+            msg = (
+                f"kappa is {self.kappa:g}, expected at least {least:g}: below, {MOST_STEPS:.0e} time steps do"
+                " not lead through jamming; use jamshape slow, whose steps are implicit"
+            )
+            raise ValueError(msg)
+
+
+class ApproachError(RuntimeError):
+    """The state was not jammed in time; the sentence says where it is."""
 
 
 def compressed_start(start: Packing, phi: float) -> Packing:
@@ -99,6 +115,8 @@ def resume_approach(
 def approach(run: CompressionRun, settings: Approach) -> Iterator[Row]:
     """Compress until the state is jammed, then open the box until the pressure is nearly gone.
 
+    Either ends so, or after `MOST_STEPS` time steps in all.
+
     Parameters
     ----------
     run : CompressionRun
@@ -110,6 +128,11 @@ def approach(run: CompressionRun, settings: Approach) -> Iterator[Row]:
     Row
         Observables after every `settings.strain`, or less; `kappa` is one of them, negative while
         the box is opened.
+
+    Raises
+    ------
+    ApproachError
+        After so many time steps.
     """
     if run.settings.kappa > 0:
         yield from _compress(run, settings)
@@ -144,8 +167,18 @@ def _open(run: CompressionRun, settings: Approach) -> Iterator[Row]:
 
 def _advance(run: CompressionRun, settings: Approach, strain: float) -> Row:
     step = abs(run.settings.kappa) * run.settings.dt
-    run.advance(run.session.step + max(1, round(strain / step)))
+    run.advance(min(run.session.step + max(1, round(strain / step)), MOST_STEPS + 1))
     sample = run.sample()
+    if sample.step > MOST_STEPS:
+        found, aim = (
+            sample.observables,
+            settings.p_end if run.settings.kappa > 0 else settings.p_open,
+        )
+        msg = (
+            f"{MOST_STEPS:.0e} time steps have led to phi = {found['phi']:.6g} and a pressure of"
+            f" {found['pressure']:.2g}, expected {aim:g} by then; take a larger kappa"
+        )
+        raise ApproachError(msg)
     sample.observables["kappa"] = run.settings.kappa
     stable = min(settings.dt, _STABLE * sample.observables["dt_max"])
     if not 0.5 * stable <= run.settings.dt <= stable:

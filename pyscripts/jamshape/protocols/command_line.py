@@ -5,9 +5,15 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
-from jamshape.protocols.defaults import SETTINGS, WAYS, recipe_for
+from jamshape.files.vocabulary import read_protocol
+from jamshape.protocols.defaults import PROTOCOLS, SETTINGS, WAYS, recipe_for
 from jamshape.protocols.recipe import Recipe
-from jamshape.shapes.command_line import add_particle_options, particles_of
+from jamshape.shapes.command_line import (
+    add_particle_options,
+    are_particles_given,
+    particles_of,
+)
+from jamshape.shapes.particles import Particles
 
 
 def add_recipe_options(parser: ArgumentParser) -> None:
@@ -15,22 +21,38 @@ def add_recipe_options(parser: ArgumentParser) -> None:
     add_particle_options(parser)
     group = parser.add_argument_group("how to make it")
     group.add_argument("--dimension", type=int, choices=(2, 3), help="(that of the shape's paper)")
+    group.add_argument("--way", choices=tuple(WAYS), help="to jamming (2D dynamics, 3D steps)")
     group.add_argument(
-        "--way", choices=tuple(WAYS),
-        help="to jamming: slow compression in LAMMPS (2D), or quasistatic steps (3D, or --protocol)",
+        "--protocol", type=read_protocol, metavar="NAME",
+        help=f"as published, in place of --way: {', '.join(PROTOCOLS)} (1 and 2 for short)",
     )  # fmt: skip
-    group.add_argument("--seed", type=int, default=1, help="of all that is random (1)")
+    group.add_argument("--seed", type=int, help="of all that is random (1)")
     for one in SETTINGS:
-        usual = {way: table.usual.get(one.name) for way, table in WAYS.items()}
-        text = ", ".join(f"{way} {value:g}" for way, value in usual.items() if value is not None)
         option = f"--{one.name.replace('_', '-')}"
-        group.add_argument(option, type=one.kind, help=f"{one.meaning} ({text})")
+        group.add_argument(option, type=one.kind, help=f"{one.meaning}{_usual(one.name)}")
+
+
+def _usual(name: str) -> str:
+    """Tell the defaults of a setting, those of protocols where they are no way's."""
+    tables = WAYS | {k: v for k, v in PROTOCOLS.items() if v not in WAYS.values()}
+    found = {way: table.usual.get(name) for way, table in tables.items()}
+    texts = [f"{way} {_said(value)}" for way, value in found.items() if value is not None]
+    return f" ({', '.join(texts)})" if texts else ""
+
+
+def _said(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 def settings_of(options: Namespace) -> dict[str, Any]:
     """Read what was given of a recipe, but for its particles, by the names of `recipe_for`."""
-    names = ("dimension", "way", "seed", *(one.name for one in SETTINGS))
+    names = ("dimension", "way", "seed", "protocol", *(one.name for one in SETTINGS))
     return {name: getattr(options, name) for name in names}
+
+
+def asked_particles(options: Namespace) -> Particles | None:
+    """Read the particles; None where there is a start, which has its own, and none were asked for."""
+    return None if options.start and not are_particles_given(options) else particles_of(options)
 
 
 def recipe_of(options: Namespace) -> Recipe:
@@ -41,4 +63,4 @@ def recipe_of(options: Namespace) -> Recipe:
     ValueError
         If an option is none of the shape or the way, or out of its range.
     """
-    return recipe_for(particles_of(options), **settings_of(options))
+    return recipe_for(asked_particles(options), **settings_of(options))

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from jamshape.checks import RANGES, require_one_of, require_stated
+from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL, protocol_named
+from jamshape.minima import METHODS
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.protocols.recipe import Dynamics, Recipe, Steps, Thermalisation, Way
+from jamshape.protocols.recipe import (
+    Compressed,
+    Dynamics,
+    Recipe,
+    Steps,
+    Thermalisation,
+    Way,
+)
+from jamshape.protocols.source import Source
 from jamshape.shapes.particles import Particles
 
 # A minimum that is led to an energy is at least so good.
@@ -21,10 +33,11 @@ Values = Mapping[str, Any]
 
 
 class Setting(NamedTuple):
-    """A number of a recipe that may be asked for; the ways that have it are those of `WAYS` with a default."""
+    """What may be asked for of a recipe; the ways and protocols that have it are those with a default."""
 
     name: str
-    kind: type
+    kind: Callable[[str], Any]
+    """Reads it from the words of a command."""
     meaning: str
 
 
@@ -36,17 +49,22 @@ SETTINGS = (
     Setting("accuracy", float, "of |u - u0|/u0"),
     Setting("kappa", float, "slowest compression rate"),
     Setting("p_end", float, "pressure to compress to at that rate"),
-    Setting("protocol", int, "2: with Monte Carlo of hard particles at phi_thermal"),
+    Setting("phi_end", float, "packing fraction to compress to, beyond jamming"),
     Setting("phi_thermal", float, "packing fraction of the Monte Carlo"),
     Setting("n_sweeps", int, "sweeps of it"),
     Setting("delta_phi", float, "step of the packing fraction"),
+    Setting("start", Path, "file of compress or slow, through jamming, instead of a compression"),
+    Setting("search", str, "for u0: direct, or halving as in the paper"),
+    Setting("minimiser", str, "of the halving search: auto, or paper, newton, lbfgs, lammps"),
 )
+
+_LAMBDA = 1e-6  # of the halving search, to begin with (Marschall & Teitel 2018, Sec. III C)
 
 
 class UsualWay(NamedTuple):
-    """A way to jamming by its name: how it is made of its settings, and their defaults.
+    """A way to jamming, or a protocol, by its name: how it is made of its settings, and their defaults.
 
-    What has no default is no setting of the way, and is refused.
+    What has no default is no setting of it, and is refused.
     """
 
     compose: Callable[[Values], tuple[Way, Target | None]]
@@ -66,16 +84,36 @@ def _by_dynamics(get: Values) -> tuple[Way, Target | None]:
 
 
 def _by_steps(get: Values) -> tuple[Way, Target | None]:
-    require_one_of("protocol", get["protocol"], (1, 2))
-    thermal = Thermalisation(get["phi_thermal"], get["n_sweeps"])
     quasistatic = Quasistatic(step=get["delta_phi"], tolerance=get["tolerance"])
-    way = Steps(quasistatic, thermal if get["protocol"] == 2 else None)
-    return way, _target(get, min(get["tolerance"], _TIGHT))
+    thermal = Thermalisation(get["phi_thermal"], get["n_sweeps"]) if "n_sweeps" in get else None
+    return Steps(quasistatic, thermal), _target(get, min(get["tolerance"], _TIGHT))
+
+
+def _by_compression(get: Values) -> tuple[Way, Target | None]:
+    way = Compressed(get["kappa"], get["phi_end"], get["search"], get["start"])
+    target, minimiser = _target(get, get["tolerance"]), get["minimiser"]
+    if way.search == "direct":
+        if minimiser is not None:
+            msg = (
+                f"the minimiser is {minimiser} and the search direct, which has its own; expected a"
+                " halving search, or no minimiser"
+            )
+            raise ValueError(msg)
+        return way, target
+    require_one_of("minimiser", minimiser or "auto", METHODS)
+    method = minimiser or "auto"
+    return way, target and dataclasses.replace(target, step=_LAMBDA, method=method)
 
 
 def _target(get: Values, tolerance: float) -> Target | None:
     return Target(get["u0"], get["accuracy"], tolerance) if get["u0"] else None
 
+
+_ATHERMAL = UsualWay(
+    _by_steps,
+    {"n": 400, "phi_start": 0.1, "tolerance": 1e-4, "u0": 0.0, "accuracy": 1e-7, "delta_phi": 1e-3},
+    {"n": 256, "phi_start": 0.4},
+)
 
 WAYS: dict[str, UsualWay] = {
     "dynamics": UsualWay(
@@ -85,39 +123,59 @@ WAYS: dict[str, UsualWay] = {
             "kappa": 4e-7, "p_end": 1e-3,
         },
     ),
-    "steps": UsualWay(
-        _by_steps,
-        {
-            "n": 400, "phi_start": 0.1, "tolerance": 1e-4, "u0": 0.0, "accuracy": 1e-7,
-            "protocol": 1, "phi_thermal": 0.55, "n_sweeps": 100_000, "delta_phi": 1e-3,
-        },
-        {"n": 256, "phi_start": 0.4},
-    ),
+    "steps": _ATHERMAL,
 }  # fmt: skip
 """Slow compression in LAMMPS; quasistatic steps. Another way is one more entry."""
 
+PROTOCOLS: dict[str, UsualWay] = {
+    COMPRESSED: UsualWay(
+        _by_compression,
+        {
+            "n": 1024, "phi_start": 0.1, "tolerance": 1e-8, "u0": 1e-15, "accuracy": 1e-7,
+            "kappa": 1e-6, "phi_end": 0.8, "start": None, "search": "direct", "minimiser": None,
+        },
+        {"phi_start": 0.4, "phi_end": 0.95},
+    ),
+    ATHERMAL: _ATHERMAL,
+    THERMAL: _ATHERMAL._replace(
+        usual=dict(_ATHERMAL.usual) | {"phi_thermal": 0.55, "n_sweeps": 100_000}
+    ),
+}  # fmt: skip
+"""As published, with the numbers of the papers where these say them.
+
+marschall-2018: N = 1024 and phi_init = 0.4 (Marschall & Teitel 2018, Sec. III B), a fixed rate, of which they have
+1e-6 to 1e-10; U_0/L^2 = 1e-15 to 1e-7 of itself (Sec. III C, Eq. 20). They do not say where a compression ends.
+yuan-2019-1: N = 400, Delta phi = 1e-3, forces balanced to 1e-4, the first packing with U/N > 1e-10 (Yuan et al.
+2019, Sec. 2.2); yuan-2019-2 with Monte Carlo at phi_i = 0.55, whose N_s they vary.
+Both papers are of one dimension; in the other, N is that of the paper or as usual, and starts are as dense as one can place them.
+"""
+
 
 def recipe_for(
-    particles: Particles,
+    particles: Particles | None = None,
     dimension: int | None = None,
     way: str | None = None,
-    seed: int = 1,
+    seed: int | None = None,
+    protocol: int | str | None = None,
     **given: Any,
 ) -> Recipe:
     """Make a recipe of what is given, and of what is usual for the rest.
 
     Parameters
     ----------
-    particles : Particles
+    particles : Particles, optional
+        Needed unless there is a start.
     dimension : {2, 3}, optional
         That of the shape's paper when left out.
-    way : {"dynamics", "steps"}, optional
-        Slow compression in LAMMPS, usual in 2D, or quasistatic steps, usual in 3D and where a protocol
-        is given.
-    seed : int
-        Of all that is random.
+    way : str, optional
+        One of `WAYS`: slow compression in LAMMPS ("dynamics"), usual in 2D, or quasistatic steps
+        ("steps"), usual in 3D.
+    seed : int, optional
+        Of all that is random; 1 when left out.
+    protocol : str or int, optional
+        One of `PROTOCOLS`, which is a way with the published numbers; 1 and 2 are those of Yuan et al. 2019.
     **given
-        Numbers of `SETTINGS` by name; None where they are left out.
+        Of `SETTINGS` by name; None where they are left out.
 
     Returns
     -------
@@ -126,7 +184,7 @@ def recipe_for(
     Raises
     ------
     ValueError
-        If a number is none of the way, or out of its range.
+        If a setting is none of the way or the protocol, contradicts the start, or is out of its range.
 
     Examples
     --------
@@ -134,26 +192,64 @@ def recipe_for(
     >>> from jamshape.shapes.particles import Particles
     >>> recipe_for(Particles.of(alpha=4.0), n=64).target.u0
     1e-15
+    >>> recipe_for(Particles.of(alpha=4.0), protocol="marschall-2018").n
+    1024
     """
+    source = None if given.get("start") is None else Source.read(Path(given["start"]))
+    if source is not None:
+        source.require(particles, n=given.get("n"), dimension=dimension, seed=seed)
+        particles, dimension, seed = source.particles, source.dimension, source.seed
+    if particles is None:
+        msg = "there are neither particles nor a start, expected one of them"
+        raise ValueError(msg)
     dimension = particles.shape.dimension if dimension is None else dimension
     require_one_of("dimension", dimension, (2, 3))
-    way = way or ("steps" if dimension == 3 or given.get("protocol") else "dynamics")
-    require_one_of("the way", way, WAYS)
-    get = _values(given, way, dimension)
-    how, target = WAYS[way].compose(get)
+    usual, called = _chosen(way, protocol, dimension)
+    get = usual.defaults(dimension) | _allowed(given, usual, called)
+    if source is not None:
+        get |= _of_source(source, given)
+    how, target = usual.compose(get)
+    seed = 1 if seed is None else seed
     return Recipe(particles, get["n"], dimension, seed, get["phi_start"], how, target)
 
 
-def _values(given: dict[str, Any], way: str, dimension: int) -> dict[str, Any]:
-    """Fill in what was not given."""
-    usual, known = WAYS[way].defaults(dimension), [setting.name for setting in SETTINGS]
+def _chosen(way: str | None, protocol: int | str | None, dimension: int) -> tuple[UsualWay, str]:
+    """Find the way or the protocol, and how sentences call it."""
+    if protocol is None:
+        way = way or ("steps" if dimension == 3 else "dynamics")
+        require_one_of("the way", way, WAYS)
+        return WAYS[way], f"the way by {way}"
+    name = protocol_named(protocol)
+    require_one_of("protocol", name, PROTOCOLS)
+    chosen = PROTOCOLS[name]
+    if way is not None:
+        require_one_of("the way", way, WAYS)
+        if WAYS[way].compose is not chosen.compose:
+            msg = f"the way is {way} and the protocol {name}, which has its own; leave the way out"
+            raise ValueError(msg)
+    return chosen, f"the protocol {name}"
+
+
+def _allowed(given: dict[str, Any], usual: UsualWay, called: str) -> dict[str, Any]:
+    """Leave out what was not given, and refuse what cannot be."""
+    known = [setting.name for setting in SETTINGS]
     for name, value in given.items():
         if name not in known:
             msg = f"{name} is no setting of a recipe, expected one of {', '.join(known)}"
             raise ValueError(msg)
-        if value is not None and name not in usual:
-            msg = f"{name} is no setting of the way by {way}, expected another way or setting"
+        if value is not None and name not in usual.usual:
+            msg = f"{name} is no setting of {called}, expected another way or setting"
             raise ValueError(msg)
     kept = {name: value for name, value in given.items() if value is not None}
     require_stated(**{name: value for name, value in kept.items() if name in RANGES})
-    return usual | kept
+    return kept
+
+
+def _of_source(source: Source, given: dict[str, Any]) -> dict[str, Any]:
+    """Take from a start what it is made of; what was asked for beside it would mean nothing."""
+    for name in ("phi_start", "phi_end", "kappa"):
+        if given.get(name) is not None:
+            msg = f"{name} means nothing to a start that is compressed already; leave {name} out"
+            raise ValueError(msg)
+    own = {name: getattr(source, name) for name in ("n", "phi_start", "phi_end", "kappa")}
+    return own | {"start": source.path}

@@ -1,7 +1,7 @@
 """The one path of a packing, of any shape and dimension.
 
-A random start; a way from there to jamming, by dynamics or by quasistatic steps; the energy it is led to, if one
-is asked for; everything that is measured on it; and the file. Between its steps everything is in files
+A random start; a way from there to jamming, by dynamics, by quasistatic steps or by a compression at a rate; the
+energy it is led to, if one is asked for; everything that is measured on it; and the file. Between its steps everything is in files
 beside the result, so that a path that was cut off goes on where it was.
 """
 
@@ -14,18 +14,21 @@ from typing import Any
 
 from jamshape.files.h5md import read_attributes, require_attributes
 from jamshape.measures.minimum import summary_of, write_minimum
+from jamshape.protocols.by_compression import ByCompression
 from jamshape.protocols.by_dynamics import ByDynamics
 from jamshape.protocols.by_steps import BySteps
 from jamshape.protocols.making import Making, Progress, SearchFile, lead
-from jamshape.protocols.recipe import Dynamics, Recipe, Steps, Thermalisation, Way
+from jamshape.protocols.recipe import Compressed, Dynamics, Recipe, Steps, Thermalisation, Way
 
 _MAKING: dict[type[Way], Callable[[Recipe, Path], Making]] = {
     Dynamics: ByDynamics,
     Steps: BySteps,
+    Compressed: ByCompression,
 }
 """Who goes each way."""
 
 __all__ = [
+    "Compressed",
     "Dynamics",
     "Progress",
     "Recipe",
@@ -72,11 +75,14 @@ def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress
         way.forget()
     yield from way.steps()
     landscape, minimum = way.landscape(), way.minimum
-    search = _search(recipe, out)
+    before, search = landscape.evaluations, _search(recipe, out)
     if recipe.target:
         minimum = yield from lead(landscape, way.state(), recipe.target, search)
     assert minimum is not None
     attributes: dict[str, Any] = recipe.attributes() | way.measured()
+    if recipe.target:
+        attributes |= {"search": recipe.way.search, "search_minimisations": search.minimisations}
+        attributes |= {"search_evaluations": landscape.evaluations - before}
     seconds = attributes.pop("seconds_before", 0.0) + time.perf_counter() - began
     attributes |= {"wall_seconds": seconds, "evaluations": landscape.evaluations}
     write_minimum(out, landscape, minimum, attributes)

@@ -5,19 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.checks import require_one_of, require_stated
+from jamshape.checks import require_one_of, require_rising, require_stated
 from jamshape.files.h5md import read_packing
-from jamshape.minima.target import Target
+from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL
+from jamshape.minima.target import Target, direct, halving
 from jamshape.packing import Packing
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
 from jamshape.protocols.random_start import dilute_packing, random_packing
 from jamshape.shapes.particles import Particles
+
+SEARCHES = {"direct": direct, "halving": halving}
+"""Ways to lead a jammed state to an energy: ours, and that of Marschall & Teitel 2018, Sec. III C, as written."""
+
+# Paper's slowest rate; a slower one in LAMMPS does not end in a time that anybody waits for.
+_SLOWEST = 1e-10
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,10 @@ class Thermalisation:
 class Way(Protocol):
     """From a random start to jamming."""
 
+    @property
+    def search(self) -> str:
+        """How the energy is looked for from there, one of `SEARCHES`."""
+
     def start(self, recipe: Recipe) -> Packing:
         """Make the random start."""
 
@@ -61,6 +72,8 @@ class Way(Protocol):
 class Steps:
     """Quasistatic steps from the random start to the first jammed packing (Yuan et al. 2019, Sec. 2.2).
 
+    These are the protocols yuan-2019-1 and, with Monte Carlo, yuan-2019-2.
+
     Parameters
     ----------
     quasistatic
@@ -68,6 +81,8 @@ class Steps:
     thermal
         Monte Carlo before the last part of it; None for protocol 1.
     """
+
+    search: ClassVar[str] = "direct"
 
     quasistatic: Quasistatic = field(default_factory=Quasistatic)
     thermal: Thermalisation | None = None
@@ -83,7 +98,7 @@ class Steps:
 
     def attributes(self, target: Target | None) -> dict[str, Any]:
         """Return what identifies it, to be stored."""
-        found: dict[str, Any] = {"protocol": 2 if self.thermal else 1}
+        found: dict[str, Any] = {"protocol": THERMAL if self.thermal else ATHERMAL}
         if self.thermal:
             found |= {"phi_thermal": self.thermal.phi, "n_sweeps": self.thermal.n_sweeps}
         return found | {f"quasistatic_{k}": v for k, v in vars(self.compression(target)).items()}
@@ -108,6 +123,8 @@ class Dynamics:
         How to compress.
     """
 
+    search: ClassVar[str] = "direct"
+
     approach: Approach = field(default_factory=Approach)
 
     def start(self, recipe: Recipe) -> Packing:
@@ -127,6 +144,71 @@ class Dynamics:
         if recipe.target is None:
             msg = "there is no energy to reach, expected one after a compression by dynamics (u0)"
             raise ValueError(msg)
+
+
+@dataclass(frozen=True)
+class Compressed:
+    """Compression at one rate through jamming: the protocol marschall-2018 (Sec. II and III B-C, App. A).
+
+    The energy is looked for from the first state of it that stays jammed when it is minimised; nothing opens the
+    box before.
+
+    Parameters
+    ----------
+    kappa
+        Rate, dL/dt = -kappa L (Eq. 6), [1/time]; the paper's are 1e-6 to 1e-10.
+    phi_end
+        Packing fraction where the compression ends, well above jamming.
+    search
+        One of `SEARCHES`.
+    source
+        File with the frames of such a compression, which takes its place.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, the rate below the paper's slowest, or there is no such search.
+    """
+
+    kappa: float = 1e-6
+    phi_end: float = 0.95
+    search: str = "direct"
+    source: Path | None = None
+
+    def __post_init__(self) -> None:
+        require_one_of("search", self.search, SEARCHES)
+        if self.source is not None:
+            return
+        require_stated(kappa=self.kappa, phi_end=self.phi_end)
+        if self.kappa < _SLOWEST:
+            msg = (
+                f"kappa is {self.kappa:g}, expected at least {_SLOWEST:g} in LAMMPS, the paper's slowest;"
+                " compress with jamshape slow and take its file as the start"
+            )
+            raise ValueError(msg)
+
+    def start(self, recipe: Recipe) -> Packing:
+        """Make the random start, without overlaps, or take the first frame of the file."""
+        if self.source is not None:
+            return read_packing(self.source, 0)
+        return random_packing(
+            recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension
+        )
+
+    def attributes(self, target: Target | None) -> dict[str, Any]:
+        """Return what identifies it, to be stored."""
+        del target
+        start = "" if self.source is None else self.source.name
+        told = {"kappa": self.kappa, "phi_end": self.phi_end, "start": start}
+        return {"protocol": COMPRESSED, "search": self.search} | told
+
+    def require(self, recipe: Recipe) -> None:
+        """Refuse a recipe without an energy, or that does not compress."""
+        if recipe.target is None:
+            msg = "there is no energy to reach, expected one after a compression at a rate (u0)"
+            raise ValueError(msg)
+        if self.source is None:
+            require_rising(recipe.phi_start, self.phi_end)
 
 
 @dataclass(frozen=True)

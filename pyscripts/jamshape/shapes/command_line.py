@@ -12,7 +12,7 @@ from jamshape.shapes.table import DEFAULT, SHAPES, shape_named
 def add_particle_options(parser: ArgumentParser) -> None:
     """Add --shape, the parameters of all shapes, --size-ratio and --kind."""
     group = parser.add_argument_group("particles")
-    group.add_argument("--shape", choices=SHAPES, default=DEFAULT, help="(%(default)s)")
+    group.add_argument("--shape", choices=SHAPES, help=f"({DEFAULT})")
     for parameter, shapes in _parameters().items():
         usual = ", ".join(f"{shape.name} {_default(shape, parameter):g}" for shape in shapes)
         group.add_argument(
@@ -39,7 +39,7 @@ def particles_of(options: Namespace) -> Particles:
     ValueError
         If an option is none of the shape, or out of its range.
     """
-    shape, given = shape_named(options.shape), _given(options)
+    shape, given = _shape(options), _given(options)
     if options.kind:
         if given or options.size_ratio is not None:
             msg = "kinds and other sizes were given, expected a mixture's numbers in --kind alone"
@@ -48,9 +48,19 @@ def particles_of(options: Namespace) -> Particles:
     return Particles.of(shape, options.size_ratio, **given)
 
 
+def are_particles_given(options: Namespace) -> bool:
+    """Whether any of the options of `add_particle_options` was given."""
+    others = options.shape, options.size_ratio
+    return bool(options.kind or _given(options)) or any(value is not None for value in others)
+
+
+def _shape(options: Namespace) -> Shape:
+    return shape_named(options.shape or DEFAULT)
+
+
 def _given(options: Namespace) -> dict[str, float]:
     """Collect the parameters that were given, all of them the shape's."""
-    shape, found = shape_named(options.shape), {}
+    shape, found = _shape(options), {}
     own = {parameter.option: parameter.name for parameter in shape.parameters}
     for parameter in _parameters():
         value = getattr(options, parameter.option)

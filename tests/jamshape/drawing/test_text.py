@@ -19,7 +19,9 @@ from jamshape.shapes.particles import Kind, Particles
 
 ROD = "spherocylinder"
 RODS = System(ROD, 2, (("alpha", 4.0),))
-BALLS = System("superellipsoid", 3, (("exponent", 1.5), ("w1", 1.0), ("w2", 1.0)), protocol=1)
+BALLS = System(
+    "superellipsoid", 3, (("exponent", 1.5), ("w1", 1.0), ("w2", 1.0)), protocol="yuan-2019-1"
+)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +48,7 @@ def test_labels_tell_what_differs():
     assert [*system_labels(others).values()] == [r"$\alpha=4$", r"$\alpha=0$"]
     both = system_labels([RODS, BALLS])
     assert both[RODS] == r"spherocylinders, 2D, $\alpha=4$, dynamics"
-    assert both[BALLS] == r"superellipsoids, 3D, $p=1.5, w_1=1, w_2=1$, protocol 1"
+    assert both[BALLS] == r"superellipsoids, 3D, $p=1.5, w_1=1, w_2=1$, yuan-2019-1"
     assert system_labels([RODS.without("alpha")]) == {RODS.without("alpha"): ""}
     assert unit_text([RODS]) == "(2R)"
     assert unit_text([RODS, BALLS]) == r"(\mathrm{length})"
@@ -56,7 +58,7 @@ def test_titles_tell_all_that_systems_are_of():
     assert systems_text([RODS]) == r"spherocylinders in 2D, $\alpha=4$"
     several = [RODS, RODS._replace(parameters=(("alpha", 0.01),), dimension=3)]
     assert systems_text(several) == r"spherocylinders in 2D and 3D, $\alpha=0.01$ to $4$"
-    assert systems_text([BALLS]) == "superellipsoids in 3D, $p=1.5, w_1=1, w_2=1$, protocol 1"
+    assert systems_text([BALLS]) == "superellipsoids in 3D, $p=1.5, w_1=1, w_2=1$, yuan-2019-1"
     assert systems_text([RODS, BALLS]) == "spherocylinders and superellipsoids in 2D and 3D"
 
 

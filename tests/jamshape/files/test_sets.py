@@ -67,7 +67,7 @@ def test_shapes_with_other_parameters_and_protocols(tmp_path):
     write(tmp_path, "a", one, dimension=3, protocol=1)
     write(tmp_path, "b", one, dimension=3, protocol=2, n_sweeps=50)
     first, second = read_groups([tmp_path], needs=("exponent", "w1"))
-    assert (first.protocol, second.protocol, second.n_sweeps) == (1, 2, 50)
+    assert (first.protocol, second.protocol, second.n_sweeps) == ("yuan-2019-1", "yuan-2019-2", 50)
     assert (first.number("exponent"), first.number("w2")) == (1.5, 1.2)
     told = json.loads(json.dumps(plain(second.report())))
     assert told == {
@@ -76,7 +76,7 @@ def test_shapes_with_other_parameters_and_protocols(tmp_path):
         "exponent": 1.5,
         "w1": 0.8,
         "w2": 1.2,
-        "protocol": 2,
+        "protocol": "yuan-2019-2",
         "n_sweeps": 50,
     }
     assert not of_paper(first)

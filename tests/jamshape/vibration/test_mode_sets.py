@@ -56,7 +56,7 @@ def test_system_and_energy_of_modes_old_and_new():
     assert (old.number("alpha"), old.number("u0")) == (4.0, 1e-15)
     old = key_of(table(3, p=1.5, w1=1.0, w2=1.0, protocol=1, pressure=1e-6))
     assert old.number("exponent") == 1.5
-    assert (old.u0, old.system.protocol) == (0.0, 1)
+    assert (old.u0, old.system.protocol) == (0.0, "yuan-2019-1")
     assert key_of(table(alpha=1.0, shape="superellipsoid")).system.parameters == ()
     assert seed_of(table(seed=7)) == 7
     with pytest.raises(ValueError, match="do not tell the shape"):

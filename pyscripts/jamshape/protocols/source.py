@@ -1,0 +1,87 @@
+"""A compression in a file, whose states packings are made from: what it is of."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.checks import RANGES
+from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.measures.runs import rate_of
+from jamshape.shapes.particles import Particles
+
+
+class Source(NamedTuple):
+    """What a file of a run says that a recipe needs to know."""
+
+    path: Path
+    particles: Particles
+    """Those of the file, one by one."""
+    n: int
+    dimension: int
+    seed: int
+    """1 where the file says none."""
+    phi_start: float
+    phi_end: float
+    """Packing fraction of the last frame."""
+    kappa: float
+    """Its last rate, [1/time]; 0 where the file says none."""
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read any H5MD file of particles, a run or a packing; errors as `read_packing`."""
+        stored, last = read_attributes(path), read_packing(path)
+        given = Particles.given(last.shape, last.diameters, last.exponent, last.species)
+        names = [*(one.name for one in last.shape.parameters), "size_ratio", "kinds"]
+        told = {name: stored[name] for name in names if name in stored}
+        particles = dataclasses.replace(given, told=told) if told else given
+        kappa = rate_of(stored) if "kappa" in stored else 0.0
+        first = read_packing(path, 0).phi
+        low, high = RANGES["phi_start"].low, RANGES["phi_start"].high
+        return cls(
+            path=path,
+            particles=particles,
+            n=last.n,
+            dimension=last.dimension,
+            seed=int(stored.get("seed", 1)),
+            phi_start=min(max(first, low), high),
+            phi_end=last.phi,
+            kappa=kappa if math.isfinite(kappa) else 0.0,
+        )
+
+    def require(self, particles: Particles | None, **asked: Any) -> None:
+        """Refuse what was asked for beside the start and is something else there; None was not asked for.
+
+        Raises
+        ------
+        ValueError
+        """
+        for name, value in asked.items():
+            own = getattr(self, name)
+            if value is not None and value != own:
+                msg = f"{name} is {value} and that of the start {self.path} {own}; leave {name} out"
+                raise ValueError(msg)
+        if particles is not None and not self._has(particles):
+            msg = (
+                f"the start {self.path} holds {self.n} particles of {self.particles}, expected those"
+                f" that were asked for, {particles}; leave the particles out"
+            )
+            raise ValueError(msg)
+
+    def _has(self, particles: Particles) -> bool:
+        if particles.shape.name != self.particles.shape.name:
+            return False
+        own, other = (
+            p.sample(self.n, np.random.default_rng(self.seed)) for p in (self.particles, particles)
+        )
+        pairs = zip(own[:2], other[:2], strict=True)
+        return all(np.array_equal(_sorted(one), _sorted(two)) for one, two in pairs)
+
+
+def _sorted(rows: FloatArray) -> FloatArray:
+    return np.asarray(rows[np.lexsort(np.atleast_2d(rows.T))])

@@ -1,0 +1,280 @@
+"""Protocols by their names: their numbers, what they refuse, and what their files tell."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from squeezed import squeezed
+
+import jamshape as js
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, write_packing
+from jamshape.files.run_writer import RunWriter
+from jamshape.landscape import Landscape, State
+from jamshape.minima import Stop, minimise
+from jamshape.minima.target import TargetError
+from jamshape.protocols import approach, making
+from jamshape.protocols.approach import Approach, ApproachError
+from jamshape.protocols.defaults import PROTOCOLS, recipe_for
+from jamshape.protocols.make import make, require_same
+from jamshape.protocols.recipe import Compressed, Dynamics, Recipe
+from jamshape.shapes.particles import Particles
+
+RODS = js.Spherocylinders(alpha=1)
+BALLS = js.Superellipsoids(p=1.5)
+U0 = 1e-8
+ROW = 1e-3  # strain between the frames of a run
+
+
+@cache
+def frames():
+    """A rod packing that is squeezed from well below jamming to well above."""
+    packing, state = squeezed(16, 1, 0.86)
+    loose = state.strained(0.02).packing(packing)
+    start = State.of(loose.with_(position=loose.position, orientation=loose.orientation))
+    return [start.strained(-k * ROW).packing(packing).with_(step=k) for k in range(61)]
+
+
+@pytest.fixture
+def run(tmp_path):
+    """The file of a compression of rods through jamming."""
+    return written(tmp_path / "through.h5", frames())
+
+
+def written(path, states):
+    told = dict(RODS.told) | {"n": 16, "seed": 3, "kappa": 1e-5, "finished": True}
+    with RunWriter.create(path, states[0], told) as writer:
+        for state in states[1:]:
+            writer.append(state)
+    return path
+
+
+def packed(out, **options):
+    return js.make_packing(file=out, protocol="marschall-2018", u0=U0, progress=False, **options)
+
+
+def test_numbers_are_short_for_names():
+    for number, name in ((1, "yuan-2019-1"), (2, "yuan-2019-2")):
+        short, full = (recipe_for(BALLS, protocol=which) for which in (number, name))
+        assert short == full
+        assert full.attributes()["protocol"] == name
+    assert recipe_for(BALLS) == recipe_for(BALLS, protocol="yuan-2019-1")
+    assert recipe_for(BALLS, way="steps", protocol=2).way.thermal.n_sweeps == 100_000
+
+
+def test_names_give_the_published_numbers():
+    ours = recipe_for(RODS, protocol="marschall-2018")
+    assert (ours.n, ours.phi_start, ours.target.u0, ours.target.accuracy) == (
+        1024,
+        0.4,
+        1e-15,
+        1e-7,
+    )
+    assert ours.way == Compressed(kappa=1e-6, phi_end=0.95, search="direct")
+    halving = recipe_for(RODS, protocol="marschall-2018", search="halving", minimiser="paper")
+    assert (halving.target.step, halving.target.method) == (1e-6, "paper")
+    yuan = recipe_for(BALLS, protocol="yuan-2019-1")
+    steps = yuan.way.quasistatic
+    assert (yuan.n, steps.step, steps.tolerance, steps.energy) == (400, 1e-3, 1e-4, 1e-10)
+    assert recipe_for(BALLS, protocol="yuan-2019-2").way.thermal.phi == 0.55
+    assert recipe_for(RODS, protocol="marschall-2018", n=32, kappa=1e-5).way.kappa == 1e-5
+
+
+REFUSED = {
+    "p_end is no setting of the protocol marschall-2018": {"protocol": "marschall-2018", "p_end": 1e-3},
+    "n_sweeps is no setting of the protocol yuan-2019-1": {"protocol": 1, "n_sweeps": 5},
+    "kappa is no setting of the protocol yuan-2019-2": {"protocol": 2, "kappa": 1e-6},
+    "start is no setting of the way by dynamics": {"way": "dynamics", "search": None, "start": "a.h5"},
+    "protocol is 'yuan', expected one of marschall-2018": {"protocol": "yuan"},
+    "protocol is True, expected one of": {"protocol": True},
+    "the way is steps and the protocol marschall-2018": {"way": "steps", "protocol": "marschall-2018"},
+    "search is 'blind', expected one of direct, halving": {"protocol": "marschall-2018", "search": "blind"},
+    "minimiser is 'none', expected one of": {
+        "protocol": "marschall-2018", "search": "halving", "minimiser": "none",
+    },
+    "the minimiser is paper and the search direct": {"protocol": "marschall-2018", "minimiser": "paper"},
+    "no energy to reach": {"protocol": "marschall-2018", "u0": 0.0},
+    "kappa is 1e-12, expected at least 1e-10": {"protocol": "marschall-2018", "kappa": 1e-12},
+    "phi_start is 0.97 and phi_end 0.95": {"protocol": "marschall-2018", "phi_start": 0.97},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_what_is_none_of_a_protocol_is_refused(words, run, monkeypatch):
+    monkeypatch.chdir(run.parent)
+    write_packing("a.h5", frames()[0])
+    with pytest.raises(ValueError, match=r"expected|leave") as error:
+        recipe_for(RODS, **REFUSED[words]) if "start" not in REFUSED[words] else recipe_for(
+            **REFUSED[words]
+        )
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_files_with_numbered_protocols_are_those_of_the_names(tmp_path):
+    recipe = recipe_for(RODS, way="steps", n=16)
+    old = recipe.attributes() | {"protocol": 1, "outcome": "converged"}
+    out, sizes = tmp_path / "old.h5", recipe.particles.sample(16, np.random.default_rng(1))
+    write_packing(out, frames()[0].with_(diameters=sizes.diameters), old)
+    assert read_attributes(out)["protocol"] == "yuan-2019-1"
+    require_same(out, recipe)
+    with pytest.raises(ValueError, match="protocol = yuan-2019-1, expected yuan-2019-2"):
+        require_same(out, recipe_for(RODS, way="steps", protocol=2, n=16, phi_thermal=0.5))
+
+
+def u_of(packing):
+    """Energy density of a frame once forces balance, or below U0."""
+    stop = Stop(1e-4, lowest=U0)
+    return minimise(Landscape(packing), State.of(packing), "auto", stop).energy_density
+
+
+def test_a_start_is_taken_where_it_is_first_jammed(run, tmp_path):
+    found = packed(tmp_path / "packing.h5", start=run)
+    told = found.results
+    step = told["start_step"]
+    assert u_of(frames()[step - 1]) <= U0 < u_of(frames()[step])
+    assert (told["protocol"], told["search"], told["start"]) == (
+        "marschall-2018",
+        "direct",
+        run.name,
+    )
+    assert told["start_phi"] == pytest.approx(frames()[step].phi, rel=1e-14)
+    assert told["start_u_minimised"] == pytest.approx(u_of(frames()[step]), rel=1e-12)
+    assert told["start_u"] > told["start_u_minimised"]
+    assert (told["n"], told["seed"], told["alpha"], told["kappa"]) == (16, 3, 1.0, 1e-5)
+    assert told["u"] == pytest.approx(U0, rel=1e-7)
+    assert told["search_evaluations"] == told["evaluations"] > 0
+    # It is the file's own particles, in its order, and is loaded when asked for again.
+    np.testing.assert_array_equal(found.diameters, frames()[0].diameters)
+    again = packed(tmp_path / "packing.h5", start=run)
+    np.testing.assert_array_equal(again.position, found.position)
+    assert {path.name for path in tmp_path.iterdir()} == {"packing.h5", run.name}
+
+
+def test_both_searches_end_at_one_packing(run, tmp_path):
+    ours = packed(tmp_path / "direct.h5", start=run)
+    papers = packed(tmp_path / "halving.h5", start=run, search="halving")
+    assert papers.results["search"] == "halving"
+    assert papers.results["search_minimisations"] > 100
+    assert papers.u == pytest.approx(U0, rel=1e-7)
+    assert papers.results["phi_J"] == pytest.approx(ours.results["phi_J"], abs=1e-6)
+    assert papers.z == ours.z
+    with pytest.raises(ValueError, match="search = halving, expected direct"):
+        packed(tmp_path / "halving.h5", start=run)
+
+
+def test_a_halving_search_that_was_killed_goes_on_to_the_same_bits(run, tmp_path):
+    recipe = recipe_for(protocol="marschall-2018", start=run, search="halving", u0=U0)
+    whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
+    steps = list(make(recipe, whole))
+    searched = [at for at in steps if at.stage == "search"]
+    # Before u crosses u0, and while lambda is halved.
+    for after in (20, len(searched) - 40):
+        going, count = make(recipe, cut), 0
+        while count < after:
+            count += next(going).stage == "search"
+        going.close()
+    rest = [at for at in make(recipe, cut) if at.stage == "search"]
+    assert len(rest) == 20
+    assert rest[-1].text == searched[-1].text
+    for one, other in zip(read_packing(cut).poses(), read_packing(whole).poses(), strict=True):
+        np.testing.assert_array_equal(one, other)
+    names = ("evaluations", "search_minimisations", "start_step", "start_evaluations", "u", "phi")
+    mine, others = read_attributes(cut), read_attributes(whole)
+    assert [mine[name] for name in names] == [others[name] for name in names]
+
+
+def test_progress_says_how_many_steps_are_left(run, tmp_path):
+    recipe = recipe_for(protocol="marschall-2018", start=run, search="halving", u0=U0)
+    texts = [at.text for at in make(recipe, tmp_path / "a.h5") if at.stage == "search"]
+    first = next(k for k, text in enumerate(texts) if "more of it" in text)
+    left = int(texts[first].split("about ")[1].split()[0])
+    crossed = next(k for k, text in enumerate(texts) if "step 5.0e-07" in text)
+    assert left == pytest.approx(crossed - first, rel=0.2)
+
+
+def test_a_search_ends_after_so_many_minimisations(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(making, "MOST_MINIMISATIONS", 5)
+    with pytest.raises(TargetError, match=r"has made 5 minimisations and is at u = .* expected u"):
+        packed(tmp_path / "a.h5", start=run, search="halving")
+    monkeypatch.undo()
+    assert packed(tmp_path / "a.h5", start=run, search="halving").results["outcome"] == "converged"
+
+
+OTHERS = {
+    "n is 32 and that of the start": {"n": 32},
+    "seed is 4 and that of the start": {"seed": 4},
+    "dimension is 3 and that of the start": {"dimension": 3},
+    "kappa means nothing to a start": {"kappa": 1e-6},
+    "phi_end means nothing to a start": {"phi_end": 0.9},
+    "phi_start means nothing to a start": {"phi_start": 0.3},
+    "asked for, Particles('spherocylinder', alpha=4": {"particles": js.Spherocylinders(alpha=4)},
+    "asked for, Particles('dimer'": {"particles": js.Dimers(alpha=1)},
+}
+
+
+@pytest.mark.parametrize("words", OTHERS)
+def test_what_contradicts_a_start_is_refused(run, tmp_path, words):
+    with pytest.raises(ValueError, match="leave") as error:
+        packed(tmp_path / "a.h5", start=run, **OTHERS[words])
+    assert words in str(error.value)
+    assert not (tmp_path / "a.h5").exists()
+
+
+def test_what_agrees_with_a_start_is_taken(run):
+    asked = recipe_for(RODS, protocol="marschall-2018", start=run, n=16, seed=3, dimension=2)
+    assert asked.attributes() == recipe_for(protocol="marschall-2018", start=run).attributes()
+
+
+def test_a_start_below_jamming_is_refused(tmp_path):
+    run = written(tmp_path / "below.h5", frames()[:10])
+    with pytest.raises(ValueError, match=r"last frame has phi = .* expected more than u0 = 1e-08"):
+        packed(tmp_path / "a.h5", start=run)
+
+
+def test_neither_particles_nor_a_start_are_refused():
+    with pytest.raises(ValueError, match="neither particles nor a start"):
+        recipe_for(protocol="marschall-2018")
+
+
+@pytest.mark.lammps
+def test_a_compression_through_jamming_is_not_opened(tmp_path):
+    out = tmp_path / "packing.h5"
+    quick = {"n": 16, "phi_start": 0.6, "kappa": 1e-4}
+    told = packed(out, particles=RODS, **quick).results
+    rows = read_observables(tmp_path / "packing.h5.run.h5")
+    assert (np.diff(rows["phi"]) > 0).all()
+    assert told["compression_phi"] == pytest.approx(0.95, rel=1e-9)
+    for name in ("phi", "u", "pressure", "evaluations"):
+        assert told[f"compression_{name}"] == rows[name][-1]
+    assert told["start_file"] == "packing.h5.run.h5"
+    assert told["phi"] < told["start_phi"] < told["compression_phi"]
+    assert not math.isnan(told["phi_J"])
+    assert list(tmp_path.glob("*restart*")) == []
+    # The run is there to be searched from, too: it leads to the same packing.
+    other = packed(tmp_path / "other.h5", start=tmp_path / "packing.h5.run.h5")
+    np.testing.assert_array_equal(other.position, read_packing(out).position)
+    with pytest.raises(ValueError, match=r"kappa = 0.0001, expected 1e-05"):
+        packed(out, particles=RODS, **quick | {"kappa": 1e-5})
+
+
+@pytest.mark.lammps
+def test_an_approach_to_jamming_ends_after_so_many_steps(tmp_path, monkeypatch):
+    monkeypatch.setattr(approach, "MOST_STEPS", 20_000)
+    recipe = Recipe(Particles.of(alpha=0.0), n=16, way=Dynamics(Approach(kappa=1e-6)))
+    with pytest.raises(
+        ApproachError, match=r"2e.04 time steps have led to phi = 0.* expected 0.001"
+    ):
+        list(make(recipe, tmp_path / "a.h5"))
+
+
+def test_a_rate_whose_approach_would_not_end_is_refused():
+    with pytest.raises(ValueError, match=r"kappa is 1e-14, expected at least 4e-12.*jamshape slow"):
+        recipe_for(RODS, kappa=1e-14)
+
+
+def test_every_protocol_has_its_defaults_in_both_dimensions():
+    for name in PROTOCOLS:
+        for dimension in (2, 3):
+            recipe = recipe_for(RODS, protocol=name, dimension=dimension)
+            assert recipe.attributes()["protocol"] == name
