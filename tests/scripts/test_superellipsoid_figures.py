@@ -132,12 +132,12 @@ def test_shapes_without_three_axes_are_refused(wrong, tmp_path, script):
 
 def test_phi_j_of_spheroids_and_superballs(drawn, wrong, sweep):
     rows = rows_by_shape(drawn(PHI_J, sweep)["phi_J"])
-    assert (1.0, 0.8, 1.25, 1) not in rows
+    assert (1.0, 0.8, 1.25, ATHERMAL) not in rows
     stored = [read_attributes(sweep / f"p1_w0.6_1_seed{seed}.h5")["phi_J"] for seed in (1, 2)]
-    phi = rows[1.0, 0.6, 1.0, 1]["phi_J"]
+    phi = rows[1.0, 0.6, 1.0, ATHERMAL]["phi_J"]
     assert phi["value"] == pytest.approx(np.mean(stored))
     assert phi["error"] == pytest.approx(abs(stored[0] - stored[1]) / 2)
-    assert rows[1.0, 1.0, 1.0, 1]["phi_J"] == {
+    assert rows[1.0, 1.0, 1.0, ATHERMAL]["phi_J"] == {
         "value": pytest.approx(0.66, abs=0.08),
         "error": None,
         "samples": 1,
@@ -157,10 +157,10 @@ def test_global_order(drawn, sweep, thermal):
 @pytest.mark.parametrize("quantity", ["phi_J", "z"])
 def test_asphericity(drawn, sweep, quantity):
     rows = rows_by_shape(drawn(ASPHERICITY, sweep, "--quantity", quantity)["shapes"])
-    assert rows[1.0, 1.0, 1.0, 1]["asphericity"]["value"] == pytest.approx(0, abs=1e-12)
-    assert rows[1.0, 1.0, 2.0, 1]["z_iso"]["value"] == 10
-    assert rows[1.5, 1.0, 1.0, 1]["z_iso"]["value"] == 12
-    assert rows[1.0, 0.6, 1.0, 1][quantity]["samples"] == 2
+    assert rows[1.0, 1.0, 1.0, ATHERMAL]["asphericity"]["value"] == pytest.approx(0, abs=1e-12)
+    assert rows[1.0, 1.0, 2.0, ATHERMAL]["z_iso"]["value"] == 10
+    assert rows[1.5, 1.0, 1.0, ATHERMAL]["z_iso"]["value"] == 12
+    assert rows[1.0, 0.6, 1.0, ATHERMAL][quantity]["samples"] == 2
 
 
 def test_shape_map_and_plane(drawn, wrong, sweep, thermal):
@@ -169,7 +169,7 @@ def test_shape_map_and_plane(drawn, wrong, sweep, thermal):
     assert "no packing is of the protocol yuan-2019-2" in wrong(MAP, sweep, "--protocol", 2)
     assert len(drawn(MAP, sweep, thermal, "--protocol", 2)["shapes"]) == 1
     rows = rows_by_shape(drawn(PLANE, sweep)["shapes"])
-    assert rows[1.0, 0.8, 1.25, 1]["beta"]["value"] == pytest.approx(1)
+    assert rows[1.0, 0.8, 1.25, ATHERMAL]["beta"]["value"] == pytest.approx(1)
 
 
 def test_order_and_density_of_both_protocols(drawn, sweep, thermal):
@@ -189,22 +189,22 @@ def test_order_and_density_of_both_protocols(drawn, sweep, thermal):
 
 def test_local_order_and_curvature(drawn, sweep):
     rows = rows_by_shape(drawn(LOCAL, sweep)["order"])
-    assert 0 < rows[1.5, 1.0, 1.0, 1]["local_C4"]["value"] < 1
-    assert rows[1.0, 1.0, 1.0, 1]["random_S2"]["value"] > 0.2
+    assert 0 < rows[1.5, 1.0, 1.0, ATHERMAL]["local_C4"]["value"] < 1
+    assert rows[1.0, 1.0, 1.0, ATHERMAL]["random_S2"]["value"] > 0.2
     found = drawn(CURVATURE, sweep)
     assert found["with_z"]["shapes"] == 4
     rows = rows_by_shape(found["curvature"])
-    assert rows[1.0, 1.0, 1.0, 1]["quantiles"]["0.5"] == pytest.approx(1)
-    assert rows[1.5, 1.0, 1.0, 1]["quantiles"]["0.05"] < 0.5
+    assert rows[1.0, 1.0, 1.0, ATHERMAL]["quantiles"]["0.5"] == pytest.approx(1)
+    assert rows[1.5, 1.0, 1.0, ATHERMAL]["quantiles"]["0.05"] < 0.5
     network = 2 * read_attributes(sweep / "p1.5_w1_1_seed1.h5")["n_contacts"]
-    assert rows[1.5, 1.0, 1.0, 1]["sides"] >= network
+    assert rows[1.5, 1.0, 1.0, ATHERMAL]["sides"] >= network
 
 
 def test_eigenvalues(drawn, wrong, sweep, modes):
     asked = ("--modes", modes)
     rows = rows_by_shape(drawn(EIGENVALUES, sweep, *asked)["spectra"])
-    assert rows[1.0, 1.0, 1.0, 1]["regimes"][:2] == [0, 0], "spheres do not turn"
-    quartic, turning, moving = rows[1.5, 1.0, 1.0, 1]["regimes"]
+    assert rows[1.0, 1.0, 1.0, ATHERMAL]["regimes"][:2] == [0, 0], "spheres do not turn"
+    quartic, turning, moving = rows[1.5, 1.0, 1.0, ATHERMAL]["regimes"]
     assert min(quartic, turning, moving) > 0
     kept = sorted(modes.glob("*.modes.h5"))
     assert len(kept) == 5
