@@ -54,8 +54,8 @@ SETTINGS = (
     Setting("n_sweeps", int, "sweeps of it"),
     Setting("delta_phi", float, "step of the packing fraction"),
     Setting("start", Path, "file of compress or slow, through jamming, instead of a compression"),
-    Setting("search", str, "for u0: direct, or halving as in the paper"),
-    Setting("minimiser", str, "of the halving search: auto, or paper, newton, lbfgs, lammps"),
+    Setting("search", str, "for u0; halving is the paper's"),
+    Setting("minimiser", str, "of the halving search; auto when left out"),
 )
 
 _LAMBDA = 1e-6  # of the halving search, to begin with (Marschall & Teitel 2018, Sec. III C)
