@@ -21,6 +21,7 @@ NO_COUNTS = ("-1", "0", "1.5", "99999999999")
 COMPRESS = "compress --n 8 --kappa 1e-2 --phi-start 0.3 --phi-end 0.32 --out new.h5"
 PACK = "pack --n 8 --out new.h5"
 STEPS = "pack --way steps --n 8 --out new.h5"
+PUBLISHED = "pack --n 8 --protocol marschall-2018 --out new.h5"
 SLOW = "slow --n 8 --phi-end 0.85 --out new.h5"
 INITIAL = "initial --n 8 --phi 0.2 --out new.data"
 
@@ -30,6 +31,17 @@ def each(start, options, values):
         (f"{start} {option} {value}", option.strip("-")) for option in options for value in values
     ]
 
+
+# Files that no search can start from.
+STARTS = {
+    "none.h5": "none.h5",
+    "text.h5": "text.h5",
+    "cut.h5": "cut.h5",
+    "other.h5": "other.h5",
+    "empty.h5": "empty.h5",
+    "'a folder'": "a folder",
+    "run.h5": "its last frame has phi = 0.320.* and comes to u = 0 .* compress further",
+}
 
 CASES = [
     *each(COMPRESS, ["--kappa", "--phi-start", "--phi-end", "--dt", "--tolerance", "--alpha", "--size-ratio"],
@@ -84,7 +96,26 @@ CASES = [
     *each(STEPS, ["--delta-phi", "--phi-start", "--u0"], NO_NUMBERS),
     *each(f"{STEPS} --protocol 2", ["--phi-thermal"], NO_NUMBERS),
     *each(f"{STEPS} --protocol 2", ["--n-sweeps"], ["-1", "1.5", "99999999999"]),
-    (f"{STEPS} --protocol 3", "protocol is '3'"),
+    (f"{STEPS} --protocol 3", "invalid choice"),
+    (f"{STEPS} --protocol yuan", "invalid choice"),
+    (f"{STEPS} --protocol marschall-2018", "which has its own; leave the way out"),
+    (f"{STEPS} --protocol 1 --n-sweeps 5", "no setting of the protocol yuan-2019-1"),
+    (f"{STEPS} --start run.h5", "no setting of the way"),
+    (f"{PACK} --kappa 1e-14", "use jamshape slow, whose steps are implicit"),
+    *each(PUBLISHED, ["--kappa", "--phi-start", "--phi-end", "--u0", "--tolerance"], NO_NUMBERS),
+    (f"{PUBLISHED} --kappa 1e-12", "at least 1e-10"),
+    (f"{PUBLISHED} --phi-end 0.3", "expected an end above the start"),
+    (f"{PUBLISHED} --p-end 1e-3", "no setting of the protocol marschall-2018"),
+    (f"{PUBLISHED} --u0 0", "no energy to reach"),
+    (f"{PUBLISHED} --search blind", "invalid choice"),
+    (f"{PUBLISHED} --search halving --minimiser none", "invalid choice"),
+    (f"{PUBLISHED} --minimiser paper", "the search direct, which has its own"),
+    *((f"{PUBLISHED} --start {name}", sentence) for name, sentence in STARTS.items()),
+    (f"{PUBLISHED} --start run.h5 --n 9", "n is 9 and that of the start run.h5 8; leave n out"),
+    (f"{PUBLISHED} --start run.h5 --alpha 3", "asked for, Particles\\('spherocylinder', alpha=3"),
+    (f"{PUBLISHED} --start run.h5 --shape dimer", "asked for, Particles\\('dimer'"),
+    (f"{PUBLISHED} --start run.h5 --kappa 1e-6", "kappa means nothing to a start"),
+    ("sweep --alpha 1 --protocol marschall-2018 --start run.h5 --out new", "--start is run.h5, which means nothing"),
     (f"{STEPS} --protocol 2 --phi-thermal 0.2", "a start at a smaller packing fraction"),
     (f"{STEPS} --kappa 1e-6", "no setting of the way"),
     (f"{PACK} --delta-phi 1e-3", "no setting of the way"),

@@ -68,6 +68,10 @@ class _Parser(ArgumentParser):
                 f"--seed is {given.seed}, which means nothing to a sweep: its samples have the"
                 " seeds 1 to that of --samples"
             )
+        if given.start is not None:
+            self.error(
+                f"--start is {given.start}, which means nothing to a sweep: its samples differ in their seed"
+            )
         for particle in particles(options):
             parser.parse_args(arguments_of(particle, 1, options))
 

@@ -6,14 +6,17 @@ from argparse import ArgumentParser, Namespace
 from typing import Any
 
 from jamshape.files.vocabulary import read_protocol
+from jamshape.minima import METHODS
 from jamshape.protocols.defaults import PROTOCOLS, SETTINGS, WAYS, recipe_for
-from jamshape.protocols.recipe import Recipe
+from jamshape.protocols.recipe import SEARCHES, Recipe
 from jamshape.shapes.command_line import (
     add_particle_options,
     are_particles_given,
     particles_of,
 )
 from jamshape.shapes.particles import Particles
+
+_CHOICES = {"search": tuple(SEARCHES), "minimiser": tuple(METHODS)}
 
 
 def add_recipe_options(parser: ArgumentParser) -> None:
@@ -23,13 +26,18 @@ def add_recipe_options(parser: ArgumentParser) -> None:
     group.add_argument("--dimension", type=int, choices=(2, 3), help="(that of the shape's paper)")
     group.add_argument("--way", choices=tuple(WAYS), help="to jamming (quasistatic)")
     group.add_argument(
-        "--protocol", type=read_protocol, metavar="NAME",
-        help=f"as published, in place of --way: {', '.join(PROTOCOLS)} (1 and 2 for short)",
+        "--protocol", type=read_protocol, choices=tuple(PROTOCOLS),
+        help="as published, in place of --way; 1 and 2 are short for the last two",
     )  # fmt: skip
     group.add_argument("--seed", type=int, help="of all that is random (1)")
     for one in SETTINGS:
         option = f"--{one.name.replace('_', '-')}"
-        group.add_argument(option, type=one.kind, help=f"{one.meaning}{_usual(one.name)}")
+        group.add_argument(
+            option,
+            type=one.kind,
+            choices=_CHOICES.get(one.name),
+            help=f"{one.meaning}{_usual(one.name)}",
+        )
 
 
 def _usual(name: str) -> str:

@@ -55,8 +55,8 @@ SETTINGS = (
     Setting("n_sweeps", int, "sweeps of it"),
     Setting("delta_phi", float, "step of the packing fraction"),
     Setting("start", Path, "file of compress or slow, through jamming, instead of a compression"),
-    Setting("search", str, "for u0: direct, or halving as in the paper"),
-    Setting("minimiser", str, "of the halving search: auto, or paper, newton, lbfgs, lammps"),
+    Setting("search", str, "for u0; halving is the paper's"),
+    Setting("minimiser", str, "of the halving search; auto when left out"),
 )
 
 # Steps of the packing fraction grow to this far below jamming. What is led to an energy need not be balanced well before.
