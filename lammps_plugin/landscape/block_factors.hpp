@@ -183,7 +183,7 @@ template <int BLOCK> class BlockFactors : public Factors {
   /// Of a matrix with a diagonal added, its rows in the order of elimination. False, and no
   /// factors, where a pivot is not positive: then the matrix is not positive definite (Sylvester's
   /// law of inertia), if fill is complete.
-  bool factorise(const BlockMatrix<BLOCK> &matrix, const std::vector<BlockRow<BLOCK>> &added)
+  bool factorise(const BlockMatrix<BLOCK> &matrix, BlockRows<BLOCK> &added)
   {
     factors = matrix;
     std::fill(column_of_row.begin(), column_of_row.end(), -1);

@@ -2,7 +2,7 @@
 
 #include "contact/pair_derivatives.hpp"
 
-#include "landscape/block_factors.hpp"
+#include "landscape/block_system.hpp"
 #include "packing/pair_sum.hpp"
 
 #include <algorithm>
@@ -224,11 +224,12 @@ template <class Model, int D> class VicinityOf : public Vicinity {
 
   void differentiate(const Displacement &at) override
   {
-    if (!pattern) find_blocks();
+    if (!hessian) hessian = block_system();
     const SplitArrays poses = displaced(at);
     const PosedPairs<Model, D, double> posed(shapes, poses.view(), pairs.list(), law);
     const TurnedBodies<Model, D, double> turned_bodies(posed);
-    clear_hessian();
+    hessian->clear();
+    pulled = Eigen::VectorXd::Zero(n());
     for (std::size_t p = 0; p < posed.size(); ++p) {
       const Vec<D> r = posed.separation(p);
       if (posed.contact(p, r).status != ContactStatus::TOUCHING) continue;
@@ -238,39 +239,23 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   }
 
   const Eigen::VectorXd &coupling() const override { return pulled; }
-
-  Eigen::VectorXd diagonal() const override
-  {
-    Eigen::VectorXd found(n());
-    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
-      const std::int64_t c = coordinates.column[k];
-      const int own = static_cast<int>(k % BLOCK);
-      if (c >= 0) found[c] = hessian.diagonal[pattern->place[k / BLOCK]](own, own);
-    }
-    return found;
-  }
-
+  Eigen::VectorXd diagonal() const override { return hessian->diagonal(); }
   Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const override
   {
-    return product(*pattern, hessian, vector);
+    return hessian->times(vector);
   }
 
   bool has_complete_factors() const override { return fill() == Fill::COMPLETE; }
 
-  std::shared_ptr<Factors> factors(const Eigen::VectorXd &diagonal) override
+  std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) override
   {
-    BlockRows<BLOCK> rows(*pattern, diagonal);
-    std::vector<BlockRow<BLOCK>> added;
-    for (std::size_t k = 0; k < pattern->size(); ++k) added.push_back(rows[k]);
-    const std::shared_ptr<BlockFactors<BLOCK>> found = spare();
-    return found->factorise(hessian, added) ? found : nullptr;
+    return hessian->factors(added);
   }
 
  private:
   static constexpr int BLOCK = D + ROTATIONS<D>;
   static constexpr int VARIABLES = PAIR_VARIABLES<D>;
   using DualContact = ContactOf<Model, D, Dual<VARIABLES>>;
-  using Block = BlockOf<BLOCK>;
 
   /// What is nearly round may turn so far in one step, if its surface moves no further than it may.
   static constexpr double WIDE = 1.0;
@@ -298,11 +283,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   double skin = 0.0;
   Law law;
   Poses base;
-  std::shared_ptr<const BlockPattern> pattern;
-  std::vector<int> block;  // (M,) of each pair below the diagonal of `hessian`
-  BlockMatrix<BLOCK> hessian;
+  std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
   Eigen::VectorXd pulled;
-  std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
 
   Fill fill() const { return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE; }
 
@@ -424,8 +406,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
       for (int k = 0; k < D; ++k) pairs.shift.push_back(wide.shift[D * p + k]);
     }
     measure(pairs);
-    pattern = nullptr;
-    made.clear();
+    hessian = nullptr;
   }
 
   double component(const Displacement &at, std::size_t i, int k) const
@@ -498,30 +479,12 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     }
   }
 
-  void find_blocks()
+  /// With blocks of displacements alone where nothing can turn.
+  std::unique_ptr<BlockSystem> block_system() const
   {
-    pattern = std::make_shared<BlockPattern>(coordinates.column, pairs.particles, shapes.size(),
-                                             fill());
-    block.clear();
-    for (std::size_t p = 0; p < pairs.list().n; ++p) {
-      const int i = place(p, 0), j = place(p, 1);
-      block.push_back(pattern->find(std::min(i, j), std::max(i, j)));
-    }
-  }
-
-  /// Row of a pair's first or second particle in `hessian`.
-  int place(std::size_t p, int side) const { return pattern->place[pairs.particles[2 * p + side]]; }
-
-  /// Zero, with 1 for each coordinate that a particle does not have.
-  void clear_hessian()
-  {
-    pulled = Eigen::VectorXd::Zero(n());
-    hessian.diagonal.assign(shapes.size(), Block::Zero());
-    hessian.below.assign(pattern->row.size(), Block::Zero());
-    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
-      const int own = static_cast<int>(k % BLOCK);
-      if (coordinates.column[k] < 0) hessian.diagonal[pattern->place[k / BLOCK]](own, own) = 1.0;
-    }
+    const BlockPlan plan{coordinates.column, pairs.particles, shapes.size(), BLOCK, fill()};
+    if (coordinates.n == D * shapes.size()) return std::make_unique<BlockSystemOf<D>>(plan);
+    return std::make_unique<BlockSystemOf<BLOCK>>(plan);
   }
 
   /// Second derivatives by the variables of a pair that touches.
@@ -559,22 +522,14 @@ template <class Model, int D> class VicinityOf : public Vicinity {
                                 : (side == 0 ? stretch : -stretch);
       }
     }
-    const auto add = [&](Block &to, int rows, int columns) {
-      for (int b = 0; b < BLOCK; ++b) {
-        for (int a = 0; a < BLOCK; ++a) {
-          to(a, b) += scale[rows][a] * scale[columns][b] * by(variable(rows, a), variable(columns, b));
-        }
+    Eigen::Matrix<double, 2 * BLOCK, 2 * BLOCK> scaled;
+    for (int b = 0; b < 2 * BLOCK; ++b) {
+      for (int a = 0; a < 2 * BLOCK; ++a) {
+        scaled(a, b) = scale[a / BLOCK][a % BLOCK] * scale[b / BLOCK][b % BLOCK] *
+                       by(variable(a / BLOCK, a % BLOCK), variable(b / BLOCK, b % BLOCK));
       }
-    };
-    const int i = place(p, 0), j = place(p, 1);
-    add(hessian.diagonal[i], 0, 0);
-    add(hessian.diagonal[j], 1, 1);
-    if (i == j) {  // a particle and its own image
-      add(hessian.diagonal[i], 0, 1);
-      add(hessian.diagonal[i], 1, 0);
-    } else {
-      add(hessian.below[block[p]], i > j ? 0 : 1, i > j ? 1 : 0);
     }
+    hessian->add(p, scaled.data());
     // The affine strain moves i from j by r.
     for (int side = 0; side < 2; ++side) {
       for (int k = 0; k < BLOCK; ++k) {
@@ -585,16 +540,6 @@ template <class Model, int D> class VicinityOf : public Vicinity {
         pulled[c] += scale[side][k] * along;
       }
     }
-  }
-
-  /// Factors that nobody else holds.
-  std::shared_ptr<BlockFactors<BLOCK>> spare()
-  {
-    for (const auto &one : made) {
-      if (one.use_count() == 1) return one;
-    }
-    made.push_back(std::make_shared<BlockFactors<BLOCK>>(pattern));
-    return made.back();
   }
 };
 

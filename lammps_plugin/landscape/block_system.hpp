@@ -1,0 +1,137 @@
+#pragma once
+
+#include "landscape/block_factors.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+namespace jamshape {
+
+/// The Hessian of the energies of pairs, block by block, and its factors.
+class BlockSystem {
+ public:
+  virtual ~BlockSystem() = default;
+  virtual void clear() = 0;
+  /// Adds the second derivatives of a pair by the coordinates of its first particle and of its
+  /// second one, a square matrix in columns.
+  virtual void add(std::size_t pair, const double *by) = 0;
+  virtual Eigen::VectorXd diagonal() const = 0;
+  virtual Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const = 0;
+  /// Of the matrix plus a diagonal (n,); nothing where a pivot is not positive.
+  virtual std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) = 0;
+};
+
+/// What a block system is made for: N particles whose coordinates, `most` of each, have the numbers
+/// column (N, most), -1 for none, and pairs of them (M, 2).
+struct BlockPlan {
+  const std::vector<std::int64_t> &column;
+  const std::vector<std::int64_t> &pairs;
+  std::size_t N;
+  int most;
+  Fill fill;
+};
+
+/// That of particles of which only the first BLOCK coordinates are there.
+template <int BLOCK> class BlockSystemOf : public BlockSystem {
+ public:
+  explicit BlockSystemOf(const BlockPlan &plan) : most(plan.most), pairs(plan.pairs)
+  {
+    std::vector<std::int64_t> column;
+    for (std::size_t i = 0; i < plan.N; ++i) {
+      const auto first = plan.column.begin() + i * most;
+      column.insert(column.end(), first, first + BLOCK);
+    }
+    pattern = std::make_shared<BlockPattern>(std::move(column), pairs, plan.N, plan.fill);
+    for (std::size_t p = 0; p < pairs.size() / 2; ++p) {
+      const int i = place(p, 0), j = place(p, 1);
+      block.push_back(pattern->find(std::min(i, j), std::max(i, j)));
+    }
+  }
+
+  /// Zero, with 1 for each coordinate that a particle does not have.
+  void clear() override
+  {
+    hessian.diagonal.assign(pattern->size(), Block::Zero());
+    hessian.below.assign(pattern->row.size(), Block::Zero());
+    each([&](std::int64_t c, double &value) {
+      if (c < 0) value = 1.0;
+    });
+  }
+
+  void add(std::size_t p, const double *by) override
+  {
+    const Eigen::Map<const Eigen::MatrixXd> all(by, 2 * most, 2 * most);
+    const auto part = [&](int rows, int columns) {
+      return all.template block<BLOCK, BLOCK>(rows * most, columns * most);
+    };
+    const int i = place(p, 0), j = place(p, 1);
+    hessian.diagonal[i] += part(0, 0);
+    hessian.diagonal[j] += part(1, 1);
+    if (i == j) {  // a particle and its own image
+      hessian.diagonal[i] += part(0, 1) + part(1, 0);
+    } else {
+      hessian.below[block[p]] += i > j ? part(0, 1) : part(1, 0);
+    }
+  }
+
+  Eigen::VectorXd diagonal() const override
+  {
+    Eigen::VectorXd found(static_cast<Eigen::Index>(pattern->n));
+    each([&](std::int64_t c, const double &value) {
+      if (c >= 0) found[c] = value;
+    });
+    return found;
+  }
+
+  Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const override
+  {
+    return product(*pattern, hessian, vector);
+  }
+
+  std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) override
+  {
+    BlockRows<BLOCK> rows(*pattern, added);
+    const std::shared_ptr<BlockFactors<BLOCK>> found = spare();
+    return found->factorise(hessian, rows) ? found : nullptr;
+  }
+
+ private:
+  using Block = BlockOf<BLOCK>;
+  int most;
+  std::vector<std::int64_t> pairs;
+  std::shared_ptr<const BlockPattern> pattern;
+  std::vector<int> block;  // (M,) of each pair below the diagonal
+  BlockMatrix<BLOCK> hessian;
+  std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
+
+  /// Row of a pair's first or second particle.
+  int place(std::size_t p, int side) const { return pattern->place[pairs[2 * p + side]]; }
+
+  /// Each coordinate with its element on the diagonal.
+  template <class Matrix, class Then>
+  static void each_of(const BlockPattern &at, Matrix &matrix, const Then &then)
+  {
+    for (std::size_t k = 0; k < at.column.size(); ++k) {
+      const auto own = static_cast<Eigen::Index>(k % BLOCK);
+      then(at.column[k], matrix.diagonal[at.place[k / BLOCK]](own, own));
+    }
+  }
+  template <class Then> void each(const Then &then) { each_of(*pattern, hessian, then); }
+  template <class Then> void each(const Then &then) const { each_of(*pattern, hessian, then); }
+
+  /// Factors that nobody else holds.
+  std::shared_ptr<BlockFactors<BLOCK>> spare()
+  {
+    for (const auto &one : made) {
+      if (one.use_count() == 1) return one;
+    }
+    made.push_back(std::make_shared<BlockFactors<BLOCK>>(pattern));
+    return made.back();
+  }
+};
+
+}  // namespace jamshape
