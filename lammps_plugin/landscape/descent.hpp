@@ -110,10 +110,7 @@ class Descent {
       record(sums);
       DescentOutcome outcome;
       if (is_over(sums, outcome)) return end(outcome, std::move(sums));
-      if (!by_newton && (residual() < stop.newton_below || rows.size() > best_row + SLOW)) {
-        by_newton = true;
-        best_row = rows.size();
-      }
+      choose_method();
       const Vector step = direction(sums);
       Line line = search_along(step, sums);
       if (line.sums.is_refused()) return end(DescentOutcome::STALLED, std::move(sums));
@@ -133,6 +130,11 @@ class Descent {
 
   /// L-BFGS gains in waves: it is given up after so many states for each particle, and more.
   static constexpr std::size_t SLOW = 1000;
+
+  /// It comes back, a few times, where Newton's method has led to another part of the landscape:
+  /// above so many times the residual from which on that is used.
+  static constexpr double AWAY = 30.0;
+  static constexpr int MOST_RETURNS = 5;
 
   /// Its first step, over the longest.
   static constexpr double FIRST = 0.05;
@@ -158,6 +160,7 @@ class Descent {
   NewtonSystem system;
   QuasiNewton memory;
   bool by_newton = false;
+  int returns = 0;
   std::vector<DescentRow> rows;
   std::int64_t evaluations = 0;
   double least_energy = INFINITY, least_residual = INFINITY;
@@ -173,6 +176,19 @@ class Descent {
 
   double residual() const { return rows.back().residual; }
   double accuracy() const { return std::min(COARSE, std::sqrt(residual())); }
+
+  void choose_method()
+  {
+    if (by_newton) {
+      if (residual() < AWAY * stop.newton_below || returns == MOST_RETURNS) return;
+      ++returns;
+      memory.forget();
+    } else if (residual() >= stop.newton_below && rows.size() <= best_row + SLOW) {
+      return;
+    }
+    by_newton = !by_newton;
+    best_row = rows.size();
+  }
 
   Vector direction(const LandscapeSums &sums)
   {
