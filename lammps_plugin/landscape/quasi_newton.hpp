@@ -1,5 +1,7 @@
 #pragma once
 
+#include "landscape/block_factors.hpp"
+
 #include <cstddef>
 #include <deque>
 #include <Eigen/Core>
@@ -8,7 +10,8 @@
 
 namespace jamshape {
 
-/// Directions of the limited-memory BFGS method (Nocedal & Wright, Numerical Optimization, Alg. 7.4).
+/// Directions of the limited-memory BFGS method (Nocedal & Wright, Numerical Optimization,
+/// Alg. 7.4).
 class QuasiNewton {
  public:
   using Vector = Eigen::VectorXd;
@@ -26,8 +29,8 @@ class QuasiNewton {
 
   void forget() { pairs.clear(); }
 
-  /// Where to go from a gradient; only if there is something to go by.
-  Vector direction(const Vector &gradient) const
+  /// Where to go from a gradient, with the inverse of a matrix near the Hessian to begin with.
+  Vector direction(const Vector &gradient, const Factors &near) const
   {
     Vector q = -gradient;
     std::vector<double> weight(pairs.size());
@@ -35,7 +38,7 @@ class QuasiNewton {
       weight[k] = pairs[k].inverse * pairs[k].step.dot(q);
       q -= weight[k] * pairs[k].change;
     }
-    q /= pairs.back().inverse * pairs.back().change.squaredNorm();
+    q = near.solve(q);
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       q += (weight[k] - pairs[k].inverse * pairs[k].change.dot(q)) * pairs[k].step;
     }

@@ -202,8 +202,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const double widest =
           std::max(bounds.widest, std::min(WIDE, bounds.longest / coordinates.turning_radius[i]));
-      excess = std::max({excess, norm(shift(by, i)) / bounds.longest,
-                         std::abs(angle_of(turn(by, i))) / widest});
+      excess = std::max(
+          {excess, norm(shift(by, i)) / bounds.longest, std::abs(angle_of(turn(by, i))) / widest});
     }
     return 1.0 / excess;
   }
@@ -357,7 +357,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   {
     if constexpr (D == 2) {
       return static_cast<double>(base.orientation[i] - then.orientation[i]);
-      } else {  // quaternions are apart by twice the sine of a quarter of the angle
+    } else {  // quaternions are apart by twice the sine of a quarter of the angle
       long double apart = 0.0, opposite = 0.0;
       for (std::size_t k = 4 * i; k < 4 * i + 4; ++k) {
         const long double minus = base.orientation[k] - then.orientation[k];
@@ -454,8 +454,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
       poses.orientation[i] += by[0];
     } else {
       long double *const q = &poses.orientation[4 * i];
-      const QuaternionOf<long double> found = turned(
-          QuaternionOf<long double>{q[0], q[1], q[2], q[3]}, constants_of<long double>(by));
+      const QuaternionOf<long double> found =
+          turned(QuaternionOf<long double>{q[0], q[1], q[2], q[3]}, constants_of<long double>(by));
       q[0] = found.w, q[1] = found.i, q[2] = found.j, q[3] = found.k;
     }
   }
@@ -518,8 +518,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     for (int side = 0; side < 2; ++side) {
       const std::size_t particle = pairs.particles[2 * p + side];
       for (int k = 0; k < BLOCK; ++k) {
-        scale[side][k] = k >= D ? coordinates.radians_per_length[particle]
-                                : (side == 0 ? stretch : -stretch);
+        scale[side][k] =
+            k >= D ? coordinates.radians_per_length[particle] : (side == 0 ? stretch : -stretch);
       }
     }
     Eigen::Matrix<double, 2 * BLOCK, 2 * BLOCK> scaled;
