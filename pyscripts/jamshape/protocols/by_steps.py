@@ -126,6 +126,7 @@ class BySteps:
         attributes = self.recipe.attributes() | {
             "phi": compression.phi,
             "phi_step": compression.step,
+            "parts": compression.parts,
             "loose_phi": compression.loose_phi,
             "is_thermalised": self.is_thermalised,
             "n_sweeps_done": self.thermal.n_done if self.thermal else -1,
@@ -144,6 +145,7 @@ class BySteps:
             step=float(stored["phi_step"]),
             loose=None if math.isnan(loose_phi) else State.of(read_packing(self.file, 0)),
             loose_phi=loose_phi,
+            parts=int(stored.get("parts", 0)),
         )
         self.is_thermalised = bool(stored["is_thermalised"])
         self.seconds_before = float(stored["seconds_before"])
