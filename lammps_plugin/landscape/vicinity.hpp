@@ -115,6 +115,7 @@ class Vicinity {
   {
     differentiate(at);
     const Eigen::VectorXd sum = diagonal() + added;
+    if (!sum.allFinite()) return nullptr;
     const double smallest = sum.size() > 0 ? sum.minCoeff() : 1.0;
     const double first =
         std::max(smallest, sum.size() > 0 ? LEAST_SHIFT * sum.cwiseAbs().maxCoeff() : 1.0);
