@@ -87,9 +87,7 @@ class History:
         """Append a row, now."""
         self.put(time.perf_counter() - self.began, evaluations, residual, energy_density)
 
-    def put(
-        self, seconds: float, evaluations: int, residual: float, energy_density: float
-    ) -> None:
+    def put(self, seconds: float, evaluations: int, residual: float, energy_density: float) -> None:
         """Append a row."""
         self.wall_seconds.append(seconds)
         self.evaluations.append(evaluations)

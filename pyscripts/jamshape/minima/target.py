@@ -55,6 +55,7 @@ _SMALLEST_STEP = 1e-3
 _LEAST_OVERLAP = 1e-13
 _LARGEST_OVERLAP = 0.05
 
+
 class TargetError(RuntimeError):
     """No minimum of the asked energy was found; the sentence says what was."""
 
@@ -238,7 +239,9 @@ def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Iterator[M
             tolerance = max(tolerance, _GAIN * left)  # the next ones need be no better
         if left <= tolerance and target.is_met(u):
             break
-        if abs(u / target.u0 - 1) < _CLOSE:  # what minimising takes from it, as rods slide, is added
+        if (
+            abs(u / target.u0 - 1) < _CLOSE
+        ):  # what minimising takes from it, as rods slide, is added
             aim *= target.u0 / u
         strained = jammed.state.strained(part * _strain_to(jammed, aim))
         wanted = replace(target, tolerance=tolerance)

@@ -11,6 +11,7 @@ from typing import Any
 from jamshape.files.h5md import read_attributes, read_packing, require_attributes
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum
+from jamshape.minima.target import require_reachable
 from jamshape.packing import State
 from jamshape.protocols.making import Progress, write_states
 from jamshape.protocols.quasistatic import QuasistaticRun, compress
@@ -62,6 +63,8 @@ class BySteps:
         self.compression = QuasistaticRun.of(self._landscape, State.of(start), self.protocol)
         if self.file.exists():
             self._read()
+        elif self.recipe.target:
+            require_reachable(self._landscape, self.recipe.target)
         if self.way.thermal and not self.is_thermalised:
             if self.thermal is None:
                 yield from self._compress(self.way.thermal.phi)

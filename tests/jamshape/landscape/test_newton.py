@@ -110,7 +110,9 @@ def test_first_shift_falls_with_the_forces():
     packing = pressed_named("discs")
     landscape = Landscape(packing)
     here = landscape.evaluate(State.of(packing))
-    shifts = [least_shift(landscape, here._replace(gradient=f * here.gradient)) for f in (1, 1e-9, 0)]
+    shifts = [
+        least_shift(landscape, here._replace(gradient=f * here.gradient)) for f in (1, 1e-9, 0)
+    ]
     assert shifts[0] > shifts[1] > shifts[2] > 0
     forces = 1e-9 * np.abs(here.gradient).max()
     assert shifts[1] == pytest.approx(forces / landscape.length)
