@@ -1,5 +1,6 @@
-#include "bindings/vicinity.hpp"
 #include "landscape/descent.hpp"
+
+#include "bindings/vicinity.hpp"
 
 #include <string>
 
@@ -10,10 +11,14 @@ namespace {
 const char *name_of(DescentOutcome outcome)
 {
   switch (outcome) {
-    case DescentOutcome::CONVERGED: return "converged";
-    case DescentOutcome::UNJAMMED: return "unjammed";
-    case DescentOutcome::STALLED: return "stalled";
-    default: return "exhausted";
+    case DescentOutcome::CONVERGED:
+      return "converged";
+    case DescentOutcome::UNJAMMED:
+      return "unjammed";
+    case DescentOutcome::STALLED:
+      return "stalled";
+    default:
+      return "exhausted";
   }
 }
 
@@ -83,12 +88,16 @@ void export_descent(nb::module_ &m)
           [](DescentStop *place, double tolerance, double lowest, std::int64_t evaluations,
              double seconds, double rounding, double newton_below, double longest_step,
              double widest_turn) {
-            new (place) DescentStop{tolerance, lowest,       evaluations,
-                                    seconds,   rounding,     newton_below,
+            new (place) DescentStop{tolerance,
+                                    lowest,
+                                    evaluations,
+                                    seconds,
+                                    rounding,
+                                    newton_below,
                                     {longest_step, widest_turn}};
           },
-          "tolerance"_a, "lowest"_a, "evaluations"_a, "seconds"_a, "rounding"_a,
-          "newton_below"_a, "longest_step"_a, "widest_turn"_a);
+          "tolerance"_a, "lowest"_a, "evaluations"_a, "seconds"_a, "rounding"_a, "newton_below"_a,
+          "longest_step"_a, "widest_turn"_a);
   nb::class_<DescentEnd>(m, "DescentEnd")
       .def_prop_ro("outcome", [](const DescentEnd &end) { return name_of(end.outcome); })
       .def_prop_ro("sums", [](const DescentEnd &end) { return tuple_of(end.sums); })
@@ -101,9 +110,10 @@ void export_descent(nb::module_ &m)
       .def_ro("evaluations", &DescentEnd::evaluations)
       .def_ro("factorisations", &DescentEnd::factorisations)
       .def_ro("products", &DescentEnd::products);
-  nb::class_<PosedNewton>(m, "NewtonSystem",
-                          "(H + shift) x = right at the base of a vicinity, with a shift that makes\n"
-                          "the Hessian H positive definite.")
+  nb::class_<PosedNewton>(
+      m, "NewtonSystem",
+      "(H + shift) x = right at the base of a vicinity, with a shift that makes\n"
+      "the Hessian H positive definite.")
       .def(nb::init<Vicinity &, double>(), "vicinity"_a, "shift"_a, nb::keep_alive<1, 2>())
       .def("prepare", &PosedNewton::prepare, "Takes the Hessian at the base.")
       .def_prop_ro("coupling", &PosedNewton::coupling,

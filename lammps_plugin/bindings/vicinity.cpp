@@ -1,6 +1,7 @@
+#include "bindings/vicinity.hpp"
+
 #include "bindings/shape.hpp"
 #include "bindings/shapes.hpp"
-#include "bindings/vicinity.hpp"
 
 #include <memory>
 #include <nanobind/stl/shared_ptr.h>
@@ -118,7 +119,7 @@ nb::object evaluate(Vicinity &of, const Array1<double> &x, double strain, bool e
 }
 
 std::shared_ptr<Factors> factorise(Vicinity &of, const Array1<double> &x, double strain,
-                  const Array1<double> &diagonal)
+                                   const Array1<double> &diagonal)
 {
   require(diagonal.shape(0) == of.n(), "diagonal has another length than there are coordinates.");
   require(of.has_pairs(), "there are no pairs yet, expected take_pairs before.");

@@ -78,11 +78,11 @@ struct BlockPattern {
   std::size_t n;                     // coordinates
   std::vector<std::int64_t> column;  // (N, block)
   Fill fill;
-  std::vector<int> place;            // (N,) of each particle in the order of elimination
-  std::vector<int> first;            // (N + 1,) of the blocks below the diagonal, column by column
-  std::vector<int> row;              // of each block, ascending within a column
-  std::vector<int> first_left;       // (N + 1,) of the same blocks, row by row
-  std::vector<Left> left;            // ascending within a row
+  std::vector<int> place;       // (N,) of each particle in the order of elimination
+  std::vector<int> first;       // (N + 1,) of the blocks below the diagonal, column by column
+  std::vector<int> row;         // of each block, ascending within a column
+  std::vector<int> first_left;  // (N + 1,) of the same blocks, row by row
+  std::vector<Left> left;       // ascending within a row
 
  private:
   /// In an order in which few blocks are added (approximate minimum degree).

@@ -8,7 +8,8 @@
 
 namespace jamshape {
 
-/// Directions of the limited-memory BFGS method (Nocedal & Wright, Numerical Optimization, Alg. 7.4).
+/// Directions of the limited-memory BFGS method (Nocedal & Wright, Numerical Optimization,
+/// Alg. 7.4).
 class QuasiNewton {
  public:
   using Vector = Eigen::VectorXd;

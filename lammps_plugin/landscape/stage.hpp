@@ -78,8 +78,7 @@ class StageSolver {
 
   /// From a guess, or from another one if particles collide there; with factors of an earlier,
   /// similar stage, if there are any.
-  StageEnd solve(const Vector &guess, const Vector &other,
-                 std::shared_ptr<Factors> found)
+  StageEnd solve(const Vector &guess, const Vector &other, std::shared_ptr<Factors> found)
   {
     factors = std::move(found);
     Point at = begin(guess, other);

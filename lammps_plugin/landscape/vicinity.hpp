@@ -206,8 +206,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const double widest =
           std::max(bounds.widest, std::min(WIDE, bounds.longest / coordinates.turning_radius[i]));
-      excess = std::max({excess, norm(shift(by, i)) / bounds.longest,
-                         std::abs(angle_of(turn(by, i))) / widest});
+      excess = std::max(
+          {excess, norm(shift(by, i)) / bounds.longest, std::abs(angle_of(turn(by, i))) / widest});
     }
     return 1.0 / excess;
   }
@@ -367,8 +367,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
       list.turned[i] = static_cast<double>(now[0] - then[0]);
     } else {
       using Long = QuaternionOf<long double>;
-      const Long q = Long{now[0], now[1], now[2], now[3]} *
-                     Long{then[0], -then[1], -then[2], -then[3]};
+      const Long q =
+          Long{now[0], now[1], now[2], now[3]} * Long{then[0], -then[1], -then[2], -then[3]};
       const long double parts[] = {q.w, q.i, q.j, q.k};
       std::transform(parts, parts + TURNS, &list.turned[TURNS * i],
                      [](long double x) { return static_cast<double>(x); });
@@ -471,8 +471,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
       poses.orientation[i] += by[0];
     } else {
       long double *const q = &poses.orientation[4 * i];
-      const QuaternionOf<long double> found = turned(
-          QuaternionOf<long double>{q[0], q[1], q[2], q[3]}, constants_of<long double>(by));
+      const QuaternionOf<long double> found =
+          turned(QuaternionOf<long double>{q[0], q[1], q[2], q[3]}, constants_of<long double>(by));
       q[0] = found.w, q[1] = found.i, q[2] = found.j, q[3] = found.k;
     }
   }
@@ -535,8 +535,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     for (int side = 0; side < 2; ++side) {
       const std::size_t particle = pairs.particles[2 * p + side];
       for (int k = 0; k < BLOCK; ++k) {
-        scale[side][k] = k >= D ? coordinates.radians_per_length[particle]
-                                : (side == 0 ? stretch : -stretch);
+        scale[side][k] =
+            k >= D ? coordinates.radians_per_length[particle] : (side == 0 ? stretch : -stretch);
       }
     }
     Eigen::Matrix<double, 2 * BLOCK, 2 * BLOCK> scaled;

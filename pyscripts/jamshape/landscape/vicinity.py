@@ -163,7 +163,7 @@ class Vicinity:
         ValueError
             If a contact does not converge there.
         """
-        end = self._compiled.descend(stop, shift, self._renew, lambda row: None)
+        end = self._compiled.descend(stop, shift, self._renew, lambda _row: None)
         self.landscape.evaluations += end.evaluations
         self.base = State.joined(*self._compiled.poses)
         return DescentEnd(end.outcome, self._accepted(end.sums), end.rows)

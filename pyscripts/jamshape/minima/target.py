@@ -7,11 +7,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from jamshape.arrays import FloatArray
 from jamshape.checks import require_positive
-from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.landscape.vicinity import Vicinity
 from jamshape.minima.descent import History, Minimum, Outcome, Stop, residual_of
@@ -184,8 +180,7 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
         found = minimise(landscape, search.state, "auto", stop, search.history)
         if found.outcome is Outcome.CONVERGED:
             jammed = found
-            for found in _lead_to(landscape, jammed, target):
-                pass
+            found = collections.deque(_lead_to(landscape, jammed, target), maxlen=1).pop()
             if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):
                 search.minimum, search.state = found, found.state
                 yield search

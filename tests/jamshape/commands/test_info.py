@@ -33,8 +33,8 @@ def test_a_packing(jamshape, tiny, name, rate, made):
     stored = read_attributes(path)
     assert (report["kind"], report["finished"], report["reached"]) == ("packing", True, True)
     assert set(rate) == {"kappa"} & report.keys()
-    for name in ("phi", "pressure", "u", "z", "seed", *rate, "u0", "wall_seconds"):
-        assert report[name] == stored[name]
+    for told in ("phi", "pressure", "u", "z", "seed", *rate, "u0", "wall_seconds"):
+        assert report[told] == stored[told]
     assert report["rattlers"] == stored["n_rattlers"]
     assert report["error"] == stored["residual"]
     kind = {"alpha": pytest.approx(1.0), "count": 8}

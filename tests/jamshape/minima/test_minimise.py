@@ -176,16 +176,16 @@ def test_a_minimum_is_the_same_to_the_bit_whatever_the_age_of_the_pairs(name, me
     state, rng = State.of(packing), np.random.default_rng(7)
     stop = Stop(tolerance=1e-7, evaluations=150)
     expected = minimise(Landscape(packing), state, method, stop)
-    for part in (0.2, 0.8):  # of how far pairs hold
+    for far in (0.2, 0.8):  # of how far pairs hold
         landscape = Landscape(packing)
         move = rng.normal(size=landscape.size)
-        move *= part * 0.5 * landscape.skin / np.abs(move).max()
+        move *= far * 0.5 * landscape.skin / np.abs(move).max()
         then = landscape.displaced(state, move)
         pairs = landscape.wide_pairs(then)
         found = minimise(landscape, state, method, stop)
         assert pairs.then is then
-        for name in ("position", "orientation", "edges"):
-            np.testing.assert_array_equal(getattr(found.state, name), getattr(expected.state, name))
+        for part in ("position", "orientation", "edges"):
+            np.testing.assert_array_equal(getattr(found.state, part), getattr(expected.state, part))
         assert found.evaluation.energy == expected.evaluation.energy
         assert found.history.residual == expected.history.residual
 

@@ -116,9 +116,7 @@ def test_steps_that_adapt_are_fewer_and_end_as_close_to_the_tolerance(adaptive):
 def test_long_minimisations_are_told_of_and_gone_on_with_in_parts(monkeypatch):
     monkeypatch.setattr(quasistatic, "_PART", 60)
     landscape, compression, protocol = begun(n=24, phi=0.5, protocol=ADAPTIVE)
-    parts = []
-    for at in compress(landscape, compression, protocol):
-        parts.append(at.parts)
+    parts = [at.parts for at in compress(landscape, compression, protocol)]
     assert max(parts) >= 2
     assert compression.minimum is not None
     per_particle = compression.minimum.evaluation.energy / 24
