@@ -148,7 +148,7 @@ class Vicinity:
         )
 
     def descend(self, stop: DescentStop, shift: float) -> DescentEnd:
-        """Minimise the energy at fixed box by Newton's method; the base moves along.
+        """Minimise the energy at fixed box by L-BFGS and Newton's method; the base moves along.
 
         Parameters
         ----------
