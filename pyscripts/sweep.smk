@@ -13,7 +13,7 @@ ALPHA = str(config.get("alpha", "0 0.01 1 4")).split()
 SEEDS = range(1, int(config.get("samples", 6)) + 1)
 OPTIONS = " ".join(
     f"--{name.replace('_', '-')} {config[name]}"
-    for name in ("n", "u0", "kappa", "p_end", "tolerance", "size_ratio")
+    for name in ("n", "u0", "way", "kappa", "p_end", "tolerance", "size_ratio")
     if name in config
 )
 

@@ -125,7 +125,8 @@ void export_descent(nb::module_ &m)
       .def_prop_ro("shift", &PosedNewton::shift);
   nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
       .def("descend", &descend, "stop"_a, "shift"_a, "renew"_a, "tell"_a,
-           "Minimises the energy at fixed box by Newton's method with a first shift of the\n"
+           "Minimises the energy at fixed box by L-BFGS and Newton's method, with a first shift of "
+           "the\n"
            "Hessian, the base moving along; renew(x, strain) takes pairs that hold there, and\n"
            "tell(row) hears of a row (seconds, evaluations, residual, energy density) now and\n"
            "then. Returns a DescentEnd.");

@@ -162,40 +162,10 @@ nb::object move(Vicinity &of, const Array1<double> &x, double strain)
   return tuple_of(of.poses());
 }
 
-template <class AnyFactors> nb::object solve(const AnyFactors &factors, const Array2<double> &right)
+nb::object solve(const Factors &factors, const Array2<double> &right)
 {
   require(right.shape(1) == factors.size(), "right has another length than the matrix.");
   return solutions(right, [&](const auto &side) { return factors.solve(side); });
-}
-
-/// Whether these are starts of columns and rows of a square sparse matrix (CSC).
-bool are_columns(const Array1<int> &start, const Array1<int> &row)
-{
-  if (start.shape(0) == 0) return false;
-  const int *const first = start.data(), *const last = first + start.shape(0) - 1;
-  const auto n = static_cast<int>(last - first);
-  return *first == 0 && static_cast<std::size_t>(*last) == row.shape(0) &&
-         std::is_sorted(first, last + 1) &&
-         std::all_of(row.data(), row.data() + row.shape(0), [n](int r) { return r >= 0 && r < n; });
-}
-
-void make_factors(SymmetricFactors *place, const Array1<int> &start, const Array1<int> &row,
-                  const Array1<double> &value)
-{
-  require(are_columns(start, row) && row.shape(0) == value.shape(0),
-          "start, row and value are not the columns of a sparse matrix.");
-  require_finite(value, "value");
-  const int n = static_cast<int>(start.shape(0)) - 1;
-  const UpperTriangle matrix = Eigen::Map<const UpperTriangle>(
-      n, n, static_cast<Eigen::Index>(row.shape(0)), start.data(), row.data(), value.data());
-  const Order order = sparse_order(matrix);
-  UpperTriangle ordered(n, n);
-  ordered.selfadjointView<Eigen::Upper>() = matrix.selfadjointView<Eigen::Upper>().twistedBy(order);
-  new (place) SymmetricFactors(ordered, order);
-  if (!place->factorise(ordered)) {
-    place->~SymmetricFactors();
-    throw std::runtime_error("The matrix is singular.");
-  }
 }
 
 /// A function of its own: how much is inlined into one is limited by its size.
@@ -210,14 +180,8 @@ template <class Model, int D>
 void export_vicinity(nb::module_ &m)
 {
   using namespace nb::literals;
-  nb::class_<SymmetricFactors>(m, "SymmetricFactors")
-      .def("__init__", &make_factors, "start"_a, "row"_a, "value"_a,
-           "Of a matrix in CSC, of which the upper triangle is read. RuntimeError if singular.")
-      .def_prop_ro("n_negative", &SymmetricFactors::n_negative)
-      .def("solve", &solve<SymmetricFactors>, "right"_a, "For the rows of right (k, n).");
   nb::class_<Factors>(m, "Factors", "Of a positive definite matrix.")
-      .def_prop_ro("n_negative", [](const Factors &) { return 0; })
-      .def("solve", &solve<Factors>, "right"_a, "For the rows of right (k, n).");
+      .def("solve", &solve, "right"_a, "For the rows of right (k, n).");
   m.attr("LEAST_SHIFT") = LEAST_SHIFT;
 
   nb::class_<Vicinity>(m, "Vicinity", "The energy of a packing about a base.")

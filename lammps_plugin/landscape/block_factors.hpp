@@ -1,16 +1,20 @@
 #pragma once
 
-#include "landscape/symmetric_factors.hpp"
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <Eigen/Core>
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
 #include <memory>
 #include <utility>
 #include <vector>
 
 namespace jamshape {
+
+/// The smallest shift of a diagonal, over its largest element: rounding in the factorisation is
+/// just below it, and so is what it does to modes that are stiff at all.
+inline constexpr double LEAST_SHIFT = 1e-13;
 
 /// Factors of a symmetric matrix, or of one that is nearly it.
 class Factors {
@@ -90,9 +94,11 @@ struct BlockPattern {
       const auto [low, high] = std::minmax(pairs[p], pairs[p + 1]);
       entries.emplace_back(low, high, 1.0);
     }
-    UpperTriangle neighbours(N, N);
+    Eigen::SparseMatrix<double> neighbours(N, N);
     neighbours.setFromTriplets(entries.begin(), entries.end());
-    const Order order = sparse_order(neighbours);
+    Eigen::AMDOrdering<int>::PermutationType inverse;
+    Eigen::AMDOrdering<int>()(neighbours.selfadjointView<Eigen::Upper>(), inverse);
+    const auto order = inverse.inverse().eval();
     return {order.indices().data(), order.indices().data() + N};
   }
 

@@ -35,7 +35,8 @@ struct NearPairs {
   std::vector<std::int64_t> particles, shift;  // (M, 2), (M, D)
   Poses then;
   double skin, reach;
-  // From `then` to the base, apart from the box's strain: (N, D) displacements and (N,) angles.
+  // From `then` to the base, apart from the box's strain: (N, D) displacements, and (N,) angles, in
+  // space (N, 4) quaternions.
   std::vector<double> moved{}, turned{};
 
   PairList list() const { return {particles.size() / 2, particles.data(), shift.data()}; }
@@ -114,6 +115,7 @@ class Vicinity {
   {
     differentiate(at);
     const Eigen::VectorXd sum = diagonal() + added;
+    if (!sum.allFinite()) return nullptr;
     const double smallest = sum.size() > 0 ? sum.minCoeff() : 1.0;
     const double first =
         std::max(smallest, sum.size() > 0 ? LEAST_SHIFT * sum.cwiseAbs().maxCoeff() : 1.0);
@@ -173,9 +175,11 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   bool holds(const Displacement &at) override
   {
     if (!has_pairs()) return false;
-    if (!is_beyond(pairs, at)) return true;
+    if (!is_outrun && !is_beyond(pairs, at)) return true;
     const Eigen::Map<const Eigen::VectorXd> x(at.x, static_cast<Eigen::Index>(n()));
-    if (is_beyond(wide, at, skin) || !x.allFinite()) return false;
+    // Chosen at the same points whenever the wide ones were taken: factors depend on the choice.
+    is_outrun = is_beyond(wide, at, skin) || !x.allFinite();
+    if (is_outrun) return false;
     choose(at);
     return true;
   }
@@ -255,6 +259,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
  private:
   static constexpr int BLOCK = D + ROTATIONS<D>;
   static constexpr int VARIABLES = PAIR_VARIABLES<D>;
+  static constexpr int TURNS = D == 2 ? 1 : 4;  // numbers of an orientation
   using DualContact = ContactOf<Model, D, Dual<VARIABLES>>;
 
   /// What is nearly round may turn so far in one step, if its surface moves no further than it may.
@@ -281,6 +286,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   NearPairs wide, pairs;             // `pairs` are those of `wide` that are within `skin`
   std::vector<std::int64_t> chosen;  // (M,) which of them
   double skin = 0.0;
+  bool is_outrun = false;  // `pairs`, at a point where `wide` is so too
   Law law;
   Poses base;
   std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
@@ -342,31 +348,43 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   void measure(NearPairs &list) const
   {
     list.moved.resize(D * shapes.size());
-    list.turned.resize(shapes.size());
+    list.turned.resize(TURNS * shapes.size());
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       for (int k = 0; k < D; ++k) {
         const long double scale = base.edges[k] / list.then.edges[k];
         list.moved[D * i + k] =
             static_cast<double>(base.position[D * i + k] - scale * list.then.position[D * i + k]);
       }
-      list.turned[i] = turned_since(list.then, i);
+      measure_turn(list, i);
     }
   }
 
-  double turned_since(const Poses &then, std::size_t i) const
+  void measure_turn(NearPairs &list, std::size_t i) const
   {
+    const long double *const now = &base.orientation[TURNS * i];
+    const long double *const then = &list.then.orientation[TURNS * i];
     if constexpr (D == 2) {
-      return static_cast<double>(base.orientation[i] - then.orientation[i]);
-    } else {  // quaternions are apart by twice the sine of a quarter of the angle
-      long double apart = 0.0, opposite = 0.0;
-      for (std::size_t k = 4 * i; k < 4 * i + 4; ++k) {
-        const long double minus = base.orientation[k] - then.orientation[k];
-        const long double plus = base.orientation[k] + then.orientation[k];
-        apart += minus * minus;
-        opposite += plus * plus;
-      }
-      const auto chord = static_cast<double>(std::sqrt(std::min(apart, opposite)));
-      return 4.0 * std::asin(std::min(0.5 * chord, 1.0));
+      list.turned[i] = static_cast<double>(now[0] - then[0]);
+    } else {
+      using Long = QuaternionOf<long double>;
+      const Long q =
+          Long{now[0], now[1], now[2], now[3]} * Long{then[0], -then[1], -then[2], -then[3]};
+      const long double parts[] = {q.w, q.i, q.j, q.k};
+      std::transform(parts, parts + TURNS, &list.turned[TURNS * i],
+                     [](long double x) { return static_cast<double>(x); });
+    }
+  }
+
+  /// The angle by which a particle is turned at a point, since a list was made.
+  double turned_to(const NearPairs &list, const Displacement &at, std::size_t i) const
+  {
+    const double *const before = &list.turned[TURNS * i];
+    if constexpr (D == 2) {
+      const double angle = std::abs(before[0] + turn(at, i)[0]);
+      return angle > M_PI ? std::abs(std::remainder(angle, 2.0 * M_PI)) : angle;
+    } else {
+      const Quaternion q{before[0], before[1], before[2], before[3]};
+      return norm(rotation_vector(turned(q, turn(at, i))));
     }
   }
 
@@ -385,9 +403,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       Vec<D> by = shift(at, i);
       for (int k = 0; k < D; ++k) by[k] += list.moved[D * i + k];
-      double turned = std::abs(list.turned[i] + angle_of(turn(at, i)));
-      if (turned > M_PI) turned = std::abs(std::remainder(turned, 2.0 * M_PI));
-      most = std::max(most, stretch * norm(by) + coordinates.turning_radius[i] * turned);
+      const double angle = turned_to(list, at, i);
+      most = std::max(most, stretch * norm(by) + coordinates.turning_radius[i] * angle);
     }
     return 2.0 * most >= list.skin - kept - scaled * list.reach;
   }

@@ -2,7 +2,7 @@
 
 >>> import jamshape as js
 >>> rods = js.Spherocylinders(alpha=4)
->>> packing = js.make_packing(rods, n=16, kappa=1e-4, u0=1e-8, progress=False)
+>>> packing = js.make_packing(rods, n=16, u0=1e-8, progress=False)
 >>> packing.n, packing.results["outcome"]
 (16, 'converged')
 

@@ -132,15 +132,7 @@ def superellipsoid_overlap(
 
 LEAST_SHIFT: float
 
-class SymmetricFactors:
-    n_negative: int
-    def __init__(
-        self, start: NDArray[np.int32], row: NDArray[np.int32], value: NDArray[np.float64]
-    ) -> None: ...
-    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]: ...
-
 class Factors:
-    n_negative: int
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
 class StageUnits:

@@ -20,6 +20,7 @@ NO_COUNTS = ("-1", "0", "1.5", "99999999999")
 
 COMPRESS = "compress --n 8 --kappa 1e-2 --phi-start 0.3 --phi-end 0.32 --out new.h5"
 PACK = "pack --n 8 --out new.h5"
+DYNAMICS = "pack --way dynamics --n 8 --out new.h5"
 STEPS = "pack --way steps --n 8 --out new.h5"
 PUBLISHED = "pack --n 8 --protocol marschall-2018 --out new.h5"
 SLOW = "slow --n 8 --phi-end 0.85 --out new.h5"
@@ -40,7 +41,7 @@ STARTS = {
     "other.h5": "other.h5",
     "empty.h5": "empty.h5",
     "'a folder'": "a folder",
-    "run.h5": "its last frame has phi = 0.320.* and comes to u = 0 .* compress further",
+    "run.h5": "its last frame has phi = 0.320.* and comes to u = .* expected more than u0 = 1e-15; compress further",
 }
 
 CASES = [
@@ -89,8 +90,9 @@ CASES = [
         ("newline.h5", "integrator is"), ("euler.h5", "integrator is"), ("backwards.h5", "kappa is nan"),
         ("sides.h5", "sides is 7"), ("no_rows.h5", "rows is 0"), ("no_frames.h5", "frames is -3"),
         ("words.h5", "dt is"), ("stiff.h5", "k_e is"))),
-    *each(PACK, ["--kappa", "--p-end", "--u0", "--accuracy", "--tolerance", "--phi-start", "--alpha"],
+    *each(PACK, ["--u0", "--accuracy", "--tolerance", "--phi-start", "--delta-phi", "--alpha"],
           [*NO_NUMBERS, "inf"]),
+    *each(DYNAMICS, ["--kappa", "--p-end", "--u0"], [*NO_NUMBERS, "inf"]),
     *each(PACK, ["--n"], NO_COUNTS),
     *each(PACK, ["--seed", "--dimension"], ["-1", "x"]),
     *each(STEPS, ["--delta-phi", "--phi-start", "--u0"], NO_NUMBERS),
@@ -101,7 +103,7 @@ CASES = [
     (f"{STEPS} --protocol marschall-2018", "which has its own; leave the way out"),
     (f"{STEPS} --protocol 1 --n-sweeps 5", "no setting of the protocol yuan-2019-1"),
     (f"{STEPS} --start run.h5", "no setting of the way"),
-    (f"{PACK} --kappa 1e-14", "use jamshape slow, whose steps are implicit"),
+    (f"{DYNAMICS} --kappa 1e-14", "use jamshape slow, whose steps are implicit"),
     *each(PUBLISHED, ["--kappa", "--phi-start", "--phi-end", "--u0", "--tolerance"], NO_NUMBERS),
     (f"{PUBLISHED} --kappa 1e-12", "at least 1e-10"),
     (f"{PUBLISHED} --phi-end 0.3", "expected an end above the start"),
@@ -118,14 +120,15 @@ CASES = [
     ("sweep --alpha 1 --protocol marschall-2018 --start run.h5 --out new", "--start is run.h5, which means nothing"),
     (f"{STEPS} --protocol 2 --phi-thermal 0.2", "a start at a smaller packing fraction"),
     (f"{STEPS} --kappa 1e-6", "no setting of the way"),
-    (f"{PACK} --delta-phi 1e-3", "no setting of the way"),
+    (f"{PACK} --kappa 1e-6", "no setting of the way"),
+    (f"{DYNAMICS} --delta-phi 1e-3", "no setting of the way"),
     (f"{PACK} --way walking", "invalid choice"),
-    (f"{PACK} --u0 0", "no energy to reach"),
-    (f"{PACK} --u0 0.01", "take another u0"),
-    (f"{PACK} --kappa 1e-2", "at most kappa_start"),
+    (f"{DYNAMICS} --u0 0", "no energy to reach"),
+    *((f"{way} --u0 0.01", "take another u0") for way in (PACK, DYNAMICS, STEPS)),
+    (f"{DYNAMICS} --kappa 1e-2", "at most kappa_start"),
     *((f"pack --n 8 --out {name}", "expected") for name in ("start.h5", "run.h5", "text.h5", "empty.h5")),
     ("pack --n 8 --out 'a folder'", "folder"),
-    ("pack --n 8 --out '$(touch X).h5'", "LAMMPS cannot take, expected"),
+    ("pack --way dynamics --n 8 --out '$(touch X).h5'", "LAMMPS cannot take, expected"),
     ("pack --way steps --n 8 --out 'a\nb.h5'", "control character"),
     *each(SLOW, ["--kappa", "--phi-start", "--phi-end", "--tolerance", "--largest-drop", "--p-end", "--alpha"],
           NO_NUMBERS),

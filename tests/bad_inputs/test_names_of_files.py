@@ -41,9 +41,11 @@ def test_commands_write_where_they_are_told(tmp_path, monkeypatch):
     run("draw", paths["h5"], "--dpi", 20, "--out", paths["png"])
     run("export", paths["h5"], "--out", paths["gsd"])
     packing = folder / f"{STRANGE} jammed.h5"
-    run("pack", *few, "--u0", 1e-8, "--kappa", 1e-4, "--out", packing)
+    run("pack", *few, "--u0", 1e-8, "--out", packing)
+    slow = folder / f"{STRANGE} compressed.h5"
+    run("pack", *few, "--u0", 1e-8, "--way", "dynamics", "--kappa", 1e-4, "--out", slow)
     # The run of a packing stays, other energies may be looked for from it.
     assert {path.name for path in folder.iterdir()} == {
-        *(path.name for path in paths.values()), packing.name, f"{packing.name}.run.h5",
+        *(path.name for path in paths.values()), packing.name, slow.name, f"{slow.name}.run.h5",
     }  # fmt: skip
     assert [path.name for path in tmp_path.iterdir()] == [STRANGE]

@@ -93,7 +93,9 @@ def test_bad_particles_are_refused(shape, change, sentence):
         shape(**(arguments | change))
 
 
-def test_vicinities_are_of_the_plane():
-    shape = _contact.Dimers(np.ones((2, 3)), np.ones(2), 3, 1.0, 1)
-    with pytest.raises(ValueError, match="three dimensions, expected two"):
-        shape.vicinity(np.zeros((2, 3), np.int64), np.ones(2), np.ones(2))
+def test_vicinities_have_coordinates_of_their_space():
+    for dimension, columns in ((2, 3), (3, 6)):
+        shape = _contact.Dimers(np.ones((2, 3)), np.ones(2), dimension, 1.0, 1)
+        shape.vicinity(np.arange(2 * columns).reshape(2, columns), np.ones(2), np.ones(2))
+        with pytest.raises(ValueError, match=r"no shapes \(N, 3\) or in space \(N, 6\)"):
+            shape.vicinity(np.zeros((2, 9 - columns), np.int64), np.ones(2), np.ones(2))

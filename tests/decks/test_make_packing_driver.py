@@ -16,7 +16,8 @@ from jamshape.minima import residual_of
 pytestmark = pytest.mark.lammps
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_packing.py"
-SMALL = ("--n", "16", "--alpha", "1", "--kappa", "1e-5", "--phi-start", "0.6", "--u0", "1e-9")
+USUAL = ("--n", "16", "--alpha", "1", "--phi-start", "0.6", "--u0", "1e-9")
+SMALL = (*USUAL, "--way", "dynamics", "--kappa", "1e-5")
 
 
 def run(*options):
@@ -78,6 +79,22 @@ def test_the_compression_is_beside_it_and_nothing_else(made):
     assert observables["phi"][closing].max() > 0.7
     assert np.all(np.diff(observables["phi"][closing]) > 0)
     assert np.all(np.diff(observables["phi"][~closing]) < 0)
+
+
+def test_the_usual_way_leaves_the_packing_and_nothing_else(tmp_path):
+    out = tmp_path / "packing.h5"
+    finished = run(*USUAL, "--out", out)
+    assert finished.returncode == 0, finished.stderr
+    assert [path.name for path in tmp_path.iterdir()] == [out.name]
+    report, stored = json.loads(finished.stdout), read_attributes(out)
+    assert report["reached"] is True
+    assert report["u"] == pytest.approx(1e-9, rel=1e-7, abs=0)
+    assert stored["way"] == "quasistatic"
+    assert not {"kappa", "protocol"} & stored.keys()
+    for path in (out, tmp_path / "none.h5"):
+        refused = run(*USUAL, "--kappa", "1e-5", "--out", path)
+        assert refused.returncode == 1
+        assert "kappa is no setting of the way by quasistatic" in refused.stderr
 
 
 def test_a_finished_file_is_left_alone(made):

@@ -103,7 +103,9 @@ def ended(process, after=_SECONDS):
 def uninterrupted(case, folder):
     """Run a case to its end; return how long that took."""
     prepare(case, folder)
-    ended(forked(["--version"], folder / "said.log"))  # the process to fork from imports all that there is
+    ended(
+        forked(["--version"], folder / "said.log")
+    )  # the process to fork from imports all that there is
     began = time.monotonic()
     code = ended(case.start(folder))
     assert code == 0, said(folder)

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.lammps
 
 RODS = ("--alpha", 1, "--n", 16)
 PACK = (*RODS, "--phi-start", 0.55, "--u0", 1e-6)
-DYNAMICS = (*PACK, "--kappa", 1e-5, "--p-end", 3e-4)
+DYNAMICS = (*PACK, "--way", "dynamics", "--kappa", 1e-5, "--p-end", 3e-4)
 STEPS = (*PACK, "--way", "steps", "--delta-phi", 2e-3)
 
 Given = Mapping[str, Callable[[Path], None]]
@@ -107,6 +107,11 @@ CASES = {
         ("compress", *RODS, "--kappa", 2e-4, "--phi-start", 0.5, "--phi-end", 0.86),
         ("run.h5",),
         ("--resume",),
+    ),
+    "pack": Case(
+        ("pack", *PACK),
+        ("packing.h5",),
+        patches=(("jamshape.protocols.by_steps._STORE_SECONDS", 0.0),),
     ),
     "pack by dynamics": Case(("pack", *DYNAMICS), ("packing.h5",)),
     "pack by steps": Case(

@@ -44,7 +44,7 @@ from jamshape.vibration.spectrum import spectrum, state_error
 from jamshape.vibration.statistics import components, count, participation
 
 # What is asked for: the energy density, how well it is met, and what may be left of the forces.
-U0, ACCURACY, RESIDUAL = 1e-10, 1e-7, 1e-8
+U0, ACCURACY, RESIDUAL = 1e-12, 1e-7, 1e-8
 TARGET = Target(U0)
 
 # Coarse, since the energy is led to its target from wherever this ends.

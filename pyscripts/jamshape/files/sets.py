@@ -43,7 +43,7 @@ class System(NamedTuple):
     kinds: str = ""
     """The particles of a mixture."""
     protocol: str = ""
-    """The published one, by name; none of other ways to jamming."""
+    """The published one, by name, or the way to jamming; none of compressions in LAMMPS."""
     n_sweeps: int = 0
     """Of Monte Carlo."""
 
@@ -142,7 +142,7 @@ def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> Syst
     told = set(names) <= attributes.keys()
     known = tuple((name, float(attributes[name])) for name in names if told)
     kinds = str(attributes.get("kinds", ""))
-    protocol = str(protocol_named(attributes.get("protocol", "")))
+    protocol = str(protocol_named(attributes.get("protocol", attributes.get("way", ""))))
     sweeps = int(attributes.get("n_sweeps", 0))
     return System(shape, dimension, known, kinds, protocol, sweeps)
 

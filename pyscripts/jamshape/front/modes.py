@@ -54,9 +54,9 @@ class Modes:
     >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> modes = js.modes(packing)
     >>> len(modes), len(modes.in_band("translation")), len(modes.in_band("high"))
-    (48, 2, 46)
+    (48, 2, 45)
     >>> modes
-    <48 modes (0 low, 0 middle, 46 high) of 16 of 16 particles held by 47 bonds: z = 5.875>
+    <48 modes (0 low, 1 middle, 45 high) of 16 of 16 particles held by 46 bonds: z = 5.75>
     """
 
     table: ModeTable

@@ -148,7 +148,7 @@ class Vicinity:
         )
 
     def descend(self, stop: DescentStop, shift: float) -> DescentEnd:
-        """Minimise the energy at fixed box by Newton's method; the base moves along.
+        """Minimise the energy at fixed box by L-BFGS and Newton's method; the base moves along.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class Vicinity:
         ValueError
             If a contact does not converge there.
         """
-        end = self._compiled.descend(stop, shift, self._renew, lambda row: None)
+        end = self._compiled.descend(stop, shift, self._renew, lambda _row: None)
         self.landscape.evaluations += end.evaluations
         self.base = State.joined(*self._compiled.poses)
         return DescentEnd(end.outcome, self._accepted(end.sums), end.rows)

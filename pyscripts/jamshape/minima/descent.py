@@ -87,9 +87,7 @@ class History:
         """Append a row, now."""
         self.put(time.perf_counter() - self.began, evaluations, residual, energy_density)
 
-    def put(
-        self, seconds: float, evaluations: int, residual: float, energy_density: float
-    ) -> None:
+    def put(self, seconds: float, evaluations: int, residual: float, energy_density: float) -> None:
         """Append a row."""
         self.wall_seconds.append(seconds)
         self.evaluations.append(evaluations)
@@ -167,12 +165,6 @@ class Descent:
         """Residual of the present state."""
         return residual_of(self.landscape, self.evaluation).largest
 
-    @property
-    def extended(self) -> bool:
-        """Whether doubles are too short for the tolerance."""
-        floor = rounding_floor(self.evaluation, self.landscape, extended=False)
-        return floor > 0.1 * self.stop.tolerance
-
     def be_patient(self, evaluations: int) -> None:
         """From now on call it a stall if so many evaluations in a row gain nothing."""
         self._patience, self._last_gain, self._gained = evaluations, self.evaluations, np.inf
@@ -185,11 +177,13 @@ class Descent:
     def take(self, state: State, end: DescentEnd) -> None:
         """Accept where a compiled minimisation ended, with its history."""
         self.state, self.evaluation = state, end.evaluation
-        rows = end.rows[1:]  # the first one is there
+        if len(end.rows) < 2:  # the first one is there
+            return
         begin = time.perf_counter() - self.history.began - end.rows[-1][0]
         before = self.landscape.evaluations - end.rows[-1][1]
-        for seconds, evaluations, residual, density in rows:
+        for seconds, evaluations, residual, density in end.rows[1:-1]:
             self.history.put(begin + seconds, before + evaluations, residual, density)
+        self.record(self.evaluation)
 
     def record(self, evaluation: Evaluation) -> None:
         """Add a row to the history."""

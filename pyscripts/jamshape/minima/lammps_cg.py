@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from jamshape.landscape import Landscape
     from jamshape.minima.descent import Descent, Outcome
 
-# Iterations between two looks at the residual, and how many looks without one end it.
+# Iterations between two looks at the residual, and how many looks in a row without a gain end it.
 _ITERATIONS = 100
 _IDLE = 3
 
@@ -34,8 +34,11 @@ def descend(descent: Descent) -> Outcome | None:
             session.commands(f"minimize 0 1e-300 {_ITERATIONS} {100 * _ITERATIONS}")
             landscape.evaluations += session.step - begin  # at least: LAMMPS counts line searches
             state = State.of(session.packing())
+            before = descent.evaluation.energy
             descent.move_to(state, landscape.evaluate(state, extended=False))
-            idle = idle + 1 if session.step - begin < _ITERATIONS else 0
+            # It ends early, or goes to and fro on the spot.
+            is_idle = session.step - begin < _ITERATIONS or descent.evaluation.energy >= before
+            idle = idle + 1 if is_idle else 0
             if idle == _IDLE:
                 return None
     return outcome

@@ -8,7 +8,6 @@ from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, least_shift
 from jamshape.landscape.vicinity import DescentStop, Vicinity
 from jamshape.minima.descent import Descent, Outcome, rounding_of_a_bond
 
-
 # L-BFGS, cheap while contacts come and go, gives way to Newton's method below this residual.
 _NEWTON_BELOW = 1e-2
 

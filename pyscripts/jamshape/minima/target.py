@@ -7,11 +7,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from jamshape.arrays import FloatArray
 from jamshape.checks import require_positive
-from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.landscape.vicinity import Vicinity
 from jamshape.minima.descent import History, Minimum, Outcome, Stop, residual_of
@@ -54,6 +50,7 @@ _SMALLEST_STEP = 1e-3
 # that still are particles.
 _LEAST_OVERLAP = 1e-13
 _LARGEST_OVERLAP = 0.05
+
 
 class TargetError(RuntimeError):
     """No minimum of the asked energy was found; the sentence says what was."""
@@ -183,8 +180,7 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
         found = minimise(landscape, search.state, "auto", stop, search.history)
         if found.outcome is Outcome.CONVERGED:
             jammed = found
-            for found in _lead_to(landscape, jammed, target):
-                pass
+            found = collections.deque(_lead_to(landscape, jammed, target), maxlen=1).pop()
             if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):
                 search.minimum, search.state = found, found.state
                 yield search
@@ -238,7 +234,9 @@ def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Iterator[M
             tolerance = max(tolerance, _GAIN * left)  # the next ones need be no better
         if left <= tolerance and target.is_met(u):
             break
-        if abs(u / target.u0 - 1) < _CLOSE:  # what minimising takes from it, as rods slide, is added
+        if (
+            abs(u / target.u0 - 1) < _CLOSE
+        ):  # what minimising takes from it, as rods slide, is added
             aim *= target.u0 / u
         strained = jammed.state.strained(part * _strain_to(jammed, aim))
         wanted = replace(target, tolerance=tolerance)

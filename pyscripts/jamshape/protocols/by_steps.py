@@ -11,6 +11,7 @@ from typing import Any
 from jamshape.files.h5md import read_attributes, read_packing, require_attributes
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum
+from jamshape.minima.target import require_reachable
 from jamshape.packing import State
 from jamshape.protocols.making import Progress, write_states
 from jamshape.protocols.quasistatic import QuasistaticRun, compress
@@ -62,6 +63,8 @@ class BySteps:
         self.compression = QuasistaticRun.of(self._landscape, State.of(start), self.protocol)
         if self.file.exists():
             self._read()
+        elif self.recipe.target:
+            require_reachable(self._landscape, self.recipe.target)
         if self.way.thermal and not self.is_thermalised:
             if self.thermal is None:
                 yield from self._compress(self.way.thermal.phi)
@@ -126,6 +129,7 @@ class BySteps:
         attributes = self.recipe.attributes() | {
             "phi": compression.phi,
             "phi_step": compression.step,
+            "parts": compression.parts,
             "loose_phi": compression.loose_phi,
             "is_thermalised": self.is_thermalised,
             "n_sweeps_done": self.thermal.n_done if self.thermal else -1,
@@ -144,6 +148,7 @@ class BySteps:
             step=float(stored["phi_step"]),
             loose=None if math.isnan(loose_phi) else State.of(read_packing(self.file, 0)),
             loose_phi=loose_phi,
+            parts=int(stored.get("parts", 0)),
         )
         self.is_thermalised = bool(stored["is_thermalised"])
         self.seconds_before = float(stored["seconds_before"])

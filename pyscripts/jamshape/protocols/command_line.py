@@ -43,8 +43,13 @@ def add_recipe_options(parser: ArgumentParser) -> None:
 def _usual(name: str) -> str:
     """Tell the defaults of a setting, those of protocols where they are no way's."""
     tables = WAYS | {k: v for k, v in PROTOCOLS.items() if v not in WAYS.values()}
-    found = {way: table.usual.get(name) for way, table in tables.items()}
-    texts = [f"{way} {_said(value)}" for way, value in found.items() if value is not None]
+    texts = []
+    for way, table in tables.items():
+        if (value := table.usual.get(name)) is not None:
+            in_plane = table.in_plane.get(name, value)
+            texts.append(
+                f"{way} {_said(value)}" + f" or in 2D {_said(in_plane)}" * (in_plane != value)
+            )
     return f" ({', '.join(texts)})" if texts else ""
 
 

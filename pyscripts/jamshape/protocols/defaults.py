@@ -224,7 +224,7 @@ def recipe_for(
         raise ValueError(msg)
     dimension = particles.shape.dimension if dimension is None else dimension
     require_one_of("dimension", dimension, (2, 3))
-    usual, called = _chosen(way, protocol, dimension)
+    usual, called = _chosen(way, protocol)
     get = usual.defaults(dimension) | _allowed(given, usual, called)
     if source is not None:
         get |= _of_source(source, given)
@@ -233,7 +233,7 @@ def recipe_for(
     return Recipe(particles, get["n"], dimension, seed, get["phi_start"], how, target)
 
 
-def _chosen(way: str | None, protocol: int | str | None, dimension: int) -> tuple[UsualWay, str]:
+def _chosen(way: str | None, protocol: int | str | None) -> tuple[UsualWay, str]:
     """Find the way or the protocol, and how sentences call it."""
     if protocol is None:
         way = way or "quasistatic"

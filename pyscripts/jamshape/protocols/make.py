@@ -18,7 +18,15 @@ from jamshape.protocols.by_compression import ByCompression
 from jamshape.protocols.by_dynamics import ByDynamics
 from jamshape.protocols.by_steps import BySteps
 from jamshape.protocols.making import Making, Progress, SearchFile, lead
-from jamshape.protocols.recipe import Adaptive, Compressed, Dynamics, Recipe, Steps, Thermalisation, Way
+from jamshape.protocols.recipe import (
+    Adaptive,
+    Compressed,
+    Dynamics,
+    Recipe,
+    Steps,
+    Thermalisation,
+    Way,
+)
 
 _MAKING: dict[type[Way], Callable[[Recipe, Path], Making]] = {
     Dynamics: ByDynamics,

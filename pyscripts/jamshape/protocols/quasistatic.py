@@ -87,6 +87,8 @@ class QuasistaticRun:
         The densest unjammed state, if any.
     minimum
         The jammed packing, once it is found.
+    parts
+        Of the present minimisation, if it is a long one, that are done.
     """
 
     state: State
@@ -96,7 +98,6 @@ class QuasistaticRun:
     loose_phi: float = math.nan
     minimum: Minimum | None = None
     parts: int = 0
-    """Of the present minimisation, that are done."""
     history: History = field(default_factory=History)
 
     @classmethod

@@ -132,15 +132,6 @@ class Adaptive(Steps):
         """Return what identifies it, to be stored."""
         return {"way": "quasistatic"} | self.steps(target)
 
-    def require(self, recipe: Recipe) -> None:
-        """Refuse a start that is denser than the Monte Carlo."""
-        if self.thermal and not recipe.phi_start < self.thermal.phi:
-            found = (
-                f"phi_start is {recipe.phi_start} and the Monte Carlo runs at {self.thermal.phi}"
-            )
-            msg = f"{found}, expected a start at a smaller packing fraction"
-            raise ValueError(msg)
-
 
 @dataclass(frozen=True)
 class Dynamics:

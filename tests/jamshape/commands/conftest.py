@@ -11,7 +11,8 @@ from jamshape.commands import main
 
 FAST = ("--alpha", 1, "--n", 16)
 RUN = (*FAST, "--kappa", 1e-3, "--phi-start", 0.5, "--phi-end", 0.88, "--rows", 20, "--frames", 4)
-PACK = (*FAST, "--kappa", 1e-5, "--p-end", 3e-4, "--phi-start", 0.55, "--u0", 1e-6)
+PACK = (*FAST, "--phi-start", 0.55, "--u0", 1e-6)
+DYNAMICS = ("--way", "dynamics", "--kappa", 1e-5, "--p-end", 3e-4)
 SLOW = (*FAST, "--kappa", 1e-4, "--phi-end", 0.64)
 
 
@@ -64,6 +65,7 @@ def tiny(tmp_path_factory, start):
             "start.data": ("initial", *FAST),
             "run.h5": ("compress", *RUN),
             "packing.h5": ("pack", *PACK),
+            "dynamics.h5": ("pack", *PACK, *DYNAMICS),
             "slow.h5": ("slow", *SLOW, "--start", start),
             "modes.h5": ("modes", folder / "packing.h5"),
             "packing.png": ("draw", folder / "packing.h5", "--dpi", 60),

@@ -20,19 +20,27 @@ def info(jamshape, path):
     return dict(map(str.strip, line.split(":", 1)) for line in lines), ended.report
 
 
-def test_a_packing(jamshape, tiny):
-    path = tiny[0] / "packing.h5"
+@pytest.mark.parametrize(
+    ("name", "rate", "made"),
+    [
+        ("packing.h5", (), "seed 1, u0 1e-06, phi from 0.55"),
+        ("dynamics.h5", ("kappa",), "seed 1, kappa 1e-05, u0 1e-06, phi from 0.55"),
+    ],
+)
+def test_a_packing(jamshape, tiny, name, rate, made):
+    path = tiny[0] / name
     lines, report = info(jamshape, path)
     stored = read_attributes(path)
     assert (report["kind"], report["finished"], report["reached"]) == ("packing", True, True)
-    for name in ("phi", "pressure", "u", "z", "seed", "kappa", "u0", "wall_seconds"):
-        assert report[name] == stored[name]
+    assert set(rate) == {"kappa"} & report.keys()
+    for told in ("phi", "pressure", "u", "z", "seed", *rate, "u0", "wall_seconds"):
+        assert report[told] == stored[told]
     assert report["rattlers"] == stored["n_rattlers"]
     assert report["error"] == stored["residual"]
     kind = {"alpha": pytest.approx(1.0), "count": 8}
     assert report["kinds"] == [kind | {"size": 1.0}, kind | {"size": 1.4}]
     assert lines["particles"].startswith("16 spherocylinders in 2D, 8 with alpha 1, 2R = 1; 8 with")
-    assert lines["made with"] == "seed 1, kappa 1e-05, u0 1e-06, phi from 0.55"
+    assert lines["made with"] == made
     assert "format 2" in lines["written by"]
     assert "go on with" not in lines
 
@@ -68,9 +76,9 @@ def test_a_run(jamshape, tiny, name, kind):
         ("run.h5", {"finished": False}, "jamshape compress --resume --out {path}"),
         ("slow.h5", {"finished": False}, "start the command that began it again"),
         (
-            "packing.h5.run.h5",
+            "dynamics.h5.run.h5",
             {"finished": False},
-            "start the command that makes {folder}/packing.h5 again",
+            "start the command that makes {folder}/dynamics.h5 again",
         ),
         (
             "packing.h5.search.h5",

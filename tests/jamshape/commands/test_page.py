@@ -16,7 +16,7 @@ PAGE = (PAGES / "command.md").read_text(encoding="utf-8")
 OF_COMMAND = re.compile(r"^    jamshape (.*)$", re.MULTILINE)
 LINES = OF_COMMAND.findall(PAGE)
 
-SMALL = "--n 16 --kappa 1e-5 --p-end 3e-4 --phi-start 0.55 --u0 1e-6"
+SMALL = "--n 16 --phi-start 0.55 --u0 1e-6"
 QUICK = {
     "compress": "--alpha 1 --n 16 --kappa 1e-3 --rows 20 --frames 4",
     "pack": f"--alpha 1 {SMALL}",

@@ -4,6 +4,7 @@ import pytest
 from mixtures import bidisperse, superellipsoids
 
 from jamshape.command import plain
+from jamshape.drawing.text import system_labels
 from jamshape.files.h5md import write_packing
 from jamshape.files.run_writer import RunWriter
 from jamshape.files.sets import (
@@ -80,6 +81,18 @@ def test_shapes_with_other_parameters_and_protocols(tmp_path):
         "n_sweeps": 50,
     }
     assert not of_paper(first)
+
+
+def test_ways_to_jamming_are_told_apart(tmp_path):
+    """Packings of dynamics tell no way, as those of earlier versions do not."""
+    write(tmp_path, "a", bidisperse(1), seed=1)
+    write(tmp_path, "b", bidisperse(1), seed=2, way="quasistatic")
+    first, second = read_groups([tmp_path])
+    assert (first.protocol, second.protocol) == ("", "quasistatic")
+    assert of_paper(first)
+    assert of_paper(second)
+    assert system_labels([first, second])[first].endswith(", dynamics")
+    assert system_labels([first, second])[second].endswith(", quasistatic")
 
 
 def test_files_of_earlier_versions_have_todays_names(tmp_path):

@@ -1,97 +1,138 @@
+"""Newton's equations at a point of a landscape: what their shift is, and that their solutions solve them."""
+
+from functools import cache
+
 import numpy as np
 import pytest
-import scipy.sparse
+from pressed import PRESSED, pressed_named
+from scenes import pressed
+from squeezed import squeezed
 
-from jamshape.landscape.newton import LEAST_SHIFT, Factorisation, Regularised
+from jamshape import _contact
+from jamshape.landscape import Landscape, State
+from jamshape.landscape.newton import least_shift
+from jamshape.landscape.vicinity import Vicinity
+from jamshape.protocols.random_start import random_packing
 
-
-def random_symmetric(n, seed, density=0.1):
-    rng = np.random.default_rng(seed)
-    matrix = scipy.sparse.random(n, n, density, rng=rng, data_rvs=rng.standard_normal)
-    diagonal = scipy.sparse.diags(rng.normal(size=n))
-    return (matrix + matrix.T + diagonal).tocsc()
-
-
-def smallest_eigenvalue(matrix):
-    return np.linalg.eigvalsh(matrix.toarray()).min()
+# In space, so many particles or fewer are left to factors; more, to iterations.
+MANY = "many rods in space"
 
 
-@pytest.mark.parametrize("n", [1, 2, 17, 120])
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("shift", [0.0, 0.7, -1.3])
-def test_negative_pivots_are_as_many_as_negative_eigenvalues(n, seed, shift):
-    matrix = random_symmetric(n, seed)
-    values = np.linalg.eigvalsh(matrix.toarray()) + shift
-    assert np.abs(values).min() > 1e-6  # so that the sign is beyond doubt
-    assert Factorisation.of(matrix, shift).n_negative == (values < 0).sum()
+@cache
+def packing_named(name):
+    return pressed(n=160, dimension=3, phi=0.1) if name == MANY else pressed_named(name)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_solution_solves(seed):
-    rng = np.random.default_rng(seed)
-    matrix = random_symmetric(80, seed)
-    matrix = (matrix @ matrix.T + 1e-3 * scipy.sparse.identity(80)).tocsc()
-    right = rng.normal(size=(80, 2))
-    factors = Factorisation.of(matrix, 0.25)
-    shifted = matrix.toarray() + 0.25 * np.eye(80)
-    for b in (right, right[:, 0]):
-        x = factors.solve(b)
-        assert x.shape == b.shape
-        assert np.abs(shifted @ x - b).max() < 1e-12 * np.abs(shifted).max() * np.abs(x).max()
+def equations(packing, shift):
+    """Newton's equations of a packing, the Hessian, and whether factors are of all of it."""
+    landscape, state = Landscape(packing), State.of(packing)
+    newton = Vicinity(landscape, state).newton(shift)
+    newton.prepare()
+    return newton, landscape.curvature(state)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_indefinite_matrices_become_positive_definite(seed):
-    matrix = random_symmetric(60, seed)
-    least = smallest_eigenvalue(matrix)
-    assert least < -0.5
-    regularised = Regularised()
-    factors = regularised.factorise(matrix)
-    assert factors.n_negative == 0
-    assert -least < regularised.shift < 10 * -least  # no more than the last power of ten
-    b = np.random.default_rng(seed).normal(size=60)
-    x = factors.solve(b)
-    assert b @ x > 0
-    residual = matrix @ x + regularised.shift * x - b
-    assert np.abs(residual).max() < 1e-10 * np.abs(b).max()
+def right_sides(n, k=2):
+    return np.random.default_rng(4).normal(size=(k, n))
 
 
-@pytest.mark.parametrize(
-    "matrix",
-    [
-        [[0.0, 1.0], [1.0, 0.0]],
-        [[1.0, 1.0, 1.0], [1.0, 1.0, 2.0], [1.0, 2.0, 1.0]],
-        [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0], [0.0, 2.0, 0.0]],
-    ],
-)
-def test_pivots_that_vanish_hide_no_negative_eigenvalue(matrix):
-    matrix = scipy.sparse.csc_matrix(matrix)
-    regularised = Regularised(shift=1e-12)
-    regularised.factorise(matrix)
-    assert regularised.shift > -smallest_eigenvalue(matrix)
+def remainders(newton, hessian, right, found):
+    """What solutions leave of right-hand sides, over these."""
+    left = right - (hessian @ found.T).T - newton.shift * found
+    return np.linalg.norm(left, axis=1) / np.linalg.norm(right, axis=1)
 
 
-@pytest.mark.parametrize("matrix", [np.zeros((3, 3)), np.diag([1.0, 0.0, 0.0])])
-def test_singular_matrices_are_shifted(matrix):
-    # Rattlers: rows of zeros.
-    regularised = Regularised(shift=0.0)
-    factors = regularised.factorise(scipy.sparse.csc_matrix(matrix))
-    assert regularised.shift == pytest.approx(LEAST_SHIFT)
-    assert np.isfinite(factors.solve(np.ones(3))).all()
+@pytest.mark.parametrize("name", PRESSED)
+def test_indefinite_hessians_become_positive_definite_by_no_more_than_tenfold(name):
+    newton, curvature = equations(pressed_named(name), 1e-9)
+    values = np.linalg.eigvalsh(curvature.hessian.toarray())
+    least = values[0]
+    assert least < -1e-3 * values[-1]
+    assert -least < newton.shift < -10 * least
+    right = right_sides(len(values))
+    found = newton.solve(right, 1.0)
+    assert (np.einsum("ki,ki->k", right, found) > 0).all()
+    assert remainders(newton, curvature.hessian, right, found).max() < 1e-10
 
 
-def test_positive_definite_matrices_keep_their_shift():
-    regularised = Regularised(shift=1e-9)
-    regularised.factorise(scipy.sparse.identity(4, format="csc"))
-    assert regularised.shift == 1e-9
+def test_solutions_are_as_good_as_asked_for_where_factors_would_fill():
+    newton, curvature = equations(packing_named(MANY), 1e-9)
+    right, spread = right_sides(len(curvature.coupling)), []
+    for accuracy in (1e-1, 1e-4, 1e-10):
+        found = newton.solve(right, accuracy)
+        left = remainders(newton, curvature.hessian, right, found)
+        assert (left <= accuracy * (1 + 1e-6)).all()
+        assert (np.einsum("ki,ki->k", right, found) > 0).all()
+        spread.append(left.max())
+    assert spread[0] > 1e-6  # it does no more than it is asked for
+
+
+@pytest.mark.parametrize("name", [*PRESSED, MANY])
+def test_coupling_is_that_of_the_landscape(name):
+    newton, curvature = equations(packing_named(name), 1e-9)
+    scale = np.abs(curvature.coupling).max()
+    assert newton.coupling == pytest.approx(curvature.coupling, rel=0, abs=1e-12 * scale)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_particles_without_contacts_are_shifted_by_the_least(dimension):
+    packing = random_packing(5, 0.05, 1, dimension=dimension)
+    newton, curvature = equations(packing, 1e-300)
+    assert curvature.hessian.count_nonzero() == 0
+    assert newton.shift == _contact.LEAST_SHIFT
+    right = right_sides(len(curvature.coupling))
+    assert newton.solve(right, 1e-8) == pytest.approx(right / newton.shift)
+
+
+def test_hessians_of_minima_keep_their_shift():
+    packing, state = squeezed(24, 0, 0.9)
+    landscape = Landscape(packing)
+    values = np.linalg.eigvalsh(landscape.curvature(state).hessian.toarray())
+    shift = 1e-6
+    assert values[0] > -0.5 * shift
+    newton = Vicinity(landscape, state).newton(shift)
+    newton.prepare()
+    assert newton.shift == shift
 
 
 def test_shift_falls_after_good_steps_and_rises_after_bad_ones():
-    regularised = Regularised(shift=1e-3)
-    regularised.learn(1)
-    lower = regularised.shift
-    assert lower < 1e-3
-    regularised.learn(3)
-    assert regularised.shift == lower
-    regularised.learn(20)
-    assert regularised.shift > 1e-3
+    newton, _ = equations(pressed_named("discs"), 1e-3)
+    first = newton.shift
+    newton.learn(1)
+    lower = newton.shift
+    assert lower < first
+    newton.learn(3)
+    assert newton.shift == lower
+    newton.learn(20)
+    assert newton.shift > first
+
+
+def test_first_shift_falls_with_the_forces():
+    packing = pressed_named("discs")
+    landscape = Landscape(packing)
+    here = landscape.evaluate(State.of(packing))
+    shifts = [
+        least_shift(landscape, here._replace(gradient=f * here.gradient)) for f in (1, 1e-9, 0)
+    ]
+    assert shifts[0] > shifts[1] > shifts[2] > 0
+    forces = 1e-9 * np.abs(here.gradient).max()
+    assert shifts[1] == pytest.approx(forces / landscape.length)
+
+
+def test_equations_are_refused_before_they_are_prepared_and_of_another_size():
+    packing = pressed_named("discs")
+    landscape = Landscape(packing)
+    newton = Vicinity(landscape, State.of(packing)).newton(1e-3)
+    right = np.ones((1, landscape.size))
+    with pytest.raises(ValueError, match="not prepared, expected prepare before"):
+        newton.solve(right, 1e-3)
+    with pytest.raises(ValueError, match="not prepared, expected prepare before"):
+        _ = newton.coupling
+    newton.prepare()
+    with pytest.raises(ValueError, match="right has another length"):
+        newton.solve(right[:, 1:], 1e-3)
+    right[0, 2] = np.nan
+    with pytest.raises(ValueError, match="number 2 of right is"):
+        newton.solve(right, 1e-3)
+    for shift in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="the shift is no positive number"):
+            Vicinity(landscape, State.of(packing)).newton(shift)

@@ -1,7 +1,10 @@
+from functools import cache, partial
+
 import numpy as np
 import pytest
 from mixtures import bidisperse
-from scenes import make
+from pressed import PRESSED, pressed_named
+from scenes import make, pressed
 from squeezed import squeezed
 from superellipsoid_packings import ellipsoids, octahedra_and_boxes, superellipses
 
@@ -129,6 +132,73 @@ def test_methods_agree_where_they_begin_close_to_a_minimum_of_discs(name):
         moved -= moved.mean(axis=0)
         held = ~landscape.rattlers(expected.state)
         assert np.abs(moved[held] - moved[held].mean(axis=0)).max() < 1e-5, method
+
+
+IN_SPACE = ("rods in space", "spheres and rods in space", "ellipsoids", "octahedra and boxes")
+
+
+def jammed_named(name):
+    """Squeeze a packing by small strains until its minimum is well above jamming."""
+    landscape = Landscape(pressed_named(name))
+    found = minimise(landscape, State.of(landscape.particles), "newton")
+    while found.outcome is not Outcome.CONVERGED or found.energy_density < 1e-4:
+        found = minimise(landscape, found.state.strained(-0.01), "newton")
+    return landscape, found
+
+
+@pytest.mark.parametrize("name", ["superellipses", *IN_SPACE])
+def test_methods_agree_where_they_begin_close_to_a_minimum_of_any_shape(name):
+    landscape, expected = jammed_named(name)
+    step = np.random.default_rng(2).normal(size=landscape.size)
+    close = landscape.displaced(expected.state, 1e-3 * landscape.length * step)
+    away = landscape.evaluate(close).energy / expected.state.volume
+    assert away > 1.001 * expected.energy_density
+    for method in ("newton", "auto", "lbfgs"):
+        found = minimise(landscape, close, method, Stop(evaluations=5000))
+        assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-9), method
+        assert found.residual.largest < 1e-5, method
+
+
+@cache
+def many_in_space():
+    """More rods than are left to factors, and a gentle squeeze."""
+    return pressed(n=160, dimension=3, phi=0.1)
+
+
+def reach_of(landscape, move):
+    """How much of a move pairs hold for, those of a wide skin of which near ones are chosen."""
+    state, step = State.of(landscape.particles), 1e-3 * landscape.length
+    pairs, factor = Landscape(landscape.particles).wide_pairs(state), 0.0
+    while not pairs.outrun_by(
+        landscape.displaced(state, (factor + step) * move), landscape.turning_radius, landscape.skin
+    ):
+        factor += step
+    return factor
+
+
+OF_ANY_AGE = {name: partial(pressed_named, name) for name in PRESSED} | {"many": many_in_space}
+
+
+@pytest.mark.parametrize("method", ["newton", "auto"])
+@pytest.mark.parametrize("name", OF_ANY_AGE)
+def test_a_minimum_is_the_same_to_the_bit_whatever_the_age_of_the_pairs(name, method):
+    """What goes on after a kill finds all pairs anew, at another state than what was not killed."""
+    packing = OF_ANY_AGE[name]()
+    state, rng = State.of(packing), np.random.default_rng(7)
+    stop = Stop(tolerance=1e-7, evaluations=150)
+    expected = minimise(Landscape(packing), state, method, stop)
+    for far in (0.3, 0.95):  # of how far they hold
+        landscape = Landscape(packing)
+        move = rng.normal(size=landscape.size)
+        pairs = landscape.wide_pairs(
+            landscape.displaced(state, far * reach_of(landscape, move) * move)
+        )
+        assert landscape.wide_pairs(state) is pairs
+        found = minimise(landscape, state, method, stop)
+        for part in ("position", "orientation", "edges"):
+            np.testing.assert_array_equal(getattr(found.state, part), getattr(expected.state, part))
+        assert found.evaluation.energy == expected.evaluation.energy
+        assert found.history.residual == expected.history.residual
 
 
 @pytest.mark.lammps

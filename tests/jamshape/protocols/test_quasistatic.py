@@ -1,9 +1,13 @@
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from superellipsoid_packings import scattered
 
 from jamshape.landscape import Landscape, State
-from jamshape.minima import residual_of
+from jamshape.minima import History, residual_of
+from jamshape.protocols import quasistatic
 from jamshape.protocols.quasistatic import Quasistatic, QuasistaticRun, compress
 
 
@@ -63,6 +67,89 @@ def test_going_on_from_between_two_steps_gives_the_same_to_the_bit(ended):
         pass
     np.testing.assert_array_equal(fresh.state.position, expected.state.position)
     np.testing.assert_array_equal(fresh.state.orientation, expected.state.orientation)
+
+
+ADAPTIVE = Quasistatic(step=2e-3, energy=1e-8, coarse=2e-2)
+
+
+@pytest.fixture(scope="module")
+def adaptive():
+    """Of each minimisation that left the packing unjammed: the step before, its evaluations, the step after."""
+    landscape, compression, protocol = begun(n=24, phi=0.3, protocol=ADAPTIVE)
+    rows, loose = [], compression.loose
+    step, evaluations, reached = compression.step, landscape.evaluations, []
+    for at in compress(landscape, compression, protocol):
+        if at.loose is not loose:
+            rows.append((step, landscape.evaluations - evaluations, at.step))
+            reached.append(at.loose_phi)
+        loose, step, evaluations = at.loose, at.step, landscape.evaluations
+    return compression, rows, reached
+
+
+def test_steps_that_adapt_follow_what_minimisations_take(adaptive):
+    compression, rows, _ = adaptive
+    assert compression.minimum is not None
+    assert rows[0][0] == ADAPTIVE.coarse
+    seen = set()
+    for before, evaluations, after in rows:
+        if before < ADAPTIVE.step:  # it is being bisected
+            expected, kind = before, "kept below the step"
+        elif evaluations < 40:
+            expected, kind = min(1.5 * before, ADAPTIVE.coarse), "grown"
+        elif evaluations > 150:
+            expected, kind = max(before / 2, ADAPTIVE.step), "shrunk"
+        else:
+            expected, kind = before, "kept"
+        assert after == expected
+        seen.add(kind)
+    assert {"grown", "shrunk", "kept"} <= seen
+
+
+def test_steps_that_adapt_are_fewer_and_end_as_close_to_the_tolerance(adaptive):
+    compression, rows, reached = adaptive
+    assert np.diff(reached).max() <= ADAPTIVE.coarse * (1 + 1e-9)
+    assert len(rows) < (reached[-1] - reached[0]) / ADAPTIVE.step / 2
+    per_particle = compression.minimum.evaluation.energy / 24
+    assert 1 < per_particle / ADAPTIVE.energy <= ADAPTIVE.closeness
+
+
+def test_long_minimisations_are_told_of_and_gone_on_with_in_parts(monkeypatch):
+    monkeypatch.setattr(quasistatic, "_PART", 60)
+    landscape, compression, protocol = begun(n=24, phi=0.5, protocol=ADAPTIVE)
+    parts = [at.parts for at in compress(landscape, compression, protocol)]
+    assert max(parts) >= 2
+    assert compression.minimum is not None
+    per_particle = compression.minimum.evaluation.energy / 24
+    assert 1 < per_particle / ADAPTIVE.energy <= ADAPTIVE.closeness
+    # Gone on with from the middle of a long one, it comes to the same end.
+    middle = parts.index(max(parts))
+    landscape, again, protocol = begun(n=24, phi=0.5, protocol=ADAPTIVE)
+    for _ in zip(range(middle + 1), compress(landscape, again, protocol), strict=False):
+        pass
+    assert again.parts == max(parts)
+    fresh = replace(again, history=History())
+    assert sum(1 for _ in compress(Landscape(landscape.particles), fresh, protocol)) == (
+        len(parts) - middle - 1
+    )
+    np.testing.assert_array_equal(fresh.state.position, compression.state.position)
+    np.testing.assert_array_equal(fresh.state.orientation, compression.state.orientation)
+
+
+def test_minimisations_that_do_not_end_are_given_up_after_so_many_parts(monkeypatch):
+    landscape, compression, protocol = begun(n=24, phi=0.5, protocol=ADAPTIVE)
+    next(compress(landscape, compression, protocol))
+    assert compression.loose is not None
+    monkeypatch.setattr(quasistatic, "_PART", 5)
+    monkeypatch.setattr(quasistatic, "_MOST_PARTS", 3)
+    parts = [at.parts for at in compress(landscape, compression, protocol)]
+    assert max(parts) == 2
+    for at, after in itertools.pairwise(parts):
+        assert after in {0, at + 1}
+
+
+def test_a_coarse_step_is_no_finer_than_the_step():
+    with pytest.raises(ValueError, match=r"the coarse step is 0\.001, expected at least the step"):
+        Quasistatic(step=2e-3, coarse=1e-3)
 
 
 def test_a_jammed_start_is_refused():
