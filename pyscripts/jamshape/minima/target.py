@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import math
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field, replace
 
 from jamshape.checks import require_positive
@@ -181,8 +181,7 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
         found = minimise(landscape, search.state, "auto", stop, search.history)
         if found.outcome is Outcome.CONVERGED:
             jammed = found
-            for found in _lead_to(landscape, jammed, target):
-                yield search  # from where a killed one goes on
+            found = yield from _lead_to(landscape, search, jammed, target)
             if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):
                 search.minimum, search.state = found, found.state
                 yield search
@@ -221,33 +220,32 @@ def require_reachable(landscape: Landscape, target: Target) -> None:
         raise ValueError(msg)
 
 
-def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Iterator[Minimum]:
-    """Lead a minimum to u0, minimum by minimum; the last one is unjammed if the energy falls to nothing.
+def _lead_to(
+    landscape: Landscape, search: Search, start: Minimum, target: Target
+) -> Generator[Search, None, Minimum]:
+    """Lead a minimum to u0, minimum by minimum; unjammed if the energy falls to nothing.
 
     One that stalls at u0, where a contact is about to open or to close, is led there again from a higher energy.
+    Yields the search before each minimisation: from its state a killed one goes on.
     """
-    jammed = _relaxed(landscape, start, target)
-    yield jammed
     best = None
+    jammed = start
     for _ in range(_CYCLES):
-        yield from (led := _Led(landscape, target, jammed)).minima()
-        if led.is_lost:
-            if best is None:
-                return
-            break
+        yield search
+        led = _Led(landscape, target, _relaxed(landscape, jammed, target))
+        for _ in led.minima():
+            yield search
+        if led.lost is not None:
+            return best or led.lost
         found = _judged(landscape, led.jammed, target)
         if best is None or found.residual.largest < best.residual.largest:
             best = found
         if found.outcome is not Outcome.STALLED:
-            best = found
-            break
+            return found
         higher = found.state.strained(_strain_to(found, _HIGHER * target.u0))
-        jammed = _relaxed(landscape, replace(found, state=higher), target)
-        yield jammed
-        if jammed.outcome is Outcome.UNJAMMED:
-            break
+        jammed = replace(found, state=higher)
     assert best is not None
-    yield best
+    return best
 
 
 @dataclass(eq=False)
@@ -261,11 +259,14 @@ class _Led:
     landscape: Landscape
     target: Target
     jammed: Minimum
-    is_lost: bool = False
-    """Whether it falls apart on the way."""
+    lost: Minimum | None = None
+    """What is left of it if it falls apart on the way."""
 
-    def minima(self) -> Iterator[Minimum]:
-        """Give each minimum on the way."""
+    def minima(self) -> Iterator[None]:
+        """Yield before each minimisation on the way."""
+        if self.jammed.outcome is Outcome.UNJAMMED:
+            self.lost = self.jammed
+            return
         target, part = self.target, 1.0
         tolerance, aim = target.tolerance, target.u0
         for _ in range(_MOST_MINIMA):
@@ -278,12 +279,12 @@ class _Led:
                 aim *= target.u0 / u  # what minimising takes from it, as rods slide, is added
             strained = self.jammed.state.strained(part * _strain_to(self.jammed, aim))
             wanted = replace(target, tolerance=tolerance)
+            yield
             found = _relaxed(self.landscape, replace(self.jammed, state=strained), wanted)
-            yield found
             if found.outcome is not Outcome.UNJAMMED:
                 self.jammed, part = found, min(2 * part, 1.0)
             elif part < _LEAST_PART:
-                self.is_lost = True
+                self.lost = found
                 return
             else:
                 part /= 4
