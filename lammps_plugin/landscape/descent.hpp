@@ -136,8 +136,10 @@ class Descent {
   static constexpr double AWAY = 30.0;
   static constexpr int MOST_RETURNS = 5;
 
-  /// Its first step, over the longest.
-  static constexpr double FIRST = 0.05;
+  /// It begins with factors of a Hessian with such a shift, over its largest diagonal element, or
+  /// more; they are made anew after so many steps.
+  static constexpr double SOFT = 0.03, STIFFEN = 3.0;
+  static constexpr int REFRESH = 30;
 
   /// Doubles are given up where rounding leaves more than this part of what there is, and of what
   /// is to be reached.
@@ -160,7 +162,8 @@ class Descent {
   NewtonSystem system;
   QuasiNewton memory;
   bool by_newton = false;
-  int returns = 0;
+  int returns = 0, age = 0, preconditioned = 0;
+  std::shared_ptr<Factors> near;
   std::vector<DescentRow> rows;
   std::int64_t evaluations = 0;
   double least_energy = INFINITY, least_residual = INFINITY;
@@ -170,8 +173,12 @@ class Descent {
 
   DescentEnd end(DescentOutcome outcome, LandscapeSums sums)
   {
-    return {outcome,     std::move(sums),       std::move(rows),
-            evaluations, system.factorisations, system.products};
+    return {outcome,
+            std::move(sums),
+            std::move(rows),
+            evaluations,
+            system.factorisations + preconditioned,
+            system.products};
   }
 
   double residual() const { return rows.back().residual; }
@@ -196,15 +203,30 @@ class Descent {
     if (by_newton) {
       system.prepare();
       step = -system.solve(sums.gradient, accuracy());
-    } else if (!memory.is_empty()) {
-      step = memory.direction(sums.gradient);
-      if (!(step.dot(sums.gradient) < 0.0)) memory.forget();
-    }
-    if (!by_newton && memory.is_empty()) {
-      step = -sums.gradient;
-      step *= FIRST * stop.step.longest / about.largest_part(step.data());
+    } else {
+      if (age % REFRESH == 0) precondition();
+      ++age;
+      step = memory.direction(sums.gradient, *near);
+      if (!(step.dot(sums.gradient) < 0.0)) {
+        memory.forget();
+        step = -near->solve(sums.gradient);
+      }
     }
     return about.part_within(step.data(), stop.step) * step;
+  }
+
+  /// Takes a matrix near the Hessian for L-BFGS to begin with.
+  void precondition()
+  {
+    const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
+    about.differentiate({origin.data(), 0.0});
+    const double scale = about.diagonal().cwiseAbs().maxCoeff();
+    double shift = SOFT * (scale > 0.0 ? scale : 1.0);
+    while (!(near = about.factors(Vector::Constant(origin.size(), shift)))) {
+      shift *= STIFFEN;
+      if (!std::isfinite(shift)) throw std::runtime_error("The Hessian has no factors.");
+    }
+    ++preconditioned;
   }
 
   void learn(const Line &line, const LandscapeSums &from)

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "landscape/block_factors.hpp"
+
 #include <cstddef>
 #include <deque>
 #include <Eigen/Core>
@@ -27,8 +29,8 @@ class QuasiNewton {
 
   void forget() { pairs.clear(); }
 
-  /// Where to go from a gradient; only if there is something to go by.
-  Vector direction(const Vector &gradient) const
+  /// Where to go from a gradient, with the inverse of a matrix near the Hessian to begin with.
+  Vector direction(const Vector &gradient, const Factors &near) const
   {
     Vector q = -gradient;
     std::vector<double> weight(pairs.size());
@@ -36,7 +38,7 @@ class QuasiNewton {
       weight[k] = pairs[k].inverse * pairs[k].step.dot(q);
       q -= weight[k] * pairs[k].change;
     }
-    q /= pairs.back().inverse * pairs.back().change.squaredNorm();
+    q = near.solve(q);
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       q += (weight[k] - pairs[k].inverse * pairs[k].change.dot(q)) * pairs[k].step;
     }
