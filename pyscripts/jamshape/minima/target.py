@@ -32,6 +32,7 @@ _NEAR = 0.1
 _LEAST_PART = 0.1
 _SOFT = 1e-6
 _CLOSE = 1e-3
+_CYCLES, _HIGHER = 3, 2.0
 _STIFF_STEPS = 4
 _ACCURACY = 1e-9
 
@@ -180,7 +181,8 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
         found = minimise(landscape, search.state, "auto", stop, search.history)
         if found.outcome is Outcome.CONVERGED:
             jammed = found
-            found = collections.deque(_lead_to(landscape, jammed, target), maxlen=1).pop()
+            for found in _lead_to(landscape, jammed, target):
+                yield search  # from where a killed one goes on
             if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):
                 search.minimum, search.state = found, found.state
                 yield search
@@ -222,33 +224,69 @@ def require_reachable(landscape: Landscape, target: Target) -> None:
 def _lead_to(landscape: Landscape, start: Minimum, target: Target) -> Iterator[Minimum]:
     """Lead a minimum to u0, minimum by minimum; the last one is unjammed if the energy falls to nothing.
 
-    The box is strained to where sqrt(u), which is linear in the strain, is that of u0. Where that opens the
-    packing, parts of the strain are tried.
+    One that stalls at u0, where a contact is about to open or to close, is led there again from a higher energy.
     """
     jammed = _relaxed(landscape, start, target)
     yield jammed
-    part, tolerance, aim = 1.0, target.tolerance, target.u0
-    for _ in range(_MOST_MINIMA):
-        left, u = jammed.residual.largest, jammed.energy_density
-        if jammed.outcome is Outcome.STALLED and left < _SLIDING:
-            tolerance = max(tolerance, _GAIN * left)  # the next ones need be no better
-        if left <= tolerance and target.is_met(u):
+    best = None
+    for _ in range(_CYCLES):
+        yield from (led := _Led(landscape, target, jammed)).minima()
+        if led.is_lost:
+            if best is None:
+                return
             break
-        if (
-            abs(u / target.u0 - 1) < _CLOSE
-        ):  # what minimising takes from it, as rods slide, is added
-            aim *= target.u0 / u
-        strained = jammed.state.strained(part * _strain_to(jammed, aim))
-        wanted = replace(target, tolerance=tolerance)
-        found = _relaxed(landscape, replace(jammed, state=strained), wanted)
-        yield found
-        if found.outcome is not Outcome.UNJAMMED:
-            jammed, part = found, min(2 * part, 1.0)
-        elif part < _LEAST_PART:
-            return
-        else:
-            part /= 4
-    yield _judged(landscape, jammed, target)
+        found = _judged(landscape, led.jammed, target)
+        if best is None or found.residual.largest < best.residual.largest:
+            best = found
+        if found.outcome is not Outcome.STALLED:
+            best = found
+            break
+        higher = found.state.strained(_strain_to(found, _HIGHER * target.u0))
+        jammed = _relaxed(landscape, replace(found, state=higher), target)
+        yield jammed
+        if jammed.outcome is Outcome.UNJAMMED:
+            break
+    assert best is not None
+    yield best
+
+
+@dataclass(eq=False)
+class _Led:
+    """A minimum on its way to u0.
+
+    The box is strained to where sqrt(u), which is linear in the strain, is that of u0. Where that opens the
+    packing, parts of the strain are tried.
+    """
+
+    landscape: Landscape
+    target: Target
+    jammed: Minimum
+    is_lost: bool = False
+    """Whether it falls apart on the way."""
+
+    def minima(self) -> Iterator[Minimum]:
+        """Give each minimum on the way."""
+        target, part = self.target, 1.0
+        tolerance, aim = target.tolerance, target.u0
+        for _ in range(_MOST_MINIMA):
+            left, u = self.jammed.residual.largest, self.jammed.energy_density
+            if self.jammed.outcome is Outcome.STALLED and left < _SLIDING:
+                tolerance = max(tolerance, _GAIN * left)  # the next ones need be no better
+            if left <= tolerance and target.is_met(u):
+                return
+            if abs(u / target.u0 - 1) < _CLOSE:
+                aim *= target.u0 / u  # what minimising takes from it, as rods slide, is added
+            strained = self.jammed.state.strained(part * _strain_to(self.jammed, aim))
+            wanted = replace(target, tolerance=tolerance)
+            found = _relaxed(self.landscape, replace(self.jammed, state=strained), wanted)
+            yield found
+            if found.outcome is not Outcome.UNJAMMED:
+                self.jammed, part = found, min(2 * part, 1.0)
+            elif part < _LEAST_PART:
+                self.is_lost = True
+                return
+            else:
+                part /= 4
 
 
 def _relaxed(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
@@ -295,9 +333,8 @@ def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
     if not slides:
         return replace(at, outcome=Outcome.STALLED)
     left = residual_of(landscape, evaluation)
-    return replace(
-        at, state=vicinity.base, evaluation=evaluation, outcome=Outcome.SLIDING, residual=left
-    )
+    outcome = Outcome.CONVERGED if left.largest <= target.tolerance else Outcome.SLIDING
+    return replace(at, state=vicinity.base, evaluation=evaluation, outcome=outcome, residual=left)
 
 
 def halving(

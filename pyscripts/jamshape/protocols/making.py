@@ -144,11 +144,12 @@ def lead(
         As the search, or after so many minimisations.
     """
     search = file.read(landscape) or Search(start, target.step)
-    u = math.nan
+    u, written = math.nan, None
     for at in SEARCHES[file.recipe.way.search](landscape, search, target):
         file.minimisations += 1
-        if at.minimum is None:
+        if at.minimum is None and at.state is not written:
             file.write(at, landscape)
+            written = at.state
             _require_few(file, at, target)
         told = _searching(at, landscape, target, u)
         u = at.history.energy_density[-1]
