@@ -43,7 +43,7 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | RunFil
     >>> rods = js.Spherocylinders(alpha=1)
     >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> js.load("packing.h5")
-    <Packing of 16 spherocylinders in 2D: phi = 0.88826, pressure = 8.268e-05, u = 1e-08, z = 5.75, rattlers = 0, in packing.h5>
+    <Packing of 16 spherocylinders in 2D: phi = 0.8..., pressure = ...e-05, u = 1e-08, z = 5..., rattlers = 0, in packing.h5>
     """
     path = Path(path)
     found = format_of(path)
