@@ -23,12 +23,12 @@ from jamshape.drawing.text import ensemble_text, onset_symbol, pressure_unit
 from jamshape.files.sets import of_paper
 from jamshape.measures.averages import Mean, mean
 from jamshape.measures.onset import OnsetFit
+from jamshape.measures.published import PHI_J
 from jamshape.measures.runs import Run, read_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-PAPER_PHI_J = {0.0: 0.8412, 1.0: 0.8875, 4.0: 0.866}  # Secs. III A, B; by alpha, at N = 1024
 NAMED = 10  # runs, at most, that the legend names
 
 
@@ -72,7 +72,8 @@ def draw(runs: list[Run], average: Mean | None, options: Namespace) -> None:
         if len(runs) <= NAMED:
             draw_jamming(onset, one, f"C{k}", f"{one.path.stem}, ")
     systems = [one.ensemble.system for one in runs]
-    paper = {PAPER_PHI_J.get(s.number("alpha")) for s in systems if of_paper(s)} - {None}
+    alphas = {s.number("alpha") for s in systems if of_paper(s)}
+    paper = [PHI_J[alpha].value for alpha in sorted(alphas & PHI_J.keys())]
     for axes in (whole, onset):
         for phi in paper:
             text = rf"paper, $N=1024$: $\phi_J(\kappa\to 0)={phi}$"
@@ -82,7 +83,7 @@ def draw(runs: list[Run], average: Mean | None, options: Namespace) -> None:
     whole.set_ylim(bottom=1e-6 * max(one.pressure.max() for one in runs) or None)
     names = ("n", "size_ratio", "kappa")
     titles = dict.fromkeys(ensemble_text(one.ensemble, names) for one in runs)
-    figure.suptitle("\n".join(titles), size=9)
+    figure.suptitle("\n".join(["pressure of a compression through jamming", *titles]), size=9)
     if average:
         title = f"${onset_symbol(runs[0].ensemble.kappa)}={average.tex}$"
         onset.set_title(f"{title}, mean of {average.samples}", size=9)

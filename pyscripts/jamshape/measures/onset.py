@@ -79,10 +79,9 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
        soon after. So the rounded foot that a finite rate of compression makes is left out: lines
        through it fail the last two.
     3. Of the first part that has such lines the one with the smallest error is taken, or the one
-       that starts first of those nearly as good. How far off the others put phi_J, of all parts, adds to
-       its error, as far as they begin below ten times the pressure where it ends: the root of the mean
-       square, in which each counts with its number of rows, not more where it happens to be straighter.
-       So the error holds what another choice of the window gives.
+       that starts first of those nearly as good. Its error holds the choice of the window: it adds how
+       far off the others put phi_J, of all parts, that begin below ten times the pressure where it ends,
+       the root of the mean square, in which each counts with its number of rows, straight or not.
 
     Parameters
     ----------
