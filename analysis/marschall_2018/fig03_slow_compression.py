@@ -4,10 +4,10 @@
 
 Runs are of pyscripts/slow_compress.py or compress.py; there is a column for each system and N, with p on a
 linear axis above and on a logarithmic one below, and a line for each rate: the mean over samples (seeds),
-which are drawn thin. Vertical lines mark phi_J of the slowest rate, from the lines through the pressures
-just above the onsets (Fig. 4), and of packings at an energy. Prints a table (Markdown) of what runs cost (medians;
-beside Heun's method with dt = 0.01), of phi_J, of how far it lies from that of the slowest rate, and of
-the pressure above phi_J over that of the slowest rate, sample by sample, with standard errors. The last line of
+which are drawn thin. Vertical lines mark phi_J(kappa) of the slowest rate, from the lines through the pressures
+just above the onsets (Fig. 4), and phi_J of packings at an energy. Prints a table (Markdown) of what runs cost (medians;
+beside Heun's method with dt = 0.01), of phi_J(kappa), of how far it lies from that of the slowest rate, and of
+the pressure above it over that of the slowest rate, sample by sample, with standard errors. The last line of
 standard output is one JSON object.
 """
 
@@ -89,11 +89,11 @@ class Rate(NamedTuple):
 
     @property
     def onsets(self) -> dict[int, float]:
-        """phi_J of each seed that has one."""
+        """phi_J(kappa) of each seed that has one."""
         return {one.seed: one.fit.phi_J for one in self.runs if one.fit}
 
     def onset(self) -> Mean:
-        """Mean phi_J; the error of the fit where there is one sample."""
+        """Mean phi_J(kappa); the error of the fit where there is one sample."""
         fits = [one.fit for one in self.runs if one.fit]
         if len(fits) == 1:
             return Mean(fits[0].phi_J, fits[0].phi_J_error, 1)
@@ -158,7 +158,7 @@ def draw_pressures(axis: Axes, of: Rate, color: str) -> None:
 
 
 def draw_onsets(axis: Axes, own: list[Rate], packings: list[float]) -> None:
-    """Mark phi_J of the slowest rate that has one, and of packings."""
+    """Mark phi_J(kappa) of the slowest rate that has one, and phi_J of packings."""
     fitted = [of for of in own if of.onsets]
     if fitted:
         onset = fitted[-1].onset()
@@ -206,7 +206,7 @@ def row(of: Rate, rates: list[Rate]) -> dict[str, Any]:
     costs = [cost for cost in map(cost_of, of.runs) if cost]
     medians = np.median(costs, axis=0).tolist() if costs else [None] * len(Cost._fields)
     found |= dict(zip(Cost._fields, medians, strict=True))
-    found |= {"runs": [one.path for one in of.runs], "phi_J": of.onset()}
+    found |= {"runs": [one.path for one in of.runs], "phi_J(kappa)": of.onset()}
     if of is slowest:
         return found | {"shift": None, "excess": None}
     pairs = [(one, twins[one.seed]) for one in of.runs if one.seed in twins]
@@ -219,7 +219,7 @@ def table(rates: list[Rate], rows: list[dict[str, Any]]) -> str:
     lines = ["| " + " | ".join(TABLE) + " |", "| --- " * len(TABLE) + "|"]
     for of, r in zip(rates, rows, strict=True):
         cost = ["" if r[name] is None else f"{r[name]:.3g}" for name in Cost._fields]
-        means = [m.text() if m else "" for m in (r["phi_J"], r["shift"], r["excess"])]
+        means = [m.text() if m else "" for m in (r["phi_J(kappa)"], r["shift"], r["excess"])]
         system = system_text(of.place.system).replace("$", "").replace("\\", "")
         cells = (system, r["n"], f"{r['kappa']:g}", len(r["runs"]), *cost, *means)
         lines.append("| " + " | ".join(map(str, cells)) + " |")

@@ -31,9 +31,8 @@ from jamshape.files.sets import (
     read_groups,
 )
 from jamshape.measures.averages import Mean, mean
+from jamshape.measures.published import PHI_J
 
-# Secs. III A, B; the error is that of the average, where it is given.
-PAPER = {0.0: Mean(0.8412, 0.0005), 1.0: Mean(0.8875), 4.0: Mean(0.866)}
 WAYS = {
     "phi_J": ("o-", r"$\phi_J$ from $u_0$ to 0"),
     "phi_J_compression": ("s", r"$\phi_J(\kappa)$ from $p$ to 0, compression"),
@@ -60,7 +59,7 @@ def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> N
 
     figure = Figure(figsize=(5.6, 4), dpi=200, layout="constrained")
     axes = figure.subplots()
-    discs = discs_at([*PAPER, *(alpha for of in known.values() for alpha in of["phi_J"])])
+    discs = discs_at([*PHI_J, *(alpha for of in known.values() for alpha in of["phi_J"])])
     labels = system_labels(known)
     for k, (system, of) in enumerate(known.items()):
         for way, (name, (marker, text)) in enumerate(WAYS.items()):
@@ -72,7 +71,7 @@ def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> N
                 style: dict[str, Any] = {"fmt": marker, "color": tint, "label": label}
                 error_bars(axes, found, discs, mfc=tint if way == 0 else "none", **style)
     if any(of_paper(system) for system in known):
-        error_bars(axes, PAPER, discs, **PAPER_STYLE)
+        error_bars(axes, PHI_J, discs, **PAPER_STYLE)
     label_alpha_axis(axes, discs)
     axes.set_ylabel(r"jamming density $\langle\phi_J\rangle$")
     axes.legend(fontsize=8, frameon=False, title=conditions_text(groups), title_fontsize=8)
@@ -81,7 +80,7 @@ def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> N
 
 def rows(system: System, known: Averages) -> list[dict[str, Any]]:
     """Report the averages of one curve."""
-    paper = PAPER if of_paper(system) else {}
+    paper = PHI_J if of_paper(system) else {}
     return [
         system.report()
         | {"alpha": alpha, "paper": paper[alpha].value if alpha in paper else None}

@@ -23,18 +23,17 @@ from jamshape.drawing.text import conditions_text, system_labels
 from jamshape.files.sets import System, conditions, curves_over, of_paper, read_groups
 from jamshape.measures.averages import Mean, averages
 from jamshape.measures.contact_statistics import OffsetPowerLaw, fit_offset_power_law
+from jamshape.measures.published import RATTLERS, Z
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Sec. III C, Fig. 8: z at N = 1024, and the a of a + b alpha^x with its error.
-PAPER = {0.0: Mean(4.0), 0.01: Mean(4.43, 0.03), 1.0: Mean(5.91, 0.01), 4.0: Mean(5.64, 0.01)}
+# Sec. III C, Fig. 8, N = 1024: the a of a + b alpha^x with its error.
 PAPER_LIMIT, PAPER_LIMIT_ERROR = 0.31, 0.08
 PAPER_FITS = {
     "z": {"a": 0.31, "a_error": 0.08, "x": 0.68, "x_error": 0.13},
     "z_single": {"a": -0.048, "a_error": 0.065, "x": 0.67, "x_error": 0.11},
 }
-PAPER_RATTLERS = {0.01: 34.0, 1.0: 0.0, 4.0: 1.2}
 
 FITTED = 4  # of the smallest alpha, as in the paper
 MARKS = {"z": ("o", r"\langle z_J\rangle"), "z_single": ("D", r"\langle\tilde z_J\rangle")}
@@ -93,7 +92,7 @@ def draw(curves: dict[System, Found], title: str, options: Namespace) -> None:
 
     figure = Figure(figsize=(10.5, 4.4), dpi=200, layout="constrained")
     linear, logarithmic = figure.subplots(1, 2)
-    discs = discs_at([*PAPER, *(alpha for found in curves.values() for alpha in found.z["z"])])
+    discs = discs_at([*Z, *(alpha for found in curves.values() for alpha in found.z["z"])])
     labels = system_labels(curves)
     for k, (system, found) in enumerate(curves.items()):
         limit = round_z(system)
@@ -134,8 +133,8 @@ def draw_fit(axes: Axes, fitted: Fitted, tint: str) -> None:
 
 def draw_paper(linear: Axes, logarithmic: Axes, discs: float) -> None:
     """Draw the numbers of the paper."""
-    error_bars(linear, PAPER, discs, **PAPER_STYLE)
-    error_bars(logarithmic, above(PAPER, 4), None, **PAPER_STYLE | {"label": ""})
+    error_bars(linear, Z, discs, **PAPER_STYLE)
+    error_bars(logarithmic, above(Z, 4), None, **PAPER_STYLE | {"label": ""})
     low, high = PAPER_LIMIT - PAPER_LIMIT_ERROR, PAPER_LIMIT + PAPER_LIMIT_ERROR
     limit = r"$\langle z_J\rangle - 4$ at $\alpha\to 0$, paper"
     logarithmic.axhspan(low, high, color=SKY, alpha=0.3, lw=0, label=limit, zorder=0)
@@ -154,7 +153,7 @@ def finish(axes: Axes, isostatic: list[int]) -> None:
 
 def rows(system: System, found: Found) -> list[dict[str, Any]]:
     """Report one curve."""
-    paper, rattlers = (PAPER, PAPER_RATTLERS) if of_paper(system) else ({}, {})
+    paper, rattlers = (Z, RATTLERS) if of_paper(system) else ({}, {})
     return [
         system.report()
         | {"alpha": alpha, "paper_z": paper[alpha].value if alpha in paper else None}

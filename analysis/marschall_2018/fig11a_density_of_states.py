@@ -33,20 +33,20 @@ from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import PAPER_STYLE, marked
 from jamshape.files.sets import of_paper
 from jamshape.measures.averages import mean, standard_error
+from jamshape.measures.published import BANDS
 from jamshape.vibration.sets import TOLD, Key, Tables, every, sizes, stable, unstable
 from jamshape.vibration.table import ModeTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Sec. III D, N = 1024, u = 1e-15: fractions of modes, and frequencies in the bands.
-PAPER_FRACTIONS = {
-    4.0: {"low": 0.0638, "middle": 0.00033, "high": 0.936},
-    1.0: {"low": 0.0039, "middle": 0.0105, "high": 0.986},
-    0.01: {"low": 0.0, "middle": (6 - 4.43) / 6, "high": 4.43 / 6},
-}
+# Sec. III D, N = 1024, u = 1e-15: frequencies in the bands.
 PAPER_OMEGA = {4.0: (1e-8, 1e-4), 0.01: (3e-3, 3e-2)}
 PAPER_U0 = 1e-15
+
+SHADES = {"low": "C1", "middle": "C2", "high": "0.6"}
+MARGIN = 1.3  # of a shaded band beyond its last mode
+SLIDING = 0.9  # motion along the spines is named from this part on
 
 
 def of_figure(key: Key) -> bool:
@@ -98,10 +98,13 @@ def draw(tables: Tables, options: Namespace) -> None:
     if row.unstable is not None:
         draw_errors(row.unstable, tables)
     mark_paper(row.stable, tables)
+    if len(tables) == 1:
+        mark_bands(row, *next(iter(tables.items())))
     for axes in row.each():
         axes.set_yscale("log")
         axes.set_ylim(bottom=least / 8)
     title = legend_title(tables)
+    figure.suptitle("density of vibrational states", size=9)
     row.stable.legend(loc="upper right", frameon=False, title=title, **SMALL_TEXT)
     row.first.set_ylabel(r"density of states  $D(\omega)$")
     save_figure(figure, options.out)
@@ -117,10 +120,35 @@ def mark_paper(axes: Axes, tables: Tables) -> None:
         axes.plot(omega, [0.03] * len(omega), "*", **style, **low)
 
 
+def mark_bands(row: Sides, key: Key, samples: list[ModeTable]) -> None:
+    """Shade the frequencies of each band that has modes, and name it with its fraction of all modes."""
+    found = row_of(key, samples)
+    for band, shade in SHADES.items():
+        part = found[band]["fraction"].value
+        style: dict[str, Any] = {"color": shade, "alpha": 0.2, "lw": 0, "zorder": 0}
+        if part:
+            style["label"] = band_text(band, samples, part, found[band]["paper"])
+        for axes, selected in ((row.stable, stable), (row.unstable, unstable)):
+            omega = np.concatenate(
+                [sizes(t)[[k for k in t.in_band(band) if selected(t)[k]]] for t in samples]
+            )
+            if axes is not None and (omega > 0).any():
+                axes.axvspan(omega[omega > 0].min() / MARGIN, omega.max() * MARGIN, **style)
+                style.pop("label", None)
+
+
+def band_text(band: str, samples: list[ModeTable], part: float, paper: float | None) -> str:
+    """Name a band by its fraction of all modes and, where they are that, as sliding."""
+    along = mean([t["parallel"][t.in_band(band)].mean() for t in samples]).value
+    text = f"{band} band" + f", {100 * along:.1f} % sliding" * (along > SLIDING)
+    beside = "" if paper is None else f" (paper {paper:.4f})"
+    return f"{text}: {part:.4f} of all modes{beside}"
+
+
 def row_of(key: Key, samples: list[ModeTable]) -> dict[str, Any]:
     """Give the fractions of modes in the bands."""
     found: dict[str, Any] = key.report() | {"samples": len(samples)}
-    paper = PAPER_FRACTIONS.get(key.number("alpha"), {}) if of_figure(key) else {}
+    paper = BANDS.get(key.number("alpha"), {}) if of_figure(key) else {}
     for band in TOLD:
         fraction = mean([len(t.in_band(band)) / total(t) for t in samples])
         counts = [int(unstable(t)[t.in_band(band)].sum()) for t in samples]

@@ -22,17 +22,13 @@ from jamshape.drawing.styles import PAPER_STYLE, color, marked
 from jamshape.drawing.text import bars_text, counted, system_labels, systems_text
 from jamshape.files.sets import PackingFile, System, finished, of_paper
 from jamshape.measures.averages import Mean, mean
+from jamshape.measures.published import DISTANCE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 EXPONENT = 0.5
-# Captions of Figs. 14 and 18, N = 1024. The one of alpha = 4 at u = 1e-9, 4.3e-4, does not fit the others.
-PAPER = {
-    0.01: {1e-15: 7.4e-8, 1e-14: 2.4e-7, 1e-12: 2.4e-6},
-    4.0: {1e-15: 9.1e-8, 1e-11: 9.3e-6, 1e-9: 4.3e-4},
-}
-MISPRINT = 4.3e-4
+MISPRINT = 4.3e-4  # does not fit the others
 FEWEST = 3  # energies of a fit
 STAR: dict[str, Any] = {"ms": PAPER_STYLE["ms"], "lw": 0, "zorder": 1.5, "mec": "k", "mew": 0.7}
 
@@ -85,7 +81,7 @@ def exponent(samples: Samples) -> Mean:
 
 def paper_of(system: System) -> dict[float, float]:
     """Phi - phi_J by u, as the paper has it."""
-    return PAPER.get(system.number("alpha"), {}) if of_paper(system) else {}
+    return DISTANCE.get(system.number("alpha"), {}) if of_paper(system) else {}
 
 
 def draw_system(panels: list[Axes], samples: Samples, **style: Any) -> None:

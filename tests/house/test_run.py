@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -91,3 +92,42 @@ def test_a_stage_that_fails_says_what_to_do(tmp_path):
         "./run: this did not work: look elsewhere; all that was said is in build/setup.log.",
     ]
     assert "noise" in (tmp_path / "build" / "setup.log").read_text()
+
+
+SMALL = (
+    "DEMO_RODS=(--alpha 4 --n 24 --seed 1); DEMO_RUN=(--kappa 1e-5 --phi-start 0.7 --phi-end 0.95)"
+)
+
+
+@pytest.mark.lammps
+def test_the_demo_draws_what_it_says_and_puts_its_numbers_beside_the_papers(tmp_path):
+    (tmp_path / "analysis").symlink_to(RUN.parent / "analysis")
+    command = parts(f"{SMALL}; PYTHON={sys.executable}; demo")
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for name in ("pressure", "packing", "density_of_states"):
+        picture = (tmp_path / "runs" / "demo" / f"{name}.png").read_bytes()
+        assert picture.startswith(b"\x89PNG")
+        assert len(picture) > 10_000
+        assert f"   {name}.png" in done.stdout
+    rows = dict(re.findall(r"^   (\w.*?)  +(.+)$", done.stdout, re.MULTILINE))
+    assert rows["phi_J(kappa = 1e-05), p to 0"].endswith("0.866")
+    assert 0.7 < float(rows["phi_J of the packing, u0 = 1e-15 to 0"].split()[0]) < 0.95
+    assert 5 < float(rows["z"].split()[0]) < 6.5
+    bands = [
+        float(rows[f"modes in the {band} band"].split()[0]) for band in ("low", "middle", "high")
+    ]
+    assert 0.97 < sum(bands) <= 1  # and two translations
+    (verdict,) = re.findall(r"^   phi_J\(kappa = .*stays jammed\.$", done.stdout, re.MULTILINE)
+    assert verdict.strip() in (tmp_path / "runs" / "demo" / "said.txt").read_text()
+
+
+@pytest.mark.lammps
+def test_a_demo_whose_packing_fails_says_why(tmp_path):
+    (tmp_path / "analysis").symlink_to(RUN.parent / "analysis")
+    broken = "demo_packing() { echo 'there was none' >$DEMO/packing.log; return 1; }"
+    command = parts(f"{SMALL}; PYTHON={sys.executable}; {broken}; demo")
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.endswith("./run: the packing was not made: there was none\n")
+    assert "Done" not in done.stdout

@@ -89,9 +89,9 @@ def test_pressure_of_one_run(report, tmp_path):
     assert (found["mean"], found["error"]) == (None, None)
     (fit,) = found["runs"]
     assert (fit["run"], fit["kappa"]) == (str(run_file), 1e-6)
-    assert fit["phi_J"] == pytest.approx(PHI_J, abs=1e-12)
+    assert fit["phi_J(kappa)"] == pytest.approx(PHI_J, abs=1e-12)
     assert fit["slope"] == pytest.approx(0.2, rel=1e-9)
-    assert 0 < fit["phi_J_error"] < 1e-9
+    assert 0 < fit["phi_J(kappa)_error"] < 1e-9
     image(out)
 
 
@@ -99,7 +99,7 @@ def test_pressure_of_samples(report, tmp_path):
     shifts = (-0.003, 0.0, 0.001)
     runs = [compression(tmp_path / f"{k}.h5", k, shift=s) for k, s in enumerate(shifts)]
     found = report(PRESSURE, *runs, "--out", tmp_path / "p.png")
-    assert [fit["phi_J"] for fit in found["runs"]] == pytest.approx(PHI_J + np.array(shifts))
+    assert [fit["phi_J(kappa)"] for fit in found["runs"]] == pytest.approx(PHI_J + np.array(shifts))
     assert found["mean"] == pytest.approx(PHI_J + np.mean(shifts))
     assert found["error"] == pytest.approx(np.std(shifts, ddof=1) / np.sqrt(3))
     image(tmp_path / "p.png")
@@ -115,8 +115,8 @@ def test_pressure_without_onset_is_drawn_and_said(problem, capsys, tmp_path):
     said = problem(PRESSURE, *runs, "--out", tmp_path / "p.png")
     assert said.startswith(f"fig04_pressure.py: {runs[1]}: p has no onset of jamming")
     fits = json.loads(capsys.readouterr().out)["runs"]
-    assert fits[0]["phi_J"] == pytest.approx(PHI_J)
-    assert fits[1]["phi_J"] is None
+    assert fits[0]["phi_J(kappa)"] == pytest.approx(PHI_J)
+    assert fits[1]["phi_J(kappa)"] is None
     image(tmp_path / "p.png")
 
 
@@ -160,8 +160,8 @@ def rates(tmp_path_factory):
 def test_rates_are_compared_sample_by_sample(report, rates, tmp_path):
     fast, slow = report(SLOW, *rates, "--out", tmp_path / "slow.png")["rows"]
     assert (fast["kappa"], slow["kappa"]) == (1e-8, 1e-10)
-    assert slow["phi_J"]["value"] == pytest.approx(PHI_J + 0.004, abs=2e-4)
-    assert slow["phi_J"]["error"] == pytest.approx(
+    assert slow["phi_J(kappa)"]["value"] == pytest.approx(PHI_J + 0.004, abs=2e-4)
+    assert slow["phi_J(kappa)"]["error"] == pytest.approx(
         np.std([0, 2, 10], ddof=1) / 1e3 / 3**0.5, rel=0.05
     )
     # Samples differ by more than the rates do, and that does not enter.
@@ -181,8 +181,8 @@ def test_one_sample_has_the_error_of_its_fit_and_packings_are_marked(here, capsy
     assert here(SLOW, rates[0], *asked) == 0
     lines = capsys.readouterr().out.splitlines()
     (row,) = json.loads(lines[-1])["rows"]
-    assert row["phi_J"]["samples"] == 1
-    assert 0 < row["phi_J"]["error"] < 1e-9
+    assert row["phi_J(kappa)"]["samples"] == 1
+    assert 0 < row["phi_J(kappa)"]["error"] < 1e-9
     table = lines[:3]
     assert {line.count("|") for line in table} == {11}
     image(tmp_path / "slow.png")

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from figures import words
 from jamming import write_jammed
+from matplotlib.figure import Figure
 from mixtures import bidisperse, superellipsoids
 from numpy.testing import assert_allclose
 from pictures import image
@@ -135,6 +137,17 @@ def test_density_of_states(report, modes, tmp_path):
     rows = report(STATES, modes, "--alpha", 4, "--out", out)["bands"]
     assert [row["u0"] for row in rows] == [1e-18, 1e-15, 1e-14, 1e-12]
     assert [row["low"]["paper"] for row in rows] == [None, 0.0638, None, None]
+
+
+def test_bands_of_one_curve_are_named_with_their_fractions(here, modes, tmp_path, monkeypatch):
+    figures, save = [], Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **k: (figures.append(f), save(f, *a, **k)))
+    assert here(STATES, modes, "--alpha", 4, "--u0", U0, "--out", tmp_path / "one.png") == 0
+    total = sum(BANDS.values()) + 2
+    for band, count in BANDS.items():
+        assert f"{band} band: {count / total:.4f} of all modes (paper " in words(figures[0])
+    assert here(STATES, modes, "--out", tmp_path / "all.png") == 0
+    assert "band:" not in words(figures[1])
 
 
 def test_density_is_normalised(modes):

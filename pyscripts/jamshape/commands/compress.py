@@ -2,7 +2,9 @@
 
     jamshape compress --alpha 4 --n 1024 --kappa 1e-6 --phi-start 0.4 --phi-end 0.9 --out run.h5
 
-The last line of standard output is one JSON object. With --resume a killed run goes on from its
+At the end frames are minimised: p(phi) of a flow rises, too, and its onset phi_J(kappa) is that of jamming only
+where states stay jammed when nothing drives them; --no-minimising leaves that out. A sentence says so, and the last
+line of standard output is one JSON object. With --resume a killed run goes on from its
 last restart file, with the settings it began with, and a finished one is left alone. A file that is
 there is replaced only with --again.
 """
@@ -14,6 +16,7 @@ from pathlib import Path
 
 from jamshape.checks import require_free
 from jamshape.command import parser_of, report
+from jamshape.commands.onset import add_onset_options, tell_onset
 from jamshape.flow.recording import summary_of
 from jamshape.front.compressing import compress, resume
 from jamshape.shapes.command_line import add_particle_options, particles_of
@@ -43,6 +46,7 @@ def options_of() -> ArgumentParser:
     usual = "rkc2; heun with --dt or --sides 1"
     parser.add_argument("--integrator", help=f"heun, heun/adaptive or rkc2 ({usual})")
     parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
+    add_onset_options(parser)
     parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
     begin = parser.add_mutually_exclusive_group()
     begin.add_argument("--resume", action="store_true", help="go on after a kill")
@@ -60,4 +64,5 @@ def main(options: Namespace) -> None:
         given = {name: getattr(options, name) for name in (*names, "rows", "frames")}
         phi = (options.phi_start, options.phi_end)
         compress(particles_of(options), phi=phi, **given, file=options.out, again=options.again)
+    tell_onset(options)
     report(summary_of(options.out))

@@ -3,8 +3,9 @@
     jamshape slow --alpha 4 --n 256 --kappa 1e-9 --phi-end 0.88 --out slow.h5
 
 Starts from the last frame of a run or packing file (--start), or compresses a random packing fast in
-LAMMPS first. Run again after a kill, it goes on; a finished run is left alone. The last line of
-standard output is one JSON object.
+LAMMPS first. At the end frames are minimised: p(phi) of a flow rises, too, and its onset phi_J(kappa) is that of
+jamming only where states stay jammed when nothing drives them; --no-minimising leaves that out. Run again after a
+kill, it goes on; a finished run is left alone. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 
 from jamshape.checks import RANGES, Range, require_in
 from jamshape.command import parser_of, report
+from jamshape.commands.onset import add_onset_options, tell_onset
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.slow_recording import summary_of
 from jamshape.front.compressing import slow_compress
@@ -46,6 +48,7 @@ def options_of() -> ArgumentParser:
             name, type=type(default), default=default, help=f"{meaning} ({default})"
         )
     parser.add_argument("--method", choices=METHODS, default="tr-bdf2")
+    add_onset_options(parser)
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
     parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
     return parser
@@ -61,4 +64,5 @@ def main(options: Namespace) -> None:
     kappa = ((0.0, options.kappa_before), slowly) if options.phi_slow else options.kappa
     phi = (options.phi_start, options.phi_end)
     slow_compress(particles_of(options), phi=phi, kappa=kappa, **given, file=options.out)
+    tell_onset(options)
     report(summary_of(options.out))

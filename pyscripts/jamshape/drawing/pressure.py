@@ -1,8 +1,11 @@
-"""Pressure against packing fraction, with the onset of jamming."""
+"""Pressure against packing fraction, with its onset and where frames stay jammed."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from jamshape.drawing.text import ensemble_text, onset_symbol, pressure_unit
 from jamshape.measures.averages import Mean
@@ -17,6 +20,11 @@ def draw_pressure(axes: Axes, run: Run, color: str = "C0") -> None:
     """Draw the pressure of a run and the line that leads to its onset, and say what they are."""
     axes.plot(run.phi, run.pressure, ".-", color=color, ms=3, lw=0.5, label="pressure")
     draw_onset(axes, run, color, f"line to the onset at this rate, {onset_text(run)}")
+    draw_jamming(axes, run, "C2")
+    # What a fast start leaves relaxes first, and may be higher than all that follows.
+    begun = run.pressure[int(np.argmin(run.pressure)) :]
+    if begun.max() > 0:
+        axes.set_ylim(-0.03 * begun.max(), 1.3 * begun.max())
     unit = pressure_unit([run.ensemble.system])
     axes.set(xlabel=r"packing fraction $\phi$", ylabel=rf"pressure $p$  ${unit}$")
     axes.set_title(ensemble_text(run.ensemble), size=9)
@@ -30,6 +38,16 @@ def draw_onset(axes: Axes, run: Run, color: str, label: str = "") -> None:
         rise = fit.slope * (run.phi[fit.last] - fit.phi_J)
         axes.plot([fit.phi_J, run.phi[fit.last]], [0, rise], "k", lw=1, zorder=3)
         axes.plot(fit.phi_J, 0, "o", color=color, mec="k", ms=5, zorder=4, ls="", label=label)
+
+
+def draw_jamming(axes: Axes, run: Run, color: str, name: str = "") -> None:
+    """Draw between which packing fractions frames begin to stay jammed when they are minimised, if that is known."""
+    found = run.jamming
+    if found is None or math.isnan(found.unjams) or math.isnan(found.jams):
+        return
+    low, high = (rf"$\phi={phi:.4f}$" for phi in found[:2])
+    text = f"{name}minimised: {low} unjams, {high} stays jammed"
+    axes.axvspan(found.unjams, found.jams, color=color, alpha=0.25, lw=0, label=text)
 
 
 def onset_text(run: Run) -> str:

@@ -19,8 +19,7 @@ from jamshape.files.h5md import (
 from jamshape.files.restarts import RestartFiles
 from jamshape.files.run_writer import RunWriter, fold
 from jamshape.flow.compression import Compression, CompressionRun, Row
-from jamshape.measures.onset import fit_onset
-from jamshape.measures.runs import rate_of
+from jamshape.measures.runs import onset_report
 from jamshape.packing import Packing
 
 if TYPE_CHECKING:
@@ -193,13 +192,8 @@ def _write_row(writer: RunWriter, row: Row) -> None:
 
 
 def summary_of(path: Path) -> dict[str, object]:
-    """Summarise a run: its end, its rate and, where the pressure rises, phi_J of that rate."""
+    """Summarise a run: its end, its rate, phi_J(kappa) where the pressure rises, and where frames stay jammed."""
     observables, stored = read_observables(path), read_attributes(path)
     names = [name for name in _SUMMARY if name in observables]  # slow runs count no contacts
     last: dict[str, object] = {name: float(observables[name][-1]) for name in names}
-    last |= {"kappa": rate_of(stored), "left_out": stored.get("left_out", "")}
-    try:
-        fit = fit_onset(observables["phi"], observables["pressure"])
-    except ValueError:  # the run ends below jamming
-        return {"out": str(path), **last, "phi_J": None}
-    return {"out": str(path), **last, "phi_J": fit.phi_J, "phi_J_error": fit.phi_J_error}
+    return {"out": str(path), **last, "left_out": stored.get("left_out", "")} | onset_report(path)

@@ -13,8 +13,7 @@ from jamshape.files.h5md import read_attributes, read_observables, read_packing,
 from jamshape.files.run_writer import RunWriter
 from jamshape.flow.implicit import Flow, Protocol, Step, compress
 from jamshape.landscape import Landscape, State
-from jamshape.measures.onset import fit_onset
-from jamshape.measures.runs import rate_of
+from jamshape.measures.runs import onset_report
 from jamshape.packing import Packing
 
 # Steps between two frames, from which a run goes on.
@@ -64,18 +63,13 @@ def is_finished(path: Path) -> bool:
 
 
 def summary_of(path: Path) -> dict[str, object]:
-    """Summarise a run: its end, its cost, its last rate and, where p rises, phi_J of that rate."""
+    """Summarise a run: its end, its cost, phi_J(kappa) where p rises, and where frames stay jammed."""
     observables, stored = read_observables(path), read_attributes(path)
     found: dict[str, object] = {"out": str(path)}
     found |= {name: float(observables[name][-1]) for name in ("phi", "pressure", "u")}
-    found["kappa"] = rate_of(stored)
     cost = ("steps", "rejected", "explicit", "evaluations", "factorisations", "wall_seconds")
     found |= {name: float(stored[f"flow_{name}"]) for name in cost}
-    try:
-        fit = fit_onset(observables["phi"], observables["pressure"])
-    except ValueError:  # the run ends below jamming
-        return found | {"phi_J": None}
-    return found | {"phi_J": fit.phi_J, "phi_J_error": fit.phi_J_error}
+    return found | onset_report(path)
 
 
 def record(path: Path) -> Iterator[Step]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,8 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.files.h5md import count_frames, read_attributes, read_observables, read_style
+from jamshape.files.h5md import (
+    count_frames,
+    read_attributes,
+    read_observables,
+    read_packing,
+    read_style,
+)
+from jamshape.files.run_writer import RunWriter
 from jamshape.front.packing import MeasuredPacking
+from jamshape.front.progress import Told, follow
+from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
 
 if TYPE_CHECKING:
@@ -73,17 +83,62 @@ class RunFile:
         return float(np.ravel(self.about["kappa"])[-1])
 
     def onset(self) -> OnsetFit | None:
-        """Fit phi_J of this rate, where the pressure begins; None where it does not rise.
+        """Fit phi_J(kappa), where the pressure begins at this rate; None where it does not rise.
+
+        A pressure of flow has an onset, too; `jamming` tells from where on states are jammed.
 
         Returns
         -------
         OnsetFit or None
-            ``phi_J`` and ``phi_J_error``; see `jamshape.measures.onset.fit_onset`.
+            ``phi_J`` is phi_J(kappa), and ``phi_J_error`` holds what other windows give; see
+            `jamshape.measures.onset.fit_onset`.
         """
         try:
             return fit_onset(self.phi, self.pressure)
         except ValueError:  # it ends below jamming
             return None
+
+    def jamming(self, *, progress: bool = True) -> Jamming:
+        """Minimise frames, from the densest on, to see which stay jammed when nothing drives them.
+
+        Parameters
+        ----------
+        progress : bool
+            Whether a bar on standard error says how far it is.
+
+        Returns
+        -------
+        Jamming
+            The packing fractions ``unjams`` and ``jams`` of the densest frame that unjams and of the next one
+            that stays jammed. The file of a finished run keeps them, and figures of it show them.
+
+        Examples
+        --------
+        >>> import jamshape as js
+        >>> rods = js.Spherocylinders(alpha=4)
+        >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
+        >>> found = run.jamming(progress=False)
+        >>> run.onset().phi_J < found.unjams < found.jams
+        True
+        """
+        known = Jamming.stored(self.about)
+        if known is not None:
+            return known
+        tried: list[Tried] = []
+
+        def told(one: Tried) -> Told:
+            tried.append(one)
+            return Told("minimising frames", str(one))
+
+        k_e = float(self.about.get("k_e", 1.0))
+        frames = minimised_frames(len(self), lambda frame: read_packing(self.file, frame), k_e)
+        follow(frames, told, shown=progress)
+        found = Jamming.of(tried)
+        if self.about.get("finished"):
+            with suppress(OSError), RunWriter.open(self.file) as file:  # or it may only be read
+                file.set_attributes(found.attributes())
+            self.__dict__.pop("about", None)
+        return found
 
     def __len__(self) -> int:
         """Count the frames."""

@@ -38,6 +38,9 @@ _CHORD_END = 10.0
 # Of the lines with an error up to this multiple of the smallest one the lowest is taken.
 _NEARLY_BEST = 2.0
 
+# Other windows that might have been taken begin below this multiple of the pressure where the line ends.
+_REACH = 10.0
+
 # Smaller drops and smaller rises are noise, in its standard deviations.
 _NOISE_DROP = 6
 _NOISE_RISE = 10
@@ -76,9 +79,9 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
        soon after. So the rounded foot that a finite rate of compression makes is left out: lines
        through it fail the last two.
     3. Of the first part that has such lines the one with the smallest error is taken, or the one
-       that starts first of those nearly as good. How far off the others put phi_J that overlap it, or
-       that lie before it in another part, adds to its error: the root of the mean square, in which
-       each counts with its number of rows, not more where it happens to be straighter.
+       that starts first of those nearly as good. Its error holds the choice of the window: it adds how
+       far off the others put phi_J, of all parts, that begin below ten times the pressure where it ends,
+       the root of the mean square, in which each counts with its number of rows, straight or not.
 
     Parameters
     ----------
@@ -92,8 +95,8 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     Returns
     -------
     OnsetFit
-        It is phi_J at the rate of this compression: it rises as kappa falls, until kappa is about
-        1e-9. The error says nothing of that, and nothing of other samples, which differ by more. Nor
+        It is phi_J(kappa), that of the rate of this compression: it rises as kappa falls, until kappa is about
+        1e-9. Whether states there stay jammed `jamshape.measures.jamming` tells. The error says nothing of that, and nothing of other samples, which differ by more. Nor
         does it know of stretches with fewer rows than a line needs: where samples of p are so far
         apart that the first of them is missed, phi_J is that of a later one.
 
@@ -141,7 +144,8 @@ def _first_best(
     others = [line for lines in found for line, slope in lines if slope >= _MIN_SLOPES[-1]]
     for min_slope, lines in itertools.product(_MIN_SLOPES, found):
         if chosen := [line for line, slope in lines if slope >= min_slope]:
-            return _best(chosen, others)
+            best = _chosen(chosen)
+            return _with_spread(best, [of for of in others if y[of.first] <= _REACH * y[best.last]])
     return None
 
 
@@ -255,12 +259,15 @@ def _line(
     return OnsetFit(phi_J, max(float(error), _ROUNDING * abs(phi_J)), slope, first, last)
 
 
-def _best(lines: Sequence[OnsetFit], others: Sequence[OnsetFit]) -> OnsetFit:
-    """Choose one, and add to its error how far off the others that do not start after it put phi_J."""
+def _chosen(lines: Sequence[OnsetFit]) -> OnsetFit:
+    """Choose among lines the first of the best ones."""
     smallest = min(line.phi_J_error for line in lines)
     good = [line for line in lines if line.phi_J_error <= _NEARLY_BEST * smallest]
-    best = min(good, key=lambda line: (line.first, -line.last))
-    others = [line for line in others if line.first < best.last]
+    return min(good, key=lambda line: (line.first, -line.last))
+
+
+def _with_spread(best: OnsetFit, others: Sequence[OnsetFit]) -> OnsetFit:
+    """Add to the error of a line how far off the others put phi_J."""
     squares = [(line.phi_J - best.phi_J) ** 2 for line in others]
     spread = np.sqrt(np.average(squares, weights=[line.last - line.first + 1 for line in others]))
     return best._replace(phi_J_error=float(np.hypot(best.phi_J_error, spread)))

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.files.h5md import read_observables
+from jamshape.files.h5md import read_attributes, read_observables
 from jamshape.files.sets import PackingFile, System
+from jamshape.measures.jamming import Jamming
 from jamshape.measures.onset import OnsetFit, fit_onset
 
 
@@ -31,7 +32,7 @@ class Ensemble(NamedTuple):
 
 
 class Run(NamedTuple):
-    """A compression and its onset, or the sentence that says why there is none."""
+    """A compression and its onset phi_J(kappa), or the sentence that says why there is none."""
 
     path: Path
     ensemble: Ensemble
@@ -40,6 +41,8 @@ class Run(NamedTuple):
     pressure: FloatArray
     fit: OnsetFit | None
     problem: str = ""
+    jamming: Jamming | None = None
+    """Where its frames stay jammed, if they were minimised."""
 
 
 def ensemble_of(file: PackingFile) -> Ensemble:
@@ -91,7 +94,23 @@ def read_run(path: Path) -> Run:
     phi, pressure = observables_of(file, ("phi", "pressure")).values()
     seed = int(file.attributes.get("seed", 0))
     run = Run(path, ensemble_of(file), seed, phi, pressure, None)
+    run = run._replace(jamming=Jamming.stored(file.attributes))
     try:
         return run._replace(fit=fit_onset(phi, pressure))
     except ValueError as error:  # it ends below jamming, or rearranges too soon
         return run._replace(problem=f"{path}: {error}")
+
+
+def onset_report(path: Path) -> dict[str, Any]:
+    """Report where p(phi) begins, phi_J(kappa), and where frames stay jammed, as far as that is known."""
+    found, stored = read_observables(path), read_attributes(path)
+    names, kappa = ("phi_J(kappa)", "phi_J(kappa)_error"), rate_of(stored)
+    try:
+        fit = fit_onset(found["phi"], found["pressure"])
+    except ValueError:  # it ends below jamming
+        fit = None
+    told = dict(zip(names, fit[:2] if fit else (None, None), strict=True)) | {"kappa": kappa}
+    jamming = Jamming.stored(stored)
+    if jamming is None:
+        return told
+    return told | jamming.attributes() | {"onset": jamming.verdict(fit, kappa)}

@@ -106,6 +106,15 @@ def test_error_holds_the_choice_of_the_window(slope):
     assert 0.3 < fit.phi_J_error / abs(other - PHI_J) < 1
 
 
+def test_error_holds_windows_after_a_plastic_drop():
+    phi = np.linspace(0.8, 0.9, 1000)
+    p = line(phi)
+    p[phi > 0.85] -= SLOPE * 0.004  # the line after it leads to PHI_J + 0.004
+    fit = fit_onset(phi, p)
+    assert fit.phi_J == pytest.approx(PHI_J, abs=1e-12)
+    assert 0.002 < fit.phi_J_error < 0.004
+
+
 @pytest.mark.parametrize("seed", [8, 13, 15, 16])  # of 40, those that differ most
 def test_rows_that_are_left_out_move_it_within_its_errors(seed):
     rng, phi = np.random.default_rng(seed), np.linspace(0.8, 0.9, 800)

@@ -1,0 +1,194 @@
+"""Where frames of a compression stay jammed: each is minimised, and keeps its energy or loses it.
+
+The pressure of a flowing state rises much like that of a jammed one, so a line through p(phi) leads to an onset
+of jamming only if states there stay jammed when nothing drives them any more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from jamshape.contacts.network import CrossingError
+from jamshape.landscape import Landscape
+from jamshape.measures.averages import Mean
+from jamshape.measures.onset import OnsetFit
+from jamshape.minima import Outcome, Stop, minimise
+from jamshape.packing import Packing, State
+
+# Of so many frames, at most, evenly spread, one after the other is minimised; then those around the change.
+_MOST = 32
+
+# Minimisations end at this residual, that of packings, or this energy density, in units of k_e and
+# `Landscape.length`, which harmonic contacts have some 1e-8 above phi_J, or after so many evaluations.
+_TOLERANCE, _LOWEST, _EVALUATIONS = 1e-8, 1e-16, 20_000
+
+_VERDICTS = {
+    Outcome.UNJAMMED: False,
+    Outcome.CONVERGED: True,
+    Outcome.SLIDING: True,
+}
+
+_NAMES = {"unjams": "phi_unjams", "jams": "phi_jams", "tried": "frames_minimised"}
+
+
+class Tried(NamedTuple):
+    """A frame that was minimised."""
+
+    frame: int
+    phi: float
+    stays: bool | None
+    """Whether it stays jammed; None where the minimisation did not end."""
+
+    def __str__(self) -> str:
+        said = {True: "stays jammed", False: "unjams", None: "is undecided"}[self.stays]
+        return f"frame {self.frame} at phi {self.phi:.6f} {said}"
+
+
+class Jamming(NamedTuple):
+    """Between which packing fractions frames of a run begin to stay jammed when they are minimised."""
+
+    unjams: float
+    """Of the densest frame that unjams; NaN if none does."""
+    jams: float
+    """Of the first frame from there on that stays jammed; NaN if none does."""
+    tried: int = 0
+    """How many frames were minimised."""
+
+    @classmethod
+    def of(cls, tried: Iterable[Tried]) -> Jamming:
+        """Bracket the change.
+
+        Examples
+        --------
+        >>> Jamming.of([Tried(3, 0.87, True), Tried(2, 0.86, True), Tried(1, 0.85, False)])
+        Jamming(unjams=0.85, jams=0.86, tried=3)
+        """
+        tried = list(tried)
+        unjams = max((one.phi for one in tried if one.stays is False), default=math.nan)
+        above = (one.phi for one in tried if one.stays and not one.phi <= unjams)
+        return cls(unjams, min(above, default=math.nan), len(tried))
+
+    @classmethod
+    def stored(cls, attributes: Mapping[str, Any]) -> Jamming | None:
+        """Read it from the attributes of a run that keeps it; else None."""
+        if not set(_NAMES.values()) <= attributes.keys():
+            return None
+        unjams, jams, tried = (attributes[name] for name in _NAMES.values())
+        return cls(float(unjams), float(jams), int(tried))
+
+    def attributes(self) -> dict[str, Any]:
+        """Name its numbers as they are stored."""
+        return {name: getattr(self, own) for own, name in _NAMES.items()}
+
+    def text(self) -> str:
+        """Say it in words, up to the end of a sentence."""
+        if math.isnan(self.unjams):
+            none = "none of the frames unjams"
+            return none if math.isnan(self.jams) else f"{none}, down to phi = {self.jams:.5f}"
+        low = f"the frame at phi = {self.unjams:.5f} unjams"
+        if math.isnan(self.jams):
+            return f"{low} and no denser one stays jammed"
+        return f"{low} and that at phi = {self.jams:.5f} stays jammed"
+
+    def differs(self, fit: OnsetFit) -> bool:
+        """Whether an onset of p(phi) lies outside by more than its error."""
+        low, high = fit.phi_J - fit.phi_J_error, fit.phi_J + fit.phi_J_error
+        return high < self.unjams or low > self.jams  # comparisons with NaN are false
+
+    def verdict(self, fit: OnsetFit | None, kappa: float) -> str:
+        """Say in one sentence whether frames that are minimised bear out the onset of p(phi).
+
+        Examples
+        --------
+        >>> fit = OnsetFit(0.829, 0.003, 0.2, 10, 20)
+        >>> print(Jamming(0.855, 0.858).verdict(fit, 1e-6))
+        phi_J(kappa = 1e-06) = 0.829 +- 0.003 is the onset of flow and not of jamming: minimised, the frame at phi = 0.85500 unjams and that at phi = 0.85800 stays jammed.
+        """
+        told = f"minimised, {self.text()}."
+        if fit is None:
+            return f"p(phi) has no onset; {told}"
+        onset = f"phi_J(kappa = {kappa:g}) = {Mean(*fit[:2]).text()}"
+        if not self.differs(fit):
+            return f"{onset} is borne out: {told}"
+        if fit.phi_J > self.jams:
+            return f"{onset} is not where jamming begins but later: {told}"
+        return f"{onset} is the onset of flow and not of jamming: {told}"
+
+
+def stays_jammed(packing: Packing, k_e: float = 1.0) -> bool | None:
+    """Tell whether a state keeps energy in balanced contacts when it is minimised at fixed box.
+
+    Parameters
+    ----------
+    packing : Packing
+    k_e : float, [energy]
+
+    Returns
+    -------
+    bool or None
+        None where the minimisation does not end at either.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> discs = js.Spherocylinders(alpha=0)
+    >>> packing = js.make_packing(discs, n=16, u0=1e-6, file="packing.h5", progress=False)
+    >>> stays_jammed(packing)
+    True
+    """
+    landscape, state = Landscape(packing, k_e), State.of(packing)
+    lowest = _LOWEST * k_e / landscape.length**packing.dimension
+    stop = Stop(tolerance=_TOLERANCE, lowest=lowest, evaluations=_EVALUATIONS)
+    try:
+        found = minimise(landscape, state, "auto", stop)
+        if found.outcome is Outcome.STALLED:
+            found = minimise(landscape, found.state, "newton", stop)
+    except CrossingError:  # of deep overlaps, which have no gradient to go down
+        return None
+    return _VERDICTS.get(found.outcome)
+
+
+def minimised_frames(
+    count: int, read: Callable[[int], Packing], k_e: float = 1.0
+) -> Iterator[Tried]:
+    """Minimise frames of a compression from the densest on, until one unjams.
+
+    Of more than 32 frames it takes some that are evenly spread first, then those around the change: so what
+    it finds is the densest frame that unjams, up to rearrangements that others skip.
+
+    Parameters
+    ----------
+    count : int
+        How many frames there are.
+    read : callable
+        Reads one by its number, from 0.
+    k_e : float, [energy]
+
+    Yields
+    ------
+    Tried
+    """
+
+    def tried(frame: int) -> Tried:
+        packing = read(frame)
+        return Tried(frame, packing.phi, stays_jammed(packing, k_e))
+
+    stride = max(1, math.ceil(count / _MOST))
+    seen, unjams = set(), -1
+    for frame in range(count - 1, -1, -stride):
+        one = tried(frame)
+        yield one
+        seen.add(frame)
+        if one.stays is False:
+            unjams = frame
+            break
+    above = unjams + 2 * stride if unjams >= 0 else min(seen, default=0)
+    for frame in range(min(above, count) - 1, unjams, -1):
+        if frame in seen:
+            continue
+        one = tried(frame)
+        yield one
+        if one.stays is False:
+            return
