@@ -8,9 +8,8 @@ then led to its energy again. Of any shape and dimension.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
-from jamshape.minima import History, Minimum, Outcome, Stop, minimise
+from jamshape.minima import Minimum, Outcome, Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.packing import State
 from jamshape.vibration.hessian import Scope, dynamical_matrix
@@ -101,28 +100,41 @@ class StrictSearch:
         Where it is: stiff modes are relaxed there.
     farthest : (N,) array of float64, [length]
         How far particles may move in the next step.
+    most_steps
+        After so many it ends.
     n_steps, n_fallen
         Steps so far, and how often the energy fell to nothing, so that the packing was led to it again.
     proof
         Of the minimum, where the search has ended or takes it for one.
     done
         Whether it has ended.
+    last : (N, D + T) array of float64, optional
+        The last step, as `sliding.Step.moved`.
+    n_free, n_met
+        Of the last step: motions that slide, and how many of them are stopped by new contacts.
     """
 
     minimum: Minimum
     farthest: FloatArray
+    most_steps: int
     n_steps: int = 0
     n_fallen: int = 0
     proof: Proof | None = None
     done: bool = False
     last: FloatArray | None = None
-    history: History = field(default_factory=History)
+    n_free: int = 0
+    n_met: int = 0
+
+    def counts(self) -> dict[str, int]:
+        """Return what a file says of its course."""
+        return {"strict_steps": self.n_steps, "strict_fallen": self.n_fallen}
 
 
-def start(landscape: Landscape, state: State, target: Target) -> StrictSearch:
-    """Begin at a packing of the target's energy."""
-    minimum = _relaxed(landscape, state, target)
-    return StrictSearch(minimum, _everywhere(landscape, _LONGEST))
+def start(landscape: Landscape, state: State) -> StrictSearch:
+    """Begin at a packing of about the energy that is asked for."""
+    minimum = _relaxed(landscape, state)
+    most = _MORE_STEPS + _STEPS * landscape.particles.n
+    return StrictSearch(minimum, _everywhere(landscape, _LONGEST), most)
 
 
 def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Iterator[StrictSearch]:
@@ -150,9 +162,9 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
         As `target.direct`, where the packing unjams on the way and is led to the energy again.
     """
     radius = 0.5 * landscape.length
-    most = _MORE_STEPS + _STEPS * landscape.particles.n
     while not search.done:
-        if search.n_steps >= most or search.farthest.max() < _STILL * radius:
+        search.proof = None
+        if search.n_steps >= search.most_steps or search.farthest.max() < _STILL * radius:
             _close(landscape, search, target)
             search.done = True
             yield search
@@ -161,6 +173,7 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
         sliding = Sliding.at(landscape, search.minimum.state, reach)
         step = sliding.step(search.farthest, landscape.turning_radius)
         search.n_steps += 1
+        search.n_free, search.n_met = sliding.n_free, step.n_met
         size = float(np.abs(step.moved).max(initial=0.0))
         if size > _STILL * radius:
             _take(landscape, search, target, (sliding, step))
@@ -179,7 +192,7 @@ def _take(
     radius, reach = 0.5 * landscape.length, float(search.farthest.max())
     shift, turn = sliding.matrix.coordinates.motion(step.vector)
     try:
-        there = _relaxed(landscape, search.minimum.state.displaced(shift, turn), target)
+        there = _relaxed(landscape, search.minimum.state.displaced(shift, turn))
     except CrossingError:
         search.farthest, search.last = np.minimum(search.farthest, reach) / _LESS, None
         return
@@ -224,9 +237,8 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     search.farthest, search.last = _everywhere(landscape, _CAREFUL), None
 
 
-def _relaxed(landscape: Landscape, state: State, target: Target) -> Minimum:
+def _relaxed(landscape: Landscape, state: State) -> Minimum:
     """Relax all that is stiffer than what slides."""
-    del target
     return minimise(landscape, state, "newton", Stop(_RELAXED, evaluations=_EVALUATIONS))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse
 from scipy.optimize import linprog
 
-from jamshape.arrays import BoolArray, FloatArray
+from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix, lengths_of_bonds
 from jamshape.vibration.sparse_modes import lowest, typical_prestress
@@ -178,7 +178,9 @@ def _walls(landscape: Landscape, state: State, matrix: DynamicalMatrix, reach: f
         names = _named(contacts)
         bonds = lengths_of_bonds(contacts, matrix.coordinates)
         D = state.dimension
-        apart = np.einsum("md,md->m", bonds.by_variables[:, :D], contacts["separation"][bonds.contact])
+        apart = np.einsum(
+            "md,md->m", bonds.by_variables[:, :D], contacts["separation"][bonds.contact]
+        )
         gap = swelling * apart - bonds.overlap
         is_new = _are_new(names, bonds.contact, known)
         seen = np.array([names[c] in known for c in bonds.contact], bool)
@@ -194,7 +196,7 @@ def _walls(landscape: Landscape, state: State, matrix: DynamicalMatrix, reach: f
 
 
 def _are_new(
-    names: list[tuple[int, ...]], contact: FloatArray, known: dict[tuple[int, ...], int]
+    names: list[tuple[int, ...]], contact: IntArray, known: dict[tuple[int, ...], int]
 ) -> BoolArray:
     """Tell bonds of contacts that have more of them than before."""
     count = np.bincount(contact, minlength=len(names))
@@ -204,7 +206,9 @@ def _are_new(
 
 def _named(contacts: dict[str, FloatArray]) -> list[tuple[int, ...]]:
     """Name contacts by their particles and periodic image."""
-    return [tuple(row) for row in np.column_stack([contacts["particles"], contacts["shift"]]).tolist()]
+    return [
+        tuple(row) for row in np.column_stack([contacts["particles"], contacts["shift"]]).tolist()
+    ]
 
 
 def _larger(landscape: Landscape, swelling: float) -> Landscape:
