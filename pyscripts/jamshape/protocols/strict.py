@@ -47,8 +47,9 @@ _LESS = 4.0
 _DENSE = 3000
 _SOFTEST = 60
 
-# A search ends after so many steps for each particle, and more.
+# A search ends after so many steps for each particle, and more, or when so many states were taken for a minimum.
 _STEPS, _MORE_STEPS = 4, 400
+_MOST_CLOSED = 30
 
 
 @dataclass(frozen=True)
@@ -102,8 +103,9 @@ class StrictSearch:
         How far particles may move in the next step.
     most_steps
         After so many it ends.
-    n_steps, n_fallen
-        Steps so far, and how often the energy fell to nothing, so that the packing was led to it again.
+    n_steps, n_fallen, n_closed
+        Steps so far; how often the energy fell to nothing, so that the packing was led to it again; and how often
+        it was taken for a minimum.
     proof
         Of the minimum, where the search has ended or takes it for one.
     done
@@ -119,6 +121,7 @@ class StrictSearch:
     most_steps: int
     n_steps: int = 0
     n_fallen: int = 0
+    n_closed: int = 0
     proof: Proof | None = None
     done: bool = False
     last: FloatArray | None = None
@@ -164,11 +167,12 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
     radius = 0.5 * landscape.length
     while not search.done:
         search.proof = None
-        if search.n_steps >= search.most_steps or search.farthest.max() < _STILL * radius:
+        ends = search.n_steps >= search.most_steps or search.n_closed >= _MOST_CLOSED
+        if ends or search.farthest.max() < _STILL * radius:
             _close(landscape, search, target)
-            search.done = True
+            search.done |= ends
             yield search
-            return
+            continue
         reach = float(search.farthest.max())
         sliding = Sliding.at(landscape, search.minimum.state, reach)
         step = sliding.step(search.farthest, landscape.turning_radius)
@@ -226,6 +230,7 @@ def _next_farthest(search: StrictSearch, moved: FloatArray, longest: float) -> F
 def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     """Lead what has met its walls to the energy, and look whether it is a minimum."""
     minimum = find(landscape, search.minimum.state, target)
+    search.n_closed += 1
     search.proof = Proof.of(landscape, minimum.state)
     balanced = minimum.residual.largest <= target.tolerance
     if search.proof.n_negative == 0 and balanced:
