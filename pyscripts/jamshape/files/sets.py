@@ -25,7 +25,7 @@ from jamshape.shapes.table import DEFAULT, shape_named
 REACHED = ("converged", "sliding")  # outcomes with mechanical equilibrium; others stalled
 
 # Ends of the names of files that may lie beside a packing and are none.
-OTHERS = (".run.h5", ".search.h5", ".path.h5", ".modes.h5")
+OTHERS = (".run.h5", ".search.h5", ".path.h5", ".strict.h5", ".modes.h5")
 
 CONDITIONS = ("n", "size_ratio", "u0", "kappa")
 

@@ -34,6 +34,7 @@ def make_packing(
     start: str | Path | None = None,
     search: str | None = None,
     minimiser: str | None = None,
+    strict: bool = False,
     file: str | Path | None = None,
     again: bool = False,
     progress: bool = True,
@@ -89,6 +90,9 @@ def make_packing(
         the paper's steps of the box, 1e-6 at first and halved where u crosses u0 (Sec. III C, Eq. 20).
     minimiser : {"auto", "paper", "newton", "lbfgs", "lammps"}, optional
         Of the halving search: "paper" is the conjugate gradients of its App. A; "auto" when left out.
+    strict : bool
+        Go on at the energy, along what slides, until no mode has an eigenvalue below zero by more than its
+        bound; ``results["n_negative"]`` says how many have. Rods of alpha = 4 end at saddles otherwise.
     file : path, optional
         H5MD file of the packing. One of this recipe is loaded from it, one that was cut off goes on from
         files beside it, and one of another recipe is refused. Without it nothing is kept but the result.
@@ -123,7 +127,7 @@ def make_packing(
         particles, dimension, way, seed, n=n, u0=u0, accuracy=accuracy, tolerance=tolerance,
         protocol=protocol, phi_start=phi_start, kappa=kappa, p_end=p_end, phi_end=phi_end,
         phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi, start=start,
-        search=search, minimiser=minimiser,
+        search=search, minimiser=minimiser, strict=strict,
     )  # fmt: skip
     at = place(file, "packing.h5")
     (require_path_for_lammps if isinstance(recipe.way, Dynamics | Compressed) else require_path)(

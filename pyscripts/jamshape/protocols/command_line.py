@@ -30,6 +30,10 @@ def add_recipe_options(parser: ArgumentParser) -> None:
         help="as published, in place of --way; 1 and 2 are short for the last two",
     )  # fmt: skip
     group.add_argument("--seed", type=int, help="of all that is random (1)")
+    group.add_argument(
+        "--strict", action="store_true",
+        help="go on, at the energy, until no mode has a negative eigenvalue",
+    )  # fmt: skip
     for one in SETTINGS:
         option = f"--{one.name.replace('_', '-')}"
         group.add_argument(
@@ -59,7 +63,7 @@ def _said(value: Any) -> str:
 
 def settings_of(options: Namespace) -> dict[str, Any]:
     """Read what was given of a recipe, but for its particles, by the names of `recipe_for`."""
-    names = ("dimension", "way", "seed", "protocol", *(one.name for one in SETTINGS))
+    names = ("dimension", "way", "seed", "protocol", "strict", *(one.name for one in SETTINGS))
     return {name: getattr(options, name) for name in names}
 
 

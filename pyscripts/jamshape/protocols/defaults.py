@@ -177,6 +177,7 @@ def recipe_for(
     way: str | None = None,
     seed: int | None = None,
     protocol: int | str | None = None,
+    strict: bool | None = None,
     **given: Any,
 ) -> Recipe:
     """Make a recipe of what is given, and of what is usual for the rest.
@@ -194,6 +195,8 @@ def recipe_for(
         Of all that is random; 1 when left out.
     protocol : str or int, optional
         One of `PROTOCOLS`, which is a way with the published numbers; 1 and 2 are those of Yuan et al. 2019.
+    strict : bool, optional
+        Whether to go on to a minimum without negative eigenvalues; not when left out.
     **given
         Of `SETTINGS` by name; None where they are left out.
 
@@ -230,7 +233,9 @@ def recipe_for(
         get |= _of_source(source, given)
     how, target = usual.compose(get)
     seed = 1 if seed is None else seed
-    return Recipe(particles, get["n"], dimension, seed, get["phi_start"], how, target)
+    return Recipe(
+        particles, get["n"], dimension, seed, get["phi_start"], how, target, strict=bool(strict)
+    )
 
 
 def _chosen(way: str | None, protocol: int | str | None) -> tuple[UsualWay, str]:

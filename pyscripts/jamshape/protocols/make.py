@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.files.h5md import read_attributes, require_attributes
+from jamshape.files.journal import remove_run
 from jamshape.measures.minimum import summary_of, write_minimum
 from jamshape.protocols.by_compression import ByCompression
 from jamshape.protocols.by_dynamics import ByDynamics
@@ -27,6 +28,7 @@ from jamshape.protocols.recipe import (
     Thermalisation,
     Way,
 )
+from jamshape.protocols.strict_file import StrictFile, lead_strictly
 
 _MAKING: dict[type[Way], Callable[[Recipe, Path], Making]] = {
     Dynamics: ByDynamics,
@@ -89,10 +91,14 @@ def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress
     if recipe.target:
         minimum = yield from lead(landscape, way.state(), recipe.target, search)
     assert minimum is not None
+    strict = StrictFile(_strict_file(out), recipe)
+    if recipe.strict:
+        minimum = yield from lead_strictly(landscape, minimum, strict)
     attributes: dict[str, Any] = recipe.attributes() | way.measured()
     if recipe.target:
         attributes |= {"search": recipe.way.search, "search_minimisations": search.minimisations}
         attributes |= {"search_evaluations": landscape.evaluations - before}
+    attributes |= strict.attributes
     seconds = attributes.pop("seconds_before", 0.0) + time.perf_counter() - began
     attributes |= {"wall_seconds": seconds, "evaluations": landscape.evaluations}
     write_minimum(out, landscape, minimum, attributes)
@@ -102,6 +108,7 @@ def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress
 def tidy(recipe: Recipe, out: Path) -> None:
     """Remove what was there to go on from beside a finished packing, which a kill may have left."""
     _search(recipe, out).forget()
+    remove_run(_strict_file(out))
     _way(recipe, out).done()
 
 
@@ -111,6 +118,10 @@ def _way(recipe: Recipe, out: Path) -> Making:
 
 def _search(recipe: Recipe, out: Path) -> SearchFile:
     return SearchFile(out.with_name(out.name + ".search.h5"), recipe)
+
+
+def _strict_file(out: Path) -> Path:
+    return out.with_name(out.name + ".strict.h5")
 
 
 def is_done(out: Path) -> bool:

@@ -247,11 +247,13 @@ class Recipe:
         From there to jamming.
     target
         Energy density to lead the packing to; None for the first jammed packing of `Steps` as it is.
+    strict
+        Whether to lead it on, at that energy, to a minimum without negative eigenvalues (`protocols.strict`).
 
     Raises
     ------
     ValueError
-        If a number is out of its range.
+        If a number is out of its range, or a strict packing has no energy.
 
     Examples
     --------
@@ -269,10 +271,14 @@ class Recipe:
     phi_start: float = 0.4
     way: Way = field(default_factory=Dynamics)
     target: Target | None = field(default_factory=Target)
+    strict: bool = False
 
     def __post_init__(self) -> None:
         require_stated(n=self.n, seed=self.seed, phi_start=self.phi_start)
         require_one_of("dimension", self.dimension, (2, 3))
+        if self.strict and self.target is None:
+            msg = "there is no energy to reach, expected one for a strict minimum (u0)"
+            raise ValueError(msg)
         self.way.require(self)
 
     def start(self) -> Packing:
@@ -281,7 +287,8 @@ class Recipe:
 
     def attributes(self) -> dict[str, Any]:
         """Return what identifies it, to be stored."""
-        return self.before_target() | (vars(self.target) if self.target else {})
+        strict = {"strict": True} if self.strict else {}
+        return self.before_target() | (vars(self.target) if self.target else {}) | strict
 
     def before_target(self) -> dict[str, Any]:
         """Return what identifies it as far as it is before the energy is led to its target."""

@@ -299,6 +299,28 @@ def matrix_at(landscape: Landscape, state: State, like: DynamicalMatrix) -> Dyna
     )
 
 
+class BondLengths(NamedTuple):
+    """Lengths of m bonds that are shorter than they would be at rest."""
+
+    contact: IntArray
+    """(m,) row of the contacts."""
+    overlap: FloatArray
+    """(m,) force over stiffness, [length]."""
+    by_variables: FloatArray
+    """(m, v) derivative of the length by the pair's variables."""
+    gradient: Any
+    """(m, n) scipy.sparse CSR matrix, derivative by coordinates."""
+
+
+def lengths_of_bonds(contacts: dict[str, NDArray[Any]], coordinates: Coordinates) -> BondLengths:
+    """List the bonds of contacts (`Landscape.derivatives`) with their lengths as functions of coordinates."""
+    contact, slot = np.nonzero(contacts["stiffness"] > 0)
+    gradient = contacts["gradient"][contact, slot]
+    overlap = contacts["bond_force"][contact, slot] / contacts["stiffness"][contact, slot]
+    rows = _Scatter(contacts["particles"], coordinates).rows(gradient, contact)
+    return BondLengths(contact, overlap, gradient, rows)
+
+
 def _matrix(
     landscape: Landscape, state: State, evaluation: Evaluation, parts: dict[str, Any]
 ) -> DynamicalMatrix:

@@ -1,0 +1,251 @@
+"""Strict minima: packings led on from where rods slide until no mode has a negative eigenvalue.
+
+Minimisers leave packings of long rods at saddles: what slides along flat sides lowers the energy by so little that no
+force tells (Marschall & Teitel 2018, Appendix B). Here all that slides goes downhill in long steps, limited by new contacts
+(`vibration.sliding`); after each step what is stiff is relaxed. A rod that slides off another one unjams the packing, which is
+then led to its energy again. Of any shape and dimension.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.contacts import CrossingError
+from jamshape.landscape import Landscape
+from jamshape.minima import Minimum, Outcome, Stop, minimise
+from jamshape.minima.target import Target, find
+from jamshape.packing import State
+from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.sliding import Sliding, Step
+from jamshape.vibration.sparse_modes import lowest
+from jamshape.vibration.spectrum import Spectrum, spectrum
+
+# No particle moves by more in one step, over the smallest radius; after a minimum that is none, by less.
+_LONGEST, _CAREFUL = 0.1, 1e-4
+
+# A corner is met where nothing moves by more than this; a step that fails is a quarter as long, down to this.
+_STILL = 1e-8
+
+# Residual that leaves only what slides, and how long to look for it.
+_RELAXED, _EVALUATIONS = 1e-6, 400
+
+# The energy falls by a larger part only where particles rearrange, which is believed of steps that are so short, and
+# of shorter ones also where the packing unjams.
+_SLIDE = 0.05
+_SHORT, _SHORTER = 0.02, 2e-3
+
+# A particle that turns back goes less far, and further if it goes on; by the cosine of two steps.
+_TURNED = 0.3
+_LESS = 4.0
+
+# All modes are found up to so many coordinates, beyond only the softest.
+_DENSE = 3000
+_SOFTEST = 60
+
+# A search ends after so many steps for each particle, and more, or when so many states were taken for a minimum.
+_STEPS, _MORE_STEPS = 4, 400
+_MOST_CLOSED = 30
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What is known of the modes of a minimum.
+
+    Parameters
+    ----------
+    n_negative
+        Number of modes with an eigenvalue below zero by more than its numerical bound.
+    lowest, bound
+        The lowest eigenvalue but those of translations, and the bound of its error, [energy / length^2].
+    """
+
+    n_negative: int
+    lowest: float
+    bound: float
+
+    @classmethod
+    def of(cls, landscape: Landscape, state: State) -> Proof:
+        """Find the modes of a state, by `vibration.spectrum` of relative accuracy."""
+        matrix = dynamical_matrix(landscape, state, Scope(force=True))
+        most = matrix.size - matrix.translations.shape[1] - 2
+        if matrix.size <= _DENSE or most <= _SOFTEST:
+            found: Spectrum = spectrum(matrix)
+        else:
+            found = lowest(matrix, _SOFTEST)
+        own = np.flatnonzero(~found.is_translation)
+        first = own[np.argmin(found.eigenvalues[own])]
+        n_negative = int((found.sign[own] < 0).sum())
+        return cls(n_negative, float(found.eigenvalues[first]), float(found.bound[first]))
+
+    def attributes(self) -> dict[str, Any]:
+        """Return what a packing's file says of it."""
+        return {
+            "n_negative": self.n_negative,
+            "lowest_eigenvalue": self.lowest,
+            "lowest_eigenvalue_bound": self.bound,
+        }
+
+
+@dataclass(eq=False)
+class StrictSearch:
+    """A search between two steps: all that is needed to go on from here.
+
+    Parameters
+    ----------
+    minimum
+        Where it is: stiff modes are relaxed there.
+    farthest : (N,) array of float64, [length]
+        How far particles may move in the next step.
+    most_steps
+        After so many it ends.
+    n_steps, n_fallen, n_closed
+        Steps so far; how often the energy fell to nothing, so that the packing was led to it again; and how often
+        it was taken for a minimum.
+    proof
+        Of the minimum, where the search has ended or takes it for one.
+    done
+        Whether it has ended.
+    last : (N, D + T) array of float64, optional
+        The last step, as `sliding.Step.moved`.
+    n_free, n_met
+        Of the last step: motions that slide, and how many of them are stopped by new contacts.
+    """
+
+    minimum: Minimum
+    farthest: FloatArray
+    most_steps: int
+    n_steps: int = 0
+    n_fallen: int = 0
+    n_closed: int = 0
+    proof: Proof | None = None
+    done: bool = False
+    last: FloatArray | None = None
+    n_free: int = 0
+    n_met: int = 0
+
+    def counts(self) -> dict[str, int]:
+        """Return what a file says of its course."""
+        return {"strict_steps": self.n_steps, "strict_fallen": self.n_fallen}
+
+
+def start(landscape: Landscape, state: State) -> StrictSearch:
+    """Begin at a packing of about the energy that is asked for."""
+    minimum = _relaxed(landscape, state)
+    most = _MORE_STEPS + _STEPS * landscape.particles.n
+    return StrictSearch(minimum, _everywhere(landscape, _LONGEST), most)
+
+
+def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Iterator[StrictSearch]:
+    """Follow negative curvature until none is left.
+
+    Ends where no eigenvalue is below zero by more than its bound and forces balance, and otherwise after a number of
+    steps that grows with the packing, or where steps become too short; `StrictSearch.proof` tells which.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    search : StrictSearch
+        Where to begin, or to go on.
+    target : Target
+        The energy, and how well forces are to balance.
+
+    Yields
+    ------
+    StrictSearch
+        The same object after each step.
+
+    Raises
+    ------
+    TargetError
+        As `target.direct`, where the packing unjams on the way and is led to the energy again.
+    """
+    radius = 0.5 * landscape.length
+    while not search.done:
+        search.proof = None
+        ends = search.n_steps >= search.most_steps or search.n_closed >= _MOST_CLOSED
+        if ends or search.farthest.max() < _STILL * radius:
+            _close(landscape, search, target)
+            search.done |= ends
+            yield search
+            continue
+        reach = float(search.farthest.max())
+        sliding = Sliding.at(landscape, search.minimum.state, reach)
+        step = sliding.step(search.farthest, landscape.turning_radius)
+        search.n_steps += 1
+        search.n_free, search.n_met = sliding.n_free, step.n_met
+        size = float(np.abs(step.moved).max(initial=0.0))
+        if size > _STILL * radius:
+            _take(landscape, search, target, (sliding, step))
+        elif reach > 2 * _CAREFUL * radius:
+            search.farthest, search.last = _everywhere(landscape, _CAREFUL), None
+        else:
+            _close(landscape, search, target)
+        yield search
+
+
+def _take(
+    landscape: Landscape, search: StrictSearch, target: Target, way: tuple[Sliding, Step]
+) -> None:
+    """Take a step if the energy falls, and judge how far the next one may go."""
+    sliding, step = way
+    radius, reach = 0.5 * landscape.length, float(search.farthest.max())
+    shift, turn = sliding.matrix.coordinates.motion(step.vector)
+    try:
+        there = _relaxed(landscape, search.minimum.state.displaced(shift, turn))
+    except CrossingError:
+        search.farthest, search.last = np.minimum(search.farthest, reach) / _LESS, None
+        return
+    energy = search.minimum.evaluation.energy
+    change = (there.evaluation.energy - energy) / energy
+    settled = there.outcome is Outcome.CONVERGED
+    fell = change < -_SLIDE or there.outcome is Outcome.UNJAMMED
+    if settled and -_SLIDE < change < 0:
+        search.farthest = _next_farthest(search, step.moved, _LONGEST * radius)
+        search.minimum, search.last = there, step.moved
+    elif fell and reach < (_SHORT if settled else _SHORTER) * radius:
+        rough = replace(target, tolerance=_RELAXED, accuracy=1e-3)
+        search.minimum = find(landscape, there.state, rough)
+        search.farthest, search.last = _everywhere(landscape, _LONGEST), None
+        search.n_fallen += 1
+    else:
+        search.farthest, search.last = search.farthest / _LESS, None
+
+
+def _next_farthest(search: StrictSearch, moved: FloatArray, longest: float) -> FloatArray:
+    """Let particles go further that go on in their direction, and less far where they turn back."""
+    if search.last is None:
+        return search.farthest
+    size, before = (np.linalg.norm(part, axis=1) for part in (moved, search.last))
+    cosine = (moved * search.last).sum(axis=1) / np.maximum(size * before, 1e-300)
+    goes_on = (cosine > _TURNED) & (size > 0.5 * search.farthest)
+    further = np.where(goes_on, np.minimum(2 * search.farthest, longest), search.farthest)
+    return np.where(cosine < -_TURNED, search.farthest / _LESS, further)
+
+
+def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
+    """Lead what has met its walls to the energy, and look whether it is a minimum."""
+    minimum = find(landscape, search.minimum.state, target)
+    search.n_closed += 1
+    search.proof = Proof.of(landscape, minimum.state)
+    balanced = minimum.residual.largest <= target.tolerance
+    if search.proof.n_negative == 0 and balanced:
+        search.minimum = replace(minimum, outcome=Outcome.CONVERGED)
+        search.done = True
+        return
+    left = Outcome.SLIDING if minimum.outcome is Outcome.CONVERGED else minimum.outcome
+    search.minimum = replace(minimum, outcome=left)
+    search.farthest, search.last = _everywhere(landscape, _CAREFUL), None
+
+
+def _relaxed(landscape: Landscape, state: State) -> Minimum:
+    """Relax all that is stiffer than what slides."""
+    return minimise(landscape, state, "newton", Stop(_RELAXED, evaluations=_EVALUATIONS))
+
+
+def _everywhere(landscape: Landscape, part: float) -> FloatArray:
+    return np.full(landscape.particles.n, part * 0.5 * landscape.length)

@@ -1,0 +1,217 @@
+"""Motions that the stiff contacts of a packing leave free, and how far they go until something new touches.
+
+Modes of the dynamical matrix that vanish at first order in the prestress (Marschall & Teitel 2018, Appendix B): rods
+that slide along flat sides. Contacts with forces of second order in the overlap, which stop what slides, are
+taken for what they nearly are: hard walls. General in the shape; needs no LAMMPS.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse
+from scipy.optimize import linprog
+
+from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.landscape import Landscape, State
+from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix, lengths_of_bonds
+from jamshape.vibration.sparse_modes import lowest, typical_prestress
+
+# Modes softer than this part of the prestress vanish at first order in it.
+_FIRST_ORDER = 1e-2
+
+# Forces below this part of the root of the prestress (over the stiffness) are of second order in the overlap.
+_WEAK = 0.1
+
+# Where distances between surfaces are measured: where they are this much smaller than the longest step.
+_LEVELS = (1e-6, 1e-4, 1e-2, 1.0)
+
+# Bonds of contacts that bear force are new ones if they are open by more than this part of the step.
+_OPEN = 0.1
+
+
+class Walls(NamedTuple):
+    """What may not come closer: m distances between surfaces, and how (n,) coordinates change them."""
+
+    gap: FloatArray
+    """(m,) [length]"""
+    gradient: scipy.sparse.csr_matrix
+    """(m, n)"""
+
+
+@dataclass(frozen=True, eq=False)
+class Sliding:
+    """The sliding motions of one state.
+
+    Parameters
+    ----------
+    matrix : DynamicalMatrix
+        Of the contacts that bear forces of first order.
+    modes : (n, k) array of float64
+        Orthonormal columns.
+    eigenvalues : (k,) array of float64, [energy / length^2]
+    slope : (k,) array of float64, [energy / length]
+        Of the energy of these contacts along the modes.
+    walls : Walls
+    """
+
+    matrix: DynamicalMatrix
+    modes: FloatArray
+    eigenvalues: FloatArray
+    slope: FloatArray
+    walls: Walls
+
+    @classmethod
+    def at(cls, landscape: Landscape, state: State, reach: float) -> Sliding:
+        """Find what slides at a state where stiff modes are relaxed.
+
+        Parameters
+        ----------
+        landscape : Landscape
+        state : State
+        reach : float, [length]
+            How far particles are to move at most.
+        """
+        every = dynamical_matrix(landscape, state, Scope(force=True))
+        stiffest = float(every.bonds.stiffness.max())
+        weakest = _WEAK * math.sqrt(typical_prestress(every) / stiffest)
+        matrix = dynamical_matrix(landscape, state, Scope(force=True, least_force=weakest))
+        values, modes = _softest(matrix)
+        bonds, force = matrix.bonds, matrix.contacts["bond_force"]
+        own = bonds.slot < force.shape[1]
+        pull = np.zeros(len(own))
+        pull[own] = force[bonds.contact[own], bonds.slot[own]] / np.sqrt(bonds.stiffness[own])
+        slope = -((matrix.compatibility @ modes).T @ pull)
+        return cls(matrix, modes, values, slope, _walls(landscape, state, matrix, reach))
+
+    @property
+    def n_free(self) -> int:
+        """Number of motions k."""
+        return len(self.eigenvalues)
+
+    def step(self, farthest: FloatArray, radius: FloatArray) -> Step:
+        """Find the step that lowers the energy most as far as its slope tells, up to the walls.
+
+        Along negative curvature the energy falls faster than its slope says. So this is a linear programme, and
+        its solution a corner: each motion goes until something touches, or as far as it may.
+
+        Parameters
+        ----------
+        farthest : (N,) array of float64, [length]
+            How far each particle may move.
+        radius : (N,) array of float64, [length]
+            How far a radian moves a particle's surface.
+        """
+        if not self.n_free:
+            return Step(np.zeros(self.matrix.size), 0.0, 0, self._split(np.zeros(0), radius))
+        scale = float(farthest.max())
+        downhill = np.where(self.slope >= 0, 1.0, -1.0)
+        bend = 0.5 * scale * np.maximum(-self.eigenvalues, 0.0)
+        cost = self.slope + downhill * bend
+        moved = self._moved(radius) / farthest[:, None, None]
+        moved = moved.reshape(-1, self.n_free)
+        moved = moved[np.abs(moved).max(axis=1) * scale > _FIRST_ORDER**2]
+        walls = self.walls.gradient @ self.modes
+        rows = np.vstack([-walls, moved * scale, -moved * scale])
+        most = np.concatenate([self.walls.gap / scale, np.ones(2 * len(moved))])
+        up = self.eigenvalues > 0
+        limit = np.full(self.n_free, math.sqrt(self.matrix.size))
+        limit[up] = np.minimum(limit[up], np.abs(self.slope[up]) / self.eigenvalues[up] / scale)
+        bounds = np.column_stack([-limit, limit])
+        largest = float(np.abs(cost).max()) or 1.0
+        found = linprog(cost / largest, A_ub=rows, b_ub=most, bounds=bounds)
+        c = scale * found.x if found.status == 0 else np.zeros(self.n_free)
+        n_met = int((walls @ c + self.walls.gap < 1e-9 * scale).sum())
+        return Step(self.modes @ c, float(cost @ c), n_met, self._split(c, radius))
+
+    def _moved(self, radius: FloatArray) -> FloatArray:
+        """(N, D + T, k) how far the modes move and turn the particles' surfaces."""
+        at, D = self.matrix.coordinates, self.matrix.coordinates.dimension
+        moved = (at.embedding @ self.modes).reshape(at.n_all, -1, self.n_free)
+        moved[:, D:] *= radius[:, None, None]
+        return np.asarray(moved)
+
+    def _split(self, c: FloatArray, radius: FloatArray) -> FloatArray:
+        return np.asarray(self._moved(radius) @ c)
+
+
+class Step(NamedTuple):
+    """A step along sliding motions."""
+
+    vector: FloatArray
+    """(n,)"""
+    gain: float
+    """What the energy changes by, as far as slope and curvature tell."""
+    n_met: int
+    """How many walls it goes up to."""
+    moved: FloatArray
+    """(N, D + T) how far it moves and turns the particles' surfaces."""
+
+
+def _softest(matrix: DynamicalMatrix) -> tuple[FloatArray, FloatArray]:
+    """Find the modes that vanish at first order in the prestress."""
+    limit = _FIRST_ORDER * typical_prestress(matrix)
+    most = matrix.size - matrix.translations.shape[1] - 2
+    k = min(most, max(8, matrix.size - matrix.n_bonds + 4))
+    while True:
+        found = lowest(matrix, k)
+        soft = found.eigenvalues < limit
+        if not soft.all() or k == most:
+            return found.eigenvalues[soft], found.vectors[:, soft]
+        k = min(2 * k, most)
+
+
+def _walls(landscape: Landscape, state: State, matrix: DynamicalMatrix, reach: float) -> Walls:
+    """Measure distances on particles that are larger, so that they touch, as exactly as these are small."""
+    radius = 0.5 * landscape.length
+    bearing = _named(matrix.contacts)
+    is_held = np.zeros(matrix.coordinates.n_all, bool)
+    is_held[matrix.coordinates.backbone] = True
+    known: dict[tuple[int, ...], int] = dict.fromkeys(bearing, 0)
+    gaps, rows = [], []
+    for level in _LEVELS:
+        swelling = level * reach / radius
+        contacts = _larger(landscape, swelling).derivatives(state)
+        names = _named(contacts)
+        bonds = lengths_of_bonds(contacts, matrix.coordinates)
+        D = state.dimension
+        apart = np.einsum(
+            "md,md->m", bonds.by_variables[:, :D], contacts["separation"][bonds.contact]
+        )
+        gap = swelling * apart - bonds.overlap
+        is_new = _are_new(names, bonds.contact, known)
+        seen = np.array([names[c] in known for c in bonds.contact], bool)
+        used = is_held[contacts["particles"][bonds.contact]].all(axis=1) & is_new
+        used &= ~seen | (gap > _OPEN * level * reach)
+        gaps.append(np.maximum(gap[used], 0.0))
+        rows.append(bonds.gradient[used])
+        count = np.bincount(bonds.contact, minlength=len(names))
+        for name, n in zip(names, count.tolist(), strict=True):
+            if name not in bearing or n > 1:
+                known[name] = max(n, known.get(name, 0))
+    return Walls(np.concatenate(gaps), scipy.sparse.vstack(rows).tocsr())
+
+
+def _are_new(
+    names: list[tuple[int, ...]], contact: IntArray, known: dict[tuple[int, ...], int]
+) -> BoolArray:
+    """Tell bonds of contacts that have more of them than before."""
+    count = np.bincount(contact, minlength=len(names))
+    more = np.array([count[c] > known.get(names[c], 0) for c in range(len(names))], bool)
+    return np.asarray(more[contact])
+
+
+def _named(contacts: dict[str, FloatArray]) -> list[tuple[int, ...]]:
+    """Name contacts by their particles and periodic image."""
+    return [
+        tuple(row) for row in np.column_stack([contacts["particles"], contacts["shift"]]).tolist()
+    ]
+
+
+def _larger(landscape: Landscape, swelling: float) -> Landscape:
+    particles = landscape.particles
+    larger = particles.with_(diameters=(1 + swelling) * particles.diameters)
+    return Landscape(larger, landscape.k_e, landscape.sides)

@@ -1,0 +1,137 @@
+"""Strict minima: what slides is followed to where it stops, and no negative eigenvalue is left."""
+
+import itertools
+
+import mpmath
+import numpy as np
+import pytest
+from mixtures import bidisperse
+
+from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.landscape import Landscape, State
+from jamshape.minima import Outcome, Stop, minimise
+from jamshape.minima.target import Target
+from jamshape.packing import Box, Packing
+from jamshape.protocols.defaults import recipe_for
+from jamshape.protocols.make import make
+from jamshape.protocols.strict import Proof, descend, start
+from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.sliding import Sliding
+
+OVERLAP = 1e-7
+
+
+def between_flat_sides():
+    """A short rod in the middle between two long ones, all parallel, which is pressed on by both.
+
+    In the middle it presses on the ends of its neighbour evenly, which is where they are stiffest: a saddle.
+    """
+    half_length = np.array([4.0, 2.0, 0.8])
+    height = 3 * (1 - OVERLAP)
+    packing = Packing(
+        position=np.column_stack([np.full(3, 5.0), 0.5 + height / 3 * np.arange(3)]),
+        orientation=np.zeros(3),
+        diameters=np.column_stack([2 * half_length + 1, np.ones(3), np.ones(3)]),
+        species=np.arange(1, 4),
+        id=np.arange(1, 4),
+        box=Box(lo=np.zeros(2), edges=np.array([10.0, height])),
+    )
+    landscape = Landscape(packing)
+    return landscape, minimise(landscape, State.of(packing), "newton", Stop(1e-8))
+
+
+def test_what_slides_between_flat_sides_is_at_a_saddle():
+    landscape, minimum = between_flat_sides()
+    assert minimum.outcome is Outcome.CONVERGED
+    proof = Proof.of(landscape, minimum.state)
+    assert proof.n_negative == 1
+    assert proof.lowest + proof.bound < 0
+
+
+def test_strict_search_leaves_a_saddle():
+    landscape, minimum = between_flat_sides()
+    target = Target(minimum.energy_density)
+    search = start(landscape, minimum.state)
+    for _ in descend(landscape, search, target):
+        pass
+    found = search.minimum
+    assert search.n_steps < search.most_steps
+    assert found.outcome is Outcome.CONVERGED
+    assert found.residual.largest <= target.tolerance
+    assert target.is_met(found.energy_density)
+    assert search.proof.n_negative == 0
+    moved = found.state.position - minimum.state.position
+    along = np.diff(moved[:, 0].astype(float))
+    assert np.abs(along).max() > 0.1
+    assert found.state.volume < minimum.state.volume  # denser at the same energy
+
+
+def test_steps_end_at_walls():
+    landscape, minimum = between_flat_sides()
+    moved = minimum.state.displaced(np.array([[0, 0], [0, 0], [0.3, 0]]), np.zeros((3, 1)))
+    free = Sliding.at(landscape, moved, 0.05)
+    assert free.n_free == 2
+    step = free.step(np.full(3, 0.05), landscape.turning_radius)
+    assert step.gain < 0
+    assert np.abs(step.moved).max() == pytest.approx(0.05)
+    along = step.moved[2, 0] - step.moved[1, 0]
+    assert along > 0  # on, away from the middle
+
+
+@pytest.fixture(scope="module")
+def strict(tmp_path_factory):
+    out = tmp_path_factory.mktemp("strict") / "packing.h5"
+    recipe = recipe_for(bidisperse(4.0), n=32, seed=1, strict=True)
+    for _ in make(recipe, out):
+        pass
+    return out, recipe
+
+
+def exact_eigenvalues(landscape, state):
+    """All of M = C^T C - S, each entry as it is stored, in sixty digits."""
+    matrix = dynamical_matrix(landscape, state, Scope(force=True))
+    with mpmath.workdps(60):
+        C = mpmath.matrix(matrix.compatibility.toarray().tolist())
+        S = mpmath.matrix(matrix.prestress.toarray().tolist())
+        return [float(x) for x in mpmath.eigsy(C.T * C - S, eigvals_only=True)]
+
+
+def test_strict_packing_has_no_negative_eigenvalue(strict):
+    out, _ = strict
+    stored, packing = read_attributes(out), read_packing(out)
+    assert stored["outcome"] == "converged"
+    assert max(stored["residual_force"], stored["residual_torque"]) <= stored["tolerance"]
+    assert stored["n_negative"] == 0
+    assert abs(stored["u"] / stored["u0"] - 1) <= stored["accuracy"]
+    values = np.sort(exact_eigenvalues(Landscape(packing), State.of(packing)))
+    translations = np.sort(np.abs(values))[:2]
+    assert translations.max() < 1e-20
+    assert values[0] > -1e-20
+    assert np.sort(np.abs(values))[2] == pytest.approx(stored["lowest_eigenvalue"], rel=1e-6)
+
+
+def test_strict_search_goes_on_from_its_file(strict, tmp_path, monkeypatch):
+    out, recipe = strict
+    monkeypatch.setattr("jamshape.protocols.strict_file._STORE_SECONDS", 0.0)
+    again = tmp_path / "packing.h5"
+    steps = make(recipe, again)
+    during = (at for at in steps if at.stage == "strict")
+    for _ in itertools.islice(during, 4):
+        pass
+    steps.close()
+    file = tmp_path / "packing.h5.strict.h5"
+    before = read_attributes(file)["strict_steps"]
+    assert before > 0
+    for _ in make(recipe, again):
+        pass
+    stored = read_attributes(again)
+    assert stored["strict_steps"] > before
+    assert stored["n_negative"] == 0
+    assert stored["outcome"] == "converged"
+    assert stored["phi_J"] == pytest.approx(read_attributes(out)["phi_J"], abs=1e-7)
+    assert not file.exists()
+
+
+def test_strict_packing_needs_an_energy():
+    with pytest.raises(ValueError, match="expected one for a strict minimum"):
+        recipe_for(bidisperse(4.0), n=32, u0=0.0, strict=True)
