@@ -104,4 +104,4 @@ def main(options: Namespace) -> int:
 
 
 if __name__ == "__main__":
-    run(main, parser())
+    run(parser(), main)
