@@ -110,6 +110,8 @@ class StrictSearch:
         Of the minimum, where the search has ended or takes it for one.
     done
         Whether it has ended.
+    keeping
+        Whether weak contacts are to stay in the next step, as they do after a state that was taken for a minimum.
     last : (N, D + T) array of float64, optional
         The last step, as `sliding.Step.moved`.
     n_free, n_met
@@ -125,6 +127,7 @@ class StrictSearch:
     proof: Proof | None = None
     done: bool = False
     last: FloatArray | None = None
+    keeping: bool = False
     n_free: int = 0
     n_met: int = 0
 
@@ -174,7 +177,7 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
             yield search
             continue
         reach = float(search.farthest.max())
-        sliding = Sliding.at(landscape, search.minimum.state, reach)
+        sliding = Sliding.at(landscape, search.minimum.state, reach, keeping=search.keeping)
         step = sliding.step(search.farthest, landscape.turning_radius)
         search.n_steps += 1
         search.n_free, search.n_met = sliding.n_free, step.n_met
@@ -183,6 +186,8 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
             _take(landscape, search, target, (sliding, step))
         elif reach > 2 * _CAREFUL * radius:
             search.farthest, search.last = _everywhere(landscape, _CAREFUL), None
+        elif search.keeping:
+            search.keeping = False
         else:
             _close(landscape, search, target)
         yield search
@@ -240,6 +245,7 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     left = Outcome.SLIDING if minimum.outcome is Outcome.CONVERGED else minimum.outcome
     search.minimum = replace(minimum, outcome=left)
     search.farthest, search.last = _everywhere(landscape, _CAREFUL), None
+    search.keeping = search.proof.n_negative > 0
 
 
 def _relaxed(landscape: Landscape, state: State) -> Minimum:

@@ -29,6 +29,9 @@ _WEAK = 0.1
 # Where distances between surfaces are measured: where they are this much smaller than the longest step.
 _LEVELS = (1e-6, 1e-4, 1e-2, 1.0)
 
+# What moves less, for motions of unit size, is not asked how far; a wall is met at this distance over the step.
+_SEEN, _MET = 1e-4, 1e-9
+
 # Bonds of contacts that bear force are new ones if they are open by more than this part of the step.
 _OPEN = 0.1
 
@@ -65,7 +68,9 @@ class Sliding:
     walls: Walls
 
     @classmethod
-    def at(cls, landscape: Landscape, state: State, reach: float) -> Sliding:
+    def at(
+        cls, landscape: Landscape, state: State, reach: float, *, keeping: bool = False
+    ) -> Sliding:
         """Find what slides at a state where stiff modes are relaxed.
 
         Parameters
@@ -74,11 +79,14 @@ class Sliding:
         state : State
         reach : float, [length]
             How far particles are to move at most.
+        keeping : bool
+            Whether weak contacts are to stay too, rather than be walls: for states where forces balance.
         """
         every = dynamical_matrix(landscape, state, Scope(force=True))
         stiffest = float(every.bonds.stiffness.max())
         weakest = _WEAK * math.sqrt(typical_prestress(every) / stiffest)
-        matrix = dynamical_matrix(landscape, state, Scope(force=True, least_force=weakest))
+        strong = Scope(force=True, least_force=weakest)
+        matrix = every if keeping else dynamical_matrix(landscape, state, strong)
         values, modes = _softest(matrix)
         bonds, force = matrix.bonds, matrix.contacts["bond_force"]
         own = bonds.slot < force.shape[1]
@@ -108,24 +116,28 @@ class Sliding:
         if not self.n_free:
             return Step(np.zeros(self.matrix.size), 0.0, 0, self._split(np.zeros(0), radius))
         scale = float(farthest.max())
-        downhill = np.where(self.slope >= 0, 1.0, -1.0)
         bend = 0.5 * scale * np.maximum(-self.eigenvalues, 0.0)
-        cost = self.slope + downhill * bend
-        moved = self._moved(radius) / farthest[:, None, None]
+        downhill = np.where(self.slope >= 0, 1.0, -1.0)
+        # From the top of a saddle it goes down on both sides, and there may be a wall on one of them.
+        other = np.where(bend > np.abs(self.slope), -downhill, downhill)
+        sides = [downhill] if (other == downhill).all() else [downhill, other]
+        limits = self._limits(farthest, radius)
+        steps = [scale * limits.corner(self.slope + side * bend) for side in sides]
+        gains = [self.slope @ c + 0.5 * self.eigenvalues @ c**2 for c in steps]
+        c = steps[int(np.argmin(gains))]
+        n_met = int((limits.gap + limits.walls @ (c / scale) < _MET).sum())
+        return Step(self.modes @ c, float(min(gains)), n_met, self._split(c, radius))
+
+    def _limits(self, farthest: FloatArray, radius: FloatArray) -> _Limits:
+        """Say how far the motions may go, in units of the longest step."""
+        scale = float(farthest.max())
+        moved = scale * self._moved(radius) / farthest[:, None, None]
         moved = moved.reshape(-1, self.n_free)
-        moved = moved[np.abs(moved).max(axis=1) * scale > _FIRST_ORDER**2]
-        walls = self.walls.gradient @ self.modes
-        rows = np.vstack([-walls, moved * scale, -moved * scale])
-        most = np.concatenate([self.walls.gap / scale, np.ones(2 * len(moved))])
-        up = self.eigenvalues > 0
+        moved = moved[np.abs(moved).max(axis=1) > _SEEN]
         limit = np.full(self.n_free, math.sqrt(self.matrix.size))
+        up = self.eigenvalues > 0
         limit[up] = np.minimum(limit[up], np.abs(self.slope[up]) / self.eigenvalues[up] / scale)
-        bounds = np.column_stack([-limit, limit])
-        largest = float(np.abs(cost).max()) or 1.0
-        found = linprog(cost / largest, A_ub=rows, b_ub=most, bounds=bounds)
-        c = scale * found.x if found.status == 0 else np.zeros(self.n_free)
-        n_met = int((walls @ c + self.walls.gap < 1e-9 * scale).sum())
-        return Step(self.modes @ c, float(cost @ c), n_met, self._split(c, radius))
+        return _Limits(self.walls.gradient @ self.modes, self.walls.gap / scale, moved, limit)
 
     def _moved(self, radius: FloatArray) -> FloatArray:
         """(N, D + T, k) how far the modes move and turn the particles' surfaces."""
@@ -136,6 +148,28 @@ class Sliding:
 
     def _split(self, c: FloatArray, radius: FloatArray) -> FloatArray:
         return np.asarray(self._moved(radius) @ c)
+
+
+class _Limits(NamedTuple):
+    """How far k motions may go."""
+
+    walls: FloatArray
+    """(m, k) what they change distances between surfaces by."""
+    gap: FloatArray
+    """(m,) these distances."""
+    moved: FloatArray
+    """(l, k) what they move, by at most 1."""
+    limit: FloatArray
+    """(k,) of each motion."""
+
+    def corner(self, cost: FloatArray) -> FloatArray:
+        """Go down a slope to the end; nowhere if there is none."""
+        rows = np.vstack([-self.walls, self.moved, -self.moved])
+        most = np.concatenate([self.gap, np.ones(2 * len(self.moved))])
+        bounds = np.column_stack([-self.limit, self.limit])
+        largest = float(np.abs(cost).max()) or 1.0
+        found = linprog(cost / largest, A_ub=rows, b_ub=most, bounds=bounds)
+        return np.asarray(found.x) if found.status == 0 else np.zeros(len(cost))
 
 
 class Step(NamedTuple):
