@@ -21,8 +21,8 @@ from jamshape.command import parser_of, report, run
 from jamshape.files.sets import PackingFile, finished
 from jamshape.landscape import Landscape, State
 from jamshape.measures.averages import mean
-from jamshape.vibration.hessian import Scope, dynamical_matrix
-from jamshape.vibration.spectrum import spectrum
+from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
+from jamshape.vibration.spectrum import Spectrum, spectrum
 from jamshape.vibration.statistics import bands
 
 # Forces below this part of the mean stop what slides; they are of second order in the overlap.
@@ -30,7 +30,7 @@ WEAK = 1e-4
 
 NUMBERS = (
     *("z", "z_without_weak", "phi_J", "n_negative", "low", "middle", "high"),
-    *("weak_forces", "force_spread", "wall_seconds"),
+    *("low_without_weak", "weak_forces", "force_spread", "wall_seconds"),
 )
 
 
@@ -48,22 +48,30 @@ def parser() -> ArgumentParser:
     return found
 
 
+def parts_of(matrix: DynamicalMatrix, found: Spectrum) -> dict[str, float]:
+    """Tell which fraction of all modes is in which band."""
+    return {band.name: band.n_modes / matrix.size for band in bands(matrix, found)}
+
+
 def numbers_of(file: PackingFile) -> dict[str, float]:
     """Measure one packing; fractions are of all modes, and of all bonds."""
     packing = file.packing()
-    matrix = dynamical_matrix(Landscape(packing), State.of(packing), Scope(force=True))
+    landscape, state = Landscape(packing), State.of(packing)
+    matrix = dynamical_matrix(landscape, state, Scope(force=True))
+    strong = dynamical_matrix(landscape, state, Scope(force=True, least_force=WEAK))
     found = spectrum(matrix)
     own = ~found.is_translation
     force = matrix.contacts["bond_force"]
     force = force[force > 0] / matrix.bond_force
     weak = force < WEAK
-    part = {band.name: band.n_modes / matrix.size for band in bands(matrix, found)}
+    part = parts_of(matrix, found)
     return {
         "z": matrix.z,
         "z_without_weak": 2 * float((~weak).sum()) / matrix.n_particles,
         "phi_J": file.number("phi_J"),
         "n_negative": float((found.sign[own] < 0).sum()),
         **{name: part.get(name, 0.0) for name in ("low", "middle", "high")},
+        "low_without_weak": parts_of(strong, spectrum(strong)).get("low", 0.0),
         "weak_forces": float(weak.mean()),
         "force_spread": float(force[~weak].std() / force[~weak].mean()),
         "wall_seconds": file.number("wall_seconds"),
