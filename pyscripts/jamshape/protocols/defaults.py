@@ -177,7 +177,6 @@ def recipe_for(
     way: str | None = None,
     seed: int | None = None,
     protocol: int | str | None = None,
-    strict: bool | None = None,
     **given: Any,
 ) -> Recipe:
     """Make a recipe of what is given, and of what is usual for the rest.
@@ -195,10 +194,9 @@ def recipe_for(
         Of all that is random; 1 when left out.
     protocol : str or int, optional
         One of `PROTOCOLS`, which is a way with the published numbers; 1 and 2 are those of Yuan et al. 2019.
-    strict : bool, optional
-        Whether to go on to a minimum without negative eigenvalues; not when left out.
     **given
-        Of `SETTINGS` by name; None where they are left out.
+        Of `SETTINGS` by name, None where they are left out; and `strict`, whether to go on to a minimum
+        without negative eigenvalues.
 
     Returns
     -------
@@ -218,24 +216,29 @@ def recipe_for(
     >>> recipe_for(Particles.of(alpha=4.0), protocol="marschall-2018").n
     1024
     """
+    strict = bool(given.pop("strict", None))
     source = None if given.get("start") is None else Source.read(Path(given["start"]))
     if source is not None:
         source.require(particles, n=given.get("n"), dimension=dimension, seed=seed)
         particles, dimension, seed = source.particles, source.dimension, source.seed
-    if particles is None:
-        msg = "there are neither particles nor a start, expected one of them"
-        raise ValueError(msg)
-    dimension = particles.shape.dimension if dimension is None else dimension
-    require_one_of("dimension", dimension, (2, 3))
+    particles, dimension = _placed(particles, dimension)
     usual, called = _chosen(way, protocol)
     get = usual.defaults(dimension) | _allowed(given, usual, called)
     if source is not None:
         get |= _of_source(source, given)
     how, target = usual.compose(get)
-    seed = 1 if seed is None else seed
-    return Recipe(
-        particles, get["n"], dimension, seed, get["phi_start"], how, target, strict=bool(strict)
-    )
+    numbers = (get["n"], dimension, 1 if seed is None else seed, get["phi_start"])
+    return Recipe(particles, *numbers, how, target, strict=strict)
+
+
+def _placed(particles: Particles | None, dimension: int | None) -> tuple[Particles, int]:
+    """Require particles, and give the dimension that they are to be in."""
+    if particles is None:
+        msg = "there are neither particles nor a start, expected one of them"
+        raise ValueError(msg)
+    dimension = particles.shape.dimension if dimension is None else dimension
+    require_one_of("dimension", dimension, (2, 3))
+    return particles, dimension
 
 
 def _chosen(way: str | None, protocol: int | str | None) -> tuple[UsualWay, str]:
