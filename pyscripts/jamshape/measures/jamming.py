@@ -134,7 +134,7 @@ def stays_jammed(packing: Packing, k_e: float = 1.0) -> bool | None:
     --------
     >>> import jamshape as js
     >>> discs = js.Spherocylinders(alpha=0)
-    >>> packing = js.make_packing(discs, n=16, u0=1e-6, file="packing.h5", progress=False)
+    >>> packing = js.make_packing(discs, n=16, u0=1e-6, file="discs.h5", progress=False)
     >>> stays_jammed(packing)
     True
     """
