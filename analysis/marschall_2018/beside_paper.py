@@ -1,26 +1,26 @@
 """Put the numbers of a run, a packing and its modes beside those of Marschall & Teitel, PRE 97, 012905.
 
-    python analysis/marschall_2018/beside_paper.py --run SLOW.h5 --packing PACKING.h5 --modes MODES.h5
+    python analysis/marschall_2018/beside_paper.py --run SLOW.h5 --packing PACKING.h5 [MORE.h5 ...] --modes MODES.h5 [MORE.h5 ...]
 
 SLOW.h5 is of `jamshape slow` or `jamshape compress`, which minimise frames of it; PACKING.h5 of `jamshape pack` and
-MODES.h5 of `jamshape modes`. Prints a table: each is one sample of its N, the paper's are averages over samples. The
-last line of standard output is one JSON object with the same.
+MODES.h5 of `jamshape modes`. Prints a table with averages over samples and their standard errors. The last line of
+standard output is one JSON object with the same.
 """
 
 from __future__ import annotations
 
 import math
 from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from jamshape.command import parser_of, report, run
-from jamshape.files.sets import PackingFile, System, of_paper
+from jamshape.files.sets import System, n_of, of_paper, read_groups
 from jamshape.measures import published
-from jamshape.measures.averages import Mean
+from jamshape.measures.averages import Mean, mean
 from jamshape.measures.runs import read_run
-from jamshape.vibration.sets import TOLD, key_of
-from jamshape.vibration.table import read_modes
+from jamshape.vibration.sets import TOLD, read_tables
 
 NONE = Mean(math.nan)
 
@@ -29,6 +29,7 @@ class Row(NamedTuple):
     """A line of the table."""
 
     quantity: str
+    samples: int
     here: str
     paper: str = ""
 
@@ -43,93 +44,89 @@ def rows_of_run(path: Path) -> tuple[int, list[Row]]:
     one = read_run(path)
     known, kappa = published.PHI_J.get(alpha_of(one.ensemble.system), NONE), one.ensemble.kappa
     onset = Mean(*one.fit[:2]).text() if one.fit else "none"
-    rows = [Row(f"phi_J(kappa = {kappa:g}), p to 0", onset, number(known))]
+    rows = [Row(f"phi_J(kappa = {kappa:g}), p to 0", 1, onset, number(known))]
     if one.jamming:
-        unjams, jams, _ = one.jamming
-        rows.append(
-            Row("phi_J between frames, minimised", f"{unjams:.5f} and {jams:.5f}", number(known))
-        )
+        between = f"{one.jamming.unjams:.5f} and {one.jamming.jams:.5f}"
+        rows.append(Row("phi_J between frames, minimised", 1, between, number(known)))
     return one.ensemble.n, rows
 
 
-def rows_of_packing(path: Path) -> tuple[int, list[Row]]:
+def rows_of_packings(paths: list[Path]) -> tuple[int, list[Row]]:
     """Tell N, phi_J, z and rattlers."""
-    file = PackingFile.read(path)
-    alpha, u0 = alpha_of(file.system()), file.number("u0")
-    phi, phi_J, z, rattlers, n = map(file.number, ("phi", "phi_J", "z", "n_rattlers", "n"))
+    groups = read_groups(paths, same=("n", "size_ratio", "u0"))
+    (system, files), *others = groups.items()
+    if others:
+        msg = f"{files[0].path} and {others[0][1][0].path} are of different particles, expected samples"
+        raise ValueError(msg)
+    alpha, u0, n = alpha_of(system), files[0].number("u0"), n_of(groups)
+    phi_J, z, rattlers = (
+        mean([file.number(name) for file in files]) for name in ("phi_J", "z", "n_rattlers")
+    )
+    beyond = mean([file.number("phi") - file.number("phi_J") for file in files]).value
     distance = published.DISTANCE.get(alpha, {}).get(u0)
     few = published.RATTLERS.get(alpha)
-    return int(n), [
-        Row(
-            f"phi_J of the packing, u0 = {u0:g} to 0",
-            f"{phi_J:.5f}",
-            number(published.PHI_J.get(alpha, NONE)),
-        ),
-        Row(
-            f"phi - phi_J at u0 = {u0:g}",
-            f"{phi - phi_J:.2g}",
-            f"{distance:.2g}" if distance else "",
-        ),
-        Row("z", f"{z:.3f}", number(published.Z.get(alpha, NONE))),
-        Row(
-            "rattlers",
-            f"{100 * rattlers / n:.2g} %",
-            "" if few is None else f"{100 * few / published.N:.2g} %",
-        ),
-    ]
+    here = (
+        (f"phi_J, u0 = {u0:g} to 0", phi_J.text(), number(published.PHI_J.get(alpha, NONE))),
+        (f"phi - phi_J at u0 = {u0:g}", f"{beyond:.2g}", f"{distance:.2g}" if distance else ""),
+        ("z", z.text(), number(published.Z.get(alpha, NONE))),
+        ("rattlers", percent(rattlers.value, n), "" if few is None else percent(few, published.N)),
+    )
+    return n, [Row(name, len(files), *numbers) for name, *numbers in here]
 
 
-def rows_of_modes(path: Path) -> tuple[int, list[Row]]:
+def rows_of_modes(paths: list[Path]) -> tuple[int, list[Row]]:
     """Tell N and the fractions of modes in the bands."""
-    table = read_modes(path)
-    known = published.BANDS.get(alpha_of(key_of(table).system), {})
-    share = {band: len(table.in_band(band)) / int(table.attributes["n_modes"]) for band in TOLD}
-    rows = [
-        Row(f"modes in the {band} band", f"{part:.4f}", f"{known[band]:.4f}" if known else "")
-        for band, part in share.items()
-    ]
-    return int(table.attributes["n"]), rows
+    ((key, tables),) = read_tables(paths).items()
+    known = published.BANDS.get(alpha_of(key.system), {})
+    rows = []
+    for band in TOLD:
+        share = mean([len(t.in_band(band)) / int(t.attributes["n_modes"]) for t in tables])
+        paper = f"{known[band]:.4f}" if known else ""
+        rows.append(Row(f"modes in the {band} band", len(tables), share.text(), paper))
+    return int(tables[0].attributes["n"]), rows
+
+
+def percent(part: float, whole: int) -> str:
+    """Write a part of the particles."""
+    return f"{100 * part / whole:.2g} %"
 
 
 def number(known: Mean) -> str:
     """Write a number of the paper with the digits that it has."""
-    return (
-        known.text()
-        if math.isfinite(known.error)
-        else f"{known.value:g}" * math.isfinite(known.value)
-    )
+    if math.isfinite(known.error):
+        return known.text()
+    return f"{known.value:g}" if math.isfinite(known.value) else ""
+
+
+def show(title: Sequence[str], rows: Sequence[Row]) -> None:
+    """Print the table."""
+    lines = [tuple(title), *(tuple(map(str, row)) for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        cells = (text.ljust(width) for text, width in zip(line, widths, strict=True))
+        print(f"   {'  '.join(cells)}".rstrip())
 
 
 def main(options: Namespace) -> None:
     """Read, print, report."""
     found = []
-    for path, read in (
-        (options.run, rows_of_run),
-        (options.packing, rows_of_packing),
-        (options.modes, rows_of_modes),
-    ):
-        found += [read(path)] if path else []
+    found += [rows_of_run(options.run)] if options.run else []
+    found += [rows_of_packings(options.packing)] if options.packing else []
+    found += [rows_of_modes(options.modes)] if options.modes else []
     if not found:
         msg = "no file was given, expected --run, --packing or --modes"
         raise ValueError(msg)
-    sizes = dict.fromkeys(n for n, _ in found)
+    sizes = list(dict.fromkeys(n for n, _ in found))
     rows = [row for _, of in found for row in of]
-    title = Row("", f"here, N = {', '.join(map(str, sizes))}", f"the paper, N = {published.N}")
-    widths = [max(len(row[k]) for row in (title, *rows)) for k in range(3)]
-    for row in (title, *rows):
-        print(
-            "   "
-            + "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip()
-        )
-    report({"n": list(sizes), "rows": rows})
+    here = f"here, N = {', '.join(map(str, sizes))}"
+    show(("", "samples", here, f"the paper, N = {published.N}"), rows)
+    report({"n": sizes, "rows": rows})
 
 
 if __name__ == "__main__":
     parser = parser_of(__doc__)
-    for name, meaning in (
-        ("run", "a compression"),
-        ("packing", "a packing"),
-        ("modes", "its modes"),
-    ):
-        parser.add_argument(f"--{name}", type=Path, metavar=f"{name.upper()}.h5", help=meaning)
+    parser.add_argument("--run", type=Path, metavar="RUN.h5", help="a compression")
+    several: dict[str, Any] = {"type": Path, "nargs": "+", "default": []}
+    parser.add_argument("--packing", metavar="PACKING.h5", help="samples", **several)
+    parser.add_argument("--modes", metavar="MODES.h5", help="their modes", **several)
     run(parser, main)
