@@ -139,7 +139,7 @@ def mark_bands(row: Sides, key: Key, samples: list[ModeTable]) -> None:
 
 def band_text(band: str, samples: list[ModeTable], part: float, paper: float | None) -> str:
     """Name a band by its fraction of all modes and, where they are that, as sliding."""
-    along = mean([t["parallel"][t.in_band(band)].mean() for t in samples]).value
+    along = float(np.concatenate([t["parallel"][t.in_band(band)] for t in samples]).mean())
     text = f"{band} band" + f", {100 * along:.1f} % sliding" * (along > SLIDING)
     beside = "" if paper is None else f" (paper {paper:.4f})"
     return f"{text}: {part:.4f} of all modes{beside}"
