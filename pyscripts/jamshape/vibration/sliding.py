@@ -142,7 +142,7 @@ class Sliding:
     def _moved(self, radius: FloatArray) -> FloatArray:
         """(N, D + T, k) how far the modes move and turn the particles' surfaces."""
         at, D = self.matrix.coordinates, self.matrix.coordinates.dimension
-        moved = (at.embedding @ self.modes).reshape(at.n_all, -1, self.n_free)
+        moved = (at.embedding @ self.modes).reshape(at.n_all, at.direction.shape[1], self.n_free)
         moved[:, D:] *= radius[:, None, None]
         return np.asarray(moved)
 

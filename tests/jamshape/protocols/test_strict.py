@@ -15,6 +15,7 @@ from jamshape.packing import Box, Packing
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import make
 from jamshape.protocols.strict import Proof, descend, start
+from jamshape.shapes.particles import Particles
 from jamshape.vibration.hessian import Scope, dynamical_matrix
 from jamshape.vibration.sliding import Sliding
 
@@ -130,6 +131,24 @@ def test_strict_search_goes_on_from_its_file(strict, tmp_path, monkeypatch):
     assert stored["outcome"] == "converged"
     assert stored["phi_J"] == pytest.approx(read_attributes(out)["phi_J"], abs=1e-7)
     assert not file.exists()
+
+
+@pytest.mark.parametrize(
+    ("particles", "n"),
+    [
+        (Particles.of("spherocylinder", alpha=0.0), 16),
+        (Particles.of("superellipsoid", p=1.0, w1=0.6, w2=1.0), 16),
+    ],
+    ids=["discs", "spheroids"],
+)
+def test_minima_where_nothing_slides_are_strict(particles, n, tmp_path):
+    out = tmp_path / "packing.h5"
+    for _ in make(recipe_for(particles, n=n, strict=True), out):
+        pass
+    stored = read_attributes(out)
+    assert stored["outcome"] == "converged"
+    assert stored["n_negative"] == 0
+    assert stored["lowest_eigenvalue"] > stored["lowest_eigenvalue_bound"]
 
 
 def test_strict_packing_needs_an_energy():
