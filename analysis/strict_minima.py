@@ -21,6 +21,7 @@ from jamshape.command import parser_of, report, run
 from jamshape.files.sets import PackingFile, finished
 from jamshape.landscape import Landscape, State
 from jamshape.measures.averages import mean
+from jamshape.minima import Stop, minimise
 from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
 from jamshape.vibration.spectrum import Spectrum, spectrum
 from jamshape.vibration.statistics import bands
@@ -28,9 +29,20 @@ from jamshape.vibration.statistics import bands
 # Forces below this part of the mean stop what slides; they are of second order in the overlap.
 WEAK = 1e-4
 
+# Modes are followed so far, over the smallest radius, and what is stiff is relaxed there to such a residual.
+FAR, RELAXED = 1e-5, 1e-6
+
 NUMBERS = (
-    *("z", "z_without_weak", "phi_J", "n_negative", "low", "middle", "high"),
-    *("low_without_weak", "weak_forces", "force_spread", "wall_seconds"),
+    *("z", "z_without_weak", "phi_J", "n_negative", "n_falling", "low", "middle", "high"),
+    *(
+        "low_without_weak",
+        "weak_forces",
+        "median_weak",
+        "largest_weak",
+        "least_other",
+        "force_spread",
+        "wall_seconds",
+    ),
 )
 
 
@@ -53,6 +65,23 @@ def parts_of(matrix: DynamicalMatrix, found: Spectrum) -> dict[str, float]:
     return {band.name: band.n_modes / matrix.size for band in bands(matrix, found)}
 
 
+def n_falling(landscape: Landscape, state: State, matrix: DynamicalMatrix, found: Spectrum) -> int:
+    """Count the modes of negative eigenvalues along which the energy does fall, on one side at least.
+
+    At a corner of the energy it rises on both, whatever second derivatives say.
+    """
+    energy, count = landscape.evaluate(state).energy, 0
+    for vector in found.vectors[:, (found.sign < 0) & ~found.is_translation].T:
+        shift, turn = matrix.coordinates.motion(vector)
+        size = max(np.abs(shift).max(), np.abs(turn * landscape.turning_radius[:, None]).max())
+        way = FAR * landscape.inner_radius.min() / size
+        there = (state.displaced(sign * way * shift, sign * way * turn) for sign in (1, -1))
+        stop = Stop(RELAXED, evaluations=400)
+        relaxed = [minimise(landscape, at, "newton", stop).evaluation.energy for at in there]
+        count += min(relaxed) < energy
+    return count
+
+
 def numbers_of(file: PackingFile) -> dict[str, float]:
     """Measure one packing; fractions are of all modes, and of all bonds."""
     packing = file.packing()
@@ -72,7 +101,11 @@ def numbers_of(file: PackingFile) -> dict[str, float]:
         "n_negative": float((found.sign[own] < 0).sum()),
         **{name: part.get(name, 0.0) for name in ("low", "middle", "high")},
         "low_without_weak": parts_of(strong, spectrum(strong)).get("low", 0.0),
+        "n_falling": float(n_falling(landscape, state, matrix, found)),
         "weak_forces": float(weak.mean()),
+        "median_weak": float(np.median(force[weak])) if weak.any() else 0.0,
+        "largest_weak": float(force[weak].max(initial=0.0)),
+        "least_other": float(force[~weak].min()),
         "force_spread": float(force[~weak].std() / force[~weak].mean()),
         "wall_seconds": file.number("wall_seconds"),
     }
