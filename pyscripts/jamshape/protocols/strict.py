@@ -49,7 +49,7 @@ _SOFTEST = 60
 
 # A search ends after so many steps for each particle, and more, or when so many states were taken for a minimum.
 _STEPS, _MORE_STEPS = 4, 400
-_MOST_CLOSED = 12
+_MOST_CLOSED = 30
 
 
 @dataclass(frozen=True)
