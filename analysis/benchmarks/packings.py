@@ -1,4 +1,4 @@
-"""Core seconds that packings take by the default way, how they end, and how that grows with their size.
+"""Core seconds of packings by the usual way, how they end, phi_J and z, and how all that changes with N.
 
     python analysis/benchmarks/packings.py --seeds 3 --out runs/packing_times
     python analysis/benchmarks/packings.py --cases rods-1 rods-4 --sizes 64 256 1024 --seeds 8

@@ -144,7 +144,8 @@ def lead(
         As the search, or after so many minimisations.
     """
     search = file.read(landscape) or Search(start, target.step)
-    u, written = math.nan, None
+    # From a state that was written all is done again that had been done from there: it is written once.
+    u, written = math.nan, search.state
     for at in SEARCHES[file.recipe.way.search](landscape, search, target):
         file.minimisations += 1
         if at.minimum is None and at.state is not written:
