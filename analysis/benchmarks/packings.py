@@ -1,8 +1,8 @@
 """Core seconds of packings by the usual way, how they end, phi_J and z, and how all that changes with N.
 
     python analysis/benchmarks/packings.py --seeds 3 --out runs/packing_times
-    python analysis/benchmarks/packings.py --cases rods-1 rods-4 --sizes 64 256 1024 --seeds 8
-    python analysis/benchmarks/packings.py --cases superballs --sizes 400 --seconds 300
+    python analysis/benchmarks/packings.py --cases rods-1 rods-4 --n 64 256 1024 --seeds 8
+    python analysis/benchmarks/packings.py --cases superballs --n 400 --seconds 300
 
 Each packing is one call of make_packing in a process of its own with one thread, which is given up after some
 seconds; its seconds are those in which the processor was busy, from the call to the measured packing. What is
@@ -65,7 +65,7 @@ def parser() -> ArgumentParser:
     found = parser_of(__doc__)
     add = found.add_argument
     add("--cases", nargs="*", default=list(CASES), choices=list(CASES), help="(all)")
-    add("--sizes", type=int, nargs="*", help="particles (those of each case)")
+    add("--n", type=int, nargs="*", help="particles (those of each case)")
     add("--seeds", type=int, default=3, help="packings of each (3)")
     add("--seconds", type=float, default=600.0, help="after which one is given up (600)")
     add("--out", type=Path, default=Path("runs/packing_times"), help="folder for what is finished")
@@ -88,7 +88,7 @@ def main(options: Namespace) -> int:
 def tasks(options: Namespace) -> Iterator[Task]:
     """List all packings."""
     for case in options.cases:
-        for n in options.sizes or CASES[case][1]:
+        for n in options.n or CASES[case][1]:
             for seed in range(1, options.seeds + 1):
                 yield Task(case, n, seed)
 
