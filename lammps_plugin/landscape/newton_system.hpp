@@ -62,9 +62,8 @@ class NewtonSystem {
   static constexpr int FAR_OFF = 6;
 
   /// Incomplete factors are of a matrix with a shift, by the largest diagonal element, of at least
-  /// so much where pivots need one; and iterations end after so many.
+  /// so much where pivots need one.
   static constexpr double INCOMPLETE = 1e-4;
-  static constexpr int ITERATIONS = 500;
 
   Vicinity &about;
   double scale = 1.0;
@@ -87,12 +86,13 @@ class NewtonSystem {
     return about.factors(Vector::Constant(static_cast<Eigen::Index>(about.n()), added));
   }
 
-  /// Preconditioned conjugate gradients. False where the matrix is not positive definite.
+  /// Preconditioned conjugate gradients, which without rounding end after as many steps as there
+  /// are coordinates. False where the matrix is not positive definite.
   bool iterate(const Vector &right, double remainder, Vector &x)
   {
     Vector rest = right, preconditioned = factors->solve(rest), along = preconditioned;
     double product = rest.dot(preconditioned);
-    for (int k = 0; k < ITERATIONS && rest.norm() > remainder; ++k) {
+    for (Eigen::Index k = 0; k < right.size() && rest.norm() > remainder; ++k) {
       const Vector pulled = about.times(along) + shift * along;
       ++products;
       const double curvature = along.dot(pulled);
