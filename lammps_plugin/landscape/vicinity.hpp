@@ -500,8 +500,17 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   std::unique_ptr<BlockSystem> block_system() const
   {
     const BlockPlan plan{coordinates.column, pairs.particles, shapes.size(), BLOCK, fill()};
-    if (coordinates.n == D * shapes.size()) return std::make_unique<BlockSystemOf<D>>(plan);
-    return std::make_unique<BlockSystemOf<BLOCK>>(plan);
+    if (turns()) return std::make_unique<BlockSystemOf<BLOCK>>(plan);
+    return std::make_unique<BlockSystemOf<D>>(plan);
+  }
+
+  /// Whether any of the coordinates is a rotation.
+  bool turns() const
+  {
+    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
+      if (k % BLOCK >= D && coordinates.column[k] >= 0) return true;
+    }
+    return false;
   }
 
   /// Second derivatives by the variables of a pair that touches.
