@@ -128,7 +128,7 @@ class Descent {
   static constexpr double LESS_ENERGY = 0.98, LESS_RESIDUAL = 0.7;
   static constexpr int PATIENCE = 150;
 
-  /// L-BFGS gains in waves: it is given up after so many states for each particle, and more.
+  /// L-BFGS gains in waves: Newton's method takes over only after so many states without a gain.
   static constexpr std::size_t SLOW = 1000;
 
   /// It comes back, a few times, where Newton's method has led to another part of the landscape:

@@ -149,11 +149,11 @@ class Search:
 
 
 def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Search]:
-    """Find the packing by Newton's method on coordinates and box at once.
+    """Find the packing by straining the box to where the energy is u0, and minimising.
 
     Unjammed states are compressed by small strains and minimised, until one stays jammed. From
-    there sqrt(u), which is linear in the strain, is led to sqrt(u0) by steps that move the box and
-    let the particles follow it to second order. A box opened too far is closed in finer steps.
+    there sqrt(u), which is linear in the strain, is led to sqrt(u0) minimum by minimum. A box opened
+    too far is closed in finer steps.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
     Yields
     ------
     Search
-        The same object after each minimisation. The last one has a minimum.
+        The same object between minimisations. The last one has a minimum.
 
     Raises
     ------
