@@ -38,6 +38,15 @@ DescentEnd descend(Vicinity &of, const DescentStop &stop, double shift, const nb
   return descent.run();
 }
 
+double part_within(const Vicinity &of, const Array1<double> &x, double longest, double widest)
+{
+  require_base(of);
+  require(x.shape(0) == of.n(), "x has another length than there are coordinates.");
+  require_finite(x, "x");
+  require(longest > 0.0 && widest > 0.0, "the longest step or the widest turn is not positive.");
+  return of.part_within(x.data(), {longest, widest});
+}
+
 /// Newton's equations at the base of a vicinity, which Python keeps alive.
 class PosedNewton {
  public:
@@ -86,18 +95,19 @@ void export_descent(nb::module_ &m)
       .def(
           "__init__",
           [](DescentStop *place, double tolerance, double lowest, std::int64_t evaluations,
-             double seconds, double rounding, double newton_below, double longest_step,
-             double widest_turn) {
+             double seconds, double rounding, double newton_below, bool is_near,
+             double longest_step, double widest_turn) {
             new (place) DescentStop{tolerance,
                                     lowest,
                                     evaluations,
                                     seconds,
                                     rounding,
                                     newton_below,
+                                    is_near,
                                     {longest_step, widest_turn}};
           },
           "tolerance"_a, "lowest"_a, "evaluations"_a, "seconds"_a, "rounding"_a, "newton_below"_a,
-          "longest_step"_a, "widest_turn"_a);
+          "is_near"_a, "longest_step"_a, "widest_turn"_a);
   nb::class_<DescentEnd>(m, "DescentEnd")
       .def_prop_ro("outcome", [](const DescentEnd &end) { return name_of(end.outcome); })
       .def_prop_ro("sums", [](const DescentEnd &end) { return tuple_of(end.sums); })
@@ -124,6 +134,8 @@ void export_descent(nb::module_ &m)
            "Shifts less after a step that was right at once, more after one that was far off.")
       .def_prop_ro("shift", &PosedNewton::shift);
   nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
+      .def("part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,
+           "At most 1: the part of a step (n,) that moves no particle further and turns none wider.")
       .def("descend", &descend, "stop"_a, "shift"_a, "renew"_a, "tell"_a,
            "Minimises the energy at fixed box by L-BFGS and Newton's method, with a first shift of "
            "the\n"

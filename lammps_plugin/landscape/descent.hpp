@@ -22,6 +22,7 @@ struct DescentStop {
   double seconds;            // or so much time
   double rounding;           // residual that doubles leave, times the mean force of a bond
   double newton_below;       // residual from which on Newton's method takes over from L-BFGS
+  bool is_near;              // it begins with Newton's method, too, as long as that gains
   StepBounds step;
 };
 
@@ -95,7 +96,8 @@ class Descent {
   using Tell = std::function<void(const DescentRow &)>;
 
   Descent(Vicinity &landscape, const DescentStop &when, double first_shift) :
-      about(landscape), stop(when), system(landscape, first_shift)
+      about(landscape), stop(when), system(landscape, first_shift),
+      by_newton(when.is_near), is_near(when.is_near), newton_below(when.newton_below)
   {
   }
 
@@ -131,10 +133,12 @@ class Descent {
   /// L-BFGS gains in waves: Newton's method takes over only after so many states without a gain.
   static constexpr std::size_t SLOW = 1000;
 
-  /// It comes back, a few times, where Newton's method has led to another part of the landscape:
-  /// above so many times the residual from which on that is used.
-  static constexpr double AWAY = 30.0;
-  static constexpr int MOST_RETURNS = 5;
+  /// It comes back where Newton's method has led to another part of the landscape: above so many
+  /// times the residual from which on that is used, which then falls by a factor.
+  static constexpr double AWAY = 30.0, LATER = 0.3;
+
+  /// And where it did not gain in so many states from a start that was said to be near a minimum.
+  static constexpr std::size_t NO_GAIN = 10;
 
   /// It begins with factors of a Hessian with such a shift, over its largest diagonal element, or
   /// more; they are made anew after so many steps.
@@ -161,13 +165,15 @@ class Descent {
   DescentStop stop;
   NewtonSystem system;
   QuasiNewton memory;
-  bool by_newton = false;
-  int returns = 0, age = 0, preconditioned = 0;
+  bool by_newton, is_near;
+  double newton_below;
+  int age = 0, preconditioned = 0;
   std::shared_ptr<Factors> near;
   std::vector<DescentRow> rows;
   std::int64_t evaluations = 0;
   double least_energy = INFINITY, least_residual = INFINITY;
-  std::size_t best_row = 0;
+  std::size_t best_row = 0;   // of the present method
+  std::size_t last_gain = 0;  // of any
   bool extended = false;
   Clock::time_point began = Clock::now(), told = began;
 
@@ -187,14 +193,22 @@ class Descent {
   void choose_method()
   {
     if (by_newton) {
-      if (residual() < AWAY * stop.newton_below || returns == MOST_RETURNS) return;
-      ++returns;
+      if (!is_astray()) return;
+      if (!is_near) newton_below *= LATER;
+      is_near = false;
       memory.forget();
-    } else if (residual() >= stop.newton_below && rows.size() <= best_row + SLOW) {
+    } else if (residual() >= newton_below && rows.size() <= best_row + SLOW) {
       return;
     }
     by_newton = !by_newton;
     best_row = rows.size();
+  }
+
+  /// Whether Newton's method, where contacts still come and go, is better left.
+  bool is_astray() const
+  {
+    if (is_near) return residual() >= newton_below && rows.size() > best_row + NO_GAIN;
+    return residual() >= AWAY * newton_below;
   }
 
   Vector direction(const LandscapeSums &sums)
@@ -276,7 +290,7 @@ class Descent {
     rows.push_back({seconds, evaluations, residual_of(about, sums), sums.energy / volume});
     const double left = rows.back().residual, density = rows.back().energy_density;
     if (density < LESS_ENERGY * least_energy || left < LESS_RESIDUAL * least_residual) {
-      best_row = rows.size();
+      last_gain = best_row = rows.size();
       least_energy = std::min(least_energy, density);
       least_residual = std::min(least_residual, left);
     }
@@ -294,7 +308,8 @@ class Descent {
       outcome = DescentOutcome::CONVERGED;
     } else if (evaluations >= stop.evaluations || rows.back().seconds >= stop.seconds) {
       outcome = DescentOutcome::EXHAUSTED;
-    } else if (rows.size() > best_row + PATIENCE + (by_newton ? 0 : SLOW)) {
+    } else if (rows.size() > last_gain + SLOW + 2 * PATIENCE ||
+               (by_newton && rows.size() > best_row + PATIENCE)) {
       outcome = DescentOutcome::STALLED;
     } else {
       return false;
@@ -317,7 +332,7 @@ class Descent {
       line.sums = evaluate(line.x);
       const bool refused = line.sums.is_refused();
       const double here = refused ? INFINITY : line.sums.gradient.dot(step);
-      const bool is_good = std::abs(here) <= 0.5 * std::abs(slope) || (here < 0.0 && n == 1);
+      const bool is_good = std::abs(here) <= 0.9 * std::abs(slope) || (here < 0.0 && n == 1);
       if (is_good || n >= (refused ? 2 * TRIES : TRIES)) return line;
       factor = bracket.next(factor, here);
     }

@@ -40,12 +40,7 @@ class NewtonSystem {
   Vector solve(const Vector &right, double accuracy)
   {
     if (about.has_complete_factors()) return factors->solve(right);
-    while (true) {
-      Vector x = Vector::Zero(right.size());
-      if (iterate(right, accuracy * right.norm(), x)) return x;
-      shift *= GROWTH;
-      factorise();
-    }
+    return iterate(right, accuracy * right.norm());
   }
 
   /// Shifts less after a step that was right at once, more after one that was far off.
@@ -87,16 +82,17 @@ class NewtonSystem {
   }
 
   /// Preconditioned conjugate gradients, which without rounding end after as many steps as there
-  /// are coordinates. False where the matrix is not positive definite.
-  bool iterate(const Vector &right, double remainder, Vector &x)
+  /// are coordinates. They end where the matrix curves down, too: until there they went downhill.
+  Vector iterate(const Vector &right, double remainder)
   {
+    Vector x = Vector::Zero(right.size());
     Vector rest = right, preconditioned = factors->solve(rest), along = preconditioned;
     double product = rest.dot(preconditioned);
     for (Eigen::Index k = 0; k < right.size() && rest.norm() > remainder; ++k) {
       const Vector pulled = about.times(along) + shift * along;
       ++products;
       const double curvature = along.dot(pulled);
-      if (!(curvature > 0.0)) return false;
+      if (!(curvature > 0.0)) return k > 0 ? x : along;
       const double length = product / curvature;
       x += length * along;
       rest -= length * pulled;
@@ -105,7 +101,7 @@ class NewtonSystem {
       along = preconditioned + (next / product) * along;
       product = next;
     }
-    return true;
+    return x;
   }
 };
 

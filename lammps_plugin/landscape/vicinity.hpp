@@ -470,6 +470,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     if constexpr (D == 2) {
       poses.orientation[i] += by[0];
     } else {
+      if (norm_sq(by) == 0.0) return;  // such as all spheres
       long double *const q = &poses.orientation[4 * i];
       const QuaternionOf<long double> found =
           turned(QuaternionOf<long double>{q[0], q[1], q[2], q[3]}, constants_of<long double>(by));

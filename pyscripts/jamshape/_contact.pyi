@@ -181,6 +181,7 @@ class DescentStop:
         seconds: float,
         rounding: float,
         newton_below: float,
+        is_near: bool,
         longest_step: float,
         widest_turn: float,
     ) -> None: ...
@@ -227,6 +228,9 @@ class Vicinity:
         self, x: NDArray[np.float64], strain: float, extended: bool
     ) -> tuple[float, NDArray[np.float64], float, float, int, int, int] | None: ...
     def stretch(self, strain: float) -> NDArray[np.float64]: ...
+    def part_within(
+        self, x: NDArray[np.float64], longest_step: float, widest_turn: float
+    ) -> float: ...
     def factorise(
         self,
         x: NDArray[np.float64],

@@ -172,6 +172,10 @@ class Vicinity:
         """Give Newton's equations at the base, with a first shift of the Hessian's diagonal."""
         return NewtonSystem(self._compiled, shift)
 
+    def part_within(self, x: FloatArray) -> float:
+        """Give the part, at most 1, of a step along (n,) coordinates that is as long as a step may be."""
+        return float(self._compiled.part_within(x, self._longest_step, WIDEST_TURN))
+
     def stretch(self, strain: float) -> FloatArray:
         """(n,) 1 + strain for displacements, 1 for rotations."""
         found: FloatArray = self._compiled.stretch(strain)

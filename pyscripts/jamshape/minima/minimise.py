@@ -11,7 +11,7 @@ from collections.abc import Callable
 from jamshape.landscape import Landscape
 from jamshape.minima.descent import Descent, History, Minimum, Outcome, Stop
 from jamshape.minima.lbfgs import lbfgs
-from jamshape.minima.newton import auto, newton
+from jamshape.minima.newton import auto, near, newton
 from jamshape.minima.paper import paper
 from jamshape.packing import State
 
@@ -30,7 +30,7 @@ def minimise(
     landscape : Landscape
     start : State
     method : str
-        One of `METHODS`: ``auto``, ``newton``, ``lbfgs``, ``paper``, ``lammps``.
+        One of `METHODS`: ``auto``, ``near``, ``newton``, ``lbfgs``, ``paper``, ``lammps``.
     stop : Stop, optional
     history : History, optional
         One to append to.
@@ -63,6 +63,7 @@ def _lammps(descent: Descent) -> Outcome:
 
 METHODS: dict[str, Callable[[Descent], Outcome]] = {
     "auto": auto,
+    "near": near,
     "newton": newton,
     "lbfgs": lbfgs,
     "paper": paper,

@@ -17,12 +17,17 @@ def auto(descent: Descent) -> Outcome:
     return _descend(descent, _NEWTON_BELOW)
 
 
+def near(descent: Descent) -> Outcome:
+    """As `auto`, but begin with Newton's method: for a start that is thought to be near a minimum."""
+    return _descend(descent, _NEWTON_BELOW, is_near=True)
+
+
 def newton(descent: Descent) -> Outcome:
     """Newton steps with the analytic Hessian, shifted where it is not positive definite."""
     return _descend(descent, math.inf)
 
 
-def _descend(descent: Descent, newton_below: float) -> Outcome:
+def _descend(descent: Descent, newton_below: float, *, is_near: bool = False) -> Outcome:
     landscape, stop = descent.landscape, descent.stop
     if outcome := descent.outcome():
         return outcome
@@ -33,6 +38,7 @@ def _descend(descent: Descent, newton_below: float) -> Outcome:
         seconds=stop.seconds - descent.seconds,
         rounding=rounding_of_a_bond(landscape, extended=False),
         newton_below=newton_below,
+        is_near=is_near,
         longest_step=LONGEST_STEP * 0.5 * landscape.length,
         widest_turn=WIDEST_TURN,
     )

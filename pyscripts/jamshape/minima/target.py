@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from jamshape.checks import require_positive
 from jamshape.landscape import Landscape
+from jamshape.landscape.newton import least_shift
 from jamshape.landscape.vicinity import Vicinity
 from jamshape.minima.descent import History, Minimum, Outcome, Stop, residual_of
 from jamshape.minima.minimise import minimise
@@ -29,7 +30,7 @@ _SLIDING = 1e-5
 _MOST_MINIMA = 60
 _GAIN = 1.5
 _NEAR = 0.1
-_LEAST_PART = 0.1
+_TRIES = 2
 _SOFT = 1e-6
 _CLOSE = 1e-3
 _CYCLES, _HIGHER = 3, 2.0
@@ -39,8 +40,13 @@ _ACCURACY = 1e-9
 # At most this factor in sqrt(u), which is linear in phi - phi_J, from one step to the next.
 _LARGEST_FACTOR = 4.0
 
-# Below this fraction of u0 the energy is falling to nothing: the box was opened too far.
-_FALLEN = 1e-4
+# A minimisation whose energy falls below this part of what it was to be is falling to nothing: the box was opened
+# too far. So is one below this part of what a step of compression adds to a jammed packing.
+_FALLEN = 1e-2
+_UNJAMMED = 1e-3
+
+# Where particles go as the box is strained is predicted to this part.
+_PREDICTION = 1e-3
 
 # Steps grow again after so many that left the state unjammed, and at once while they are finer than
 # the strain from jamming to u0; a search whose steps fall below this fraction of that strain has failed.
@@ -96,8 +102,16 @@ class Target:
 
     def strain_above_jamming(self, landscape: Landscape) -> float:
         """Estimate the strain of the box between jamming and u0."""
-        size = float(landscape.inner_radius.max()) ** landscape.particles.dimension
-        return math.sqrt(self.u0 * size / landscape.k_e)
+        return math.sqrt(self.u0 / _stiffness(landscape))
+
+    def lowest(self, landscape: Landscape, step: float) -> float:
+        """Give the energy density below which a packing that was compressed by a step is unjammed."""
+        return max(_FALLEN * self.u0, _UNJAMMED * _stiffness(landscape) * step**2)
+
+
+def _stiffness(landscape: Landscape) -> float:
+    """Estimate the energy density of a jammed packing over the square of its strain from jamming."""
+    return landscape.k_e / float(landscape.inner_radius.max()) ** landscape.particles.dimension
 
 
 @dataclass(eq=False)
@@ -177,7 +191,7 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
     fine = target.strain_above_jamming(landscape)
     require_reachable(landscape, target)
     while search.minimum is None:
-        stop = Stop(tolerance=_GOOD, lowest=_FALLEN * target.u0)
+        stop = Stop(tolerance=_GOOD, lowest=target.lowest(landscape, search.step))
         found = minimise(landscape, search.state, "auto", stop, search.history)
         if found.outcome is Outcome.CONVERGED:
             jammed = found
@@ -232,7 +246,7 @@ def _lead_to(
     jammed = start
     for _ in range(_CYCLES):
         yield search
-        led = _Led(landscape, target, _relaxed(landscape, jammed, target))
+        led = _Led(landscape, target, _relaxed(landscape, jammed, target, jammed.energy_density))
         for _ in led.minima():
             yield search
         if led.lost is not None:
@@ -242,7 +256,7 @@ def _lead_to(
             best = found
         if found.outcome is not Outcome.STALLED:
             return found
-        higher = found.state.strained(_strain_to(found, _HIGHER * target.u0))
+        higher = found.state.strained(_strain_to(found, _towards(found, _HIGHER * target.u0)))
         jammed = replace(found, state=higher)
     assert best is not None
     return best
@@ -267,7 +281,7 @@ class _Led:
         if self.jammed.outcome is Outcome.UNJAMMED:
             self.lost = self.jammed
             return
-        target, part = self.target, 1.0
+        target, part, tries = self.target, 1.0, 1
         tolerance, aim = target.tolerance, target.u0
         for _ in range(_MOST_MINIMA):
             left, u = self.jammed.residual.largest, self.jammed.energy_density
@@ -277,38 +291,54 @@ class _Led:
                 return
             if abs(u / target.u0 - 1) < _CLOSE:
                 aim *= target.u0 / u  # what minimising takes from it, as rods slide, is added
-            strained = self.jammed.state.strained(part * _strain_to(self.jammed, aim))
+            root = _towards(self.jammed, aim, part)
+            strain = _strain_to(self.jammed, root)
             wanted = replace(target, tolerance=tolerance)
             yield
-            found = _relaxed(self.landscape, replace(self.jammed, state=strained), wanted)
+            strained = replace(self.jammed, state=_followed(self.landscape, self.jammed, strain))
+            found = _relaxed(self.landscape, strained, wanted, root**2)
             if found.outcome is not Outcome.UNJAMMED:
                 self.jammed, part = found, min(2 * part, 1.0)
-            elif part < _LEAST_PART:
+            elif tries == _TRIES:
                 self.lost = found
                 return
             else:
-                part /= 4
+                tries, part = tries + 1, part / 4
 
 
-def _relaxed(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
-    """Minimise, well only where u is nearly u0."""
-    ratio = math.sqrt(at.evaluation.energy / at.state.volume / target.u0)
-    near = abs(ratio - 1) < _NEAR
+def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float) -> Minimum:
+    """Minimise, well only where u, the energy density that is expected, is nearly u0."""
+    near = abs(math.sqrt(u / target.u0) - 1) < _NEAR
     tolerance = target.tolerance if near else max(target.tolerance, _GOOD_TO_MOVE)
-    stop = Stop(tolerance, lowest=_FALLEN * target.u0)
-    return minimise(landscape, at.state, "auto", stop, at.history)
+    return minimise(landscape, at.state, "near", Stop(tolerance, lowest=_FALLEN * u), at.history)
 
 
-def _strain_to(at: Minimum, u0: float) -> float:
-    """Strain after which sqrt(u) is that of u0, or nearer to it by a bounded factor.
+def _followed(landscape: Landscape, at: Minimum, strain: float) -> State:
+    """Strain the box of a minimum, and move particles to where forces balance as long as contacts stay."""
+    vicinity = Vicinity(landscape, at.state)
+    newton = vicinity.newton(least_shift(landscape, at.evaluation))
+    newton.prepare()
+    [x] = newton.solve(-strain * newton.coupling[None], _PREDICTION)
+    vicinity.move(vicinity.part_within(x) * x, strain)
+    return vicinity.base
+
+
+def _towards(at: Minimum, u0: float, part: float = 1.0) -> float:
+    """Give sqrt(u) after a part of the way to u0, which is a bounded factor at most."""
+    now, aim = math.sqrt(at.energy_density), math.sqrt(u0)
+    aim = min(max(aim, now / _LARGEST_FACTOR), now * _LARGEST_FACTOR)
+    return now + part * (aim - now)
+
+
+def _strain_to(at: Minimum, root: float) -> float:
+    """Strain after which sqrt(u) is this root.
 
     The energy of a minimum changes with the strain as if the particles did not move.
     """
     energy, volume = at.evaluation.energy, at.state.volume
-    now, aim = math.sqrt(energy / volume), math.sqrt(u0)
-    aim = min(max(aim, now / _LARGEST_FACTOR), now * _LARGEST_FACTOR)
+    now = math.sqrt(energy / volume)
     slope = at.evaluation.strain_gradient - at.state.dimension * energy
-    return (aim - now) * 2 * now * volume / slope
+    return (root - now) * 2 * now * volume / slope
 
 
 def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:

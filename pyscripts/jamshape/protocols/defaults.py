@@ -62,6 +62,9 @@ SETTINGS = (
 # Steps of the packing fraction grow to this far below jamming. What is led to an energy need not be balanced well before.
 _COARSE, _ROUGH = 1e-2, 1e-2
 
+# Of the square of the step, [energy]: a step adds some ten thousand times as much to a jammed packing.
+_LOOSE = 2.5e-3
+
 _LAMBDA = 1e-6  # of the halving search, to begin with (Marschall & Teitel 2018, Sec. III C)
 
 
@@ -97,7 +100,8 @@ def _by_adaptive_steps(get: Values) -> tuple[Way, Target | None]:
     step, tolerance = get["delta_phi"], get["tolerance"]
     coarse = max(_COARSE, step)
     rough = _ROUGH if get["u0"] else tolerance
-    quasistatic = Quasistatic(step=step, tolerance=rough, coarse=coarse)
+    energy = {"energy": _LOOSE * step**2} if get["u0"] else {}
+    quasistatic = Quasistatic(step=step, tolerance=rough, coarse=coarse, **energy)
     return Adaptive(quasistatic), _target(get, tolerance)
 
 
