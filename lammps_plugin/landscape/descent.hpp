@@ -137,8 +137,9 @@ class Descent {
   /// times the residual from which on that is used, which then falls by a factor.
   static constexpr double AWAY = 30.0, LATER = 0.3;
 
-  /// And where it did not gain in so many states from a start that was said to be near a minimum.
-  static constexpr std::size_t NO_GAIN = 10;
+  /// And where it did not gain in so many states from a start that was said to be near a minimum:
+  /// where there are no complete factors, one of its steps takes as long as tens of L-BFGS.
+  static constexpr std::size_t NO_GAIN = 75, NO_CHEAP_GAIN = 10;
 
   /// It begins with factors of a Hessian with such a shift, over its largest diagonal element, or
   /// more; they are made anew after so many steps.
@@ -207,7 +208,10 @@ class Descent {
   /// Whether Newton's method, where contacts still come and go, is better left.
   bool is_astray() const
   {
-    if (is_near) return residual() >= newton_below && rows.size() > best_row + NO_GAIN;
+    if (is_near) {
+      const std::size_t most = about.has_complete_factors() ? NO_GAIN : NO_CHEAP_GAIN;
+      return residual() >= newton_below && rows.size() > best_row + most;
+    }
     return residual() >= AWAY * newton_below;
   }
 
