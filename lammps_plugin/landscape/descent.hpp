@@ -220,7 +220,7 @@ class Descent {
     Vector step;
     if (by_newton) {
       system.prepare();
-      step = -system.solve(sums.gradient, accuracy());
+      step = system.direction(sums.gradient, accuracy());
     } else {
       if (age % REFRESH == 0) precondition();
       ++age;

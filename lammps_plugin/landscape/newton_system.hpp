@@ -40,7 +40,20 @@ class NewtonSystem {
   Vector solve(const Vector &right, double accuracy)
   {
     if (about.has_complete_factors()) return factors->solve(right);
-    return iterate(right, accuracy * right.norm());
+    while (true) {
+      const Iterated found = iterate(right, accuracy * right.norm());
+      if (found.is_solution) return found.x;
+      shift *= GROWTH;
+      factorise();
+    }
+  }
+
+  /// Downhill from a gradient: the solution, or where iterations met a direction along which the
+  /// matrix curves down (Alg. 7.1 there).
+  Vector direction(const Vector &gradient, double accuracy)
+  {
+    if (about.has_complete_factors()) return -factors->solve(gradient);
+    return -iterate(gradient, accuracy * gradient.norm()).x;
   }
 
   /// Shifts less after a step that was right at once, more after one that was far off.
@@ -81,9 +94,14 @@ class NewtonSystem {
     return about.factors(Vector::Constant(static_cast<Eigen::Index>(about.n()), added));
   }
 
+  struct Iterated {
+    Vector x;
+    bool is_solution;
+  };
+
   /// Preconditioned conjugate gradients, which without rounding end after as many steps as there
-  /// are coordinates. They end where the matrix curves down, too: until there they went downhill.
-  Vector iterate(const Vector &right, double remainder)
+  /// are coordinates; or where the matrix is not positive definite.
+  Iterated iterate(const Vector &right, double remainder)
   {
     Vector x = Vector::Zero(right.size());
     Vector rest = right, preconditioned = factors->solve(rest), along = preconditioned;
@@ -92,7 +110,7 @@ class NewtonSystem {
       const Vector pulled = about.times(along) + shift * along;
       ++products;
       const double curvature = along.dot(pulled);
-      if (!(curvature > 0.0)) return k > 0 ? x : along;
+      if (!(curvature > 0.0)) return {k > 0 ? x : along, false};
       const double length = product / curvature;
       x += length * along;
       rest -= length * pulled;
@@ -101,7 +119,7 @@ class NewtonSystem {
       along = preconditioned + (next / product) * along;
       product = next;
     }
-    return x;
+    return {x, true};
   }
 };
 

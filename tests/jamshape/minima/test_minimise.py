@@ -251,7 +251,7 @@ def test_without_contacts_nothing_is_done(method):
 
 def test_unknown_method_is_refused_in_a_sentence():
     packing = random_packing(4, 0.2, 1)
-    sentence = "the method is 'fire', expected one of auto, newton, lbfgs, paper, lammps"
+    sentence = "the method is 'fire', expected one of auto, near, newton, lbfgs, paper, lammps"
     with pytest.raises(ValueError, match=f"^{sentence}$"):
         minimise(Landscape(packing), State.of(packing), "fire")
 
