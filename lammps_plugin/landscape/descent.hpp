@@ -111,7 +111,12 @@ class Descent {
     while (true) {
       record(sums);
       DescentOutcome outcome;
-      if (is_over(sums, outcome)) return end(outcome, std::move(sums));
+      if (is_over(sums, outcome)) {
+        if (outcome != DescentOutcome::CONVERGED || !leave_saddle(sums)) {
+          return end(outcome, std::move(sums));
+        }
+        continue;
+      }
       choose_method();
       const Vector step = direction(sums);
       Line line = search_along(step, sums);
@@ -141,6 +146,11 @@ class Descent {
   /// where there are no complete factors, one of its steps takes as long as tens of L-BFGS.
   static constexpr std::size_t NO_GAIN = 75, NO_CHEAP_GAIN = 10;
 
+  /// Saddles are left so often, along directions that curve down by more than this part of the
+  /// mean force of a bond over the longest step, by this part of the overlaps.
+  static constexpr int MOST_SADDLES = 5;
+  static constexpr double CURVED = 1e-3, OFF_SADDLE = 0.3;
+
   /// It begins with factors of a Hessian with such a shift, over its largest diagonal element, or
   /// more; they are made anew after so many steps.
   static constexpr double SOFT = 0.03, STIFFEN = 3.0;
@@ -168,7 +178,7 @@ class Descent {
   QuasiNewton memory;
   bool by_newton, is_near;
   double newton_below;
-  int age = 0, preconditioned = 0;
+  int age = 0, preconditioned = 0, saddles = 0;
   std::shared_ptr<Factors> near;
   std::vector<DescentRow> rows;
   std::int64_t evaluations = 0;
@@ -245,6 +255,28 @@ class Descent {
       if (!std::isfinite(shift)) throw std::runtime_error("The Hessian has no factors.");
     }
     ++preconditioned;
+  }
+
+  /// Steps off a saddle that has balanced forces, such as one of a symmetric arrangement, to where
+  /// the energy falls: by a part of the overlaps along a direction that curves down by more than a
+  /// small part of the prestress.
+  bool leave_saddle(LandscapeSums &sums)
+  {
+    if (!by_newton || saddles == MOST_SADDLES || sums.n_bonds == 0) return false;
+    system.prepare();
+    const double prestress = sums.bond_force / sums.n_bonds / stop.step.longest;
+    const auto falling = system.falling(CURVED * prestress);
+    if (!falling) return false;
+    const double overlap = 2.0 * sums.energy / sums.bond_force;
+    const double along = falling->dot(sums.gradient) > 0.0 ? -1.0 : 1.0;
+    const Vector step = along * OFF_SADDLE * overlap / falling->cwiseAbs().maxCoeff() * *falling;
+    LandscapeSums there = evaluate(step);
+    if (there.is_refused()) return false;
+    about.move({step.data(), 0.0});
+    sums = std::move(there);
+    memory.forget();
+    ++saddles;
+    return true;
   }
 
   void learn(const Line &line, const LandscapeSums &from)

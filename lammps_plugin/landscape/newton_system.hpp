@@ -6,7 +6,10 @@
 #include <cmath>
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
+#include <random>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace jamshape {
@@ -56,6 +59,19 @@ class NewtonSystem {
     return -iterate(gradient, accuracy * gradient.norm()).x;
   }
 
+  /// A direction along which the Hessian, as last prepared, curves down by more than this; nothing
+  /// where there is none.
+  std::optional<Vector> falling(double curvature)
+  {
+    const double before = std::exchange(shift, curvature);
+    factorise();
+    shift = curvature;  // the factors may be of more
+    const Iterated found = iterate(some_vector(), FALLING);
+    shift = before;
+    if (found.is_solution) return {};
+    return found.last;
+  }
+
   /// Shifts less after a step that was right at once, more after one that was far off.
   void learn(int tries)
   {
@@ -65,6 +81,9 @@ class NewtonSystem {
 
  private:
   static constexpr double GROWTH = 10.0, DECAY = 3.0;
+
+  /// What remains of a unit vector after iterations that met no direction that curves down.
+  static constexpr double FALLING = 1e-3;
 
   /// A step that needed more evaluations to find its length was in a wrong direction.
   static constexpr int FAR_OFF = 6;
@@ -95,9 +114,18 @@ class NewtonSystem {
   }
 
   struct Iterated {
-    Vector x;
+    Vector x, last;  // and the last direction
     bool is_solution;
   };
+
+  /// Of length 1, always the same, with a part along every mode.
+  Vector some_vector() const
+  {
+    std::mt19937_64 numbers(1);
+    Vector found(static_cast<Eigen::Index>(about.n()));
+    for (double &x : found) x = static_cast<double>(numbers() >> 11) * 0x1p-53 - 0.5;
+    return found.normalized();
+  }
 
   /// Preconditioned conjugate gradients, which without rounding end after as many steps as there
   /// are coordinates; or where the matrix is not positive definite.
@@ -110,7 +138,7 @@ class NewtonSystem {
       const Vector pulled = about.times(along) + shift * along;
       ++products;
       const double curvature = along.dot(pulled);
-      if (!(curvature > 0.0)) return {k > 0 ? x : along, false};
+      if (!(curvature > 0.0)) return {k > 0 ? x : along, along, false};
       const double length = product / curvature;
       x += length * along;
       rest -= length * pulled;
@@ -119,7 +147,7 @@ class NewtonSystem {
       along = preconditioned + (next / product) * along;
       product = next;
     }
-    return {x, true};
+    return {x, along, true};
   }
 };
 
