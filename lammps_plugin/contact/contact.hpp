@@ -37,6 +37,7 @@ template <int D, class S = double> struct Bond {
   S energy;              // this bond's share of the contact's energy
   S stiffness;           // of the energy along the bond, at most: its second derivative by distance
   S own_stiffness;       // what of it comes from this bond's overlap alone
+  S coupling;            // with the contact's other bonds: `SecondDerivatives`
   bool on_side_i;        // the foot lies strictly inside the straight part of i
   bool on_side_j;
 };

@@ -22,7 +22,8 @@ template <class Model, int D, class S> struct PosedPair {
 /// The second derivatives of a contact's energy, in two parts: the sum over bonds of own_stiffness
 /// * gradient (x) gradient, and `curvature`, all that comes from the forces themselves (Marschall &
 /// Teitel 2018, Eqs. 38-40: H and -S). Kept apart since the second is smaller by the overlap and
-/// would drown in their sum.
+/// would drown in their sum. Where bonds share an energy that is not the sum of theirs, v (x) v
+/// comes on top, v the sum over bonds of coupling * gradient.
 template <int D, class S, int BONDS> struct SecondDerivatives {
   static constexpr int N = PAIR_VARIABLES<D>;
   S gradient[BONDS][N];  // of the distance of each bond
@@ -105,10 +106,10 @@ template <int D, class S> Vec<D, Dual<PAIR_VARIABLES<D>, S>> as_variables(const 
   return variables;
 }
 
-/// Reads the second derivatives out of a contact that touches.
+/// Reads the second derivatives out of a contact that touches, but for what couples its bonds.
 template <int D, class S, int BONDS>
-void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
-                      SecondDerivatives<D, S, BONDS> &result)
+void read_uncoupled(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
+                    SecondDerivatives<D, S, BONDS> &result)
 {
   constexpr int N = PAIR_VARIABLES<D>, M = ROTATIONS<D>;
   for (int b = 0; b < dual.n_bonds; ++b) {
@@ -129,6 +130,24 @@ void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
       const S mean = 0.5 * (result.curvature[row][col] + result.curvature[col][row]);
       result.curvature[row][col] = result.curvature[col][row] = mean;
     }
+  }
+}
+
+/// All of them: what couples the bonds is part of the curvature.
+template <int D, class S, int BONDS>
+void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
+                      SecondDerivatives<D, S, BONDS> &result)
+{
+  constexpr int N = PAIR_VARIABLES<D>;
+  read_uncoupled<D, S, BONDS>(dual, result);
+  if (dual.n_bonds < 2 || dual.bond[0].coupling == 0.0) return;
+  S along[N]{};
+  for (int b = 0; b < dual.n_bonds; ++b) {
+    const S coupling = value_of(dual.bond[b].coupling);
+    for (int k = 0; k < N; ++k) along[k] += coupling * result.gradient[b][k];
+  }
+  for (int row = 0; row < N; ++row) {
+    for (int col = 0; col < N; ++col) result.curvature[row][col] += along[row] * along[col];
   }
 }
 

@@ -127,10 +127,9 @@ bool is_closer(const SpinePair<D, S> &p, const Feet<D, S> &a, const Feet<D, S> &
 template <int D, class S> struct EndFeet {
   Feet<D, S> plus, minus;
 
-  explicit EndFeet(const SpinePair<D, S> &p)
+  EndFeet(const SpinePair<D, S> &p, const TipFeet<D, ValueOf<S>> &tips)
   {
     const auto &values = values_of(p);
-    const TipFeet<D, ValueOf<S>> tips(values);
     const int j_plus = dot(values.u_i, values.u_j) < 0.0 ? 3 : 2, j_minus = 5 - j_plus;
     struct AtTip {
       int tip;
