@@ -189,7 +189,7 @@ class Approach:
     def log_ratio(self):
         """ln(b / a), of those that have two bonds."""
         a, b = (np.where(self.has_two, x, 1.0) for x in (self.overlap, self.far_overlap))
-        drop = np.where(self.drop.real > 0.0, self.drop, 0.0 * self.drop)
+        drop = self.drop - np.minimum(self.drop.real, 0.0)
         nearly_one = np.where(self.has_two & (drop.real < 0.5 * a.real), drop / a, 0.0)
         return np.where(drop.real < 0.5 * a.real, log_of_1_less(nearly_one), np.log(b / a))
 
@@ -200,7 +200,7 @@ class Approach:
         log_t = 2.0 / w * self.log_ratio
         first = np.exp((w - 1.0) * np.log(1.0 + np.exp(log_t)))
         second = first * np.exp(log_t - 2.0 * self.log_ratio)
-        return np.where(self.has_two, [first, second], [[1.0], [0.0]])
+        return np.where(self.has_two, [first, second], [[1.0], [0.0]]).T
 
     @cached_property
     def overlap(self):

@@ -109,9 +109,9 @@ def test_bonds_that_fade_and_bonds_that_become_one_are_among_the_pairs(dimension
 
     shallow, deep = x.depth < SHALLOW, x.depth > 1.0
     for least, among in (
-        (1000, is_between(x.by_steps) & shallow),
+        (500, is_between(x.by_steps) & shallow),
         (1000, is_between(x.by_steps) & deep),
-        (1000, is_between(x.steps[1])),
+        (1000 * (dimension - 2), is_between(x.steps[1]) | (dimension == 2)),
         (1000, is_between(w) & (x.by_steps > 1.0)),
         (1000, is_between(parts)),
         (1000, x.has_two & (w == 1.0)),

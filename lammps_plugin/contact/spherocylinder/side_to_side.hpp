@@ -101,7 +101,7 @@ S log_ratio_of(const SpinePair<D, S> &p, const Feet<D, S> &near, const Feet<D, S
   const S distance = sqrt(near.distance_sq), far_distance = sqrt(far.distance_sq);
   const Vec<D, S> step = (far.s - near.s) * p.u_i - (far.t - near.t) * p.u_j;
   const S drop = dot(step, far.delta + near.delta) / (far_distance + distance);
-  const S lost = std::max<S>(drop, 0.0) / (reach - distance);
+  const S lost = with_value(drop, std::max(value_of(drop), {})) / (reach - distance);
   return lost < 0.5 ? log1p(-lost) : log((reach - far_distance) / (reach - distance));
 }
 
