@@ -5,6 +5,9 @@
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace jamshape {
 
 /// A pair's energy depends on r = x_i - x_j and on the rotation vectors of i and of j (space
@@ -133,25 +136,29 @@ void read_uncoupled(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
   }
 }
 
-/// All of them: what couples the bonds is part of the curvature.
+/// All of them: what couples the bonds is part of the curvature, at most `most` times their own.
 template <int D, class S, int BONDS>
 void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
-                      SecondDerivatives<D, S, BONDS> &result)
+                      SecondDerivatives<D, S, BONDS> &result, S most = INFINITY)
 {
   constexpr int N = PAIR_VARIABLES<D>;
   read_uncoupled<D, S, BONDS>(dual, result);
-  if (dual.n_bonds < 2 || dual.bond[0].coupling == 0.0) return;
-  S along[N]{};
+  S along[N]{}, part = 1.0;
+  bool is_coupled = false;
   for (int b = 0; b < dual.n_bonds; ++b) {
-    const S coupling = value_of(dual.bond[b].coupling);
+    const S coupling = value_of(dual.bond[b].coupling), own = value_of(dual.bond[b].own_stiffness);
+    if (coupling == 0.0) continue;
+    is_coupled = true;
+    if (coupling * coupling > most * own) part = std::min(part, most * own / (coupling * coupling));
     for (int k = 0; k < N; ++k) along[k] += coupling * result.gradient[b][k];
   }
-  for (int row = 0; row < N; ++row) {
-    for (int col = 0; col < N; ++col) result.curvature[row][col] += along[row] * along[col];
+  for (int row = 0; is_coupled && row < N; ++row) {
+    for (int col = 0; col < N; ++col) result.curvature[row][col] += part * along[row] * along[col];
   }
 }
 
-/// Adds the second derivatives, by running the code of the forces on dual numbers.
+/// Adds the second derivatives, by running the code of the forces on dual numbers; of what couples
+/// bonds as much as counts in rates.
 template <class Model, int D, class S>
 ContactDerivatives<Model, D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
 {
@@ -162,7 +169,7 @@ ContactDerivatives<Model, D, S> derivatives_at(const PosedPair<Model, D, S> &pai
   ContactDerivatives<Model, D, S> result{};
   result.contact = contact_at(pair);
   if (dual.status == ContactStatus::TOUCHING)
-    read_derivatives<D, S, Model::MOST_BONDS>(dual, result);
+    read_derivatives<D, S, Model::MOST_BONDS>(dual, result, STIFFEST_COUPLING);
   return result;
 }
 

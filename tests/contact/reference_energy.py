@@ -229,6 +229,17 @@ class Approach:
         return mean / (shorter_or(self.pairs, np.inf) / self.pairs.d) ** 2
 
 
+    @cached_property
+    def couplings(self):
+        """(M, 2) of the two bonds: root of what the norm's second derivatives have beside the shares."""
+        w = np.where(self.has_two, self.exponent, 1.0)
+        t = np.exp(2.0 / w * self.log_ratio)
+        first, second = self.shares.T
+        root = np.sqrt((2.0 / w - 2.0) / (1.0 + t))
+        coupling = [root * np.sqrt(t * first), -root * np.sqrt(second)]
+        return np.where(self.has_two, coupling, 0.0).T
+
+
 def log_of_1_less(x):
     """NumPy's own has lost the digits of a small complex x."""
     return np.log1p(-x.real) - (x - x.real) / (1.0 - x.real)

@@ -102,15 +102,10 @@ template <int D, class S> class SpherocylinderContact {
   {
     if (pair.A_i == 0.0 && pair.A_j == 0.0 && law.shortcuts) return discs();
     const auto &values = values_of(pair);
-    if (law.sides == Sides::TWO) {
-      const TipFeet<D, ValueOf<S>> tips(values);
-      const auto closest = closest_from_end(values, tips.t[tips.nearest()]);
-      const ContactStatus status = status_at(closest);
-      return status == ContactStatus::TOUCHING ? two_bonds(tips) : without(status);
-    }
     const auto closest = closest_feet(values);
-    const ContactStatus status = status_at(closest);
-    if (status != ContactStatus::TOUCHING) return without(status);
+    if (!touches(closest.distance_sq)) return without(ContactStatus::APART);
+    if (is_coincident(closest) || spines_cross(values)) return without(ContactStatus::CROSSING);
+    if (law.sides == Sides::TWO && far_ends_may_touch(values, closest, reach)) return two_bonds();
     if constexpr (std::is_same_v<S, ValueOf<S>>) {
       return one_bond(closest);
     } else {
@@ -134,17 +129,6 @@ template <int D, class S> class SpherocylinderContact {
   static Found without(ContactStatus status)
   {
     return without_bonds<D, S, Found::MOST_BONDS>(status);
-  }
-
-  template <class T> ContactStatus status_at(const Feet<D, T> &closest) const
-  {
-    // The nearest tip of spines that cross may be far.
-    if (!touches(closest.distance_sq)) {
-      return law.sides == Sides::TWO && spines_cross(values_of(pair)) ? ContactStatus::CROSSING
-                                                                      : ContactStatus::APART;
-    }
-    if (is_coincident(closest) || spines_cross(values_of(pair))) return ContactStatus::CROSSING;
-    return ContactStatus::TOUCHING;
   }
 
   template <class T> bool touches(const T &distance_sq) const
@@ -172,8 +156,8 @@ template <int D, class S> class SpherocylinderContact {
   {
     Found contact = without(ContactStatus::TOUCHING);
     const S distance = sqrt(closest.distance_sq);
-    if (abs_sine(pair) < PARALLEL_SINE) {
-      const EndFeet<D, S> ends(pair, TipFeet<D, ValueOf<S>>(values_of(pair)));
+    if (law.sides == Sides::ONE && abs_sine(pair) < PARALLEL_SINE) {
+      const EndFeet<D, S> ends(pair);
       if (ends.are_apart()) {
         contact.kind = ContactKind::SIDE_TO_SIDE;
         // The energy stays that of the shortest distance, so that it does not jump at
@@ -189,9 +173,9 @@ template <int D, class S> class SpherocylinderContact {
 
   S overlap_at(const S &distance) const { return (reach - distance) * inverse_reach; }
 
-  Found two_bonds(const TipFeet<D, ValueOf<S>> &tips) const
+  Found two_bonds() const
   {
-    const EndFeet<D, S> ends(pair, tips);
+    const EndFeet<D, S> ends(pair);
     const Feet<D, S> closest = closest_to_end(pair, ends.nearer());  // never the farther, at a tie
     const Feet<D, S> &far_end = ends.farther();
     const S distance = sqrt(closest.distance_sq);
@@ -228,7 +212,8 @@ template <int D, class S> class SpherocylinderContact {
     const S energy = norm.share_a * law.harmonic.energy(overlap_at(distance)) +
                      norm.share_b * law.harmonic.energy(overlap_at(far_distance));
     const S by_exponent = energy * norm.entropy, by_overlap = 0.5 * by_exponent * w.by_mean;
-    const auto curved = 2.0 / value_of(w.value) - 2.0;  // the norm's exponent over overlaps, less 2
+    // The norm's exponent over overlaps, less that of two bonds.
+    const auto curved = std::max<ValueOf<S>>(2.0 / value_of(w.value) - 2.0, 0.0);
     const auto root = sqrt(curved * law.harmonic.k_e) * value_of(inverse_reach);
     const auto coupling_a = root * sqrt(value_of(fixed.part_b * fixed.share_a));
     const auto coupling_b = -root * sqrt(value_of(fixed.part_a * fixed.share_b));
@@ -275,7 +260,8 @@ template <int D, class S> class SpherocylinderContact {
     const S bend = law.harmonic.energy_hessian(overlap) * inverse_reach * inverse_reach;
     bond.own_stiffness = part.share * bend;
     bond.coupling = part.coupling;
-    bond.stiffness = bond.own_stiffness + part.coupling * part.coupling;
+    bond.stiffness = bond.own_stiffness + std::min<S>(part.coupling * part.coupling,
+                                                      STIFFEST_COUPLING * bond.own_stiffness);
     bond.on_side_i = abs(feet.s) < pair.A_i;
     bond.on_side_j = abs(feet.t) < pair.A_j;
     contact.energy += energy;
