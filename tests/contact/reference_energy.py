@@ -228,7 +228,6 @@ class Approach:
         mean = 0.5 * (self.overlap + self.far_overlap)
         return mean / (shorter_or(self.pairs, np.inf) / self.pairs.d) ** 2
 
-
     @cached_property
     def couplings(self):
         """(M, 2) of the two bonds: root of what the norm's second derivatives have beside the shares."""

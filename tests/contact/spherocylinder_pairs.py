@@ -439,7 +439,9 @@ def touching(dimension, sides, kind):
     as_built = result["kind"] == kind
     if sides == 1:
         assert np.mean(as_built) > 0.99
-    elif kind == SIDE_TO_SIDE:  # tilted rods of which a tip lies beyond the other's end have one bond
+    elif (
+        kind == SIDE_TO_SIDE
+    ):  # tilted rods of which a tip lies beyond the other's end have one bond
         assert np.mean(as_built) > 0.5
     else:
         assert np.mean(as_built | (result["kind"] == SIDE_TO_SIDE)) > 0.99

@@ -298,7 +298,9 @@ def test_distances_gradients_and_stiffnesses_are_those_of_the_bonds(
     unit = (K_E / pairs.d**2)[:, None] / np.where(x.has_two, x.exponent, 1.0)[:, None]
     coupling = coupling * np.sqrt(K_E) / pairs.d[:, None]
     worst = {
-        "stiffness": np.max(np.abs(found["stiffness"] - shares * K_E / pairs.d[:, None] ** 2) / unit),
+        "stiffness": np.max(
+            np.abs(found["stiffness"] - shares * K_E / pairs.d[:, None] ** 2) / unit
+        ),
         "coupling": np.max(np.abs(found["coupling"] - coupling) / np.sqrt(unit)),
     }
 
