@@ -20,6 +20,7 @@ from spherocylinder_pairs import (
     EPS,
     SHALLOW,
     SIDE_TO_SIDE,
+    SMALL_SINE,
     TIP_TO_SIDE,
     TIP_TO_TIP,
     Pairs,
@@ -155,13 +156,15 @@ def steps(packing, sides):
         least = x.exponent * np.minimum(x.overlap, x.far_overlap) * pairs.d
         length = np.where(x.has_two & (x.exponent < 1.0), np.minimum(length, least), length)
     angle = length / (np.maximum(pairs.A_i, pairs.A_j) + pairs.d)
+    small = np.where(x.depth > 1.0, SMALL_SINE * shorter / pairs.d, angle)
+    angle = np.minimum(angle, small)
     D, turns = packing.dimension, 2 * packing.rotations
     return FRACTION * np.array([length] * D + [angle] * turns)
 
 
 def are_resolved(packing, h):
     """Whether long doubles of the coordinates are much finer than the steps."""
-    return h[0] > 3e-9 * packing.plain().extent
+    return h[0] > 1e-8 * packing.plain().extent
 
 
 def is_smooth_around(packing, h, sides):
@@ -220,7 +223,7 @@ def errors(packing, matrix, expected):
 
 
 LEAST_SMOOTH = 0.7
-LEAST_RESOLVED = 0.5
+LEAST_RESOLVED = 0.3
 
 
 @EVERY_CASE

@@ -146,13 +146,15 @@ def test_coupled_bonds_have_their_stiffness_in_the_compatibility():
     *_, matrix = forced(packing)
     assert matrix.contacts["coupling"].all()
     assert matrix.n_bonds == 2 * n
-    whole = Landscape(packing, 2.5).curvature(State.of(packing)).hessian.toarray()
+    landscape = Landscape(packing, 2.5)
+    whole = landscape.curvature(State.of(packing), extended=True).hessian.toarray()
     assert_close(matrix.matrix.toarray(), whole, 1e-14)
     # The forces of the bonds, and nothing else at a minimum.
     assert np.abs(matrix.compatibility.T @ matrix.bonds.pull).max() < 1e-12
     stiffness = np.sort(np.linalg.eigvalsh(matrix.stiffness.toarray()))
     moves = 2.5 * (2 - 2 * np.cos(2 * np.pi * np.arange(n) / n))
-    np.testing.assert_allclose(stiffness[1:n], np.sort(moves)[1:], rtol=1e-2)
+    stiff = stiffness[stiffness > 1e-6]  # turns are stiffer yet
+    np.testing.assert_allclose(stiff[: n - 1], np.sort(moves)[1:], rtol=1e-2)
 
 
 # --- closed forms ------------------------------------------------------------------------------
