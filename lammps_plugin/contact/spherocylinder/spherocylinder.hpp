@@ -180,8 +180,8 @@ template <int D, class S> class SpherocylinderContact {
     const Feet<D, S> &far_end = ends.farther();
     const S distance = sqrt(closest.distance_sq);
     Found contact = without(ContactStatus::TOUCHING);
-    if (touches(far_end.distance_sq)) {
-      const S far_distance = sqrt(far_end.distance_sq);
+    const S far_distance = sqrt(far_end.distance_sq);
+    if (far_distance < reach) {
       const S mean = overlap_at(0.5 * (distance + far_distance));
       const SideBySide<ValueOf<S>> at(values_of(pair), value_of(mean), reach);
       if (at.has_two_bonds()) {
