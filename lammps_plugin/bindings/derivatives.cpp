@@ -14,8 +14,8 @@ template <class Model, int D, class S> class DerivativeArrays {
  public:
   explicit DerivativeArrays(std::size_t n) :
       pair({n}), n_bonds({n}), kind({n}), energy({n}), separation({n, D}), force({n, D}),
-      stiffness({n, BONDS}), distance({n, BONDS}), bond_force({n, BONDS}), gradient({n, BONDS, N}),
-      curvature({n, N, N}), on_side({n, BONDS, 2}), on_face({n, BONDS, 2})
+      stiffness({n, BONDS}), coupling({n, BONDS}), distance({n, BONDS}), bond_force({n, BONDS}),
+      gradient({n, BONDS, N}), curvature({n, N, N}), on_side({n, BONDS, 2}), on_face({n, BONDS, 2})
   {
   }
 
@@ -33,6 +33,7 @@ template <class Model, int D, class S> class DerivativeArrays {
     for (int b = 0; b < contact.n_bonds; ++b) {
       const Bond<D, S> &bond = contact.bond[b];
       stiffness.row(c)[b] = static_cast<double>(bond.own_stiffness);
+      coupling.row(c)[b] = static_cast<double>(bond.coupling);
       distance.row(c)[b] = static_cast<double>(bond.distance);
       on_side.row(c)[2 * b] = bond.on_side_i;
       on_side.row(c)[2 * b + 1] = bond.on_side_j;
@@ -59,6 +60,7 @@ template <class Model, int D, class S> class DerivativeArrays {
     result["separation"] = separation.release();
     result["force"] = force.release();
     result["stiffness"] = stiffness.release();
+    result["coupling"] = coupling.release();
     result["distance"] = distance.release();
     result["bond_force"] = bond_force.release();
     result["on_side"] = on_side.release();
@@ -73,7 +75,8 @@ template <class Model, int D, class S> class DerivativeArrays {
 
   NewArray<std::int64_t> pair;
   NewArray<int> n_bonds, kind;
-  NewArray<double> energy, separation, force, stiffness, distance, bond_force, gradient, curvature;
+  NewArray<double> energy, separation, force, stiffness, coupling, distance, bond_force, gradient,
+      curvature;
   NewArray<bool> on_side, on_face;
 };
 
@@ -93,7 +96,7 @@ template <class Model, int D, class S>
     found.back().contact = contact;
     const auto dual = turned.contact(p);
     if (dual.status == ContactStatus::TOUCHING) {
-      read_derivatives<D, S, Model::MOST_BONDS>(dual, found.back());
+      read_uncoupled<D, S, Model::MOST_BONDS>(dual, found.back());
     }
   }
   DerivativeArrays<Model, D, S> derivatives(found.size());
@@ -117,8 +120,9 @@ void export_derivatives()
         "Second derivatives of the C touching pairs, arguments as in `sums`. The variables are\n"
         "r_i - r_j and the rotations of i and j, n = 4 in 2D, 9 in 3D. Returns a dict: pair (C,)\n"
         "rows of pairs; n_bonds, kind, energy (C,); separation, force (C, D); of up to most_bonds\n"
-        "bonds B stiffness, distance, bond_force (C, B), on_side, on_face (C, B, 2) and gradient\n"
-        "(C, B, n) of the distance; curvature (C, n, n), all but stiffness gradient (x) gradient.");
+        "bonds B stiffness, coupling, distance, bond_force (C, B), on_side, on_face (C, B, 2) and\n"
+        "gradient (C, B, n) of the distance; curvature (C, n, n), all but the sum over bonds of\n"
+        "stiffness gradient (x) gradient and v (x) v, v the sum of coupling gradient.");
   });
 }
 

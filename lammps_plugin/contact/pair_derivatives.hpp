@@ -5,6 +5,9 @@
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace jamshape {
 
 /// A pair's energy depends on r = x_i - x_j and on the rotation vectors of i and of j (space
@@ -22,7 +25,8 @@ template <class Model, int D, class S> struct PosedPair {
 /// The second derivatives of a contact's energy, in two parts: the sum over bonds of own_stiffness
 /// * gradient (x) gradient, and `curvature`, all that comes from the forces themselves (Marschall &
 /// Teitel 2018, Eqs. 38-40: H and -S). Kept apart since the second is smaller by the overlap and
-/// would drown in their sum.
+/// would drown in their sum. Where bonds share an energy that is not the sum of theirs, v (x) v
+/// comes on top, v the sum over bonds of coupling * gradient.
 template <int D, class S, int BONDS> struct SecondDerivatives {
   static constexpr int N = PAIR_VARIABLES<D>;
   S gradient[BONDS][N];  // of the distance of each bond
@@ -105,10 +109,10 @@ template <int D, class S> Vec<D, Dual<PAIR_VARIABLES<D>, S>> as_variables(const 
   return variables;
 }
 
-/// Reads the second derivatives out of a contact that touches.
+/// Reads the second derivatives out of a contact that touches, but for what couples its bonds.
 template <int D, class S, int BONDS>
-void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
-                      SecondDerivatives<D, S, BONDS> &result)
+void read_uncoupled(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
+                    SecondDerivatives<D, S, BONDS> &result)
 {
   constexpr int N = PAIR_VARIABLES<D>, M = ROTATIONS<D>;
   for (int b = 0; b < dual.n_bonds; ++b) {
@@ -132,7 +136,29 @@ void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
   }
 }
 
-/// Adds the second derivatives, by running the code of the forces on dual numbers.
+/// All of them: what couples the bonds is part of the curvature, at most `most` times their own.
+template <int D, class S, int BONDS>
+void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
+                      SecondDerivatives<D, S, BONDS> &result, S most = INFINITY)
+{
+  constexpr int N = PAIR_VARIABLES<D>;
+  read_uncoupled<D, S, BONDS>(dual, result);
+  S along[N]{}, part = 1.0;
+  bool is_coupled = false;
+  for (int b = 0; b < dual.n_bonds; ++b) {
+    const S coupling = value_of(dual.bond[b].coupling), own = value_of(dual.bond[b].own_stiffness);
+    if (coupling == 0.0) continue;
+    is_coupled = true;
+    if (coupling * coupling > most * own) part = std::min(part, most * own / (coupling * coupling));
+    for (int k = 0; k < N; ++k) along[k] += coupling * result.gradient[b][k];
+  }
+  for (int row = 0; is_coupled && row < N; ++row) {
+    for (int col = 0; col < N; ++col) result.curvature[row][col] += part * along[row] * along[col];
+  }
+}
+
+/// Adds the second derivatives, by running the code of the forces on dual numbers; of what couples
+/// bonds as much as counts in rates.
 template <class Model, int D, class S>
 ContactDerivatives<Model, D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
 {
@@ -143,7 +169,7 @@ ContactDerivatives<Model, D, S> derivatives_at(const PosedPair<Model, D, S> &pai
   ContactDerivatives<Model, D, S> result{};
   result.contact = contact_at(pair);
   if (dual.status == ContactStatus::TOUCHING)
-    read_derivatives<D, S, Model::MOST_BONDS>(dual, result);
+    read_derivatives<D, S, Model::MOST_BONDS>(dual, result, STIFFEST_COUPLING);
   return result;
 }
 

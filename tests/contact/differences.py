@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from reference_energy import Approach, fade_length, mean_fade_length, sine_range
-from spherocylinder_pairs import EPS, cross, energies, turned
+from reference_energy import Approach, least_fade_length
+from spherocylinder_pairs import EPS, energies, turned
 
 # Steps of this many d: short enough to straddle the switch of a clamped foot, where the second
 # derivative jumps, at no cost. Differences over several steps are fitted by a constant and a square,
 # which removes the error of second order and averages rounding.
 STEP = 7e-8
 MULTIPLES = np.linspace(1.0, 3.0, 9)
-# Of the length over which the mean of two bonds fades in.
+# Of the least length over which a second bond fades in.
 STEP_IN_FADE = 1e-4
 
 
@@ -22,27 +22,22 @@ def fit_weights():
 
 
 def is_clear_of_fade(pairs):
-    """Within the steps no second bond and no mean of both, or whole ones that do not fade by length.
+    """Within the steps no second bond, or one that does not fade by length.
 
-    Fading by cosine and by depth takes long against any step; fading by sine must.
+    Fading by cosine and by depth takes long against any step.
     """
     x = Approach(pairs)
-    margin = 10.0 * STEP
+    margin = 10.0 * STEP * pairs.d / x.fade_length
     no_length = np.minimum(pairs.A_i, pairs.A_j) == 0.0
-    no_second = (x.far_overlap < -margin) | (x.by_cosine < -1e-3)
-    sine = np.linalg.norm(cross(pairs.u_i, pairs.u_j), axis=1)
-    no_mean = (x.depth < 0.999) | (sine > sine_range(pairs) + margin)
-    long = x.by_length > 1.0 + margin * pairs.d / fade_length(pairs)
-    whole_second = no_second | (x.by_cosine > 1.0 + 1e-3)
-    slow_mean = no_mean | (STEP_IN_FADE * sine_range(pairs) > STEP)
-    return no_length | (no_second & no_mean) | (long & whole_second & slow_mean)
+    no_second = (x.far_overlap < -10.0 * STEP) | (x.opposite == 0.0)
+    return no_length | no_second | (x.steps[0] > 1.0 + margin)
 
 
 def step_lengths(pairs, sides):
     step = STEP * pairs.d
     if sides == 1:
         return step
-    in_fade = STEP_IN_FADE * mean_fade_length(pairs)
+    in_fade = STEP_IN_FADE * least_fade_length(pairs)
     return np.where(is_clear_of_fade(pairs), step, np.minimum(step, in_fade))
 
 

@@ -1,15 +1,14 @@
 """The pair energies written a second time, in NumPy, from the formula and not from the C++.
 
-With overlaps a of the shortest distance and b of the far end of the overlap of the spines (b of any
-sign), m = (a + b) / 2, E(x) = x^2 / 2, S the quintic step and l how much of the spines lies opposite
-the other one (`opposite_parts`; its feet slow down over a quarter of the length it is taken over):
+With overlaps a of the shortest distance and b of the far end of what lies opposite of the spines (b of
+any sign), m = (a + b) / 2, c = u_i.u_j, E(x) = x^2 / 2 and S the quintic step:
 
     sides one   V = E(a)
-    sides two   V = E(a) + D F + W_m (1 - D) (E(m) - E(a))
-    F   = W_b E(a) (b / a)^(2 + B (1 / W_b - 1)) for b > 0, which is W_b E(b) where B = 0
-    W_b = S(l / (A_min (0.05 + 0.95 B))) S((|cos| - 0.5) / 0.35)
-    W_m = S(l / (0.05 A_min)) (1 - S((|sin| / (0.1 A_min / d))^2))
-    B   = S(1 - ln y / ln 0.01),  D = 1 - S(ln y / ln 16),  y = m / (A_min / d)^2
+    sides two   V = (E(a)^(1/w) + E(b)^(1/w))^w where b > 0 and w > 0, E(a) elsewhere
+    w = S(q / L) S(2 A_min |c| / L) / (1 + h^2)^(1/2)
+    q the harmonic mean of q_i = A_i + A_j |c| - |u_i.r| and q_j, 0 where one of them is negative
+    L = A_min ((e^2 + k^2 h^2) / (1 + k^2 h^2))^(1/2),  e = 1/20, k = 4
+    h = g^3 / (g^2 + 0.01^2),  g = max(y - 0.01, 0),  y = m / (A_min / d)^2
 
 Every formula is analytic between its branches and branches look at real parts only, so that a step
 along the imaginary axis gives derivatives to rounding, without a step size.
@@ -22,19 +21,15 @@ from typing import NamedTuple
 
 import numpy as np
 from spherocylinder_pairs import (
-    DEEP_SINE,
-    FADE_CORNER,
-    FADE_COSINE_RANGE,
-    FADE_COSINE_START,
-    FADE_DEPTH,
     FADE_LENGTH,
     SHALLOW,
-    cross,
+    growth_of,
+    length_of_fade,
     row_dot,
     scaled,
 )
 
-LEAST_WEIGHT = 1e-12
+LEAST_EXPONENT = 1e-12
 IMAGINARY_STEP = 1e-30
 
 
@@ -124,43 +119,9 @@ def fade_length(pairs):
     return Approach(pairs).fade_length.real
 
 
-def mean_fade_length(pairs):
-    """Spine overlap over which the mean of the two bonds fades in, at most that of the second."""
+def least_fade_length(pairs):
+    """Of shallow overlaps, the least of all."""
     return FADE_LENGTH * shorter_or(pairs, np.inf)
-
-
-def softly_limited(x, bound, length):
-    """x that slows down over a length before the bounds, and ends half of it inside them."""
-    outside = np.abs(x.real) > bound
-    inside = np.where(outside, bound, absolute(x))
-    into = inside - bound + length
-    y = np.where(into.real > 0.0, into, 0.0) / length
-    return np.where(x.real < 0.0, -1.0, 1.0) * (inside - length * (y**3 - 0.5 * y**4))
-
-
-def feet_of_tips(pairs):
-    """On the line of the other spine, with half of the tip's sign and that spine's half length."""
-    sign = np.where(row_dot(pairs.u_i, pairs.u_j).real < 0.0, -0.5, 0.5)
-    for e in (1.0, -1.0):
-        tip_i, tip_j = scaled(e * pairs.A_i, pairs.u_i), scaled(e * pairs.A_j, pairs.u_j)
-        yield e * sign, row_dot(pairs.u_i, tip_j - pairs.r), pairs.A_i
-        yield e * sign, row_dot(pairs.u_j, pairs.r + tip_i), pairs.A_j
-
-
-def opposite_parts(pairs, length):
-    """Of either spine what lies between the feet of the other's tips, the mean over both.
-
-    Feet slow down over a length before they stop at a tip.
-    """
-    total = 0.0
-    for sign, foot_at, bound in feet_of_tips(pairs):
-        total = total + sign * softly_limited(foot_at, bound, length)
-    return np.where(np.minimum(pairs.A_i, pairs.A_j) > 0.0, total, 0.0)
-
-
-def sine_range(pairs):
-    """|sin| of the angle over which the mean of the two bonds fades out."""
-    return DEEP_SINE * shorter_or(pairs, np.inf) / pairs.d
 
 
 class Approach:
@@ -187,43 +148,59 @@ class Approach:
         return 0.5 * (absolute(plus.s - minus.s) + absolute(plus.t - minus.t))
 
     @cached_property
-    def wide(self):
-        """B, how far the second bond fades in over all of A_min instead of a small part."""
-        y = np.where(self.depth.real > SHALLOW, self.depth, SHALLOW)
-        return smooth_step(1.0 - np.log(y) / np.log(SHALLOW))
-
-    @cached_property
     def fade_length(self):
-        return shorter_or(self.pairs, 1.0) * (FADE_LENGTH + (1.0 - FADE_LENGTH) * self.wide)
+        return length_of_fade(shorter_or(self.pairs, 1.0), self.depth)
 
     @cached_property
-    def by_length(self):
-        """What the step of the second bond's weight is taken of."""
-        return opposite_parts(self.pairs, FADE_CORNER * self.fade_length) / self.fade_length
+    def opposite(self):
+        """Harmonic mean of what lies opposite of either spine."""
+        pairs = self.pairs
+        cosine = absolute(row_dot(pairs.u_i, pairs.u_j))
+        of_i = pairs.A_i + pairs.A_j * cosine - absolute(row_dot(pairs.u_i, pairs.r))
+        of_j = pairs.A_j + pairs.A_i * cosine - absolute(row_dot(pairs.u_j, pairs.r))
+        some = (of_i.real > 0.0) & (of_j.real > 0.0) & (np.minimum(pairs.A_i, pairs.A_j) > 0.0)
+        of_i, of_j = np.where(some, of_i, 1.0), np.where(some, of_j, 1.0)
+        return np.where(some, 2.0 * of_i * of_j / (of_i + of_j), 0.0)
 
     @cached_property
-    def mean_by_length(self):
-        """What that of the mean bond's weight is."""
-        length = FADE_LENGTH * shorter_or(self.pairs, 1.0)
-        return opposite_parts(self.pairs, FADE_CORNER * length) / length
+    def steps(self):
+        """What the two steps are taken of: by length and by cosine."""
+        pairs, length = self.pairs, self.fade_length
+        cosine = absolute(row_dot(pairs.u_i, pairs.u_j))
+        return self.opposite / length, 2.0 * np.minimum(pairs.A_i, pairs.A_j) * cosine / length
 
     @cached_property
-    def by_cosine(self):
-        cosine = absolute(row_dot(self.pairs.u_i, self.pairs.u_j))
-        return (cosine - FADE_COSINE_START) / FADE_COSINE_RANGE
+    def by_steps(self):
+        """The least of them: at 0 there is one bond, above 1 nothing fades."""
+        return np.min([x.real for x in self.steps], axis=0)
 
     @cached_property
-    def by_sine(self):
-        turn = cross(self.pairs.u_i, self.pairs.u_j)
-        return row_dot(turn, turn) / sine_range(self.pairs) ** 2
+    def exponent(self):
+        """w of the norm."""
+        by_length, by_cosine = (smooth_step(x) for x in self.steps)
+        return by_length * by_cosine / np.sqrt(1.0 + growth_of(self.depth) ** 2)
 
     @cached_property
-    def second_weight(self):
-        return smooth_step(self.by_length) * smooth_step(self.by_cosine)
+    def has_two(self):
+        """Whether both ends are bonds."""
+        return (self.far_overlap.real > 0.0) & (self.exponent.real > LEAST_EXPONENT)
 
     @cached_property
-    def mean_weight(self):
-        return smooth_step(self.mean_by_length) * (1.0 - smooth_step(self.by_sine))
+    def log_ratio(self):
+        """ln(b / a), of those that have two bonds."""
+        a, b = (np.where(self.has_two, x, 1.0) for x in (self.overlap, self.far_overlap))
+        drop = self.drop - np.minimum(self.drop.real, 0.0)
+        nearly_one = np.where(self.has_two & (drop.real < 0.5 * a.real), drop / a, 0.0)
+        return np.where(drop.real < 0.5 * a.real, log_of_1_less(nearly_one), np.log(b / a))
+
+    @cached_property
+    def shares(self):
+        """(M, 2) of the two bonds: V = share_a E(a) + share_b E(b)."""
+        w = np.where(self.has_two, self.exponent, 1.0)
+        log_t = 2.0 / w * self.log_ratio
+        first = np.exp((w - 1.0) * np.log(1.0 + np.exp(log_t)))
+        second = first * np.exp(log_t - 2.0 * self.log_ratio)
+        return np.where(self.has_two, [first, second], [[1.0], [0.0]]).T
 
     @cached_property
     def overlap(self):
@@ -252,21 +229,14 @@ class Approach:
         return mean / (shorter_or(self.pairs, np.inf) / self.pairs.d) ** 2
 
     @cached_property
-    def second_energy(self):
-        """F = W E(a) (b / a)^(2 + B (1 / W - 1))."""
-        a, b, W = self.overlap, self.far_overlap, self.second_weight
-        has = (b.real > 0.0) & (W.real > LEAST_WEIGHT)
-        a, b, W = np.where(has, a, 1.0), np.where(has, b, 1.0), np.where(has, W, 1.0)
-        ratio = b / a
-        nearly_one = np.where(has & (ratio.real > 0.5), self.drop / a, 0.0)
-        log_ratio = np.where(ratio.real > 0.5, log_of_1_less(nearly_one), np.log(ratio))
-        return np.where(has, W * law(b) * np.exp(self.wide * (1.0 / W - 1.0) * log_ratio), 0.0)
-
-    @cached_property
-    def two_bonds(self):
-        """D, how much of the two bonds is left."""
-        y = np.where(self.depth.real > 1.0, self.depth, 1.0)
-        return 1.0 - smooth_step(np.log(y) / np.log(FADE_DEPTH))
+    def couplings(self):
+        """(M, 2) of the two bonds: root of what the norm's second derivatives have beside the shares."""
+        w = np.where(self.has_two, self.exponent, 1.0)
+        t = np.exp(2.0 / w * self.log_ratio)
+        first, second = self.shares.T
+        root = np.sqrt((2.0 / w - 2.0) / (1.0 + t))
+        coupling = [root * np.sqrt(t * first), -root * np.sqrt(second)]
+        return np.where(self.has_two, coupling, 0.0).T
 
 
 def log_of_1_less(x):
@@ -292,9 +262,9 @@ def one_bond_energy(pairs):
 
 def two_bond_energy(pairs):
     x = Approach(pairs)
-    a, D = x.overlap, x.two_bonds
-    excess = -0.5 * x.drop * (a - 0.25 * x.drop)  # E(m) - E(a)
-    return repulsive_law(a) + D * x.second_energy + x.mean_weight * (1.0 - D) * excess
+    w = np.where(x.has_two, x.exponent, 1.0)
+    t = np.exp(2.0 / w * x.log_ratio)
+    return repulsive_law(x.overlap) * np.where(x.has_two, np.exp(w * np.log(1.0 + t)), 1.0)
 
 
 def printed_two_bond_energy(pairs):
@@ -310,7 +280,7 @@ ENERGIES = {1: one_bond_energy, 2: two_bond_energy}
 def branches(pairs, sides):
     """Integers (M, ...) that stay the same where the energy is smooth.
 
-    Where two whole bonds change places nothing happens, so the nearer end is left out there.
+    Which of the ends is the nearer one changes nothing where there are two bonds.
     """
     x = Approach(pairs)
 
@@ -318,19 +288,12 @@ def branches(pairs, sides):
         return [np.sign(y.real) * (np.abs(y.real) >= A)
                 for y, A in ((foot.s, pairs.A_i), (foot.t, pairs.A_j))]  # fmt: skip
 
-    shares = x.second_weight * x.two_bonds + x.mean_weight * (1.0 - x.two_bonds)
-    whole = (sides == 2) & (shares > 1.0 - 1e-10)
     inside = (np.abs(x.closest.s.real) < pairs.A_i) & (np.abs(x.closest.t.real) < pairs.A_j)
     columns = [*sliding(x.plus), *sliding(x.minus), np.sign(row_dot(pairs.u_i, pairs.u_j)), inside]
-    columns.append(np.where(whole, 0.0, x.plus.exact <= x.minus.exact))
-    by_depth = np.log(np.maximum(x.depth, 0.1)) / np.log(FADE_DEPTH)
-    steps = (x.by_length, x.mean_by_length, x.by_cosine, by_depth)
-    columns += [np.sign(step) + np.sign(step - 1.0) for step in steps]
-    for length in (x.fade_length, FADE_LENGTH * shorter_or(pairs, 1.0)):
-        for _, foot_at, bound in feet_of_tips(pairs):
-            into = (np.abs(foot_at) - bound) / (FADE_CORNER * length)
-            columns.append(np.sign(foot_at) * (np.sign(into) + np.sign(into + 1.0)))
-    columns += [x.depth > SHALLOW, x.by_sine > 1.0, x.overlap > 0.0, x.far_overlap > 0.0]
+    symmetric = (sides == 2) & x.has_two & ~inside
+    columns.append(np.where(symmetric, 0.0, x.plus.exact <= x.minus.exact))
+    columns += [np.sign(step) + np.sign(step - 1.0) for step in x.steps]
+    columns += [x.depth > SHALLOW, x.overlap > 0.0, x.far_overlap > 0.0]
     return np.column_stack(columns).astype(int)
 
 

@@ -1,8 +1,9 @@
 """Random and targeted pairs over all of the stated ranges: what no contact may ever be.
 
-1e5 pairs, or 1e7 with `-m validate`. Of each: all numbers are finite, the energy lies between zero
-and the sum of its bonds, and stays the same with i and j exchanged and with both turned or shifted;
-the force is the gradient of the energy wherever that has one.
+1e5 pairs, or 1e7 with `-m validate`. Of each: all numbers are finite, the energy lies between that
+of one bond and the sum of its bonds (with two at most twice one), and stays the same with i and j
+exchanged and with both turned or shifted; the force is the gradient of the energy wherever that has
+one.
 """
 
 from __future__ import annotations
@@ -145,7 +146,9 @@ def test_energies_of_rods_are_finite_bounded_and_whoever_looks_sees_the_same(
         overlap = np.sqrt(2.0 * energies(pairs, 1))
         unit = (overlap + rounding) * rounding
         assert np.all(energy >= 0.0)
+        one = 0.5 * overlap**2
         worst.see(above_bonds=(energy - energy_of_bonds(result)) / unit)
+        worst.see(below_one=(one - energy) / unit, above_all=(energy - sides * one) / unit)
         clear = overlap > 1e3 * rounding
         size = np.linalg.norm(result["force"], axis=1) * pairs.d
         worst.see(force=size[clear] / overlap[clear])

@@ -107,7 +107,7 @@ def test_forces_and_torques_of_a_packing_balance(dimension, measured):
 @pytest.mark.parametrize("extended", [False, True])
 def test_a_particle_touches_its_own_image(extended):
     """A rod in a box lower than its width: two bonds with its image, which push on nothing."""
-    rod = rods(np.array([[5.0, 1.0, 1.0]]), 2, K_E, 2)
+    rod = rods(np.array([[13.0, 1.0, 1.0]]), 2, K_E, 2)  # long, and so with two whole bonds
     position, edges = np.zeros((2, 1, 2)), np.zeros((2, 2))
     position[0], edges[0] = (0.3, -7.1), (40.0, 0.9)
     orientation = np.zeros((2, 1, 1))

@@ -94,27 +94,27 @@ def energy_rounding(pairs, sides, energy):
     rounding = EPS * pairs.extent
     result = np.sqrt(2.0 * energy) * rounding / pairs.d
     if sides == 2:
-        fading = Approach(pairs).by_length < 1.0
+        fading = Approach(pairs).by_steps < 1.0
         result[fading] += (4.0 * energy * rounding / fade_length(pairs))[fading]
     return result
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_bonds_that_fade_and_bonds_that_are_one_are_among_the_pairs(dimension):
+def test_bonds_that_fade_and_bonds_that_become_one_are_among_the_pairs(dimension):
     x = Approach(touching(dimension, 2, SIDE_TO_SIDE))
-    not_two = x.two_bonds < 0.99
+    w, parts = x.exponent, x.shares[:, 1]
 
-    def is_between(weight):
-        return (weight > 0.01) & (weight < 0.99)
+    def is_between(number):
+        return x.has_two & (number > 0.01) & (number < 0.99)
 
+    shallow, deep = x.depth < SHALLOW, x.depth > 1.0
     for least, among in (
-        (2000, is_between(x.by_length) & ~not_two),
-        (2000, is_between(x.mean_by_length) & not_two),
-        (2000, is_between(x.by_cosine)),
-        (2000, is_between(x.by_sine) & not_two),
-        (1000, is_between(x.two_bonds) & (x.mean_weight > 0.0)),
-        (1000, is_between(x.two_bonds) & (x.mean_weight == 0.0)),
-        (500, (x.two_bonds == 0.0) & (x.mean_weight > 0.99)),
+        (500, is_between(x.by_steps) & shallow),
+        (1000, is_between(x.by_steps) & deep),
+        (1000 * (dimension - 2), is_between(x.steps[1]) | (dimension == 2)),
+        (1000, is_between(w) & (x.by_steps > 1.0)),
+        (1000, is_between(parts)),
+        (1000, x.has_two & (w == 1.0)),
     ):
         assert np.sum(among) > least
 
@@ -140,17 +140,3 @@ def test_parallel_rods_with_one_bond_sit_in_the_middle_of_their_kink(dimension, 
     assert long.sum() > 500
     if dimension == 2:
         np.testing.assert_allclose(jump[long], 2.0 * half_overlap[long], rtol=1e-4)
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_parallel_rods_with_a_fading_second_bond_lie_within_their_kink(dimension, measured):
-    """E(a) + W E(b): where a and b change places the torque jumps by (1 - W) force times length."""
-    rng = np.random.default_rng([3, dimension])
-    pairs, _ = parallel(
-        rng, N, dimension, overlaps(rng, N), alpha=(1.0, 100.0), fading=True, depth=SHALLOW
-    )
-    assert np.all(contacts(pairs, 2, K_E)["n_bonds"] == 2)
-    beyond, jump = one_sided_comparison(pairs, 2)
-    measured(outside=beyond.max(), largest_jump=jump.max())
-    assert beyond.max() < 1e-6
-    assert np.median(jump) > 1e-4

@@ -121,6 +121,7 @@ template <int D, class S> class DimerContact {
     bond.reach = reach;
     bond.energy = law.energy(overlap);
     bond.stiffness = bond.own_stiffness = law.energy_hessian(overlap) / (reach * reach);
+    bond.coupling = 0.0;
     bond.on_side_i = bond.on_side_j = false;
   }
 };

@@ -74,10 +74,10 @@ template <int N, class S = double> struct Dual {
   }
   friend Dual log(const Dual &a) { return a.chain(std::log(a.value), 1 / a.value); }
   friend Dual log1p(const Dual &a) { return a.chain(std::log1p(a.value), 1 / (1 + a.value)); }
-  friend Dual expm1(const Dual &a)
+  friend Dual exp(const Dual &a)
   {
-    const S grown = std::expm1(a.value);
-    return a.chain(grown, 1 + grown);
+    const S power = std::exp(a.value);
+    return a.chain(power, power);
   }
   /// Of a base that is not negative, to a constant power that is at least 1.
   friend Dual pow(const Dual &a, const S &exponent)

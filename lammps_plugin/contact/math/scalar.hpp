@@ -8,7 +8,7 @@ namespace jamshape {
 /// The functions that contact geometry takes of a scalar, under names that dual numbers share.
 using std::abs;
 using std::copysign;
-using std::expm1;
+using std::exp;
 using std::log;
 using std::log1p;
 using std::pow;

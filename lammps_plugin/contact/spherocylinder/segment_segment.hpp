@@ -232,6 +232,29 @@ template <int D, class S> Feet<D, S> closest_feet(const SpinePair<D, S> &p)
   return closest_from_end(p, tips.t[tips.nearest()]);
 }
 
+/// Whether the far ends of what lies opposite of two spines may be closer than `reach`, the feet
+/// where they are closest given. Spines in the plane part from there by the sine of their angle.
+template <class S>
+bool far_ends_may_touch(const SpinePair<2, S> &p, const Feet<2, S> &closest, double reach)
+{
+  const S sine = cross(p.u_i, p.u_j)[0], cosine = dot(p.u_i, p.u_j);
+  // Where they lie on one side of each other's tip, nothing is opposite.
+  if (p.A_i + p.A_j * abs(cosine) <= abs(dot(p.u_i, p.r)) ||
+      p.A_j + p.A_i * abs(cosine) <= abs(dot(p.u_j, p.r)))
+    return false;
+  if (sine * sine < NO_INTERSECTION_SINE_SQ) return true;
+  // Towards the intersection of their lines they come closer.
+  const S of_i =
+      p.A_i + copysign(closest.s, closest.s * (cross(p.u_j, p.r)[0] - closest.s * sine) * sine);
+  const S of_j =
+      p.A_j + copysign(closest.t, closest.t * (cross(p.u_i, p.r)[0] - closest.t * sine) * sine);
+  return std::min<S>(of_i, of_j) * abs(sine) < reach;
+}
+template <class S> bool far_ends_may_touch(const SpinePair<3, S> &, const Feet<3, S> &, double)
+{
+  return true;
+}
+
 /// |sin| of the angle between the spines: the one measure of being parallel used everywhere; it
 /// takes angles modulo pi, since rods have no head.
 template <int D, class S> S abs_sine(const SpinePair<D, S> &p) { return norm(cross(p.u_i, p.u_j)); }

@@ -65,33 +65,6 @@ SpinePair<D, S> spine_pair(const SpherocylinderBody<D, S> &i, const Spherocylind
   return {i.centre - j.centre, i.axis, i.half_length, j.axis, j.half_length};
 }
 
-/// Gradient of an energy of the pair with respect to r and to rotations of i and j.
-template <int D, class S> struct PairGradient {
-  Vec<D, S> r;
-  Torque<D, S> rotation_i;
-  Torque<D, S> rotation_j;
-};
-
-/// Adds what a weight does, from the energy's derivative by it.
-template <int D, class S>
-void add_through(PairGradient<D, S> &gradient, const SpinePair<D, S> &p,
-                 const BondWeight<D, S> &weight, const S &per_weight)
-{
-  const S per_part = per_weight * weight.per_part, per_cosine = per_weight * weight.per_cosine;
-  for (int k = 0; k < 2 && per_part != 0.0; ++k) {
-    const double sign = k == 0 ? 1.0 : -1.0;
-    const Vec<D, S> tip_i = (sign * p.A_i) * p.u_i, tip_j = (sign * p.A_j) * p.u_j;
-    const S per_i = per_part * weight.opposite.per_foot_on_i[k];  // of u_i.(tip_j - r)
-    const S per_j = per_part * weight.opposite.per_foot_on_j[k];  // of u_j.(tip_i + r)
-    gradient.r += per_j * p.u_j - per_i * p.u_i;
-    gradient.rotation_i += per_i * cross(p.u_i, tip_j - p.r) + per_j * cross(tip_i, p.u_j);
-    gradient.rotation_j += per_j * cross(p.u_j, tip_i + p.r) + per_i * cross(tip_j, p.u_i);
-  }
-  const Torque<D, S> turn = per_cosine * cross(p.u_i, p.u_j);
-  gradient.rotation_i += turn;
-  gradient.rotation_j -= turn;
-}
-
 /// Class of a contact with one bond. Two feet inside the flat parts happen only for skew rods in
 /// 3D.
 template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Feet<D, S> &feet)
@@ -102,22 +75,18 @@ template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Fe
 }
 
 /// Contact of two spherocylinders in 2D or 3D. With overlaps a of the shortest distance of the
-/// spines and b of the far end of the overlap of the spines, E the harmonic law, m = (a + b) / 2:
-///     Sides::ONE  V = E(a)                     (Marschall & Teitel 2018, Eqs. 3, 5, 22)
-///     Sides::TWO  V = E(a) + D F(a, b, W_b) + W_m (1 - D) (E(m) - E(a))
-/// In the second, W_b and W_m are `second_weight` and `mean_weight`, D is of the `Depth` of m, F
-/// the `SecondBond`, E(b) where W_b = 1. Overlaps far below (A_min / d)^2 have D = 1, F = W_b E(b):
-/// the paper's two bonds (Fig. 6), without the jumps of its rule. Particles that are nearly round
-/// for their overlap have D = 0: their two bonds are one contact, which a fading second bond would
-/// push aside harder than the contact pushes; E(m) leaves of it the one bond without its kink for
-/// parallel rods.
+/// spines and b of the far end of what lies opposite of them, E the harmonic law:
+///     Sides::ONE  V = E(a)                                  (Marschall & Teitel 2018, Eqs. 3, 5,
+///     22) Sides::TWO  V = (E(a)^(1/w) + E(b)^(1/w))^w, E(a) where b <= 0
+/// w is the `EndExponent`: 1, the paper's two bonds (Fig. 6), for overlaps far below A_min^2 / d of
+/// spines opposite each other by more than A_min / 20; towards 0 where they cease to be, as the
+/// norm becomes E(a). So E(a) <= V <= 2 E(a), without the jumps of the paper's rule, and the same
+/// with the two ends exchanged.
 ///
 /// Force and torques are its exact derivatives. What is left are kinks: where the nearer tip of the
-/// far end changes, of relative size of the angle between the rods; where the two bonds change
-/// places while W_b is below 1, of size 1 - W_b for small overlaps, over at most A_min / 20; and in
-/// 3D, for twisted rods, of full strength. Exactly parallel rods with Sides::ONE sit on such a
-/// kink: the lever arm is the middle of the overlap of the spines, which lies between both sides'
-/// and is the same for i, j exchanged.
+/// far end changes, of relative size of the angle between the rods; and in 3D, for twisted rods, of
+/// full strength. Exactly parallel rods with Sides::ONE sit on a kink: the lever arm is the middle
+/// of the overlap of the spines, which lies between both sides' and is the same for i, j exchanged.
 template <int D, class S> class SpherocylinderContact {
  public:
   using Found = Contact<D, S, 2>;
@@ -134,11 +103,9 @@ template <int D, class S> class SpherocylinderContact {
     if (pair.A_i == 0.0 && pair.A_j == 0.0 && law.shortcuts) return discs();
     const auto &values = values_of(pair);
     const auto closest = closest_feet(values);
-    if (!touches(closest.distance_sq))
-      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
-    if (is_coincident(closest) || spines_cross(values))
-      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
-    if (law.sides == Sides::TWO) return two_bonds();
+    if (!touches(closest.distance_sq)) return without(ContactStatus::APART);
+    if (is_coincident(closest) || spines_cross(values)) return without(ContactStatus::CROSSING);
+    if (law.sides == Sides::TWO && far_ends_may_touch(values, closest, reach)) return two_bonds();
     if constexpr (std::is_same_v<S, ValueOf<S>>) {
       return one_bond(closest);
     } else {
@@ -152,12 +119,17 @@ template <int D, class S> class SpherocylinderContact {
   S inverse_reach;
   SpherocylinderLaw law;
 
-  /// How a bond enters the energy: `law` times the harmonic law of its own overlap, with
-  /// `energy`, `slope` (by the overlap) and at most `bend` of it that do not come from that law.
-  struct Share {
-    S law, energy, slope, bend;
+  /// How a bond enters the energy: its `share`, by which the harmonic law of its own overlap is
+  /// multiplied, what else the energy changes with its overlap by (`slope`), and its `coupling`.
+  struct Part {
+    S share, slope, coupling;
   };
-  static Share whole() { return {1.0, 0.0, 0.0, 0.0}; }
+  static Part whole() { return {1.0, 0.0, 0.0}; }
+
+  static Found without(ContactStatus status)
+  {
+    return without_bonds<D, S, Found::MOST_BONDS>(status);
+  }
 
   template <class T> bool touches(const T &distance_sq) const
   {
@@ -173,20 +145,18 @@ template <int D, class S> class SpherocylinderContact {
   Found discs() const
   {
     const Feet<D, S> centres{0.0, 0.0, pair.r, norm_sq(pair.r)};
-    if (!touches(centres.distance_sq))
-      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
-    if (is_coincident(centres))
-      return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
-    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
+    if (!touches(centres.distance_sq)) return without(ContactStatus::APART);
+    if (is_coincident(centres)) return without(ContactStatus::CROSSING);
+    Found contact = without(ContactStatus::TOUCHING);
     add_bond(contact, centres, sqrt(centres.distance_sq), whole());
     return contact;
   }
 
   Found one_bond(const Feet<D, S> &closest) const
   {
-    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
+    Found contact = without(ContactStatus::TOUCHING);
     const S distance = sqrt(closest.distance_sq);
-    if (abs_sine(pair) < PARALLEL_SINE) {
+    if (law.sides == Sides::ONE && abs_sine(pair) < PARALLEL_SINE) {
       const EndFeet<D, S> ends(pair);
       if (ends.are_apart()) {
         contact.kind = ContactKind::SIDE_TO_SIDE;
@@ -208,89 +178,72 @@ template <int D, class S> class SpherocylinderContact {
     const EndFeet<D, S> ends(pair);
     const Feet<D, S> closest = closest_to_end(pair, ends.nearer());  // never the farther, at a tie
     const Feet<D, S> &far_end = ends.farther();
-    const S distance = sqrt(closest.distance_sq), a = overlap_at(distance);
-    const double shorter = std::min(pair.A_i, pair.A_j);
-    const bool may_be_deep = 0.5 * a * reach * reach > shorter * shorter;
-    const bool has_two_ends = touches(far_end.distance_sq);
-    if (has_two_ends && are_plainly_whole(values_of(pair), value_of(a), reach)) {
-      return two_whole_bonds(closest, far_end);
-    }
-    if (shorter > 0.0 && (has_two_ends || may_be_deep)) {
-      // Of the others, too, many have two whole bonds, or one: that is seen without derivatives.
-      const SideToSide<D, ValueOf<S>> side(values_of(pair), values_of(closest), values_of(far_end),
-                                           reach);
-      if (side.has_two_whole_bonds()) return two_whole_bonds(closest, far_end);
-      if (side.has_second() || side.has_mean()) {
-        if constexpr (std::is_same_v<S, ValueOf<S>>) {
-          return side_to_side(closest, far_end, side);
-        } else {
-          return side_to_side(closest, far_end, {pair, closest, far_end, reach});
-        }
+    const S distance = sqrt(closest.distance_sq);
+    Found contact = without(ContactStatus::TOUCHING);
+    const S far_distance = sqrt(far_end.distance_sq);
+    if (far_distance < reach) {
+      const S mean = overlap_at(0.5 * (distance + far_distance));
+      const SideBySide<ValueOf<S>> at(values_of(pair), value_of(mean), reach);
+      if (at.has_two_bonds()) {
+        contact.kind = ContactKind::SIDE_TO_SIDE;
+        add_bond(contact, closest, distance, whole());
+        add_bond(contact, far_end, far_distance, whole());
+        return contact;
+      }
+      if (!at.has_one_bond()) {
+        const EndExponent<S> w(pair, SideBySide<S>(pair, mean, reach));
+        if (w.value > LEAST_END_EXPONENT) return side_to_side(closest, far_end, w);
       }
     }
-    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
     contact.kind = kind_of(pair, closest);
     add_bond(contact, closest, distance, whole());
     return contact;
   }
 
-  Found two_whole_bonds(const Feet<D, S> &closest, const Feet<D, S> &far_end) const
-  {
-    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
-    contact.kind = ContactKind::SIDE_TO_SIDE;
-    add_bond(contact, closest, sqrt(closest.distance_sq), whole());
-    add_bond(contact, far_end, sqrt(far_end.distance_sq), whole());
-    return contact;
-  }
-
   Found side_to_side(const Feet<D, S> &closest, const Feet<D, S> &far_end,
-                     const SideToSide<D, S> &side) const
+                     const EndExponent<S> &w) const
   {
-    const auto &[overlap, depth, weight, mean_weight] = side;
-    const Harmonic &harmonic = law.harmonic;
-    const S excess =  // E(m) - E(a)
-        -overlap.drop * harmonic.energy_gradient(overlap.a - 0.5 * overlap.drop);
-    const S two_bonds = depth.two_bonds, deep = 1.0 - two_bonds, by_mean = mean_weight.value * deep;
-    const SecondBond<S> second = side.has_second()
-                                     ? SecondBond<S>(harmonic, overlap, weight.value, depth.wide)
-                                     : SecondBond<S>();
-    const S per_length = second.by_weight * weight.per_length * side.fade_length_per_wide(pair);
-    const S through_mean =  // by a and by b alike
-        0.5 * (depth.two_bonds_gradient * (second.energy - mean_weight.value * excess) +
-               two_bonds * (per_length + second.by_wide) * depth.wide_gradient +
-               by_mean * harmonic.energy_gradient(overlap.mean));
+    const S log_ratio = log_ratio_of(pair, closest, far_end, reach);
+    const EndNorm<S> norm(log_ratio, w.value);
+    // In dual numbers what shares change by with the overlaps is left out: `coupling` stands for
+    // it.
+    const EndNorm<S> fixed(constant(log_ratio), w.value);
+    const S distance = sqrt(closest.distance_sq), far_distance = sqrt(far_end.distance_sq);
+    const S energy = norm.share_a * law.harmonic.energy(overlap_at(distance)) +
+                     norm.share_b * law.harmonic.energy(overlap_at(far_distance));
+    const S by_exponent = energy * norm.entropy, by_overlap = 0.5 * by_exponent * w.by_mean;
+    // The norm's exponent over overlaps, less that of two bonds.
+    const auto curved = std::max<ValueOf<S>>(2.0 / value_of(w.value) - 2.0, 0.0);
+    const auto root = sqrt(curved * law.harmonic.k_e) * value_of(inverse_reach);
+    const auto coupling_a = root * sqrt(value_of(fixed.part_b * fixed.share_a));
+    const auto coupling_b = -root * sqrt(value_of(fixed.part_a * fixed.share_b));
 
-    Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
+    Found contact = without(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
-    add_bond(contact, closest, sqrt(closest.distance_sq),
-             {1.0 - by_mean, 0.0, through_mean + two_bonds * second.rest_by_a, 0.5 * by_mean});
-    add_bond(contact, far_end, sqrt(far_end.distance_sq),
-             {side.has_second() ? two_bonds * weight.value : S(0.0),
-              by_mean * harmonic.energy(overlap.mean) + two_bonds * second.rest,
-              through_mean + two_bonds * second.rest_by_b, 0.5 * by_mean});
-
-    PairGradient<D, S> fading{};
-    add_through(fading, pair, weight, two_bonds * second.by_weight);
-    add_through(fading, pair, mean_weight, deep * excess);
-    contact.force -= fading.r;
-    contact.bond[1].force -= fading.r;
-    contact.torque_i -= fading.rotation_i;
-    contact.torque_j -= fading.rotation_j;
+    add_bond(contact, closest, distance, {fixed.share_a, by_overlap, coupling_a});
+    add_bond(contact, far_end, far_distance, {fixed.share_b, by_overlap, coupling_b});
+    const S per_i = by_exponent * w.by_along_i, per_j = by_exponent * w.by_along_j;
+    const Vec<D, S> push = -1.0 * (per_i * pair.u_i + per_j * pair.u_j);
+    const Torque<D, S> turn = (by_exponent * w.by_cosine) * cross(pair.u_i, pair.u_j);
+    contact.force += push;
+    contact.torque_i -= per_i * cross(pair.u_i, pair.r) + turn;
+    contact.torque_j -= per_j * cross(pair.u_j, pair.r) - turn;
+    for (Bond<D, S> &bond : contact.bond) bond.force += 0.5 * push;
     return contact;
   }
 
   /// Adds a bond with the lever arms of `feet` and the overlap of `distance`. Any point on the line
   /// of `feet` gives the same torque; the one reported lies where the surfaces interpenetrate.
-  void add_bond(Found &contact, const Feet<D, S> &feet, const S &distance, const Share &share) const
+  void add_bond(Found &contact, const Feet<D, S> &feet, const S &distance, const Part &part) const
   {
     const S overlap = overlap_at(distance);
     const Vec<D, S> normal = (1.0 / sqrt(feet.distance_sq)) * feet.delta;
     // In dual numbers the law's own slope is left out here: `own_stiffness` stands for it, so that
     // what the derivatives of force and torque hold is the small rest, not its sum with a large
     // number.
-    const S slope = share.law * law.harmonic.energy_gradient(constant(overlap)) + share.slope;
+    const S slope = part.share * law.harmonic.energy_gradient(constant(overlap)) + part.slope;
     const Vec<D, S> force = (slope * inverse_reach) * normal;
-    const S energy = share.law * law.harmonic.energy(overlap) + share.energy;
+    const S energy = part.share * law.harmonic.energy(overlap);
     Bond<D, S> &bond = contact.bond[contact.n_bonds++];
     bond.normal = normal;
     bond.force = force;
@@ -305,8 +258,10 @@ template <int D, class S> class SpherocylinderContact {
     bond.reach = reach;
     bond.energy = energy;
     const S bend = law.harmonic.energy_hessian(overlap) * inverse_reach * inverse_reach;
-    bond.stiffness = (share.law + share.bend) * bend;
-    bond.own_stiffness = share.law * bend;
+    bond.own_stiffness = part.share * bend;
+    bond.coupling = part.coupling;
+    bond.stiffness = bond.own_stiffness + std::min<S>(part.coupling * part.coupling,
+                                                      STIFFEST_COUPLING * bond.own_stiffness);
     bond.on_side_i = abs(feet.s) < pair.A_i;
     bond.on_side_j = abs(feet.t) < pair.A_j;
     contact.energy += energy;

@@ -139,6 +139,7 @@ template <int D, class S> class SuperellipsoidContact {
     bond.reach = reach;
     bond.energy = contact.energy;
     bond.stiffness = bond.own_stiffness = law.energy_hessian(overlap) * steepness * steepness;
+    bond.coupling = 0.0;
     bond.on_side_i = bond.on_side_j = false;
     return contact;
   }

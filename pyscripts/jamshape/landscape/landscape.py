@@ -290,5 +290,6 @@ def _contracted(found: dict[str, NDArray[Any]]) -> FloatArray:
     """(C, v, v) second derivatives of the energies of contacts."""
     gradient = found["gradient"]
     bonds = np.einsum("cb,cbi,cbj->cij", found["stiffness"], gradient, gradient)
-    total: FloatArray = bonds + found["curvature"]
+    coupled = np.einsum("cb,cbi->ci", found["coupling"], gradient)
+    total: FloatArray = bonds + coupled[:, :, None] * coupled[:, None, :] + found["curvature"]
     return total

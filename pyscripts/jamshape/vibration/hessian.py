@@ -24,11 +24,6 @@ from jamshape.minima import Residual, residual_of
 # A state with a larger residual is no minimum, and has no modes.
 LARGEST_RESIDUAL = 1e-4
 
-# Rank-one parts of a contact's curvature this stiff, over the stiffest bond and over what the forces
-# alone can bring about, are bonds: where two bonds become one, it is no longer a bond's own.
-_STIFF = 0.1
-_BEYOND_FORCES = 4.0
-
 
 class NotAtMinimumError(ValueError):
     """A state is no minimum of the energy; the sentence gives its residual."""
@@ -90,18 +85,24 @@ class Coordinates:
 
 
 class Bonds(NamedTuple):
-    """The m rows of the compatibility matrix."""
+    """The m rows of the compatibility matrix.
+
+    Of two bonds whose energies are coupled (`Landscape.derivatives`) the first row is along a sum of both
+    lengths, such that rows are as many as bonds and H is the sum of their squares.
+    """
 
     contact: IntArray
     """(m,) row of `DynamicalMatrix.contacts`."""
     slot: IntArray
-    """(m,) which bond of it, from 0; one more than there can be: the one that two deep bonds have become."""
+    """(m,) which bond of it, from 0."""
     particles: IntArray
     """(m, 2) rows of the packing."""
     stiffness: FloatArray
     """(m,) second derivative of the energy along the bond, [energy / length^2]."""
     gradient: FloatArray
     """(m, v) of its length by the pair's variables: r_i - r_j, rotations of i and of j [radian]."""
+    pull: FloatArray
+    """(m,) force over the root of the stiffness: C^T pull are the forces of the bonds."""
 
 
 class Strains(NamedTuple):
@@ -382,9 +383,9 @@ def _parts(
     held = is_held[every["particles"]].all(axis=1)
     strong = every["bond_force"].sum(axis=1) >= weakest
     contacts = {name: values[held & strong] for name, values in every.items()}
-    bonds, curvature = _bonds(contacts, landscape.rotation_length)
+    bonds = _bonds(contacts)
     scatter = _Scatter(contacts["particles"], coordinates)
-    prestress, sizes = scatter.blocks(-curvature)
+    prestress, sizes = scatter.blocks(-contacts["curvature"])
     return {
         "compatibility": scatter.rows(
             np.sqrt(bonds.stiffness)[:, None] * bonds.gradient, bonds.contact
@@ -393,52 +394,36 @@ def _parts(
         "prestress_sizes": sizes,
         "coordinates": coordinates,
         "bonds": bonds,
-        "curvature": curvature,
+        "curvature": contacts["curvature"],
         "contacts": contacts,
         "n_left_out": int((held & ~strong).sum()),
     }
 
 
-def _bonds(contacts: dict[str, NDArray[Any]], lengths: FloatArray) -> tuple[Bonds, FloatArray]:
-    """List the bonds, and return the curvature (C, v, v) without what became bonds of its own."""
-    contact, slot = np.nonzero(contacts["stiffness"] > 0)
-    stiffness = contacts["stiffness"][contact, slot]
-    gradient = contacts["gradient"][contact, slot]
-    curvature = contacts["curvature"]
-    stiff, value, vector = _stiff_parts(contacts, lengths)
-    if len(stiff):
-        curvature = curvature.copy()
-        curvature[stiff] -= value[:, None, None] * vector[:, :, None] * vector[:, None, :]
-        contact = np.concatenate([contact, stiff])
-        most = contacts["stiffness"].shape[1]
-        slot = np.concatenate([slot, np.full(len(stiff), most)])
-        stiffness = np.concatenate([stiffness, value])
-        gradient = np.concatenate([gradient, vector])
-    order = np.lexsort((slot, contact))
-    contact, slot = contact[order], slot[order]
-    particles = contacts["particles"][contact]
-    return Bonds(contact, slot, particles, stiffness[order], gradient[order]), curvature
+def _bonds(contacts: dict[str, NDArray[Any]]) -> Bonds:
+    """List the bonds.
 
-
-def _stiff_parts(
-    contacts: dict[str, NDArray[Any]], lengths: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Find contacts whose curvature holds a bond: which, its stiffness, its gradient.
-
-    Two bonds of nearly round particles that overlap deeply become one (`Sides::TWO`), whose stiffness
-    comes with the curvature.
+    The stiffness of a contact's bonds, diag(s) + c c^T in their lengths, c what couples them, is L diag(d) L^T
+    with a lower triangle L: rows of d and L^T gradient. Found column by column, without differences.
     """
-    curvature, v = contacts["curvature"], contacts["curvature"].shape[1]
-    D = contacts["separation"].shape[1]
-    T = (v - D) // 2
-    length = np.where(lengths > 0, lengths, 1.0)[contacts["particles"]]
-    unit = np.concatenate([np.ones((len(length), D)), np.repeat(length, T, axis=1)], axis=1)
-    values, vectors = np.linalg.eigh(curvature / (unit[:, :, None] * unit[:, None, :]))
-    largest, vector = values[:, -1], vectors[:, :, -1]
-    softest = contacts["bond_force"].sum(axis=1) * (1 / length).sum(axis=1)
-    stiffest = contacts["stiffness"].max(initial=0.0) or largest.max(initial=0.0)
-    found = np.flatnonzero((largest > _STIFF * stiffest) & (largest > _BEYOND_FORCES * softest))
-    return found, largest[found], (vector * unit)[found]
+    stiffness, gradient, force = (
+        contacts[name].copy() for name in ("stiffness", "gradient", "bond_force")
+    )
+    coupling, left = contacts["coupling"], np.ones(len(stiffness))
+    for k in range(stiffness.shape[1]):
+        own = stiffness[:, k].copy()
+        stiffness[:, k] += left * coupling[:, k] ** 2
+        of = left * coupling[:, k] / np.where(stiffness[:, k] > 0, stiffness[:, k], 1.0)
+        for later in range(k + 1, stiffness.shape[1]):
+            entry = of * coupling[:, later]
+            gradient[:, k] += entry[:, None] * gradient[:, later]
+            force[:, later] -= entry * force[:, k]
+        left = left * own / np.where(stiffness[:, k] > 0, stiffness[:, k], 1.0)
+    contact, slot = np.nonzero(stiffness > 0)
+    stiffness = stiffness[contact, slot]
+    pull = force[contact, slot] / np.sqrt(stiffness)
+    particles = contacts["particles"][contact]
+    return Bonds(contact, slot, particles, stiffness, gradient[contact, slot], pull)
 
 
 class _Scatter:

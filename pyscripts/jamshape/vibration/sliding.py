@@ -88,11 +88,7 @@ class Sliding:
         strong = Scope(force=True, least_force=weakest)
         matrix = every if keeping else dynamical_matrix(landscape, state, strong)
         values, modes = _softest(matrix)
-        bonds, force = matrix.bonds, matrix.contacts["bond_force"]
-        own = bonds.slot < force.shape[1]
-        pull = np.zeros(len(own))
-        pull[own] = force[bonds.contact[own], bonds.slot[own]] / np.sqrt(bonds.stiffness[own])
-        slope = -((matrix.compatibility @ modes).T @ pull)
+        slope = -((matrix.compatibility @ modes).T @ matrix.bonds.pull)
         return cls(matrix, modes, values, slope, _walls(landscape, state, matrix, reach))
 
     @property

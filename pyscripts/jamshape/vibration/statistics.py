@@ -291,9 +291,7 @@ def redundancies(matrix: DynamicalMatrix) -> list[Redundancy]:
 
 def _self_stress(matrix: DynamicalMatrix) -> FloatArray:
     """(m,) unit vector of the forces of the bonds over the roots of their stiffness."""
-    bonds, force = matrix.bonds, matrix.contacts["bond_force"]
-    own = np.where(bonds.slot < 2, force[bonds.contact, np.minimum(bonds.slot, 1)], 0.0)
-    own = own / np.sqrt(bonds.stiffness)
+    own = matrix.bonds.pull
     return np.asarray(own / max(float(np.linalg.norm(own)), 1e-300))
 
 

@@ -259,7 +259,8 @@ def test_sparse_modes_are_those_of_the_whole_spectrum(name):
     expected = real[np.argsort(np.abs(real))[:9]]
     found = lowest(matrix, 9)
     assert found.n_before == -1
-    np.testing.assert_allclose(found.eigenvalues, np.sort(expected), rtol=1e-9)
+    rounding = 1e-11 * second_order(matrix)  # one may be 0 by chance
+    np.testing.assert_allclose(found.eigenvalues, np.sort(expected), rtol=1e-9, atol=rounding)
     assert (np.abs(found.eigenvalues - np.sort(expected)) <= 2 * found.solver_error).all()
     size = np.maximum(np.abs(found.eigenvalues), second_order(matrix))
     assert (found.solver_error <= 1e-5 * size).all()
