@@ -166,15 +166,12 @@ class Flow:
         Size of the next step; 0 to choose one.
     velocity : (n,) array, [length / time]
         Of the non-affine motion, at the end of the last step, in the coordinates of the landscape;
-        empty to find it.
-    acceleration : (n,) array, [length / time^2]
-        Its change over the last step; both only predict, unless the method has an explicit stage.
+        empty to find it; it only predicts, unless the method has an explicit stage.
     """
 
     state: State
     dt: float = 0.0
     velocity: FloatArray = field(default_factory=lambda: np.empty(0))
-    acceleration: FloatArray = field(default_factory=lambda: np.empty(0))
     time: float = 0.0
     strain: float = 0.0
     """Of the box since the start, -ln L / L_0."""
@@ -428,7 +425,6 @@ class _Run:
     def _begin(self, here: Evaluation) -> None:
         flow = self.flow
         flow.velocity = -here.gradient / self.drag
-        flow.acceleration = np.zeros_like(flow.velocity)
         if flow.dt == 0.0:
             speed = self._rms(flow.velocity)
             flow.dt = min(
@@ -483,7 +479,8 @@ class _Run:
                 continue
             strain = math.expm1(-self.kappa * times[k] * dt)
             drag = self.drag * self.vicinity.stretch(strain) ** 2 / own
-            guess = centre + own * self._predicted(times[k] * dt, velocities, times, dt)
+            # Contacts that open and close make velocities jump: what extrapolates them is farther off.
+            guess = centre + own * (velocities[-1] if velocities else flow.velocity)
             stage = Stage(strain, drag, centre, (guess, last), self._is_extended(unit))
             found = self.vicinity.solve(stage, flow._factors, units, accuracy)
             flow.factorisations += found.factorisations
@@ -505,17 +502,6 @@ class _Run:
         known = zip(weights, velocities, strict=False)
         return sum((dt * weight * velocity for weight, velocity in known), start=self._still)
 
-    def _predicted(
-        self, after: float, velocities: list[FloatArray], times: list[float], dt: float
-    ) -> FloatArray:
-        """Extrapolate the velocity to a time after the start of the step."""
-        flow = self.flow
-        if velocities and times[len(velocities) - 1] > 0:
-            last = times[len(velocities) - 1] * dt
-            slope = (velocities[-1] - flow.velocity) / last
-            return velocities[-1] + (after - last) * slope
-        return flow.velocity + after * flow.acceleration
-
     def _explicit(self, dt: float, here: Evaluation) -> _Attempt:
         extended = self._is_extended(self._unit(here))
         velocities, evaluation = [-here.gradient / self.drag], here
@@ -534,7 +520,6 @@ class _Run:
         stretch = self.vicinity.stretch(strain)
         self.vicinity.move(attempt.x, strain)
         flow.state, flow._here = self.vicinity.base, attempt.evaluation
-        flow.acceleration = stretch * (attempt.velocities[-1] - flow.velocity) / dt
         flow.velocity = stretch * attempt.velocities[-1]
         flow.time += dt
         flow.strain += self.kappa * dt

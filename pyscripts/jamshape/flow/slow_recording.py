@@ -103,8 +103,7 @@ def _keep(writer: RunWriter, rows: list[Step], flow: Flow, like: Packing) -> Non
     writer.append_series(steps, times, {k: [getattr(row, k) for row in rows] for k in _ROW})
     seconds, errors = [row.wall_seconds for row in rows], [row.error for row in rows]
     writer.append_report(steps, seconds, errors)
-    motion = {"velocity": flow.velocity, "acceleration": flow.acceleration}
-    writer.append(_as_frame(flow, like), motion)
+    writer.append(_as_frame(flow, like), {"velocity": flow.velocity})
     writer.set_attributes(_counts(flow))
     rows.clear()
 
@@ -125,8 +124,7 @@ def _flow(path: Path, stored: Mapping[str, Any]) -> Flow:
     counts = {name: stored[f"flow_{name}"] for name in _COUNTS}
     flow = Flow(State.of(read_packing(path)), **counts)
     if flow.steps:
-        found = read_observables(path)
-        flow.velocity, flow.acceleration = found["velocity"][-1], found["acceleration"][-1]
+        flow.velocity = read_observables(path)["velocity"][-1]
     return flow
 
 
