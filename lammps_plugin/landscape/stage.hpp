@@ -47,11 +47,17 @@ struct StageLimits {
   StepBounds step;
 };
 
+/// Factors of the Hessian plus drag at a point, and how many bonds there were.
+struct StageFactors {
+  std::shared_ptr<Factors> factors;
+  std::size_t n_bonds;
+};
+
 /// Where the solution of a stage ended: refused are guesses whose `sums` say why.
 struct StageEnd {
   Eigen::VectorXd x;
   LandscapeSums sums;
-  std::shared_ptr<Factors> factors;
+  StageFactors found;
   int evaluations, factorisations, directions;
   bool solved;
 };
@@ -80,14 +86,14 @@ class StageSolver {
 
   /// From a guess, or from another one if particles collide there; with factors of an earlier,
   /// similar stage, if there are any.
-  StageEnd solve(const Vector &guess, const Vector &other, std::shared_ptr<Factors> found)
+  StageEnd solve(const Vector &guess, const Vector &other, StageFactors earlier)
   {
-    factors = std::move(found);
+    known = std::move(earlier);
     Point at = begin(guess, other);
     Vector before = Vector::Zero(guess.size());
     for (; directions < DIRECTIONS && !at.sums.is_refused(); ++directions) {
       const Correction correction = correction_at(at);
-      if (!factors || !correction.step.allFinite()) break;
+      if (!known.factors || !correction.step.allFinite()) break;
       if (is_last(correction.size)) {
         at.x += correction.step;
         return end(std::move(at), true);
@@ -150,14 +156,14 @@ class StageSolver {
   const StageLimits &limits;
   Renew renew_pairs;
   Vector stretch;
-  std::shared_ptr<Factors> factors;
+  StageFactors known;
   std::vector<Kink> kinks;
   int evaluations = 0, factorisations = 0, directions = 0;
   double size_before = 0.0;  // of the last correction by these factors, at the end of a whole step
 
   StageEnd end(Point at, bool solved) const
   {
-    return {std::move(at.x), std::move(at.sums), factors, evaluations,
+    return {std::move(at.x), std::move(at.sums), known, evaluations,
             factorisations,  directions,         solved};
   }
 
@@ -189,14 +195,21 @@ class StageSolver {
   /// By the factors that there are, as long as they serve.
   Correction correction_at(const Point &at)
   {
-    if (factors) {
+    if (known.factors) {
       Correction found = newton(at);
-      if (found.size <= std::max(limits.accuracy, SHRUNK * size_before)) return found;
+      if (serve(at, found.size)) return found;
     }
     size_before = 0.0;
-    factors = about.factorise({at.x.data(), stage.strain}, stage.drag);
+    known = {about.factorise({at.x.data(), stage.strain}, stage.drag), at.sums.n_bonds};
     ++factorisations;
-    return factors ? newton(at) : Correction{};
+    return known.factors ? newton(at) : Correction{};
+  }
+
+  /// Those of an earlier stage make the first step where as many bonds are there as were then.
+  bool serve(const Point &at, double size) const
+  {
+    if (directions == 0 && at.sums.n_bonds == known.n_bonds) return true;
+    return size <= std::max(limits.accuracy, SHRUNK * size_before);
   }
 
   /// Newton's step, by BFGS for the kinks that were found.
@@ -208,7 +221,7 @@ class StageSolver {
       weights[k] = kinks[k].inverse * kinks[k].across.dot(q);
       q -= weights[k] * kinks[k].jump;
     }
-    q = factors->solve(q);
+    q = known.factors->solve(q);
     for (std::size_t k = 0; k < kinks.size(); ++k) {
       q += (weights[k] - kinks[k].inverse * kinks[k].jump.dot(q)) * kinks[k].across;
     }

@@ -20,8 +20,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.checks import require_one_of, require_positive
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
-from jamshape.landscape.newton import Factorisation
-from jamshape.landscape.vicinity import Stage, Units, Vicinity
+from jamshape.landscape.vicinity import Stage, StageFactors, Units, Vicinity
 
 # Stages are solved to this fraction of the local error that is allowed. Ten times as much leaves velocities on kinks
 # that have the next steps rejected: packings of nearly round rods then cost ten times as many.
@@ -184,7 +183,7 @@ class Flow:
     explicit_left: int = 0
     held: int = 0
     """Steps that are not to grow any more."""
-    _factors: Factorisation | None = field(default=None, repr=False)
+    _factors: StageFactors | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
     _here: Evaluation | None = field(default=None, repr=False)
     """At the end of the last step, before the last correction of its last stage."""
@@ -492,7 +491,7 @@ class _Run:
         error = self._combined(method.error, velocities, dt)
         force = drag * error
         assert found.factors is not None
-        size = self._units(evaluation).size(found.factors.solve(force), force, drag)
+        size = self._units(evaluation).size(found.factors.factors.solve(force), force, drag)
         return _Attempt(found.x, velocities, size, evaluation)
 
     def _combined(
