@@ -67,7 +67,7 @@ struct StageEnd {
 /// (semismooth Newton: Qi & Sun, Math. Program. 58, 353 (1993)), mostly in three or four
 /// evaluations. Steps that a closing bond turns back with more force than they had end where it
 /// does, or else rods slide to and fro through each other's bonds for ever. Where steps shrink fast
-/// the same factors serve several: they cost as much as six evaluations. On a kink that holds the
+/// the same factors serve several, as they cost several evaluations. On a kink that holds the
 /// solution steps go to and fro: it is found by bisection and kept as a stiff valley, a
 /// BFGS update of the factors (Lewis & Overton, Math. Program. 141, 135 (2013)). Stages that do not
 /// end are given up soon: half of the time, the time step was too long anyway.
