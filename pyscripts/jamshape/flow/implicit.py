@@ -165,12 +165,15 @@ class Flow:
         Size of the next step; 0 to choose one.
     velocity : (n,) array, [length / time]
         Of the non-affine motion, at the end of the last step, in the coordinates of the landscape;
-        empty to find it; it only predicts, unless the method has an explicit stage.
+        empty to find it.
+    acceleration : (n,) array, [length / time^2]
+        Its change over the last step; both only predict, unless the method has an explicit stage.
     """
 
     state: State
     dt: float = 0.0
     velocity: FloatArray = field(default_factory=lambda: np.empty(0))
+    acceleration: FloatArray = field(default_factory=lambda: np.empty(0))
     time: float = 0.0
     strain: float = 0.0
     """Of the box since the start, -ln L / L_0."""
@@ -183,6 +186,8 @@ class Flow:
     explicit_left: int = 0
     held: int = 0
     """Steps that are not to grow any more."""
+    extrapolates: int = 1
+    """Whether the acceleration told the last velocity better than the one before did."""
     _factors: StageFactors | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
     _here: Evaluation | None = field(default=None, repr=False)
@@ -424,6 +429,7 @@ class _Run:
     def _begin(self, here: Evaluation) -> None:
         flow = self.flow
         flow.velocity = -here.gradient / self.drag
+        flow.acceleration = np.zeros_like(flow.velocity)
         if flow.dt == 0.0:
             speed = self._rms(flow.velocity)
             flow.dt = min(
@@ -478,8 +484,7 @@ class _Run:
                 continue
             strain = math.expm1(-self.kappa * times[k] * dt)
             drag = self.drag * self.vicinity.stretch(strain) ** 2 / own
-            # Contacts that open and close make velocities jump: what extrapolates them is farther off.
-            guess = centre + own * (velocities[-1] if velocities else flow.velocity)
+            guess = centre + own * self._predicted(times[k] * dt, velocities, times, dt)
             stage = Stage(strain, drag, centre, (guess, last), self._is_extended(unit))
             found = self.vicinity.solve(stage, flow._factors, units, accuracy)
             flow.factorisations += found.factorisations
@@ -501,6 +506,19 @@ class _Run:
         known = zip(weights, velocities, strict=False)
         return sum((dt * weight * velocity for weight, velocity in known), start=self._still)
 
+    def _predicted(
+        self, after: float, velocities: list[FloatArray], times: list[float], dt: float
+    ) -> FloatArray:
+        """Extrapolate the velocity to a time after the start of the step, or hold it."""
+        flow = self.flow
+        if not flow.extrapolates:
+            return velocities[-1] if velocities else flow.velocity
+        if velocities and times[len(velocities) - 1] > 0:
+            last = times[len(velocities) - 1] * dt
+            slope = (velocities[-1] - flow.velocity) / last
+            return velocities[-1] + (after - last) * slope
+        return flow.velocity + after * flow.acceleration
+
     def _explicit(self, dt: float, here: Evaluation) -> _Attempt:
         extended = self._is_extended(self._unit(here))
         velocities, evaluation = [-here.gradient / self.drag], here
@@ -519,6 +537,11 @@ class _Run:
         stretch = self.vicinity.stretch(strain)
         self.vicinity.move(attempt.x, strain)
         flow.state, flow._here = self.vicinity.base, attempt.evaluation
+        # Contacts that open and close make velocities jump.
+        jump = attempt.velocities[-1] - flow.velocity
+        missed = np.linalg.norm(jump - dt * flow.acceleration)
+        flow.extrapolates = int(missed < np.linalg.norm(jump))
+        flow.acceleration = stretch * jump / dt
         flow.velocity = stretch * attempt.velocities[-1]
         flow.time += dt
         flow.strain += self.kappa * dt

@@ -33,7 +33,7 @@ _ROW = (
 )
 
 _COUNTS = ("dt", "time", "strain", "steps", "rejected", "explicit", "evaluations", "factorisations",
-           "wall_seconds", "explicit_left", "held")  # fmt: skip
+           "wall_seconds", "explicit_left", "held", "extrapolates")  # fmt: skip
 
 
 def begin(
@@ -103,7 +103,8 @@ def _keep(writer: RunWriter, rows: list[Step], flow: Flow, like: Packing) -> Non
     writer.append_series(steps, times, {k: [getattr(row, k) for row in rows] for k in _ROW})
     seconds, errors = [row.wall_seconds for row in rows], [row.error for row in rows]
     writer.append_report(steps, seconds, errors)
-    writer.append(_as_frame(flow, like), {"velocity": flow.velocity})
+    motion = {"velocity": flow.velocity, "acceleration": flow.acceleration}
+    writer.append(_as_frame(flow, like), motion)
     writer.set_attributes(_counts(flow))
     rows.clear()
 
@@ -121,10 +122,12 @@ def _counts(flow: Flow) -> dict[str, float]:
 
 
 def _flow(path: Path, stored: Mapping[str, Any]) -> Flow:
-    counts = {name: stored[f"flow_{name}"] for name in _COUNTS}
+    # Files of earlier versions lack some.
+    counts = {name: stored[f"flow_{name}"] for name in _COUNTS if f"flow_{name}" in stored}
     flow = Flow(State.of(read_packing(path)), **counts)
     if flow.steps:
-        flow.velocity = read_observables(path)["velocity"][-1]
+        found = read_observables(path)
+        flow.velocity, flow.acceleration = found["velocity"][-1], found["acceleration"][-1]
     return flow
 
 
