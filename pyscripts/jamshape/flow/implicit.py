@@ -32,6 +32,9 @@ _LARGEST_GROWTH, _LEAST_GROWTH, _SAFETY = 3.0, 0.2, 0.85
 # After a stage without a solution, and after one where the energy falls too far.
 _RETREAT, _FALLING = 0.25, 0.5
 
+# Velocities are extrapolated after a step whose change of velocity the acceleration told to this fraction.
+_TOLD = 0.5
+
 # Steps that do not grow after one that was rejected.
 _HELD = 2
 
@@ -187,7 +190,7 @@ class Flow:
     held: int = 0
     """Steps that are not to grow any more."""
     extrapolates: int = 1
-    """Whether the acceleration told the last velocity better than the one before did."""
+    """Whether velocities are, rather than held: the acceleration told the last one."""
     _factors: StageFactors | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
     _here: Evaluation | None = field(default=None, repr=False)
@@ -537,10 +540,10 @@ class _Run:
         stretch = self.vicinity.stretch(strain)
         self.vicinity.move(attempt.x, strain)
         flow.state, flow._here = self.vicinity.base, attempt.evaluation
-        # Contacts that open and close make velocities jump.
+        # Contacts that open and close make velocities jump: then what extrapolates them is farther off.
         jump = attempt.velocities[-1] - flow.velocity
         missed = np.linalg.norm(jump - dt * flow.acceleration)
-        flow.extrapolates = int(missed < np.linalg.norm(jump))
+        flow.extrapolates = int(missed < _TOLD * np.linalg.norm(jump))
         flow.acceleration = stretch * jump / dt
         flow.velocity = stretch * attempt.velocities[-1]
         flow.time += dt
