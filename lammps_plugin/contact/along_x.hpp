@@ -1,5 +1,6 @@
 #pragma once
 
+#include "contact/contact.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 
@@ -21,6 +22,7 @@ template <class Shape, int D, class S = double> struct BodyAlongX {
 template <class ShapeAlongX> struct AlongX {
   using Shape = ShapeAlongX;
   template <int D, class S = double> using Body = BodyAlongX<Shape, D, S>;
+  template <int D> using Start = NoStart;
 
   /// Nothing when the semi-axes are of another shape. Other shapes have an exponent.
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)

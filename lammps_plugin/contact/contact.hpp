@@ -80,6 +80,22 @@ template <int D, class S, int BONDS> Contact<D, S, BONDS> without_bonds(ContactS
 /// The contact of two particles of a model.
 template <class Model, int D, class S = double> using ContactOf = Contact<D, S, Model::MOST_BONDS>;
 
+/// What a pair remembers of one contact to begin the search for the next one at, a moment later: a
+/// model's Start<D>. Shapes whose contacts need no search remember nothing.
+struct NoStart {};
+
+template <class Body, class Law>
+auto contact_from(const Body &i, const Body &j, const Law &law, NoStart &)
+{
+  return contact_of(i, j, law);
+}
+
+template <class Body, class Law, class Start>
+auto contact_from(const Body &i, const Body &j, const Law &law, Start &start)
+{
+  return contact_of(i, j, law, start);
+}
+
 /// What the drag on the substrate needs of a particle (Marschall & Teitel 2018, Eqs. 8-12): its
 /// area (volume in 3D) and, per body axis, the integral of the squared distance from that axis over
 /// it, divided by it (their I, Eq. 10, about z in 2D).

@@ -106,6 +106,7 @@ class Descent {
 
   DescentEnd run()
   {
+    const Remembering remembering(about);
     LandscapeSums sums = first();
     if (sums.is_refused()) return end(DescentOutcome::STALLED, std::move(sums));
     while (true) {
@@ -167,6 +168,18 @@ class Descent {
 
   static constexpr int TRIES = 25;
   static constexpr double TELL_SECONDS = 0.2;
+
+  /// Contacts begin where the last ones were, as long as this lives.
+  class Remembering {
+   public:
+    explicit Remembering(Vicinity &landscape) : about(landscape) { about.remember(true); }
+    ~Remembering() { about.remember(false); }
+    Remembering(const Remembering &) = delete;
+    Remembering &operator=(const Remembering &) = delete;
+
+   private:
+    Vicinity &about;
+  };
 
   struct Line {
     Vector x;

@@ -87,6 +87,10 @@ class Vicinity {
   /// to be taken before anything is asked for there.
   virtual bool holds(const Displacement &at) = 0;
 
+  /// Whether contacts from now on begin where those of the last point were, so that what is found
+  /// depends in its last bits on the points before; for points that follow one another.
+  virtual void remember(bool contacts) = 0;
+
   virtual LandscapeSums evaluate(const Displacement &at, bool extended) const = 0;
   /// (n,) by how much a coordinate moves its particle: 1 + strain, and 1 for rotations.
   virtual Eigen::VectorXd stretch(double strain) const = 0;
@@ -184,6 +188,12 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return true;
   }
 
+  void remember(bool contacts) override
+  {
+    remembers = contacts;
+    starts.assign(pairs.list().n, {});
+  }
+
   LandscapeSums evaluate(const Displacement &at, bool extended) const override
   {
     return extended ? sums<long double>(at) : sums<double>(at);
@@ -236,8 +246,9 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     pulled = Eigen::VectorXd::Zero(n());
     for (std::size_t p = 0; p < posed.size(); ++p) {
       const Vec<D> r = posed.separation(p);
-      if (posed.contact(p, r).status != ContactStatus::TOUCHING) continue;
-      const DualContact contact = turned_bodies.contact(p);
+      Start start = remembers ? starts[p] : Start{};
+      if (posed.contact(p, r, start).status != ContactStatus::TOUCHING) continue;
+      const DualContact contact = turned_bodies.contact(p, start);
       if (contact.status == ContactStatus::TOUCHING) add_pair(p, r, contact, 1.0 + at.strain);
     }
   }
@@ -261,6 +272,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   static constexpr int VARIABLES = PAIR_VARIABLES<D>;
   static constexpr int TURNS = D == 2 ? 1 : 4;  // numbers of an orientation
   using DualContact = ContactOf<Model, D, Dual<VARIABLES>>;
+  using Start = typename Model::template Start<D>;
 
   /// What is nearly round may turn so far in one step, if its surface moves no further than it may.
   static constexpr double WIDE = 1.0;
@@ -286,6 +298,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   NearPairs wide, pairs;             // `pairs` are those of `wide` that are within `skin`
   std::vector<std::int64_t> chosen;  // (M,) which of them
   double skin = 0.0;
+  bool remembers = false;
+  mutable std::vector<Start> starts;  // (M,) of `pairs`
   bool is_outrun = false;  // `pairs`, at a point where `wide` is so too
   Law law;
   Poses base;
@@ -298,7 +312,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   {
     const SplitArrays poses = displaced(at);
     const PairSums<D, S> sums =
-        sum_over(PosedPairs<Model, D, S>(shapes, poses.view(), pairs.list(), law), shapes.size());
+        sum_over(PosedPairs<Model, D, S>(shapes, poses.view(), pairs.list(), law), shapes.size(),
+                 remembers ? &starts : nullptr);
     S trace = 0.0;
     for (int k = 0; k < D; ++k) trace += sums.virial[(D + 1) * k];
     return {static_cast<double>(sums.energy),
@@ -423,6 +438,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
       for (int k = 0; k < D; ++k) pairs.shift.push_back(wide.shift[D * p + k]);
     }
     measure(pairs);
+    starts.assign(pairs.list().n, {});
     hessian = nullptr;
   }
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 namespace jamshape {
@@ -88,6 +89,13 @@ template <class Model, int D, class S> class PosedPairs {
     return contact_of(first_body(p, r), second_body(p), law);
   }
 
+  /// The same, begun where the pair's last one was.
+  ContactOf<Model, D, S> contact(std::size_t p, const Vec<D, S> &r,
+                                 typename Model::template Start<D> &start) const
+  {
+    return contact_from(first_body(p, r), second_body(p), law, start);
+  }
+
   /// Whether surfaces may be closer than a margin.
   bool are_closer(std::size_t p, double margin) const
   {
@@ -156,6 +164,15 @@ template <class Model, int D, class S> class TurnedBodies {
     return contact_of(body_i, as_j[pairs.second(p)], pairs.contact_law());
   }
 
+  /// The same, begun where the pair's last one was.
+  ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>>
+  contact(std::size_t p, typename Model::template Start<D> &start) const
+  {
+    auto body_i = as_i[pairs.first(p)];
+    body_i.centre = as_variables<D, S>(pairs.separation(p));
+    return contact_from(body_i, as_j[pairs.second(p)], pairs.contact_law(), start);
+  }
+
  private:
   const PosedPairs<Model, D, S> &pairs;
   std::vector<typename Model::template Body<D, Dual<PAIR_VARIABLES<D>, S>>> as_i, as_j;
@@ -174,15 +191,23 @@ template <int D, class S> struct PairSums {
   std::int64_t unconverged = -1;  // likewise
 };
 
+/// Contacts begin where the last ones of these pairs were, if that is given (in doubles).
 template <class Model, int D, class S>
-PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_particles)
+PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_particles,
+                        std::vector<typename Model::template Start<D>> *starts = nullptr)
 {
+  const auto contact_at = [&](std::size_t p, const Vec<D, S> &r) {
+    if constexpr (std::is_same_v<S, double>) {
+      if (starts != nullptr) return pairs.contact(p, r, (*starts)[p]);
+    }
+    return pairs.contact(p, r);
+  };
   PairSums<D, S> sums;
   sums.force.assign(n_particles, Vec<D, S>{});
   sums.torque.assign(n_particles, Torque<D, S>{});
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const Vec<D, S> r = pairs.separation(p);
-    const ContactOf<Model, D, S> contact = pairs.contact(p, r);
+    const ContactOf<Model, D, S> contact = contact_at(p, r);
     if (contact.status == ContactStatus::APART) continue;
     if (contact.status != ContactStatus::TOUCHING) {
       const bool is_crossing = contact.status == ContactStatus::CROSSING;

@@ -166,6 +166,7 @@ struct SuperellipsoidModel {
   using Shape = Superellipsoid;
   using Law = SuperellipsoidLaw;
   template <int D, class S = double> using Body = SuperellipsoidBody<D, S>;
+  template <int D> using Start = Vec<D>;  // a normal
 
   static constexpr const char *NAME = "superellipsoid";
   static constexpr const char *SHAPE_RULE =
