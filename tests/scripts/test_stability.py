@@ -31,7 +31,13 @@ _FREE_MOTION = (
     "a single contact below jamming may open and close by more than its overlap at a kappa of 1e-14: "
     "free motion is resolved to sqrt(overlap size) only, as ARCHITECTURE says"
 )
+_DEEP_KINK = (
+    "overlaps of a third of rods: two bonds as a norm have a kink where the far end goes from one rod's "
+    "tip to the other's, as strong as overlaps are deep, and the minimum lies on it: residual 4e-3"
+)
 KNOWN = {
+    "minimisers: overlaps of a third, to the end": _DEEP_KINK,
+    "spectrum: overlaps of a third": _DEEP_KINK,
     **{
         f"implicit compression: kappa {case} of the steady overlap": _FREE_MOTION
         for case in ("1e-14, tr-bdf2, from 1", "1e-14, tr-bdf2, from 10")

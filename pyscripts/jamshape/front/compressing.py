@@ -103,7 +103,7 @@ def compress(
     >>> rods = js.Spherocylinders(alpha=4)
     >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
     >>> run
-    <Run of 24 spherocylinders in 2D at kappa = 0.001: 21 frames to phi = 0.95, pressure = 0.054, in run.h5>
+    <Run of 24 spherocylinders in 2D at kappa = 0.001: 21 frames to phi = 0.95, pressure = 0.0547, in run.h5>
     """
     require_rising(*phi)
     require_stated(n=n, seed=seed, kappa=kappa, tolerance=tolerance, rows=rows, frames=frames)

@@ -47,7 +47,7 @@ class RunFile:
     >>> run.phi.shape, len(run), run.packing().n
     ((401,), 21, 24)
     >>> round(float(run.phi[-1]), 6), round(run.onset().phi_J, 2)
-    (0.95, 0.69)
+    (0.95, 0.7)
     """
 
     file: Path

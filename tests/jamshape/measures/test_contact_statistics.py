@@ -40,7 +40,7 @@ def none(packing):
     return np.zeros(packing.n, bool)
 
 
-def squeezed(alpha, n=40, seed=3):
+def squeezed(alpha, n=40, seed=7):
     """A random packing squeezed until there are more contacts than particles, with all classes."""
     packing = random_packing(n, 0.45, seed, bidisperse(alpha))
     while len(find_contacts(packing, sides=2).pairs) <= n:
