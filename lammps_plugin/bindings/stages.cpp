@@ -16,7 +16,7 @@ struct PosedStage {
 };
 
 StageEnd solve_stage(Vicinity &of, const PosedStage &stage, const std::shared_ptr<Factors> &factors,
-                     const nb::callable &renew)
+                     std::size_t n_bonds, const nb::callable &renew)
 {
   for (const auto *part :
        {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
@@ -29,7 +29,7 @@ StageEnd solve_stage(Vicinity &of, const PosedStage &stage, const std::shared_pt
   require(!factors || factors->size() == of.n(),
           "the factors are of another number of coordinates.");
   return StageSolver(of, stage.equation, stage.units, stage.limits, renewing(of, renew))
-      .solve(stage.guess, stage.other, factors);
+      .solve(stage.guess, stage.other, {factors, n_bonds});
 }
 
 double size_of(const StageUnits &units, const Array1<double> &shift, const Array1<double> &force,
@@ -77,15 +77,17 @@ void export_stages(nb::module_ &m)
   nb::class_<StageEnd>(m, "StageEnd")
       .def_prop_ro("x", [](const StageEnd &end) { return array_of(end.x.data(), end.x.size()); })
       .def_prop_ro("sums", [](const StageEnd &end) { return tuple_of(end.sums); })
-      .def_ro("factors", &StageEnd::factors)
+      .def_prop_ro("factors", [](const StageEnd &end) { return end.found.factors; })
+      .def_prop_ro("bonds_of_factors", [](const StageEnd &end) { return end.found.n_bonds; })
       .def_ro("evaluations", &StageEnd::evaluations)
       .def_ro("factorisations", &StageEnd::factorisations)
       .def_ro("directions", &StageEnd::directions)
       .def_ro("solved", &StageEnd::solved);
   nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
-      .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "renew"_a,
-           "The StageEnd of a Stage, with factors of an earlier one; renew(x, strain) takes pairs\n"
-           "that hold there.");
+      .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
+           "renew"_a,
+           "The StageEnd of a Stage, with factors of an earlier one and how many bonds there were\n"
+           "where they are those of the Hessian; renew(x, strain) takes pairs that hold there.");
 }
 
 }  // namespace jamshape

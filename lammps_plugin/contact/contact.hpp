@@ -25,11 +25,6 @@ enum class Shortcut { NONE, ROUND, ELLIPSOIDS };
 /// left to push along.
 inline constexpr double COINCIDENT = 1e-14;
 
-/// How stiff bonds count in rates of relaxation that are coupled, over their own stiffness. The two
-/// of rods that are about to have one may be coupled without limit; what is more is a kink to an
-/// integrator, which jumps over it, not a spring.
-inline constexpr double STIFFEST_COUPLING = 4.0;
-
 /// One point of contact that carries one force. Vectors are in space coordinates.
 template <int D, class S = double> struct Bond {
   Vec<D, S> normal;      // unit, into i
@@ -40,7 +35,7 @@ template <int D, class S = double> struct Bond {
   S distance;            // the r of the overlap 1 - r/d
   S reach;               // the d of it
   S energy;              // this bond's share of the contact's energy
-  S stiffness;           // of the energy along the bond, as it counts in rates of relaxation
+  S stiffness;           // of the energy along the bond, without what couples it to others
   S own_stiffness;       // what of it comes from this bond's overlap alone
   S coupling;            // with the contact's other bonds: `SecondDerivatives`
   bool on_side_i;        // the foot lies strictly inside the straight part of i

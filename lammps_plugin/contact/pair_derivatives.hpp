@@ -157,6 +157,11 @@ void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
   }
 }
 
+/// How stiff bonds count in rates of relaxation that are coupled, over their own stiffness. The two
+/// of rods that are about to have one may be coupled without limit; what is more is a kink to an
+/// integrator, which jumps over it, not a spring.
+inline constexpr double STIFFEST_COUPLING = 4.0;
+
 /// Adds the second derivatives, by running the code of the forces on dual numbers; of what couples
 /// bonds as much as counts in rates.
 template <class Model, int D, class S>

@@ -130,21 +130,23 @@ class Descent {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// A method no longer gains if in so many states neither the energy nor the residual fell below
-  /// such a part of the lowest one; either may fall for long while the other does not.
+  /// A method no longer gains if in so many evaluations neither the energy nor the residual fell
+  /// below such a part of the lowest one; either may fall for long while the other does not.
   static constexpr double LESS_ENERGY = 0.98, LESS_RESIDUAL = 0.7;
-  static constexpr int PATIENCE = 150;
+  static constexpr std::int64_t PATIENCE = 500;
 
-  /// L-BFGS gains in waves: Newton's method takes over only after so many states without a gain.
-  static constexpr std::size_t SLOW = 1000;
+  /// L-BFGS gains in waves: Newton's method takes over only after so many without a gain.
+  static constexpr std::int64_t SLOW = 2000;
 
   /// It comes back where Newton's method has led to another part of the landscape: above so many
-  /// times the residual from which on that is used, which then falls by a factor.
+  /// times the residual from which on that is used. With complete factors a few times; without them,
+  /// where a step takes as long as tens of L-BFGS, again and again, from ever smaller residuals on.
   static constexpr double AWAY = 30.0, LATER = 0.3;
+  static constexpr int MOST_RETURNS = 5;
 
-  /// And where it did not gain in so many states from a start that was said to be near a minimum:
-  /// where there are no complete factors, one of its steps takes as long as tens of L-BFGS.
-  static constexpr std::size_t NO_GAIN = 75, NO_CHEAP_GAIN = 10;
+  /// And where it did not gain in so many evaluations from a start that was said to be near a
+  /// minimum, with complete factors and without.
+  static constexpr std::int64_t NO_GAIN = 250, NO_CHEAP_GAIN = 35;
 
   /// Saddles are left so often, along directions that curve down by more than this part of the
   /// mean force of a bond over the longest step, by this part of the overlaps.
@@ -178,13 +180,13 @@ class Descent {
   QuasiNewton memory;
   bool by_newton, is_near;
   double newton_below;
-  int age = 0, preconditioned = 0, saddles = 0;
+  int age = 0, preconditioned = 0, saddles = 0, returns = 0;
   std::shared_ptr<Factors> near;
   std::vector<DescentRow> rows;
   std::int64_t evaluations = 0;
   double least_energy = INFINITY, least_residual = INFINITY;
-  std::size_t best_row = 0;   // of the present method
-  std::size_t last_gain = 0;  // of any
+  std::int64_t best = 0;       // when the present method gained
+  std::int64_t last_gain = 0;  // or any
   bool extended = false;
   Clock::time_point began = Clock::now(), told = began;
 
@@ -205,23 +207,25 @@ class Descent {
   {
     if (by_newton) {
       if (!is_astray()) return;
-      if (!is_near) newton_below *= LATER;
+      if (!is_near) ++returns;
+      if (!is_near && !about.has_complete_factors()) newton_below *= LATER;
       is_near = false;
       memory.forget();
-    } else if (residual() >= newton_below && rows.size() <= best_row + SLOW) {
+    } else if (residual() >= newton_below && evaluations <= best + SLOW) {
       return;
     }
     by_newton = !by_newton;
-    best_row = rows.size();
+    best = evaluations;
   }
 
   /// Whether Newton's method, where contacts still come and go, is better left.
   bool is_astray() const
   {
     if (is_near) {
-      const std::size_t most = about.has_complete_factors() ? NO_GAIN : NO_CHEAP_GAIN;
-      return residual() >= newton_below && rows.size() > best_row + most;
+      const std::int64_t most = about.has_complete_factors() ? NO_GAIN : NO_CHEAP_GAIN;
+      return residual() >= newton_below && evaluations > best + most;
     }
+    if (about.has_complete_factors() && returns == MOST_RETURNS) return false;
     return residual() >= AWAY * newton_below;
   }
 
@@ -326,7 +330,7 @@ class Descent {
     rows.push_back({seconds, evaluations, residual_of(about, sums), sums.energy / volume});
     const double left = rows.back().residual, density = rows.back().energy_density;
     if (density < LESS_ENERGY * least_energy || left < LESS_RESIDUAL * least_residual) {
-      last_gain = best_row = rows.size();
+      last_gain = best = evaluations;
       least_energy = std::min(least_energy, density);
       least_residual = std::min(least_residual, left);
     }
@@ -344,8 +348,8 @@ class Descent {
       outcome = DescentOutcome::CONVERGED;
     } else if (evaluations >= stop.evaluations || rows.back().seconds >= stop.seconds) {
       outcome = DescentOutcome::EXHAUSTED;
-    } else if (rows.size() > last_gain + SLOW + 2 * PATIENCE ||
-               (by_newton && rows.size() > best_row + PATIENCE)) {
+    } else if (evaluations > last_gain + SLOW + 2 * PATIENCE ||
+               (by_newton && evaluations > best + PATIENCE)) {
       outcome = DescentOutcome::STALLED;
     } else {
       return false;

@@ -47,11 +47,17 @@ struct StageLimits {
   StepBounds step;
 };
 
+/// Factors of the Hessian plus drag at a point, and how many bonds there were.
+struct StageFactors {
+  std::shared_ptr<Factors> factors;
+  std::size_t n_bonds;
+};
+
 /// Where the solution of a stage ended: refused are guesses whose `sums` say why.
 struct StageEnd {
   Eigen::VectorXd x;
   LandscapeSums sums;
-  std::shared_ptr<Factors> factors;
+  StageFactors found;
   int evaluations, factorisations, directions;
   bool solved;
 };
@@ -59,8 +65,10 @@ struct StageEnd {
 /// Solves a stage as the minimisation that it is. Its gradient is smooth between the kinks where
 /// bonds open and close, and Newton's full steps find which of them do so for all bonds at once
 /// (semismooth Newton: Qi & Sun, Math. Program. 58, 353 (1993)), mostly in three or four
-/// evaluations; searching along each step would let through one bond at a time. On a kink that
-/// holds the solution steps go to and fro: it is found by bisection and kept as a stiff valley, a
+/// evaluations. Steps that a closing bond turns back with more force than they had end where it
+/// does, or else rods slide to and fro through each other's bonds for ever. Where steps shrink fast
+/// the same factors serve several, as they cost several evaluations. On a kink that holds the
+/// solution steps go to and fro: it is found by bisection and kept as a stiff valley, a
 /// BFGS update of the factors (Lewis & Overton, Math. Program. 141, 135 (2013)). Stages that do not
 /// end are given up soon: half of the time, the time step was too long anyway.
 class StageSolver {
@@ -78,22 +86,29 @@ class StageSolver {
 
   /// From a guess, or from another one if particles collide there; with factors of an earlier,
   /// similar stage, if there are any.
-  StageEnd solve(const Vector &guess, const Vector &other, std::shared_ptr<Factors> found)
+  StageEnd solve(const Vector &guess, const Vector &other, StageFactors earlier)
   {
-    factors = std::move(found);
+    known = std::move(earlier);
     Point at = begin(guess, other);
     Vector before = Vector::Zero(guess.size());
     for (; directions < DIRECTIONS && !at.sums.is_refused(); ++directions) {
       const Correction correction = correction_at(at);
-      if (!factors || !correction.step.allFinite()) break;
-      if (correction.size <= limits.accuracy) {
+      if (!known.factors || !correction.step.allFinite()) break;
+      if (is_last(correction.size)) {
         at.x += correction.step;
         return end(std::move(at), true);
       }
-      const Vector step = shortened(correction.step);
+      size_before = correction.size;
+      const double part = about.part_within(correction.step.data(), limits.step);
+      const Vector step = part * correction.step;
       Point tried = point(at.x + step);
-      if (!tried.sums.is_refused() && is_past_a_kink(at, tried, step, before, correction.size)) {
-        tried = between(at, std::move(tried), limits.accuracy / correction.size);
+      if (!tried.sums.is_refused()) {
+        if (is_past_a_kink(at, tried, step, before, correction.size)) {
+          tried = between(at, std::move(tried), limits.accuracy / correction.size);
+        } else if (tried.gradient.dot(step) > -at.gradient.dot(step)) {
+          tried = point(at.x + lowest(at, tried, step, part) * step);
+          size_before = 0.0;
+        }
       }
       if (tried.sums.crossing >= 0) break;
       at = std::move(tried);
@@ -111,6 +126,10 @@ class StageSolver {
   /// nearer than so many accuracies or steps go straight to and fro, with this cosine.
   static constexpr int SMOOTH = 3;
   static constexpr double OVERSHOT = 0.3, NEAR = 100.0, BACK = 0.95;
+
+  /// Factors serve once more where they leave a correction so much smaller than the one before. A
+  /// correction of not more than so many accuracies is the last if the next would be within one.
+  static constexpr double SHRUNK = 0.02, NEARLY = 10.0;
 
   /// A guess with a force above this multiple of the typical one has gone through a collision.
   static constexpr double COLLISION = 30.0;
@@ -137,13 +156,14 @@ class StageSolver {
   const StageLimits &limits;
   Renew renew_pairs;
   Vector stretch;
-  std::shared_ptr<Factors> factors;
+  StageFactors known;
   std::vector<Kink> kinks;
   int evaluations = 0, factorisations = 0, directions = 0;
+  double size_before = 0.0;  // of the last correction by these factors, at the end of a whole step
 
   StageEnd end(Point at, bool solved) const
   {
-    return {std::move(at.x), std::move(at.sums), factors, evaluations,
+    return {std::move(at.x), std::move(at.sums), known, evaluations,
             factorisations,  directions,         solved};
   }
 
@@ -172,16 +192,24 @@ class StageSolver {
     return first.sums.crossing >= 0 || collides ? point(other) : first;
   }
 
-  /// By the factors that there are, unless they leave more than rounding.
+  /// By the factors that there are, as long as they serve.
   Correction correction_at(const Point &at)
   {
-    if (factors) {
+    if (known.factors) {
       Correction found = newton(at);
-      if (found.size <= limits.accuracy) return found;
+      if (serve(at, found.size)) return found;
     }
-    factors = about.factorise({at.x.data(), stage.strain}, stage.drag);
+    size_before = 0.0;
+    known = {about.factorise({at.x.data(), stage.strain}, stage.drag), at.sums.n_bonds};
     ++factorisations;
-    return factors ? newton(at) : Correction{};
+    return known.factors ? newton(at) : Correction{};
+  }
+
+  /// Those of an earlier stage make the first step where as many bonds are there as were then.
+  bool serve(const Point &at, double size) const
+  {
+    if (directions == 0 && at.sums.n_bonds == known.n_bonds) return true;
+    return size <= std::max(limits.accuracy, SHRUNK * size_before);
   }
 
   /// Newton's step, by BFGS for the kinks that were found.
@@ -193,7 +221,7 @@ class StageSolver {
       weights[k] = kinks[k].inverse * kinks[k].across.dot(q);
       q -= weights[k] * kinks[k].jump;
     }
-    q = factors->solve(q);
+    q = known.factors->solve(q);
     for (std::size_t k = 0; k < kinks.size(); ++k) {
       q += (weights[k] - kinks[k].inverse * kinks[k].jump.dot(q)) * kinks[k].across;
     }
@@ -201,9 +229,33 @@ class StageSolver {
     return {std::move(q), size};
   }
 
-  Vector shortened(const Vector &step) const
+  /// Newton's method squares errors: by factors from the point before, what a correction leaves is
+  /// less than twice its square over the one before.
+  bool is_last(double size) const
   {
-    return about.part_within(step.data(), limits.step) * step;
+    const bool is_near = size <= NEARLY * limits.accuracy;
+    return size <= limits.accuracy ||
+           (is_near && 2.0 * size * size <= limits.accuracy * size_before);
+  }
+
+  /// What is minimised.
+  double energy(const Point &at) const
+  {
+    const Vector by = at.x - stage.centre;
+    return at.sums.energy + 0.5 * by.dot(stage.drag.cwiseProduct(by));
+  }
+
+  /// The part of a step after which the energy is lowest, if its slope is that of the factors, of
+  /// which the step is a part, and from some point on also that of one bond that closes: so that
+  /// energies and slopes at both ends are right.
+  double lowest(const Point &at, const Point &tried, const Vector &step, double part) const
+  {
+    const double slope = -at.gradient.dot(step);
+    const double force = tried.gradient.dot(step) / slope + 1.0 - part;
+    const double work = (energy(tried) - energy(at)) / slope + 1.0 - 0.5 * part;
+    const double closed = std::clamp(2.0 * work / force, 1e-3, 1.0);  // part with that bond
+    const double stiffness = force / closed;
+    return (1.0 + stiffness * (1.0 - closed)) / (part + stiffness);
   }
 
   bool is_past_a_kink(const Point &at, const Point &tried, const Vector &step, const Vector &before,

@@ -167,6 +167,7 @@ class StageEnd:
     x: NDArray[np.float64]
     sums: tuple[float, NDArray[np.float64], float, float, int, int, int]
     factors: Factors | None
+    bonds_of_factors: int
     evaluations: int
     factorisations: int
     directions: int
@@ -241,6 +242,7 @@ class Vicinity:
         self,
         stage: Stage,
         factors: Factors | None,
+        bonds_of_factors: int,
         renew: Callable[[NDArray[np.float64], float], None],
     ) -> StageEnd: ...
     def descend(

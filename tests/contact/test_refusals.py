@@ -217,7 +217,7 @@ def test_a_landscape_without_a_base_has_no_energy():
         with pytest.raises(ValueError, match="there is no base yet"):
             ask(x, 0.0)
     with pytest.raises(ValueError, match="there is no base yet"):
-        of.solve_stage(stage(), None, lambda *_: None)
+        of.solve_stage(stage(), None, 0, lambda *_: None)
 
 
 @pytest.mark.parametrize("bad", BAD_NUMBERS)
@@ -253,13 +253,13 @@ def stage(**parts):
 
 def test_stages_and_factors_of_another_size_are_refused():
     of, _, _ = about_a_base()
-    end = of.solve_stage(stage(), None, lambda *_: None)
+    end = of.solve_stage(stage(), None, 0, lambda *_: None)
     assert end.solved
     for name in ("drag", "centre", "guess", "other"):
         with pytest.raises(ValueError, match="a part of a stage has another length"):
-            of.solve_stage(stage(**{name: np.zeros(8)}), None, lambda *_: None)
+            of.solve_stage(stage(**{name: np.zeros(8)}), None, 0, lambda *_: None)
         with pytest.raises(ValueError, match="a part of a stage is nan"):
-            of.solve_stage(stage(**{name: np.full(9, np.nan)}), None, lambda *_: None)
+            of.solve_stage(stage(**{name: np.full(9, np.nan)}), None, 0, lambda *_: None)
     held = vicinity(np.where(COLUMN < 6, COLUMN, -1))
     given = arguments(2)
     pairs = {"pairs": given.pop("pairs"), "shift": given.pop("shift")}
@@ -269,4 +269,4 @@ def test_stages_and_factors_of_another_size_are_refused():
     with pytest.raises(ValueError, match="right has another length"):
         fewer.solve(np.ones((1, 9)))
     with pytest.raises(ValueError, match="factors are of another number of coordinates"):
-        of.solve_stage(stage(), fewer, lambda *_: None)
+        of.solve_stage(stage(), fewer, 0, lambda *_: None)

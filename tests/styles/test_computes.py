@@ -132,8 +132,8 @@ def test_rows_are_the_bonds_of_the_bindings(name, sides, newton, tmp_path):
     stiffness = found[:, COLUMNS.index("stiffness")]
     full = found[:, COLUMNS.index("bond")] == 0
     reach = found[:, COLUMNS.index("sumrad")]
-    # Two bonds on their way to one share its stiffness, and are coupled; at most 4 times counts.
-    assert (stiffness * reach**2 < (5 if sides == "two" else 1) + 1e-14).all()
+    assert (stiffness * reach**2 < 1 + 1e-14).all()
+    # Two bonds on their way to one share its stiffness.
     one = full & (found[:, COLUMNS.index("kind")] != contacts.ContactKind.SIDE_TO_SIDE)
     np.testing.assert_allclose(stiffness[one], 1 / reach[one] ** 2, rtol=1e-15)
     assert (stiffness[full] * reach[full] ** 2 > 0.5 - 1e-14).all()

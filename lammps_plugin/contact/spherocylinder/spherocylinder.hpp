@@ -258,10 +258,8 @@ template <int D, class S> class SpherocylinderContact {
     bond.reach = reach;
     bond.energy = energy;
     const S bend = law.harmonic.energy_hessian(overlap) * inverse_reach * inverse_reach;
-    bond.own_stiffness = part.share * bend;
+    bond.stiffness = bond.own_stiffness = part.share * bend;
     bond.coupling = part.coupling;
-    bond.stiffness = bond.own_stiffness + std::min<S>(part.coupling * part.coupling,
-                                                      STIFFEST_COUPLING * bond.own_stiffness);
     bond.on_side_i = abs(feet.s) < pair.A_i;
     bond.on_side_j = abs(feet.t) < pair.A_j;
     contact.energy += energy;

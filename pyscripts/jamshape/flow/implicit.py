@@ -20,8 +20,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.checks import require_one_of, require_positive
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
-from jamshape.landscape.newton import Factorisation
-from jamshape.landscape.vicinity import Stage, Units, Vicinity
+from jamshape.landscape.vicinity import Stage, StageFactors, Units, Vicinity
 
 # Stages are solved to this fraction of the local error that is allowed. Ten times as much leaves velocities on kinks
 # that have the next steps rejected: packings of nearly round rods then cost ten times as many.
@@ -32,6 +31,9 @@ _LARGEST_GROWTH, _LEAST_GROWTH, _SAFETY = 3.0, 0.2, 0.85
 
 # After a stage without a solution, and after one where the energy falls too far.
 _RETREAT, _FALLING = 0.25, 0.5
+
+# Velocities are extrapolated after a step whose change of velocity the acceleration told to this fraction.
+_TOLD = 0.5
 
 # Steps that do not grow after one that was rejected.
 _HELD = 2
@@ -187,7 +189,9 @@ class Flow:
     explicit_left: int = 0
     held: int = 0
     """Steps that are not to grow any more."""
-    _factors: Factorisation | None = field(default=None, repr=False)
+    extrapolates: int = 1
+    """Whether velocities are, rather than held: the acceleration told the last one."""
+    _factors: StageFactors | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
     _here: Evaluation | None = field(default=None, repr=False)
     """At the end of the last step, before the last correction of its last stage."""
@@ -495,7 +499,7 @@ class _Run:
         error = self._combined(method.error, velocities, dt)
         force = drag * error
         assert found.factors is not None
-        size = self._units(evaluation).size(found.factors.solve(force), force, drag)
+        size = self._units(evaluation).size(found.factors.factors.solve(force), force, drag)
         return _Attempt(found.x, velocities, size, evaluation)
 
     def _combined(
@@ -508,8 +512,10 @@ class _Run:
     def _predicted(
         self, after: float, velocities: list[FloatArray], times: list[float], dt: float
     ) -> FloatArray:
-        """Extrapolate the velocity to a time after the start of the step."""
+        """Extrapolate the velocity to a time after the start of the step, or hold it."""
         flow = self.flow
+        if not flow.extrapolates:
+            return velocities[-1] if velocities else flow.velocity
         if velocities and times[len(velocities) - 1] > 0:
             last = times[len(velocities) - 1] * dt
             slope = (velocities[-1] - flow.velocity) / last
@@ -534,7 +540,11 @@ class _Run:
         stretch = self.vicinity.stretch(strain)
         self.vicinity.move(attempt.x, strain)
         flow.state, flow._here = self.vicinity.base, attempt.evaluation
-        flow.acceleration = stretch * (attempt.velocities[-1] - flow.velocity) / dt
+        # Contacts that open and close make velocities jump: then what extrapolates them is farther off.
+        jump = attempt.velocities[-1] - flow.velocity
+        missed = np.linalg.norm(jump - dt * flow.acceleration)
+        flow.extrapolates = int(missed < _TOLD * np.linalg.norm(jump))
+        flow.acceleration = stretch * jump / dt
         flow.velocity = stretch * attempt.velocities[-1]
         flow.time += dt
         flow.strain += self.kappa * dt

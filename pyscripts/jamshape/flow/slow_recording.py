@@ -33,7 +33,7 @@ _ROW = (
 )
 
 _COUNTS = ("dt", "time", "strain", "steps", "rejected", "explicit", "evaluations", "factorisations",
-           "wall_seconds", "explicit_left", "held")  # fmt: skip
+           "wall_seconds", "explicit_left", "held", "extrapolates")  # fmt: skip
 
 
 def begin(
@@ -122,7 +122,8 @@ def _counts(flow: Flow) -> dict[str, float]:
 
 
 def _flow(path: Path, stored: Mapping[str, Any]) -> Flow:
-    counts = {name: stored[f"flow_{name}"] for name in _COUNTS}
+    # Files of earlier versions lack some.
+    counts = {name: stored[f"flow_{name}"] for name in _COUNTS if f"flow_{name}" in stored}
     flow = Flow(State.of(read_packing(path)), **counts)
     if flow.steps:
         found = read_observables(path)

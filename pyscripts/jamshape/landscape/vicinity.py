@@ -59,13 +59,21 @@ class Stage:
     extended: bool = False
 
 
+class StageFactors(NamedTuple):
+    """Factors of the Hessian plus drag at a point of a stage."""
+
+    factors: Factorisation
+    n_bonds: int
+    """How many there were at that point."""
+
+
 class Solution(NamedTuple):
     """Where the solution of a stage ended."""
 
     x: FloatArray
     evaluation: Evaluation
     """Before the last correction."""
-    factors: Factorisation | None
+    factors: StageFactors | None
     factorisations: int
     directions: int
     solved: bool
@@ -125,7 +133,7 @@ class Vicinity:
         return Factorisation(self._compiled.factorise(x, strain, diagonal))
 
     def solve(
-        self, stage: Stage, factors: Factorisation | None, units: Units, accuracy: float
+        self, stage: Stage, factors: StageFactors | None, units: Units, accuracy: float
     ) -> Solution:
         """Solve a stage until the next correction is smaller than an accuracy in these units.
 
@@ -140,9 +148,12 @@ class Vicinity:
         posed = _contact.Stage(
             stage.strain, stage.drag, stage.centre, stage.extended, units, limits, *stage.guesses
         )
-        end = self._compiled.solve_stage(posed, factors and factors.compiled, self._renew)
+        known = (factors.factors.compiled, factors.n_bonds) if factors else (None, 0)
+        end = self._compiled.solve_stage(posed, *known, self._renew)
         self.landscape.evaluations += end.evaluations
-        found = None if end.factors is None else Factorisation(end.factors)
+        found = None
+        if end.factors is not None:
+            found = StageFactors(Factorisation(end.factors), end.bonds_of_factors)
         return Solution(
             end.x, self._accepted(end.sums), found, end.factorisations, end.directions, end.solved
         )

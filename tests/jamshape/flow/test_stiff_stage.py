@@ -14,8 +14,8 @@ STRAIN, ACCURACY = -1e-3, 1e-5
 class Posed:
     """A stage of h in time about a state, and what is minimised."""
 
-    def __init__(self, landscape, state, h, extended=False):
-        self.vicinity, self.n = Vicinity(landscape, state), landscape.size
+    def __init__(self, landscape, state, h, extended=False, strain=STRAIN):
+        self.vicinity, self.n, self.strain = Vicinity(landscape, state), landscape.size, strain
         self.drag, self.extended = drag_coefficients(landscape) / h, extended
         found = landscape.evaluate(state)
         overlap = found.bond_force
@@ -24,12 +24,12 @@ class Posed:
         )
 
     def solve(self, *guesses, factors=None, accuracy=ACCURACY):
-        stage = Stage(STRAIN, self.drag, np.zeros(self.n), guesses, self.extended)
+        stage = Stage(self.strain, self.drag, np.zeros(self.n), guesses, self.extended)
         return self.vicinity.solve(stage, factors, self.units, accuracy)
 
     def evaluate(self, x):
-        found = self.vicinity.evaluate(x, STRAIN, extended=self.extended)
-        return found, self.vicinity.stretch(STRAIN) * found.gradient + self.drag * x
+        found = self.vicinity.evaluate(x, self.strain, extended=self.extended)
+        return found, self.vicinity.stretch(self.strain) * found.gradient + self.drag * x
 
     def size(self, x, force):
         return self.units.size(x, force, self.drag)
@@ -57,6 +57,22 @@ def test_stages_are_solved_in_few_evaluations_while_bonds_open_and_close(jammed,
         assert evaluation.n_bonds != bonds
 
 
+@pytest.mark.parametrize(("n", "strain", "h"), [(12, -3e-3, 1e6), (32, -1e-3, 1e4)])
+def test_steps_end_where_bonds_that_turn_them_close(n, strain, h):
+    """Whole steps go to and fro here: ten directions do not lead to the solution."""
+    packing, state = squeezed(n, 4.0, 0.9)
+    landscape = Landscape(packing)
+    posed = Posed(landscape, minimise(landscape, state).state, h, strain=strain)
+    start = np.zeros(posed.n)
+    before = landscape.evaluations
+    found = posed.solve(start, start)
+    assert found.solved
+    assert landscape.evaluations - before <= 9
+    again = posed.solve(found.x, start, accuracy=1e-3 * ACCURACY)
+    assert again.solved
+    assert posed.size(again.x - found.x, posed.drag * (again.x - found.x)) < ACCURACY
+
+
 def test_a_guess_in_a_collision_gives_way_to_the_other(jammed):
     posed = Posed(*jammed, 1e3)
     still = np.zeros(posed.n)
@@ -73,8 +89,22 @@ def test_factors_of_an_earlier_stage_that_are_good_enough_are_kept(jammed):
     again = posed.solve(first.x, still, factors=first.factors)
     assert first.factorisations > 0
     assert again.factorisations == 0
-    assert again.factors.compiled is first.factors.compiled
+    assert again.factors.factors.compiled is first.factors.factors.compiled
     assert np.abs(again.x - first.x).max() < 1e-6 * np.abs(first.x).max()
+
+
+def test_factors_lead_to_a_nearby_solution_with_the_same_bonds(jammed):
+    posed, nearby = Posed(*jammed, 1e3), Posed(*jammed, 1e3, strain=1.01 * STRAIN)
+    still = np.zeros(posed.n)
+    first = posed.solve(still, still)
+    found = nearby.solve(first.x, still, factors=first.factors)
+    assert found.solved
+    assert found.factorisations == 0
+    assert found.evaluation.n_bonds == first.factors.n_bonds
+    fresh = nearby.solve(first.x, still)
+    assert fresh.factorisations > 0
+    shift = found.x - fresh.x
+    assert nearby.size(shift, nearby.drag * shift) < ACCURACY
 
 
 @pytest.mark.parametrize("overlap_of_spines", [0.03, 0.06])
