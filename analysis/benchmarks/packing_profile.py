@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Any
 
 import jamshape as js
-from jamshape import _contact
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes
+from jamshape.landscape import Landscape
 from jamshape.minima import Minimum, Stop, target
 from jamshape.protocols import quasistatic
 from jamshape.protocols.defaults import recipe_for
@@ -57,7 +57,7 @@ class Part:
 
 
 class Profile:
-    """Counts what minimisations take while it is entered."""
+    """Counts what minimisations take."""
 
     def __init__(self) -> None:
         self.parts = {name: Part() for name in (BELOW, FIRST, LEADING, REST)}
@@ -67,7 +67,8 @@ class Profile:
         """From now on, in this process, count all minimisations of steps and of the search."""
         for module in (quasistatic, target):
             module.minimise = self._counted(module.minimise, module is target)  # type: ignore[attr-defined]
-        descend = _contact.Vicinity.descend
+        compiled = compiled_vicinity()
+        descend = compiled.descend
 
         def counted(*arguments: Any) -> Any:
             end = descend(*arguments)
@@ -75,7 +76,7 @@ class Profile:
             self._now.products += end.products
             return end
 
-        _contact.Vicinity.descend = counted  # type: ignore[method-assign]
+        compiled.descend = counted
 
     def _counted(self, minimise: Callable[..., Minimum], searches: bool) -> Callable[..., Minimum]:
         @functools.wraps(minimise)
@@ -94,12 +95,19 @@ class Profile:
         return counted
 
 
+def compiled_vicinity() -> Any:
+    """Give the class whose minimisations tell of factorisations and products, by an instance of it."""
+    some = Landscape(recipe_for(js.Spherocylinders(alpha=1.0), n=4, phi_start=0.1).start())
+    return type(some.bodies.vicinity(some.column, some.rotation_length, some.turning_radius))
+
+
 def parser() -> ArgumentParser:
     """Make the parser."""
     found = parser_of(__doc__)
     add = found.add_argument
     add("--alpha", type=float, default=4.0, help="of rods in the plane (4)")
-    add("--superellipsoid", type=float, nargs=3, metavar=("P", "W1", "W2"), help="in their place, in space")
+    add("--superellipsoid", type=float, nargs=3, metavar=("P", "W1", "W2"),
+        help="in their place, in space")  # fmt: skip
     add("--n", type=int, default=256, help="particles (256)")
     add("--seed", type=int, default=1, help="(1)")
     return found
@@ -113,7 +121,8 @@ def main(options: Namespace) -> None:
     total = time.process_time() - began
     parts = profile.parts
     parts[REST].seconds = total - sum(part.seconds for part in parts.values())
-    print("| | minimisations | evaluations | factorisations | products | core s | longest | us an evaluation |")
+    counts = "minimisations | evaluations | factorisations | products"
+    print(f"| | {counts} | core s | longest | us an evaluation |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for name, part in parts.items():
         print("| " + " | ".join([name, *part.told()]) + " |")

@@ -146,9 +146,8 @@ def run_target(name: str, packing: Packing, seconds: float) -> Row:
     search, method, tolerance = TARGETS[name]
     landscape, state = Landscape(packing), State.of(packing)
     u0 = landscape.evaluate(state).energy / state.volume
-    target = Target(u0=float(f"{u0:.3g}"), tolerance=tolerance, method=method)
-    step = 1e-6 if search is halving else target.step
-    at = Search(state.strained(-STRAIN), step)
+    target = Target(u0=float(f"{u0:.3g}"), tolerance=tolerance, step=STRAIN, method=method)
+    at = Search(state.strained(-STRAIN), target.step)
     began, busy, outcome = time.perf_counter(), time.process_time(), "out of time"
     try:
         for _ in search(landscape, at, target):
