@@ -16,10 +16,12 @@ import functools
 import tempfile
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import jamshape as js
 from jamshape.command import parser_of, report, run
@@ -31,7 +33,12 @@ from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import make
 from jamshape.shapes.particles import Particles
 
-BELOW, FIRST, LEADING, REST = "steps below jamming", "to the first jammed state", "to u0", "the rest"
+BELOW, FIRST, LEADING, REST = (
+    "steps below jamming",
+    "to the first jammed state",
+    "to u0",
+    "the rest",
+)
 
 # Minimisations of the search that need be no better than this look for a jammed state.
 LOOSE = 1e-2
@@ -63,12 +70,11 @@ class Profile:
         self.parts = {name: Part() for name in (BELOW, FIRST, LEADING, REST)}
         self._now = self.parts[BELOW]
 
-    def count(self) -> None:
-        """From now on, in this process, count all minimisations of steps and of the search."""
-        for module in (quasistatic, target):
-            module.minimise = self._counted(module.minimise, module is target)  # type: ignore[attr-defined]
+    @contextmanager
+    def counting(self) -> Iterator[None]:
+        """Count all minimisations of steps and of the search in this process, as long as it is entered."""
         compiled = compiled_vicinity()
-        descend = compiled.descend
+        descend, by_steps, by_search = compiled.descend, quasistatic.minimise, target.minimise
 
         def counted(*arguments: Any) -> Any:
             end = descend(*arguments)
@@ -76,9 +82,18 @@ class Profile:
             self._now.products += end.products
             return end
 
-        compiled.descend = counted
+        with ExitStack() as patches:
+            for patch in (
+                mock.patch.object(compiled, "descend", counted),
+                mock.patch.object(quasistatic, "minimise", self._counted(by_steps, searches=False)),
+                mock.patch.object(target, "minimise", self._counted(by_search, searches=True)),
+            ):
+                patches.enter_context(patch)
+            yield
 
-    def _counted(self, minimise: Callable[..., Minimum], searches: bool) -> Callable[..., Minimum]:
+    def _counted(
+        self, minimise: Callable[..., Minimum], *, searches: bool
+    ) -> Callable[..., Minimum]:
         @functools.wraps(minimise)
         def counted(landscape: Any, start: Any, method: str, stop: Stop, *more: Any) -> Minimum:
             name = (FIRST if stop.tolerance >= LOOSE else LEADING) if searches else BELOW
@@ -116,8 +131,8 @@ def parser() -> ArgumentParser:
 def main(options: Namespace) -> None:
     """Make the packing and print the table."""
     profile, began = Profile(), time.process_time()
-    profile.count()
-    found = packing_of(particles_of(options), options)
+    with profile.counting():
+        found = packing_of(particles_of(options), options)
     total = time.process_time() - began
     parts = profile.parts
     parts[REST].seconds = total - sum(part.seconds for part in parts.values())

@@ -76,7 +76,13 @@ class Growth(NamedTuple):
     def told(self) -> list[str]:
         """Make the line of a table."""
         sizes, seconds = ", ".join(map(str, self.n)), ", ".join(f"{s:.3g}" for s in self.seconds)
-        return [self.case, sizes, seconds, f"{self.power:.2f}", ", ".join(f"{p:.1f}" for p in self.local)]
+        return [
+            self.case,
+            sizes,
+            seconds,
+            f"{self.power:.2f}",
+            ", ".join(f"{p:.1f}" for p in self.local),
+        ]
 
 
 def parser() -> ArgumentParser:

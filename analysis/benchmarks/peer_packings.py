@@ -111,7 +111,11 @@ def made(task: Task, options: Namespace) -> dict[str, Any]:
     python = sys.executable if task.maker == "jamshape" else str(options.peer)
     threads = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
     done = subprocess.run(
-        [python, "-c", task.code], capture_output=True, text=True, env=os.environ | threads, check=False
+        [python, "-c", task.code],
+        capture_output=True,
+        text=True,
+        env=os.environ | threads,
+        check=False,
     )
     if done.returncode:
         msg = f"{task.maker} made no packing of {task.n} {task.case}: {done.stderr.strip()[-300:]}"

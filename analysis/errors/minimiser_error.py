@@ -195,7 +195,7 @@ def draw(results: dict[str, Row], path: Path) -> None:
             axis.loglog(row["seconds"], row["residual"], label=method)
         number = name.replace(".", "", 1).isdecimal()
         label = rf"$\alpha = {name}$" if number else Path(name).stem
-        axis.set(xlabel="seconds", ylim=(1e-11, None))
+        axis.set(xlabel="core seconds", ylim=(1e-11, None))
         axis.set_title(f"{label}, $N$ = {result['n']}", fontsize=9)
     axes[0].set_ylabel("largest net force / mean bond force")
     axes[0].legend(fontsize="small")
