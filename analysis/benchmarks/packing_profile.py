@@ -27,7 +27,7 @@ import jamshape as js
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes
 from jamshape.landscape import Landscape
-from jamshape.minima import Minimum, Stop, target
+from jamshape.minima import Minimum, Stop, minimise, target
 from jamshape.protocols import quasistatic
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import make
@@ -74,7 +74,7 @@ class Profile:
     def counting(self) -> Iterator[None]:
         """Count all minimisations of steps and of the search in this process, as long as it is entered."""
         compiled = compiled_vicinity()
-        descend, by_steps, by_search = compiled.descend, quasistatic.minimise, target.minimise
+        descend = compiled.descend
 
         def counted(*arguments: Any) -> Any:
             end = descend(*arguments)
@@ -85,15 +85,13 @@ class Profile:
         with ExitStack() as patches:
             for patch in (
                 mock.patch.object(compiled, "descend", counted),
-                mock.patch.object(quasistatic, "minimise", self._counted(by_steps, searches=False)),
-                mock.patch.object(target, "minimise", self._counted(by_search, searches=True)),
+                mock.patch.object(quasistatic, "minimise", self._counted(searches=False)),
+                mock.patch.object(target, "minimise", self._counted(searches=True)),
             ):
                 patches.enter_context(patch)
             yield
 
-    def _counted(
-        self, minimise: Callable[..., Minimum], *, searches: bool
-    ) -> Callable[..., Minimum]:
+    def _counted(self, *, searches: bool) -> Callable[..., Minimum]:
         @functools.wraps(minimise)
         def counted(landscape: Any, start: Any, method: str, stop: Stop, *more: Any) -> Minimum:
             name = (FIRST if stop.tolerance >= LOOSE else LEADING) if searches else BELOW
