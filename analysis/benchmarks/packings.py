@@ -3,13 +3,16 @@
     python analysis/benchmarks/packings.py --seeds 3 --out runs/packing_times
     python analysis/benchmarks/packings.py --cases rods-1 rods-4 --n 64 256 1024 --seeds 8
     python analysis/benchmarks/packings.py --cases superballs --n 400 --seconds 300
+    python analysis/benchmarks/packings.py --n 64 256 400 1000 1024 --seeds 20 --kept --out runs/packing_times
 
 Each packing is one call of make_packing in a process of its own with one thread, which is given up after some
 seconds; its seconds are those in which the processor was busy, from the call to the measured packing. What is
 finished is kept, and taken from there the next time. A table tells of each case and size the median of the
 seconds, the means of phi_J and z with their standard errors, how packings end, and in the last column whether
 the contacts of those that are in equilibrium are as many as isostatic ones of round particles are, where they
-are round. The last line of standard output is one JSON object.
+are round. A second table tells for cases of several sizes as what power of N the median of the seconds grows, by a
+straight line through the logarithms, and from each size to the next. With --kept nothing is made: the tables tell of
+what is in the folder. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -60,6 +63,28 @@ class Task(NamedTuple):
     seed: int
 
 
+class Growth(NamedTuple):
+    """How the seconds of a case grow with N."""
+
+    case: str
+    n: list[int]
+    seconds: list[float]
+    power: float
+    local: list[float]
+    """From each size to the next."""
+
+    def told(self) -> list[str]:
+        """Make the line of a table."""
+        sizes, seconds = ", ".join(map(str, self.n)), ", ".join(f"{s:.3g}" for s in self.seconds)
+        return [
+            self.case,
+            sizes,
+            seconds,
+            f"{self.power:.2f}",
+            ", ".join(f"{p:.1f}" for p in self.local),
+        ]
+
+
 def parser() -> ArgumentParser:
     """Make the parser."""
     found = parser_of(__doc__)
@@ -68,6 +93,7 @@ def parser() -> ArgumentParser:
     add("--n", type=int, nargs="*", help="particles (those of each case)")
     add("--seeds", type=int, default=3, help="packings of each (3)")
     add("--seconds", type=float, default=600.0, help="after which one is given up (600)")
+    add("--kept", action="store_true", help="make nothing, tell of what is finished")
     add("--out", type=Path, default=Path("runs/packing_times"), help="folder for what is finished")
     return found
 
@@ -75,13 +101,18 @@ def parser() -> ArgumentParser:
 def main(options: Namespace) -> int:
     """Make what is missing and print the table."""
     options.out.mkdir(parents=True, exist_ok=True)
-    rows = [made(task, options) for task in tasks(options)]
+    rows = [made(task, options) for task in tasks(options) if is_asked_for(task, options)]
     table = [told(group) for group in grouped(rows)]
     print("| | N | core s, median (range) | phi_J | z | ends | isostatic |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for line in table:
         print("| " + " | ".join(line) + " |")
-    report({"out": str(options.out), "rows": rows})
+    growing = growths(rows)
+    print("\n| | N | core s, medians | power of N | between neighbours |")
+    print("| --- | --- | --- | --- | --- |")
+    for growth in growing:
+        print("| " + " | ".join(growth.told()) + " |")
+    report({"out": options.out, "rows": rows, "growths": growing})
     return 0
 
 
@@ -93,9 +124,20 @@ def tasks(options: Namespace) -> Iterator[Task]:
                 yield Task(case, n, seed)
 
 
+def file_of(task: Task, options: Namespace) -> Path:
+    """Where what is finished is kept."""
+    path: Path = options.out / f"{task.case}_n{task.n}_seed{task.seed}.json"
+    return path
+
+
+def is_asked_for(task: Task, options: Namespace) -> bool:
+    """Whether a packing is to be in the tables."""
+    return not options.kept or file_of(task, options).exists()
+
+
 def made(task: Task, options: Namespace) -> dict[str, Any]:
     """Make a packing, unless it is there, and tell what it took."""
-    path = options.out / f"{task.case}_n{task.n}_seed{task.seed}.json"
+    path = file_of(task, options)
     if path.exists():
         kept: dict[str, Any] = json.loads(path.read_text())
         return kept
@@ -149,6 +191,20 @@ def told(group: list[dict[str, Any]]) -> list[str]:
         ", ".join(f"{count} {name}" for name, count in ends.items()),
         isostatic(first["case"], good),
     ]
+
+
+def growths(rows: list[dict[str, Any]]) -> list[Growth]:
+    """Fit how the seconds of each case of several sizes grow with N; those given up count with what they had."""
+    found = []
+    for case in dict.fromkeys(row["case"] for row in rows):
+        of_case = [group for group in grouped(rows) if group[0]["case"] == case]
+        sizes = {g[0]["n"]: float(np.median([row["seconds"] for row in g])) for g in of_case}
+        if len(sizes) > 1:
+            n, seconds = sorted(sizes), [sizes[k] for k in sorted(sizes)]
+            x, y = np.log(n), np.log(seconds)
+            local = (np.diff(y) / np.diff(x)).tolist()
+            found.append(Growth(case, n, seconds, float(np.polyfit(x, y, 1)[0]), local))
+    return found
 
 
 def mean(values: list[float], digits: int) -> str:

@@ -1,0 +1,143 @@
+"""Packings of discs and spheres beside those of spheropack: core seconds, packing fractions and contacts, in turns.
+
+    python -m venv peers && peers/bin/pip install spheropack
+    python analysis/benchmarks/peer_packings.py --peer peers/bin/python --seeds 3 --out runs/peer_packings
+
+Each packing is made in a process of its own with one thread, one of ours and one of spheropack 0.2 after the other;
+its seconds are those in which the processor was busy, without imports. Ours are by the usual way, of soft particles
+whose forces balance; spheropack's are of hard ones by the event-driven algorithm of Lubachevsky and Stillinger, with the
+slow steps with which its documentation has 98 % of the isostatic contacts, Jammed(step=0.1). Discs are of two sizes, 1 and
+1.4, as many of each. Contacts are told over those of an isostatic packing of what is no rattler. What is finished is
+kept. The last line of standard output is one JSON object.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.command import parser_of, report, run
+from jamshape.files.disk import store
+
+CASES: dict[str, tuple[int, str, tuple[int, ...]]] = {
+    "discs": (2, "js.Spherocylinders(alpha=0)", (256, 1024)),
+    "spheres": (3, "js.Superellipsoids(p=1, w1=1, w2=1)", (400, 1000)),
+}
+
+OURS = """
+import json, time
+import jamshape as js
+began = time.process_time()
+found = js.make_packing({shape}, n={n}, seed={seed}, progress=False).results
+seconds = time.process_time() - began
+contacts = found["n_contacts"] / ({D} * (found["n"] - found["n_rattlers"] - 1))
+print(json.dumps({{"seconds": seconds, "phi": found["phi_J"], "contacts": contacts, "outcome": found["outcome"]}}))
+"""
+
+PEER = """
+import json, time
+import spheropack as sp
+radii = [1.4 if {D} == 2 and k % 2 else 1.0 for k in range({n})]
+began = time.process_time()
+found = sp.pack(radii=radii, container=sp.Box([1.0] * {D}), density="max", seed={seed}, stop=[sp.stop.Jammed(step=0.1)])
+seconds = time.process_time() - began
+contacts = sp.analysis.isostaticity(found)
+print(json.dumps({{"seconds": seconds, "phi": found.density, "contacts": contacts, "outcome": found.status}}))
+"""
+
+
+class Task(NamedTuple):
+    """One packing, and who makes it."""
+
+    case: str
+    n: int
+    seed: int
+    maker: str
+
+    @property
+    def code(self) -> str:
+        """What makes it and prints what it took."""
+        D, shape, _ = CASES[self.case]
+        code = OURS if self.maker == "jamshape" else PEER
+        return code.format(D=D, shape=shape, n=self.n, seed=self.seed)
+
+
+def parser() -> ArgumentParser:
+    """Make the parser."""
+    found = parser_of(__doc__, "runs/peer_packings")
+    add = found.add_argument
+    add("--peer", type=Path, required=True, help="a Python that has spheropack")
+    add("--cases", nargs="*", default=list(CASES), choices=list(CASES), help="(all)")
+    add("--n", type=int, nargs="*", help="particles (those of each case)")
+    add("--seeds", type=int, default=3, help="packings of each (3)")
+    return found
+
+
+def main(options: Namespace) -> None:
+    """Make what is missing and print the table."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    rows = [made(task, options) for task in tasks(options)]
+    print("| | N | | core s, median (range) | phi_J | contacts over isostatic | ends |")
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for key in dict.fromkeys((row["case"], row["n"], row["maker"]) for row in rows):
+        group = [row for row in rows if (row["case"], row["n"], row["maker"]) == key]
+        print("| " + " | ".join(told(group)) + " |")
+    report({"out": options.out, "rows": rows})
+
+
+def tasks(options: Namespace) -> Iterator[Task]:
+    """List all packings, in turns."""
+    for case in options.cases:
+        for n in options.n or CASES[case][2]:
+            for seed in range(1, options.seeds + 1):
+                for maker in ("jamshape", "spheropack"):
+                    yield Task(case, n, seed, maker)
+
+
+def made(task: Task, options: Namespace) -> dict[str, Any]:
+    """Make a packing, unless it is there, and tell what it took."""
+    path = options.out / f"{task.case}_n{task.n}_seed{task.seed}_{task.maker}.json"
+    if path.exists():
+        kept: dict[str, Any] = json.loads(path.read_text())
+        return kept
+    python = sys.executable if task.maker == "jamshape" else str(options.peer)
+    threads = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
+    done = subprocess.run(
+        [python, "-c", task.code],
+        capture_output=True,
+        text=True,
+        env=os.environ | threads,
+        check=False,
+    )
+    if done.returncode:
+        msg = f"{task.maker} made no packing of {task.n} {task.case}: {done.stderr.strip()[-300:]}"
+        raise RuntimeError(msg)
+    found: dict[str, Any] = task._asdict() | json.loads(done.stdout)
+    store(path, json.dumps(found).encode())
+    return found
+
+
+def told(group: list[dict[str, Any]]) -> list[str]:
+    """Make the line of a table."""
+    first, seconds = group[0], [row["seconds"] for row in group]
+    return [
+        first["case"],
+        str(first["n"]),
+        first["maker"],
+        f"{np.median(seconds):.3g} ({min(seconds):.3g} to {max(seconds):.3g})",
+        f"{np.mean([row['phi'] for row in group]):.4f}",
+        f"{np.mean([row['contacts'] for row in group]):.4f}",
+        ", ".join(sorted({row["outcome"] for row in group})),
+    ]
+
+
+if __name__ == "__main__":
+    run(parser(), main)
