@@ -104,10 +104,6 @@ class Target:
         """Estimate the strain of the box between jamming and u0."""
         return math.sqrt(self.u0 / _stiffness(landscape))
 
-    def lowest(self, landscape: Landscape, step: float) -> float:
-        """Give the energy density below which a packing that was compressed by a step is unjammed."""
-        return max(_FALLEN * self.u0, _UNJAMMED * _stiffness(landscape) * step**2)
-
 
 def _stiffness(landscape: Landscape) -> float:
     """Estimate the energy density of a jammed packing over the square of its strain from jamming."""
@@ -139,6 +135,17 @@ class Search:
     opening: bool | None = None
     minimum: Minimum | None = None
     history: History = field(default_factory=History)
+
+    def lowest(self, landscape: Landscape, target: Target) -> float | None:
+        """Give the energy density below which the state, once it is minimised, is unjammed.
+
+        That of a jammed one which was compressed is far above; a start may be a packing at any energy.
+        """
+        if self.opening is None:
+            return None
+        least = _FALLEN * target.u0
+        added = _UNJAMMED * _stiffness(landscape) * self.step**2
+        return least if self.opening else max(least, added)
 
     def close_further(self, unjammed: State, fine: float, target: Target) -> None:
         """Go on from an unjammed state, in finer steps if the last one opened the box too far."""
@@ -191,7 +198,7 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
     fine = target.strain_above_jamming(landscape)
     require_reachable(landscape, target)
     while search.minimum is None:
-        stop = Stop(tolerance=_GOOD, lowest=target.lowest(landscape, search.step))
+        stop = Stop(tolerance=_GOOD, lowest=search.lowest(landscape, target))
         found = minimise(landscape, search.state, "auto", stop, search.history)
         if found.outcome is Outcome.CONVERGED:
             jammed = found

@@ -58,6 +58,20 @@ def test_direct_search_finds_the_energy_and_a_minimum(name, u0):
     assert values.min() > -max(1e-10, 10 * math.sqrt(u0)) * values.max()
 
 
+@pytest.mark.parametrize("name", STARTS)
+@pytest.mark.parametrize("u0", [1e-15, 1e-13, 1e-11])
+def test_a_packing_is_no_unjammed_start(name, u0):
+    # One at 1e-15 is led to its energy or a higher one as it is, not compressed to another packing before.
+    start = found(name, 1e-15)
+    landscape, _ = start_of(name)
+    minimum = find(landscape, start.state, Target(u0))
+    shrunk = 1 - minimum.state.volume / start.state.volume
+    assert abs(shrunk) < 1e-5
+    far = Search(start.state, 5e-4)
+    first = next(iter(direct(landscape, far, Target(u0))))
+    assert first.loose is None
+
+
 @pytest.mark.parametrize("name", ["16 discs", "32 discs"])
 @pytest.mark.parametrize("u0", ENERGIES)
 def test_discs_end_converged(name, u0):
