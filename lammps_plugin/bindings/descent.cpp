@@ -97,14 +97,9 @@ void export_descent(nb::module_ &m)
           [](DescentStop *place, double tolerance, double lowest, std::int64_t evaluations,
              double seconds, double rounding, double newton_below, bool is_near,
              double longest_step, double widest_turn) {
-            new (place) DescentStop{tolerance,
-                                    lowest,
-                                    evaluations,
-                                    seconds,
-                                    rounding,
-                                    newton_below,
-                                    is_near,
-                                    {longest_step, widest_turn}};
+            new (place)
+                DescentStop{tolerance, lowest,       evaluations, seconds,
+                            rounding,  newton_below, is_near,     {longest_step, widest_turn}};
           },
           "tolerance"_a, "lowest"_a, "evaluations"_a, "seconds"_a, "rounding"_a, "newton_below"_a,
           "is_near"_a, "longest_step"_a, "widest_turn"_a);
@@ -134,8 +129,9 @@ void export_descent(nb::module_ &m)
            "Shifts less after a step that was right at once, more after one that was far off.")
       .def_prop_ro("shift", &PosedNewton::shift);
   nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
-      .def("part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,
-           "At most 1: the part of a step (n,) that moves no particle further and turns none wider.")
+      .def(
+          "part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,
+          "At most 1: the part of a step (n,) that moves no particle further and turns none wider.")
       .def("descend", &descend, "stop"_a, "shift"_a, "renew"_a, "tell"_a,
            "Minimises the energy at fixed box by L-BFGS and Newton's method, with a first shift of "
            "the\n"

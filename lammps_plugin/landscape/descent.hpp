@@ -96,8 +96,8 @@ class Descent {
   using Tell = std::function<void(const DescentRow &)>;
 
   Descent(Vicinity &landscape, const DescentStop &when, double first_shift) :
-      about(landscape), stop(when), system(landscape, first_shift),
-      by_newton(when.is_near), is_near(when.is_near), newton_below(when.newton_below)
+      about(landscape), stop(when), system(landscape, first_shift), by_newton(when.is_near),
+      is_near(when.is_near), newton_below(when.newton_below)
   {
   }
 
@@ -140,8 +140,9 @@ class Descent {
   static constexpr std::int64_t SLOW = 2000;
 
   /// It comes back where Newton's method has led to another part of the landscape: above so many
-  /// times the residual from which on that is used. With complete factors a few times; without them,
-  /// where a step takes as long as tens of L-BFGS, again and again, from ever smaller residuals on.
+  /// times the residual from which on that is used. With complete factors a few times; without
+  /// them, where a step takes as long as tens of L-BFGS, again and again, from ever smaller
+  /// residuals on.
   static constexpr double AWAY = 30.0, LATER = 0.3;
   static constexpr int MOST_RETURNS = 5;
 

@@ -300,7 +300,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   double skin = 0.0;
   bool remembers = false;
   mutable std::vector<Start> starts;  // (M,) of `pairs`
-  bool is_outrun = false;  // `pairs`, at a point where `wide` is so too
+  bool is_outrun = false;             // `pairs`, at a point where `wide` is so too
   Law law;
   Poses base;
   std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
