@@ -87,9 +87,7 @@ def runs_of(options: Namespace, bench: Bench, at: At) -> dict[str, Callable[...,
             called = name if measure == at.measure else ALONE.format(name)
             found[called] = partial(run_deck, deck, plugin_path(), tiles=at.tiles)
             if style.is_ours and options.against:
-                found[f"{called} before"] = partial(
-                    run_deck, deck, options.against, tiles=at.tiles
-                )
+                found[f"{called} before"] = partial(run_deck, deck, options.against, tiles=at.tiles)
     return found
 
 

@@ -174,9 +174,20 @@ template <int D> void OverdampedFlow::hold(int begin, int end, double scale)
   }
 }
 
+/// What a move's parts are multiplied by, without a division for each particle.
+struct OverdampedFlow::Weights {
+  double stored, present_shift, present, last, before;
+
+  explicit Weights(const Move &m) :
+      stored(m.stored), present_shift(m.present / m.from), present(m.present), last(m.last),
+      before(m.before)
+  {
+  }
+};
+
 /// Displacement in coordinates of the box of strain 0 and rotation vector.
 template <int D>
-RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Move &m, RateIn<D> present) const
+RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Weights &m, RateIn<D> present) const
 {
   const RateIn<D> stored = of.stored_rate();
   RateIn<D> sum{m.stored * stored.shift, m.stored * stored.turn};
@@ -185,7 +196,7 @@ RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Move &m, RateIn<D> pres
       // The rate of a rotation vector is not the angular velocity, to first order in the vector.
       if (n_registers > 0) present.turn += -0.5 * cross(of.displacement(0).turn, present.turn);
     }
-    sum.shift += (m.present / m.from) * present.shift;
+    sum.shift += m.present_shift * present.shift;
     sum.turn += m.present * present.turn;
   }
   if (m.last != 0.0) add(sum, m.last, of.displacement(0));
@@ -211,6 +222,7 @@ template <int D> void OverdampedFlow::require_small(int i, const RateIn<D> &move
 
 template <int D> void OverdampedFlow::move_in(const Move &m, Pass pass)
 {
+  const Weights weights(m);
   const auto target = box.scaled<D>(m.to);
   const bool is_last = pass == Pass::FINISH, compares = !can_retry && m.present != 0.0;
   double largest_sq = 0.0;
@@ -222,7 +234,7 @@ template <int D> void OverdampedFlow::move_in(const Move &m, Pass pass)
       const Vec<D> change = present.shift - m.to * its.stored_rate().shift;
       largest_sq = std::max(largest_sq, norm_sq(change));
     }
-    const RateIn<D> moved = sum_of<D>(its, m, present);
+    const RateIn<D> moved = sum_of<D>(its, weights, present);
     require_small<D>(i, moved, m.to);
     if (n_registers > 0 && !is_last) its.push_displacement(moved);
     const Vec<D> coordinates = its.coordinates() + moved.shift;
@@ -278,12 +290,13 @@ template <int D> double OverdampedFlow::length_of(int i, const RateIn<D> &of, do
 
 template <int D> void OverdampedFlow::add_lengths(const Move &m, double *sums)
 {
+  const Weights weights(m);
   for (int i = 0; i < atom->nlocal; ++i) {
     const Row<D> its{row(i)};
     const RateIn<D> stored = its.stored_rate();
     if (norm(stored.shift) == 0.0 && norm(vec3(atom->f[i])) == 0.0) continue;
     const RateIn<D> present = mobilities.present_rate_in<D>(i);
-    const double length = length_of<D>(i, sum_of<D>(its, m, present), m.to);
+    const double length = length_of<D>(i, sum_of<D>(its, weights, present), m.to);
     largest_difference = std::max(largest_difference, length);
     sums[0] += length * length;
     sums[1] += 1.0;

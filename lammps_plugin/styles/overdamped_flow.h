@@ -139,7 +139,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   template <int D> struct Row;
   template <int D> bool is_as_it_was(int i, const AffineBox::Scaled<D> &present) const;
   template <int D> void hold(int begin, int end, double scale);
-  template <int D> RateIn<D> sum_of(const Row<D> &row, const Move &move, RateIn<D> present) const;
+  struct Weights;
+  template <int D> RateIn<D> sum_of(const Row<D> &row, const Weights &of, RateIn<D> present) const;
   template <int D> double length_of(int i, const RateIn<D> &of, double scale) const;
   template <int D> void require_small(int i, const RateIn<D> &moved, double scale);
   /// What a pass over the particles does beside moving them.
