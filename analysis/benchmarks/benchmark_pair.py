@@ -14,9 +14,12 @@ of the longest diameter, so that no contact is out of reach.
           a contact that is sought by iteration is found where it was
   nve     rods: under each atom style's fix nve, superellipsoids: flying on straight lines, about
           1e-3 a step; the list checked: LAMMPS's cost of any step
-  step    the whole compression step, lists rebuilt as needed: two evaluations, box, drag, rotation
+  step    the whole compression step, lists rebuilt as needed: two evaluations, box, drag, rotation;
+          in turns with `force` on the same state, so that a step is told in evaluations
   memory  slope of the peak resident set against N (a state replicated along its edges), integrator
           and rebuilt lists included; program, libraries and Python are in the intercept
+
+Larger systems are copies of a state side by side: --n 1024 --tiles 8 is 65536 particles.
 
 Each run is a process of the stock `lmp`, one rank; its deck stays under --work, to be profiled. A
 second is one of the loop time, times the share of a core that it got. Styles take turns, ratios are
@@ -49,6 +52,7 @@ Row = dict[str, Any]
 
 CALIBRATION = 50
 LIGHT = "bytes each"
+ALONE = "evaluation of {}"
 
 
 class At(NamedTuple):
@@ -58,6 +62,8 @@ class At(NamedTuple):
     case: Case
     phi: float
     n: int
+    tiles: int = 1
+    """Copies along each edge that these particles are; not of the memory, which has its own."""
 
     @property
     def row(self) -> Row:
@@ -72,13 +78,16 @@ def runs_of(options: Namespace, bench: Bench, at: At) -> dict[str, Callable[...,
         if name not in options.only or (at.measure == "step" and not style.is_ours):
             continue
         particles = style.instead or at.case.particles
-        packing = state(options.work, bench, particles, at.phi, at.n)
-        tag = re.sub(r"[^\w.]+", "_", f"{name}_{at.measure}_{at.case.name}_{at.phi:g}_{at.n}")
-        deck = options.work / f"{tag}.lmp"
-        write_deck(deck, bench, style, at.measure, packing)
-        found[name] = partial(run_deck, deck, plugin_path())
-        if style.is_ours and options.against:
-            found[f"{name} before"] = partial(run_deck, deck, options.against)
+        n = at.n // at.tiles**bench.dimension
+        packing = state(options.work, bench, particles, at.phi, n)
+        for measure in ("step", "force") if at.measure == "step" else (at.measure,):
+            tag = re.sub(r"[^\w.]+", "_", f"{name}_{measure}_{at.case.name}_{at.phi:g}_{n}")
+            deck = options.work / f"{tag}.lmp"
+            write_deck(deck, bench, style, measure, packing)
+            called = name if measure == at.measure else ALONE.format(name)
+            found[called] = partial(run_deck, deck, plugin_path(), tiles=at.tiles)
+            if style.is_ours and options.against:
+                found[f"{called} before"] = partial(run_deck, deck, options.against, tiles=at.tiles)
     return found
 
 
@@ -107,6 +116,8 @@ def compared(bench: Bench, rate: dict[str, FloatArray], name: str) -> Row:
     for column, other in bench.dearer_than.items():
         if other in rate:
             found[column] = np.median(rate[other] / rate[name])
+    if ALONE.format(name) in rate:
+        found["in evaluations"] = np.median(rate[ALONE.format(name)] / rate[name])
     if f"{name} before" in rate:
         found["speed over before"] = np.median(rate[name] / rate[f"{name} before"])
     return found
@@ -150,6 +161,7 @@ def parser() -> ArgumentParser:
     add("--measure", nargs="+", choices=MEASURES, default=list(MEASURES), help="(all)")
     add("--phi", nargs="+", type=float, help="packing fractions (those of the shape's cases)")
     add("--n", nargs="+", type=int, help="particles (usual for the shape)")
+    add("--tiles", type=int, default=1, help="copies of each state along each edge (1)")
     add("--rounds", type=int, default=5, help="(5)")
     add("--seconds", type=float, default=1.5, help="of each run (1.5)")
     add("--against", type=Path, help="an older plugin to compare with")
@@ -163,7 +175,7 @@ def places(options: Namespace, bench: Bench) -> list[At]:
     cases = bench.cases[: -(-len(bench.cases) // 2)] if options.quick else bench.cases
     sizes = options.n or (bench.n[:1] if options.quick else bench.n)
     found = [
-        At(measure, case, phi, n)
+        At(measure, case, phi, n * options.tiles**bench.dimension, options.tiles)
         for case in cases
         for phi in options.phi or case.phi
         for n in sizes

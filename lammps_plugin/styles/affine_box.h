@@ -40,17 +40,32 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   /// Gives LAMMPS the box of that scale.
   void set_box(double scale);
 
-  /// A position from its coordinates in the box of strain 0 (relative to the fixed point,
-  /// unwrapped), and back. `image` holds LAMMPS's periodic image counts.
-  Vec<3> position(const Vec<3> &reference, LAMMPS_NS::imageint image, double scale) const
-  {
-    const Vec<3> images = image_counts(image);
-    Vec<3> x{};
-    for (int k = 0; k < dimension; ++k) {
-      x[k] = fixed_point(k) + scale * (reference[k] - images[k] * edge_at_start(k));
+  /// The box of one scale: positions from coordinates in the box of strain 0 (relative to the fixed
+  /// point, unwrapped). `image` holds LAMMPS's periodic image counts.
+  template <int D> struct Scaled {
+    Vec<D> fixed_point, edge_at_start;
+    double scale;
+
+    Vec<D> position(const Vec<D> &reference, LAMMPS_NS::imageint image) const
+    {
+      const Vec<3> images = image_counts(image);
+      Vec<D> x;
+      for (int k = 0; k < D; ++k) {
+        x[k] = fixed_point[k] + scale * (reference[k] - images[k] * edge_at_start[k]);
+      }
+      return x;
     }
-    return x;
+  };
+  template <int D> Scaled<D> scaled(double scale) const
+  {
+    Scaled<D> found{{}, {}, scale};
+    for (int k = 0; k < D; ++k) {
+      found.fixed_point[k] = fixed_point(k);
+      found.edge_at_start[k] = edge_at_start(k);
+    }
+    return found;
   }
+  /// And back.
   Vec<3> reference(const double *x, LAMMPS_NS::imageint image, double scale) const;
 
  private:

@@ -24,10 +24,8 @@ class Heun : public Integrator {
   void step(OverdampedFlow &flow, LAMMPS_NS::bigint step, double dt) override
   {
     const double from = box.scale(step - 1), to = box.scale(step);
-    flow.hold_start();
-    flow.store_rates(from);
     box.set_box(to);
-    flow.move_by({dt, 0.0, from, to});
+    flow.start_by({dt, 0.0, from, to});
     flow.evaluate_forces();
     flow.finish_step({0.5 * dt, 0.5 * dt, to, to});
   }

@@ -13,26 +13,17 @@
 
 namespace jamshape {
 
-namespace {
-
-Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
-
-}  // namespace
-
 Rate read_rate(const double *from, int dimension)
 {
-  if (dimension == 2) return {{{from[0], from[1], 0.0}}, {{0.0, 0.0, from[2]}}};
-  return {vec3(from), vec3(from + 3)};
+  if (dimension == 3) return read_rate<3>(from);
+  const RateIn<2> in_plane = read_rate<2>(from);
+  return {{{in_plane.shift[0], in_plane.shift[1], 0.0}}, {{0.0, 0.0, in_plane.turn[0]}}};
 }
 
 void write_rate(double *to, const Rate &rate, int dimension)
 {
-  to = std::copy_n(rate.shift.c, dimension, to);
-  if (dimension == 2) {
-    *to = rate.turn[2];
-  } else {
-    std::copy_n(rate.turn.c, 3, to);
-  }
+  if (dimension == 3) return write_rate<3>(to, rate);
+  write_rate<2>(to, {{{rate.shift[0], rate.shift[1]}}, {{rate.turn[2]}}});
 }
 
 void Mobilities::measure(const PairContact &of)

@@ -12,13 +12,29 @@ namespace jamshape {
 
 class PairContact;
 
-/// Velocity and angular velocity of a particle relative to the affine motion, in space coordinates.
-struct Rate {
-  Vec<3> shift, turn;
+/// Velocity and angular velocity of a particle relative to the affine motion, in space coordinates;
+/// in the plane without the components that are zero.
+template <int D> struct RateIn {
+  Vec<D> shift;
+  Torque<D> turn;
 };
+using Rate = RateIn<3>;
 
-/// Rates as rows of 3 numbers in the plane, 6 in space, without the components that are zero.
+/// Rates as rows of 3 numbers in the plane, 6 in space.
 inline int rate_width(int dimension) { return dimension == 2 ? 3 : 6; }
+template <int D> RateIn<D> read_rate(const double *from)
+{
+  RateIn<D> rate;
+  for (int k = 0; k < D; ++k) rate.shift[k] = from[k];
+  for (int k = 0; k < ROTATIONS<D>; ++k) rate.turn[k] = from[D + k];
+  return rate;
+}
+template <int D> void write_rate(double *to, const RateIn<D> &rate)
+{
+  for (int k = 0; k < D; ++k) to[k] = rate.shift[k];
+  for (int k = 0; k < ROTATIONS<D>; ++k) to[D + k] = rate.turn[k];
+}
+/// The same where the dimension is known at run time only.
 Rate read_rate(const double *from, int dimension);
 void write_rate(double *to, const Rate &rate, int dimension);
 
@@ -57,6 +73,16 @@ class Mobilities : protected LAMMPS_NS::Pointers {
   {
     const double *const f = atom->f[i], *const t = atom->torque[i];
     return times(i, {{f[0], f[1], f[2]}}, {{t[0], t[1], t[2]}});
+  }
+  template <int D> RateIn<D> present_rate_in(int i) const
+  {
+    if constexpr (D == 3) {
+      return present_rate(i);
+    } else {
+      const Mobility &m = (*this)[i];
+      const double *const f = atom->f[i];
+      return {{{m.shift * f[0], m.shift * f[1]}}, {{m.turn[2] * atom->torque[i][2]}}};
+    }
   }
   Rate resistance_times(int i, const Rate &rate) const;
 

@@ -1,5 +1,7 @@
 #include "overdamped_flow.h"
 
+#include "contact/math/dimension.hpp"
+
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
@@ -39,6 +41,59 @@ constexpr double SAME_POSITION = 1e-13;
 
 }  // namespace
 
+/// What is kept of a particle, in its order: coordinates, rates of the stored stage, orientation at
+/// the step's start, registers.
+template <int D> struct OverdampedFlow::Row {
+  static constexpr int N_RATES = D + ROTATIONS<D>, N_TURNS = D == 2 ? 2 : 4;
+
+  double *values;
+
+  Vec<D> coordinates() const
+  {
+    Vec<D> y;
+    for (int k = 0; k < D; ++k) y[k] = values[k];
+    return y;
+  }
+  void set_coordinates(const Vec<D> &y) const { std::copy_n(y.c, D, values); }
+
+  RateIn<D> stored_rate() const { return read_rate<D>(values + D); }
+  void store_rate(const RateIn<D> &rate) const { write_rate<D>(values + D, rate); }
+
+  Quaternion orientation() const
+  {
+    const double *const q = values + D + N_RATES;
+    if constexpr (D == 2) {
+      return {q[0], 0.0, 0.0, q[1]};
+    } else {
+      return {q[0], q[1], q[2], q[3]};
+    }
+  }
+  void set_orientation(const Quaternion &q) const
+  {
+    double *const to = values + D + N_RATES;
+    to[0] = q.w;
+    if constexpr (D == 2) {
+      to[1] = q.k;
+    } else {
+      to[1] = q.i;
+      to[2] = q.j;
+      to[3] = q.k;
+    }
+  }
+
+  /// Of the last move (0) and of the one before it.
+  RateIn<D> displacement(int which) const
+  {
+    return read_rate<D>(values + D + N_RATES + N_TURNS + which * N_RATES);
+  }
+  void push_displacement(const RateIn<D> &moved) const
+  {
+    double *const last = values + D + N_RATES + N_TURNS;
+    std::copy_n(last, N_RATES, last + N_RATES);
+    write_rate<D>(last, moved);
+  }
+};
+
 OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineBox &affine_box,
                                LAMMPS_NS::Fix *owner, int registers) :
     Pointers(lmp), box(affine_box), dimension(domain->dimension), n_rates(rate_width(dimension)),
@@ -58,19 +113,26 @@ bool OverdampedFlow::begin_run()
 {
   pair = &PairContact::of(lmp, "fix overdamped/affine");
   measure_particles();
-  const double scale = box.scale(update->ntimestep);
   double moved = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    const Vec<3> expected = box.position(read_coordinates(i), atom->image[i], scale);
-    bool same = true;
-    for (int k = 0; k < dimension; ++k) {
-      same = same && std::abs(expected[k] - atom->x[i][k]) <= SAME_POSITION * domain->prd[k];
+  in_dimension(dimension, [&](auto D) {
+    const auto present = box.scaled<D>(box.scale(update->ntimestep));
+    for (int i = 0; i < atom->nlocal; ++i) {
+      if (is_as_it_was<D>(i, present)) continue;
+      set(i);
+      moved = 1.0;
     }
-    if (same) continue;
-    set(i);
-    moved = 1.0;
-  }
+  });
   return sum(moved) == 0.0;
+}
+
+template <int D> bool OverdampedFlow::is_as_it_was(int i, const AffineBox::Scaled<D> &present) const
+{
+  const Vec<D> expected = present.position(Row<D>{row(i)}.coordinates(), atom->image[i]);
+  bool same = true;
+  for (int k = 0; k < D; ++k) {
+    same = same && std::abs(expected[k] - atom->x[i][k]) <= SAME_POSITION * domain->prd[k];
+  }
+  return same;
 }
 
 double OverdampedFlow::largest_strain() const
@@ -82,12 +144,12 @@ double OverdampedFlow::largest_strain() const
 }
 
 /* ----------------------------------------------------------------------
-   rates
+   stages
 ------------------------------------------------------------------------- */
 
 namespace {
 
-void add(Rate &to, double weight, const Rate &rate)
+template <int D> void add(RateIn<D> &to, double weight, const RateIn<D> &rate)
 {
   to.shift += weight * rate.shift;
   to.turn += weight * rate.turn;
@@ -95,161 +157,162 @@ void add(Rate &to, double weight, const Rate &rate)
 
 }  // namespace
 
-Rate OverdampedFlow::stored_rate(int i) const { return read_rate(row(i) + dimension, dimension); }
-
-Rate OverdampedFlow::register_of(int i, int which) const
+void OverdampedFlow::hold_start(double scale)
 {
-  return read_rate(row(i) + dimension + n_rates + n_turns + which * n_rates, dimension);
+  in_dimension(dimension, [&](auto D) { hold<D>(0, atom->nlocal, scale); });
 }
 
-Vec<3> OverdampedFlow::read_coordinates(int i) const
+template <int D> void OverdampedFlow::hold(int begin, int end, double scale)
 {
-  return {{row(i)[0], row(i)[1], dimension == 2 ? 0.0 : row(i)[2]}};
-}
-
-Quaternion OverdampedFlow::orientation_at_start(int i) const
-{
-  const double *q = row(i) + dimension + n_rates;
-  if (dimension == 2) return {q[0], 0.0, 0.0, q[1]};
-  return {q[0], q[1], q[2], q[3]};
-}
-
-/* ----------------------------------------------------------------------
-   stages
-------------------------------------------------------------------------- */
-
-void OverdampedFlow::hold_start()
-{
-  if (!pair->particles_turn()) return;
-  pair->particle_view().for_each_orientation(atom->nlocal, [&](int i, const Quaternion &q) {
-    double *to = row(i) + dimension + n_rates;
-    to[0] = q.w;
-    if (dimension == 2) {
-      to[1] = q.k;
-    } else {
-      to[1] = q.i;
-      to[2] = q.j;
-      to[3] = q.k;
-    }
-  });
-}
-
-void OverdampedFlow::store_rate(int i, const Rate &rate)
-{
-  write_rate(row(i) + dimension, rate, dimension);
-}
-
-void OverdampedFlow::store_rates(double scale)
-{
-  for (int i = 0; i < atom->nlocal; ++i) {
-    const Rate rate = mobilities.present_rate(i);
-    store_rate(i, {(1.0 / scale) * rate.shift, rate.turn});
+  if (pair->particles_turn()) {
+    pair->particle_view().for_each_orientation(
+        begin, end, [&](int i, const Quaternion &q) { Row<D>{row(i)}.set_orientation(q); });
+  }
+  for (int i = begin; i < end; ++i) {
+    const RateIn<D> rate = mobilities.present_rate_in<D>(i);
+    Row<D>{row(i)}.store_rate({(1.0 / scale) * rate.shift, rate.turn});
   }
 }
+
+/// What a move's parts are multiplied by, without a division for each particle.
+struct OverdampedFlow::Weights {
+  double stored, present_shift, present, last, before;
+
+  explicit Weights(const Move &m) :
+      stored(m.stored), present_shift(m.present / m.from), present(m.present), last(m.last),
+      before(m.before)
+  {
+  }
+};
 
 /// Displacement in coordinates of the box of strain 0 and rotation vector.
-Rate OverdampedFlow::sum_of(int i, const Move &m) const
+template <int D>
+RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Weights &m, RateIn<D> present) const
 {
-  const Rate stored = stored_rate(i);
-  Rate sum{m.stored * stored.shift, m.stored * stored.turn};
+  const RateIn<D> stored = of.stored_rate();
+  RateIn<D> sum{m.stored * stored.shift, m.stored * stored.turn};
   if (m.present != 0.0) {
-    Rate present = mobilities.present_rate(i);
-    if (n_registers > 0 && dimension == 3) {
+    if constexpr (D == 3) {
       // The rate of a rotation vector is not the angular velocity, to first order in the vector.
-      present.turn += -0.5 * cross(register_of(i, 0).turn, present.turn);
+      if (n_registers > 0) present.turn += -0.5 * cross(of.displacement(0).turn, present.turn);
     }
-    sum.shift += (m.present / m.from) * present.shift;
+    sum.shift += m.present_shift * present.shift;
     sum.turn += m.present * present.turn;
   }
-  if (m.last != 0.0) add(sum, m.last, register_of(i, 0));
-  if (m.before != 0.0) add(sum, m.before, register_of(i, 1));
+  if (m.last != 0.0) add(sum, m.last, of.displacement(0));
+  if (m.before != 0.0) add(sum, m.before, of.displacement(1));
   return sum;
 }
 
-void OverdampedFlow::require_small(int i, const Rate &moved, double scale)
+template <int D> void OverdampedFlow::require_small(int i, const RateIn<D> &moved, double scale)
 {
-  const double limit = step_limit(mobilities[i]), distance = scale * norm(moved.shift);
+  const Mobilities::Mobility &of = mobilities[i];
+  const double limit = step_limit(of);
   if (can_retry) {
-    const double ratio =
-        (distance + mobilities[i].longest * norm(moved.turn)) / (LARGEST_TRIAL * limit);
+    const double reached = scale * norm(moved.shift) + of.longest * norm(moved.turn);
+    const double ratio = reached / (LARGEST_TRIAL * limit);
     farthest = ratio <= farthest ? farthest : ratio;  // NaN too
     return;
   }
-  if (distance <= limit) return;  // false for NaN
+  if (scale * scale * norm_sq(moved.shift) <= limit * limit) return;  // false for NaN
   error->one(FLERR, "fix overdamped/affine found that one step moves atom " +
-                        std::to_string(atom->tag[i]) + " by " + shown(distance) +
+                        std::to_string(atom->tag[i]) + " by " + shown(scale * norm(moved.shift)) +
                         ", expected at most half its radius: use a smaller timestep.");
 }
 
-/// Returns the distance from where the stored rates alone lead.
-double OverdampedFlow::place(int i, const Move &m, bool is_last)
+template <int D> void OverdampedFlow::move_in(const Move &m, Pass pass)
 {
-  const Rate moved = sum_of(i, m);
-  require_small(i, moved, m.to);
-  double difference = 0.0;
-  if (!can_retry && m.present != 0.0) {
-    difference = m.present * norm(mobilities.present_rate(i).shift - m.to * stored_rate(i).shift);
-  }
-  if (n_registers > 0 && !is_last) {
-    double *const last = row(i) + dimension + n_rates + n_turns;
-    std::copy_n(last, n_rates, last + n_rates);
-    write_rate(last, moved, dimension);
-  }
-  const Vec<3> coordinates = read_coordinates(i) + moved.shift;
-  const Vec<3> x = box.position(coordinates, atom->image[i], m.to);
-  for (int k = 0; k < dimension; ++k) {
-    atom->x[i][k] = x[k];
-    if (is_last) row(i)[k] = coordinates[k];
-  }
-  if (!pair->particles_turn()) return difference;
-  const Quaternion q = orientation_at_start(i);
-  pair->particle_view().set_orientation(i, dimension == 2 ? turned(q, Vec<1>{{moved.turn[2]}})
-                                                          : turned(q, moved.turn));
-  return difference;
-}
-
-void OverdampedFlow::move(const Move &m, bool is_last)
-{
-  double largest = 0.0;
+  const Weights weights(m);
+  const auto target = box.scaled<D>(m.to);
+  const bool is_last = pass == Pass::FINISH, compares = !can_retry && m.present != 0.0;
+  double largest_sq = 0.0;
   farthest = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i) largest = std::max(largest, place(i, m, is_last));
-  if (!can_retry) largest_difference = largest;
+  const auto place = [&](int i) {
+    const Row<D> its{row(i)};
+    const RateIn<D> present = m.present != 0.0 ? mobilities.present_rate_in<D>(i) : RateIn<D>{};
+    if (compares) {
+      const Vec<D> change = present.shift - m.to * its.stored_rate().shift;
+      largest_sq = std::max(largest_sq, norm_sq(change));
+    }
+    const RateIn<D> moved = sum_of<D>(its, weights, present);
+    require_small<D>(i, moved, m.to);
+    if (n_registers > 0 && !is_last) its.push_displacement(moved);
+    const Vec<D> coordinates = its.coordinates() + moved.shift;
+    const Vec<D> x = target.position(coordinates, atom->image[i]);
+    for (int k = 0; k < D; ++k) atom->x[i][k] = x[k];
+    if (is_last) its.set_coordinates(coordinates);
+    return moved.turn;
+  };
+  ParticleView::in_blocks(atom->nlocal, [&](int begin, int end) {
+    if (pass == Pass::START) hold<D>(begin, end, m.from);
+    // Two loops, so that many of the roots and quotients of `turned` are under way at a time.
+    Torque<D> turns[ParticleView::BLOCK];
+    for (int i = begin; i < end; ++i) turns[i - begin] = place(i);
+    if (!pair->particles_turn()) return;
+    pair->particle_view().set_orientations(
+        begin, end, [&](int i) { return turned(Row<D>{row(i)}.orientation(), turns[i - begin]); });
+  });
+  if (!can_retry) largest_difference = std::max(0.0, m.present * std::sqrt(largest_sq));
 }
 
-bool OverdampedFlow::move_by(const Move &m)
+void OverdampedFlow::move(const Move &m, Pass pass)
 {
-  move(m, false);
+  in_dimension(dimension, [&](auto D) { move_in<D>(m, pass); });
+}
+
+bool OverdampedFlow::was_small() const
+{
   if (!can_retry) return true;
   const double too_far = farthest <= 1.0 ? 0.0 : 1.0;
   return sum(too_far) == 0.0;
 }
 
-void OverdampedFlow::finish_step(const Move &m) { move(m, true); }
-
-double OverdampedFlow::length_of(int i, const Rate &of, double scale) const
+bool OverdampedFlow::move_by(const Move &m)
 {
-  const Vec<3> shift = scale * of.shift, turn = mobilities[i].gyration * of.turn;
+  move(m, Pass::MOVE);
+  return was_small();
+}
+
+bool OverdampedFlow::start_by(const Move &m)
+{
+  move(m, Pass::START);
+  return was_small();
+}
+
+void OverdampedFlow::finish_step(const Move &m) { move(m, Pass::FINISH); }
+
+template <int D> double OverdampedFlow::length_of(int i, const RateIn<D> &of, double scale) const
+{
+  const Vec<D> shift = scale * of.shift;
+  const Torque<D> turn = mobilities[i].gyration * of.turn;
   return std::sqrt(dot(shift, shift) + dot(turn, turn));
+}
+
+template <int D> void OverdampedFlow::add_lengths(const Move &m, double *sums)
+{
+  const Weights weights(m);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const Row<D> its{row(i)};
+    const RateIn<D> stored = its.stored_rate();
+    if (norm(stored.shift) == 0.0 && norm(vec3(atom->f[i])) == 0.0) continue;
+    const RateIn<D> present = mobilities.present_rate_in<D>(i);
+    const double length = length_of<D>(i, sum_of<D>(its, weights, present), m.to);
+    largest_difference = std::max(largest_difference, length);
+    sums[0] += length * length;
+    sums[1] += 1.0;
+    if (n_registers == 0) continue;
+    RateIn<D> change{(1.0 / m.from) * present.shift, present.turn};
+    add(change, -1.0, stored);
+    sums[2] += length * length_of<D>(i, change, m.to);
+    sums[3] += length * length_of<D>(i, its.displacement(0), m.to);
+  }
 }
 
 double OverdampedFlow::rms_of(const Move &m)
 {
   double mine[4] = {0.0, 0.0, 0.0, 0.0}, all[4];
   largest_difference = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    const Rate stored = stored_rate(i);
-    if (norm(stored.shift) == 0.0 && norm(vec3(atom->f[i])) == 0.0) continue;
-    const double length = length_of(i, sum_of(i, m), m.to);
-    largest_difference = std::max(largest_difference, length);
-    mine[0] += length * length;
-    mine[1] += 1.0;
-    if (n_registers == 0) continue;
-    Rate change = mobilities.present_rate(i);
-    change.shift = (1.0 / m.from) * change.shift;
-    add(change, -1.0, stored);
-    mine[2] += length * length_of(i, change, m.to);
-    mine[3] += length * length_of(i, register_of(i, 0), m.to);
-  }
+  in_dimension(dimension, [&](auto D) { add_lengths<D>(m, mine); });
   MPI_Allreduce(mine, all, 4, MPI_DOUBLE, MPI_SUM, world);
   seen = all[3] > 0.0 ? all[2] / all[3] : 0.0;
   return all[1] > 0.0 ? std::sqrt(all[0] / all[1]) : 0.0;

@@ -32,14 +32,13 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /// Sizes of own atoms; after every exchange of atoms.
   void measure_particles() { mobilities.measure(*pair); }
 
-  /* stages of a step, for integrators: from `hold_start` to `finish_step`, coordinates at the start
-     of the step, rates stored with `store_rates` and registers stay with their atoms on whatever
-     rank. Scales are those of the box, L / L(strain 0) */
+  /* stages of a step, for integrators: from `hold_start` to `finish_step`, coordinates and rates at
+     the start of the step and registers stay with their atoms on whatever rank. Scales are those of
+     the box, L / L(strain 0) */
 
-  /// The present state is where every move starts, until the step is finished.
-  void hold_start();
-  /// Stores the rates of the present forces, which belong to the box of this scale.
-  void store_rates(double scale);
+  /// The present state is where every move starts, until the step is finished; the rates of the
+  /// present forces, which belong to the box of this scale, are stored.
+  void hold_start(double scale);
   /// Moves every particle from its coordinates at the start of the step, into the box `to`, by
   ///
   ///     stored * (stored rate) + present * (rate of the present forces in the box `from`)
@@ -56,6 +55,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /// through then, and another move may follow.
   bool move_by(const Move &move);
   void allow_retries() { can_retry = true; }
+  /// `hold_start(move.from)` and `move_by(move)` in one pass over the particles.
+  bool start_by(const Move &move);
   /// As move_by, and makes it the state.
   void finish_step(const Move &move);
   /// The same sum as a length: rms over all particles that a force moves, turns times the radius of
@@ -135,16 +136,19 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
 
   double *row(int i) const { return values + static_cast<std::size_t>(width()) * i; }
 
-  Rate stored_rate(int i) const;
-  Rate register_of(int i, int which) const;
-  void store_rate(int i, const Rate &rate);
-  Rate sum_of(int i, const Move &move) const;
-  double length_of(int i, const Rate &of, double scale) const;
-  void require_small(int i, const Rate &moved, double scale);
-  Vec<3> read_coordinates(int i) const;
-  Quaternion orientation_at_start(int i) const;
-  double place(int i, const Move &move, bool is_last);
-  void move(const Move &move, bool is_last);
+  template <int D> struct Row;
+  template <int D> bool is_as_it_was(int i, const AffineBox::Scaled<D> &present) const;
+  template <int D> void hold(int begin, int end, double scale);
+  struct Weights;
+  template <int D> RateIn<D> sum_of(const Row<D> &row, const Weights &of, RateIn<D> present) const;
+  template <int D> double length_of(int i, const RateIn<D> &of, double scale) const;
+  template <int D> void require_small(int i, const RateIn<D> &moved, double scale);
+  /// What a pass over the particles does beside moving them.
+  enum class Pass { MOVE, START, FINISH };
+  template <int D> void move_in(const Move &move, Pass pass);
+  void move(const Move &move, Pass pass);
+  bool was_small() const;
+  template <int D> void add_lengths(const Move &of, double *sums);
   void clear_forces();
   double sum(double mine) const;
   void rebuild_lists();

@@ -56,8 +56,7 @@ void StepControl::step(OverdampedFlow &flow, bigint to, double dt)
   Span left{box, to - 1, 0.0, dt, true, 0.0};
   while (left.h > 0.0) {
     refresh(flow);
-    flow.hold_start();
-    flow.store_rates(left.from());
+    flow.hold_start(left.from());
     const double h = substep(flow, left);
     left.begin = h == left.h ? dt : left.begin + h;
     left.h = dt - left.begin;

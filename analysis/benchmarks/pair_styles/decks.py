@@ -112,9 +112,9 @@ def write_deck(path: Path, bench: Bench, style: Style, measure: str, packing: Pa
     flow = bench.step if style.is_ours and measure in {"step", "memory"} else style.nve
     path.write_text(
         f"units lj\ndimension {bench.dimension}\n{style.atoms}\nread_data {data}\n"
-        + (f"replicate {tiles}\n" if measure == "memory" else "")
-        + f"{style.pair(packing)}\nneighbor {style.skin} bin\n"
-        + f"neigh_modify {MEASURES[measure]} one 10000 page 1000000\n"
+        f"replicate {tiles}\n"
+        f"{style.pair(packing)}\nneighbor {style.skin} bin\n"
+        f"neigh_modify {MEASURES[measure]} one 10000 page 1000000\n"
         + (f"{flow}\n" if measure != "force" else "")
         + 'thermo 0\nrun ${steps}\nshell "grep VmHWM /proc/$PPID/status"\n'
     )
