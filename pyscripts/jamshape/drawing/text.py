@@ -19,13 +19,18 @@ _OF_ENSEMBLES = ("n", "size_ratio", "kappa")
 
 
 def scientific(value: float) -> str:
-    """Write a number from 0 as a power of ten in TeX, without dollars."""
+    r"""Write a number from 0 as a power of ten in TeX, without dollars, to two digits.
+
+    Examples
+    --------
+    >>> scientific(9.9999e-16), scientific(2e-6)
+    ('10^{-15}', '2\\times 10^{-6}')
+    """
     if value == 0:
         return "0"
-    exponent = math.floor(math.log10(value) + 1e-9)
-    factor = value / 10.0**exponent
-    power = f"10^{{{exponent}}}"
-    return power if abs(factor - 1) < 1e-6 else rf"{factor:.2g}\times {power}"
+    factor, exponent = f"{value:.1e}".split("e")
+    power = f"10^{{{int(exponent)}}}"
+    return power if factor == "1.0" else rf"{float(factor):g}\times {power}"
 
 
 def short(value: float) -> str:
