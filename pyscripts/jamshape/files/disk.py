@@ -34,7 +34,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
         One sentence, if the disk is full, or the folder is not there or not to be written to.
     """
     place = real(path)
-    _remove_leftovers(place)
+    remove_leftovers(place)
     temporary = place.with_name(f"{_prefix(place)}{os.getpid()}{_END}")
     with refusals(path, temporary):
         try:
@@ -83,8 +83,9 @@ def _prefix(place: Path) -> str:
     return f".{place.name}.{os.uname().nodename}."
 
 
-def _remove_leftovers(place: Path) -> None:
-    """Remove temporary files of processes of this machine that are no more."""
+def remove_leftovers(path: PathLike) -> None:
+    """Remove temporary files for `path` of processes of this machine that are no more."""
+    place = real(path)
     prefix = _prefix(place)
     with suppress(OSError):  # of folders that are not there, of which the writer tells
         for name in (path.name for path in place.parent.iterdir()):

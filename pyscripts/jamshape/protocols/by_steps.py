@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from jamshape.files.disk import remove_leftovers
 from jamshape.files.h5md import read_attributes, read_packing, require_attributes
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum
@@ -53,6 +54,7 @@ class BySteps:
         ------
         ValueError
         """
+        remove_leftovers(self.file)  # what goes on may be done before it writes the file again
         if self.file.exists():
             require_attributes(self.file, self.recipe.attributes(), "the making of a packing")
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from jamshape.files.disk import remove_leftovers
 from jamshape.files.h5md import read_attributes, read_packing, write_frames
 from jamshape.files.journal import remove_run
 from jamshape.landscape import Landscape
@@ -87,6 +88,7 @@ class SearchFile:
 
     def read(self, landscape: Landscape) -> Search | None:
         """Read the search, if it is there and of this recipe; the landscape goes on counting."""
+        remove_leftovers(self.path)  # what goes on may be done before it writes the file again
         if not self.path.exists():
             return None
         stored = read_attributes(self.path)
