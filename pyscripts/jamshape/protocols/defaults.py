@@ -62,7 +62,7 @@ SETTINGS = (
 # Steps of the packing fraction grow to this far below jamming. What is led to an energy need not be balanced well before.
 _COARSE, _ROUGH = 1e-2, 1e-2
 
-# Of the square of the step, [energy]: a step adds some ten thousand times as much to a jammed packing.
+# Of the square of the step, [energy]: a step adds some ten to a hundred times as much to a jammed packing.
 _LOOSE = 2.5e-3
 
 _LAMBDA = 1e-6  # of the halving search, to begin with (Marschall & Teitel 2018, Sec. III C)
