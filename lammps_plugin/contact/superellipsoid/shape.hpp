@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 
 namespace jamshape {
 
@@ -128,31 +129,42 @@ bool is_flat_at(const SuperellipsoidBody<D, S> &body, const Vec<D, S> &point)
   return true;
 }
 
-/// x^e of x >= 0. Small integer powers, all that the usual shapes need, are products.
+/// x^e of x >= 0. Small whole powers, all that the usual shapes need, are products; of plain
+/// numbers half ones, too (the root of a dual number has no derivative at 0, but x^1.5 has one).
 template <class T> class Exponent {
  public:
-  explicit Exponent(T exponent) :
-      e(exponent),
-      whole(exponent == std::floor(exponent) && exponent <= T(32) ? static_cast<int>(exponent) : -1)
-  {
-  }
+  explicit Exponent(T exponent) : e(exponent), halves(halves_in(exponent)) {}
 
   T value() const { return e; }
 
   template <class S> S operator()(const S &x) const
   {
-    if (whole < 0) return pow(x, e);
+    if (halves >= 0 && halves % 2 == 0) return product(x, halves / 2);
+    if constexpr (std::is_same_v<S, T>) {
+      if (halves >= 0) return product(sqrt(x), halves);
+    }
+    return pow(x, e);
+  }
+
+ private:
+  T e;
+  int halves;  // in e, or -1
+
+  static int halves_in(T exponent)
+  {
+    const T twice = 2 * exponent;
+    return twice == std::floor(twice) && exponent <= T(32) ? static_cast<int>(twice) : -1;
+  }
+
+  template <class S> static S product(const S &x, int times)
+  {
     S power = 1.0, square = x;
-    for (int left = whole; left > 0; left >>= 1) {
+    for (int left = times; left > 0; left >>= 1) {
       if (left & 1) power *= square;
       if (left > 1) square *= square;
     }
     return power;
   }
-
- private:
-  T e;
-  int whole;
 };
 
 /// A norm at a vector: its value N, its gradient and its second derivatives.

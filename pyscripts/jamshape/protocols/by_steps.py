@@ -133,6 +133,9 @@ class BySteps:
             "phi_step": compression.step,
             "parts": compression.parts,
             "loose_phi": compression.loose_phi,
+            "jammed_phi": compression.jammed_phi,
+            "openings": compression.openings,
+            "halves": compression.halves,
             "is_thermalised": self.is_thermalised,
             "n_sweeps_done": self.thermal.n_done if self.thermal else -1,
             "move_size": self.thermal.size if self.thermal else 0.0,
@@ -150,6 +153,9 @@ class BySteps:
             step=float(stored["phi_step"]),
             loose=None if math.isnan(loose_phi) else State.of(read_packing(self.file, 0)),
             loose_phi=loose_phi,
+            jammed_phi=float(stored.get("jammed_phi", math.nan)),
+            openings=int(stored.get("openings", 0)),
+            halves=bool(stored.get("halves", False)),
             parts=int(stored.get("parts", 0)),
         )
         self.is_thermalised = bool(stored["is_thermalised"])

@@ -1,8 +1,9 @@
 """Athermal quasistatic compression: protocol 1 of Yuan et al., Soft Matter (2019), Sec. 2.2.
 
 The packing fraction grows by small steps, each followed by a minimisation, until the energy per particle is above
-a small tolerance; then the step is halved from the last unjammed state until the first jammed one is as
-close to the tolerance as asked. Of any shape; needs no LAMMPS.
+a small tolerance. The jammed packing is then opened until it is as close to the tolerance as asked. Where it falls
+apart on the way, the step from the last unjammed state is halved instead, again and again. Of any shape; needs no
+LAMMPS.
 """
 
 from __future__ import annotations
@@ -14,10 +15,14 @@ from dataclasses import dataclass, field
 from jamshape.checks import require_positive
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Minimum, Outcome, Stop, minimise
+from jamshape.minima.target import nearer
 from jamshape.packing import State
 
 # A step this small leads nowhere: the energy jumps there, by a rearrangement.
 _SMALLEST_STEP = 1e-9
+
+# A jammed packing is opened at most so often, each time by at most a factor of 4 in sqrt(U).
+_MOST_OPENINGS = 30
 
 # A long minimisation is told of and stored after so many evaluations, and given up after so many parts.
 _PART, _MOST_PARTS = 5000, 40
@@ -85,6 +90,12 @@ class QuasistaticRun:
         By which phi grows next.
     loose, loose_phi
         The densest unjammed state, if any.
+    jammed_phi
+        Of the least dense jammed state, if any.
+    openings
+        How often the jammed packing was opened to get to the state; 0: it was not.
+    halves
+        Whether steps are halved instead: a packing that was opened fell apart, or did not come close.
     minimum
         The jammed packing, once it is found.
     parts
@@ -96,6 +107,9 @@ class QuasistaticRun:
     step: float
     loose: State | None = None
     loose_phi: float = math.nan
+    jammed_phi: float = math.nan
+    openings: int = 0
+    halves: bool = False
     minimum: Minimum | None = None
     parts: int = 0
     history: History = field(default_factory=History)
@@ -105,11 +119,20 @@ class QuasistaticRun:
         """Begin at a state."""
         return cls(state, _phi(landscape, state), protocol.coarse or protocol.step)
 
-    def go_on(self, phi: float) -> None:
-        """Compress the densest unjammed state to a packing fraction."""
+    def begin(self, step: float) -> None:
+        """Compress the densest unjammed state by a step of the packing fraction."""
         assert self.loose is not None
-        strain = (self.loose_phi / phi) ** (1 / self.loose.dimension) - 1
-        self.state, self.phi = self.loose.strained(strain), phi
+        self.step, self.phi, self.openings = step, self.loose_phi + step, 0
+        strain = (self.loose_phi / self.phi) ** (1 / self.loose.dimension) - 1
+        self.state = self.loose.strained(strain)
+
+    def halve(self) -> None:
+        """Go on in the middle between the densest unjammed state and the least dense jammed one."""
+        self.begin((self.jammed_phi - self.loose_phi) / 2)
+
+    def open(self, state: State, phi: float) -> None:
+        """Go on with a jammed state that was opened."""
+        self.state, self.phi, self.openings = state, phi, self.openings + 1
 
 
 def compress(
@@ -146,23 +169,51 @@ def compress(
         compression.parts = 0
         per_particle = found.evaluation.energy / landscape.particles.n
         if per_particle <= protocol.energy:
-            compression.loose, compression.loose_phi = found.state, compression.phi
-            compression.step = _next_step(compression.step, evaluations, protocol)
-            compression.go_on(compression.phi + compression.step)
+            _go_on_from_unjammed(compression, found, evaluations, protocol)
         elif compression.loose is None:
             msg = (
                 f"the start at phi = {compression.phi:.4g} is jammed with U/N = {per_particle:.3g},"
                 f" expected at most {protocol.energy:g}; start at a smaller phi"
             )
             raise ValueError(msg)
-        elif per_particle <= protocol.closeness * protocol.energy or (
-            compression.step < _SMALLEST_STEP
-        ):
+        elif per_particle <= protocol.closeness * protocol.energy or _is_narrow(compression):
             compression.minimum, compression.state = found, found.state
         else:
-            compression.step /= 2
-            compression.go_on(compression.loose_phi + compression.step)
+            _go_on_from_jammed(landscape, compression, found, protocol)
         yield compression
+
+
+def _is_narrow(compression: QuasistaticRun) -> bool:
+    """Whether nothing is left between the jammed state and the unjammed one."""
+    left = compression.phi - compression.loose_phi
+    return left < _SMALLEST_STEP and compression.halves
+
+
+def _go_on_from_unjammed(
+    compression: QuasistaticRun, found: Minimum, evaluations: int, protocol: Quasistatic
+) -> None:
+    compression.halves |= compression.openings > 0
+    compression.loose, compression.loose_phi = found.state, compression.phi
+    if compression.jammed_phi - compression.loose_phi > _SMALLEST_STEP:
+        compression.halve()
+        return
+    if not math.isnan(compression.jammed_phi):  # it was none, or jams at another phi now
+        compression.jammed_phi, compression.halves = math.nan, False
+        compression.step = protocol.step
+    compression.begin(_next_step(compression.step, evaluations, protocol))
+
+
+def _go_on_from_jammed(
+    landscape: Landscape, compression: QuasistaticRun, found: Minimum, protocol: Quasistatic
+) -> None:
+    compression.jammed_phi = compression.phi
+    compression.halves |= compression.openings >= _MOST_OPENINGS
+    if compression.halves:
+        compression.halve()
+        return
+    aim = math.sqrt(protocol.closeness) * protocol.energy * landscape.particles.n
+    opened = nearer(landscape, found, aim / found.state.volume)
+    compression.open(opened, _phi(landscape, opened))
 
 
 def _next_step(step: float, evaluations: int, protocol: Quasistatic) -> float:
@@ -179,7 +230,9 @@ def _minimised(landscape: Landscape, compression: QuasistaticRun, protocol: Quas
     state = compression.state
     lowest = protocol.energy * landscape.particles.n / state.volume
     stop = Stop(tolerance=protocol.tolerance, lowest=lowest, evaluations=_PART)
-    found = minimise(landscape, state, protocol.method, stop, compression.history)
+    is_near = compression.openings > 0 and protocol.method == "auto"
+    method = "near" if is_near else protocol.method
+    found = minimise(landscape, state, method, stop, compression.history)
     if found.outcome is Outcome.STALLED and protocol.method != "newton":
         return minimise(landscape, found.state, "newton", stop, compression.history)
     return found
