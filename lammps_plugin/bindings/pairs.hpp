@@ -46,15 +46,10 @@ struct PairArrays {
 
   SplitPoses poses() const
   {
-    const auto parts = [](const double *data, std::size_t size, const double *(&to)[2]) {
-      to[0] = data;
-      to[1] = data + size / 2;
+    const auto parts = [](const auto &of) {
+      return SplitPoses::View{of.data(), of.data() + of.size() / 2};
     };
-    SplitPoses split;
-    parts(position.data(), position.size(), split.position);
-    parts(orientation.data(), orientation.size(), split.orientation);
-    parts(edges.data(), edges.size(), split.edges);
-    return split;
+    return {parts(position), parts(orientation), parts(edges)};
   }
 
   PairList list() const { return {pairs.shape(0), pairs.data(), shift.data()}; }

@@ -18,15 +18,18 @@ struct PoseArrays {
   const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
   const Array2<double> &edges;        // (2, D)
 
-  Poses sum() const
+  Poses read() const
   {
-    const auto added = [](const double *from, std::size_t size) {
-      std::vector<long double> sum(from, from + size / 2);
-      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += from[sum.size() + k];
-      return sum;
+    Poses poses;
+    const auto fill = [](Poses::Numbers &to, const auto &from) {
+      for (std::size_t part = 0, n = from.size() / 2; part < 2; ++part) {
+        to[part].assign(from.data() + part * n, from.data() + (part + 1) * n);
+      }
     };
-    return {added(position.data(), position.size()), added(orientation.data(), orientation.size()),
-            added(edges.data(), edges.size())};
+    fill(poses.position, position);
+    fill(poses.orientation, orientation);
+    fill(poses.edges, edges);
+    return poses;
   }
 };
 
@@ -95,7 +98,7 @@ void take(Vicinity &of, const Array2<std::int64_t> &pairs, const Array2<std::int
   require_finite(hold.c, 3, "wide, reach and skin");
   of.take({{pairs.data(), pairs.data() + pairs.size()},
            {shift.data(), shift.data() + shift.size()},
-           then.sum(),
+           then.read(),
            hold[0],
            hold[1]},
           hold[2]);
@@ -133,26 +136,20 @@ void move_to(Vicinity &of, const Array3<double> &position, const Array3<double> 
 {
   const PoseArrays poses{position, orientation, edges};
   check_poses(poses, of);
-  of.move_to(poses.sum());
-}
-
-/// Fills the doubles and their small rests of an array (2, ...).
-void split_into(NewArray<double> &to, const std::vector<long double> &from)
-{
-  for (std::size_t k = 0; k < from.size(); ++k) {
-    to[k] = static_cast<double>(from[k]);
-    to[from.size() + k] = static_cast<double>(from[k] - to[k]);
-  }
+  of.move_to(poses.read());
 }
 
 nb::object tuple_of(const Poses &poses)
 {
-  const std::size_t D = poses.edges.size(), N = poses.position.size() / D;
-  const std::size_t turns = poses.orientation.size() / std::max<std::size_t>(N, 1);
+  const std::size_t D = poses.edges[0].size(), N = poses.position[0].size() / D;
+  const std::size_t turns = poses.orientation[0].size() / std::max<std::size_t>(N, 1);
   NewArray<double> position({2, N, D}), orientation({2, N, turns}), edges({2, D});
-  split_into(position, poses.position);
-  split_into(orientation, poses.orientation);
-  split_into(edges, poses.edges);
+  const auto fill = [](NewArray<double> &to, const Poses::Numbers &from) {
+    std::copy(from[1].begin(), from[1].end(), std::copy(from[0].begin(), from[0].end(), &to[0]));
+  };
+  fill(position, poses.position);
+  fill(orientation, poses.orientation);
+  fill(edges, poses.edges);
   return nb::make_tuple(position.release(), orientation.release(), edges.release());
 }
 

@@ -340,7 +340,7 @@ class Descent {
   {
     const double seconds = std::chrono::duration<double>(Clock::now() - began).count();
     double volume = 1.0;
-    for (const long double edge : about.poses().edges) volume *= static_cast<double>(edge);
+    for (const double edge : about.poses().edges[0]) volume *= edge;
     rows.push_back({seconds, evaluations, residual_of(about, sums), sums.energy / volume});
     const double left = rows.back().residual, density = rows.back().energy_density;
     if (density < LESS_ENERGY * least_energy || left < LESS_RESIDUAL * least_residual) {

@@ -6,6 +6,7 @@
 #include "packing/pair_sum.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,11 +16,26 @@
 
 namespace jamshape {
 
-/// Poses of N particles and the edges of the box, in long double.
+/// Poses of N particles and the edges of the box, every number a double [0] and its small rest [1].
 struct Poses {
-  std::vector<long double> position;     // (N, D)
-  std::vector<long double> orientation;  // (N,) angles in the plane, (N, 4) quaternions in space
-  std::vector<long double> edges;        // (D,)
+  using Numbers = std::vector<double>[2];
+  Numbers position;     // (N, D)
+  Numbers orientation;  // (N,) angles in the plane, (N, 4) quaternions in space
+  Numbers edges;        // (D,)
+
+  static Split get(const Numbers &of, std::size_t k) { return {of[0][k], of[1][k]}; }
+  static void set(Numbers &of, std::size_t k, const Split &to)
+  {
+    of[0][k] = to.value;
+    of[1][k] = to.rest;
+  }
+
+  /// To be strained.
+  SplitPoses view(double strain) const
+  {
+    const auto parts = [](const Numbers &of) { return std::array{of[0].data(), of[1].data()}; };
+    return {parts(position), parts(orientation), parts(edges), strain};
+  }
 };
 
 /// What coordinates are: column (N, D + rotations), -1 for none; rotations count as lengths, and
@@ -146,32 +162,26 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   int dimension() const override { return D; }
   std::size_t n() const override { return coordinates.n; }
   std::size_t n_particles() const override { return shapes.size(); }
-  bool has_base() const override { return base.position.size() == D * shapes.size(); }
+  bool has_base() const override { return base.position[0].size() == D * shapes.size(); }
   bool has_pairs() const override { return !pairs.moved.empty(); }
   const Poses &poses() const override { return base; }
 
   void move_to(const Poses &poses) override
   {
     base = poses;
-    for (NearPairs *list : {&wide, &pairs}) {
-      if (!list->moved.empty()) measure(*list);
-    }
+    if (has_pairs()) measure(pairs);
   }
 
   void move(const Displacement &at) override
   {
-    Poses poses = moved(at);
-    if constexpr (D == 2) {  // whole turns would cost digits
-      constexpr long double TURN = 2.0L * 3.14159265358979323846264338327950288L;
-      for (long double &angle : poses.orientation) angle -= TURN * std::rint(angle / TURN);
-    }
-    move_to(poses);
+    displace(base, at);
+    settle(base, at.strain);
+    if (has_pairs()) measure(pairs);
   }
 
   void take(NearPairs wider, double smaller_skin) override
   {
     wide = std::move(wider);
-    measure(wide);
     skin = smaller_skin;
     choose({std::vector<double>(n()).data(), 0.0});
   }
@@ -182,6 +192,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     if (!is_outrun && !is_beyond(pairs, at)) return true;
     const Eigen::Map<const Eigen::VectorXd> x(at.x, static_cast<Eigen::Index>(n()));
     // Chosen at the same points whenever the wide ones were taken: factors depend on the choice.
+    measure(wide);
     is_outrun = is_beyond(wide, at, skin) || !x.allFinite();
     if (is_outrun) return false;
     choose(at);
@@ -239,16 +250,15 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   void differentiate(const Displacement &at) override
   {
     if (!hessian) hessian = block_system();
-    const SplitArrays poses = displaced(at);
-    const PosedPairs<Model, D, double> posed(shapes, poses.view(), pairs.list(), law);
+    const PosedPairs<Model, D, double> posed = posed_at<double>(pairs, at);
     const TurnedBodies<Model, D, double> turned_bodies(posed);
     hessian->clear();
     pulled = Eigen::VectorXd::Zero(n());
     for (std::size_t p = 0; p < posed.size(); ++p) {
       const Vec<D> r = posed.separation(p);
       Start start = remembers ? starts[p] : Start{};
-      if (posed.contact(p, r, start).status != ContactStatus::TOUCHING) continue;
-      const DualContact contact = turned_bodies.contact(p, start);
+      if (posed.contact(p, r, &start).status != ContactStatus::TOUCHING) continue;
+      const DualContact contact = turned_bodies.contact(p, &start);
       if (contact.status == ContactStatus::TOUCHING) add_pair(p, r, contact, 1.0 + at.strain);
     }
   }
@@ -281,18 +291,6 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   /// than the iterations that spare it.
   static constexpr std::size_t FEW = 150;
 
-  /// Doubles and their small rests.
-  struct SplitArrays {
-    std::vector<double> position[2], orientation[2], edges[2];
-
-    SplitPoses view() const
-    {
-      return {{position[0].data(), position[1].data()},
-              {orientation[0].data(), orientation[1].data()},
-              {edges[0].data(), edges[1].data()}};
-    }
-  };
-
   std::vector<Shape> shapes;
   Coordinates coordinates;
   NearPairs wide, pairs;             // `pairs` are those of `wide` that are within `skin`
@@ -303,6 +301,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   bool is_outrun = false;             // `pairs`, at a point where `wide` is so too
   Law law;
   Poses base;
+  mutable Poses there;                   // at the last point
   std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
   Eigen::VectorXd pulled;
 
@@ -310,10 +309,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
 
   template <class S> LandscapeSums sums(const Displacement &at) const
   {
-    const SplitArrays poses = displaced(at);
-    const PairSums<D, S> sums =
-        sum_over(PosedPairs<Model, D, S>(shapes, poses.view(), pairs.list(), law), shapes.size(),
-                 remembers ? &starts : nullptr);
+    const PairSums<D, S> sums = sum_over(posed_at<S>(pairs, at), begins<S>());
     S trace = 0.0;
     for (int k = 0; k < D; ++k) trace += sums.virial[(D + 1) * k];
     return {static_cast<double>(sums.energy),
@@ -323,6 +319,21 @@ template <class Model, int D> class VicinityOf : public Vicinity {
             sums.n_bonds,
             of_wide(sums.crossing),
             of_wide(sums.unconverged)};
+  }
+
+  template <class S> StartIn<Model, D, S> *begins() const
+  {
+    if constexpr (std::is_same_v<S, double>) return remembers ? starts.data() : nullptr;
+    return nullptr;
+  }
+
+  /// Pairs of a list at a point, as long as no other point is asked for.
+  template <class S>
+  PosedPairs<Model, D, S> posed_at(const NearPairs &list, const Displacement &at) const
+  {
+    there = base;
+    displace(there, at);
+    return {shapes, there.view(at.strain), list.list(), law};
   }
 
   /// The number of a pair, or -1, as whoever gave the pairs knows it.
@@ -360,37 +371,45 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return {{static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])}};
   }
 
+  /// How an edge of the box has grown since a list was made.
+  double growth(const NearPairs &list, int k) const
+  {
+    return base.edges[0][k] / list.then.edges[0][k];
+  }
+
   void measure(NearPairs &list) const
   {
     list.moved.resize(D * shapes.size());
     list.turned.resize(TURNS * shapes.size());
-    for (std::size_t i = 0; i < shapes.size(); ++i) {
-      for (int k = 0; k < D; ++k) {
-        const long double scale = base.edges[k] / list.then.edges[k];
-        list.moved[D * i + k] =
-            static_cast<double>(base.position[D * i + k] - scale * list.then.position[D * i + k]);
+    for (int k = 0; k < D; ++k) {
+      const double scale = growth(list, k);
+      for (std::size_t c = k; c < list.moved.size(); c += D) {
+        list.moved[c] = base.position[0][c] - scale * list.then.position[0][c];
       }
-      measure_turn(list, i);
+    }
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      if (turns(i)) measure_turn(list, i);
     }
   }
 
   void measure_turn(NearPairs &list, std::size_t i) const
   {
-    const long double *const now = &base.orientation[TURNS * i];
-    const long double *const then = &list.then.orientation[TURNS * i];
+    const double *const now = &base.orientation[0][TURNS * i];
+    const double *const then = &list.then.orientation[0][TURNS * i];
     if constexpr (D == 2) {
-      list.turned[i] = static_cast<double>(now[0] - then[0]);
+      list.turned[i] = now[0] - then[0];
     } else {
-      using Long = QuaternionOf<long double>;
-      const Long q =
-          Long{now[0], now[1], now[2], now[3]} * Long{then[0], -then[1], -then[2], -then[3]};
-      const long double parts[] = {q.w, q.i, q.j, q.k};
-      std::transform(parts, parts + TURNS, &list.turned[TURNS * i],
-                     [](long double x) { return static_cast<double>(x); });
+      const Quaternion q = Quaternion{now[0], now[1], now[2], now[3]} *
+                           Quaternion{then[0], -then[1], -then[2], -then[3]};
+      const double parts[] = {q.w, q.i, q.j, q.k};
+      std::copy_n(parts, TURNS, &list.turned[TURNS * i]);
     }
   }
 
-  /// The angle by which a particle is turned at a point, since a list was made.
+  /// Whether contacts can turn a particle.
+  bool turns(std::size_t i) const { return Model::template turns<D>(shapes[i]); }
+
+  /// The angle by which a particle is turned at a point since a list was made, or a little more.
   double turned_to(const NearPairs &list, const Displacement &at, std::size_t i) const
   {
     const double *const before = &list.turned[TURNS * i];
@@ -398,8 +417,9 @@ template <class Model, int D> class VicinityOf : public Vicinity {
       const double angle = std::abs(before[0] + turn(at, i)[0]);
       return angle > M_PI ? std::abs(std::remainder(angle, 2.0 * M_PI)) : angle;
     } else {
-      const Quaternion q{before[0], before[1], before[2], before[3]};
-      return norm(rotation_vector(turned(q, turn(at, i))));
+      const Quaternion q =
+          rotation_by(turn(at, i)) * Quaternion{before[0], before[1], before[2], before[3]};
+      return std::min(M_PI, 2.0 * norm(Vec<3>{{q.i, q.j, q.k}}) / std::abs(q.w));  // its tangent
     }
   }
 
@@ -412,14 +432,14 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     double most = 0.0, scaled = 0.0;
     const double stretch = 1.0 + at.strain;
     for (int k = 0; k < D; ++k) {
-      const double scale = stretch * static_cast<double>(base.edges[k] / list.then.edges[k]);
+      const double scale = stretch * growth(list, k);
       scaled = std::max(scaled, std::abs(scale - 1.0));
     }
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       Vec<D> by = shift(at, i);
       for (int k = 0; k < D; ++k) by[k] += list.moved[D * i + k];
-      const double angle = turned_to(list, at, i);
-      most = std::max(most, stretch * norm(by) + coordinates.turning_radius[i] * angle);
+      const double turned = turns(i) ? coordinates.turning_radius[i] * turned_to(list, at, i) : 0.0;
+      most = std::max(most, stretch * norm(by) + turned);
     }
     return 2.0 * most >= list.skin - kept - scaled * list.reach;
   }
@@ -427,16 +447,17 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   /// Those of the wide pairs that are within the smaller skin at a point.
   void choose(const Displacement &at)
   {
-    pairs = {{}, {}, moved(at), skin, wide.reach - wide.skin + skin};
+    pairs = {{}, {}, {}, skin, wide.reach - wide.skin + skin};
     chosen.clear();
-    const SplitArrays poses = displaced(at);
-    const PosedPairs<Model, D, double> posed(shapes, poses.view(), wide.list(), law);
+    const PosedPairs<Model, D, double> posed = posed_at<double>(wide, at);
     for (std::size_t p = 0; p < posed.size(); ++p) {
       if (!posed.are_closer(p, skin)) continue;
       chosen.push_back(static_cast<std::int64_t>(p));
       for (int k = 0; k < 2; ++k) pairs.particles.push_back(wide.particles[2 * p + k]);
       for (int k = 0; k < D; ++k) pairs.shift.push_back(wide.shift[D * p + k]);
     }
+    pairs.then = there;
+    settle(pairs.then, at.strain);
     measure(pairs);
     starts.assign(pairs.list().n, {});
     hessian = nullptr;
@@ -465,51 +486,52 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return by;
   }
 
-  /// Poses at a point.
-  Poses moved(const Displacement &at) const
+  /// From the base to a point, but for the strain there.
+  void displace(Poses &poses, const Displacement &at) const
   {
-    Poses poses = base;
-    const long double stretch = 1.0L + at.strain;
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const Vec<D> by = shift(at, i);
-      for (int k = 0; k < D; ++k) {
-        poses.position[D * i + k] = stretch * (base.position[D * i + k] + by[k]);
-      }
-      turn_pose(poses, turn(at, i), i);
+      for (int k = 0; k < D; ++k) add(poses.position, D * i + k, by[k]);
+      if (turns(i)) turn_pose(poses, turn(at, i), i);
     }
-    for (long double &edge : poses.edges) edge *= stretch;
-    return poses;
+  }
+
+  static void add(Poses::Numbers &to, std::size_t k, double by)
+  {
+    const Split sum = two_sum(to[0][k], by);
+    Poses::set(to, k, {sum.value, sum.rest + to[1][k]});
   }
 
   static void turn_pose(Poses &poses, const Torque<D> &by, std::size_t i)
   {
     if constexpr (D == 2) {
-      poses.orientation[i] += by[0];
+      add(poses.orientation, i, by[0]);
     } else {
-      if (norm_sq(by) == 0.0) return;  // such as all spheres
-      long double *const q = &poses.orientation[4 * i];
-      const QuaternionOf<long double> found =
-          turned(QuaternionOf<long double>{q[0], q[1], q[2], q[3]}, constants_of<long double>(by));
-      q[0] = found.w, q[1] = found.i, q[2] = found.j, q[3] = found.k;
+      if (norm_sq(by) == 0.0) return;
+      const auto at = [&](int k) { return joined(Poses::get(poses.orientation, TURNS * i + k)); };
+      const QuaternionOf<long double> found = turned(
+          QuaternionOf<long double>{at(0), at(1), at(2), at(3)}, constants_of<long double>(by));
+      const long double parts[] = {found.w, found.i, found.j, found.k};
+      for (int k = 0; k < TURNS; ++k) Poses::set(poses.orientation, TURNS * i + k, split(parts[k]));
     }
   }
 
-  SplitArrays displaced(const Displacement &at) const
+  /// Strains displaced poses, and rounds their numbers to long doubles, as they are stored.
+  static void settle(Poses &poses, double strain)
   {
-    const Poses poses = moved(at);
-    SplitArrays split;
-    put(poses.position, split.position);
-    put(poses.orientation, split.orientation);
-    put(poses.edges, split.edges);
-    return split;
-  }
-
-  static void put(const std::vector<long double> &from, std::vector<double> (&to)[2])
-  {
-    for (std::vector<double> &part : to) part.resize(from.size());
-    for (std::size_t k = 0; k < from.size(); ++k) {
-      to[0][k] = static_cast<double>(from[k]);
-      to[1][k] = static_cast<double>(from[k] - to[0][k]);
+    const long double stretch = 1.0L + strain;
+    for (Poses::Numbers *lengths : {&poses.position, &poses.edges}) {
+      for (std::size_t k = 0; k < (*lengths)[0].size(); ++k) {
+        Poses::set(*lengths, k, split(stretch * joined(Poses::get(*lengths, k))));
+      }
+    }
+    if constexpr (D == 2) {  // whole turns would cost digits
+      constexpr long double TURN = 2.0L * 3.14159265358979323846264338327950288L;
+      for (std::size_t i = 0; i < poses.orientation[0].size(); ++i) {
+        const long double angle = joined(Poses::get(poses.orientation, i));
+        const long double whole = std::rint(poses.orientation[0][i] / static_cast<double>(TURN));
+        Poses::set(poses.orientation, i, split(angle - TURN * whole));
+      }
     }
   }
 
@@ -517,12 +539,12 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   std::unique_ptr<BlockSystem> block_system() const
   {
     const BlockPlan plan{coordinates.column, pairs.particles, shapes.size(), BLOCK, fill()};
-    if (turns()) return std::make_unique<BlockSystemOf<BLOCK>>(plan);
+    if (any_turns()) return std::make_unique<BlockSystemOf<BLOCK>>(plan);
     return std::make_unique<BlockSystemOf<D>>(plan);
   }
 
   /// Whether any of the coordinates is a rotation.
-  bool turns() const
+  bool any_turns() const
   {
     for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
       if (k % BLOCK >= D && coordinates.column[k] >= 0) return true;

@@ -5,7 +5,10 @@
 #include "contact/math/vec.hpp"
 #include "contact/pair_derivatives.hpp"
 
+#include "packing/split.hpp"
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -16,12 +19,20 @@ namespace jamshape {
 
 /// Poses of N particles in a periodic box, every coordinate the sum of a double and its small rest:
 /// overlaps are differences of coordinates, and a double of 40 diameters has lost their last eight
-/// digits. Row-major views: [0] the doubles, [1] the rests.
+/// digits. Row-major views: [0] the doubles, [1] the rests. Box and positions are strained.
 struct SplitPoses {
-  const double *position[2];     // (N, D)
-  const double *orientation[2];  // (N,) angles in 2D, (N, 4) quaternions w i j k in 3D
-  const double *edges[2];        // (D,)
+  using View = std::array<const double *, 2>;
+  View position;     // (N, D)
+  View orientation;  // (N,) angles in 2D, (N, 4) quaternions w i j k in 3D
+  View edges;        // (D,)
+  double strain = 0.0;
 };
+
+/// An element of such a view.
+inline Split at(const SplitPoses::View &view, std::size_t index)
+{
+  return {view[0][index], view[1][index]};
+}
 
 /// Pairs that may touch: (M, 2) particles and (M, D) box edges to add to the second one's position.
 struct PairList {
@@ -30,7 +41,28 @@ struct PairList {
   const std::int64_t *shift;
 };
 
-/// Pairs of posed particles, in the scalar S. Separations are taken in long double whatever S is.
+namespace detail {
+
+/// A contact, begun where its pair's last one was if that is given, in doubles, and its shape
+/// remembers anything.
+template <class Body, class Law, class Start>
+auto contact_begun(const Body &i, const Body &j, const Law &law, Start *start)
+{
+  if constexpr (!std::is_same_v<Start, NoStart>) {
+    if (start != nullptr) return contact_of(i, j, law, *start);
+  }
+  return contact_of(i, j, law);
+}
+
+}  // namespace detail
+
+/// Where contacts in the scalar S may begin: long doubles, which settle last bits, always anew.
+template <class Model, int D, class S>
+using StartIn =
+    std::conditional_t<std::is_same_v<S, double>, typename Model::template Start<D>, NoStart>;
+
+/// Pairs of posed particles, in the scalar S. Separations have no rounding errors but their own,
+/// whatever S is.
 template <class Model, int D, class S> class PosedPairs {
  public:
   PosedPairs(const std::vector<typename Model::Shape> &particle_shapes, const SplitPoses &at,
@@ -38,12 +70,10 @@ template <class Model, int D, class S> class PosedPairs {
       shapes(particle_shapes), poses(at), pairs(list), law(contact_law)
   {
     body.reserve(shapes.size());
-    orientation.reserve(shapes.size());
     for (std::size_t n = 0; n < shapes.size(); ++n) {
-      orientation.push_back(orientation_of(n));
       body.push_back(Model::template body<D, S>(shapes[n]));
       if (Model::template turns<D>(shapes[n]))
-        Model::template turn_to<D, S>(body[n], orientation[n]);
+        Model::template turn_to<D, S>(body[n], orientation_of(n));
     }
   }
 
@@ -59,14 +89,9 @@ template <class Model, int D, class S> class PosedPairs {
     const std::size_t i = first(p), j = second(p);
     Vec<D, S> r;
     for (int k = 0; k < D; ++k) {
-      const Long turns = static_cast<Long>(pairs.shift[D * p + k]);
-      Long difference = 0.0;
-      for (int part = 0; part < 2; ++part) {
-        const double *const x = poses.position[part];
-        difference +=
-            (static_cast<Long>(x[D * i + k]) - x[D * j + k]) - turns * poses.edges[part][k];
-      }
-      r[k] = static_cast<S>(difference);
+      const auto turns = static_cast<double>(pairs.shift[D * p + k]);
+      r[k] = strained(difference(at(poses.position, D * i + k), at(poses.position, D * j + k),
+                                 at(poses.edges, k), turns));
     }
     return r;
   }
@@ -83,17 +108,11 @@ template <class Model, int D, class S> class PosedPairs {
     return body[second(p)];
   }
 
-  /// The contact of a pair of this separation.
-  ContactOf<Model, D, S> contact(std::size_t p, const Vec<D, S> &r) const
-  {
-    return contact_of(first_body(p, r), second_body(p), law);
-  }
-
-  /// The same, begun where the pair's last one was.
+  /// The contact of a pair of this separation, begun where its last one was if that is given.
   ContactOf<Model, D, S> contact(std::size_t p, const Vec<D, S> &r,
-                                 typename Model::template Start<D> &start) const
+                                 StartIn<Model, D, S> *start = nullptr) const
   {
-    return contact_from(first_body(p, r), second_body(p), law, start);
+    return detail::contact_begun(first_body(p, r), second_body(p), law, start);
   }
 
   /// Whether surfaces may be closer than a margin.
@@ -111,7 +130,7 @@ template <class Model, int D, class S> class PosedPairs {
   /// A body that its rotation variables, from `first` on, turn.
   auto turned(std::size_t n, int first_variable) const
   {
-    return turned_body<Model, D, S>(shapes[n], orientation[n], first_variable);
+    return turned_body<Model, D, S>(shapes[n], orientation_of(n), first_variable);
   }
 
  private:
@@ -120,26 +139,28 @@ template <class Model, int D, class S> class PosedPairs {
   SplitPoses poses;
   PairList pairs;
   typename Model::Law law;
-  std::vector<QuaternionOf<S>> orientation;
   std::vector<typename Model::template Body<D, S>> body;  // at the origin
 
-  QuaternionOf<S> orientation_of(std::size_t n) const
+  S strained(const Split &length) const
   {
-    if constexpr (D == 2) {
-      const S half = 0.5 * component<S>(n);
-      return {std::cos(half), S(0.0), S(0.0), std::sin(half)};
+    if constexpr (std::is_same_v<S, double>) {
+      return length.value + (length.rest + poses.strain * length.value);
     } else {
-      const QuaternionOf<Long> q =
-          normalized(QuaternionOf<Long>{component<Long>(4 * n), component<Long>(4 * n + 1),
-                                        component<Long>(4 * n + 2), component<Long>(4 * n + 3)});
-      return {static_cast<S>(q.w), static_cast<S>(q.i), static_cast<S>(q.j), static_cast<S>(q.k)};
+      return (S(1) + poses.strain) * joined(length);
     }
   }
 
-  template <class T> T component(std::size_t index) const
+  QuaternionOf<S> orientation_of(std::size_t n) const
   {
-    return static_cast<T>(poses.orientation[0][index]) +
-           static_cast<T>(poses.orientation[1][index]);
+    const auto component = [&](std::size_t k) { return joined(at(poses.orientation, k)); };
+    if constexpr (D == 2) {
+      const S half = 0.5 * static_cast<S>(component(n));
+      return {std::cos(half), S(0.0), S(0.0), std::sin(half)};
+    } else {
+      const auto q = normalized(QuaternionOf<Long>{component(4 * n), component(4 * n + 1),
+                                                   component(4 * n + 2), component(4 * n + 3)});
+      return {static_cast<S>(q.w), static_cast<S>(q.i), static_cast<S>(q.j), static_cast<S>(q.k)};
+    }
   }
 };
 
@@ -157,20 +178,13 @@ template <class Model, int D, class S> class TurnedBodies {
     }
   }
 
-  ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>> contact(std::size_t p) const
-  {
-    auto body_i = as_i[pairs.first(p)];
-    body_i.centre = as_variables<D, S>(pairs.separation(p));
-    return contact_of(body_i, as_j[pairs.second(p)], pairs.contact_law());
-  }
-
-  /// The same, begun where the pair's last one was.
+  /// Begun where the pair's last contact was if that is given.
   ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>>
-  contact(std::size_t p, typename Model::template Start<D> &start) const
+  contact(std::size_t p, StartIn<Model, D, S> *start = nullptr) const
   {
     auto body_i = as_i[pairs.first(p)];
     body_i.centre = as_variables<D, S>(pairs.separation(p));
-    return contact_from(body_i, as_j[pairs.second(p)], pairs.contact_law(), start);
+    return detail::contact_begun(body_i, as_j[pairs.second(p)], pairs.contact_law(), start);
   }
 
  private:
@@ -191,23 +205,18 @@ template <int D, class S> struct PairSums {
   std::int64_t unconverged = -1;  // likewise
 };
 
-/// Contacts begin where the last ones of these pairs were, if that is given (in doubles).
+/// Contacts begin where the last ones of these pairs were, if that is given.
 template <class Model, int D, class S>
-PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_particles,
-                        std::vector<typename Model::template Start<D>> *starts = nullptr)
+PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs,
+                        StartIn<Model, D, S> *starts = nullptr)
 {
-  const auto contact_at = [&](std::size_t p, const Vec<D, S> &r) {
-    if constexpr (std::is_same_v<S, double>) {
-      if (starts != nullptr) return pairs.contact(p, r, (*starts)[p]);
-    }
-    return pairs.contact(p, r);
-  };
   PairSums<D, S> sums;
-  sums.force.assign(n_particles, Vec<D, S>{});
-  sums.torque.assign(n_particles, Torque<D, S>{});
+  sums.force.assign(pairs.n_particles(), Vec<D, S>{});
+  sums.torque.assign(pairs.n_particles(), Torque<D, S>{});
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const Vec<D, S> r = pairs.separation(p);
-    const ContactOf<Model, D, S> contact = contact_at(p, r);
+    const ContactOf<Model, D, S> contact =
+        pairs.contact(p, r, starts == nullptr ? nullptr : starts + p);
     if (contact.status == ContactStatus::APART) continue;
     if (contact.status != ContactStatus::TOUCHING) {
       const bool is_crossing = contact.status == ContactStatus::CROSSING;

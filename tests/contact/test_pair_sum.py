@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from functools import cache
 
 import numpy as np
@@ -347,3 +348,28 @@ def test_centres_on_each_other_are_crossing(dimension):
     two["position"] = np.zeros((2, 2, dimension))
     assert sums(**two)["crossing"] == 0
     assert len(derivatives(**two)["pair"]) == 0
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("images", [0, 1, 3])
+def test_separations_are_right_to_the_last_bit_of_doubles(images, dimension):
+    """Of particles 40 diameters out, from 1e-9 to 1 apart, in the same image and in others."""
+    rng, n = np.random.default_rng(17), 300
+    edges = LONG(1) * rng.uniform(35.0, 45.0, dimension)
+    shift = rng.integers(-images, images + 1, (n, dimension))
+    apart = LONG(1) * 10.0 ** rng.uniform(-9.0, -0.3, (n, 1)) * rng.normal(size=(n, dimension))
+    second = edges * rng.uniform(-1.0, 1.0, (n, dimension))
+    position = split(np.stack([second + shift * edges + apart, second], 1).reshape(2 * n, -1))
+    turn = split(np.tile([[0.0]] if dimension == 2 else np.eye(1, 4), (2 * n, 1)))
+    pairs, discs = np.arange(2 * n).reshape(-1, 2), rods(np.full((2 * n, 3), 20.0), dimension)
+    found = discs.derivatives(position, turn, split(edges), pairs, shift, False)["separation"]
+    x, edge = exactly(position), exactly(split(edges))
+    expected = x[::2] - x[1::2] - edge * np.vectorize(Fraction)(shift)
+    error = np.abs((np.vectorize(Fraction)(found) - expected).astype(float))
+    assert found.shape == (n, dimension)
+    assert np.all(error <= 0.5001 * np.spacing(np.abs(found)))
+
+
+def exactly(parts):
+    """Sums of doubles (2, ...) and their rests as fractions."""
+    return np.vectorize(Fraction)(parts).sum(axis=0)
