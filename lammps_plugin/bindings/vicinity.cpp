@@ -190,6 +190,14 @@ void export_vicinity(nb::module_ &m)
           "poses", [](const Vicinity &of) { return tuple_of(of.poses()); },
           "Of the base, as move_to takes them.")
       .def(
+          "share",
+          [](Vicinity &of, std::int64_t threads) {
+            require(threads >= 1,
+                    "threads is " + std::to_string(threads) + ", expected at least 1.");
+            of.share(static_cast<std::size_t>(threads));
+          },
+          "threads"_a, "By how many threads sums over contacts are taken; 1 if nobody says so.")
+      .def(
           "evaluate", &evaluate, "x"_a, "strain"_a, "extended"_a,
           "None where the pairs no longer hold, or energy, gradient (n,), derivative by the\n"
           "strain, sum of the magnitudes of bond forces, number of bonds, and a pair that crosses\n"

@@ -107,6 +107,10 @@ class Vicinity {
   /// depends in its last bits on the points before; for points that follow one another.
   virtual void remember(bool contacts) = 0;
 
+  /// By how many threads sums over contacts are taken, where there are enough: on the number, but
+  /// on nothing else, last bits depend.
+  virtual void share(std::size_t threads) = 0;
+
   virtual LandscapeSums evaluate(const Displacement &at, bool extended) const = 0;
   /// (n,) by how much a coordinate moves its particle: 1 + strain, and 1 for rotations.
   virtual Eigen::VectorXd stretch(double strain) const = 0;
@@ -205,6 +209,11 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     starts.assign(pairs.list().n, {});
   }
 
+  void share(std::size_t threads) override
+  {
+    team = threads > 1 ? std::make_unique<Team>(threads) : nullptr;
+  }
+
   LandscapeSums evaluate(const Displacement &at, bool extended) const override
   {
     return extended ? sums<long double>(at) : sums<double>(at);
@@ -254,12 +263,20 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     const TurnedBodies<Model, D, double> turned_bodies(posed);
     hessian->clear();
     pulled = Eigen::VectorXd::Zero(n());
-    for (std::size_t p = 0; p < posed.size(); ++p) {
-      const Vec<D> r = posed.separation(p);
-      Start start = remembers ? starts[p] : Start{};
-      if (posed.contact(p, r, &start).status != ContactStatus::TOUCHING) continue;
-      const DualContact contact = turned_bodies.contact(p, &start);
-      if (contact.status == ContactStatus::TOUCHING) add_pair(p, r, contact, 1.0 + at.strain);
+    Team *const by = team_for(posed.size());
+    curved.resize(parts_of(by));
+    in_parts(by, posed.size(), [&](std::size_t k, const Range &part) {
+      each_curved(posed, turned_bodies, part, [&](const Curved &pair) {
+        if (by == nullptr) {
+          add_pair(pair, 1.0 + at.strain);
+        } else {
+          curved[k].push_back(pair);
+        }
+      });
+    });
+    for (auto &part : curved) {
+      for (const Curved &pair : part) add_pair(pair, 1.0 + at.strain);
+      part.clear();
     }
   }
 
@@ -291,6 +308,16 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   /// than the iterations that spare it.
   static constexpr std::size_t FEW = 150;
 
+  /// Fewer pairs take no longer in one thread.
+  static constexpr std::size_t MANY = 2000;
+
+  /// A pair that touches, and second derivatives by its variables.
+  struct Curved {
+    std::size_t p;
+    Vec<D> r;
+    Eigen::Matrix<double, VARIABLES, VARIABLES> by;
+  };
+
   std::vector<Shape> shapes;
   Coordinates coordinates;
   NearPairs wide, pairs;             // `pairs` are those of `wide` that are within `skin`
@@ -304,12 +331,17 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   mutable Poses there;                   // at the last point
   std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
   Eigen::VectorXd pulled;
+  std::unique_ptr<Team> team;
+  std::vector<std::vector<Curved>> curved;  // of each thread's part, empty between uses
+
+  Team *team_for(std::size_t n) const { return n < MANY ? nullptr : team.get(); }
 
   Fill fill() const { return D == 2 || shapes.size() <= FEW ? Fill::COMPLETE : Fill::NONE; }
 
   template <class S> LandscapeSums sums(const Displacement &at) const
   {
-    const PairSums<D, S> sums = sum_over(posed_at<S>(pairs, at), begins<S>());
+    const PairSums<D, S> sums =
+        sum_over(posed_at<S>(pairs, at), begins<S>(), team_for(pairs.list().n));
     S trace = 0.0;
     for (int k = 0; k < D; ++k) trace += sums.virial[(D + 1) * k];
     return {static_cast<double>(sums.energy),
@@ -576,9 +608,23 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return k < D || side == 0 ? k : k + ROTATIONS<D>;
   }
 
-  void add_pair(std::size_t p, const Vec<D> &r, const DualContact &contact, double stretch)
+  template <class Then>
+  void each_curved(const PosedPairs<Model, D, double> &posed,
+                   const TurnedBodies<Model, D, double> &turned_bodies, const Range &part,
+                   const Then &then) const
   {
-    const auto by = by_variables(contact);
+    for (std::size_t p = part.first; p < part.last; ++p) {
+      const Vec<D> r = posed.separation(p);
+      Start start = remembers ? starts[p] : Start{};
+      if (posed.contact(p, r, &start).status != ContactStatus::TOUCHING) continue;
+      const DualContact contact = turned_bodies.contact(p, &start);
+      if (contact.status == ContactStatus::TOUCHING) then(Curved{p, r, by_variables(contact)});
+    }
+  }
+
+  void add_pair(const Curved &pair, double stretch)
+  {
+    const auto &[p, r, by] = pair;
     double scale[2][BLOCK];
     for (int side = 0; side < 2; ++side) {
       const std::size_t particle = pairs.particles[2 * p + side];

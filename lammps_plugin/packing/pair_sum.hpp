@@ -6,6 +6,7 @@
 #include "contact/pair_derivatives.hpp"
 
 #include "packing/split.hpp"
+#include "packing/team.hpp"
 
 #include <algorithm>
 #include <array>
@@ -203,17 +204,34 @@ template <int D, class S> struct PairSums {
   double error = 0.0;             // the largest of a contact
   std::int64_t crossing = -1;     // the first pair of this status, -1 for none
   std::int64_t unconverged = -1;  // likewise
+
+  /// Adds those over pairs that come after.
+  void add(const PairSums &next)
+  {
+    energy += next.energy;
+    for (std::size_t n = 0; n < force.size(); ++n) {
+      force[n] += next.force[n];
+      torque[n] += next.torque[n];
+    }
+    virial += next.virial;
+    bond_force += next.bond_force;
+    n_bonds += next.n_bonds;
+    error = std::max(error, next.error);
+    if (crossing < 0) crossing = next.crossing;
+    if (unconverged < 0) unconverged = next.unconverged;
+  }
 };
 
-/// Contacts begin where the last ones of these pairs were, if that is given.
+/// Over some of the pairs. Contacts begin where the last ones of these pairs were, if that is
+/// given.
 template <class Model, int D, class S>
-PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs,
-                        StartIn<Model, D, S> *starts = nullptr)
+PairSums<D, S> sum_part(const PosedPairs<Model, D, S> &pairs, StartIn<Model, D, S> *starts,
+                        const Range &part)
 {
   PairSums<D, S> sums;
   sums.force.assign(pairs.n_particles(), Vec<D, S>{});
   sums.torque.assign(pairs.n_particles(), Torque<D, S>{});
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
+  for (std::size_t p = part.first; p < part.last; ++p) {
     const Vec<D, S> r = pairs.separation(p);
     const ContactOf<Model, D, S> contact =
         pairs.contact(p, r, starts == nullptr ? nullptr : starts + p);
@@ -237,6 +255,18 @@ PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs,
     sums.error = std::max(sums.error, contact.error);
   }
   return sums;
+}
+
+/// Over all of them, by a team if there is one: in parts, added in their order.
+template <class Model, int D, class S>
+PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs,
+                        StartIn<Model, D, S> *starts = nullptr, Team *team = nullptr)
+{
+  std::vector<PairSums<D, S>> sums(parts_of(team));
+  in_parts(team, pairs.size(),
+           [&](std::size_t k, const Range &part) { sums[k] = sum_part(pairs, starts, part); });
+  for (std::size_t k = 1; k < sums.size(); ++k) sums[0].add(sums[k]);
+  return std::move(sums[0]);
 }
 
 }  // namespace jamshape

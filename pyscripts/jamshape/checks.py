@@ -50,6 +50,7 @@ RANGES = {
     "spread": Range(0.0, 1.0, "a spread"),
     "samples": Range(1, _COUNT, "samples", whole=True),
     "pairs": Range(1, 10**9, "pairs", whole=True),
+    "threads": Range(1, 1024, "threads", whole=True),
     "dpi": Range(1, 4000, "dots", whole=True),
     "follow": Range(0, _COUNT, "modes", whole=True),
     "largest": Range(0.0, 100.0, "a bound"),

@@ -34,6 +34,9 @@ def options_of() -> ArgumentParser:
     parser = parser_of(__doc__)
     add_recipe_options(parser)
     parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
+    parser.add_argument(
+        "--threads", type=int, default=1, help="for the contacts of thousands of particles (1)"
+    )
     parser.add_argument("--again", action="store_true", help="make it anew if it is there")
     return parser
 
@@ -41,7 +44,10 @@ def options_of() -> ArgumentParser:
 def main(options: Namespace) -> int:
     """Make the packing unless it is there; return the exit code."""
     settings = settings_of(options)
-    make_packing(asked_particles(options), **settings, file=options.out, again=options.again)
+    make_packing(
+        asked_particles(options), **settings, threads=options.threads, file=options.out,
+        again=options.again,
+    )  # fmt: skip
     found = summary_of(options.out)
     report(found)
     return 0 if found["reached"] else 1

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jamshape.checks import require_path, require_path_for_lammps
+from jamshape.checks import require_path, require_path_for_lammps, require_stated
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow, place
+from jamshape.landscape.threads import sharing
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Progress, is_done, make, require_same, tidy
 from jamshape.protocols.recipe import Compressed, Dynamics
@@ -35,6 +36,7 @@ def make_packing(
     search: str | None = None,
     minimiser: str | None = None,
     strict: bool = False,
+    threads: int = 1,
     file: str | Path | None = None,
     again: bool = False,
     progress: bool = True,
@@ -93,6 +95,10 @@ def make_packing(
     strict : bool
         Go on at the energy, along what slides, until no mode has an eigenvalue below zero by more than its
         bound; ``results["n_negative"]`` says how many have. Rods of alpha = 4 end at saddles otherwise.
+    threads : int
+        By which the contacts of a large packing are evaluated, thousands of particles on cores that are free.
+        Last bits depend on it, and with them which of many minima is found; a packing that was
+        cut off goes on with any number. Many packings take less time one beside the other, each in a process.
     file : path, optional
         H5MD file of the packing. One of this recipe is loaded from it, one that was cut off goes on from
         files beside it, and one of another recipe is refused. Without it nothing is kept but the result.
@@ -129,13 +135,15 @@ def make_packing(
         phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi, start=start,
         search=search, minimiser=minimiser, strict=strict,
     )  # fmt: skip
+    require_stated(threads=threads)
     at = place(file, "packing.h5")
     (require_path_for_lammps if isinstance(recipe.way, Dynamics | Compressed) else require_path)(
         at.path
     )
     if again or not is_done(at.path):
         steps = make(recipe, at.path, again=again)
-        follow(steps, _told, shown=progress)
+        with sharing(threads):
+            follow(steps, _told, shown=progress)
     else:
         require_same(at.path, recipe)
         tidy(recipe, at.path)

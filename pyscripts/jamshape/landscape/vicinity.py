@@ -14,6 +14,7 @@ from jamshape.arrays import FloatArray
 from jamshape.contacts import Pairs
 from jamshape.landscape.landscape import Evaluation, Landscape
 from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, Factorisation
+from jamshape.landscape.threads import threads
 from jamshape.packing import State
 
 # Force, energy and length in which errors of displacements are measured.
@@ -88,6 +89,10 @@ class Vicinity:
         Whose pairs it uses and whose evaluations it counts.
     base : State
         From where coordinates count.
+
+    Notes
+    -----
+    Contacts are shared by the `threads` there are where it is made.
     """
 
     def __init__(self, landscape: Landscape, base: State) -> None:
@@ -95,6 +100,7 @@ class Vicinity:
         self._compiled = landscape.bodies.vicinity(
             landscape.column, landscape.rotation_length, landscape.turning_radius
         )
+        self._compiled.share(threads())
         self.move_to(base)
         self._take(landscape.wide_pairs(base))
 
