@@ -616,7 +616,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     for (std::size_t p = part.first; p < part.last; ++p) {
       const Vec<D> r = posed.separation(p);
       Start start = remembers ? starts[p] : Start{};
-      if (posed.contact(p, r, &start).status != ContactStatus::TOUCHING) continue;
+      if (!posed.may_touch(p, r) || posed.contact(p, r, &start).status != ContactStatus::TOUCHING)
+        continue;
       const DualContact contact = turned_bodies.contact(p, &start);
       if (contact.status == ContactStatus::TOUCHING) then(Curved{p, r, by_variables(contact)});
     }

@@ -71,7 +71,9 @@ template <class Model, int D, class S> class PosedPairs {
       shapes(particle_shapes), poses(at), pairs(list), law(contact_law)
   {
     body.reserve(shapes.size());
+    around.reserve(shapes.size());
     for (std::size_t n = 0; n < shapes.size(); ++n) {
+      around.push_back(WIDER * Model::template outer_radius<D>(shapes[n]));
       body.push_back(Model::template body<D, S>(shapes[n]));
       if (Model::template turns<D>(shapes[n]))
         Model::template turn_to<D, S>(body[n], orientation_of(n));
@@ -95,6 +97,14 @@ template <class Model, int D, class S> class PosedPairs {
                                  at(poses.edges, k), turns));
     }
     return r;
+  }
+
+  /// Whether the spheres around a pair of this separation touch: most pairs of a list are seen to
+  /// be apart by that, at a tenth of the price of a contact.
+  bool may_touch(std::size_t p, const Vec<D, S> &r) const
+  {
+    const double reach = around[first(p)] + around[second(p)];
+    return norm_sq(r) < S(reach) * reach;
   }
 
   /// The bodies of a pair of this separation, the second at the origin.
@@ -136,11 +146,16 @@ template <class Model, int D, class S> class PosedPairs {
 
  private:
   using Long = long double;
+
+  /// So that rounding hides no contact of tips.
+  static constexpr double WIDER = 1.0 + 1e-14;
+
   const std::vector<typename Model::Shape> &shapes;
   SplitPoses poses;
   PairList pairs;
   typename Model::Law law;
   std::vector<typename Model::template Body<D, S>> body;  // at the origin
+  std::vector<double> around;                             // radii of the spheres around them
 
   S strained(const Split &length) const
   {
@@ -233,6 +248,7 @@ PairSums<D, S> sum_part(const PosedPairs<Model, D, S> &pairs, StartIn<Model, D, 
   sums.torque.assign(pairs.n_particles(), Torque<D, S>{});
   for (std::size_t p = part.first; p < part.last; ++p) {
     const Vec<D, S> r = pairs.separation(p);
+    if (!pairs.may_touch(p, r)) continue;
     const ContactOf<Model, D, S> contact =
         pairs.contact(p, r, starts == nullptr ? nullptr : starts + p);
     if (contact.status == ContactStatus::APART) continue;
