@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mixtures import bidisperse
 
+from jamshape import _contact
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape, State
 from jamshape.landscape.threads import sharing, threads
@@ -71,6 +72,13 @@ def test_of_pairs_that_cross_the_first_is_named(number):
     with pytest.raises(CrossingError) as expected:
         Landscape(packing).evaluate(state)
     assert str(crossing.value) == str(expected.value)
+
+
+@pytest.mark.parametrize("number", [1, 2, 5])
+def test_what_is_thrown_in_threads_is_thrown_to_who_asked_and_the_threads_go_on(number):
+    counts, failed = _contact.counts_of_team(number, number // 2, 30)
+    assert (counts == 30).all()
+    assert failed == f"part {number // 2} failed"
 
 
 @pytest.mark.parametrize("number", [0, -1, 1.5, True])
