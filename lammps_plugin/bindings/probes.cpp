@@ -6,9 +6,11 @@
 #include "bindings/arrays.hpp"
 #include "bindings/contact_arrays.hpp"
 #include "bindings/shape.hpp"
+#include "packing/team.hpp"
 
 #include <nanobind/stl/optional.h>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 namespace jamshape {
@@ -215,6 +217,28 @@ nb::object superellipsoid_overlap(const Bodies &bodies_i, const Bodies &bodies_j
                     [](const auto &i, const auto &j) { return are_overlapping(i, j); });
 }
 
+/// Lets a team count its parts again and again, each time but the last with some that fail.
+nb::object counts_of_team(std::size_t threads, std::size_t first_that_fails, int rounds)
+{
+  Team team(threads);
+  NewArray<std::int64_t> counts({threads});
+  std::fill_n(&counts[0], threads, 0);
+  const auto part = [&](std::size_t k, std::size_t fails) {
+    ++counts[k];
+    if (k >= fails) throw std::runtime_error("part " + std::to_string(k) + " failed");
+  };
+  std::string failed;
+  for (int round = 0; round < rounds; ++round) {
+    const std::size_t fails = round + 1 < rounds ? first_that_fails : threads;
+    try {
+      team.run([&](std::size_t k) { part(k, fails); });
+    } catch (const std::runtime_error &error) {
+      failed = error.what();
+    }
+  }
+  return nb::make_tuple(counts.release(), failed.c_str());
+}
+
 }  // namespace
 
 void export_probes(nb::module_ &m)
@@ -246,6 +270,9 @@ void export_probes(nb::module_ &m)
         "Upper bound of the squared distance that any point of a body moved (M,).");
   m.def("superellipsoid_overlap", &superellipsoid_overlap, "bodies_i"_a, "bodies_j"_a,
         "Whether bodies share more than a point (M,).");
+  m.def("counts_of_team", &counts_of_team, "threads"_a, "first_that_fails"_a, "rounds"_a,
+        "How often each of so many threads did its part (threads,), of which those from a number\n"
+        "on fail but in the last round, and what was thrown last.");
 }
 
 }  // namespace jamshape

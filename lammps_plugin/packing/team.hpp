@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <exception>
@@ -43,33 +46,51 @@ class Team {
   /// threw.
   void run(const std::function<void(std::size_t)> &part)
   {
-    {
-      const std::lock_guard<std::mutex> lock(guard);
-      work = &part;
-      left = others.size();
-      ++round;
-    }
-    begin.notify_all();
+    work = &part;
+    left = others.size();
+    tell(begin, [this] { ++round; });
     attempt(part, 0);
-    std::unique_lock<std::mutex> lock(guard);
-    end.wait(lock, [this] { return left == 0; });
-    work = nullptr;
-    for (std::exception_ptr &one : failed) {
-      if (!one) continue;
-      const std::exception_ptr first = one;
-      failed.assign(failed.size(), nullptr);
-      std::rethrow_exception(first);
-    }
+    await(end, [this] { return left == 0; });
+    const auto first =
+        std::find_if(failed.begin(), failed.end(), [](const auto &one) { return one != nullptr; });
+    if (first == failed.end()) return;
+    const std::exception_ptr thrown = *first;
+    failed.assign(failed.size(), nullptr);
+    std::rethrow_exception(thrown);
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
+  /// To be woken takes as long as the contacts of some hundred particles: a thread that waits looks
+  /// for so long whether it can go on before it sleeps.
+  static constexpr std::chrono::microseconds AWAKE{50};
+
   std::mutex guard;
   std::condition_variable begin, end;
   const std::function<void(std::size_t)> *work = nullptr;
-  std::size_t left = 0, round = 0;
-  bool is_over = false;
+  std::atomic<std::size_t> left{0}, round{0};
+  std::atomic<bool> is_over{false};
   std::vector<std::exception_ptr> failed;  // one for each part
   std::vector<std::thread> others;
+
+  template <class Change> void tell(std::condition_variable &those, const Change &change)
+  {
+    {
+      const std::lock_guard<std::mutex> lock(guard);
+      change();
+    }
+    those.notify_all();
+  }
+
+  template <class Ready> void await(std::condition_variable &where, const Ready &is_ready)
+  {
+    for (const auto until = Clock::now() + AWAKE; Clock::now() < until; std::this_thread::yield()) {
+      if (is_ready()) return;
+    }
+    std::unique_lock<std::mutex> lock(guard);
+    where.wait(lock, is_ready);
+  }
 
   void attempt(const std::function<void(std::size_t)> &part, std::size_t k)
   {
@@ -82,26 +103,18 @@ class Team {
 
   void serve(std::size_t k)
   {
-    std::unique_lock<std::mutex> lock(guard);
     for (std::size_t done = 0;;) {
-      begin.wait(lock, [&] { return is_over || round != done; });
+      await(begin, [&] { return is_over || round != done; });
       if (is_over) return;
       done = round;
-      const std::function<void(std::size_t)> &part = *work;
-      lock.unlock();
-      attempt(part, k);
-      lock.lock();
-      if (--left == 0) end.notify_one();
+      attempt(*work, k);
+      tell(end, [this] { --left; });
     }
   }
 
   void dismiss()
   {
-    {
-      const std::lock_guard<std::mutex> lock(guard);
-      is_over = true;
-    }
-    begin.notify_all();
+    tell(begin, [this] { is_over = true; });
     for (std::thread &one : others) one.join();
   }
 };

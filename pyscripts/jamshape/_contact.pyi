@@ -126,6 +126,9 @@ def superellipsoid_near(
 def superellipsoid_motion_sq(
     then: NDArray[np.float64], now: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
+def counts_of_team(
+    threads: int, first_that_fails: int, rounds: int
+) -> tuple[NDArray[np.int64], str]: ...
 def superellipsoid_overlap(
     bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64]
 ) -> NDArray[np.bool_]: ...

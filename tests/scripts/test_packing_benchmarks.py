@@ -1,4 +1,4 @@
-"""analysis/benchmarks/packings.py, packing_profile.py and peer_packings.py."""
+"""analysis/benchmarks/packings.py, packing_profile.py, packing_threads.py and peer_packings.py."""
 
 import json
 import sys
@@ -49,6 +49,15 @@ def test_parts_of_a_packing_add_up(here, capsys, shape):
     assert parts["to u0"]["minimisations"] > 1
     assert parts["to u0"]["factorisations"] > 1
     assert parts["the rest"]["seconds"] > 0
+
+
+def test_threads_are_told_beside_one(here, capsys):
+    here("benchmarks/packing_threads.py", "--n", 64, "--threads", 2, 3, "--rounds", 2)
+    found = rows_of(capsys)
+    assert found["threads"] == [1, 2, 3]
+    for name in ("evaluation", "factorisation"):
+        assert found[name]["by_clock"][0] == found[name]["asking"][0] == 1
+        assert len(found[name]["by_clock"]) == 3
 
 
 PEER = """

@@ -45,6 +45,16 @@ def test_a_finished_packing_is_not_made_again(tiny, jamshape):
     assert (folder / "packing.h5").stat().st_mtime_ns == before
 
 
+def test_a_packing_is_the_same_by_any_number_of_threads(tiny, jamshape):
+    _, said = tiny
+    made = said["packing.h5"]
+    assert jamshape(*made.arguments, "--threads", 2).report == made.report
+    refused = jamshape(*made.arguments, "--threads", 0).code
+    assert (
+        refused == "jamshape pack: threads is 0, expected a whole number of threads from 1 to 1024"
+    )
+
+
 def test_what_is_no_run_is_not_gone_on_with(tiny, jamshape):
     folder, said = tiny
     again = jamshape("compress", "--resume", "--out", folder / "slow.h5")
