@@ -44,7 +44,7 @@ def jammed():
 
 @pytest.mark.parametrize("h", [1.0, 1e3, 1e6])
 def test_stages_are_solved_in_few_evaluations_while_bonds_open_and_close(jammed, h):
-    posed = Posed(*jammed, h)
+    posed = Posed(*jammed, h, strain=4 * STRAIN)
     start = np.zeros(posed.n)
     bonds = posed.evaluate(start)[0].n_bonds
     before = posed.vicinity.landscape.evaluations
