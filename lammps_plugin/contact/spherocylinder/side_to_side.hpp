@@ -41,28 +41,32 @@ template <class S> ValueAndSlope<S> fade_length(const S &h)
 /// opposite of i is q_i = A_i + A_j |c| - |u_i.r|; `opposite` is the harmonic mean of both, 0 where
 /// one of them is none.
 template <class S> struct SideBySide {
-  double shorter, depth_per_overlap;
+  Plain<S> shorter, depth_per_overlap;
   S along_i, along_j, cosine, depth, opposite_i, opposite_j, opposite;
 
   template <int D>
-  SideBySide(const SpinePair<D, S> &p, const S &mean_overlap, double reach) :
-      shorter(std::min(p.A_i, p.A_j)), depth_per_overlap(reach / shorter * (reach / shorter)),
+  SideBySide(const SpinePair<D, S> &p, const S &mean_overlap, const Plain<S> &reach) :
+      shorter(least(p.A_i, p.A_j)), depth_per_overlap(reach / shorter * (reach / shorter)),
       along_i(dot(p.u_i, p.r)), along_j(dot(p.u_j, p.r)), cosine(dot(p.u_i, p.u_j)),
       depth(mean_overlap * depth_per_overlap),
       opposite_i(p.A_i + p.A_j * abs(cosine) - abs(along_i)),
       opposite_j(p.A_j + p.A_i * abs(cosine) - abs(along_j)), opposite(0.0)
   {
-    if (opposite_i > 0.0 && opposite_j > 0.0)
-      opposite = 2.0 * opposite_i * opposite_j / (opposite_i + opposite_j);
+    const Truth<S> both = (opposite_i > S(0.0)) & (opposite_j > S(0.0));
+    if (any(both))
+      opposite = select(both, 2.0 * opposite_i * opposite_j / (opposite_i + opposite_j), opposite);
   }
 
   /// Whether the exponent is 1, as of most, or 0: known without computing it.
-  bool has_two_bonds() const
+  Truth<S> has_two_bonds() const
   {
-    const S least = std::min<S>(opposite, 2.0 * shorter * abs(cosine));
-    return depth <= SHALLOW && least >= FADE_LENGTH * shorter;
+    const S length = least(opposite, S(2.0 * shorter * abs(cosine)));
+    return (depth <= S(SHALLOW)) & (S(FADE_LENGTH * shorter) <= length);
   }
-  bool has_one_bond() const { return !(opposite > 0.0 && depth * LEAST_END_EXPONENT < 1.0); }
+  Truth<S> has_one_bond() const
+  {
+    return !((opposite > S(0.0)) & (depth * LEAST_END_EXPONENT < S(1.0)));
+  }
 };
 
 /// Exponent of the norm of the overlaps at the two ends,
