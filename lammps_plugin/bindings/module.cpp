@@ -1,6 +1,6 @@
-#include "bindings/arrays.hpp"
-#include "packs/instruction_set.hpp"
+#include "contact/instruction_set.hpp"
 
+#include "bindings/arrays.hpp"
 namespace jamshape {
 namespace {
 

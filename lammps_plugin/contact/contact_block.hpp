@@ -33,15 +33,18 @@ template <int D> struct ContactBlock {
     k_e[n++] = stiffness;
   }
 
-  /// Finds them in packs of so many lanes: `contacts_from(first)` gives ContactLanes.
-  template <class ContactsFrom> void find(int lanes, const ContactsFrom &contacts_from)
+  /// Finds them in packs of so many lanes: `contacts_of(block, first)` and `shared_of(block,
+  /// first)` give ContactLanes of the pairs of a block from `first` on.
+  template <class ContactsOf, class SharedOf>
+  void find(int lanes, const ContactsOf &contacts_of, const SharedOf &shared_of)
   {
-    fill_up(lanes);
-    touching = alone = two_bonds = 0;
-    for (int first = 0; first < n; first += lanes) set(first, contacts_from(first));
-    const std::uint64_t asked = ~std::uint64_t{0} >> (MOST - n);
-    touching &= asked;
-    alone &= asked;
+    const std::uint64_t shared = set_all(lanes, contacts_of);
+    if (shared == 0) return;
+    ContactBlock others;
+    for_each(shared, [&](int k) { others.add(i[k], j[k], separation_of(k), k_e[k]); });
+    others.set_all(lanes, shared_of);
+    int from = 0;
+    for_each(shared, [&](int k) { copy(k, others, from++); });
   }
 
   Vec<D> separation_of(int k) const { return of_pair<D>(separation, k); }
@@ -56,6 +59,22 @@ template <int D> struct ContactBlock {
   }
 
  private:
+  /// Returns those that are shared.
+  template <class LanesOf> std::uint64_t set_all(int lanes, const LanesOf &lanes_of)
+  {
+    fill_up(lanes);
+    std::uint64_t shared = touching = alone = two_bonds = 0;
+    for (int first = 0; first < n; first += lanes) {
+      const auto found = lanes_of(*this, first);
+      set(first, found);
+      shared |= std::uint64_t{bits_of(found.shared)} << first;
+    }
+    const std::uint64_t asked = ~std::uint64_t{0} >> (MOST - n);
+    touching &= asked;
+    alone &= asked;
+    return shared & asked;
+  }
+
   /// The last pair fills what packs take beyond it.
   void fill_up(int lanes)
   {
@@ -78,6 +97,25 @@ template <int D> struct ContactBlock {
     for (int a = 0; a < ROTATIONS<D>; ++a) {
       found.torque_i[a].store(torque_i[a] + first);
       found.torque_j[a].store(torque_j[a] + first);
+    }
+  }
+
+  /// Takes pair k from another block.
+  void copy(int k, const ContactBlock &other, int from)
+  {
+    const auto take = [&](std::uint64_t &bits, std::uint64_t of_other) {
+      const std::uint64_t here = std::uint64_t{1} << k;
+      bits = (bits & ~here) | ((of_other >> from & 1) << k);
+    };
+    take(touching, other.touching);
+    take(alone, other.alone);
+    take(two_bonds, other.two_bonds);
+    energy[k] = other.energy[from];
+    bond_force[k] = other.bond_force[from];
+    for (int a = 0; a < D; ++a) force[a][k] = other.force[a][from];
+    for (int a = 0; a < ROTATIONS<D>; ++a) {
+      torque_i[a][k] = other.torque_i[a][from];
+      torque_j[a][k] = other.torque_j[a][from];
     }
   }
 

@@ -4,9 +4,8 @@
 #include "contact/contact_block.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/packs.hpp"
 #include "contact/pair_derivatives.hpp"
-
-#include "packs/packs.hpp"
 
 #include <algorithm>
 #include <cmath>

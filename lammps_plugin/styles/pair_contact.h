@@ -1,9 +1,9 @@
 #pragma once
 
 #include "contact/contact.hpp"
+#include "contact/instruction_set.hpp"
 #include "contact/math/vec.hpp"
 
-#include "packs/instruction_set.hpp"
 #include "pair.h"
 #include "particle_view.h"
 

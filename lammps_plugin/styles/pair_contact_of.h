@@ -5,6 +5,7 @@
 #include "contact/math/dimension.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/packs.hpp"
 #include "contact/pair_derivatives.hpp"
 
 #include "atom.h"
@@ -14,7 +15,6 @@
 #include "force.h"
 #include "neigh_list.h"
 #include "neighbor.h"
-#include "packs/packs.hpp"
 #include "pair_contact.h"
 
 #include <algorithm>

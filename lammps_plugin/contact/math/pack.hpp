@@ -89,6 +89,19 @@ struct Pack {
   {
     return from([&](int k) { return std::sqrt(a.lanes[k]); });  // one instruction
   }
+  // One by one, by the library: so that they round alike on every machine.
+  friend Pack exp(const Pack &a)
+  {
+    return a.each([](double x) { return std::exp(x); });
+  }
+  friend Pack log(const Pack &a)
+  {
+    return a.each([](double x) { return std::log(x); });
+  }
+  friend Pack log1p(const Pack &a)
+  {
+    return a.each([](double x) { return std::log1p(x); });
+  }
   friend Pack abs(const Pack &a) { return of_words(a.words() & ~SIGN); }
   friend Pack copysign(const Pack &a, const Pack &sign)
   {
@@ -102,6 +115,10 @@ struct Pack {
   template <class Of, int... K> static Pack from(const Of &of, std::integer_sequence<int, K...>)
   {
     return Pack(Doubles{of(K)...});
+  }
+  template <class Function> Pack each(const Function &function) const
+  {
+    return from([&](int k) { return function(lanes[k]); });
   }
   Words words() const { return reinterpret_cast<Words>(lanes); }
   static Pack of_words(const Words &words) { return Pack(reinterpret_cast<Doubles>(words)); }
@@ -126,6 +143,7 @@ inline bool all(const Mask &mask) { return bits_of(mask) == (1U << LANES) - 1; }
 /// A pack has no derivatives: it is its own value.
 inline const Pack &value_of(const Pack &x) { return x; }
 inline const Pack &constant(const Pack &x) { return x; }
+inline const Pack &with_value(const Pack &, const Pack &value) { return value; }
 
 }  // namespace JAMSHAPE_SET
 

@@ -3,8 +3,6 @@
 #include "contact/math/smooth_step.hpp"
 #include "contact/spherocylinder/segment_segment.hpp"
 
-#include <algorithm>
-
 namespace jamshape {
 
 /// Depth y of two bonds: mean overlap (a length) over A_min^2 / d, A_min the shorter half length.
@@ -23,7 +21,7 @@ template <class S> struct ValueAndSlope {
 /// h = g^3 / (g^2 + SHALLOW^2), g = y - SHALLOW: 0 below SHALLOW, about y far above, C2.
 template <class S> ValueAndSlope<S> growth_of(const S &y)
 {
-  const S g = std::max<S>(y - SHALLOW, 0.0);
+  const S g = most(S(y - SHALLOW), S(0.0));
   const S square = g * g, sum = square + SHALLOW * SHALLOW;
   return {g * square / sum, square * (sum + 2.0 * SHALLOW * SHALLOW) / (sum * sum)};
 }
@@ -100,13 +98,16 @@ template <class S> struct EndExponent {
 /// of the feet, since the overlaps may differ by less than they round.
 template <int D, class S>
 S log_ratio_of(const SpinePair<D, S> &p, const Feet<D, S> &near, const Feet<D, S> &far,
-               double reach)
+               const Plain<S> &reach)
 {
   const S distance = sqrt(near.distance_sq), far_distance = sqrt(far.distance_sq);
   const Vec<D, S> step = (far.s - near.s) * p.u_i - (far.t - near.t) * p.u_j;
   const S drop = dot(step, far.delta + near.delta) / (far_distance + distance);
-  const S lost = with_value(drop, std::max(value_of(drop), {})) / (reach - distance);
-  return lost < 0.5 ? log1p(-lost) : log((reach - far_distance) / (reach - distance));
+  const S lost = with_value(drop, most(value_of(drop), ValueOf<S>(0.0))) / (reach - distance);
+  const Truth<S> little = lost < S(0.5);
+  if (all(little)) return log1p(-lost);
+  const S of_overlaps = log((reach - far_distance) / (reach - distance));
+  return any(little) ? select(little, log1p(-lost), of_overlaps) : of_overlaps;
 }
 
 /// The norm V = (E(a)^(1/w) + E(b)^(1/w))^w of harmonic energies, from ln(b / a): their parts of

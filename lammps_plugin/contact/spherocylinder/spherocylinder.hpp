@@ -3,8 +3,10 @@
 #include "contact/along_x.hpp"
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
+#include "contact/instruction_set.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/packs.hpp"
 #include "contact/spherocylinder/segment_segment.hpp"
 #include "contact/spherocylinder/side_to_side.hpp"
 
@@ -118,6 +120,25 @@ template <int D, class S> class SpherocylinderContact {
     }
   }
 
+  /// Lanes all of which were found to be `shared`.
+  ContactLanes<D, S> evaluate_shared_lanes() const
+  {
+    const EndFeet<D, S> ends(pair);
+    const Feet<D, S> closest = closest_to_end(pair, ends.nearer()), far_end = ends.farther();
+    const S mean = overlap_at(0.5 * (sqrt(closest.distance_sq) + sqrt(far_end.distance_sq)));
+    const EndExponent<S> w(pair, SideBySide<S>(pair, mean, reach));
+    const Sharing of = shared_by(closest, far_end, w);
+    ContactLanes<D, S> lanes;
+    lanes.touching = touches(closest.distance_sq);
+    lanes.two_bonds = lanes.touching;
+    lanes.alone = !(w.value > S(LEAST_END_EXPONENT));
+    const Load near = add_load(lanes, closest, of.distance, of.near);
+    const Load far = add_load(lanes, far_end, of.far_distance, of.far);
+    add_sharing(lanes, of);
+    lanes.bond_force = norm(near.force + 0.5 * of.push) + norm(far.force + 0.5 * of.push);
+    return lanes;
+  }
+
   /// The same of all lanes of a pack, but for the rare ones.
   ContactLanes<D, S> evaluate_lanes() const
   {
@@ -224,8 +245,17 @@ template <int D, class S> class SpherocylinderContact {
     return contact;
   }
 
-  Found side_to_side(const Feet<D, S> &closest, const Feet<D, S> &far_end,
-                     const EndExponent<S> &w) const
+  /// What two bonds that share an energy add to a contact beside their loads: `push` on i, and
+  /// turns of both.
+  struct Sharing {
+    S distance, far_distance;
+    Part near, far;
+    Vec<D, S> push;
+    Torque<D, S> turn_i, turn_j;
+  };
+
+  Sharing shared_by(const Feet<D, S> &closest, const Feet<D, S> &far_end,
+                    const EndExponent<S> &w) const
   {
     const S log_ratio = log_ratio_of(pair, closest, far_end, reach);
     const EndNorm<S> norm(log_ratio, w.value);
@@ -237,27 +267,43 @@ template <int D, class S> class SpherocylinderContact {
                      norm.share_b * law.harmonic.energy(overlap_at(far_distance));
     const S by_exponent = energy * norm.entropy, by_overlap = 0.5 * by_exponent * w.by_mean;
     // The norm's exponent over overlaps, less that of two bonds.
-    const auto curved = std::max<ValueOf<S>>(2.0 / value_of(w.value) - 2.0, 0.0);
-    const auto root = sqrt(curved * law.harmonic.k_e) * value_of(inverse_reach);
-    const auto coupling_a = root * sqrt(value_of(fixed.part_b * fixed.share_a));
-    const auto coupling_b = -root * sqrt(value_of(fixed.part_a * fixed.share_b));
+    const ValueOf<S> curved = most(ValueOf<S>(2.0 / value_of(w.value) - 2.0), ValueOf<S>(0.0));
+    const ValueOf<S> root = sqrt(curved * law.harmonic.k_e) * value_of(inverse_reach);
+    const ValueOf<S> coupling_a = root * sqrt(value_of(fixed.part_b * fixed.share_a));
+    const ValueOf<S> coupling_b = -root * sqrt(value_of(fixed.part_a * fixed.share_b));
 
+    const S per_i = by_exponent * w.by_along_i, per_j = by_exponent * w.by_along_j;
+    const Torque<D, S> turn = (by_exponent * w.by_cosine) * cross(pair.u_i, pair.u_j);
+    return {distance,
+            far_distance,
+            {fixed.share_a, by_overlap, coupling_a},
+            {fixed.share_b, by_overlap, coupling_b},
+            -1.0 * (per_i * pair.u_i + per_j * pair.u_j),
+            per_i * cross(pair.u_i, pair.r) + turn,
+            per_j * cross(pair.u_j, pair.r) - turn};
+  }
+
+  template <class To> static void add_sharing(To &to, const Sharing &of)
+  {
+    to.force += of.push;
+    to.torque_i -= of.turn_i;
+    to.torque_j -= of.turn_j;
+  }
+
+  Found side_to_side(const Feet<D, S> &closest, const Feet<D, S> &far_end,
+                     const EndExponent<S> &w) const
+  {
+    const Sharing of = shared_by(closest, far_end, w);
     Found contact = without(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
-    add_bond(contact, closest, distance, {fixed.share_a, by_overlap, coupling_a});
-    add_bond(contact, far_end, far_distance, {fixed.share_b, by_overlap, coupling_b});
-    const S per_i = by_exponent * w.by_along_i, per_j = by_exponent * w.by_along_j;
-    const Vec<D, S> push = -1.0 * (per_i * pair.u_i + per_j * pair.u_j);
-    const Torque<D, S> turn = (by_exponent * w.by_cosine) * cross(pair.u_i, pair.u_j);
-    contact.force += push;
-    contact.torque_i -= per_i * cross(pair.u_i, pair.r) + turn;
-    contact.torque_j -= per_j * cross(pair.u_j, pair.r) - turn;
-    for (Bond<D, S> &bond : contact.bond) bond.force += 0.5 * push;
+    add_bond(contact, closest, of.distance, of.near);
+    add_bond(contact, far_end, of.far_distance, of.far);
+    add_sharing(contact, of);
+    for (Bond<D, S> &bond : contact.bond) bond.force += 0.5 * of.push;
     return contact;
   }
 
-  /// The second bonds of lanes that have two whole ones; those whose bonds share an energy are left
-  /// alone.
+  /// The second bonds of lanes that have two whole ones.
   void add_far_ends(ContactLanes<D, S> &lanes, Feet<D, S> &closest) const
   {
     const Truth<S> opposite = lanes.touching & far_ends_may_touch(pair, closest, reach);
@@ -270,7 +316,7 @@ template <int D, class S> class SpherocylinderContact {
     const S distance = sqrt(closest.distance_sq), far_distance = sqrt(far_end.distance_sq);
     const SideBySide<S> at(pair, overlap_at(0.5 * (distance + far_distance)), reach);
     lanes.two_bonds = far & at.has_two_bonds();
-    lanes.alone = lanes.alone | (far & !lanes.two_bonds & !at.has_one_bond());
+    lanes.shared = far & !lanes.two_bonds & !at.has_one_bond() & !lanes.alone;
     const S distance_of_second = select(lanes.two_bonds, far_distance, S(reach));
     lanes.bond_force += add_load(lanes, far_end, distance_of_second, whole()).size;
   }
@@ -381,6 +427,22 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
     const double reach = i.radius + j.radius + margin;
     return spheres_are_closer<D>(margin, i, j) &&
            spine_distance_sq(spine_pair(i, j)) < reach * reach;
+  }
+};
+
+/// Compiled in packs.cpp for each set.
+template <InstructionSet SET, int D> FindContacts<SpherocylinderModel, D> find_rod_contacts;
+
+template <int D> struct PacksOf<SpherocylinderModel, D> {
+  static constexpr bool EXIST = true;
+
+  static FindContacts<SpherocylinderModel, D> *of(InstructionSet set)
+  {
+    if (set == InstructionSet::scalar) return nullptr;
+#if defined(__x86_64__)
+    if (set == InstructionSet::avx2) return find_rod_contacts<InstructionSet::avx2, D>;
+#endif
+    return find_rod_contacts<InstructionSet::baseline, D>;
   }
 };
 

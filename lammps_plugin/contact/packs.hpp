@@ -1,8 +1,7 @@
 #pragma once
 
 #include "contact/contact_block.hpp"
-
-#include "packs/instruction_set.hpp"
+#include "contact/instruction_set.hpp"
 
 namespace jamshape {
 

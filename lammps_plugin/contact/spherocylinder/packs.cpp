@@ -1,7 +1,5 @@
 // Compiled once for each set of instructions, JAMSHAPE_SET.
 
-#include "packs/rods.hpp"
-
 #include "contact/contact_block.hpp"
 #include "contact/math/pack.hpp"
 #include "contact/math/vec.hpp"
@@ -17,9 +15,11 @@ template <int D> Vec<D, Pack> axes(const SpherocylinderBody<D> *bodies, const in
   return u;
 }
 
+/// The pairs of a block from `first` on.
 template <int D>
-ContactLanes<D, Pack> contacts_of(const SpherocylinderBody<D> *bodies, const SpherocylinderLaw &law,
-                                  const ContactBlock<D> &block, int first)
+SpherocylinderContact<D, Pack> pairs_of(const SpherocylinderBody<D> *bodies,
+                                        const SpherocylinderLaw &law, const ContactBlock<D> &block,
+                                        int first)
 {
   const int *const i = block.i + first, *const j = block.j + first;
   const auto A = [&](const int *index) {
@@ -32,7 +32,7 @@ ContactLanes<D, Pack> contacts_of(const SpherocylinderBody<D> *bodies, const Sph
   for (int a = 0; a < D; ++a) pair.r[a] = Pack::load(block.separation[a] + first);
   const SpherocylinderLawOf<Pack> of_lanes{
       {Pack::load(block.k_e + first)}, law.sides, law.shortcuts};
-  return SpherocylinderContact<D, Pack>(pair, R(i), R(j), of_lanes).evaluate_lanes();
+  return {pair, R(i), R(j), of_lanes};
 }
 
 }  // namespace
@@ -43,7 +43,14 @@ template <InstructionSet SET, int D>
 [[gnu::flatten]] void find_rod_contacts(const SpherocylinderBody<D> *bodies,
                                         const SpherocylinderLaw &law, ContactBlock<D> &block)
 {
-  block.find(LANES, [&](int first) { return contacts_of<D>(bodies, law, block, first); });
+  block.find(
+      LANES,
+      [&](const ContactBlock<D> &of, int first) {
+        return pairs_of<D>(bodies, law, of, first).evaluate_lanes();
+      },
+      [&](const ContactBlock<D> &of, int first) {
+        return pairs_of<D>(bodies, law, of, first).evaluate_shared_lanes();
+      });
 }
 
 template FindContacts<SpherocylinderModel, 2> find_rod_contacts<InstructionSet::JAMSHAPE_SET, 2>;
