@@ -1,6 +1,20 @@
-#include "bindings/arrays.hpp"
+#include "contact/instruction_set.hpp"
 
+#include "bindings/arrays.hpp"
 namespace jamshape {
+namespace {
+
+nb::list instruction_sets()
+{
+  nb::list names;
+  for (const NamedSet &known : INSTRUCTION_SETS) {
+    if (machine_has(known.set)) names.append(known.name);
+  }
+  return names;
+}
+
+}  // namespace
+
 void export_shapes(nanobind::module_ &m);
 void export_sums();
 void export_derivatives();
@@ -24,4 +38,8 @@ NB_MODULE(_contact, m)
   jamshape::export_descent(m);
   jamshape::export_rattlers(m);
   jamshape::export_probes(m);
+  m.def("instruction_sets", &jamshape::instruction_sets,
+        "Sets of instructions of this machine that contacts in packs are compiled for, as the\n"
+        "environment variable JAMSHAPE_SIMD names them, best last; with 'scalar' pairs go one by\n"
+        "one.");
 }

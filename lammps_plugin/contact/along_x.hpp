@@ -13,8 +13,8 @@ namespace jamshape {
 template <class Shape, int D, class S = double> struct BodyAlongX {
   Vec<D, S> centre;
   Vec<D, S> axis;
-  double half_length;
-  double radius;
+  Plain<S> half_length;
+  Plain<S> radius;
 };
 
 /// What models share whose shape is a half length A >= 0 along the body's x and a radius R, of

@@ -80,6 +80,18 @@ template <int D, class S, int BONDS> Contact<D, S, BONDS> without_bonds(ContactS
 /// The contact of two particles of a model.
 template <class Model, int D, class S = double> using ContactOf = Contact<D, S, Model::MOST_BONDS>;
 
+/// The contacts of as many pairs as a pack has lanes, without bonds: energies and their derivatives
+/// of those that touch. A lane that is `alone` is one of a rare kind, for the code of one pair;
+/// lanes that are `shared`, whose bonds share an energy, take longer and go into packs of their
+/// own.
+template <int D, class S> struct ContactLanes {
+  S energy{0.0};
+  Vec<D, S> force{};
+  Torque<D, S> torque_i{}, torque_j{};
+  S bond_force{0.0};  // sum of the magnitudes
+  Truth<S> touching, alone{}, shared{}, two_bonds{};
+};
+
 /// What a pair remembers of one contact to begin the search for the next one at, a moment later: a
 /// model's Start<D>. Shapes whose contacts need no search remember nothing.
 struct NoStart {};

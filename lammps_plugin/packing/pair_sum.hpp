@@ -1,8 +1,10 @@
 #pragma once
 
 #include "contact/contact.hpp"
+#include "contact/contact_block.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/packs.hpp"
 #include "contact/pair_derivatives.hpp"
 
 #include "packing/split.hpp"
@@ -126,6 +128,9 @@ template <class Model, int D, class S> class PosedPairs {
     return detail::contact_begun(first_body(p, r), second_body(p), law, start);
   }
 
+  /// All at the origin.
+  const typename Model::template Body<D, S> *bodies() const { return body.data(); }
+
   /// Whether surfaces may be closer than a margin.
   bool are_closer(std::size_t p, double margin) const
   {
@@ -220,6 +225,39 @@ template <int D, class S> struct PairSums {
   std::int64_t crossing = -1;     // the first pair of this status, -1 for none
   std::int64_t unconverged = -1;  // likewise
 
+  /// The contact of the p-th pair.
+  template <class Model>
+  void add(const PosedPairs<Model, D, S> &pairs, std::size_t p, const Vec<D, S> &r,
+           const ContactOf<Model, D, S> &contact)
+  {
+    if (contact.status == ContactStatus::APART) return;
+    if (contact.status != ContactStatus::TOUCHING) {
+      const bool is_crossing = contact.status == ContactStatus::CROSSING;
+      std::int64_t &first = is_crossing ? crossing : unconverged;
+      if (first < 0) first = static_cast<std::int64_t>(p);
+      return;
+    }
+    energy += contact.energy;
+    add_force(pairs.first(p), pairs.second(p), r, contact.force);
+    torque[pairs.first(p)] += contact.torque_i;
+    torque[pairs.second(p)] += contact.torque_j;
+    for (int b = 0; b < contact.n_bonds; ++b) bond_force += norm(contact.bond[b].force);
+    n_bonds += contact.n_bonds;
+    error = std::max(error, contact.error);
+  }
+
+  /// The k-th contact of a block, one that touches and is not alone.
+  void add(const ContactBlock<D> &block, int k)
+  {
+    const int i = block.i[k], j = block.j[k];
+    energy += block.energy[k];
+    add_force(i, j, block.separation_of(k), block.force_of(k));
+    torque[i] += block.torque_i_of(k);
+    torque[j] += block.torque_j_of(k);
+    bond_force += block.bond_force[k];
+    n_bonds += 1 + (block.two_bonds >> k & 1);
+  }
+
   /// Adds those over pairs that come after.
   void add(const PairSums &next)
   {
@@ -235,7 +273,43 @@ template <int D, class S> struct PairSums {
     if (crossing < 0) crossing = next.crossing;
     if (unconverged < 0) unconverged = next.unconverged;
   }
+
+ private:
+  void add_force(std::size_t i, std::size_t j, const Vec<D, S> &r, const Vec<D, S> &on_i)
+  {
+    force[i] += on_i;
+    force[j] -= on_i;
+    for (int a = 0; a < D; ++a) {
+      for (int b = 0; b < D; ++b) virial[D * a + b] += r[a] * on_i[b];
+    }
+  }
 };
+
+/// Adds contacts of some of the pairs, many at once.
+template <class Model, int D>
+void add_blocks(PairSums<D, double> &sums, const PosedPairs<Model, D, double> &pairs,
+                FindContacts<Model, D> &find, const Range &part)
+{
+  const typename Model::Law &law = pairs.contact_law();
+  ContactBlock<D> block;
+  std::size_t number[block.MOST];  // of each pair of the block
+  for (std::size_t p = part.first; p < part.last;) {
+    for (block.n = 0; p < part.last && block.n < block.MOST; ++p) {
+      const Vec<D> r = pairs.separation(p);
+      if (!pairs.may_touch(p, r)) continue;
+      number[block.n] = p;
+      block.add(static_cast<int>(pairs.first(p)), static_cast<int>(pairs.second(p)), r,
+                law.harmonic.k_e);
+    }
+    if (block.n == 0) return;
+    find(pairs.bodies(), law, block);
+    block.for_each(block.touching & ~block.alone, [&](int k) { sums.add(block, k); });
+    block.for_each(block.alone, [&](int k) {
+      const Vec<D> r = block.separation_of(k);
+      sums.add(pairs, number[k], r, pairs.contact(number[k], r));
+    });
+  }
+}
 
 /// Over some of the pairs. Contacts begin where the last ones of these pairs were, if that is
 /// given.
@@ -246,29 +320,16 @@ PairSums<D, S> sum_part(const PosedPairs<Model, D, S> &pairs, StartIn<Model, D, 
   PairSums<D, S> sums;
   sums.force.assign(pairs.n_particles(), Vec<D, S>{});
   sums.torque.assign(pairs.n_particles(), Torque<D, S>{});
+  if constexpr (std::is_same_v<S, double> && PacksOf<Model, D>::EXIST) {
+    if (auto *const find = PacksOf<Model, D>::of(required_instruction_set())) {
+      add_blocks<Model, D>(sums, pairs, *find, part);
+      return sums;
+    }
+  }
   for (std::size_t p = part.first; p < part.last; ++p) {
     const Vec<D, S> r = pairs.separation(p);
     if (!pairs.may_touch(p, r)) continue;
-    const ContactOf<Model, D, S> contact =
-        pairs.contact(p, r, starts == nullptr ? nullptr : starts + p);
-    if (contact.status == ContactStatus::APART) continue;
-    if (contact.status != ContactStatus::TOUCHING) {
-      const bool is_crossing = contact.status == ContactStatus::CROSSING;
-      std::int64_t &first = is_crossing ? sums.crossing : sums.unconverged;
-      if (first < 0) first = static_cast<std::int64_t>(p);
-      continue;
-    }
-    sums.energy += contact.energy;
-    sums.force[pairs.first(p)] += contact.force;
-    sums.force[pairs.second(p)] -= contact.force;
-    sums.torque[pairs.first(p)] += contact.torque_i;
-    sums.torque[pairs.second(p)] += contact.torque_j;
-    for (int a = 0; a < D; ++a) {
-      for (int b = 0; b < D; ++b) sums.virial[D * a + b] += r[a] * contact.force[b];
-    }
-    for (int b = 0; b < contact.n_bonds; ++b) sums.bond_force += norm(contact.bond[b].force);
-    sums.n_bonds += contact.n_bonds;
-    sums.error = std::max(sums.error, contact.error);
+    sums.add(pairs, p, r, pairs.contact(p, r, starts == nullptr ? nullptr : starts + p));
   }
   return sums;
 }

@@ -23,6 +23,7 @@ template <class Model, int D> class StoredBodies {
 
   std::size_t size() const { return now.size(); }
   const Body &operator[](std::size_t i) const { return now[i]; }
+  const Body *data() const { return now.data(); }
 
   void begin_shapes(std::size_t n) { resize_closely(now, n); }
   void set_shape(std::size_t i, const Shape &shape) { now[i] = Model::template body<D>(shape); }

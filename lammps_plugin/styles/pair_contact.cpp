@@ -15,14 +15,15 @@
 #include <cmath>
 #include <cstddef>
 #include <mpi.h>
+#include <stdexcept>
 
 namespace jamshape {
 
 using LAMMPS_NS::bigint;
 
 PairContact::PairContact(LAMMPS_NS::LAMMPS *lmp) :
-    Pair(lmp), particles(lmp), k_e(nullptr), any_turns(true), any_round(false),
-    any_ellipsoids(false), is_new_run(false)
+    Pair(lmp), particles(lmp), k_e(nullptr), any_turns(true), instructions(InstructionSet::scalar),
+    any_round(false), any_ellipsoids(false), is_new_run(false)
 {
   no_virial_fdotr_compute = 1;  // sum_i x_i F_i loses digits that the pairwise sum keeps
   single_enable = 0;
@@ -134,9 +135,19 @@ void PairContact::init_style()
                "pair_style " + style_name() +
                    " found a triclinic box, expected an orthogonal one: use a box without tilt.");
   }
+  choose_instructions();
   measure_particles();
   neighbor->request(this, instance_me);
   if (update->whichflag == 2 && any_turns) request_minimiser();
+}
+
+void PairContact::choose_instructions()
+{
+  try {
+    instructions = required_instruction_set();
+  } catch (const std::invalid_argument &wrong) {
+    error->all(FLERR, "pair_style " + style_name() + " " + wrong.what());
+  }
 }
 
 void PairContact::request_minimiser()

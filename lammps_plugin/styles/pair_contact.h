@@ -1,6 +1,7 @@
 #pragma once
 
 #include "contact/contact.hpp"
+#include "contact/instruction_set.hpp"
 #include "contact/math/vec.hpp"
 
 #include "pair.h"
@@ -88,6 +89,7 @@ class PairContact : public LAMMPS_NS::Pair {
   ParticleView particles;
   double **k_e;
   bool any_turns;
+  InstructionSet instructions;
   /// Where the general path is taken although the scene does not need it: for tests and timings.
   struct General {
     bool rotation = false, pairs = false, contact = false;
@@ -135,6 +137,7 @@ class PairContact : public LAMMPS_NS::Pair {
   std::string told, said;  // the last line in the log, without and with its numbers
 
   void allocate();
+  void choose_instructions();
   void measure_particles();
   void request_minimiser();
   int rotations() const;

@@ -1,9 +1,11 @@
 #pragma once
 
 #include "contact/contact.hpp"
+#include "contact/contact_block.hpp"
 #include "contact/math/dimension.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/packs.hpp"
 #include "contact/pair_derivatives.hpp"
 
 #include "atom.h"
@@ -181,6 +183,74 @@ template <class Model> class PairContactOf : public PairContact {
 
   template <int D, bool TURNS, bool TALLY> void evaluate()
   {
+    if constexpr (PacksOf<Model, D>::EXIST) {
+      FindContacts<Model, D> *const find = PacksOf<Model, D>::of(instructions);
+      if (find != nullptr) return evaluate_blocks<D, TURNS, TALLY>(*find);
+    }
+    evaluate_pairs<D, TURNS, TALLY>();
+  }
+
+  /// Many pairs at once.
+  template <int D, bool TURNS, bool TALLY> void evaluate_blocks(FindContacts<Model, D> &find)
+  {
+    const BodiesOf<Model, D> &bodies = all<D>().now;
+    const int *const type = atom->type;
+    ContactBlock<D> block;
+    const auto add_found = [&] {
+      if (block.n == 0) return;
+      find(bodies.data(), law_of(block.i[0], block.j[0]), block);
+      block.for_each(block.touching & ~block.alone, [&](int k) {
+        add_contact<D, TURNS, TALLY>(
+            block.i[k], block.j[k],
+            {block.energy[k], block.force_of(k), block.torque_i_of(k), block.torque_j_of(k)});
+      });
+      block.for_each(block.alone,
+                     [&](int k) { add_alone<D, TURNS, TALLY>(block.i[k], block.j[k]); });
+      block.n = 0;
+    };
+    for (int n = 0; n < list->inum; ++n) {
+      const int i = list->ilist[n];
+      const Body<D> &body = bodies[i];
+      for (int k = first[n]; k < first[n + 1]; ++k) {
+        const int j = partner[k];
+        block.add(i, j, body.centre - bodies[j].centre, k_e[type[i]][type[j]]);
+        if (block.n == block.MOST) add_found();
+      }
+    }
+    add_found();
+  }
+
+  template <int D> struct Load {
+    double energy;
+    Vec<D> force;
+    Torque<D> torque_i, torque_j;
+  };
+
+  template <int D, bool TURNS, bool TALLY> void add_contact(int i, int j, const Load<D> &load)
+  {
+    double **const f = atom->f, **const torque = atom->torque;
+    add_to<D>(f[i], load.force);
+    if constexpr (TURNS) add_torque<D>(torque[i], load.torque_i);
+    if (force->newton_pair || j < atom->nlocal) {
+      add_to<D>(f[j], -load.force);
+      if constexpr (TURNS) add_torque<D>(torque[j], load.torque_j);
+    }
+    if constexpr (TALLY) tally<D>(i, j, load);
+  }
+
+  /// A pair that packs leave.
+  template <int D, bool TURNS, bool TALLY> void add_alone(int i, int j)
+  {
+    const BodiesOf<Model, D> &bodies = all<D>().now;
+    const Touch<D> contact = contact_of(bodies[i], bodies[j], law_of(i, j));
+    if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
+    if (contact.status == ContactStatus::UNCONVERGED) stop_at_unconverged(i, j);
+    add_contact<D, TURNS, TALLY>(
+        i, j, {contact.energy, contact.force, contact.torque_i, contact.torque_j});
+  }
+
+  template <int D, bool TURNS, bool TALLY> void evaluate_pairs()
+  {
     const BodiesOf<Model, D> &bodies = all<D>().now;
     const int nlocal = atom->nlocal, newton = force->newton_pair;
     double **const f = atom->f, **const torque = atom->torque;
@@ -202,7 +272,8 @@ template <class Model> class PairContactOf : public PairContact {
           add_to<D>(f[j], -contact.force);
           if constexpr (TURNS) add_torque<D>(torque[j], contact.torque_j);
         }
-        if constexpr (TALLY) tally<D>(i, j, contact, body.centre - other.centre);
+        if constexpr (TALLY)
+          tally<D>(i, j, {contact.energy, contact.force, contact.torque_i, contact.torque_j});
       }
       add_to<D>(f[i], force_i);
       if constexpr (TURNS) add_torque<D>(torque[i], torque_i);
@@ -240,11 +311,13 @@ template <class Model> class PairContactOf : public PairContact {
     }
   }
 
-  template <int D> void tally(int i, int j, const Touch<D> &contact, const Vec<D> &r)
+  template <int D> void tally(int i, int j, const Load<D> &load)
   {
-    const double fz = D == 2 ? 0.0 : contact.force[D - 1], z = D == 2 ? 0.0 : r[D - 1];
-    ev_tally_xyz(i, j, atom->nlocal, force->newton_pair, contact.energy, 0.0, contact.force[0],
-                 contact.force[1], fz, r[0], r[1], z);
+    const Vec<3> along = in_space<D>(load.force);
+    const double *const x = atom->x[i], *const y = atom->x[j];
+    const double z = D == 2 ? 0.0 : x[2] - y[2];
+    ev_tally_xyz(i, j, atom->nlocal, force->newton_pair, load.energy, 0.0, along[0], along[1],
+                 along[2], x[0] - y[0], x[1] - y[1], z);
   }
 
   /* ----------------------------------------------------------------------

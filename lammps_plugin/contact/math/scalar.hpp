@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 namespace jamshape {
@@ -19,7 +21,24 @@ inline double value_of(double x) { return x; }
 inline long double value_of(long double x) { return x; }
 
 /// The type of the plain number in a scalar S; only to be named where value_of(S) is declared.
-template <class S> using ValueOf = decltype(value_of(std::declval<S>()));
+template <class S> using ValueOf = std::decay_t<decltype(value_of(std::declval<S>()))>;
+
+/// What lengths of a shape are that nothing is differentiated by: doubles, in packs one a lane.
+template <class S> struct PlainOf {
+  using Type = double;
+};
+template <class S> using Plain = typename PlainOf<S>::Type;
+
+/// What a comparison of scalars gives.
+template <class S> using Truth = decltype(std::declval<S>() < std::declval<S>());
+
+/// `a` where a condition holds, else `b`; the smaller and the larger of two: under names that packs
+/// share, of which every lane chooses for itself.
+template <class S> S select(bool where, const S &a, const S &b) { return where ? a : b; }
+template <class S> S least(const S &a, const S &b) { return std::min(a, b); }
+template <class S> S most(const S &a, const S &b) { return std::max(a, b); }
+inline bool any(bool truth) { return truth; }
+inline bool all(bool truth) { return truth; }
 
 /// A scalar as a constant: of a dual number what it is without its derivatives.
 inline double constant(double x) { return x; }

@@ -72,6 +72,15 @@ template <class S, int D, class V> Vec<D, S> constants_of(const Vec<D, V> &value
   return constants;
 }
 
+/// `a` where a condition holds, else `b`.
+template <int D, class S>
+Vec<D, S> chosen(const Truth<S> &where, const Vec<D, S> &a, const Vec<D, S> &b)
+{
+  Vec<D, S> c;
+  for (int k = 0; k < D; ++k) c[k] = select(where, a[k], b[k]);
+  return c;
+}
+
 template <class S> Vec<1, S> cross(const Vec<2, S> &a, const Vec<2, S> &b)
 {
   return {{a[0] * b[1] - a[1] * b[0]}};

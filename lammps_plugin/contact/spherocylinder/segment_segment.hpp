@@ -13,9 +13,9 @@ namespace jamshape {
 template <int D, class S = double> struct SpinePair {
   Vec<D, S> r;
   Vec<D, S> u_i;
-  double A_i;
+  Plain<S> A_i;
   Vec<D, S> u_j;
-  double A_j;
+  Plain<S> A_j;
 };
 
 /// The pair without its derivatives, itself if it has none: searches and other decisions look at
@@ -49,10 +49,18 @@ template <int D, class S> Feet<D, S> feet_at(const SpinePair<D, S> &p, const S &
   return {s, t, delta, norm_sq(delta)};
 }
 
-/// `x` limited to [-bound, bound], in the two instructions that std::clamp does not become.
-template <class S> S limited(const S &x, double bound)
+/// `a` where a condition holds, else `b`.
+template <int D, class S>
+Feet<D, S> chosen(const Truth<S> &where, const Feet<D, S> &a, const Feet<D, S> &b)
 {
-  return std::min<S>(bound, std::max<S>(-bound, x));
+  return {select(where, a.s, b.s), select(where, a.t, b.t), chosen(where, a.delta, b.delta),
+          select(where, a.distance_sq, b.distance_sq)};
+}
+
+/// `x` limited to [-bound, bound], in the two instructions that std::clamp does not become.
+template <class S> S limited(const S &x, const Plain<S> &bound)
+{
+  return least(S(bound), most(S(-bound), x));
 }
 
 /// Foot on spine j of the point s of spine i, and the reverse.
@@ -75,9 +83,9 @@ template <int D, class S> struct TipFeet {
   {
     for (int k = 0; k < 2; ++k) {
       const double sign = k == 0 ? 1.0 : -1.0;
-      s[k] = sign * p.A_i;
+      s[k] = S(sign * p.A_i);
       t[k] = foot_on_j(p, s[k]);
-      t[2 + k] = sign * p.A_j;
+      t[2 + k] = S(sign * p.A_j);
       s[2 + k] = foot_on_i(p, t[2 + k]);
     }
     for (int k = 0; k < 4; ++k) distance_sq[k] = norm_sq(p.r + s[k] * p.u_i - t[k] * p.u_j);
@@ -101,6 +109,19 @@ template <int D, class S> struct TipFeet {
     const int of_i = distance_sq[1] < distance_sq[0], of_j = 2 + (distance_sq[3] < distance_sq[2]);
     return distance_sq[of_j] < distance_sq[of_i] ? of_j : of_i;
   }
+
+  /// The t of that tip.
+  S t_of_nearest() const
+  {
+    if constexpr (std::is_same_v<Truth<S>, bool>) {
+      return t[nearest()];
+    } else {
+      const Truth<S> of_i = distance_sq[1] < distance_sq[0], of_j = distance_sq[3] < distance_sq[2];
+      const Truth<S> on_j = select(of_j, distance_sq[3], distance_sq[2]) <
+                            select(of_i, distance_sq[1], distance_sq[0]);
+      return select(on_j, select(of_j, t[3], t[2]), select(of_i, t[1], t[0]));
+    }
+  }
 };
 
 /// Whether feet `a` are closer than `b`, each a tip and its foot on the other spine. Where they
@@ -108,17 +129,13 @@ template <int D, class S> struct TipFeet {
 /// that tip. Rounded distances cannot tell that of feet within 1e-8 of each other, and would leave
 /// normal and lever arms with half of the digits.
 template <int D, class S>
-bool is_closer(const SpinePair<D, S> &p, const Feet<D, S> &a, const Feet<D, S> &b)
+Truth<S> is_closer(const SpinePair<D, S> &p, const Feet<D, S> &a, const Feet<D, S> &b)
 {
-  if (a.s == b.s) {
-    const bool a_inside = abs(a.t) < p.A_j, b_inside = abs(b.t) < p.A_j;
-    if (a_inside != b_inside) return a_inside;
-  }
-  if (a.t == b.t) {
-    const bool a_inside = abs(a.s) < p.A_i, b_inside = abs(b.s) < p.A_i;
-    if (a_inside != b_inside) return a_inside;
-  }
-  return a.distance_sq < b.distance_sq;
+  const Truth<S> a_on_i = abs(a.s) < p.A_i, b_on_i = abs(b.s) < p.A_i;
+  const Truth<S> a_on_j = abs(a.t) < p.A_j, b_on_j = abs(b.t) < p.A_j;
+  const Truth<S> tip_of_i = (a.s == b.s) & (a_on_j ^ b_on_j);
+  const Truth<S> tip_of_j = (a.t == b.t) & (a_on_i ^ b_on_i);
+  return select(tip_of_i, a_on_j, select(tip_of_j, a_on_i, a.distance_sq < b.distance_sq));
 }
 
 /// The closest approach at either end of the pair: at end e = +, - the shorter of (tip e of i to
@@ -128,6 +145,30 @@ template <int D, class S> struct EndFeet {
   Feet<D, S> plus, minus;
 
   explicit EndFeet(const SpinePair<D, S> &p)
+  {
+    if constexpr (std::is_same_v<Truth<S>, bool>) {
+      find_by_tip(p);
+    } else {
+      find_in_lanes(p);
+    }
+  }
+
+  Feet<D, S> nearer() const { return chosen(minus_is_nearer, minus, plus); }
+  Feet<D, S> farther() const { return chosen(minus_is_nearer, plus, minus); }
+
+  /// Whether the two ends are different points.
+  bool are_apart() const { return plus.s != minus.s || plus.t != minus.t; }
+
+  /// The middle between the two ends, on both spines.
+  Feet<D, S> middle(const SpinePair<D, S> &p) const
+  {
+    return feet_at(p, 0.5 * (plus.s + minus.s), 0.5 * (plus.t + minus.t));
+  }
+
+ private:
+  Truth<S> minus_is_nearer;
+
+  void find_by_tip(const SpinePair<D, S> &p)
   {
     const auto &values = values_of(p);
     const TipFeet<D, ValueOf<S>> tips(values);
@@ -151,20 +192,19 @@ template <int D, class S> struct EndFeet {
     }
   }
 
-  const Feet<D, S> &nearer() const { return minus_is_nearer ? minus : plus; }
-  const Feet<D, S> &farther() const { return minus_is_nearer ? plus : minus; }
-
-  /// Whether the two ends are different points.
-  bool are_apart() const { return plus.s != minus.s || plus.t != minus.t; }
-
-  /// The middle between the two ends, on both spines.
-  Feet<D, S> middle(const SpinePair<D, S> &p) const
+  /// The same for all lanes of a pack.
+  void find_in_lanes(const SpinePair<D, S> &p)
   {
-    return feet_at(p, 0.5 * (plus.s + minus.s), 0.5 * (plus.t + minus.t));
+    const TipFeet<D, S> tips(p);
+    const Truth<S> opposed = dot(p.u_i, p.u_j) < S(0.0);
+    const auto closer = [&](const Feet<D, S> &of_i, const Feet<D, S> &of_j) {
+      return chosen(is_closer(p, of_j, of_i), of_j, of_i);
+    };
+    const Feet<D, S> first = tips.feet(p, 2), second = tips.feet(p, 3);
+    plus = closer(tips.feet(p, 0), chosen(opposed, second, first));
+    minus = closer(tips.feet(p, 1), chosen(opposed, first, second));
+    minus_is_nearer = is_closer(p, minus, plus);
   }
-
- private:
-  bool minus_is_nearer;
 };
 
 /// The closest points from a point t close to that on spine j: they are each other's feet.
@@ -181,20 +221,29 @@ template <class S> Feet<2, S> closest_from_end(const SpinePair<2, S> &p, const S
   return each_others_feet(p, t);
 }
 
-template <class S> Feet<3, S> closest_from_end(const SpinePair<3, S> &p, const S &t_at_end)
+/// The points inside both of two skew spines that are closest, if there are any; else `at_end()`.
+template <class S, class AtEnd>
+Feet<3, S> closest_inside(const SpinePair<3, S> &p, const AtEnd &at_end)
 {
   // The part of u_i across u_j, from the difference of the axes: nearly parallel spines lose no
   // digits.
   const Vec<3, S> turn = p.u_i - copysign(S(1.0), dot(p.u_i, p.u_j)) * p.u_j;
   const Vec<3, S> across = turn - dot(turn, p.u_j) * p.u_j;
   const S sin_sq = norm_sq(across);
-  if (sin_sq == 0.0) return each_others_feet(p, t_at_end);
   const S s = -dot(p.r, across) / sin_sq;
   const S t = dot(p.u_j, p.r + s * p.u_i);
   // Feet inside both spines are the minimum, the distance being convex: comparing it with that at
-  // the ends would leave it to rounding where the feet of nearly parallel spines sit.
-  if (abs(s) < p.A_i && abs(t) < p.A_j) return feet_at(p, foot_on_i(p, t), t);
-  return each_others_feet(p, t_at_end);
+  // the ends would leave it to rounding where the feet of nearly parallel spines sit. Of parallel
+  // ones s is infinite or no number.
+  const Truth<S> inside = (abs(s) < p.A_i) & (abs(t) < p.A_j) & !(sin_sq == S(0.0));
+  if (!any(inside)) return at_end();
+  const Feet<3, S> found = feet_at(p, foot_on_i(p, t), t);
+  return all(inside) ? found : chosen(inside, found, at_end());
+}
+
+template <class S> Feet<3, S> closest_from_end(const SpinePair<3, S> &p, const S &t)
+{
+  return closest_inside(p, [&] { return each_others_feet(p, t); });
 }
 
 template <class S> Feet<2, S> closest_to_end(const SpinePair<2, S> &, const Feet<2, S> &end)
@@ -203,19 +252,18 @@ template <class S> Feet<2, S> closest_to_end(const SpinePair<2, S> &, const Feet
 }
 template <class S> Feet<3, S> closest_to_end(const SpinePair<3, S> &p, const Feet<3, S> &end)
 {
-  const Vec<3, S> turn = p.u_i - copysign(S(1.0), dot(p.u_i, p.u_j)) * p.u_j;
-  const Vec<3, S> across = turn - dot(turn, p.u_j) * p.u_j;
-  const S sin_sq = norm_sq(across);
-  if (sin_sq == 0.0) return end;
-  const S s = -dot(p.r, across) / sin_sq;
-  const S t = dot(p.u_j, p.r + s * p.u_i);
-  if (abs(s) < p.A_i && abs(t) < p.A_j) return feet_at(p, foot_on_i(p, t), t);
-  return end;
+  return closest_inside(p, [&] { return end; });
 }
 
 /// Below this squared sine of the angle the intersection of the lines through two spines does not
 /// tell where the spines are closest.
 inline constexpr double NO_INTERSECTION_SINE_SQ = 1e-8;
+
+template <int D, class S> Feet<D, S> closest_by_tips(const SpinePair<D, S> &p)
+{
+  const TipFeet<D, S> tips(p);
+  return closest_from_end(p, tips.t_of_nearest());
+}
 
 /// The closest points of two spines. In the plane they are at the tip towards the intersection of
 /// their lines, which saves the search over four tips; crossing spines, a state to detect
@@ -224,35 +272,39 @@ template <int D, class S> Feet<D, S> closest_feet(const SpinePair<D, S> &p)
 {
   if constexpr (D == 2) {
     const S sine = cross(p.u_i, p.u_j)[0];
-    if (sine * sine > NO_INTERSECTION_SINE_SQ) {
-      return each_others_feet(p, foot_on_j(p, limited(cross(p.u_j, p.r)[0] / sine, p.A_i)));
-    }
+    const Truth<S> meet = sine * sine > S(NO_INTERSECTION_SINE_SQ);
+    if (!any(meet)) return closest_by_tips(p);
+    const S towards = limited(cross(p.u_j, p.r)[0] / sine, p.A_i);
+    const Feet<D, S> found = each_others_feet(p, foot_on_j(p, towards));
+    return all(meet) ? found : chosen(meet, found, closest_by_tips(p));
+  } else {
+    return closest_by_tips(p);
   }
-  const TipFeet<D, S> tips(p);
-  return closest_from_end(p, tips.t[tips.nearest()]);
 }
 
 /// Whether the far ends of what lies opposite of two spines may be closer than `reach`, the feet
 /// where they are closest given. Spines in the plane part from there by the sine of their angle.
 template <class S>
-bool far_ends_may_touch(const SpinePair<2, S> &p, const Feet<2, S> &closest, double reach)
+Truth<S> far_ends_may_touch(const SpinePair<2, S> &p, const Feet<2, S> &closest,
+                            const Plain<S> &reach)
 {
   const S sine = cross(p.u_i, p.u_j)[0], cosine = dot(p.u_i, p.u_j);
   // Where they lie on one side of each other's tip, nothing is opposite.
-  if (p.A_i + p.A_j * abs(cosine) <= abs(dot(p.u_i, p.r)) ||
-      p.A_j + p.A_i * abs(cosine) <= abs(dot(p.u_j, p.r)))
-    return false;
-  if (sine * sine < NO_INTERSECTION_SINE_SQ) return true;
+  const Truth<S> beside = (p.A_i + p.A_j * abs(cosine) <= abs(dot(p.u_i, p.r))) |
+                          (p.A_j + p.A_i * abs(cosine) <= abs(dot(p.u_j, p.r)));
+  if (all(beside)) return !beside;
   // Towards the intersection of their lines they come closer.
   const S of_i =
       p.A_i + copysign(closest.s, closest.s * (cross(p.u_j, p.r)[0] - closest.s * sine) * sine);
   const S of_j =
       p.A_j + copysign(closest.t, closest.t * (cross(p.u_i, p.r)[0] - closest.t * sine) * sine);
-  return std::min<S>(of_i, of_j) * abs(sine) < reach;
+  const Truth<S> nearly_parallel = sine * sine < S(NO_INTERSECTION_SINE_SQ);
+  return (nearly_parallel | (least(of_i, of_j) * abs(sine) < S(reach))) & !beside;
 }
-template <class S> bool far_ends_may_touch(const SpinePair<3, S> &, const Feet<3, S> &, double)
+template <class S>
+Truth<S> far_ends_may_touch(const SpinePair<3, S> &, const Feet<3, S> &closest, const Plain<S> &)
 {
-  return true;
+  return closest.distance_sq == closest.distance_sq;
 }
 
 /// |sin| of the angle between the spines: the one measure of being parallel used everywhere; it
@@ -260,12 +312,12 @@ template <class S> bool far_ends_may_touch(const SpinePair<3, S> &, const Feet<3
 template <int D, class S> S abs_sine(const SpinePair<D, S> &p) { return norm(cross(p.u_i, p.u_j)); }
 
 /// True when the two segments cross in the plane: each has its tips on opposite sides of the other.
-template <class S> bool spines_cross(const SpinePair<2, S> &p)
+template <class S> Truth<S> spines_cross(const SpinePair<2, S> &p)
 {
   const S sine = abs(cross(p.u_i, p.u_j)[0]);
-  return abs(cross(p.u_j, p.r)[0]) < p.A_i * sine && abs(cross(p.u_i, p.r)[0]) < p.A_j * sine;
+  return (abs(cross(p.u_j, p.r)[0]) < p.A_i * sine) & (abs(cross(p.u_i, p.r)[0]) < p.A_j * sine);
 }
-template <class S> bool spines_cross(const SpinePair<3, S> &) { return false; }
+template <class S> Truth<S> spines_cross(const SpinePair<3, S> &) { return S(0.0) < S(0.0); }
 
 /// Squared shortest distance of the two spines, zero where they cross.
 template <int D, class S> S spine_distance_sq(const SpinePair<D, S> &p)

@@ -3,8 +3,6 @@
 #include "contact/math/smooth_step.hpp"
 #include "contact/spherocylinder/segment_segment.hpp"
 
-#include <algorithm>
-
 namespace jamshape {
 
 /// Depth y of two bonds: mean overlap (a length) over A_min^2 / d, A_min the shorter half length.
@@ -23,7 +21,7 @@ template <class S> struct ValueAndSlope {
 /// h = g^3 / (g^2 + SHALLOW^2), g = y - SHALLOW: 0 below SHALLOW, about y far above, C2.
 template <class S> ValueAndSlope<S> growth_of(const S &y)
 {
-  const S g = std::max<S>(y - SHALLOW, 0.0);
+  const S g = most(S(y - SHALLOW), S(0.0));
   const S square = g * g, sum = square + SHALLOW * SHALLOW;
   return {g * square / sum, square * (sum + 2.0 * SHALLOW * SHALLOW) / (sum * sum)};
 }
@@ -41,28 +39,32 @@ template <class S> ValueAndSlope<S> fade_length(const S &h)
 /// opposite of i is q_i = A_i + A_j |c| - |u_i.r|; `opposite` is the harmonic mean of both, 0 where
 /// one of them is none.
 template <class S> struct SideBySide {
-  double shorter, depth_per_overlap;
+  Plain<S> shorter, depth_per_overlap;
   S along_i, along_j, cosine, depth, opposite_i, opposite_j, opposite;
 
   template <int D>
-  SideBySide(const SpinePair<D, S> &p, const S &mean_overlap, double reach) :
-      shorter(std::min(p.A_i, p.A_j)), depth_per_overlap(reach / shorter * (reach / shorter)),
+  SideBySide(const SpinePair<D, S> &p, const S &mean_overlap, const Plain<S> &reach) :
+      shorter(least(p.A_i, p.A_j)), depth_per_overlap(reach / shorter * (reach / shorter)),
       along_i(dot(p.u_i, p.r)), along_j(dot(p.u_j, p.r)), cosine(dot(p.u_i, p.u_j)),
       depth(mean_overlap * depth_per_overlap),
       opposite_i(p.A_i + p.A_j * abs(cosine) - abs(along_i)),
       opposite_j(p.A_j + p.A_i * abs(cosine) - abs(along_j)), opposite(0.0)
   {
-    if (opposite_i > 0.0 && opposite_j > 0.0)
-      opposite = 2.0 * opposite_i * opposite_j / (opposite_i + opposite_j);
+    const Truth<S> both = (opposite_i > S(0.0)) & (opposite_j > S(0.0));
+    if (any(both))
+      opposite = select(both, 2.0 * opposite_i * opposite_j / (opposite_i + opposite_j), opposite);
   }
 
   /// Whether the exponent is 1, as of most, or 0: known without computing it.
-  bool has_two_bonds() const
+  Truth<S> has_two_bonds() const
   {
-    const S least = std::min<S>(opposite, 2.0 * shorter * abs(cosine));
-    return depth <= SHALLOW && least >= FADE_LENGTH * shorter;
+    const S length = least(opposite, S(2.0 * shorter * abs(cosine)));
+    return (depth <= S(SHALLOW)) & (S(FADE_LENGTH * shorter) <= length);
   }
-  bool has_one_bond() const { return !(opposite > 0.0 && depth * LEAST_END_EXPONENT < 1.0); }
+  Truth<S> has_one_bond() const
+  {
+    return !((opposite > S(0.0)) & (depth * LEAST_END_EXPONENT < S(1.0)));
+  }
 };
 
 /// Exponent of the norm of the overlaps at the two ends,
@@ -96,13 +98,16 @@ template <class S> struct EndExponent {
 /// of the feet, since the overlaps may differ by less than they round.
 template <int D, class S>
 S log_ratio_of(const SpinePair<D, S> &p, const Feet<D, S> &near, const Feet<D, S> &far,
-               double reach)
+               const Plain<S> &reach)
 {
   const S distance = sqrt(near.distance_sq), far_distance = sqrt(far.distance_sq);
   const Vec<D, S> step = (far.s - near.s) * p.u_i - (far.t - near.t) * p.u_j;
   const S drop = dot(step, far.delta + near.delta) / (far_distance + distance);
-  const S lost = with_value(drop, std::max(value_of(drop), {})) / (reach - distance);
-  return lost < 0.5 ? log1p(-lost) : log((reach - far_distance) / (reach - distance));
+  const S lost = with_value(drop, most(value_of(drop), ValueOf<S>(0.0))) / (reach - distance);
+  const Truth<S> little = lost < S(0.5);
+  if (all(little)) return log1p(-lost);
+  const S of_overlaps = log((reach - far_distance) / (reach - distance));
+  return any(little) ? select(little, log1p(-lost), of_overlaps) : of_overlaps;
 }
 
 /// The norm V = (E(a)^(1/w) + E(b)^(1/w))^w of harmonic energies, from ln(b / a): their parts of

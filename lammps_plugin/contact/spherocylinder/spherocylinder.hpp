@@ -3,8 +3,10 @@
 #include "contact/along_x.hpp"
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
+#include "contact/instruction_set.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/packs.hpp"
 #include "contact/spherocylinder/segment_segment.hpp"
 #include "contact/spherocylinder/side_to_side.hpp"
 
@@ -49,11 +51,12 @@ template <> inline SubstrateDrag substrate_drag<3>(const Spherocylinder &shape)
 
 template <int D, class S = double> using SpherocylinderBody = BodyAlongX<Spherocylinder, D, S>;
 
-struct SpherocylinderLaw {
-  Harmonic harmonic;
+template <class K> struct SpherocylinderLawOf {
+  HarmonicOf<K> harmonic;
   Sides sides;
   bool shortcuts;  // false: discs by the search for feet, too
 };
+using SpherocylinderLaw = SpherocylinderLawOf<double>;
 
 /// Below this |sin| of the angle between them two spines are parallel: their one bond sits in the
 /// middle of the overlap of the spines (Marschall & Teitel 2018, Sec. II, taken modulo pi).
@@ -92,9 +95,13 @@ template <int D, class S> class SpherocylinderContact {
   using Found = Contact<D, S, 2>;
 
   SpherocylinderContact(const SpherocylinderBody<D, S> &i, const SpherocylinderBody<D, S> &j,
-                        const SpherocylinderLaw &contact_law) :
-      pair(spine_pair(i, j)), radius_i(i.radius), reach(i.radius + j.radius),
-      inverse_reach(S(1.0) / reach), law(contact_law)
+                        const SpherocylinderLawOf<Plain<S>> &contact_law) :
+      SpherocylinderContact(spine_pair(i, j), i.radius, j.radius, contact_law)
+  {
+  }
+  SpherocylinderContact(const SpinePair<D, S> &spines, const Plain<S> &R_i, const Plain<S> &R_j,
+                        const SpherocylinderLawOf<Plain<S>> &contact_law) :
+      pair(spines), radius_i(R_i), reach(R_i + R_j), inverse_reach(S(1.0) / reach), law(contact_law)
   {
   }
 
@@ -113,11 +120,47 @@ template <int D, class S> class SpherocylinderContact {
     }
   }
 
+  /// Lanes all of which were found to be `shared`.
+  ContactLanes<D, S> evaluate_shared_lanes() const
+  {
+    const EndFeet<D, S> ends(pair);
+    const Feet<D, S> closest = closest_to_end(pair, ends.nearer()), far_end = ends.farther();
+    const S mean = overlap_at(0.5 * (sqrt(closest.distance_sq) + sqrt(far_end.distance_sq)));
+    const EndExponent<S> w(pair, SideBySide<S>(pair, mean, reach));
+    const Sharing of = shared_by(closest, far_end, w);
+    ContactLanes<D, S> lanes;
+    lanes.touching = touches(closest.distance_sq);
+    lanes.two_bonds = lanes.touching;
+    lanes.alone = !(w.value > S(LEAST_END_EXPONENT));
+    const Load near = add_load(lanes, closest, of.distance, of.near);
+    const Load far = add_load(lanes, far_end, of.far_distance, of.far);
+    add_sharing(lanes, of);
+    lanes.bond_force = norm(near.force + 0.5 * of.push) + norm(far.force + 0.5 * of.push);
+    return lanes;
+  }
+
+  /// The same of all lanes of a pack, but for the rare ones.
+  ContactLanes<D, S> evaluate_lanes() const
+  {
+    const Truth<S> round = (pair.A_i == S(0.0)) & (pair.A_j == S(0.0));
+    Feet<D, S> closest =
+        law.shortcuts && all(round) ? feet_at(pair, S(0.0), S(0.0)) : closest_feet(pair);
+    ContactLanes<D, S> lanes;
+    lanes.touching = touches(closest.distance_sq);
+    if (!any(lanes.touching)) return lanes;
+    lanes.alone = is_coincident(closest) | spines_cross(pair);
+    if (law.sides == Sides::ONE) lanes.alone = lanes.alone | (is_parallel() & !round);
+    lanes.alone = lanes.touching & lanes.alone;
+    if (law.sides == Sides::TWO) add_far_ends(lanes, closest);
+    lanes.bond_force += add_load(lanes, closest, sqrt(closest.distance_sq), whole()).size;
+    return lanes;
+  }
+
  private:
   SpinePair<D, S> pair;
-  double radius_i, reach;
+  Plain<S> radius_i, reach;
   S inverse_reach;
-  SpherocylinderLaw law;
+  SpherocylinderLawOf<Plain<S>> law;
 
   /// How a bond enters the energy: its `share`, by which the harmonic law of its own overlap is
   /// multiplied, what else the energy changes with its overlap by (`slope`), and its `coupling`.
@@ -131,12 +174,14 @@ template <int D, class S> class SpherocylinderContact {
     return without_bonds<D, S, Found::MOST_BONDS>(status);
   }
 
-  template <class T> bool touches(const T &distance_sq) const
+  template <class T> Truth<T> touches(const T &distance_sq) const
   {
     return distance_sq < T(reach) * reach;
   }
 
-  template <class T> bool is_coincident(const Feet<D, T> &feet) const
+  Truth<S> is_parallel() const { return abs_sine(pair) < S(PARALLEL_SINE); }
+
+  template <class T> Truth<T> is_coincident(const Feet<D, T> &feet) const
   {
     return feet.distance_sq <= COINCIDENT * reach * COINCIDENT * reach;
   }
@@ -156,7 +201,7 @@ template <int D, class S> class SpherocylinderContact {
   {
     Found contact = without(ContactStatus::TOUCHING);
     const S distance = sqrt(closest.distance_sq);
-    if (law.sides == Sides::ONE && abs_sine(pair) < PARALLEL_SINE) {
+    if (law.sides == Sides::ONE && is_parallel()) {
       const EndFeet<D, S> ends(pair);
       if (ends.are_apart()) {
         contact.kind = ContactKind::SIDE_TO_SIDE;
@@ -200,8 +245,17 @@ template <int D, class S> class SpherocylinderContact {
     return contact;
   }
 
-  Found side_to_side(const Feet<D, S> &closest, const Feet<D, S> &far_end,
-                     const EndExponent<S> &w) const
+  /// What two bonds that share an energy add to a contact beside their loads: `push` on i, and
+  /// turns of both.
+  struct Sharing {
+    S distance, far_distance;
+    Part near, far;
+    Vec<D, S> push;
+    Torque<D, S> turn_i, turn_j;
+  };
+
+  Sharing shared_by(const Feet<D, S> &closest, const Feet<D, S> &far_end,
+                    const EndExponent<S> &w) const
   {
     const S log_ratio = log_ratio_of(pair, closest, far_end, reach);
     const EndNorm<S> norm(log_ratio, w.value);
@@ -213,28 +267,67 @@ template <int D, class S> class SpherocylinderContact {
                      norm.share_b * law.harmonic.energy(overlap_at(far_distance));
     const S by_exponent = energy * norm.entropy, by_overlap = 0.5 * by_exponent * w.by_mean;
     // The norm's exponent over overlaps, less that of two bonds.
-    const auto curved = std::max<ValueOf<S>>(2.0 / value_of(w.value) - 2.0, 0.0);
-    const auto root = sqrt(curved * law.harmonic.k_e) * value_of(inverse_reach);
-    const auto coupling_a = root * sqrt(value_of(fixed.part_b * fixed.share_a));
-    const auto coupling_b = -root * sqrt(value_of(fixed.part_a * fixed.share_b));
+    const ValueOf<S> curved = most(ValueOf<S>(2.0 / value_of(w.value) - 2.0), ValueOf<S>(0.0));
+    const ValueOf<S> root = sqrt(curved * law.harmonic.k_e) * value_of(inverse_reach);
+    const ValueOf<S> coupling_a = root * sqrt(value_of(fixed.part_b * fixed.share_a));
+    const ValueOf<S> coupling_b = -root * sqrt(value_of(fixed.part_a * fixed.share_b));
 
+    const S per_i = by_exponent * w.by_along_i, per_j = by_exponent * w.by_along_j;
+    const Torque<D, S> turn = (by_exponent * w.by_cosine) * cross(pair.u_i, pair.u_j);
+    return {distance,
+            far_distance,
+            {fixed.share_a, by_overlap, coupling_a},
+            {fixed.share_b, by_overlap, coupling_b},
+            -1.0 * (per_i * pair.u_i + per_j * pair.u_j),
+            per_i * cross(pair.u_i, pair.r) + turn,
+            per_j * cross(pair.u_j, pair.r) - turn};
+  }
+
+  template <class To> static void add_sharing(To &to, const Sharing &of)
+  {
+    to.force += of.push;
+    to.torque_i -= of.turn_i;
+    to.torque_j -= of.turn_j;
+  }
+
+  Found side_to_side(const Feet<D, S> &closest, const Feet<D, S> &far_end,
+                     const EndExponent<S> &w) const
+  {
+    const Sharing of = shared_by(closest, far_end, w);
     Found contact = without(ContactStatus::TOUCHING);
     contact.kind = ContactKind::SIDE_TO_SIDE;
-    add_bond(contact, closest, distance, {fixed.share_a, by_overlap, coupling_a});
-    add_bond(contact, far_end, far_distance, {fixed.share_b, by_overlap, coupling_b});
-    const S per_i = by_exponent * w.by_along_i, per_j = by_exponent * w.by_along_j;
-    const Vec<D, S> push = -1.0 * (per_i * pair.u_i + per_j * pair.u_j);
-    const Torque<D, S> turn = (by_exponent * w.by_cosine) * cross(pair.u_i, pair.u_j);
-    contact.force += push;
-    contact.torque_i -= per_i * cross(pair.u_i, pair.r) + turn;
-    contact.torque_j -= per_j * cross(pair.u_j, pair.r) - turn;
-    for (Bond<D, S> &bond : contact.bond) bond.force += 0.5 * push;
+    add_bond(contact, closest, of.distance, of.near);
+    add_bond(contact, far_end, of.far_distance, of.far);
+    add_sharing(contact, of);
+    for (Bond<D, S> &bond : contact.bond) bond.force += 0.5 * of.push;
     return contact;
   }
 
-  /// Adds a bond with the lever arms of `feet` and the overlap of `distance`. Any point on the line
-  /// of `feet` gives the same torque; the one reported lies where the surfaces interpenetrate.
-  void add_bond(Found &contact, const Feet<D, S> &feet, const S &distance, const Part &part) const
+  /// The second bonds of lanes that have two whole ones.
+  void add_far_ends(ContactLanes<D, S> &lanes, Feet<D, S> &closest) const
+  {
+    const Truth<S> opposite = lanes.touching & far_ends_may_touch(pair, closest, reach);
+    if (!any(opposite)) return;
+    const EndFeet<D, S> ends(pair);
+    closest = chosen(opposite, closest_to_end(pair, ends.nearer()), closest);
+    const Feet<D, S> far_end = ends.farther();
+    const Truth<S> far = opposite & touches(far_end.distance_sq);
+    if (!any(far)) return;
+    const S distance = sqrt(closest.distance_sq), far_distance = sqrt(far_end.distance_sq);
+    const SideBySide<S> at(pair, overlap_at(0.5 * (distance + far_distance)), reach);
+    lanes.two_bonds = far & at.has_two_bonds();
+    lanes.shared = far & !lanes.two_bonds & !at.has_one_bond() & !lanes.alone;
+    const S distance_of_second = select(lanes.two_bonds, far_distance, S(reach));
+    lanes.bond_force += add_load(lanes, far_end, distance_of_second, whole()).size;
+  }
+
+  /// What a bond adds to a contact's energy, force and torques.
+  struct Load {
+    Vec<D, S> normal, force;
+    S size, energy;
+  };
+  template <class To>
+  Load add_load(To &to, const Feet<D, S> &feet, const S &distance, const Part &part) const
   {
     const S overlap = overlap_at(distance);
     const Vec<D, S> normal = (1.0 / sqrt(feet.distance_sq)) * feet.delta;
@@ -242,30 +335,39 @@ template <int D, class S> class SpherocylinderContact {
     // what the derivatives of force and torque hold is the small rest, not its sum with a large
     // number.
     const S slope = part.share * law.harmonic.energy_gradient(constant(overlap)) + part.slope;
-    const Vec<D, S> force = (slope * inverse_reach) * normal;
+    const S size = slope * inverse_reach;
+    const Vec<D, S> force = size * normal;
     const S energy = part.share * law.harmonic.energy(overlap);
+    to.energy += energy;
+    to.force += force;
+    to.torque_i += feet.s * cross(pair.u_i, force);
+    to.torque_j -= feet.t * cross(pair.u_j, force);
+    return {normal, force, size, energy};
+  }
+
+  /// Adds a bond with the lever arms of `feet` and the overlap of `distance`. Any point on the line
+  /// of `feet` gives the same torque; the one reported lies where the surfaces interpenetrate.
+  void add_bond(Found &contact, const Feet<D, S> &feet, const S &distance, const Part &part) const
+  {
+    const Load load = add_load(contact, feet, distance, part);
     Bond<D, S> &bond = contact.bond[contact.n_bonds++];
-    bond.normal = normal;
-    bond.force = force;
+    bond.normal = load.normal;
+    bond.force = load.force;
     // Nobody asks for derivatives of these.
     const auto &values = values_of(pair);
-    const auto along = values_of(normal);
+    const auto along = values_of(load.normal);
     const auto depth = radius_i * value_of(distance) * value_of(inverse_reach);
     bond.arm_i = constants_of<S>(value_of(feet.s) * values.u_i - depth * along);
     bond.lever_i = constants_of<S>(value_of(feet.s) * cross(values.u_i, along));
     bond.lever_j = constants_of<S>(-value_of(feet.t) * cross(values.u_j, along));
     bond.distance = distance;
     bond.reach = reach;
-    bond.energy = energy;
-    const S bend = law.harmonic.energy_hessian(overlap) * inverse_reach * inverse_reach;
+    bond.energy = load.energy;
+    const S bend = law.harmonic.energy_hessian(distance) * inverse_reach * inverse_reach;
     bond.stiffness = bond.own_stiffness = part.share * bend;
     bond.coupling = part.coupling;
     bond.on_side_i = abs(feet.s) < pair.A_i;
     bond.on_side_j = abs(feet.t) < pair.A_j;
-    contact.energy += energy;
-    contact.force += force;
-    contact.torque_i += feet.s * cross(pair.u_i, force);
-    contact.torque_j -= feet.t * cross(pair.u_j, force);
   }
 };
 
@@ -325,6 +427,22 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
     const double reach = i.radius + j.radius + margin;
     return spheres_are_closer<D>(margin, i, j) &&
            spine_distance_sq(spine_pair(i, j)) < reach * reach;
+  }
+};
+
+/// Compiled in packs.cpp for each set.
+template <InstructionSet SET, int D> FindContacts<SpherocylinderModel, D> find_rod_contacts;
+
+template <int D> struct PacksOf<SpherocylinderModel, D> {
+  static constexpr bool EXIST = true;
+
+  static FindContacts<SpherocylinderModel, D> *of(InstructionSet set)
+  {
+    if (set == InstructionSet::scalar) return nullptr;
+#if defined(__x86_64__)
+    if (set == InstructionSet::avx2) return find_rod_contacts<InstructionSet::avx2, D>;
+#endif
+    return find_rod_contacts<InstructionSet::baseline, D>;
   }
 };
 

@@ -1,0 +1,130 @@
+#pragma once
+
+#include "contact/math/vec.hpp"
+
+#include <cstdint>
+
+namespace jamshape {
+
+/// Pairs of bodies of which the contacts are found at once, in packs.
+template <int D> struct ContactBlock {
+  static constexpr int MOST = 64;
+
+  /// Pair k: bodies i[k] and j[k], their separation and the k_e of their law.
+  int n = 0, i[MOST], j[MOST];
+  alignas(64) double separation[D][MOST];
+  alignas(64) double k_e[MOST];
+
+  /// A bit for each pair: whether it touches, whether it is also `alone`, of a rare kind that is
+  /// left to the code of one pair, and whether it has two bonds. What follows is set for pairs that
+  /// touch and are not alone.
+  std::uint64_t touching, alone, two_bonds;
+  alignas(64) double energy[MOST];
+  alignas(64) double force[D][MOST];
+  alignas(64) double torque_i[ROTATIONS<D>][MOST];
+  alignas(64) double torque_j[ROTATIONS<D>][MOST];
+  alignas(64) double bond_force[MOST];  // sum of the magnitudes
+
+  void add(int first, int second, const Vec<D> &r, double stiffness)
+  {
+    i[n] = first;
+    j[n] = second;
+    for (int a = 0; a < D; ++a) separation[a][n] = r[a];
+    k_e[n++] = stiffness;
+  }
+
+  /// Finds them in packs of so many lanes: `contacts_of(block, first)` and `shared_of(block,
+  /// first)` give ContactLanes of the pairs of a block from `first` on.
+  template <class ContactsOf, class SharedOf>
+  void find(int lanes, const ContactsOf &contacts_of, const SharedOf &shared_of)
+  {
+    const std::uint64_t shared = set_all(lanes, contacts_of);
+    if (shared == 0) return;
+    ContactBlock others;
+    for_each(shared, [&](int k) { others.add(i[k], j[k], separation_of(k), k_e[k]); });
+    others.set_all(lanes, shared_of);
+    int from = 0;
+    for_each(shared, [&](int k) { copy(k, others, from++); });
+  }
+
+  Vec<D> separation_of(int k) const { return of_pair<D>(separation, k); }
+  Vec<D> force_of(int k) const { return of_pair<D>(force, k); }
+  Torque<D> torque_i_of(int k) const { return of_pair<ROTATIONS<D>>(torque_i, k); }
+  Torque<D> torque_j_of(int k) const { return of_pair<ROTATIONS<D>>(torque_j, k); }
+
+  /// Calls `visit(k)` for the pairs of these bits, in their order.
+  template <class Visit> static void for_each(std::uint64_t bits, const Visit &visit)
+  {
+    for (; bits != 0; bits &= bits - 1) visit(__builtin_ctzll(bits));
+  }
+
+ private:
+  /// Returns those that are shared.
+  template <class LanesOf> std::uint64_t set_all(int lanes, const LanesOf &lanes_of)
+  {
+    fill_up(lanes);
+    std::uint64_t shared = touching = alone = two_bonds = 0;
+    for (int first = 0; first < n; first += lanes) {
+      const auto found = lanes_of(*this, first);
+      set(first, found);
+      shared |= std::uint64_t{bits_of(found.shared)} << first;
+    }
+    const std::uint64_t asked = ~std::uint64_t{0} >> (MOST - n);
+    touching &= asked;
+    alone &= asked;
+    return shared & asked;
+  }
+
+  /// The last pair fills what packs take beyond it.
+  void fill_up(int lanes)
+  {
+    for (int k = n; k % lanes != 0; ++k) {
+      i[k] = i[n - 1];
+      j[k] = j[n - 1];
+      for (int a = 0; a < D; ++a) separation[a][k] = separation[a][n - 1];
+      k_e[k] = k_e[n - 1];
+    }
+  }
+
+  template <class Lanes> void set(int first, const Lanes &found)
+  {
+    touching |= std::uint64_t{bits_of(found.touching)} << first;
+    alone |= std::uint64_t{bits_of(found.alone)} << first;
+    two_bonds |= std::uint64_t{bits_of(found.two_bonds)} << first;
+    found.energy.store(energy + first);
+    found.bond_force.store(bond_force + first);
+    for (int a = 0; a < D; ++a) found.force[a].store(force[a] + first);
+    for (int a = 0; a < ROTATIONS<D>; ++a) {
+      found.torque_i[a].store(torque_i[a] + first);
+      found.torque_j[a].store(torque_j[a] + first);
+    }
+  }
+
+  /// Takes pair k from another block.
+  void copy(int k, const ContactBlock &other, int from)
+  {
+    const auto take = [&](std::uint64_t &bits, std::uint64_t of_other) {
+      const std::uint64_t here = std::uint64_t{1} << k;
+      bits = (bits & ~here) | ((of_other >> from & 1) << k);
+    };
+    take(touching, other.touching);
+    take(alone, other.alone);
+    take(two_bonds, other.two_bonds);
+    energy[k] = other.energy[from];
+    bond_force[k] = other.bond_force[from];
+    for (int a = 0; a < D; ++a) force[a][k] = other.force[a][from];
+    for (int a = 0; a < ROTATIONS<D>; ++a) {
+      torque_i[a][k] = other.torque_i[a][from];
+      torque_j[a][k] = other.torque_j[a][from];
+    }
+  }
+
+  template <int N> static Vec<N> of_pair(const double (&values)[N][MOST], int k)
+  {
+    Vec<N> v;
+    for (int a = 0; a < N; ++a) v[a] = values[a][k];
+    return v;
+  }
+};
+
+}  // namespace jamshape

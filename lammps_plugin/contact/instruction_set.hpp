@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdlib>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace jamshape {
+
+/// Sets of instructions that packs are compiled for, and `scalar`, no packs at all.
+enum class InstructionSet { scalar, baseline, avx2 };
+
+struct NamedSet {
+  InstructionSet set;
+  const char *name;
+};
+inline constexpr NamedSet INSTRUCTION_SETS[] = {{InstructionSet::scalar, "scalar"},
+                                                {InstructionSet::baseline, "baseline"},
+                                                {InstructionSet::avx2, "avx2"}};
+
+inline bool machine_has(InstructionSet set)
+{
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2") != 0;
+#endif
+  return set != InstructionSet::avx2;
+}
+
+/// The set that the environment variable JAMSHAPE_SIMD names, the best of this machine if there is
+/// none; nothing where it names no set of this machine.
+inline std::optional<InstructionSet> instruction_set()
+{
+  const char *const wish = std::getenv("JAMSHAPE_SIMD");
+  std::optional<InstructionSet> best;
+  for (const NamedSet &known : INSTRUCTION_SETS) {
+    if (machine_has(known.set) && (wish == nullptr || wish == std::string(known.name))) {
+      best = known.set;
+    }
+  }
+  return best;
+}
+
+/// Names of the sets of this machine, for messages.
+inline std::string known_sets()
+{
+  std::string names = "no value";
+  for (const NamedSet &known : INSTRUCTION_SETS) {
+    if (machine_has(known.set)) names += std::string(" or ") + known.name;
+  }
+  return names;
+}
+
+/// The set to use; throws std::invalid_argument where none of this machine is named.
+inline InstructionSet required_instruction_set()
+{
+  const auto chosen = instruction_set();
+  if (chosen) return *chosen;
+  throw std::invalid_argument(std::string("found JAMSHAPE_SIMD=") + std::getenv("JAMSHAPE_SIMD") +
+                              ", expected " + known_sets() + ".");
+}
+
+}  // namespace jamshape

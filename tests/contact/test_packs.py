@@ -1,0 +1,68 @@
+"""Contacts in packs: with every set of instructions those of one pair at a time, to the last bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pair_packings import PairPacking, rods
+from spherocylinder_pairs import concatenated, disc_to_disc, overlaps
+from test_fuzz import kinds_of_rods
+
+from jamshape import _contact
+
+K_E = 1.3
+N = 333
+PACKS = [name for name in _contact.instruction_sets() if name != "scalar"]
+each_set = pytest.mark.parametrize("instructions", PACKS)
+
+
+def every_kind(rng, dimension):
+    """Pairs of all kinds in any order, every third apart, and some that cross."""
+    kinds = [*kinds_of_rods(rng, N, dimension)]
+    kinds.append(disc_to_disc(rng, N, dimension, overlaps(rng, N)))
+    pairs = concatenated(*(pairs[:N] for pairs in kinds))
+    pairs = pairs[rng.permutation(len(pairs))]
+    away = np.where(np.arange(len(pairs)) % 3 == 0, 1.0 + rng.exponential(0.1, len(pairs)), 1.0)
+    away[::97] = 0.0
+    return pairs.replaced(r=away[:, None] * pairs.r)
+
+
+def sums(monkeypatch, instructions, packing, sides):
+    monkeypatch.setenv("JAMSHAPE_SIMD", instructions)
+    return packing.sums(sides, K_E, extended=False)
+
+
+@each_set
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("sides", [1, 2])
+def test_packs_give_what_pairs_give_alone(instructions, dimension, sides, monkeypatch):
+    rng = np.random.default_rng([18, dimension])
+    packing = PairPacking.of(rng, every_kind(rng, dimension))
+    alone = sums(monkeypatch, "scalar", packing, sides)
+    found = sums(monkeypatch, instructions, packing, sides)
+    for name in ("force", "torque", "n_bonds", "crossing", "unconverged"):
+        np.testing.assert_array_equal(found[name], alone[name], name)
+    for name in ("energy", "virial", "bond_force"):
+        np.testing.assert_allclose(found[name], alone[name], rtol=1e-13, err_msg=name)
+    assert np.isfinite(found["force"]).all()
+    assert 0.3 < np.mean(found["force"].any(axis=1)) < 0.9
+
+
+@each_set
+@pytest.mark.parametrize("n", [1, 2, 3, 7, 8, 63, 64, 65, 129])
+def test_packs_that_are_not_full_count_no_pair_twice(instructions, n, monkeypatch):
+    rng = np.random.default_rng(n)
+    packing = PairPacking.of(rng, disc_to_disc(rng, n, 2, overlaps(rng, n)))
+    alone = sums(monkeypatch, "scalar", packing, 1)
+    found = sums(monkeypatch, instructions, packing, 1)
+    assert found["n_bonds"] == alone["n_bonds"] == n
+    np.testing.assert_array_equal(found["force"], alone["force"])
+    assert found["energy"] == pytest.approx(alone["energy"], rel=1e-14)
+
+
+def test_a_set_that_this_machine_has_not_is_refused(monkeypatch):
+    monkeypatch.setenv("JAMSHAPE_SIMD", "mmx")
+    discs = rods(np.ones((2, 3)), 2)
+    pose = np.zeros((2, 2, 2)), np.zeros((2, 2, 1)), np.array([[9.0, 9.0], [0.0, 0.0]])
+    with pytest.raises(ValueError, match=r"JAMSHAPE_SIMD=mmx, expected no value or scalar"):
+        discs.sums(*pose, np.array([[0, 1]]), np.zeros((1, 2), int), False)
