@@ -98,6 +98,12 @@ template <class Model, int D, class S> class PosedPairs {
     return contact_from(first_body(p, r), second_body(p), law, start);
   }
 
+  /// Whether packs know all of the shapes.
+  bool packs_take_all() const
+  {
+    return std::all_of(shapes.begin(), shapes.end(), PacksOf<Model, D>::takes);
+  }
+
   /// All at the origin.
   const typename Model::template Body<D, S> *bodies() const { return body.data(); }
 
@@ -226,6 +232,7 @@ template <int D, class S> struct PairSums {
     torque[j] += block.torque_j_of(k);
     bond_force += block.bond_force[k];
     n_bonds += 1 + (block.two_bonds >> k & 1);
+    error = std::max(error, block.error[k]);
   }
 
  private:
@@ -239,11 +246,20 @@ template <int D, class S> struct PairSums {
   }
 };
 
-/// Adds contacts many at once.
+/// What finds the contacts of these pairs many at once; nothing where they go one by one.
+template <class Model, int D>
+FindContacts<Model, D> *packs_for(const PosedPairs<Model, D, double> &pairs)
+{
+  if (!pairs.packs_take_all()) return nullptr;
+  return PacksOf<Model, D>::of(required_instruction_set());
+}
+
+/// Adds contacts many at once, from `starts` where they are given.
 template <class Model, int D>
 void add_blocks(PairSums<D, double> &sums, const PosedPairs<Model, D, double> &pairs,
-                FindContacts<Model, D> &find)
+                FindContacts<Model, D> &find, typename Model::template Start<D> *starts)
 {
+  constexpr bool HAS_START = !std::is_same_v<typename Model::template Start<D>, NoStart>;
   const typename Model::Law &law = pairs.contact_law();
   ContactBlock<D> block;
   for (std::size_t begin = 0; begin < pairs.size(); begin += block.MOST) {
@@ -251,14 +267,24 @@ void add_blocks(PairSums<D, double> &sums, const PosedPairs<Model, D, double> &p
     block.n = 0;
     for (std::size_t p = begin; p < end; ++p) {
       const auto i = static_cast<int>(pairs.first(p)), j = static_cast<int>(pairs.second(p));
-      block.add(i, j, pairs.separation(p), law.harmonic.k_e);
+      if constexpr (HAS_START) {
+        if (starts != nullptr) block.set_start(block.n, starts[p]);
+      }
+      block.add(i, j, pairs.separation(p), Model::k_e(law));
     }
     find(pairs.bodies(), law, block);
     block.for_each(block.touching & ~block.alone, [&](int k) { sums.add(block, k); });
     block.for_each(block.alone, [&](int k) {
+      const std::size_t p = begin + k;
       const Vec<D> r = block.separation_of(k);
-      sums.add(pairs, begin + k, r, pairs.contact(begin + k, r));
+      sums.add(pairs, p, r, starts ? pairs.contact(p, r, starts[p]) : pairs.contact(p, r));
+      if constexpr (HAS_START) {
+        if (starts != nullptr) block.set_start(k, starts[p]);
+      }
     });
+    if constexpr (HAS_START) {
+      for (int k = 0; starts != nullptr && k < block.n; ++k) starts[begin + k] = block.start_of(k);
+    }
   }
 }
 
@@ -271,8 +297,8 @@ PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs, std::size_t n_part
   sums.force.assign(n_particles, Vec<D, S>{});
   sums.torque.assign(n_particles, Torque<D, S>{});
   if constexpr (std::is_same_v<S, double> && PacksOf<Model, D>::EXIST) {
-    if (auto *const find = PacksOf<Model, D>::of(required_instruction_set())) {
-      add_blocks<Model, D>(sums, pairs, *find);
+    if (auto *const find = packs_for(pairs)) {
+      add_blocks<Model, D>(sums, pairs, *find, starts == nullptr ? nullptr : starts->data());
       return sums;
     }
   }
