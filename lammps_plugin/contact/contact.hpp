@@ -89,6 +89,7 @@ template <int D, class S> struct ContactLanes {
   Vec<D, S> force{};
   Torque<D, S> torque_i{}, torque_j{};
   S bond_force{0.0};  // sum of the magnitudes
+  S error{0.0};
   Truth<S> touching, alone{}, shared{}, two_bonds{};
 };
 

@@ -24,6 +24,12 @@ template <int D> struct ContactBlock {
   alignas(64) double torque_i[ROTATIONS<D>][MOST];
   alignas(64) double torque_j[ROTATIONS<D>][MOST];
   alignas(64) double bond_force[MOST];  // sum of the magnitudes
+  alignas(64) double error[MOST];
+
+  /// Of shapes whose contacts are searched: where the searches of all pairs begin, if they are to
+  /// begin anywhere, and where they ended.
+  bool has_starts = false;
+  alignas(64) double start[D][MOST];
 
   void add(int first, int second, const Vec<D> &r, double stiffness)
   {
@@ -31,6 +37,12 @@ template <int D> struct ContactBlock {
     j[n] = second;
     for (int a = 0; a < D; ++a) separation[a][n] = r[a];
     k_e[n++] = stiffness;
+  }
+
+  /// Of a shape no contacts of which are shared.
+  template <class ContactsOf> void find(int lanes, const ContactsOf &contacts_of)
+  {
+    set_all(lanes, contacts_of);
   }
 
   /// Finds them in packs of so many lanes: `contacts_of(block, first)` and `shared_of(block,
@@ -46,6 +58,13 @@ template <int D> struct ContactBlock {
     int from = 0;
     for_each(shared, [&](int k) { copy(k, others, from++); });
   }
+
+  void set_start(int k, const Vec<D> &at)
+  {
+    has_starts = true;
+    for (int a = 0; a < D; ++a) start[a][k] = at[a];
+  }
+  Vec<D> start_of(int k) const { return of_pair<D>(start, k); }
 
   Vec<D> separation_of(int k) const { return of_pair<D>(separation, k); }
   Vec<D> force_of(int k) const { return of_pair<D>(force, k); }
@@ -82,6 +101,7 @@ template <int D> struct ContactBlock {
       i[k] = i[n - 1];
       j[k] = j[n - 1];
       for (int a = 0; a < D; ++a) separation[a][k] = separation[a][n - 1];
+      for (int a = 0; has_starts && a < D; ++a) start[a][k] = start[a][n - 1];
       k_e[k] = k_e[n - 1];
     }
   }
@@ -93,6 +113,7 @@ template <int D> struct ContactBlock {
     two_bonds |= std::uint64_t{bits_of(found.two_bonds)} << first;
     found.energy.store(energy + first);
     found.bond_force.store(bond_force + first);
+    found.error.store(error + first);
     for (int a = 0; a < D; ++a) found.force[a].store(force[a] + first);
     for (int a = 0; a < ROTATIONS<D>; ++a) {
       found.torque_i[a].store(torque_i[a] + first);
@@ -112,6 +133,7 @@ template <int D> struct ContactBlock {
     take(two_bonds, other.two_bonds);
     energy[k] = other.energy[from];
     bond_force[k] = other.bond_force[from];
+    error[k] = other.error[from];
     for (int a = 0; a < D; ++a) force[a][k] = other.force[a][from];
     for (int a = 0; a < ROTATIONS<D>; ++a) {
       torque_i[a][k] = other.torque_i[a][from];

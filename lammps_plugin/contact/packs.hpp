@@ -11,7 +11,8 @@ template <class Model, int D>
 using FindContacts = void(const typename Model::template Body<D> *bodies,
                           const typename Model::Law &law, ContactBlock<D> &block);
 
-/// The function of a shape that has packs, `of` a set; none where pairs go one by one.
+/// The function of a shape that has packs, `of` a set, for particles all of which it `takes`; none
+/// where pairs go one by one.
 template <class Model, int D> struct PacksOf {
   static constexpr bool EXIST = false;
 };

@@ -128,6 +128,12 @@ template <class Model, int D, class S> class PosedPairs {
     return detail::contact_begun(first_body(p, r), second_body(p), law, start);
   }
 
+  /// Whether packs know all of the shapes.
+  bool packs_take_all() const
+  {
+    return std::all_of(shapes.begin(), shapes.end(), PacksOf<Model, D>::takes);
+  }
+
   /// All at the origin.
   const typename Model::template Body<D, S> *bodies() const { return body.data(); }
 
@@ -256,6 +262,7 @@ template <int D, class S> struct PairSums {
     torque[j] += block.torque_j_of(k);
     bond_force += block.bond_force[k];
     n_bonds += 1 + (block.two_bonds >> k & 1);
+    error = std::max(error, block.error[k]);
   }
 
   /// Adds those over pairs that come after.
@@ -285,29 +292,76 @@ template <int D, class S> struct PairSums {
   }
 };
 
-/// Adds contacts of some of the pairs, many at once.
+/// What finds the contacts of these pairs many at once; nothing where they go one by one, as they
+/// do where shortcuts are not wanted.
 template <class Model, int D>
-void add_blocks(PairSums<D, double> &sums, const PosedPairs<Model, D, double> &pairs,
-                FindContacts<Model, D> &find, const Range &part)
+FindContacts<Model, D> *packs_for(const PosedPairs<Model, D, double> &pairs)
 {
-  const typename Model::Law &law = pairs.contact_law();
-  ContactBlock<D> block;
-  std::size_t number[block.MOST];  // of each pair of the block
-  for (std::size_t p = part.first; p < part.last;) {
-    for (block.n = 0; p < part.last && block.n < block.MOST; ++p) {
+  if (!pairs.contact_law().shortcuts || !pairs.packs_take_all()) return nullptr;
+  return PacksOf<Model, D>::of(required_instruction_set());
+}
+
+/// Some of the pairs that may touch, in a block, with the number of each.
+template <class Model, int D> class NumberedBlock {
+ public:
+  using Start = typename Model::template Start<D>;
+  static constexpr bool HAS_START = !std::is_same_v<Start, NoStart>;
+
+  /// Their contacts begin where the last ones were, and leave there where they end, if `starts` is
+  /// given.
+  NumberedBlock(const PosedPairs<Model, D, double> &posed, Start *of_pairs) :
+      pairs(posed), starts(of_pairs)
+  {
+  }
+
+  bool is_empty() const { return block.n == 0; }
+
+  /// Takes as many as fit from the first on; returns where to go on.
+  std::size_t fill(const Range &from)
+  {
+    std::size_t p = from.first;
+    for (block.n = 0; p < from.last && block.n < block.MOST; ++p) {
       const Vec<D> r = pairs.separation(p);
       if (!pairs.may_touch(p, r)) continue;
+      if constexpr (HAS_START) {
+        if (starts != nullptr) block.set_start(block.n, starts[p]);
+      }
       number[block.n] = p;
       block.add(static_cast<int>(pairs.first(p)), static_cast<int>(pairs.second(p)), r,
-                law.harmonic.k_e);
+                Model::k_e(pairs.contact_law()));
     }
-    if (block.n == 0) return;
-    find(pairs.bodies(), law, block);
+    return p;
+  }
+
+  void add_to(PairSums<D, double> &sums, FindContacts<Model, D> &find)
+  {
+    find(pairs.bodies(), pairs.contact_law(), block);
     block.for_each(block.touching & ~block.alone, [&](int k) { sums.add(block, k); });
+    if constexpr (HAS_START) {
+      for (int k = 0; starts != nullptr && k < block.n; ++k) starts[number[k]] = block.start_of(k);
+    }
     block.for_each(block.alone, [&](int k) {
+      const std::size_t p = number[k];
       const Vec<D> r = block.separation_of(k);
-      sums.add(pairs, number[k], r, pairs.contact(number[k], r));
+      sums.add(pairs, p, r, pairs.contact(p, r, starts == nullptr ? nullptr : starts + p));
     });
+  }
+
+ private:
+  const PosedPairs<Model, D, double> &pairs;
+  Start *starts;
+  ContactBlock<D> block;
+  std::size_t number[ContactBlock<D>::MOST];
+};
+
+/// Adds contacts of some of the pairs, many at once.
+template <class Model, int D>
+void add_blocks(PairSums<D, double> &sums, NumberedBlock<Model, D> &block,
+                FindContacts<Model, D> &find, const Range &part)
+{
+  for (std::size_t p = part.first; p < part.last;) {
+    p = block.fill({p, part.last});
+    if (!block.is_empty()) block.add_to(sums, find);
   }
 }
 
@@ -321,8 +375,9 @@ PairSums<D, S> sum_part(const PosedPairs<Model, D, S> &pairs, StartIn<Model, D, 
   sums.force.assign(pairs.n_particles(), Vec<D, S>{});
   sums.torque.assign(pairs.n_particles(), Torque<D, S>{});
   if constexpr (std::is_same_v<S, double> && PacksOf<Model, D>::EXIST) {
-    if (auto *const find = PacksOf<Model, D>::of(required_instruction_set())) {
-      add_blocks<Model, D>(sums, pairs, *find, part);
+    if (auto *const find = packs_for(pairs)) {
+      NumberedBlock<Model, D> block(pairs, starts);
+      add_blocks(sums, block, *find, part);
       return sums;
     }
   }

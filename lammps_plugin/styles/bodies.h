@@ -23,7 +23,19 @@ template <class Model, int D> class StoredBodies {
 
   std::size_t size() const { return now.size(); }
   const Body &operator[](std::size_t i) const { return now[i]; }
-  const Body *data() const { return now.data(); }
+
+  /// Bodies of a block of contacts, put there for packs to find them.
+  class Block {
+   public:
+    explicit Block(const StoredBodies &of) : bodies(of.now.data()) {}
+    void clear() {}
+    int put(int i) { return i; }
+    int particle(int k) const { return k; }
+    const Body *data() const { return bodies; }
+
+   private:
+    const Body *bodies;
+  };
 
   void begin_shapes(std::size_t n) { resize_closely(now, n); }
   void set_shape(std::size_t i, const Shape &shape) { now[i] = Model::template body<D>(shape); }
@@ -72,6 +84,29 @@ template <class Model, int D> class AssembledBodies {
     if (!orientations.empty()) Model::template turn_to<D>(body, orientations[i]);
     return body;
   }
+
+  class Block {
+   public:
+    explicit Block(const AssembledBodies &of) : bodies(of) {}
+    void clear()
+    {
+      put_together.clear();
+      particles.clear();
+    }
+    int put(int i)
+    {
+      put_together.push_back(bodies[i]);
+      particles.push_back(i);
+      return static_cast<int>(particles.size()) - 1;
+    }
+    int particle(int k) const { return particles[k]; }
+    const Body *data() const { return put_together.data(); }
+
+   private:
+    const AssembledBodies &bodies;
+    std::vector<Body> put_together;
+    std::vector<int> particles;
+  };
 
   void begin_shapes(std::size_t n)
   {

@@ -156,6 +156,7 @@ template <class Model> class PairContactOf : public PairContact {
   Bodies<2> in_2d;
   Bodies<3> in_3d;
   double margin = 0.0, n_listed = 0.0;
+  bool packs_take_all = false;
   std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
   std::vector<float> last_normal;   // D a close pair, if contacts start from it; zeros at first
 
@@ -185,7 +186,7 @@ template <class Model> class PairContactOf : public PairContact {
   {
     if constexpr (PacksOf<Model, D>::EXIST) {
       FindContacts<Model, D> *const find = PacksOf<Model, D>::of(instructions);
-      if (find != nullptr) return evaluate_blocks<D, TURNS, TALLY>(*find);
+      if (find != nullptr && packs_take_all) return evaluate_blocks<D, TURNS, TALLY>(*find);
     }
     evaluate_pairs<D, TURNS, TALLY>();
   }
@@ -193,31 +194,69 @@ template <class Model> class PairContactOf : public PairContact {
   /// Many pairs at once.
   template <int D, bool TURNS, bool TALLY> void evaluate_blocks(FindContacts<Model, D> &find)
   {
-    const BodiesOf<Model, D> &bodies = all<D>().now;
     const int *const type = atom->type;
     ContactBlock<D> block;
-    const auto add_found = [&] {
-      if (block.n == 0) return;
-      find(bodies.data(), law_of(block.i[0], block.j[0]), block);
-      block.for_each(block.touching & ~block.alone, [&](int k) {
-        add_contact<D, TURNS, TALLY>(
-            block.i[k], block.j[k],
-            {block.energy[k], block.force_of(k), block.torque_i_of(k), block.torque_j_of(k)});
-      });
-      block.for_each(block.alone,
-                     [&](int k) { add_alone<D, TURNS, TALLY>(block.i[k], block.j[k]); });
-      block.n = 0;
-    };
+    typename BodiesOf<Model, D>::Block bodies(all<D>().now);
+    int next = 0;  // pair of the list that is not yet in a block
     for (int n = 0; n < list->inum; ++n) {
       const int i = list->ilist[n];
-      const Body<D> &body = bodies[i];
-      for (int k = first[n]; k < first[n + 1]; ++k) {
+      for (int k = first[n], at_i = -1; k < first[n + 1]; ++k) {
         const int j = partner[k];
-        block.add(i, j, body.centre - bodies[j].centre, k_e[type[i]][type[j]]);
-        if (block.n == block.MOST) add_found();
+        if (at_i < 0) at_i = bodies.put(i);
+        const int at_j = bodies.put(j);
+        const Vec<D> r = bodies.data()[at_i].centre - bodies.data()[at_j].centre;
+        block.add(at_i, at_j, r, k_e[type[i]][type[j]]);
+        if (block.n < block.MOST) continue;
+        add_block<D, TURNS, TALLY>(find, bodies, block, next);
+        next = k + 1;
+        at_i = -1;
       }
     }
-    add_found();
+    if (block.n > 0) add_block<D, TURNS, TALLY>(find, bodies, block, next);
+  }
+
+  /// The contacts of a block, the first of which is of this pair of the list, and empties it.
+  template <int D, bool TURNS, bool TALLY, class InBlock>
+  void add_block(FindContacts<Model, D> &find, InBlock &bodies, ContactBlock<D> &block, int pair)
+  {
+    read_normals<D>(block, pair);
+    const auto i = [&](int k) { return bodies.particle(block.i[k]); };
+    const auto j = [&](int k) { return bodies.particle(block.j[k]); };
+    find(bodies.data(), law_of(i(0), j(0)), block);
+    keep_normals<D>(block, pair);
+    block.for_each(block.touching & ~block.alone, [&](int k) {
+      add_contact<D, TURNS, TALLY>(
+          i(k), j(k),
+          {block.energy[k], block.force_of(k), block.torque_i_of(k), block.torque_j_of(k)});
+    });
+    block.for_each(block.alone, [&](int k) { add_alone<D, TURNS, TALLY>(pair + k, i(k), j(k)); });
+    block.n = 0;
+    bodies.clear();
+  }
+
+  /// Where the contacts of a block begin, if they begin from a normal.
+  template <int D> void read_normals(ContactBlock<D> &block, int pair) const
+  {
+    if (!StartsFromNormal<D>::value || !any_turns) return;
+    for (int k = 0; k < block.n; ++k) {
+      Vec<D> normal;
+      for (int a = 0; a < D; ++a)
+        normal[a] = last_normal[static_cast<std::size_t>(D) * (pair + k) + a];
+      block.set_start(k, normal);
+    }
+  }
+  template <int D> void keep_normals(const ContactBlock<D> &block, int pair)
+  {
+    if (!StartsFromNormal<D>::value || !any_turns) return;
+    const auto keep = [&](int k) {
+      for (int a = 0; a < D; ++a) {
+        last_normal[static_cast<std::size_t>(D) * (pair + k) + a] =
+            static_cast<float>(block.start[a][k]);
+      }
+    };
+    for (int k = 0; k < block.n; ++k) {
+      if (!(block.alone >> k & 1)) keep(k);
+    }
   }
 
   template <int D> struct Load {
@@ -239,10 +278,12 @@ template <class Model> class PairContactOf : public PairContact {
   }
 
   /// A pair that packs leave.
-  template <int D, bool TURNS, bool TALLY> void add_alone(int i, int j)
+  template <int D, bool TURNS, bool TALLY> void add_alone(int pair, int i, int j)
   {
     const BodiesOf<Model, D> &bodies = all<D>().now;
-    const Touch<D> contact = contact_of(bodies[i], bodies[j], law_of(i, j));
+    const Body<D> &body = bodies[i], &other = bodies[j];
+    const Touch<D> contact = contact_of_pair<D>(pair, body, other, law_of(i, j));
+    if (contact.status == ContactStatus::APART) return;
     if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
     if (contact.status == ContactStatus::UNCONVERGED) stop_at_unconverged(i, j);
     add_contact<D, TURNS, TALLY>(
@@ -343,10 +384,15 @@ template <class Model> class PairContactOf : public PairContact {
   {
     BodiesOf<Model, D> &bodies = all<D>().now;
     bodies.begin_shapes(static_cast<std::size_t>(n_all()));
+    packs_take_all = !general.contact;
     for (int i = 0; i < n_all(); ++i) {
       const Vec<3> semi_axes = particles.semi_axes(i);
       require_same_bound(i, semi_axes);
-      bodies.set_shape(i, *shape_from(semi_axes, atom->type[i]));
+      const typename Model::Shape shape = *shape_from(semi_axes, atom->type[i]);
+      bodies.set_shape(i, shape);
+      if constexpr (PacksOf<Model, D>::EXIST) {
+        packs_take_all = packs_take_all && PacksOf<Model, D>::takes(shape);
+      }
     }
   }
 

@@ -399,6 +399,7 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
   {
     return {{k_e}, sides, shortcuts};
   }
+  static double k_e(const Law &law) { return law.harmonic.k_e; }
 
   /// Whose contacts need no search.
   template <int D> static Shortcut shortcut(const Shape &shape)
@@ -435,6 +436,7 @@ template <InstructionSet SET, int D> FindContacts<SpherocylinderModel, D> find_r
 
 template <int D> struct PacksOf<SpherocylinderModel, D> {
   static constexpr bool EXIST = true;
+  static bool takes(const Spherocylinder &) { return true; }
 
   static FindContacts<SpherocylinderModel, D> *of(InstructionSet set)
   {

@@ -422,6 +422,29 @@ bool newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iteratio
   return false;
 }
 
+/// The same of all lanes of a pack that are `sought`, where no step is cut: true of those that such
+/// steps lead to the end. A lane that has come there waits.
+template <class Equations, int M, class T>
+Truth<T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolerance,
+                         const Truth<T> &sought)
+{
+  constexpr int LONGEST = 12;
+  Truth<T> found = sought & !sought, open = sought;
+  auto at = equations.linearised(z);
+  for (int n = 0; n < LONGEST; ++n) {
+    const Vec<M, T> step = equations.step(at);
+    const Truth<T> last = open & (norm_sq(step) <= tolerance * tolerance * norm_sq(z));
+    z = chosen(open, z - step, z);
+    found = found | last;
+    open = open & !last;
+    if (!any(open)) break;
+    const auto next = equations.linearised(z);
+    open = open & (norm_sq(next.residual) <= 0.8 * norm_sq(at.residual));
+    at = next;
+  }
+  return found;
+}
+
 /// Whether the normal n of a plane is what the equations know of a body, or a point of its surface.
 inline bool is_by_normal(double p) { return p <= 1.0; }
 

@@ -2,7 +2,9 @@
 
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
+#include "contact/instruction_set.hpp"
 #include "contact/math/vec.hpp"
+#include "contact/packs.hpp"
 #include "contact/superellipsoid/shape.hpp"
 #include "contact/superellipsoid/tangency.hpp"
 
@@ -23,6 +25,29 @@ struct SuperellipsoidLaw {
 /// A scale with a larger relative error bar is no contact that could be computed: it is reported as
 /// such (UNCONVERGED), not dropped. None has been seen.
 inline constexpr double USELESS = 1e-6;
+
+template <int D, class S>
+Tangency<D, S> tangency_of_spheres(const Vec<D, S> &r, const Plain<S> &R_i, const Plain<S> &R_j)
+{
+  const Plain<S> d = R_i + R_j;
+  return {norm(r) / d, r, S(R_i / d) * r, S(R_j / d) * r};
+}
+
+/// What a tangency at r adds to a contact. In dual numbers the law's own slope is a constant:
+/// `own_stiffness` stands for what it leaves out (see ContactDerivatives).
+template <int D, class S> struct TangencyLoad {
+  S x, overlap, energy;
+  Vec<D, S> gradient, force, arm_i, arm_j;
+  Torque<D, S> torque_i, torque_j;
+
+  TangencyLoad(const Tangency<D, S> &at, const Vec<D, S> &r, const HarmonicOf<Plain<S>> &law) :
+      x(at.scale * at.scale), overlap((1.0 - at.scale) * (1.0 + at.scale)),
+      energy(law.energy(overlap)), gradient((2.0 * x / dot(r, at.normal)) * at.normal),
+      force(law.energy_gradient(constant(overlap)) * gradient), arm_i(-at.point_i),
+      arm_j(at.point_j), torque_i(cross(arm_i, force)), torque_j(-cross(arm_j, force))
+  {
+  }
+};
 
 /// Contact of two superellipsoids in 2D or 3D. With x = eta^2, n the common normal where the scaled
 /// bodies touch, grad_r x = 2 x n / (r.n): the printed force (Yuan et al. 2019, Eq. 3) lacks one
@@ -69,7 +94,8 @@ template <int D, class S> class SuperellipsoidContact {
       return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
     }
     if (shortcuts && is_round(i) && is_round(j))
-      return touching(spheres(), T(0));  // bounded by themselves
+      // Bounded by themselves.
+      return touching(tangency_of_spheres(r, i.semi_axes[0], j.semi_axes[0]), T(0));
     const FoundTangency<D, T> found = find_tangency(last);
     if (last != nullptr) *last = found.at.normal;
     if (found.is_apart) return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
@@ -86,12 +112,6 @@ template <int D, class S> class SuperellipsoidContact {
       if (body.semi_axes[k] != body.semi_axes[0]) return false;
     }
     return true;
-  }
-
-  Tangency<D, S> spheres() const
-  {
-    const double radius_i = i.semi_axes[0], radius_j = j.semi_axes[0], d = radius_i + radius_j;
-    return {norm(r) / d, r, S(radius_i / d) * r, S(radius_j / d) * r};
   }
 
   FoundTangency<D, T> find_tangency(const Vec<D, T> *last) const
@@ -113,32 +133,27 @@ template <int D, class S> class SuperellipsoidContact {
     }
   }
 
-  /// In dual numbers the law's own slope is a constant: `own_stiffness` stands for what it leaves
-  /// out (see ContactDerivatives).
   Found touching(const Tangency<D, S> &at, const T &gap) const
   {
-    const S x = at.scale * at.scale, overlap = (T(1) - at.scale) * (T(1) + at.scale);
-    const Vec<D, S> gradient = (T(2) * x / dot(r, at.normal)) * at.normal;
-    const S steepness = norm(gradient), reach = T(1) / steepness;
-    const Vec<D, S> arm_i = -at.point_i, arm_j = at.point_j;
-
+    const TangencyLoad<D, S> load(at, r, law);
+    const S steepness = norm(load.gradient), reach = T(1) / steepness;
     Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
     contact.n_bonds = 1;
     contact.error = static_cast<double>(gap);
-    contact.energy = law.energy(overlap);
-    contact.force = law.energy_gradient(constant(overlap)) * gradient;
-    contact.torque_i = cross(arm_i, contact.force);
-    contact.torque_j = -cross(arm_j, contact.force);
+    contact.energy = load.energy;
+    contact.force = load.force;
+    contact.torque_i = load.torque_i;
+    contact.torque_j = load.torque_j;
     Bond<D, S> &bond = contact.bond[0];
-    bond.normal = reach * gradient;
+    bond.normal = reach * load.gradient;
     bond.force = contact.force;
-    bond.arm_i = arm_i;
-    bond.lever_i = cross(arm_i, bond.normal);
-    bond.lever_j = -cross(arm_j, bond.normal);
-    bond.distance = reach * x;
+    bond.arm_i = load.arm_i;
+    bond.lever_i = cross(load.arm_i, bond.normal);
+    bond.lever_j = -cross(load.arm_j, bond.normal);
+    bond.distance = reach * load.x;
     bond.reach = reach;
     bond.energy = contact.energy;
-    bond.stiffness = bond.own_stiffness = law.energy_hessian(overlap) * steepness * steepness;
+    bond.stiffness = bond.own_stiffness = law.energy_hessian(load.overlap) * steepness * steepness;
     bond.coupling = 0.0;
     bond.on_side_i = bond.on_side_j = false;
     return contact;
@@ -177,6 +192,7 @@ struct SuperellipsoidModel {
   static constexpr bool BONDS_ARE_CONTACTS = false;
 
   static Law law(double epsilon, Sides, bool shortcuts = true) { return {epsilon, shortcuts}; }
+  static double k_e(const Law &law) { return law.epsilon; }
 
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double exponent)
   {
@@ -290,6 +306,23 @@ struct SuperellipsoidModel {
     for (int k = 0; k < D; ++k) turned += now.semi_axes[k] * norm(now.axis[k] - then.axis[k]);
     const double moved = norm(shift) + turned;
     return moved * moved;
+  }
+};
+
+/// Compiled in packs.cpp for each set.
+template <InstructionSet SET, int D> FindContacts<SuperellipsoidModel, D> find_ellipsoid_contacts;
+
+template <int D> struct PacksOf<SuperellipsoidModel, D> {
+  static constexpr bool EXIST = true;
+  static bool takes(const Superellipsoid &shape) { return shape.p == 1.0; }
+
+  static FindContacts<SuperellipsoidModel, D> *of(InstructionSet set)
+  {
+    if (set == InstructionSet::scalar) return nullptr;
+#if defined(__x86_64__)
+    if (set == InstructionSet::avx2) return find_ellipsoid_contacts<InstructionSet::avx2, D>;
+#endif
+    return find_ellipsoid_contacts<InstructionSet::baseline, D>;
   }
 };
 

@@ -12,6 +12,9 @@
 
 namespace jamshape {
 
+/// A step of Newton's method that is shorter than this part of the unknowns is the last.
+inline constexpr double SHORT_STEP = 1e-9;
+
 /// A tangency found by iteration: eta lies in scale (1 +- gap), whatever the iteration did.
 template <int D, class T> struct FoundTangency {
   Tangency<D, T> at;
@@ -136,7 +139,7 @@ template <int D, class T> class TangencySearch {
   bool may_stop_apart, shortcuts, is_swapped;
   const Body &i, &j;  // a body with p > 1 comes first
 
-  static constexpr T TOLERANCE = sizeof(T) > 8 ? T(1e-11) : T(1e-9);
+  static constexpr T TOLERANCE = sizeof(T) > 8 ? T(1e-11) : T(SHORT_STEP);
   static constexpr T ROUGH = T(1e-2);
   static constexpr double RATIOS[] = {3.0, 1.5};  // of exponents, stage to stage
   static constexpr double BARRIERS[] = {1e-4,  1e-6,  1e-8,  1e-9,
