@@ -72,7 +72,7 @@ def test_spines_find_the_contacts(made):
         assert row["flat_of_backbone"]["value"] > 0.7
         assert row["angles_on_flat"]["value"] > 0.1
         assert row["peak"] > 3
-        assert 4 < row["z"]["value"] < 6
+        assert 4 <= row["z"]["value"] < 6
         assert row["overlap_over_limit"]["value"] < 0.1
     assert 0 < found["kolmogorov_distance"] < 0.4
     assert found["paper"]["flat"] == 0.963

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from jamshape.checks import require_positive
+from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Minimum, Outcome, Stop, minimise
 from jamshape.minima.target import nearer
@@ -159,7 +160,15 @@ def compress(
     """
     while compression.minimum is None:
         before = landscape.evaluations
-        found = _minimised(landscape, compression, protocol)
+        try:
+            found = _minimised(landscape, compression, protocol)
+        except CrossingError:
+            if compression.openings == 0:
+                raise
+            compression.halves = True  # what was opened was moved too far
+            compression.halve()
+            yield compression
+            continue
         compression.parts += 1
         if found.outcome is Outcome.EXHAUSTED and compression.parts < _MOST_PARTS:
             compression.state = found.state

@@ -108,7 +108,10 @@ def implicit_in_units(length: float, k_e: float, k_d: float) -> float:
     if len(a) != len(b):
         return np.inf
     p, there = (np.array([step.pressure for step in steps]) for steps in (a, b))
-    return float(np.abs(there * length**2 / k_e / p - 1).max())
+    there, some = there * length**2 / k_e, p > 0
+    if ((there > 0) != some).any():
+        return np.inf
+    return float(np.abs(there[some] / p[some] - 1).max())
 
 
 def two_tolerances(scene: Scene, kappa: float, strain: float) -> float:
