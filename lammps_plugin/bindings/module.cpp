@@ -1,6 +1,7 @@
 #include "contact/instruction_set.hpp"
 
 #include "bindings/arrays.hpp"
+
 namespace jamshape {
 namespace {
 

@@ -97,18 +97,6 @@ template <int D, class S> struct ContactLanes {
 /// model's Start<D>. Shapes whose contacts need no search remember nothing.
 struct NoStart {};
 
-template <class Body, class Law>
-auto contact_from(const Body &i, const Body &j, const Law &law, NoStart &)
-{
-  return contact_of(i, j, law);
-}
-
-template <class Body, class Law, class Start>
-auto contact_from(const Body &i, const Body &j, const Law &law, Start &start)
-{
-  return contact_of(i, j, law, start);
-}
-
 /// What the drag on the substrate needs of a particle (Marschall & Teitel 2018, Eqs. 8-12): its
 /// area (volume in 3D) and, per body axis, the integral of the squared distance from that axis over
 /// it, divided by it (their I, Eq. 10, about z in 2D).

@@ -324,7 +324,7 @@ template <int D, class S> class SpherocylinderContact {
   /// What a bond adds to a contact's energy, force and torques.
   struct Load {
     Vec<D, S> normal, force;
-    S size, energy;
+    S overlap, size, energy;
   };
   template <class To>
   Load add_load(To &to, const Feet<D, S> &feet, const S &distance, const Part &part) const
@@ -342,7 +342,7 @@ template <int D, class S> class SpherocylinderContact {
     to.force += force;
     to.torque_i += feet.s * cross(pair.u_i, force);
     to.torque_j -= feet.t * cross(pair.u_j, force);
-    return {normal, force, size, energy};
+    return {normal, force, overlap, size, energy};
   }
 
   /// Adds a bond with the lever arms of `feet` and the overlap of `distance`. Any point on the line
@@ -363,7 +363,7 @@ template <int D, class S> class SpherocylinderContact {
     bond.distance = distance;
     bond.reach = reach;
     bond.energy = load.energy;
-    const S bend = law.harmonic.energy_hessian(distance) * inverse_reach * inverse_reach;
+    const S bend = law.harmonic.energy_hessian(load.overlap) * inverse_reach * inverse_reach;
     bond.stiffness = bond.own_stiffness = part.share * bend;
     bond.coupling = part.coupling;
     bond.on_side_i = abs(feet.s) < pair.A_i;
@@ -440,11 +440,7 @@ template <int D> struct PacksOf<SpherocylinderModel, D> {
 
   static FindContacts<SpherocylinderModel, D> *of(InstructionSet set)
   {
-    if (set == InstructionSet::scalar) return nullptr;
-#if defined(__x86_64__)
-    if (set == InstructionSet::avx2) return find_rod_contacts<InstructionSet::avx2, D>;
-#endif
-    return find_rod_contacts<InstructionSet::baseline, D>;
+    return compiled_for(set, [](auto one) { return &find_rod_contacts<decltype(one)::value, D>; });
   }
 };
 

@@ -318,11 +318,8 @@ template <int D> struct PacksOf<SuperellipsoidModel, D> {
 
   static FindContacts<SuperellipsoidModel, D> *of(InstructionSet set)
   {
-    if (set == InstructionSet::scalar) return nullptr;
-#if defined(__x86_64__)
-    if (set == InstructionSet::avx2) return find_ellipsoid_contacts<InstructionSet::avx2, D>;
-#endif
-    return find_ellipsoid_contacts<InstructionSet::baseline, D>;
+    return compiled_for(set,
+                        [](auto one) { return &find_ellipsoid_contacts<decltype(one)::value, D>; });
   }
 };
 

@@ -227,7 +227,7 @@ def _go_on_from_jammed(
 
 def _next_step(step: float, evaluations: int, protocol: Quasistatic) -> float:
     """Adapt a step that left the packing unjammed to what its minimisation took."""
-    if protocol.coarse is None or step < protocol.step:
+    if protocol.coarse is None:
         return step
     if evaluations < _FEW:
         return min(_GROWTH * step, protocol.coarse)
