@@ -28,8 +28,8 @@ auto compiled_for(InstructionSet set, const OfSet &of_set)
   return of_set(std::integral_constant<InstructionSet, InstructionSet::baseline>());
 }
 
-/// The function of a shape that has packs, `of` a set, for particles all of which it `takes`; none
-/// where pairs go one by one.
+/// The function of a shape that has packs, `of` a set, for particles each of which they `take`
+/// beside the first one; none where pairs go one by one.
 template <class Model, int D> struct PacksOf {
   static constexpr bool EXIST = false;
 };

@@ -128,10 +128,12 @@ template <class Model, int D, class S> class PosedPairs {
     return detail::contact_begun(first_body(p, r), second_body(p), law, start);
   }
 
-  /// Whether packs know all of the shapes.
+  /// Whether packs take all of these particles.
   bool packs_take_all() const
   {
-    return std::all_of(shapes.begin(), shapes.end(), PacksOf<Model, D>::takes);
+    return std::all_of(shapes.begin(), shapes.end(), [&](const typename Model::Shape &shape) {
+      return PacksOf<Model, D>::take(shape, shapes.front());
+    });
   }
 
   /// All at the origin.

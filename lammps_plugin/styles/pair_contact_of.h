@@ -385,13 +385,15 @@ template <class Model> class PairContactOf : public PairContact {
     BodiesOf<Model, D> &bodies = all<D>().now;
     bodies.begin_shapes(static_cast<std::size_t>(n_all()));
     packs_take_all = !general.contact;
+    typename Model::Shape of_first{};
     for (int i = 0; i < n_all(); ++i) {
       const Vec<3> semi_axes = particles.semi_axes(i);
       require_same_bound(i, semi_axes);
       const typename Model::Shape shape = *shape_from(semi_axes, atom->type[i]);
       bodies.set_shape(i, shape);
       if constexpr (PacksOf<Model, D>::EXIST) {
-        packs_take_all = packs_take_all && PacksOf<Model, D>::takes(shape);
+        if (i == 0) of_first = shape;
+        packs_take_all = packs_take_all && PacksOf<Model, D>::take(shape, of_first);
       }
     }
   }

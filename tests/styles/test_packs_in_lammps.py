@@ -29,6 +29,8 @@ SCENES = {
     "rods in space": lambda: dense(3),
     "spheroids": lambda: crowd(kinds=(1,)),
     "spheres": lambda: crowd(kinds=(2,)).with_(exponent=np.ones(48)),
+    "superballs": lambda: crowd(kinds=(2,)).with_(exponent=np.full(48, 1.5)),
+    "rounded octahedra": lambda: crowd(kinds=(2,)).with_(exponent=np.full(48, 0.8)),
     "all exponents": crowd,
 }
 
@@ -55,10 +57,12 @@ def test_forces_do_not_depend_on_the_instructions(name, sides, ranks, tmp_path, 
     (start, end), *others = ends
     largest = np.abs(start.force).max()
     assert largest > 0
+    # Near faces a torque is known to the root of what the tangency is.
+    rounding = 1e-14 if is_rods or np.all(packing.exponent == 1.0) else 1e-11
     for start_there, end_there in others:
-        assert np.abs(start.force - start_there.force).max() < 1e-14 * largest
-        assert np.abs(start.torque - start_there.torque).max() < 1e-14 * largest
-        assert max(pose_differences(end, end_there)) < 1e-12
+        assert np.abs(start.force - start_there.force).max() < rounding * largest
+        assert np.abs(start.torque - start_there.torque).max() < rounding * largest
+        assert max(pose_differences(end, end_there)) < max(1e-12, rounding)
 
 
 def test_a_set_that_this_machine_has_not_is_refused(tmp_path, monkeypatch):

@@ -25,6 +25,7 @@ inline constexpr int LANES = 2;
 
 using Doubles = double __attribute__((vector_size(8 * LANES)));
 using Words = long long __attribute__((vector_size(8 * LANES)));
+using Naturals = unsigned long long __attribute__((vector_size(8 * LANES)));
 
 /// As many truths, words of ones or zeros.
 struct Mask {
@@ -71,6 +72,7 @@ struct Pack {
   friend Mask operator<(const Pack &a, const Pack &b) { return {a.lanes < b.lanes}; }
   friend Mask operator>(const Pack &a, const Pack &b) { return {a.lanes > b.lanes}; }
   friend Mask operator<=(const Pack &a, const Pack &b) { return {a.lanes <= b.lanes}; }
+  friend Mask operator>=(const Pack &a, const Pack &b) { return {a.lanes >= b.lanes}; }
   friend Mask operator==(const Pack &a, const Pack &b) { return {a.lanes == b.lanes}; }
 
   friend Pack select(const Mask &where, const Pack &a, const Pack &b)
@@ -85,22 +87,15 @@ struct Pack {
   {
     return Pack(a.lanes < b.lanes ? b.lanes : a.lanes);
   }
+  friend void exchange(const Mask &where, Pack &a, Pack &b)
+  {
+    const Pack kept = a;
+    a = select(where, b, a);
+    b = select(where, kept, b);
+  }
   friend Pack sqrt(const Pack &a)
   {
     return from([&](int k) { return std::sqrt(a.lanes[k]); });  // one instruction
-  }
-  // One by one, by the library: so that they round alike on every machine.
-  friend Pack exp(const Pack &a)
-  {
-    return a.each([](double x) { return std::exp(x); });
-  }
-  friend Pack log(const Pack &a)
-  {
-    return a.each([](double x) { return std::log(x); });
-  }
-  friend Pack log1p(const Pack &a)
-  {
-    return a.each([](double x) { return std::log1p(x); });
   }
   friend Pack abs(const Pack &a) { return of_words(a.words() & ~SIGN); }
   friend Pack copysign(const Pack &a, const Pack &sign)
@@ -108,20 +103,50 @@ struct Pack {
     return of_words((a.words() & ~SIGN) | (sign.words() & SIGN));
   }
 
+  /// Of numbers below 2^51.
+  friend Pack nearest_whole(const Pack &a) { return a + WHOLE - WHOLE; }
+  /// Of whole numbers from -1022 to 1023.
+  friend Pack power_of_two(const Pack &whole)
+  {
+    return of_words(((whole + WHOLE).naturals() + BIAS) << MANTISSA);
+  }
+  friend struct PowerOfTwo;
+
  private:
   using Each = std::make_integer_sequence<int, LANES>;
   static constexpr long long SIGN = static_cast<long long>(1ULL << 63);
+  static constexpr int MANTISSA = 52;        // bits of it
+  static constexpr unsigned long long BIAS = 1023;  // of the exponent above it
+  static constexpr double WHOLE = 0x1.8p52;  // numbers about this one are whole
 
   template <class Of, int... K> static Pack from(const Of &of, std::integer_sequence<int, K...>)
   {
     return Pack(Doubles{of(K)...});
   }
-  template <class Function> Pack each(const Function &function) const
-  {
-    return from([&](int k) { return function(lanes[k]); });
-  }
   Words words() const { return reinterpret_cast<Words>(lanes); }
-  static Pack of_words(const Words &words) { return Pack(reinterpret_cast<Doubles>(words)); }
+  Naturals naturals() const { return reinterpret_cast<Naturals>(lanes); }
+  template <class W> static Pack of_words(const W &words)
+  {
+    return Pack(reinterpret_cast<Doubles>(words));
+  }
+};
+
+/// A number x = 2^power rest, rest from sqrt(1/2) to sqrt(2).
+struct PowerOfTwo {
+  Pack power, rest;
+
+  /// Of positive normal numbers.
+  explicit PowerOfTwo(const Pack &x)
+  {
+    // Exponents above that of sqrt(1/2), which is added to them so that none is negative.
+    constexpr unsigned long long FROM = 0x3fe6a09e667f3bcd, ABOVE = 1024;
+    const Naturals above = (x.naturals() - FROM + (ABOVE << Pack::MANTISSA)) >> Pack::MANTISSA;
+    power = Pack::of_words(above + WHOLE_WORD) - (Pack::WHOLE + ABOVE);
+    rest = Pack::of_words(x.naturals() - ((above - ABOVE) << Pack::MANTISSA));
+  }
+
+ private:
+  static constexpr unsigned long long WHOLE_WORD = 0x4338000000000000;  // of Pack::WHOLE
 };
 
 /// The truths as bits, lane 0 the lowest.
@@ -149,6 +174,9 @@ inline const Pack &with_value(const Pack &, const Pack &value) { return value; }
 
 template <> struct PlainOf<Pack> {
   using Type = Pack;
+};
+template <> struct CommonOf<Pack> {
+  using Type = double;
 };
 
 }  // namespace jamshape

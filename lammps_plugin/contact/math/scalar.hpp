@@ -29,6 +29,12 @@ template <class S> struct PlainOf {
 };
 template <class S> using Plain = typename PlainOf<S>::Type;
 
+/// The type of a number that counts for all of a scalar: for all lanes of a pack one double.
+template <class T> struct CommonOf {
+  using Type = T;
+};
+template <class T> using Common = typename CommonOf<T>::Type;
+
 /// What a comparison of scalars gives.
 template <class S> using Truth = decltype(std::declval<S>() < std::declval<S>());
 
@@ -37,6 +43,11 @@ template <class S> using Truth = decltype(std::declval<S>() < std::declval<S>())
 template <class S> S select(bool where, const S &a, const S &b) { return where ? a : b; }
 template <class S> S least(const S &a, const S &b) { return std::min(a, b); }
 template <class S> S most(const S &a, const S &b) { return std::max(a, b); }
+/// Exchanges two where a condition holds.
+template <class S> void exchange(const bool &where, S &a, S &b)
+{
+  if (where) std::swap(a, b);
+}
 inline bool any(bool truth) { return truth; }
 inline bool all(bool truth) { return truth; }
 

@@ -2,6 +2,7 @@
 
 #include "contact/contact_block.hpp"
 #include "contact/math/pack.hpp"
+#include "contact/math/pack_functions.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
 

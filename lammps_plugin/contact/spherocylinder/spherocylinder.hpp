@@ -436,7 +436,7 @@ template <InstructionSet SET, int D> FindContacts<SpherocylinderModel, D> find_r
 
 template <int D> struct PacksOf<SpherocylinderModel, D> {
   static constexpr bool EXIST = true;
-  static bool takes(const Spherocylinder &) { return true; }
+  static bool take(const Spherocylinder &, const Spherocylinder &) { return true; }
 
   static FindContacts<SpherocylinderModel, D> *of(InstructionSet set)
   {

@@ -29,13 +29,11 @@ template <int M, class T> struct Matrix {
 template <int M, class T, class S> Vec<M, S> solved(Matrix<M, T> a, Vec<M, S> b)
 {
   for (int k = 0; k < M; ++k) {
-    int pivot = k;
     for (int row = k + 1; row < M; ++row) {
-      if (abs(a.row[row][k]) > abs(a.row[pivot][k])) pivot = row;
-    }
-    if (pivot != k) {
-      std::swap(a.row[k], a.row[pivot]);
-      std::swap(b[k], b[pivot]);
+      const Truth<T> larger = abs(a.row[row][k]) > abs(a.row[k][k]);
+      if (!any(larger)) continue;
+      for (int col = k; col < M; ++col) exchange(larger, a.row[k][col], a.row[row][col]);
+      exchange(larger, b[k], b[row]);
     }
     const T inverse = 1 / a.row[k][k];
     for (int row = k + 1; row < M; ++row) {
@@ -89,8 +87,8 @@ inline constexpr double FLAT = 1e-15;
 
 template <int D, int M, class T> void lift_diagonal(Matrix<M, T> &a)
 {
-  T largest = 0;
-  for (int k = 0; k < D; ++k) largest = std::max(largest, a.row[k][k]);
+  T largest = 0.0;
+  for (int k = 0; k < D; ++k) largest = most(largest, a.row[k][k]);
   for (int k = 0; k < D; ++k) a.row[k][k] += T(FLAT) * largest;
 }
 
@@ -99,12 +97,28 @@ template <int M, class T> struct Linearised {
   Matrix<M, T> jacobian;
 };
 
+/// Whether the normal n of a plane is what the equations know of a body, or a point of its surface.
+inline bool is_by_normal(double p) { return p <= 1.0; }
+
+template <class T> T smooth_exponent(double p)
+{
+  return is_by_normal(p) ? 1 / (2 * T(p) - 1) : 2 * T(p) - 1;
+}
+
 /// Two bodies, r = x_i - x_j, and the exponents (those of PowerNorm in the norm that is smooth) to
 /// which the equations below are posed: on the way to the bodies' own they pass through others.
 template <int D, class S> struct TangencyProblem {
   const SuperellipsoidBody<D, S> &i, &j;
   Vec<D, S> r;
-  ValueOf<S> exponent_i, exponent_j;
+  Common<ValueOf<S>> exponent_i, exponent_j;
+
+  /// With the bodies' own exponents.
+  static TangencyProblem of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
+                            const Vec<D, S> &r)
+  {
+    using Power = Common<ValueOf<S>>;
+    return {i, j, r, smooth_exponent<Power>(i.p), smooth_exponent<Power>(j.p)};
+  }
 };
 
 /// Both bodies by their support functions, p <= 1, where these are smooth. With F = h_i + h_j the
@@ -430,6 +444,7 @@ Truth<T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolera
 {
   constexpr int LONGEST = 12;
   Truth<T> found = sought & !sought, open = sought;
+  if (!any(open)) return found;
   auto at = equations.linearised(z);
   for (int n = 0; n < LONGEST; ++n) {
     const Vec<M, T> step = equations.step(at);
@@ -443,14 +458,6 @@ Truth<T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolera
     at = next;
   }
   return found;
-}
-
-/// Whether the normal n of a plane is what the equations know of a body, or a point of its surface.
-inline bool is_by_normal(double p) { return p <= 1.0; }
-
-template <class T> T smooth_exponent(double p)
-{
-  return is_by_normal(p) ? 1 / (2 * T(p) - 1) : 2 * T(p) - 1;
 }
 
 }  // namespace detail

@@ -2,57 +2,68 @@
 
 #include "contact/contact_block.hpp"
 #include "contact/math/pack.hpp"
+#include "contact/math/pack_functions.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/superellipsoid/superellipsoid.hpp"
 
 namespace jamshape {
 namespace {
 
-template <int D> struct Ellipsoids {
-  Vec<D, Pack> axis[D], semi_axes;
-  Pack bounding_radius;
+template <int D> using BodyLanes = SuperellipsoidBody<D, Pack>;
 
-  Ellipsoids(const SuperellipsoidBody<D> *bodies, const int *index) :
-      bounding_radius(Pack::from([&](int k) { return bodies[index[k]].bounding_radius; }))
-  {
-    for (int a = 0; a < D; ++a) {
-      semi_axes[a] = Pack::from([&](int k) { return bodies[index[k]].semi_axes[a]; });
-      for (int b = 0; b < D; ++b) {
-        axis[a][b] = Pack::from([&](int k) { return bodies[index[k]].axis[a][b]; });
-      }
+template <int D> BodyLanes<D> lanes_of(const SuperellipsoidBody<D> *bodies, const int *index)
+{
+  const auto each = [&](const auto &number_of) {
+    return Pack::from([&](int k) { return number_of(bodies[index[k]]); });
+  };
+  BodyLanes<D> lanes;
+  lanes.p = bodies[index[0]].p;
+  lanes.bounding_radius = each([](const auto &body) { return body.bounding_radius; });
+  for (int a = 0; a < D; ++a) {
+    lanes.semi_axes[a] = each([&](const auto &body) { return body.semi_axes[a]; });
+    for (int b = 0; b < D; ++b) {
+      lanes.axis[a][b] = each([&](const auto &body) { return body.axis[a][b]; });
     }
   }
+  return lanes;
+}
 
-  Mask is_round() const
-  {
-    Mask round = semi_axes[1] == semi_axes[0];
-    for (int a = 2; a < D; ++a) round = round & (semi_axes[a] == semi_axes[0]);
-    return round;
-  }
+template <int D> bool are_round(const BodyLanes<D> &bodies)
+{
+  Mask round = bodies.semi_axes[1] == bodies.semi_axes[0];
+  for (int a = 2; a < D; ++a) round = round & (bodies.semi_axes[a] == bodies.semi_axes[0]);
+  return bodies.p == 1.0 && all(round);
+}
 
-  /// The scale at which they contain a point.
-  Pack gauge(const Vec<D, Pack> &y) const
-  {
-    Pack sum = 0.0;
-    for (int a = 0; a < D; ++a) {
-      const Pack along = dot(axis[a], y) / semi_axes[a];
-      sum += along * along;
-    }
-    return sqrt(sum);
-  }
+template <int D> struct PairLanes {
+  BodyLanes<D> i, j;
+  Vec<D, Pack> r;
+  Mask near;  // those whose spheres touch
 };
 
-/// Normals to begin with: those of the block where it has any, and they point along r.
+/// Of pairs that are sought, as no plane was seen to divide them, whether and where they touch.
+template <int D> struct FoundLanes {
+  Tangency<D, Pack> at;
+  Mask sought, found;
+};
+
+/// How short the last step of Newton's method is that only begins another search.
+inline constexpr double ROUGH = 1e-2;
+
+/// Normals to begin with: those of the block where it has any, and they point along r, elsewhere
+/// those of ellipsoids.
 template <int D>
-Vec<D, Pack> begin(const detail::ByNormalOfEllipsoids<D, Pack> &equations, const Vec<D, Pack> &r,
-                   const Mask &near, const ContactBlock<D> &block, int first)
+Vec<D, Pack> begin(const PairLanes<D> &pairs, const ContactBlock<D> &block, int first)
 {
-  if (!block.has_starts) return equations.start();
-  Vec<D, Pack> before;
-  for (int a = 0; a < D; ++a) before[a] = Pack::load(block.start[a] + first);
-  const Mask begun = dot(r, before) > Pack(0.0);
-  const Vec<D, Pack> n = equations.scaled(before);
-  return any(near & !begun) ? chosen(begun, n, equations.start()) : n;
+  const detail::ByNormalOfEllipsoids<D, Pack> ellipsoids(pairs.i, pairs.j, pairs.r);
+  Vec<D, Pack> before{};
+  for (int a = 0; block.has_starts && a < D; ++a) before[a] = Pack::load(block.start[a] + first);
+  const Mask begun = dot(pairs.r, before) > Pack(0.0), anew = pairs.near & !begun;
+  const Vec<D, Pack> n = ellipsoids.scaled(before);
+  if (!any(anew)) return n;
+  Vec<D, Pack> start = ellipsoids.start();
+  if (pairs.i.p != 1.0) detail::newton_in_lanes(ellipsoids, start, ROUGH, anew);
+  return chosen(begun, n, start);
 }
 
 template <int D>
@@ -62,6 +73,35 @@ void end(const Vec<D, Pack> &n, const Mask &near, ContactBlock<D> &block, int fi
     double *const to = block.start[a] + first;
     select(near, n[a], Pack::load(to)).store(to);
   }
+}
+
+template <int D> FoundLanes<D> found_by_ellipsoids(const PairLanes<D> &pairs, Vec<D, Pack> n)
+{
+  const detail::ByNormalOfEllipsoids<D, Pack> equations(pairs.i, pairs.j, pairs.r);
+  const Mask sought = pairs.near & (dot(pairs.r, n) < Pack(1.0));
+  const Mask found = detail::newton_in_lanes(equations, n, SHORT_STEP, sought);
+  return {equations.tangency(n), sought, found};
+}
+
+/// At once with their own exponents.
+template <class Equations, int D>
+FoundLanes<D> found_by(const PairLanes<D> &pairs, const Vec<D, Pack> &n)
+{
+  using Norm = PowerNorm<D, Pack>;
+  const auto h_i = Norm::support(pairs.i).at(n), h_j = Norm::support(pairs.j).at(n);
+  const Pack scale = dot(pairs.r, n) / (h_i.value + h_j.value);
+  const Mask sought = pairs.near & (scale < Pack(1.0));
+  const Equations equations(detail::TangencyProblem<D, Pack>::of(pairs.i, pairs.j, pairs.r));
+  auto z = equations.start({scale, n, scale * h_i.gradient, scale * h_j.gradient});
+  const Mask found = detail::newton_in_lanes(equations, z, SHORT_STEP, sought);
+  return {equations.tangency(z), sought, found};
+}
+
+template <int D> FoundLanes<D> found_from(const PairLanes<D> &pairs, const Vec<D, Pack> &n)
+{
+  if (pairs.i.p == 1.0) return found_by_ellipsoids(pairs, n);
+  if (detail::is_by_normal(pairs.i.p)) return found_by<detail::ByNormal<D, Pack>>(pairs, n);
+  return found_by<detail::ByPoint<D, Pack>>(pairs, n);
 }
 
 template <int D> void add_load(ContactLanes<D, Pack> &lanes, const TangencyLoad<D, Pack> &load)
@@ -77,33 +117,28 @@ template <int D>
 ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBlock<D> &block,
                                   int first)
 {
-  Vec<D, Pack> r;
-  for (int a = 0; a < D; ++a) r[a] = Pack::load(block.separation[a] + first);
-  const Ellipsoids<D> i(bodies, block.i + first), j(bodies, block.j + first);
-  const Pack reach = i.bounding_radius + j.bounding_radius, distance_sq = norm_sq(r);
-  const Mask near = distance_sq < reach * reach;
+  PairLanes<D> pairs{lanes_of(bodies, block.i + first), lanes_of(bodies, block.j + first), {}, {}};
+  for (int a = 0; a < D; ++a) pairs.r[a] = Pack::load(block.separation[a] + first);
+  const Pack reach = pairs.i.bounding_radius + pairs.j.bounding_radius;
+  const Pack distance_sq = norm_sq(pairs.r);
+  pairs.near = distance_sq < reach * reach;
   ContactLanes<D, Pack> lanes;
   lanes.touching = lanes.alone;
-  if (!any(near)) return lanes;
-  lanes.alone = near & (distance_sq <= COINCIDENT * reach * COINCIDENT * reach);
-  Mask found = near;
-  Tangency<D, Pack> at;
-  if (all(i.is_round() & j.is_round())) {
-    at = tangency_of_spheres(r, i.semi_axes[0], j.semi_axes[0]);
+  if (!any(pairs.near)) return lanes;
+  lanes.alone = pairs.near & (distance_sq <= COINCIDENT * reach * COINCIDENT * reach);
+  FoundLanes<D> of{{}, pairs.near, pairs.near};
+  if (are_round(pairs.i) && are_round(pairs.j)) {
+    of.at = tangency_of_spheres(pairs.r, pairs.i.semi_axes[0], pairs.j.semi_axes[0]);
   } else {
-    const detail::ByNormalOfEllipsoids<D, Pack> equations(i, j, r);
-    Vec<D, Pack> n = begin(equations, r, near, block, first);
-    const Mask sought = near & (dot(r, n) < Pack(1.0));
-    found = detail::newton_in_lanes(equations, n, SHORT_STEP, sought);
-    end(n, near, block, first);
-    at = equations.tangency(n);
-    lanes.error = most((j.gauge(r - at.point_i) - at.scale) / at.scale, Pack(0.0));
+    of = found_from(pairs, begin(pairs, block, first));
+    end(of.at.normal, pairs.near, block, first);
+    lanes.error = gap_of(detail::TangencyProblem<D, Pack>::of(pairs.i, pairs.j, pairs.r), of.at);
     const Mask bounded = lanes.error <= Pack(TangencySearch<D, double>::GAP);
-    lanes.alone = lanes.alone | (sought & !(found & bounded));
+    lanes.alone = lanes.alone | (of.sought & !(of.found & bounded));
   }
-  lanes.touching = (found & (at.scale < Pack(1.0))) | lanes.alone;
+  lanes.touching = (of.found & (of.at.scale < Pack(1.0))) | lanes.alone;
   if (!any(lanes.touching)) return lanes;
-  add_load(lanes, {at, r, {Pack::load(block.k_e + first)}});
+  add_load(lanes, {of.at, pairs.r, {Pack::load(block.k_e + first)}});
   return lanes;
 }
 
@@ -112,16 +147,17 @@ ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBl
 /// Flattened: whatever is called becomes part of it, and no function of these instructions stands
 /// by itself under a name that other files have, too.
 template <InstructionSet SET, int D>
-[[gnu::flatten]] void find_ellipsoid_contacts(const SuperellipsoidBody<D> *bodies,
-                                              const SuperellipsoidLaw &, ContactBlock<D> &block)
+[[gnu::flatten]] void find_superellipsoid_contacts(const SuperellipsoidBody<D> *bodies,
+                                                   const SuperellipsoidLaw &,
+                                                   ContactBlock<D> &block)
 {
   block.find(LANES,
              [&](ContactBlock<D> &of, int first) { return contacts_of<D>(bodies, of, first); });
 }
 
 template FindContacts<SuperellipsoidModel, 2>
-    find_ellipsoid_contacts<InstructionSet::JAMSHAPE_SET, 2>;
+    find_superellipsoid_contacts<InstructionSet::JAMSHAPE_SET, 2>;
 template FindContacts<SuperellipsoidModel, 3>
-    find_ellipsoid_contacts<InstructionSet::JAMSHAPE_SET, 3>;
+    find_superellipsoid_contacts<InstructionSet::JAMSHAPE_SET, 3>;
 
 }  // namespace jamshape

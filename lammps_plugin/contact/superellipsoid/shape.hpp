@@ -95,13 +95,13 @@ template <int D> SubstrateDrag substrate_drag(const Superellipsoid &shape)
   return {volume, {{mean_sq[1] + mean_sq[2], mean_sq[0] + mean_sq[2], about_z}}};
 }
 
-/// Shape and pose of one particle, as the pair loops read it.
+/// Shape and pose of one particle, as the pair loops read it; in packs of several, of one exponent.
 template <int D, class S = double> struct SuperellipsoidBody {
   Vec<D, S> centre;
   Vec<D, S> axis[D];
-  Vec<D> semi_axes;
+  Vec<D, Plain<S>> semi_axes;
   double p;
-  double bounding_radius;
+  Plain<S> bounding_radius;
 };
 
 /// Where the surface bends by less than this part of what the ellipsoid of the same axes does, it
@@ -129,8 +129,8 @@ bool is_flat_at(const SuperellipsoidBody<D, S> &body, const Vec<D, S> &point)
   return true;
 }
 
-/// x^e of x >= 0. Small whole powers, all that the usual shapes need, are products; of plain
-/// numbers half ones, too (the root of a dual number has no derivative at 0, but x^1.5 has one).
+/// x^e of x >= 0. Small whole powers, all that the usual shapes need, are products; of scalars
+/// without derivatives half ones, too (the root of a dual number has none at 0, but x^1.5 has one).
 template <class T> class Exponent {
  public:
   explicit Exponent(T exponent) : e(exponent), halves(halves_in(exponent)) {}
@@ -140,7 +140,7 @@ template <class T> class Exponent {
   template <class S> S operator()(const S &x) const
   {
     if (halves >= 0 && halves % 2 == 0) return product(x, halves / 2);
-    if constexpr (std::is_same_v<S, T>) {
+    if constexpr (std::is_same_v<S, ValueOf<S>>) {
       if (halves >= 0) return product(sqrt(x), halves);
     }
     return pow(x, e);
@@ -187,8 +187,9 @@ template <int D, class T> struct CurvedNormAt {
 template <int D, class S> class PowerNorm {
  public:
   using T = ValueOf<S>;
+  using Power = Common<T>;
 
-  static PowerNorm gauge(const SuperellipsoidBody<D, S> &body, T exponent)
+  static PowerNorm gauge(const SuperellipsoidBody<D, S> &body, Power exponent)
   {
     Vec<D, T> scale;
     for (int k = 0; k < D; ++k) scale[k] = 1 / T(body.semi_axes[k]);
@@ -196,10 +197,10 @@ template <int D, class S> class PowerNorm {
   }
   static PowerNorm gauge(const SuperellipsoidBody<D, S> &body)
   {
-    return gauge(body, 2 * T(body.p) - 1);
+    return gauge(body, 2 * Power(body.p) - 1);
   }
 
-  static PowerNorm support(const SuperellipsoidBody<D, S> &body, T exponent)
+  static PowerNorm support(const SuperellipsoidBody<D, S> &body, Power exponent)
   {
     Vec<D, T> scale;
     for (int k = 0; k < D; ++k) scale[k] = body.semi_axes[k];
@@ -207,7 +208,7 @@ template <int D, class S> class PowerNorm {
   }
   static PowerNorm support(const SuperellipsoidBody<D, S> &body)
   {
-    return support(body, 1 / (2 * T(body.p) - 1));
+    return support(body, 1 / (2 * Power(body.p) - 1));
   }
 
   S value(const Vec<D, S> &v) const { return at(v).value; }
@@ -220,7 +221,7 @@ template <int D, class S> class PowerNorm {
     return norm;
   }
 
-  /// For plain numbers only.
+  /// Not of dual numbers.
   CurvedNormAt<D, T> curved_at(const Vec<D, T> &v) const
   {
     const Components c = components<true>(v);
@@ -240,9 +241,9 @@ template <int D, class S> class PowerNorm {
  private:
   const SuperellipsoidBody<D, S> *body;
   Vec<D, T> scale;
-  Exponent<T> e, e_minus_one;
+  Exponent<Power> e, e_minus_one;
 
-  PowerNorm(const SuperellipsoidBody<D, S> &of, const Vec<D, T> &scales, T exponent) :
+  PowerNorm(const SuperellipsoidBody<D, S> &of, const Vec<D, T> &scales, Power exponent) :
       body(&of), scale(scales), e(exponent), e_minus_one(exponent - 1)
   {
   }
@@ -256,13 +257,12 @@ template <int D, class S> class PowerNorm {
   /// Second derivatives are for plain numbers and e >= 1, where the norm is smooth.
   template <bool CURVED> Components components(const Vec<D, S> &v) const
   {
-    S t[D];
-    int largest = 0;
+    S t[D], largest = 0.0;
     for (int k = 0; k < D; ++k) {
       t[k] = scale[k] * dot(body->axis[k], v);
-      if (abs(t[k]) > abs(t[largest])) largest = k;
+      largest = most(largest, S(abs(t[k])));
     }
-    const S most = abs(t[largest]), inverse = T(1) / most;
+    const S inverse = T(1) / largest;
     Components c;
     S sum = T(0), power[D];
     T lower_power[D]{};
@@ -277,8 +277,8 @@ template <int D, class S> class PowerNorm {
       sum += ratio * power[k];
     }
     const S grown = root(sum);
-    c.norm = most * grown;
-    const S shrink = grown / sum;  // (most / N)^e
+    c.norm = largest * grown;
+    const S shrink = grown / sum;  // (largest / N)^e
     const T shrink_lower = value_of(shrink) * value_of(grown);
     for (int k = 0; k < D; ++k) {
       c.gradient[k] = copysign(scale[k] * power[k] * shrink, t[k]);

@@ -310,16 +310,19 @@ struct SuperellipsoidModel {
 };
 
 /// Compiled in packs.cpp for each set.
-template <InstructionSet SET, int D> FindContacts<SuperellipsoidModel, D> find_ellipsoid_contacts;
+template <InstructionSet SET, int D> FindContacts<SuperellipsoidModel, D> find_superellipsoid_contacts;
 
 template <int D> struct PacksOf<SuperellipsoidModel, D> {
   static constexpr bool EXIST = true;
-  static bool takes(const Superellipsoid &shape) { return shape.p == 1.0; }
+  static bool take(const Superellipsoid &shape, const Superellipsoid &first)
+  {
+    return shape.p == first.p;
+  }
 
   static FindContacts<SuperellipsoidModel, D> *of(InstructionSet set)
   {
     return compiled_for(set,
-                        [](auto one) { return &find_ellipsoid_contacts<decltype(one)::value, D>; });
+                        [](auto one) { return &find_superellipsoid_contacts<decltype(one)::value, D>; });
   }
 };
 

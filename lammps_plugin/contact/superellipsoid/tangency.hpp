@@ -33,6 +33,25 @@ template <int D, class T> struct TangencyWish {
   bool shortcuts = true;
 };
 
+/// Bounds of the scale, |scale - eta| / scale < gap: the plane with normal n gives the lower one,
+/// r.n / (h_i + h_j), a point y the upper, max(g_i(y), g_j(r - y)). The equations have met one half
+/// of each by how the tangency follows from their unknowns.
+template <int D, class T>
+T gap_of(const detail::TangencyProblem<D, T> &pair, const Tangency<D, T> &at)
+{
+  using Norm = PowerNorm<D, T>;
+  const auto larger = [](const T &a, const T &b) { return most(a, b) + T(0.0) * b; };  // or NaN
+  T gap = most(T(Norm::gauge(pair.j).value(pair.r - at.point_i) - at.scale), T(0.0));
+  if (!detail::is_by_normal(pair.i.p)) {
+    gap = larger(gap, Norm::gauge(pair.i).value(at.point_i) - at.scale);
+  }
+  if (!detail::is_by_normal(pair.j.p)) {
+    const T below = dot(pair.r, at.normal) / (T(1.0) + Norm::support(pair.j).value(at.normal));
+    gap = larger(gap, at.scale - below);
+  }
+  return gap / at.scale;
+}
+
 /// Finds the tangency of two bodies in plain numbers T. From the ellipsoids of the same axes, where
 /// Newton's method takes four steps, it follows the solution as the exponents grow, in stages of
 /// one to a few Newton steps each. Where a stage fails it starts again with finer ones, then from
@@ -117,21 +136,11 @@ template <int D, class T> class TangencySearch {
     return is_improved && found.gap <= GAP;
   }
 
-  /// Bounds of the scale, |scale - eta| / scale < gap: the plane with normal n gives the lower
-  /// one, r.n / (h_i + h_j), a point y the upper, max(g_i(y), g_j(r - y)). The equations have met
-  /// one half of each by how the tangency follows from their unknowns.
   void certify(FoundTangency<D, T> &found) const
   {
-    using Norm = PowerNorm<D, T>;
-    const Tangency<D, T> &at = found.at;
-    const bool i_by_normal = detail::is_by_normal(i.p), j_by_normal = detail::is_by_normal(j.p);
-    const T g_i = i_by_normal ? at.scale : Norm::gauge(i).value(at.point_i);
-    const T above = std::max(g_i, Norm::gauge(j).value(r - at.point_i));
-    const T below =
-        j_by_normal ? at.scale : dot(r, at.normal) / (T(1) + Norm::support(j).value(at.normal));
-    const T gap = std::max(above - at.scale, at.scale - below) / at.scale;
-    const bool is_bound = std::isfinite(above) && std::isfinite(below) && at.scale > T(0);
-    found.gap = is_bound ? std::max(gap, T(0)) : std::numeric_limits<T>::infinity();
+    const T gap = gap_of(detail::TangencyProblem<D, T>::of(i, j, r), found.at);
+    const bool is_bound = std::isfinite(gap) && found.at.scale > T(0);
+    found.gap = is_bound ? gap : std::numeric_limits<T>::infinity();
   }
 
  private:

@@ -1,0 +1,68 @@
+#pragma once
+
+#include "contact/math/pack.hpp"
+
+#include <limits>
+
+/// The functions that libraries have for one number at a time, for all lanes of a pack at once, to
+/// two roundings or so. They are sums and products in a fixed order, so that they round alike with
+/// every set of instructions.
+namespace jamshape {
+inline namespace JAMSHAPE_SET {
+
+// ln 2 = LN2 + LN2_REST; a whole number up to 2^20 times LN2 has no rounding error.
+inline constexpr double LN2 = 0x1.62e42fep-1, LN2_REST = 0x1.f473de6af278fp-30;
+inline constexpr double PER_LN2 = 0x1.71547652b82fep+0;
+
+/// c[0] + c[1] x + ... + c[N - 1] x^(N - 1).
+template <int N> Pack polynomial(const double (&c)[N], const Pack &x)
+{
+  Pack sum = c[N - 1];
+  for (int k = N - 2; k >= 0; --k) sum = sum * x + c[k];
+  return sum;
+}
+
+/// exp(k ln 2 + r), |r| < ln 2 / 2, by Taylor's series of exp(r). 0 below the smallest normal
+/// number.
+inline Pack exp(const Pack &x)
+{
+  constexpr double SERIES[] = {1.0,           1.0,           1.0 / 2,         1.0 / 6,
+                               1.0 / 24,      1.0 / 120,     1.0 / 720,       1.0 / 5040,
+                               1.0 / 40320,   1.0 / 362880,  1.0 / 3628800,   1.0 / 39916800,
+                               1.0 / 479001600, 1.0 / 6227020800};
+  constexpr double LEAST = -708.0, MOST = 709.0;
+  const Pack within = least(most(x, LEAST), MOST), k = nearest_whole(within * PER_LN2);
+  const Pack r = (within - k * LN2) - k * LN2_REST;
+  const Pack found = polynomial(SERIES, r) * power_of_two(k);
+  return select(x < LEAST, 0.0, select(x > MOST, std::numeric_limits<double>::infinity(), found));
+}
+
+/// ln x = k ln 2 + 2 artanh((m - 1) / (m + 1)), x = 2^k m, m from sqrt(1/2) to sqrt(2). Of what is
+/// not a positive normal number: NaN.
+inline Pack log(const Pack &x)
+{
+  constexpr double SERIES[] = {2.0 / 3,  2.0 / 5,  2.0 / 7,  2.0 / 9,  2.0 / 11,
+                               2.0 / 13, 2.0 / 15, 2.0 / 17, 2.0 / 19, 2.0 / 21};
+  const PowerOfTwo part(x);
+  const Pack s = (part.rest - 1.0) / (part.rest + 1.0), z = s * s;
+  const Pack of_rest = 2.0 * s + (s * z * polynomial(SERIES, z) + part.power * LN2_REST);
+  const Mask normal =
+      (x >= std::numeric_limits<double>::min()) & (x <= std::numeric_limits<double>::max());
+  return select(normal, part.power * LN2 + of_rest, std::numeric_limits<double>::quiet_NaN());
+}
+
+/// ln(1 + x) by that of the rounded sum, and what was rounded off.
+inline Pack log1p(const Pack &x)
+{
+  const Pack sum = 1.0 + x;
+  return log(sum) + (x - (sum - 1.0)) / sum;
+}
+
+/// Of a base that is not negative, to a positive power. Its relative error grows as power * ln x.
+inline Pack pow(const Pack &x, double power)
+{
+  return select(x < Pack(std::numeric_limits<double>::min()), 0.0, exp(power * log(x)));
+}
+
+}  // namespace JAMSHAPE_SET
+}  // namespace jamshape
