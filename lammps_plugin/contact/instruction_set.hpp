@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 namespace jamshape {
 
@@ -58,6 +59,21 @@ inline InstructionSet required_instruction_set()
   if (chosen) return *chosen;
   throw std::invalid_argument(std::string("found JAMSHAPE_SIMD=") + std::getenv("JAMSHAPE_SIMD") +
                               ", expected " + known_sets() + ".");
+}
+
+/// Of functions that are compiled once for each set, `of_set(set)`, the one for a set that this
+/// machine has; none for pairs one by one.
+template <class OfSet>
+auto compiled_for(InstructionSet set, const OfSet &of_set)
+    -> decltype(of_set(std::integral_constant<InstructionSet, InstructionSet::baseline>()))
+{
+  if (set == InstructionSet::scalar) return nullptr;
+#if defined(__x86_64__)
+  if (set == InstructionSet::avx2) {
+    return of_set(std::integral_constant<InstructionSet, InstructionSet::avx2>());
+  }
+#endif
+  return of_set(std::integral_constant<InstructionSet, InstructionSet::baseline>());
 }
 
 }  // namespace jamshape

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "landscape/block_kernels.hpp"
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -70,11 +72,6 @@ struct BlockPattern {
     return static_cast<int>(std::lower_bound(begin, end, row_sought) - row.begin());
   }
 
-  /// A block as its row sees it.
-  struct Left {
-    int column, block;
-  };
-
   std::size_t n;                     // coordinates
   std::vector<std::int64_t> column;  // (N, block)
   Fill fill;
@@ -82,7 +79,7 @@ struct BlockPattern {
   std::vector<int> first;       // (N + 1,) of the blocks below the diagonal, column by column
   std::vector<int> row;         // of each block, ascending within a column
   std::vector<int> first_left;  // (N + 1,) of the same blocks, row by row
-  std::vector<Left> left;       // ascending within a row
+  std::vector<LeftBlock> left;  // ascending within a row
 
  private:
   /// In an order in which few blocks are added (approximate minimum degree).
@@ -116,26 +113,40 @@ struct BlockPattern {
 };
 
 template <int BLOCK> using BlockOf = Eigen::Matrix<double, BLOCK, BLOCK>;
-template <int BLOCK> using BlockRow = Eigen::Matrix<double, BLOCK, 1>;
 
 /// A symmetric matrix: the blocks on its diagonal, and those below it, zero where only the factor
 /// has them.
 template <int BLOCK> struct BlockMatrix {
   std::vector<BlockOf<BLOCK>> diagonal, below;
+
+  /// Where its numbers are; nothing is changed by kernels that only read.
+  BlockView view(const BlockPattern &of) const
+  {
+    BlockView at{};
+    at.n = static_cast<int>(of.size());
+    at.first = of.first.data();
+    at.row = of.row.data();
+    at.first_left = of.first_left.data();
+    at.left = of.left.data();
+    at.diagonal = const_cast<double *>(diagonal.data()->data());
+    at.below = below.empty() ? nullptr : const_cast<double *>(below.data()->data());
+    return at;
+  }
 };
 
 /// A vector in the coordinates and the same by blocks, in the order of elimination; zero for
 /// coordinates that a particle does not have.
 template <int BLOCK> class BlockRows {
  public:
-  explicit BlockRows(const BlockPattern &of) : pattern(of), x(of.size(), BlockRow<BLOCK>::Zero()) {}
+  explicit BlockRows(const BlockPattern &of) : pattern(of), x(STRIDE * of.size()) {}
 
   BlockRows(const BlockPattern &of, const Eigen::Ref<const Eigen::VectorXd> &from) : BlockRows(of)
   {
     each([&](std::int64_t c, double &component) { component = from[c]; });
   }
 
-  BlockRow<BLOCK> &operator[](std::size_t k) { return x[k]; }
+  double *data() { return x.data(); }
+  const double *row(std::size_t k) const { return &x[STRIDE * k]; }
 
   Eigen::VectorXd gathered()
   {
@@ -145,34 +156,19 @@ template <int BLOCK> class BlockRows {
   }
 
  private:
+  static constexpr std::size_t STRIDE = stride_of(BLOCK);
+
   const BlockPattern &pattern;
-  std::vector<BlockRow<BLOCK>> x;
+  std::vector<double> x;
 
   template <class Then> void each(const Then &then)
   {
     for (std::size_t k = 0; k < pattern.column.size(); ++k) {
       const std::int64_t c = pattern.column[k];
-      if (c >= 0) then(c, x[pattern.place[k / BLOCK]][static_cast<Eigen::Index>(k % BLOCK)]);
+      if (c >= 0) then(c, x[STRIDE * pattern.place[k / BLOCK] + k % BLOCK]);
     }
   }
 };
-
-/// A matrix times a vector (n,) in the coordinates.
-template <int BLOCK>
-Eigen::VectorXd product(const BlockPattern &pattern, const BlockMatrix<BLOCK> &matrix,
-                        const Eigen::Ref<const Eigen::VectorXd> &vector)
-{
-  BlockRows<BLOCK> x(pattern, vector), y(pattern);
-  for (std::size_t j = 0; j < pattern.size(); ++j) {
-    BlockRow<BLOCK> sum = matrix.diagonal[j] * x[j];
-    for (int b = pattern.first[j]; b < pattern.first[j + 1]; ++b) {
-      y[pattern.row[b]].noalias() += matrix.below[b] * x[j];
-      sum.noalias() += matrix.below[b].transpose() * x[pattern.row[b]];
-    }
-    y[j] += sum;
-  }
-  return y.gathered();
-}
 
 /// Factors L D L^T of symmetric positive definite matrices of one pattern, block by block: three
 /// times faster than number by number. Pivots are single numbers, as without blocks, so that a
@@ -180,25 +176,26 @@ Eigen::VectorXd product(const BlockPattern &pattern, const BlockMatrix<BLOCK> &m
 /// not have are to have zeros in its blocks and 1 on the diagonal.
 template <int BLOCK> class BlockFactors : public Factors {
  public:
-  explicit BlockFactors(std::shared_ptr<const BlockPattern> of) :
-      pattern(std::move(of)), inverse_pivots(pattern->size()), block_of_row(pattern->size()),
-      column_of_row(pattern->size())
+  BlockFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled) :
+      pattern(std::move(of)), kernels(compiled), inverse_pivots(BLOCK * pattern->size()),
+      block_of_row(pattern->size()), column_of_row(pattern->size())
   {
   }
 
   /// Of a matrix with a diagonal added, its rows in the order of elimination. False, and no
   /// factors, where a pivot is not positive: then the matrix is not positive definite (Sylvester's
   /// law of inertia), if fill is complete.
-  bool factorise(const BlockMatrix<BLOCK> &matrix, BlockRows<BLOCK> &added)
+  bool factorise(const BlockMatrix<BLOCK> &matrix, const BlockRows<BLOCK> &added)
   {
     factors = matrix;
-    std::fill(column_of_row.begin(), column_of_row.end(), -1);
-    for (int j = 0; j < static_cast<int>(pattern->size()); ++j) {
-      factors.diagonal[j].diagonal() += added[j];
-      gather(j);
-      if (!eliminate(j)) return false;
+    for (std::size_t j = 0; j < pattern->size(); ++j) {
+      for (int k = 0; k < BLOCK; ++k) factors.diagonal[j](k, k) += added.row(j)[k];
     }
-    return true;
+    BlockView at = factors.view(*pattern);
+    at.inverse_pivots = inverse_pivots.data();
+    at.block_of_row = block_of_row.data();
+    at.column_of_row = column_of_row.data();
+    return kernels.factorise(at);
   }
 
   std::size_t size() const override { return pattern->n; }
@@ -206,82 +203,18 @@ template <int BLOCK> class BlockFactors : public Factors {
   Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const override
   {
     BlockRows<BLOCK> x(*pattern, right);
-    substitute(x);
+    BlockView at = factors.view(*pattern);
+    at.inverse_pivots = const_cast<double *>(inverse_pivots.data());
+    kernels.solve(at, x.data());
     return x.gathered();
   }
 
  private:
-  using Block = BlockOf<BLOCK>;
   std::shared_ptr<const BlockPattern> pattern;
+  BlockKernels kernels;
   BlockMatrix<BLOCK> factors;  // L below the pivots, which its diagonal holds
-  std::vector<BlockRow<BLOCK>> inverse_pivots;
-  std::vector<int> block_of_row, column_of_row;  // in the column that is being eliminated
-
-  /// Takes off a column what the eliminated ones on its left add to it (left-looking), but for
-  /// blocks that the pattern does not have.
-  void gather(int j)
-  {
-    const BlockPattern &at = *pattern;
-    for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
-      block_of_row[at.row[b]] = b;
-      column_of_row[at.row[b]] = j;
-    }
-    for (int k = at.first_left[j]; k < at.first_left[j + 1]; ++k) {
-      const auto [column, own] = at.left[k];
-      const Block right =
-          factors.diagonal[column].diagonal().asDiagonal() * factors.below[own].transpose();
-      factors.diagonal[j].noalias() -= factors.below[own] * right;
-      for (int b = own + 1; b < at.first[column + 1]; ++b) {
-        const int r = at.row[b];
-        if (column_of_row[r] != j) continue;
-        factors.below[block_of_row[r]].noalias() -= factors.below[b] * right;
-      }
-    }
-  }
-
-  /// Splits the diagonal block into l d l^T, and divides those below it by d l^T.
-  bool eliminate(int j)
-  {
-    Block &l = factors.diagonal[j];
-    BlockRow<BLOCK> &inverse = inverse_pivots[j];
-    for (int k = 0; k < BLOCK; ++k) {
-      if (!(l(k, k) > 0.0)) return false;
-      inverse[k] = 1.0 / l(k, k);
-      for (int c = k + 1; c < BLOCK; ++c) {
-        for (int r = c; r < BLOCK; ++r) l(r, c) -= l(r, k) * inverse[k] * l(c, k);
-      }
-      for (int r = k + 1; r < BLOCK; ++r) l(r, k) *= inverse[k];
-    }
-    for (int b = pattern->first[j]; b < pattern->first[j + 1]; ++b) {
-      Block &below = factors.below[b];
-      for (int c = 1; c < BLOCK; ++c) {
-        for (int k = 0; k < c; ++k) below.col(c) -= l(c, k) * below.col(k);
-      }
-      below = below * inverse.asDiagonal();
-    }
-    return true;
-  }
-
-  /// Forward and back substitution in place.
-  void substitute(BlockRows<BLOCK> &x) const
-  {
-    const BlockPattern &at = *pattern;
-    const auto n = static_cast<int>(at.size());
-    for (int j = 0; j < n; ++j) {
-      factors.diagonal[j].template triangularView<Eigen::UnitLower>().solveInPlace(x[j]);
-      for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
-        x[at.row[b]].noalias() -= factors.below[b] * x[j];
-      }
-    }
-    for (int j = n - 1; j >= 0; --j) {
-      x[j] = x[j].cwiseProduct(inverse_pivots[j]);
-      for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
-        x[j].noalias() -= factors.below[b].transpose() * x[at.row[b]];
-      }
-      factors.diagonal[j].transpose().template triangularView<Eigen::UnitUpper>().solveInPlace(
-          x[j]);
-    }
-  }
+  std::vector<double> inverse_pivots;
+  std::vector<int> block_of_row, column_of_row;  // space to work in
 };
 
 }  // namespace jamshape

@@ -89,12 +89,14 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
 
   Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const override
   {
-    return product(*pattern, hessian, vector);
+    BlockRows<BLOCK> x(*pattern, vector), y(*pattern);
+    kernels.multiply(hessian.view(*pattern), x.data(), y.data());
+    return y.gathered();
   }
 
   std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) override
   {
-    BlockRows<BLOCK> rows(*pattern, added);
+    const BlockRows<BLOCK> rows(*pattern, added);
     const std::shared_ptr<BlockFactors<BLOCK>> found = spare();
     return found->factorise(hessian, rows) ? found : nullptr;
   }
@@ -107,6 +109,7 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
   std::vector<int> block;  // (M,) of each pair below the diagonal
   BlockMatrix<BLOCK> hessian;
   std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
+  BlockKernels kernels = block_kernels<BLOCK>();
 
   /// Row of a pair's first or second particle.
   int place(std::size_t p, int side) const { return pattern->place[pairs[2 * p + side]]; }
@@ -129,7 +132,7 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
     for (const auto &one : made) {
       if (one.use_count() == 1) return one;
     }
-    made.push_back(std::make_shared<BlockFactors<BLOCK>>(pattern));
+    made.push_back(std::make_shared<BlockFactors<BLOCK>>(pattern, kernels));
     return made.back();
   }
 };

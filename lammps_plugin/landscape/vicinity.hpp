@@ -300,6 +300,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   static constexpr int TURNS = D == 2 ? 1 : 4;  // numbers of an orientation
   using DualContact = ContactOf<Model, D, Dual<VARIABLES>>;
   using Start = typename Model::template Start<D>;
+  using PairMatrix = Eigen::Matrix<double, VARIABLES, VARIABLES>;
+  using PairRow = Eigen::Matrix<double, VARIABLES, 1>;
 
   /// What is nearly round may turn so far in one step, if its surface moves no further than it may.
   static constexpr double WIDE = 1.0;
@@ -311,11 +313,15 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   /// Fewer pairs take no longer in one thread.
   static constexpr std::size_t MANY = 2000;
 
+  /// Faces that lie flat on each other move their point of contact without limit as they turn:
+  /// nothing that counts by how stiff it is may be stiffer than so many times the bond.
+  static constexpr double STIFFEST = 1e4;
+
   /// A pair that touches, and second derivatives by its variables.
   struct Curved {
     std::size_t p;
     Vec<D> r;
-    Eigen::Matrix<double, VARIABLES, VARIABLES> by;
+    PairMatrix by;
   };
 
   std::vector<Shape> shapes;
@@ -584,22 +590,41 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return false;
   }
 
-  /// Second derivatives by the variables of a pair that touches.
-  static Eigen::Matrix<double, VARIABLES, VARIABLES> by_variables(const DualContact &contact)
+  /// Second derivatives by the variables of a pair that touches, those of turning flat faces on
+  /// each other within bounds.
+  PairMatrix by_variables(std::size_t p, const ContactOf<Model, D> &contact,
+                          const DualContact &dual) const
   {
     SecondDerivatives<D, double, Model::MOST_BONDS> found{};
-    read_derivatives(contact, found);
-    Eigen::Matrix<double, VARIABLES, VARIABLES> by;
-    for (int a = 0; a < VARIABLES; ++a) {
-      for (int b = 0; b < VARIABLES; ++b) {
-        by(a, b) = found.curvature[a][b];
-        for (int k = 0; k < contact.n_bonds; ++k) {
-          by(a, b) +=
-              value_of(contact.bond[k].own_stiffness) * found.gradient[k][a] * found.gradient[k][b];
-        }
-      }
+    read_derivatives(dual, found);
+    const PairMatrix turning = Eigen::Map<const PairMatrix>(&found.curvature[0][0]);
+    PairMatrix by = PairMatrix::Zero();
+    double stiffest = 0.0;
+    for (int b = 0; b < contact.n_bonds; ++b) {
+      const Bond<D> &bond = contact.bond[b];
+      PairRow along;
+      std::copy_n(bond.normal.c, D, along.data());
+      std::copy_n(bond.lever_i.c, ROTATIONS<D>, along.data() + FIRST_OF_I<D>);
+      std::copy_n(bond.lever_j.c, ROTATIONS<D>, along.data() + FIRST_OF_J<D>);
+      by += bond.own_stiffness * along * along.transpose();
+      stiffest += STIFFEST * bond.own_stiffness;
     }
-    return by;
+    const PairRow part = per_length(p);
+    const double largest = (part.asDiagonal() * turning * part.asDiagonal()).cwiseAbs().maxCoeff();
+    if (!turning.allFinite()) return by;
+    return by + std::min(1.0, stiffest / largest) * turning;
+  }
+
+  /// What turns a pair's variables into lengths at its surfaces.
+  PairRow per_length(std::size_t p) const
+  {
+    PairRow part = PairRow::Ones();
+    for (int side = 0; side < 2; ++side) {
+      const double radius = coordinates.turning_radius[pairs.particles[2 * p + side]];
+      const int first = side == 0 ? FIRST_OF_I<D> : FIRST_OF_J<D>;
+      part.template segment<ROTATIONS<D>>(first).setConstant(radius > 0.0 ? 1.0 / radius : 0.0);
+    }
+    return part;
   }
 
   /// Which variable of a pair a coordinate of its first, its second particle is.
@@ -616,10 +641,13 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     for (std::size_t p = part.first; p < part.last; ++p) {
       const Vec<D> r = posed.separation(p);
       Start start = remembers ? starts[p] : Start{};
-      if (!posed.may_touch(p, r) || posed.contact(p, r, &start).status != ContactStatus::TOUCHING)
-        continue;
-      const DualContact contact = turned_bodies.contact(p, &start);
-      if (contact.status == ContactStatus::TOUCHING) then(Curved{p, r, by_variables(contact)});
+      if (!posed.may_touch(p, r)) continue;
+      const ContactOf<Model, D> contact = posed.contact(p, r, &start);
+      if (contact.status != ContactStatus::TOUCHING) continue;
+      const DualContact dual = turned_bodies.contact(p, &start);
+      if (dual.status == ContactStatus::TOUCHING) {
+        then(Curved{p, r, by_variables(p, contact, dual)});
+      }
     }
   }
 

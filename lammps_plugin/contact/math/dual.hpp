@@ -25,67 +25,88 @@ template <int N, class S = double> struct Dual {
   }
 
   /// The function value f(x) with f'(x) times the derivatives of x.
-  Dual chain(S f, S slope) const
+  [[gnu::always_inline]] Dual chain(S f, S slope) const
   {
     Dual a(f);
     for (int k = 0; k < N; ++k) a.d[k] = slope * d[k];
     return a;
   }
 
-  Dual &operator+=(const Dual &b)
+  [[gnu::always_inline]] Dual &operator+=(const Dual &b)
   {
     value += b.value;
     for (int k = 0; k < N; ++k) d[k] += b.d[k];
     return *this;
   }
-  Dual &operator-=(const Dual &b)
+  [[gnu::always_inline]] Dual &operator-=(const Dual &b)
   {
     value -= b.value;
     for (int k = 0; k < N; ++k) d[k] -= b.d[k];
     return *this;
   }
-  Dual &operator*=(const Dual &b)
+  [[gnu::always_inline]] Dual &operator*=(const Dual &b)
   {
     for (int k = 0; k < N; ++k) d[k] = d[k] * b.value + value * b.d[k];
     value *= b.value;
     return *this;
   }
-  Dual &operator/=(const Dual &b)
+  [[gnu::always_inline]] Dual &operator/=(const Dual &b)
   {
     return *this *= b.chain(1 / b.value, -1 / (b.value * b.value));
   }
 
-  friend Dual operator+(Dual a, const Dual &b) { return a += b; }
-  friend Dual operator-(Dual a, const Dual &b) { return a -= b; }
-  friend Dual operator*(Dual a, const Dual &b) { return a *= b; }
-  friend Dual operator/(Dual a, const Dual &b) { return a /= b; }
-  friend Dual operator-(const Dual &a) { return a.chain(-a.value, -1); }
+  [[gnu::always_inline]] friend Dual operator+(Dual a, const Dual &b) { return a += b; }
+  [[gnu::always_inline]] friend Dual operator-(Dual a, const Dual &b) { return a -= b; }
+  [[gnu::always_inline]] friend Dual operator*(Dual a, const Dual &b) { return a *= b; }
+  [[gnu::always_inline]] friend Dual operator/(Dual a, const Dual &b) { return a /= b; }
+  [[gnu::always_inline]] friend Dual operator-(const Dual &a) { return a.chain(-a.value, -1); }
 
-  friend bool operator<(const Dual &a, const Dual &b) { return a.value < b.value; }
-  friend bool operator>(const Dual &a, const Dual &b) { return a.value > b.value; }
-  friend bool operator<=(const Dual &a, const Dual &b) { return a.value <= b.value; }
-  friend bool operator==(const Dual &a, const Dual &b) { return a.value == b.value; }
-  friend bool operator!=(const Dual &a, const Dual &b) { return a.value != b.value; }
+  [[gnu::always_inline]] friend bool operator<(const Dual &a, const Dual &b)
+  {
+    return a.value < b.value;
+  }
+  [[gnu::always_inline]] friend bool operator>(const Dual &a, const Dual &b)
+  {
+    return a.value > b.value;
+  }
+  [[gnu::always_inline]] friend bool operator<=(const Dual &a, const Dual &b)
+  {
+    return a.value <= b.value;
+  }
+  [[gnu::always_inline]] friend bool operator==(const Dual &a, const Dual &b)
+  {
+    return a.value == b.value;
+  }
+  [[gnu::always_inline]] friend bool operator!=(const Dual &a, const Dual &b)
+  {
+    return a.value != b.value;
+  }
 
-  friend Dual sqrt(const Dual &a)
+  [[gnu::always_inline]] friend Dual sqrt(const Dual &a)
   {
     const S root = std::sqrt(a.value);
     return a.chain(root, 1 / (2 * root));
   }
-  friend Dual log(const Dual &a) { return a.chain(std::log(a.value), 1 / a.value); }
-  friend Dual log1p(const Dual &a) { return a.chain(std::log1p(a.value), 1 / (1 + a.value)); }
-  friend Dual exp(const Dual &a)
+  [[gnu::always_inline]] friend Dual log(const Dual &a)
+  {
+    return a.chain(std::log(a.value), 1 / a.value);
+  }
+  [[gnu::always_inline]] friend Dual log1p(const Dual &a)
+  {
+    return a.chain(std::log1p(a.value), 1 / (1 + a.value));
+  }
+  [[gnu::always_inline]] friend Dual exp(const Dual &a)
   {
     const S power = std::exp(a.value);
     return a.chain(power, power);
   }
   /// Of a base that is not negative, to a constant power that is at least 1.
-  friend Dual pow(const Dual &a, const S &exponent)
+  [[gnu::always_inline]] friend Dual pow(const Dual &a, const S &exponent)
   {
     return a.chain(std::pow(a.value, exponent), exponent * std::pow(a.value, exponent - 1));
   }
-  friend Dual abs(const Dual &a) { return a.value < 0 ? -a : a; }
-  friend Dual copysign(const Dual &a, const Dual &b)
+  [[gnu::always_inline]] friend Dual abs(const Dual &a) { return a.value < 0 ? -a : a; }
+  [[gnu::always_inline]] friend Dual copysign(const Dual &a, const Dual &b)
   {
     return std::signbit(a.value) == std::signbit(b.value) ? a : -a;
   }

@@ -115,9 +115,9 @@ struct Pack {
  private:
   using Each = std::make_integer_sequence<int, LANES>;
   static constexpr long long SIGN = static_cast<long long>(1ULL << 63);
-  static constexpr int MANTISSA = 52;        // bits of it
+  static constexpr int MANTISSA = 52;               // bits of it
   static constexpr unsigned long long BIAS = 1023;  // of the exponent above it
-  static constexpr double WHOLE = 0x1.8p52;  // numbers about this one are whole
+  static constexpr double WHOLE = 0x1.8p52;         // numbers about this one are whole
 
   template <class Of, int... K> static Pack from(const Of &of, std::integer_sequence<int, K...>)
   {

@@ -26,10 +26,20 @@ template <int N> Pack polynomial(const double (&c)[N], const Pack &x)
 /// number.
 inline Pack exp(const Pack &x)
 {
-  constexpr double SERIES[] = {1.0,           1.0,           1.0 / 2,         1.0 / 6,
-                               1.0 / 24,      1.0 / 120,     1.0 / 720,       1.0 / 5040,
-                               1.0 / 40320,   1.0 / 362880,  1.0 / 3628800,   1.0 / 39916800,
-                               1.0 / 479001600, 1.0 / 6227020800};
+  constexpr double SERIES[] = {1.0,
+                               1.0,
+                               1.0 / 2,
+                               1.0 / 6,
+                               1.0 / 24,
+                               1.0 / 120,
+                               1.0 / 720,
+                               1.0 / 5040,
+                               1.0 / 40320,
+                               1.0 / 362880,
+                               1.0 / 3628800,
+                               1.0 / 39916800,
+                               1.0 / 479001600,
+                               1.0 / 6227020800};
   constexpr double LEAST = -708.0, MOST = 709.0;
   const Pack within = least(most(x, LEAST), MOST), k = nearest_whole(within * PER_LN2);
   const Pack r = (within - k * LN2) - k * LN2_REST;

@@ -17,47 +17,69 @@ template <int D, class S = double> struct Vec {
 template <int D> inline constexpr int ROTATIONS = D == 2 ? 1 : 3;
 template <int D, class S = double> using Torque = Vec<ROTATIONS<D>, S>;
 
-template <int D, class S> Vec<D, S> &operator+=(Vec<D, S> &a, const Vec<D, S> &b)
+template <int D, class S>
+[[gnu::always_inline]] inline Vec<D, S> &operator+=(Vec<D, S> &a, const Vec<D, S> &b)
 {
   for (int k = 0; k < D; ++k) a[k] += b[k];
   return a;
 }
 
-template <int D, class S> Vec<D, S> &operator-=(Vec<D, S> &a, const Vec<D, S> &b)
+template <int D, class S>
+[[gnu::always_inline]] inline Vec<D, S> &operator-=(Vec<D, S> &a, const Vec<D, S> &b)
 {
   for (int k = 0; k < D; ++k) a[k] -= b[k];
   return a;
 }
 
-template <int D, class S> Vec<D, S> operator+(Vec<D, S> a, const Vec<D, S> &b) { return a += b; }
-template <int D, class S> Vec<D, S> operator-(Vec<D, S> a, const Vec<D, S> &b) { return a -= b; }
+template <int D, class S>
+[[gnu::always_inline]] inline Vec<D, S> operator+(Vec<D, S> a, const Vec<D, S> &b)
+{
+  return a += b;
+}
+template <int D, class S>
+[[gnu::always_inline]] inline Vec<D, S> operator-(Vec<D, S> a, const Vec<D, S> &b)
+{
+  return a -= b;
+}
 
 /// Keeps a parameter out of template argument deduction: `2.0 * v` for a vector of any scalar.
 template <class S> struct Itself {
   using Type = S;
 };
 
-template <int D, class S> Vec<D, S> operator*(const typename Itself<S>::Type &s, Vec<D, S> a)
+template <int D, class S>
+[[gnu::always_inline]] inline Vec<D, S> operator*(const typename Itself<S>::Type &s, Vec<D, S> a)
 {
   for (int k = 0; k < D; ++k) a[k] *= s;
   return a;
 }
 
-template <int D, class S> Vec<D, S> operator-(const Vec<D, S> &a) { return -1.0 * a; }
+template <int D, class S> [[gnu::always_inline]] inline Vec<D, S> operator-(const Vec<D, S> &a)
+{
+  return -1.0 * a;
+}
 
-template <int D, class S> S dot(const Vec<D, S> &a, const Vec<D, S> &b)
+template <int D, class S>
+[[gnu::always_inline]] inline S dot(const Vec<D, S> &a, const Vec<D, S> &b)
 {
   S sum = a[0] * b[0];
   for (int k = 1; k < D; ++k) sum += a[k] * b[k];
   return sum;
 }
 
-template <int D, class S> S norm_sq(const Vec<D, S> &a) { return dot(a, a); }
+template <int D, class S> [[gnu::always_inline]] inline S norm_sq(const Vec<D, S> &a)
+{
+  return dot(a, a);
+}
 
-template <int D, class S> S norm(const Vec<D, S> &a) { return sqrt(norm_sq(a)); }
+template <int D, class S> [[gnu::always_inline]] inline S norm(const Vec<D, S> &a)
+{
+  return sqrt(norm_sq(a));
+}
 
 /// Component by component.
-template <int D, class S> Vec<D, ValueOf<S>> values_of(const Vec<D, S> &a)
+template <int D, class S>
+[[gnu::always_inline]] inline Vec<D, ValueOf<S>> values_of(const Vec<D, S> &a)
 {
   Vec<D, ValueOf<S>> values;
   for (int k = 0; k < D; ++k) values[k] = value_of(a[k]);
@@ -65,7 +87,8 @@ template <int D, class S> Vec<D, ValueOf<S>> values_of(const Vec<D, S> &a)
 }
 
 /// The same in another scalar, as constants.
-template <class S, int D, class V> Vec<D, S> constants_of(const Vec<D, V> &values)
+template <class S, int D, class V>
+[[gnu::always_inline]] inline Vec<D, S> constants_of(const Vec<D, V> &values)
 {
   Vec<D, S> constants;
   for (int k = 0; k < D; ++k) constants[k] = S(values[k]);
@@ -74,19 +97,22 @@ template <class S, int D, class V> Vec<D, S> constants_of(const Vec<D, V> &value
 
 /// `a` where a condition holds, else `b`.
 template <int D, class S>
-Vec<D, S> chosen(const Truth<S> &where, const Vec<D, S> &a, const Vec<D, S> &b)
+[[gnu::always_inline]] inline Vec<D, S> chosen(const Truth<S> &where, const Vec<D, S> &a,
+                                               const Vec<D, S> &b)
 {
   Vec<D, S> c;
   for (int k = 0; k < D; ++k) c[k] = select(where, a[k], b[k]);
   return c;
 }
 
-template <class S> Vec<1, S> cross(const Vec<2, S> &a, const Vec<2, S> &b)
+template <class S>
+[[gnu::always_inline]] inline Vec<1, S> cross(const Vec<2, S> &a, const Vec<2, S> &b)
 {
   return {{a[0] * b[1] - a[1] * b[0]}};
 }
 
-template <class S> Vec<3, S> cross(const Vec<3, S> &a, const Vec<3, S> &b)
+template <class S>
+[[gnu::always_inline]] inline Vec<3, S> cross(const Vec<3, S> &a, const Vec<3, S> &b)
 {
   return {{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}};
 }

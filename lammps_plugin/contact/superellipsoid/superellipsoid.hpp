@@ -310,7 +310,8 @@ struct SuperellipsoidModel {
 };
 
 /// Compiled in packs.cpp for each set.
-template <InstructionSet SET, int D> FindContacts<SuperellipsoidModel, D> find_superellipsoid_contacts;
+template <InstructionSet SET, int D>
+FindContacts<SuperellipsoidModel, D> find_superellipsoid_contacts;
 
 template <int D> struct PacksOf<SuperellipsoidModel, D> {
   static constexpr bool EXIST = true;
@@ -321,8 +322,8 @@ template <int D> struct PacksOf<SuperellipsoidModel, D> {
 
   static FindContacts<SuperellipsoidModel, D> *of(InstructionSet set)
   {
-    return compiled_for(set,
-                        [](auto one) { return &find_superellipsoid_contacts<decltype(one)::value, D>; });
+    return compiled_for(
+        set, [](auto one) { return &find_superellipsoid_contacts<decltype(one)::value, D>; });
   }
 };
 

@@ -2,7 +2,7 @@
 
 The packing fraction grows by small steps, each followed by a minimisation, until the energy per particle is above
 a small tolerance. The jammed packing is then opened until it is as close to the tolerance as asked. Where it falls
-apart on the way, the step from the last unjammed state is halved instead, again and again. Of any shape; needs no
+apart on the way, or its forces are not balanced, the step from the last unjammed state is halved instead, again and again. Of any shape; needs no
 LAMMPS.
 """
 
@@ -96,7 +96,8 @@ class QuasistaticRun:
     openings
         How often the jammed packing was opened to get to the state; 0: it was not.
     halves
-        Whether steps are halved instead: a packing that was opened fell apart, or did not come close.
+        Whether steps are halved instead: a packing that was opened fell apart, was not balanced, or did not
+        come close.
     minimum
         The jammed packing, once it is found.
     parts
@@ -163,9 +164,11 @@ def compress(
         try:
             found = _minimised(landscape, compression, protocol)
         except CrossingError:
-            if compression.openings == 0:
+            if compression.loose is None:
                 raise
-            compression.halves = True  # what was opened was moved too far
+            if compression.openings == 0:  # a step that was too long
+                compression.jammed_phi = compression.phi
+            compression.halves = True
             compression.halve()
             yield compression
             continue
@@ -185,6 +188,9 @@ def compress(
                 f" expected at most {protocol.energy:g}; start at a smaller phi"
             )
             raise ValueError(msg)
+        elif compression.openings > 0 and found.outcome is not Outcome.CONVERGED:
+            compression.jammed_phi, compression.halves = compression.phi, True
+            compression.halve()
         elif per_particle <= protocol.closeness * protocol.energy or _is_narrow(compression):
             compression.minimum, compression.state = found, found.state
         else:

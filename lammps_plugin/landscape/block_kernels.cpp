@@ -1,0 +1,271 @@
+// Compiled once for each set of instructions, JAMSHAPE_SET.
+
+#include "landscape/block_kernels.hpp"
+
+#include <cstring>
+
+#ifndef JAMSHAPE_SET
+#define JAMSHAPE_SET baseline
+#endif
+
+namespace jamshape {
+namespace {
+
+using Two = double __attribute__((vector_size(16)));
+using Four = double __attribute__((vector_size(32)));
+
+/// N numbers in a register; it may hold more, which are whatever comes next.
+template <class V, int N> struct Register {
+  V v;
+
+  void load(const double *from) { std::memcpy(&v, from, sizeof(v)); }
+  void put(double *to) const { std::memcpy(to, &v, sizeof(v)); }
+  void scale(double by) { v *= by; }
+  void add(const Register &a, double by) { v += a.v * by; }
+  void add(const Register &a, const Register &by) { v += a.v * by.v; }
+  void take(const Register &a, double by) { v -= a.v * by; }
+  double sum() const
+  {
+    double all = v[0];
+    for (int k = 1; k < N; ++k) all += v[k];
+    return all;
+  }
+};
+
+struct SixNumbers {
+  Register<Four, 4> a;
+  Register<Two, 2> b;
+
+  void load(const double *from)
+  {
+    a.load(from);
+    b.load(from + 4);
+  }
+  void put(double *to) const
+  {
+    a.put(to);
+    b.put(to + 4);
+  }
+  void scale(double by)
+  {
+    a.scale(by);
+    b.scale(by);
+  }
+  void add(const SixNumbers &c, double by)
+  {
+    a.add(c.a, by);
+    b.add(c.b, by);
+  }
+  void add(const SixNumbers &c, const SixNumbers &by)
+  {
+    a.add(c.a, by.a);
+    b.add(c.b, by.b);
+  }
+  void take(const SixNumbers &c, double by)
+  {
+    a.take(c.a, by);
+    b.take(c.b, by);
+  }
+  double sum() const { return a.sum() + b.sum(); }
+};
+
+/// A column of a block, or a row of a vector.
+template <int BLOCK> struct ColumnOf;
+template <> struct ColumnOf<2> {
+  using Type = Register<Two, 2>;
+};
+template <> struct ColumnOf<3> {
+  using Type = Register<Four, 3>;
+};
+template <> struct ColumnOf<6> {
+  using Type = SixNumbers;
+};
+template <int BLOCK> using Column = typename ColumnOf<BLOCK>::Type;
+
+/// A block.
+template <int BLOCK> struct Square {
+  Column<BLOCK> column[BLOCK];
+
+  void load(const double *block)
+  {
+    for (int c = 0; c < BLOCK; ++c) column[c].load(block + BLOCK * c);
+  }
+  void put(double *block) const
+  {
+    for (int c = 0; c < BLOCK; ++c) column[c].put(block + BLOCK * c);
+  }
+};
+
+// Nothing is read nor written beyond the block.
+template <> void Square<3>::load(const double *block)
+{
+  for (int c = 0; c < 2; ++c) column[c].load(block + 3 * c);
+  column[2].load(block + 5);
+  column[2].v = __builtin_shufflevector(column[2].v, column[2].v, 1, 2, 3, 3);
+}
+template <> void Square<3>::put(double *block) const
+{
+  for (int c = 0; c < 2; ++c) column[c].put(block + 3 * c);
+  std::memcpy(block + 6, &column[2], 3 * sizeof(double));
+}
+
+/// Takes the product of a block and another one, (k, c) of which is part[BLOCK * k + c], off a
+/// third.
+template <int BLOCK> void take_product(const double *a, const double *part, double *from)
+{
+  Square<BLOCK> left, rest;
+  left.load(a);
+  rest.load(from);
+  for (int c = 0; c < BLOCK; ++c) {
+    for (int k = 0; k < BLOCK; ++k) rest.column[c].take(left.column[k], part[BLOCK * k + c]);
+  }
+  rest.put(from);
+}
+
+/// Takes off a column what the eliminated ones on its left add to it (left-looking), but for blocks
+/// that the pattern does not have.
+template <int BLOCK> void gather(const BlockView &at, int j)
+{
+  constexpr int SIZE = BLOCK * BLOCK;
+  for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
+    at.block_of_row[at.row[b]] = b;
+    at.column_of_row[at.row[b]] = j;
+  }
+  for (int k = at.first_left[j]; k < at.first_left[j + 1]; ++k) {
+    const int column = at.left[k].column, own = at.left[k].block;
+    double part[SIZE];
+    for (int c = 0; c < BLOCK; ++c) {
+      const double pivot = at.diagonal[SIZE * column + (BLOCK + 1) * c];
+      for (int r = 0; r < BLOCK; ++r) {
+        part[BLOCK * c + r] = at.below[SIZE * own + BLOCK * c + r] * pivot;
+      }
+    }
+    take_product<BLOCK>(at.below + SIZE * own, part, at.diagonal + SIZE * j);
+    for (int b = own + 1; b < at.first[column + 1]; ++b) {
+      const int r = at.row[b];
+      if (at.column_of_row[r] != j) continue;
+      take_product<BLOCK>(at.below + SIZE * b, part, at.below + SIZE * at.block_of_row[r]);
+    }
+  }
+}
+
+/// Splits the diagonal block into l d l^T, and divides those below it by d l^T.
+template <int BLOCK> bool eliminate(const BlockView &at, int j)
+{
+  constexpr int SIZE = BLOCK * BLOCK;
+  double *const block = at.diagonal + SIZE * j, *const inverse = at.inverse_pivots + BLOCK * j;
+  const auto l = [&](int r, int c) -> double & { return block[BLOCK * c + r]; };
+  for (int k = 0; k < BLOCK; ++k) {
+    if (!(l(k, k) > 0.0)) return false;
+    inverse[k] = 1.0 / l(k, k);
+    for (int c = k + 1; c < BLOCK; ++c) {
+      for (int r = c; r < BLOCK; ++r) l(r, c) -= l(r, k) * inverse[k] * l(c, k);
+    }
+    for (int r = k + 1; r < BLOCK; ++r) l(r, k) *= inverse[k];
+  }
+  for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
+    Square<BLOCK> below;
+    below.load(at.below + SIZE * b);
+    for (int c = 1; c < BLOCK; ++c) {
+      for (int k = 0; k < c; ++k) below.column[c].take(below.column[k], l(c, k));
+    }
+    for (int c = 0; c < BLOCK; ++c) below.column[c].scale(inverse[c]);
+    below.put(at.below + SIZE * b);
+  }
+  return true;
+}
+
+template <int BLOCK> bool factorise(const BlockView &at)
+{
+  for (int j = 0; j < at.n; ++j) at.column_of_row[j] = -1;
+  for (int j = 0; j < at.n; ++j) {
+    gather<BLOCK>(at, j);
+    if (!eliminate<BLOCK>(at, j)) return false;
+  }
+  return true;
+}
+
+template <int BLOCK> void substitute_forward(const BlockView &at, double *x)
+{
+  constexpr int SIZE = BLOCK * BLOCK, STRIDE = stride_of(BLOCK);
+  for (int j = 0; j < at.n; ++j) {
+    double *const own = x + STRIDE * j;
+    const double *const l = at.diagonal + SIZE * j;
+    for (int c = 0; c < BLOCK; ++c) {
+      for (int r = c + 1; r < BLOCK; ++r) own[r] -= l[BLOCK * c + r] * own[c];
+    }
+    for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
+      Square<BLOCK> below;
+      Column<BLOCK> rest;
+      below.load(at.below + SIZE * b);
+      rest.load(x + STRIDE * at.row[b]);
+      for (int k = 0; k < BLOCK; ++k) rest.take(below.column[k], own[k]);
+      rest.put(x + STRIDE * at.row[b]);
+    }
+  }
+}
+
+template <int BLOCK> void substitute_back(const BlockView &at, double *x)
+{
+  constexpr int SIZE = BLOCK * BLOCK, STRIDE = stride_of(BLOCK);
+  for (int j = at.n - 1; j >= 0; --j) {
+    double *const own = x + STRIDE * j;
+    const double *const l = at.diagonal + SIZE * j;
+    Square<BLOCK> sums{};
+    for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
+      Square<BLOCK> below;
+      Column<BLOCK> other;
+      below.load(at.below + SIZE * b);
+      other.load(x + STRIDE * at.row[b]);
+      for (int c = 0; c < BLOCK; ++c) sums.column[c].add(below.column[c], other);
+    }
+    for (int c = BLOCK - 1; c >= 0; --c) {
+      own[c] = own[c] * at.inverse_pivots[BLOCK * j + c] - sums.column[c].sum();
+      for (int r = c + 1; r < BLOCK; ++r) own[c] -= l[BLOCK * c + r] * own[r];
+    }
+  }
+}
+
+template <int BLOCK> void solve(const BlockView &factors, double *x)
+{
+  substitute_forward<BLOCK>(factors, x);
+  substitute_back<BLOCK>(factors, x);
+}
+
+template <int BLOCK> void multiply(const BlockView &at, const double *x, double *y)
+{
+  constexpr int SIZE = BLOCK * BLOCK, STRIDE = stride_of(BLOCK);
+  for (int j = 0; j < at.n; ++j) {
+    const double *const own = x + STRIDE * j;
+    Column<BLOCK> other, to;
+    Square<BLOCK> block, sums{};
+    block.load(at.diagonal + SIZE * j);
+    to.load(y + STRIDE * j);
+    for (int k = 0; k < BLOCK; ++k) to.add(block.column[k], own[k]);
+    to.put(y + STRIDE * j);
+    for (int b = at.first[j]; b < at.first[j + 1]; ++b) {
+      block.load(at.below + SIZE * b);
+      other.load(x + STRIDE * at.row[b]);
+      to.load(y + STRIDE * at.row[b]);
+      for (int k = 0; k < BLOCK; ++k) {
+        to.add(block.column[k], own[k]);
+        sums.column[k].add(block.column[k], other);
+      }
+      to.put(y + STRIDE * at.row[b]);
+    }
+    for (int c = 0; c < BLOCK; ++c) y[STRIDE * j + c] += sums.column[c].sum();
+  }
+}
+
+}  // namespace
+
+template <InstructionSet SET, int BLOCK> BlockKernels block_kernels_of()
+{
+  return {&factorise<BLOCK>, &solve<BLOCK>, &multiply<BLOCK>};
+}
+
+template BlockKernels block_kernels_of<InstructionSet::JAMSHAPE_SET, 2>();
+template BlockKernels block_kernels_of<InstructionSet::JAMSHAPE_SET, 3>();
+template BlockKernels block_kernels_of<InstructionSet::JAMSHAPE_SET, 6>();
+
+}  // namespace jamshape
