@@ -155,9 +155,9 @@ class Descent {
   static constexpr int MOST_SADDLES = 5;
   static constexpr double CURVED = 1e-3, OFF_SADDLE = 0.3;
 
-  /// It begins with factors of a Hessian with such a shift, over its largest diagonal element, or
-  /// more; they are made anew after so many steps.
-  static constexpr double SOFT = 0.03, STIFFEN = 3.0;
+  /// It begins with factors of a Hessian with such a shift, over the largest diagonal element of
+  /// displacements or of rotations, or more; they are made anew after so many steps.
+  static constexpr double SOFT = 0.1, STIFFEN = 3.0;
   static constexpr int REFRESH = 30;
 
   /// Doubles are given up where rounding leaves more than this part of what there is, and of what
@@ -266,11 +266,14 @@ class Descent {
   {
     const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
     about.differentiate({origin.data(), 0.0});
-    const double scale = about.diagonal().cwiseAbs().maxCoeff();
-    double shift = SOFT * (scale > 0.0 ? scale : 1.0);
-    while (!(near = about.factors(Vector::Constant(origin.size(), shift)))) {
+    Vector shift = SOFT * about.largest_of_kind();
+    // What incomplete factors leave out is as large for all.
+    if (!about.has_complete_factors()) shift.setConstant(shift.maxCoeff());
+    const double least = LEAST_SHIFT * shift.maxCoeff();
+    shift = shift.cwiseMax(least > 0.0 ? least : 1.0);
+    while (!(near = about.factors(shift))) {
       shift *= STIFFEN;
-      if (!std::isfinite(shift)) throw std::runtime_error("The Hessian has no factors.");
+      if (!shift.allFinite()) throw std::runtime_error("The Hessian has no factors.");
     }
     ++preconditioned;
   }

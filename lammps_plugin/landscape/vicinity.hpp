@@ -128,6 +128,9 @@ class Vicinity {
   virtual Eigen::VectorXd diagonal() const = 0;
   /// The Hessian there times a vector (n,).
   virtual Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const = 0;
+  /// (n,) for displacements the largest of their diagonal elements, for rotations that of theirs:
+  /// what is nearly round turns far more easily than it moves.
+  virtual Eigen::VectorXd largest_of_kind() const = 0;
   /// Whether `factors` are those of the Hessian, or of a matrix nearby.
   virtual bool has_complete_factors() const = 0;
   /// Factors of the Hessian there plus a diagonal (n,); nothing where a pivot is not positive.
@@ -221,11 +224,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
 
   Eigen::VectorXd stretch(double strain) const override
   {
-    Eigen::VectorXd found = Eigen::VectorXd::Ones(n());
-    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
-      const std::int64_t c = coordinates.column[k];
-      if (c >= 0 && k % BLOCK < D) found[c] = 1.0 + strain;
-    }
+    Eigen::VectorXd found(n());
+    each_coordinate([&](std::int64_t c, bool is_turn) { found[c] = is_turn ? 1.0 : 1.0 + strain; });
     return found;
   }
 
@@ -282,6 +282,19 @@ template <class Model, int D> class VicinityOf : public Vicinity {
 
   const Eigen::VectorXd &coupling() const override { return pulled; }
   Eigen::VectorXd diagonal() const override { return hessian->diagonal(); }
+
+  Eigen::VectorXd largest_of_kind() const override
+  {
+    const Eigen::VectorXd own = diagonal();
+    double largest[2] = {0.0, 0.0};
+    each_coordinate([&](std::int64_t c, bool is_turn) {
+      largest[is_turn] = std::max(largest[is_turn], std::abs(own[c]));
+    });
+    Eigen::VectorXd found(own.size());
+    each_coordinate([&](std::int64_t c, bool is_turn) { found[c] = largest[is_turn]; });
+    return found;
+  }
+
   Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const override
   {
     return hessian->times(vector);
@@ -499,6 +512,13 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     measure(pairs);
     starts.assign(pairs.list().n, {});
     hessian = nullptr;
+  }
+
+  template <class Then> void each_coordinate(const Then &then) const
+  {
+    for (std::size_t k = 0; k < coordinates.column.size(); ++k) {
+      if (coordinates.column[k] >= 0) then(coordinates.column[k], k % BLOCK >= D);
+    }
   }
 
   double component(const Displacement &at, std::size_t i, int k) const

@@ -112,7 +112,7 @@ def test_low_band_at_alpha_4_is_single_rods_that_slide(packings):
 def test_modes_of_extremes(alpha, u0, tmp_path):
     phi = 0.4 if alpha < 10 else 0.15
     sample = Recipe(bidisperse(alpha), n=32, phi_start=phi)
-    sample = replace(sample, approach=Approach(kappa=1e-5), target=Target(u0=u0))
+    sample = replace(sample, way=Dynamics(Approach(kappa=1e-5)), target=Target(u0=u0))
     for _ in make(sample, tmp_path / "packing.h5"):
         pass
     matrix, found = analysed(read_packing(tmp_path / "packing.h5"))

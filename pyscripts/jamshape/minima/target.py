@@ -374,8 +374,10 @@ def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
     That is so where nothing is left without what lies along modes softer than a small shift, once all
     stiffer ones are relaxed.
     """
-    if at.residual.largest <= target.tolerance or at.residual.largest > _SLIDING:
+    if at.residual.largest <= target.tolerance:
         return at
+    if at.residual.largest > _SLIDING:
+        return replace(at, outcome=Outcome.STALLED)  # of a step on the way it may have been enough
     vicinity = Vicinity(landscape, at.state)
     newton = vicinity.newton(_SOFT * landscape.k_e / landscape.length**2)
     evaluation = at.evaluation
