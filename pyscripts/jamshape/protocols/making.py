@@ -119,8 +119,9 @@ class SearchFile:
         write_states(self.path, states, landscape.particles, attributes)
 
     def forget(self) -> None:
-        """Remove it."""
+        """Remove it, and what a process that was killed meanwhile has left of it."""
         remove_run(self.path)
+        remove_leftovers(self.path)
 
 
 def lead(
