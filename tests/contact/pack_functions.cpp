@@ -48,7 +48,8 @@ int main()
   const auto log_ = [](const Pack &x) { return log(x); };
   const auto log1p_ = [](const Pack &x) { return log1p(x); };
   std::printf("{\"exp\": %.3g, ", largest_error(exp_, expl, [] { return between(-708, 709); }));
-  std::printf("\"exp of little\": %.3g, ", largest_error(exp_, expl, [] { return between(-1, 1); }));
+  std::printf("\"exp of little\": %.3g, ",
+              largest_error(exp_, expl, [] { return between(-1, 1); }));
   const auto any_size = [] { return std::exp2(between(-1022, 1023)); };
   std::printf("\"log\": %.3g, ", largest_error(log_, logl, any_size));
   std::printf("\"log near 1\": %.3g, ", largest_error(log_, logl, [] { return between(0.5, 2); }));
@@ -56,10 +57,10 @@ int main()
   const auto little = [] { return std::copysign(std::exp2(between(-300, -1)), between(-1, 1)); };
   std::printf("\"log1p of little\": %.3g, ", largest_error(log1p_, log1pl, little));
   for (const double power : {1.0 / 3, 0.7, 2.2}) {
-    std::printf(
-        "\"pow %.1f\": %.3g, ", power,
-        largest_error([=](const Pack &x) { return pow(x, power); },
-                      [=](long double x) { return powl(x, power); }, [] { return between(0.01, 3); }));
+    std::printf("\"pow %.1f\": %.3g, ", power,
+                largest_error([=](const Pack &x) { return pow(x, power); },
+                              [=](long double x) { return powl(x, power); },
+                              [] { return between(0.01, 3); }));
   }
   const double most = std::numeric_limits<double>::infinity(), none = std::nan("");
   std::printf("\"ends\": [%d, %d, %d, %d, %d, %d, %d]}\n", number_of(exp(Pack(-1e9))) == 0.0,

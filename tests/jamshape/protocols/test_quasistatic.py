@@ -95,7 +95,7 @@ def test_going_on_from_between_two_steps_gives_the_same_to_the_bit(ended):
     np.testing.assert_array_equal(fresh.state.orientation, expected.state.orientation)
 
 
-ADAPTIVE = Quasistatic(step=2e-3, energy=1e-8, coarse=2e-2)
+ADAPTIVE = Quasistatic(step=2e-3, energy=1e-8, coarse=4e-2)
 
 
 @pytest.fixture(scope="module")
