@@ -66,8 +66,8 @@ def test_forces_do_not_depend_on_the_instructions(name, sides, ranks, tmp_path, 
 
 
 def test_a_set_that_this_machine_has_not_is_refused(tmp_path, monkeypatch):
+    text = scene(dense(), tmp_path / "s.data")  # in this process, which LAMMPS would end
     monkeypatch.setenv("JAMSHAPE_SIMD", "mmx")
-    text = scene(dense(), tmp_path / "s.data")
     done = run_lmp(f"{load_plugin()}\n{text}\nrun 0", tmp_path)
     assert done.returncode != 0
     assert "found JAMSHAPE_SIMD=mmx, expected no value or scalar" in done.stdout
