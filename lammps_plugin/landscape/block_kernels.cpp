@@ -4,10 +4,6 @@
 
 #include <cstring>
 
-#ifndef JAMSHAPE_SET
-#define JAMSHAPE_SET baseline
-#endif
-
 namespace jamshape {
 namespace {
 

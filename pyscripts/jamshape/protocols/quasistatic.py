@@ -2,8 +2,8 @@
 
 The packing fraction grows by small steps, each followed by a minimisation, until the energy per particle is above
 a small tolerance. The jammed packing is then opened until it is as close to the tolerance as asked. Where it falls
-apart on the way, or its forces are not balanced, the step from the last unjammed state is halved instead, again and again. Of any shape; needs no
-LAMMPS.
+apart on the way, or its forces are not balanced, the step from the last unjammed state is halved instead, again and
+again. Of any shape; needs no LAMMPS.
 """
 
 from __future__ import annotations
