@@ -2,6 +2,7 @@
 
 // The one place that knows what differs between LAMMPS versions and what their installed headers
 // leave out: non-virtual member functions that liblammps exports and no installed header declares.
+// Where a version names something otherwise, the compiler is asked which name there is.
 
 #include "lammps.h"
 
@@ -31,3 +32,44 @@ class Min {
 }  // namespace LAMMPS_NS
 
 extern "C" int lammps_version(void *handle);
+
+namespace jamshape::compat {
+
+/// Sends n numbers a particle of a fix to ghosts: `forward_comm_fix` until 2021.
+template <class Comm, class Fix>
+auto forward(Comm *comm, Fix *fix, int n) -> decltype(comm->forward_comm(fix, n))
+{
+  comm->forward_comm(fix, n);
+}
+template <class Comm, class Fix>
+auto forward(Comm *comm, Fix *fix, int n) -> decltype(comm->forward_comm_fix(fix, n))
+{
+  comm->forward_comm_fix(fix, n);
+}
+
+/// Whether any fix changes forces: the count is public until 2021, later a flag beside it is.
+template <class Modify>
+auto has_post_force(const Modify *modify) -> decltype(modify->n_post_force_any != 0)
+{
+  return modify->n_post_force_any != 0;
+}
+template <class Modify>
+auto has_post_force(const Modify *modify) -> decltype(modify->n_post_force != 0)
+{
+  return modify->n_post_force != 0;
+}
+
+}  // namespace jamshape::compat
+
+/// What the PLUGIN package's header, which is not installed, says of plugins for its `plugin load`.
+extern "C" {
+struct lammpsplugin_t {
+  const char *version, *style, *name, *info, *author;
+  union {
+    void *(*v1)(void *);
+    void *(*v2)(void *, int, char **);
+  } creator;
+  void *handle;
+};
+typedef void (*lammpsplugin_regfunc)(lammpsplugin_t *, void *);
+}

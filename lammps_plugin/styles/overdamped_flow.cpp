@@ -4,6 +4,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "compat.h"
 #include "domain.h"
 #include "error.h"
 #include "force.h"
@@ -357,7 +358,7 @@ void OverdampedFlow::evaluate_forces()
   if (modify->n_pre_force) modify->pre_force(no_virial);
   force->pair->compute(no_energy, no_virial);
   if (force->newton) comm->reverse_comm();
-  if (modify->n_post_force) modify->post_force(no_virial);
+  if (compat::has_post_force(modify)) modify->post_force(no_virial);
   ++evaluations;
 }
 

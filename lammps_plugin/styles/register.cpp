@@ -1,5 +1,6 @@
 // The plugin's table of contents: one line a style, and how LAMMPS gets to know them.
 
+#include "comm.h"
 #include "compat.h"
 #include "compute_contact_local.h"
 #include "compute_packing.h"
@@ -11,10 +12,20 @@
 #include "pair_spherocylinder_harmonic.h"
 #include "pair_superellipsoid_harmonic.h"
 
+#include <mpi.h>
 #include <string>
 
 #define JAMSHAPE_QUOTED(x) #x
 #define JAMSHAPE_TEXT(x) JAMSHAPE_QUOTED(x)
+
+// Handles of one MPI library mean nothing to another, though its functions have the same names.
+#if defined(OPEN_MPI)
+#define JAMSHAPE_MPI "Open MPI"
+#elif defined(MPICH_VERSION)
+#define JAMSHAPE_MPI "MPICH"
+#else
+#define JAMSHAPE_MPI ""
+#endif
 
 namespace {
 
@@ -30,15 +41,108 @@ template <class T> LAMMPS_NS::Compute *compute(LAMMPS *lmp, int narg, char **arg
   return new T(lmp, narg, arg);
 }
 
-void add_styles(LAMMPS *lmp)
+/// Gives each style to `add`, which knows pairs, fixes and computes apart.
+template <class Add> void for_all_styles(Add &&add)
 {
   using namespace jamshape;
-  (*lmp->force->pair_map)["dimer/harmonic"] = pair<PairDimerHarmonic>;
-  (*lmp->force->pair_map)["spherocylinder/harmonic"] = pair<PairSpherocylinderHarmonic>;
-  (*lmp->force->pair_map)["superellipsoid/harmonic"] = pair<PairSuperellipsoidHarmonic>;
-  (*lmp->modify->fix_map)["overdamped/affine"] = fix<FixOverdampedAffine>;
-  (*lmp->modify->compute_map)["contact/local"] = compute<ComputeContactLocal>;
-  (*lmp->modify->compute_map)["packing"] = compute<ComputePacking>;
+  add("dimer/harmonic", pair<PairDimerHarmonic>);
+  add("spherocylinder/harmonic", pair<PairSpherocylinderHarmonic>);
+  add("superellipsoid/harmonic", pair<PairSuperellipsoidHarmonic>);
+  add("overdamped/affine", fix<FixOverdampedAffine>);
+  add("contact/local", compute<ComputeContactLocal>);
+  add("packing", compute<ComputePacking>);
+}
+
+/// Into the tables of LAMMPS.
+struct AddToMaps {
+  LAMMPS *lmp;
+
+  void operator()(const char *name, LAMMPS_NS::Pair *(*creator)(LAMMPS *) ) const
+  {
+    (*lmp->force->pair_map)[name] = creator;
+  }
+  void operator()(const char *name, LAMMPS_NS::Fix *(*creator)(LAMMPS *, int, char **) ) const
+  {
+    (*lmp->modify->fix_map)[name] = creator;
+  }
+  void operator()(const char *name, LAMMPS_NS::Compute *(*creator)(LAMMPS *, int, char **) ) const
+  {
+    (*lmp->modify->compute_map)[name] = creator;
+  }
+};
+
+/// By the function of the PLUGIN package, which then lists them and can take them away again.
+struct AddAsPlugins {
+  LAMMPS *lmp;
+  void *handle;
+  lammpsplugin_regfunc add;
+
+  void operator()(const char *name, LAMMPS_NS::Pair *(*creator)(LAMMPS *) ) const
+  {
+    lammpsplugin_t one = named("pair", name);
+    one.creator.v1 = reinterpret_cast<void *(*)(void *)>(creator);
+    add(&one, lmp);
+  }
+  void operator()(const char *name, LAMMPS_NS::Fix *(*creator)(LAMMPS *, int, char **) ) const
+  {
+    add_with_arguments("fix", name, creator);
+  }
+  void operator()(const char *name, LAMMPS_NS::Compute *(*creator)(LAMMPS *, int, char **) ) const
+  {
+    add_with_arguments("compute", name, creator);
+  }
+
+ private:
+  lammpsplugin_t named(const char *kind, const char *name) const
+  {
+    // That it was built for this version was seen to.
+    return {lmp->version, kind, name, name, "jamshape", {}, handle};
+  }
+  template <class Creator>
+  void add_with_arguments(const char *kind, const char *name, Creator *creator) const
+  {
+    lammpsplugin_t one = named(kind, name);
+    one.creator.v2 = reinterpret_cast<void *(*)(void *, int, char **)>(creator);
+    add(&one, lmp);
+  }
+};
+
+}  // namespace
+
+#pragma GCC visibility push(default)
+extern "C" {
+
+/// The LAMMPS version that this binary was compiled for, as an integer such as 20210929, and the
+/// MPI library. (Variables, so that a test can pretend to be another build.)
+int jamshape_built_for = JAMSHAPE_LAMMPS_VERSION;
+const char *jamshape_built_with = JAMSHAPE_MPI;
+
+/// The same as text that can be found in the file, which nothing but LAMMPS can load.
+extern const char jamshape_label[];
+const char jamshape_label[] = "jamshape plugin for LAMMPS " JAMSHAPE_TEXT(JAMSHAPE_LAMMPS_VERSION);
+}
+#pragma GCC visibility pop
+
+namespace {
+
+/// One sentence if this is another LAMMPS than the one compiled for, whose objects are laid out
+/// differently, or one with another MPI library; else nothing.
+std::string what_differs(void *handle)
+{
+  const int found = lammps_version(handle);
+  if (found != jamshape_built_for)
+    return "jamshape found LAMMPS version " + std::to_string(found) + ", expected " +
+           std::to_string(jamshape_built_for) +
+           " for which this plugin was built: build jamshape again with this LAMMPS.";
+  char text[MPI_MAX_LIBRARY_VERSION_STRING];
+  int length = 0;
+  MPI_Get_library_version(text, &length);
+  const std::string library(text, length);
+  if (library.find(jamshape_built_with) == std::string::npos)
+    return "jamshape found the MPI library " + library.substr(0, library.find_first_of(",\n\t")) +
+           ", expected " + jamshape_built_with +
+           " with which this plugin was built: build jamshape again with this LAMMPS.";
+  return "";
 }
 
 }  // namespace
@@ -46,27 +150,36 @@ void add_styles(LAMMPS *lmp)
 #pragma GCC visibility push(default)
 extern "C" {
 
-/// The LAMMPS version that this binary was compiled for, as an integer such as 20210929. (A
-/// variable, so that a test can pretend to be another build.)
-int jamshape_built_for = JAMSHAPE_LAMMPS_VERSION;
+/// One sentence if the plugin was not built for this LAMMPS, else nothing: for those that LAMMPS's
+/// own way to stop would end. Valid until asked again.
+const char *jamshape_differs(void *handle)
+{
+  static std::string sentence;
+  sentence = what_differs(handle);
+  return sentence.c_str();
+}
 
-/// The same as text that can be found in the file, which nothing but LAMMPS can load.
-extern const char jamshape_label[];
-const char jamshape_label[] = "jamshape plugin for LAMMPS " JAMSHAPE_TEXT(JAMSHAPE_LAMMPS_VERSION);
-
-/// Adds the styles of this plugin to a LAMMPS instance; stops it with one sentence when it is of
-/// another version than the one compiled for, whose objects are laid out differently.
+/// Adds the styles of this plugin to a LAMMPS instance; stops it with one sentence when it is
+/// another one than it was built for.
 void jamshape_register(void *handle)
 {
   auto *lmp = static_cast<LAMMPS *>(handle);
-  const int found = lammps_version(handle);
-  if (found != jamshape_built_for) {
-    lmp->error->all(FLERR,
-                    "jamshape found LAMMPS version " + std::to_string(found) + ", expected " +
-                        std::to_string(jamshape_built_for) +
-                        " for which this plugin was built: build jamshape again with this LAMMPS.");
+  const std::string wrong = what_differs(handle);
+  if (!wrong.empty()) lmp->error->all(FLERR, wrong);
+  for_all_styles(AddToMaps{lmp});
+}
+
+/// What `plugin load` and LAMMPS_PLUGIN_PATH call. With another LAMMPS it only says so: one that
+/// finds plugins by itself shall go on without.
+void lammpsplugin_init(void *handle, void *library, void *add)
+{
+  auto *lmp = static_cast<LAMMPS *>(handle);
+  const std::string wrong = what_differs(handle);
+  if (!wrong.empty()) {
+    if (lmp->comm->me == 0) lmp->error->warning(FLERR, wrong);
+    return;
   }
-  add_styles(lmp);
+  for_all_styles(AddAsPlugins{lmp, library, reinterpret_cast<lammpsplugin_regfunc>(add)});
 }
 
 /// What the scene at hand is spared, as in the log; empty before the first evaluation. Valid until

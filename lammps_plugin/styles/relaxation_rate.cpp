@@ -2,6 +2,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "compat.h"
 #include "domain.h"
 #include "force.h"
 
@@ -229,7 +230,7 @@ template <int D> void RelaxationRate::add_curvatures_times(const Curvatures &of)
 /// To ghosts, whose forces are cleared: what follows adds to them.
 void RelaxationRate::send_direction()
 {
-  comm->forward_comm_fix(fix, n_rates);
+  compat::forward(comm, fix, n_rates);
   if (!force->newton) return;
   for (double **const of : {atom->f, atom->torque}) {
     if (atom->nghost > 0) std::memset(of[atom->nlocal], 0, 3 * atom->nghost * sizeof(double));

