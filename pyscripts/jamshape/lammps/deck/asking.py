@@ -1,0 +1,68 @@
+"""The deck that asks for something, and the process of LAMMPS that runs it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+
+class Ended(Exception):  # noqa: N818 - it is not always an error
+    """A deck cannot go on; the text is the sentence that it ends with."""
+
+
+class Refused(Ended):
+    """It ends before anything has run, and leaves nothing where it was started."""
+
+
+@dataclass
+class Deck:
+    """A deck, on standard input and output of this process; LAMMPS itself is at the other end.
+
+    An order is one line: a sign that no complaint of Python begins with, a verb, and texts. These go as x and their
+    bytes in hex, so that no sign in them means anything on the way.
+    """
+
+    process: int
+    """ID of the process of rank 0."""
+    atoms: int
+    step: int
+
+    def order(self, verb: str, *texts: str) -> None:
+        """Have all ranks do something: print TEXT, set NAME TEXT (a variable), enter FOLDER, end SENTENCE, done."""
+        words = [f"@{verb}", *(f"x{os.fsencode(text).hex()}" for text in texts)]
+        sys.stdout.write(" ".join(words) + "\n")
+        sys.stdout.flush()
+
+    def ask(self, name: str) -> str | None:
+        """Value of a variable of the deck; None where there is none of this name."""
+        self.order("ask", name)
+        answer = sys.stdin.readline().strip()
+        return os.fsdecode(bytes.fromhex(answer[1:])) if answer.startswith("x") else None
+
+    def arguments(self) -> list[str]:
+        """Words of the command line of LAMMPS."""
+        words = Path("/proc", str(self.process), "cmdline").read_bytes()
+        return os.fsdecode(words).split("\0")
+
+    def open_files(self) -> Iterator[Path]:
+        """Give the files that LAMMPS reads, those opened last first; the deck is one of them."""
+        place = Path("/proc", str(self.process))
+        for number in sorted(map(int, os.listdir(place / "fd")), reverse=True):
+            path = (place / "fd" / str(number)).resolve()
+            if path.is_file() and not _is_written(place / "fdinfo" / str(number)):
+                yield path
+
+    def forget_log(self) -> None:
+        """Take away LAMMPS's first log, which it began where it was started."""
+        log = Path("log.lammps").resolve()
+        place = Path("/proc", str(self.process), "fd")
+        if any((place / number).resolve() == log for number in os.listdir(place)):
+            log.unlink(missing_ok=True)
+
+
+def _is_written(description: Path) -> bool:
+    flags = next(line for line in description.read_text().splitlines() if line.startswith("flags:"))
+    return int(flags.split()[1], 8) & os.O_ACCMODE != os.O_RDONLY
