@@ -50,16 +50,16 @@ class Deck:
     def open_files(self) -> Iterator[Path]:
         """Give the files that LAMMPS reads, those opened last first; the deck is one of them."""
         place = Path("/proc", str(self.process))
-        for number in sorted(map(int, os.listdir(place / "fd")), reverse=True):
-            path = (place / "fd" / str(number)).resolve()
-            if path.is_file() and not _is_written(place / "fdinfo" / str(number)):
+        for link in sorted((place / "fd").iterdir(), key=lambda link: -int(link.name)):
+            path = link.resolve()
+            if path.is_file() and not _is_written(place / "fdinfo" / link.name):
                 yield path
 
     def forget_log(self) -> None:
         """Take away LAMMPS's first log, which it began where it was started."""
         log = Path("log.lammps").resolve()
-        place = Path("/proc", str(self.process), "fd")
-        if any((place / number).resolve() == log for number in os.listdir(place)):
+        links = Path("/proc", str(self.process), "fd").iterdir()
+        if any(link.resolve() == log for link in links):
             log.unlink(missing_ok=True)
 
 

@@ -76,7 +76,9 @@ def initial(_: Deck, options: list[str]) -> None:
     command = [sys.executable, "-P", "-m", "jamshape", "initial", *options, "--out", "initial.data"]
     done = subprocess.run(command, text=True, capture_output=True, check=False)
     if done.returncode:
-        said = done.stderr.strip().splitlines() or [f"{sys.executable} ended with {done.returncode}"]
+        said = done.stderr.strip().splitlines() or [
+            f"{sys.executable} ended with {done.returncode}"
+        ]
         msg = f"Found no initial state: {said[-1]}."
         raise Refused(msg)
 

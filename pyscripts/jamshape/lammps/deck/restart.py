@@ -64,7 +64,7 @@ def mend(deck: Deck, _: list[str]) -> None:
 
 
 def evaluations(log: Path, step: int) -> int:
-    """Evaluations up to a step, the most of all rows up to it: the process that asks has a row there, too."""
+    """Find the evaluations up to a step, the most of all rows up to it: the process that asks has a row there, too."""
     names: list[str] = []
     found = 0
     with log.open(errors="replace") as lines:
@@ -72,7 +72,9 @@ def evaluations(log: Path, step: int) -> int:
             words = line.split()
             if words[:1] == ["Step"]:
                 names = words if "v_forces" in words else []
-            elif names and len(words) == len(names) and words[0].isdigit() and int(words[0]) <= step:
+            elif (
+                names and len(words) == len(names) and words[0].isdigit() and int(words[0]) <= step
+            ):
                 number = words[names.index("v_forces")]
                 found = max(found, int(number) if number.isdigit() else 0)
     return found

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from itertools import pairwise
 
 from jamshape.lammps.deck.asking import Deck, Refused
 
@@ -65,11 +66,11 @@ def require_settings(deck: Deck) -> dict[str, str]:
 
 
 def known_settings(text: str) -> list[str]:
-    """Names that a deck lists at its top or asks for.
+    r"""Names that a deck lists at its top or asks for.
 
     Examples
     --------
-    >>> known_settings("variable kappa index 1e-4\\nvariable have equal is_defined(variable,data)")
+    >>> known_settings("variable kappa index 1e-4\nvariable have equal is_defined(variable,data)")
     ['kappa', 'data']
     """
     listed = re.findall(r"^variable +([^ ]+) +index", text, re.MULTILINE)
@@ -79,9 +80,7 @@ def known_settings(text: str) -> list[str]:
 
 def _wrong_name(deck: Deck) -> str | None:
     words = deck.arguments()
-    given = [
-        name for option, name in zip(words, words[1:], strict=False) if option in {"-var", "-v"}
-    ]
+    given = [name for option, name in pairwise(words) if option in {"-var", "-v"}]
     small = (path for path in deck.open_files() if path.stat().st_size < _LARGEST_DECK)
     texts = [path.read_text(errors="replace") for path in small] if given else []
     known = known_settings("\n".join(text for text in texts if "variable out " in text))
@@ -124,9 +123,7 @@ def wrong_run(value: dict[str, str]) -> str | None:
     """Say what is wrong with a compression that does not compress, or does not end."""
     if not {"phi_start", "phi_end", "kappa", "dt"} <= value.keys():
         return None
-    start, end, kappa, dt = (
-        float(value[name]) for name in ("phi_start", "phi_end", "kappa", "dt")
-    )
+    start, end, kappa, dt = (float(value[name]) for name in ("phi_start", "phi_end", "kappa", "dt"))
     if not start < end:
         return f"phi_start is {start:g} and phi_end {end:g}, expected an end above the start."
     if math.log(end / start) > _MOST_STEPS * 2 * kappa * dt:

@@ -28,7 +28,7 @@ def is_whole_data(path: Path) -> bool:
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
         counted = re.search(rb"^ *([0-9]+) ellipsoids$", text[:4096], re.MULTILINE)
         last = text.rfind(b"Ellipsoids")
-        return bool(counted) and last > 0 and text[last:].count(b"\n") == int(counted[1]) + 2
+        return counted is not None and last > 0 and text[last:].count(b"\n") == int(counted[1]) + 2
 
 
 def cut_dump(path: Path, step: int = _EVER) -> bool:
