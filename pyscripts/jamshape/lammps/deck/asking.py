@@ -66,3 +66,11 @@ class Deck:
 def _is_written(description: Path) -> bool:
     flags = next(line for line in description.read_text().splitlines() if line.startswith("flags:"))
     return int(flags.split()[1], 8) & os.O_ACCMODE != os.O_RDONLY
+
+
+def quoted(path: str) -> str:
+    """Write a path as the value of a variable that stands where LAMMPS reads a file, with spaces or without.
+
+    The quotes have to be in the variable: around it they would keep LAMMPS from putting it in.
+    """
+    return f'"{path}"'

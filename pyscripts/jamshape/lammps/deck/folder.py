@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from jamshape.lammps.deck.asking import Deck, Ended, Refused
+from jamshape.lammps.deck.asking import Deck, Ended, Refused, quoted
 from jamshape.lammps.deck.settings import require_settings
 from jamshape.lammps.deck.whole import cut_dump, is_whole_data, is_whole_restart
 
@@ -21,7 +21,7 @@ _WRITTEN = ("initial.data", "final.restart", "final.data")
 def enter(deck: Deck, _: list[str]) -> None:
     """Refuse settings that are none, and go to the folder that the variable `out` names, which is made if need be.
 
-    Before, `data` and `restart` become full paths. Nothing stays behind where LAMMPS was started, its first log included.
+    Before, `data` and `restart` become full paths, in quotes for LAMMPS. Nothing stays behind where LAMMPS was started, its first log included.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def enter(deck: Deck, _: list[str]) -> None:
         deck.forget_log()
     for name in ("data", "restart"):
         if name in value:
-            deck.order("set", name, _full_path(name, value[name]))
+            deck.order("set", name, quoted(_full_path(name, value[name])))
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name in _WRITTEN:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jamshape.lammps.deck.asking import Deck, Refused
+from jamshape.lammps.deck.asking import Deck, Refused, quoted
 from jamshape.lammps.deck.whole import cut_dump, is_whole_restart
 
 _PAIR = ("restart.a", "restart.b")
@@ -25,7 +25,7 @@ def restart(deck: Deck, _: list[str]) -> None:
     """
     named, first = deck.ask("restart"), 0
     if named is not None:
-        place = Path(named)
+        place = Path(named.strip('"'))
         found = newest_whole(place)
         if found is None:
             msg = (
@@ -37,7 +37,7 @@ def restart(deck: Deck, _: list[str]) -> None:
             deck.order(
                 "print", f"Goes on from {found.name}, the newest restart file that is whole."
             )
-            deck.order("set", "restart", str(found))
+            deck.order("set", "restart", quoted(str(found)))
         first = int(found.resolve() == Path("restart.a").resolve())
     deck.order("set", "restarts", f"{_PAIR[first]} {_PAIR[1 - first]}")
 
