@@ -154,11 +154,11 @@ class Helper {
   std::string waiting_, said_;
 };
 
-/// Makes a string variable of any text: in input LAMMPS would change letters that are not ASCII,
-/// end the text at quotes and put values in for dollars.
+/// Makes a variable of any text: in input LAMMPS would change letters that are not ASCII,
+/// end the text at quotes and put values in for dollars, the last in the style `string` even here.
 void set_variable(LAMMPS_NS::Variable *variables, const std::string &name, const std::string &value)
 {
-  std::string own = name, text = value, style = "string", away = "delete";
+  std::string own = name, text = value, style = "index", away = "delete";
   char *removal[] = {own.data(), away.data()};
   char *definition[] = {own.data(), style.data(), text.data()};
   if (variables->find(own.data()) >= 0) variables->set(2, removal);

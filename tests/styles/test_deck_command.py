@@ -62,6 +62,16 @@ def test_orders_are_carried_out_by_all_ranks(ranks, tmp_path):
     assert [path.name for path in (tmp_path / STRANGE).iterdir()] == ["here"]
 
 
+ASKS = """import sys
+for name in sys.argv[8:]:
+    print(f"@ask x{name.encode().hex()}", flush=True)
+    answer = sys.stdin.readline().strip()
+    print(f"@print x{answer.encode().hex()}", flush=True)
+print("@print", "x" + " ".join(sys.argv[2:8]).encode().hex(), flush=True)
+print("@done", flush=True)
+"""
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_variables_are_answered_formulas_among_them(ranks, tmp_path):
     deck = f"""{load_plugin()}
