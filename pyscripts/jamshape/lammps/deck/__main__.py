@@ -4,30 +4,20 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
-from typing import NamedTuple
 
 from jamshape.lammps.deck.asking import Deck, Ended, Refused
 from jamshape.lammps.deck.folder import enter, finish, initial, room
 from jamshape.lammps.deck.restart import mend, restart
 from jamshape.lammps.deck.settings import NUMBER
 
-
-class Word(NamedTuple):
-    """A word of the command, with what may stand behind it."""
-
-    carry_out: Callable[[Deck, list[str]], None]
-    pattern: str = ""
-    usage: str = ""
-
-
+# What each does, and what may stand behind it: a pattern of these arguments with a space after each, and in words.
 WORDS = {
-    "enter": Word(enter),
-    "restart": Word(restart),
-    "initial": Word(initial, r"(--[a-z-]+ \S+ )*", "--OPTION VALUE ..., as the command 'jamshape initial' has them"),
-    "mend": Word(mend),
-    "room": Word(room, f"{NUMBER} (halted [01] short {NUMBER} )?", "BYTES [halted 0|1 short MB]"),
-    "finish": Word(finish, ".*", "[DUMP ...]"),
+    "enter": (enter, "", ""),
+    "restart": (restart, "", ""),
+    "initial": (initial, r"(--[a-z-]+ \S+ )*", "--OPTION VALUE ..., as the command 'jamshape initial' has them"),
+    "mend": (mend, "", ""),
+    "room": (room, f"{NUMBER} (halted [01] short {NUMBER} )?", "BYTES [halted 0|1 short MB]"),
+    "finish": (finish, ".*", "[DUMP ...]"),
 }  # fmt: skip
 
 
@@ -43,12 +33,12 @@ def carry_out(deck: Deck, word: str, arguments: list[str]) -> None:
     if word not in WORDS:
         msg = f"Found '{found}', expected one of {', '.join(WORDS)}, styles."
         raise Ended(msg)
-    allowed = WORDS[word]
-    if not re.fullmatch(allowed.pattern, "".join(f"{argument} " for argument in arguments)):
-        msg = f"Found '{found}', expected '{f'jamshape {word} {allowed.usage}'.strip()}'."
+    do, pattern, usage = WORDS[word]
+    if not re.fullmatch(pattern, "".join(f"{argument} " for argument in arguments)):
+        msg = f"Found '{found}', expected '{f'jamshape {word} {usage}'.strip()}'."
         raise Ended(msg)
     try:
-        allowed.carry_out(deck, arguments)
+        do(deck, arguments)
     except OSError as error:
         msg = (
             f"Cannot carry out '{found}' ({error}), expected a folder that can be read and written to: "

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+
+TYPE_CHECKING = False  # the module typing takes long to start
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 class Ended(Exception):  # noqa: N818 - it is not always an error
@@ -17,7 +19,6 @@ class Refused(Ended):
     """It ends before anything has run, and leaves nothing where it was started."""
 
 
-@dataclass
 class Deck:
     """A deck, on standard input and output of this process; LAMMPS itself is at the other end.
 
@@ -25,10 +26,9 @@ class Deck:
     bytes in hex, so that no sign in them means anything on the way.
     """
 
-    process: int
-    """ID of the process of rank 0."""
-    atoms: int
-    step: int
+    def __init__(self, process: int, atoms: int, step: int) -> None:
+        self.process = process  # its ID, on rank 0
+        self.atoms, self.step = atoms, step
 
     def order(self, verb: str, *texts: str) -> None:
         """Have all ranks do something: print TEXT, set NAME TEXT (a variable), enter FOLDER, end SENTENCE, done."""

@@ -7,7 +7,6 @@ whole, so that a kill leaves none by halves, and ends with a sentence where the 
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -72,6 +71,8 @@ def initial(_: Deck, options: list[str]) -> None:
     Refused
         One sentence, that of the command.
     """
+    import subprocess  # noqa: PLC0415 - takes long to start
+
     Path("initial.data").unlink(missing_ok=True)
     command = [sys.executable, "-P", "-m", "jamshape", "initial", *options, "--out", "initial.data"]
     done = subprocess.run(command, text=True, capture_output=True, check=False)
