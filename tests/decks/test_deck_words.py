@@ -139,6 +139,13 @@ def test_a_name_that_the_open_deck_has_not_is_refused(here, monkeypatch):
         settings.require_settings(Told(out="runs"))
 
 
+def test_what_the_loader_is_told_is_no_setting(here, monkeypatch):
+    (here / "own.in").write_text("variable out index runs\n")
+    monkeypatch.setattr(Told, "arguments", lambda _: ["lmp", "-var", "jamshape_python", "yes"])
+    with (here / "own.in").open():
+        assert settings.require_settings(Told(out="runs")) == {"out": "runs"}
+
+
 # --- the folder -----------------------------------------------------------------------------------
 
 

@@ -75,7 +75,7 @@ def known_settings(text: str) -> list[str]:
     """
     listed = re.findall(r"^variable +([^ ]+) +index", text, re.MULTILINE)
     asked = re.findall(r"is_defined[(]variable,([^ )]+)", text)
-    return listed + [name for name in asked if not name.startswith("jamshape")]
+    return listed + [name for name in asked if not name.startswith("jamshape")]  # of the loader
 
 
 def _wrong_name(deck: Deck) -> str | None:
@@ -85,7 +85,7 @@ def _wrong_name(deck: Deck) -> str | None:
     texts = [path.read_text(errors="replace") for path in small] if given else []
     known = known_settings("\n".join(text for text in texts if "variable out " in text))
     for name in given if known else []:
-        if name not in known:
+        if name not in known and not name.startswith("jamshape"):
             import difflib  # noqa: PLC0415 - slow
 
             meant = difflib.get_close_matches(name, known, 1) or [", ".join(known)]
