@@ -4,9 +4,11 @@
 #include "compat.h"
 #include "compute_contact_local.h"
 #include "compute_packing.h"
+#include "deck_command.h"
 #include "error.h"
 #include "fix_overdamped_affine.h"
 #include "force.h"
+#include "input.h"
 #include "modify.h"
 #include "pair_dimer_harmonic.h"
 #include "pair_spherocylinder_harmonic.h"
@@ -41,7 +43,9 @@ template <class T> LAMMPS_NS::Compute *compute(LAMMPS *lmp, int narg, char **arg
   return new T(lmp, narg, arg);
 }
 
-/// Gives each style to `add`, which knows pairs, fixes and computes apart.
+LAMMPS_NS::Command *command(LAMMPS *lmp) { return new jamshape::DeckCommand(lmp); }
+
+/// Gives each style to `add`, which knows pairs, fixes, computes and commands apart.
 template <class Add> void for_all_styles(Add &&add)
 {
   using namespace jamshape;
@@ -51,6 +55,7 @@ template <class Add> void for_all_styles(Add &&add)
   add("overdamped/affine", fix<FixOverdampedAffine>);
   add("contact/local", compute<ComputeContactLocal>);
   add("packing", compute<ComputePacking>);
+  add("jamshape", command);
 }
 
 /// Into the tables of LAMMPS.
@@ -69,6 +74,10 @@ struct AddToMaps {
   {
     (*lmp->modify->compute_map)[name] = creator;
   }
+  void operator()(const char *name, LAMMPS_NS::Command *(*creator)(LAMMPS *) ) const
+  {
+    (*lmp->input->command_map)[name] = creator;
+  }
 };
 
 /// By the function of the PLUGIN package, which then lists them and can take them away again.
@@ -79,9 +88,11 @@ struct AddAsPlugins {
 
   void operator()(const char *name, LAMMPS_NS::Pair *(*creator)(LAMMPS *) ) const
   {
-    lammpsplugin_t one = named("pair", name);
-    one.creator.v1 = reinterpret_cast<void *(*)(void *)>(creator);
-    add(&one, lmp);
+    add_without_arguments("pair", name, creator);
+  }
+  void operator()(const char *name, LAMMPS_NS::Command *(*creator)(LAMMPS *) ) const
+  {
+    add_without_arguments("command", name, creator);
   }
   void operator()(const char *name, LAMMPS_NS::Fix *(*creator)(LAMMPS *, int, char **) ) const
   {
@@ -97,6 +108,13 @@ struct AddAsPlugins {
   {
     // That it was built for this version was seen to.
     return {lmp->version, kind, name, name, "jamshape", {}, handle};
+  }
+  template <class Creator>
+  void add_without_arguments(const char *kind, const char *name, Creator *creator) const
+  {
+    lammpsplugin_t one = named(kind, name);
+    one.creator.v1 = reinterpret_cast<void *(*)(void *)>(creator);
+    add(&one, lmp);
   }
   template <class Creator>
   void add_with_arguments(const char *kind, const char *name, Creator *creator) const
@@ -167,6 +185,7 @@ void jamshape_register(void *handle)
   const std::string wrong = what_differs(handle);
   if (!wrong.empty()) lmp->error->all(FLERR, wrong);
   for_all_styles(AddToMaps{lmp});
+  jamshape::tell_plugin_file(lmp);
 }
 
 /// What `plugin load` and LAMMPS_PLUGIN_PATH call. With another LAMMPS it only says so: one that
@@ -180,6 +199,7 @@ void lammpsplugin_init(void *handle, void *library, void *add)
     return;
   }
   for_all_styles(AddAsPlugins{lmp, library, reinterpret_cast<lammpsplugin_regfunc>(add)});
+  jamshape::tell_plugin_file(lmp);
 }
 
 /// What the scene at hand is spared, as in the log; empty before the first evaluation. Valid until

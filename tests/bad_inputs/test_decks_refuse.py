@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from jamshape.checks import RANGES
+from jamshape import checks
+from jamshape.lammps.deck.settings import RANGES, WHOLE
 from jamshape.lammps.plugin import PluginError, include_line, plugin_path
 from jamshape.shapes.table import SHAPES
 
@@ -122,30 +123,19 @@ def test_a_path_that_lammps_cannot_read_in_a_deck_is_refused(name):
         include_line(Path("/home") / name / "load_plugin.lmp")
 
 
-def ranges_of_decks():
-    """Tables that are in the Python of the decks."""
-    text = (INPUTS / "check_settings.lmp").read_text()
-    tables = text[text.index("jamshape_whole =") : text.index("jamshape_words =")]
-    found = {}
-    exec(tables, found)  # noqa: S102 - our own deck
-    return found["jamshape_whole"], found["jamshape_ranges"]
-
-
 def test_decks_have_the_ranges_of_the_library():
-    whole, ranges = ranges_of_decks()
     parameters = [
         p for name in ("spherocylinder", "superellipsoid") for p in SHAPES[name].parameters
     ]
-    stated = RANGES | {p.option: p.allowed for p in parameters}
-    shared = (whole.keys() | ranges.keys()) & stated.keys()
+    stated = checks.RANGES | {p.option: p.allowed for p in parameters}
+    shared = (WHOLE.keys() | RANGES.keys()) & stated.keys()
     assert {"n", "alpha", "p", "w1", "w2", "kappa", "dt", "phi_start", "phi_end"} <= shared
     for name in shared - {"seed"}:  # LAMMPS's are shorter
         allowed = stated[name]
-        assert (whole | ranges)[name] == (allowed.low, allowed.high, *allowed.also)
+        assert (WHOLE | RANGES)[name] == (allowed.low, allowed.high, *allowed.also)
 
 
 def test_every_setting_of_a_deck_is_checked():
-    whole, ranges = ranges_of_decks()
     for deck in INPUTS.glob("*.in"):
         own = set(re.findall(r"^variable +(\w+) +index", deck.read_text(), re.MULTILINE))
-        assert own <= whole.keys() | ranges.keys() | {"integrator", "sides", "out"}
+        assert own <= WHOLE.keys() | RANGES.keys() | {"integrator", "sides", "out"}
