@@ -8,7 +8,7 @@
 Each sample is one run of `jamshape pack` in a process of its own, one a core, which ends with the sweep,
 however that ends. Started again after a kill it goes on: packings that are there are not made again, those under way go on from their own files, and those of
 other parameters are refused. A sample that fails is listed, the others go on. The last line of standard output is one JSON
-object; the exit code is 0 only if all samples are there. For clusters see pyscripts/sweep.smk.
+object; the exit code is 0 only if all samples are there. For clusters see docs/how-to/cluster.md.
 """
 
 from __future__ import annotations
