@@ -14,11 +14,29 @@ from pathlib import Path
 
 from jamshape.commands import sweep
 
+SETTINGS = ("out", "sweep", "chunk", "cores", "minutes", "mem_mb")
+
+for name in config:
+    if name not in SETTINGS:
+        sys.exit(
+            f"sweep.smk: the setting {name} is not known, expected {', '.join(SETTINGS)};"
+            ' give options of jamshape sweep in one text, such as sweep="--alpha 4 --samples 6"'
+        )
+
+
+def count(name, usual):
+    """Read a setting that counts something."""
+    text = str(config.get(name, usual))
+    if not text.isdecimal() or int(text) < 1:
+        sys.exit(f"sweep.smk: {name} is {text}, expected a whole number of at least 1")
+    return int(text)
+
+
 OUT = str(config.get("out", "sweep"))
-CHUNK, CORES = int(config.get("chunk", 1)), int(config.get("cores", 1))
-OPTIONS = sweep.options_of().parse_args(
-    [*shlex.split(str(config.get("sweep", "--alpha 0 0.01 1 4 --n 256"))), "--out", OUT]
-)
+CHUNK, CORES = count("chunk", 1), count("cores", 1)
+PARSER = sweep.options_of()
+PARSER.prog = "sweep.smk"
+OPTIONS = PARSER.parse_args([*shlex.split(str(config.get("sweep", ""))), "--out", OUT])
 
 
 def jobs():
@@ -62,8 +80,8 @@ rule packings:
         str(report_of("{name}")),
     threads: CORES
     resources:
-        runtime=int(config.get("minutes", 60)),
-        mem_mb=int(config.get("mem_mb", 1000)),
+        runtime=count("minutes", 60),
+        mem_mb=count("mem_mb", 1000),
     params:
         asked=lambda wildcards: JOBS[wildcards.name][2],
         out=shlex.quote(OUT),

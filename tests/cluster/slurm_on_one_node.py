@@ -2,7 +2,7 @@
 
     .venv/bin/python tests/cluster/slurm_on_one_node.py
 
-As root on Debian 12, where jamshape is set up (`./run setup`); five minutes. Slurm comes from Debian's packages, which
+As root on Debian 12, where jamshape is set up (`./run setup`); six minutes. Slurm comes from Debian's packages, which
 stay installed; Snakemake and its executor for Slurm come from PyPI into a virtual environment. That, the configuration,
 all files and sockets lie in a temporary folder, which is removed unless something fails, and the daemons listen on
 127.0.0.1 only. `--snakemake PROGRAM` takes a Snakemake that is there and sees jamshape; `--keep` leaves the folder.

@@ -19,9 +19,9 @@ NAMES = ["dimer_alpha1_seed1.h5", "mixture_seed1.h5", "p1_w0.6_1_seed1.h5"]
 RODS = f"--alpha 1 --samples 3 {SMALL}"
 
 
-def run(folder, options, *more):
+def run(folder, options, *more, settings=("chunk=2",)):
     """Run the workflow in a folder; the packings go to a folder in it."""
-    config = [f"sweep={options}", "out=of rods", "chunk=2"]
+    config = [f"sweep={options}", "out=of rods", *settings]
     words = ["--cores", "2", "--keep-going", "--rerun-incomplete", *more, "--config", *config]
     return subprocess.run(
         [sys.executable, "-m", "snakemake", "-s", str(WORKFLOW), *words],
@@ -95,8 +95,17 @@ def test_every_shape_and_mixtures_are_made(tmp_path):
     assert sorted(names) == NAMES
 
 
-def test_nonsense_is_refused_before_any_job(tmp_path):
-    done = run(tmp_path, "--alpha 1 --kapa 3")
+@pytest.mark.parametrize(
+    ("options", "setting", "words"),
+    [
+        ("--alpha 1 --kapa 3", "chunk=2", "sweep.smk: error: unrecognized arguments: --kapa 3"),
+        ("--alpha 1", "chunk=0", "sweep.smk: chunk is 0, expected a whole number of at least 1"),
+        ("--alpha 1", "minutes=soon", "sweep.smk: minutes is soon, expected a whole number"),
+        ("--alpha 1", "samples=6", "sweep.smk: the setting samples is not known, expected out,"),
+    ],
+)
+def test_nonsense_is_refused_before_any_job(tmp_path, options, setting, words):
+    done = run(tmp_path, options, settings=[setting])
     assert done.returncode != 0
-    assert "unrecognized arguments: --kapa 3" in done.stdout
+    assert words in done.stdout
     assert not (tmp_path / "of rods").exists()
