@@ -150,6 +150,16 @@ def test_names_of_files_keep_all_digits_and_options_given_twice_add_up(tmp_path)
     assert "3 of 3, 1 failed" in done.stderr
 
 
+def test_seeds_begin_where_they_are_asked_to(swept, tmp_path):
+    out, *_ = swept
+    done, report = run(tmp_path, "--alpha", "0", "--first-seed", "2", "--samples", "2")
+    assert (done.returncode, report["made"]) == (0, 2)
+    names = {path.name for path in tmp_path.glob("*.h5") if path.name.count(".") == 1}
+    assert names == {"alpha0_seed2.h5", "alpha0_seed3.h5"}
+    same = [read_packing(folder / "alpha0_seed2.h5").position for folder in (out, tmp_path)]
+    assert (same[0] == same[1]).all()
+
+
 def test_a_sample_that_another_process_makes_is_told(tmp_path):
     log = tmp_path / "alpha0_seed1.log"
     with log.open("a") as held:
@@ -169,6 +179,7 @@ def test_a_sample_that_another_process_makes_is_told(tmp_path):
         (("--samples", "0"), "--samples is 0, expected at least 1"),
         (("--samples", "-2"), "--samples is -2, expected at least 1"),
         (("--samples", "1", "--jobs", "0"), "--jobs is 0, expected at least 1"),
+        (("--first-seed", "-1"), "--first-seed is -1, expected at least 0"),
         (
             ("--seed", "3"),
             "--seed is 3, which means nothing to a sweep: its samples have the seeds",

@@ -3,11 +3,12 @@
     jamshape sweep --alpha 0 0.01 1 4 --samples 6 --n 256 --out sweep/
     jamshape sweep --superellipsoid 1 0.6 1 --superellipsoid 1.5 1 1 --samples 5 --n 400 --out sweep3d/
     jamshape sweep --kind alpha=0 --kind alpha=4,size=1.4 --samples 5 --n 256 --out mixtures/
+    jamshape sweep --alpha 4 --first-seed 101 --samples 20 --n 256 --out sweep/
 
 Each sample is one run of `jamshape pack` in a process of its own, one a core, which ends with the sweep,
 however that ends. Started again after a kill it goes on: packings that are there are not made again, those under way go on from their own files, and those of
 other parameters are refused. A sample that fails is listed, the others go on. The last line of standard output is one JSON
-object; the exit code is 0 only if all samples are there. For clusters see pyscripts/sweep.smk.
+object; the exit code is 0 only if all samples are there. For clusters see docs/how-to/cluster.md.
 """
 
 from __future__ import annotations
@@ -50,9 +51,9 @@ class _Parser(ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         options, extra = super().parse_known_args(args, namespace)
         options.extra = extra
-        for name in ("samples", "jobs"):
-            if getattr(options, name) < 1:
-                self.error(f"--{name} is {getattr(options, name)}, expected at least 1")
+        for name, least in (("samples", 1), ("jobs", 1), ("first_seed", 0)):
+            if (value := getattr(options, name)) < least:
+                self.error(f"--{name.replace('_', '-')} is {value}, expected at least {least}")
         if not particles(options):
             self.error("no particles were given, expected --alpha, --kind or the name of a shape")
         self._require_options_of_a_packing(options)
@@ -66,7 +67,7 @@ class _Parser(ArgumentParser):
         if given.seed is not None:
             self.error(
                 f"--seed is {given.seed}, which means nothing to a sweep: its samples have the"
-                " seeds 1 to that of --samples"
+                " seeds from --first-seed on, as many as --samples"
             )
         if given.start is not None:
             self.error(
@@ -98,17 +99,26 @@ def options_of() -> ArgumentParser:
             metavar=tuple(p.option.upper() for p in shape.parameters),
             help=f"{', '.join(p.meaning for p in shape.parameters)}; may be given several times",
         )
-    parser.add_argument("--samples", type=int, default=6, help="seeds 1 to this (6)")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes (all cores)")
+    parser.add_argument("--samples", type=int, default=6, help="of each, one for a seed (6)")
+    parser.add_argument("--first-seed", type=int, default=1, help="the next has one more (1)")
+    parser.add_argument("--jobs", type=int, default=_cores(), help="processes (all cores)")
     parser.add_argument("--out", type=Path, required=True, help="folder")
     return parser
 
 
+def _cores() -> int:
+    """Count the cores that this process may use, which in a job of a cluster are not all of the machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 class Particle(NamedTuple):
-    """What packings are of: how their files are called, and the options of its packing."""
+    """What packings are of: how their files are called, and which options ask for it."""
 
     name: str
     arguments: list[str]
+    """Of its packing."""
+    asked: list[str]
+    """Of a sweep of it alone."""
 
 
 def particles(options: Namespace) -> list[Particle]:
@@ -121,16 +131,24 @@ def particles(options: Namespace) -> list[Particle]:
         found += [particle_of(other, dict(zip(names, v, strict=True))) for v in given]
     if options.kind:
         kinds = [text for kind in options.kind for text in ("--kind", kind)]
-        found.append(Particle("mixture", ["--shape", shape.name, *kinds]))
+        told = ["--shape", shape.name, *kinds]
+        found.append(Particle("mixture", told, told))
     return list({particle.name: particle for particle in found}.values())
 
 
 def particle_of(shape: Shape, parameters: dict[str, float]) -> Particle:
     """Name particles of a shape."""
-    told = ["--shape", shape.name]
+    told, asked = ["--shape", shape.name], [f"--{shape.name}"]
     for parameter in shape.parameters:
-        told += [f"--{parameter.option}", repr(parameters[parameter.name])]
-    return Particle(shape.stem(parameters), told)
+        number = repr(parameters[parameter.name])
+        told += [f"--{parameter.option}", number]
+        asked.append(number)
+    return Particle(shape.stem(parameters), told, asked)
+
+
+def seeds(options: Namespace) -> range:
+    """List the seeds of the samples."""
+    return range(options.first_seed, options.first_seed + options.samples)
 
 
 def file_of(particle: Particle, seed: int, options: Namespace) -> Path:
@@ -216,7 +234,7 @@ def _python_path() -> str:
 
 def made(options: Namespace) -> Iterator[str | None]:
     """Make all samples, and yield the complaint of each, or None, when it ends."""
-    samples = [(p, s) for s in range(1, options.samples + 1) for p in particles(options)]
+    samples = [(p, s) for s in seeds(options) for p in particles(options)]
     leash = Leash.new()
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         runs = [pool.submit(make, particle, seed, options, leash) for particle, seed in samples]

@@ -6,6 +6,7 @@ import ctypes
 import os
 import subprocess
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -21,7 +22,7 @@ from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import guess_shape_style
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from types import TracebackType
 
     from jamshape.arrays import FloatArray, IntArray
@@ -34,6 +35,26 @@ _POSES = """compute orient all property/atom quatw quati quatj quatk
 # Of the smallest diameter.
 _SKIN = 0.3
 _WIDEST_BIN = 50.0
+
+
+# By these Open MPI tells that srun began a process.
+_STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
+
+
+@contextmanager
+def _as_one_process() -> Iterator[None]:
+    """Let MPI start in a step of one process that Slurm's srun began, as Snakemake's jobs are.
+
+    Open MPI ends such a process unless srun told it, too, how to find other processes (PMIX_RANK); here there are
+    none to find.
+    """
+    hidden = {}
+    if os.environ.get("SLURM_STEP_NUM_TASKS") == "1" and "PMIX_RANK" not in os.environ:
+        hidden = {name: os.environ.pop(name) for name in _STEP if name in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(hidden)
 
 
 class Session:
@@ -69,7 +90,8 @@ class Session:
             )
             assert self._complaints.stdin is not None
             options += ["-screen", f"/dev/fd/{self._complaints.stdin.fileno()}"]
-        self.lmp: Any = start_lammps([*options, *arguments])
+        with _as_one_process():
+            self.lmp: Any = start_lammps([*options, *arguments])
         self._library = self._load(plugin)
 
     def __enter__(self) -> Self:

@@ -1,13 +1,16 @@
 """The commands of pages in docs/how-to, in their order, with options behind them that make them quick."""
 
 import importlib.util
+import os
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from jamshape.commands import COMMANDS
+from jamshape.commands import COMMANDS, sweep
 
 pytestmark = pytest.mark.lammps
 
@@ -68,3 +71,42 @@ def test_the_commands_of_protocols_run_in_their_order(jamshape, tmp_path, monkey
         # The paper's minimiser may end before forces balance as well as ours do.
         may_fail = "--minimiser" in line
         assert not ended.code or (may_fail and ended.code == 1), f"{line}: {ended}"
+
+
+CLUSTER = (PAGES / "cluster.md").read_text(encoding="utf-8")
+
+
+def test_sweeps_for_snakemake_are_options_of_a_sweep():
+    texts = re.findall(r'sweep="([^"]*)"', CLUSTER)
+    parsed = [sweep.options_of().parse_args([*shlex.split(text), "--out", "out"]) for text in texts]
+    # Each packing has a file of its own.
+    for options in parsed:
+        files = {
+            sweep.file_of(of, seed, options)
+            for of in sweep.particles(options)
+            for seed in sweep.seeds(options)
+        }
+        assert len(files) == len(sweep.particles(options)) * options.samples
+    assert [options.samples for options in parsed] == [1000, 500, 4]
+
+
+def test_the_jobs_of_an_array_make_samples_of_their_own(tmp_path):
+    [script] = [b for b in re.findall(r"```\n(.*?)```", CLUSTER, re.DOTALL) if "--array" in b]
+    jamshape = f"{shlex.quote(sys.executable)} -m jamshape"
+    quick = script.rstrip().replace(".venv/bin/jamshape", jamshape)
+    quick += f" --samples 1 {SMALL}"
+    for job in (0, 9):
+        environment = os.environ | {"SLURM_ARRAY_TASK_ID": str(job)}
+        subprocess.run(["bash", "-c", quick], cwd=tmp_path, env=environment, check=True)
+    names = {path.name for path in (tmp_path / "sweep").glob("*.h5")}
+    assert names == {"alpha4_seed1.h5", "alpha4_seed901.h5"}
+
+
+def test_the_page_of_clusters_says_how_to_look_at_packings(jamshape, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    jamshape("sweep", "--alpha", 1, "--samples", 2, *SMALL.split(), "--out", "sweep")
+    (tmp_path / "sweep" / "alpha1_seed1.h5.run.h5").write_text("of a compression")
+    [lines] = re.findall(r"```python\n(.*?)```", CLUSTER, re.DOTALL)
+    found = {}
+    exec(lines, found)  # noqa: S102 - our own page
+    assert len(found["phi_J"]) == 2
