@@ -353,15 +353,15 @@ def kill_a_job(slurm, sweep):
     return seed
 
 
-def kill_the_node(slurm, sweep):
+def kill_the_node(slurm, sweep, seed):
     """Start again, and kill the daemon of the node and all that runs on it; Slurm begins the job again."""
-    before = sweep.finished()
+    before, began = sweep.finished(), time.time()
     process = sweep.start()
     job = wait_until(lambda: [*slurm.jobs().values()], 60, "the start of the job that failed")[0]
     require(
         len(slurm.jobs("R,PD")) == 1, "more than one job was submitted, expected the failed one"
     )
-    wait_until(lambda: sampling(slurm, job), 30, "the making of a packing")
+    wait_until(lambda: is_going_on(sweep, seed, began), 30, "going on with the packing")
     kill([slurm.daemons["slurmd"].pid, *slurm.watchers(), *slurm.processes(job)])
     slurm.daemons["slurmd"].wait(10)
     say(
@@ -380,13 +380,14 @@ def kill_the_node(slurm, sweep):
     say("Snakemake waited for it and ended well.")
 
 
-def sampling(slurm, job):
-    """Whether a process of a job makes a packing."""
-    for process in slurm.processes(job):
-        with suppress(OSError):
-            if b"import sample" in Path(f"/proc/{process}/cmdline").read_bytes():
-                return True
-    return False
+def is_going_on(sweep, seed, since):
+    """Whether something was written beside an unfinished packing since a time."""
+    there = sweep.folder.glob(f"alpha4_seed{seed}.h5.*")
+    times = []
+    for path in there:
+        with suppress(OSError):  # removed by who writes the next
+            times.append(path.stat().st_mtime)
+    return max(times, default=0.0) > since
 
 
 def require_unchanged(before, sweep):
@@ -485,7 +486,7 @@ def main():
             say(f"Slurm of one node with two cores runs in {folder}.")
             sweep = Sweep(slurm, snakemake)
             killed = kill_a_job(slurm, sweep)
-            kill_the_node(slurm, sweep)
+            kill_the_node(slurm, sweep, killed)
             start_once_more(slurm, sweep)
             require_all(slurm, sweep, killed)
             run_ranks(slurm)
