@@ -334,22 +334,43 @@ def test_late_list_rebuilds_are_set_right(tmp_path):
 # --- versions ------------------------------------------------------------------------------------
 
 
-def test_another_version_of_lammps_is_refused():
-    code = """
+ANOTHER_BUILD = """
 import ctypes
+from jamshape.lammps.module import start_lammps
 from jamshape.lammps.plugin import plugin_path
 from jamshape.lammps.session import Session
 Session().close()
 plugin = ctypes.CDLL(str(plugin_path()))
-ctypes.c_int.in_dll(plugin, "jamshape_built_for").value = 20200101
-Session(screen=True)
+{pretend}
+{start}
 """
+OTHER_VERSION = 'ctypes.c_int.in_dll(plugin, "jamshape_built_for").value = 20200101'
+OTHER_MPI = """
+built_with = ctypes.c_char_p.in_dll(plugin, "jamshape_built_with")
+built_with.value = b"no MPI"
+"""
+BY_SESSION = "Session()"
+BY_DECK = """
+plugin.jamshape_register.argtypes = [ctypes.c_void_p]
+lmp = start_lammps(["-log", "none"])
+plugin.jamshape_register(lmp.lmp)
+"""
+
+
+@pytest.mark.parametrize("start", [BY_SESSION, BY_DECK], ids=["session", "deck"])
+@pytest.mark.parametrize(
+    ("pretend", "sentence"),
+    [
+        (OTHER_VERSION, r"LAMMPS version \d{8}, expected 20200101 for which"),
+        (OTHER_MPI, r"the MPI library [^,]+, expected no MPI with which"),
+    ],
+    ids=["version", "mpi"],
+)
+def test_a_plugin_that_was_built_for_another_lammps_is_refused(start, pretend, sentence):
     done = subprocess.run(
-        [sys.executable, "-c", code], env=environment(), text=True, stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, timeout=60, check=False,
+        [sys.executable, "-c", ANOTHER_BUILD.format(pretend=pretend, start=start)], env=environment(),
+        text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60, check=False,
     )  # fmt: skip
-    assert re.fullmatch(
-        r"jamshape found LAMMPS version \d{8}, expected 20200101 for which this plugin was built: "
-        r"build jamshape again with this LAMMPS\.",
-        error_of(done),
-    )
+    again = r"this plugin was built: build jamshape again with this LAMMPS\."
+    assert done.returncode != 0
+    assert re.search(f"jamshape found {sentence} {again}", done.stdout), done.stdout
