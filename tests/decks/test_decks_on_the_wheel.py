@@ -84,7 +84,7 @@ def test_decks_run_and_leave_nothing_where_they_were_started(shape, ranks, tmp_p
             "compress_spherocylinder",
             {"n": 64, "phi_end": 0.86, "integrator": "rkc2 tolerance 1e-4"},
         ),
-        ("compress_superellipsoid", {"n": 32, "phi_end": 0.7}),
+        ("compress_superellipsoid", {"n": 32, "kappa": 1e-3, "phi_end": 0.75, "p_end": 0.5}),
     ],
 )
 def test_a_compression_through_jamming_is_that_of_debian_to_the_last_bit(name, settings, tmp_path):
@@ -98,7 +98,7 @@ def test_a_compression_through_jamming_is_that_of_debian_to_the_last_bit(name, s
     for file in ("particles.dump", "contacts.dump"):
         # Words, as one of them ends lines with a blank.
         here, there = ((tmp_path / out / file).read_text().split() for out in ("debian", "wheel"))
-        assert len(here) > 500
+        assert len(here) > 300
         assert here == there, file
 
 
