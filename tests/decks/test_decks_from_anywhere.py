@@ -274,7 +274,7 @@ def test_the_deck_of_ones_own_runs_word_for_word(ranks, clone, elsewhere):
     done = lmp(elsewhere, "-in", "rods.in", ranks=ranks)
     assert done.returncode == 0, done.stdout[-3000:]
     title, first, last = re.search(
-        r"^(Step .*)\n(.*)\n(.*)\nLoop time", done.stdout, re.MULTILINE
+        r"^ *(Step .*)\n(.*)\n(.*)\nLoop time", done.stdout, re.MULTILINE
     ).groups()
     column = {name: k for k, name in enumerate(title.split())}
     before, after = (np.array(row.split(), float) for row in (first, last))
