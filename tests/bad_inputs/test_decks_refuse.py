@@ -19,7 +19,7 @@ from jamshape.shapes.table import SHAPES
 
 sys.path.append(str(Path(__file__).parents[1] / "styles"))
 
-from lammps_scenes import ENVIRONMENT, MPIRUN, REPOSITORY
+from lammps_scenes import ENVIRONMENT, MPIRUN, REPOSITORY, complaints_of
 
 pytestmark = pytest.mark.lammps
 
@@ -73,7 +73,7 @@ def test_a_deck_refuses(deck, given, words, tmp_path):
     state = [("restart", __file__)] if deck == RELAXED else []
     ranks = 2 if given[0] in {"alpha", "phi_start"} else 1
     done = lmp(tmp_path, deck, *variables(given, *state), ranks=ranks)
-    [sentence] = re.findall("^.*(?:ERROR|Error|Traceback).*$", done.stdout, re.MULTILINE)
+    [sentence] = complaints_of(done)
     assert sentence.startswith("ERROR: ")
     assert re.search(words, sentence)
     assert done.returncode == 1
