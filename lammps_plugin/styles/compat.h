@@ -6,6 +6,21 @@
 
 #include "lammps.h"
 
+// The class of commands that stand in a deck, whose header Debian 12 does not install.
+#if __has_include("command.h")
+#include "command.h"
+#else
+#include "pointers.h"
+
+namespace LAMMPS_NS {
+class Command : protected Pointers {
+ public:
+  explicit Command(LAMMPS *lmp) : Pointers(lmp) {}
+  virtual void command(int narg, char **arg) = 0;
+};
+}  // namespace LAMMPS_NS
+#endif
+
 #ifndef JAMSHAPE_LAMMPS_VERSION
 #error "JAMSHAPE_LAMMPS_VERSION (such as 20210929) must be set by the build"
 #endif

@@ -1,19 +1,6 @@
 #pragma once
 
-// Debian's headers leave out the class of commands that stand in a deck.
-#if __has_include("command.h")
-#include "command.h"
-#else
-#include "pointers.h"
-
-namespace LAMMPS_NS {
-class Command : protected Pointers {
- public:
-  explicit Command(LAMMPS *lmp) : Pointers(lmp) {}
-  virtual void command(int narg, char **arg) = 0;
-};
-}  // namespace LAMMPS_NS
-#endif
+#include "compat.h"
 
 #include <string>
 

@@ -7,18 +7,19 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import pytest
 
 from jamshape import checks
 from jamshape.lammps.deck.settings import RANGES, WHOLE
-from jamshape.lammps.plugin import PluginError, include_line, plugin_path
+from jamshape.lammps.plugin import PluginError, built_for, include_line, plugin_path
 from jamshape.shapes.table import SHAPES
 
 sys.path.append(str(Path(__file__).parents[1] / "styles"))
 
-from lammps_scenes import ENVIRONMENT, MPIRUN, REPOSITORY
+from lammps_scenes import ENVIRONMENT, MPIRUN, REPOSITORY, complaints_of
 
 pytestmark = pytest.mark.lammps
 
@@ -72,7 +73,7 @@ def test_a_deck_refuses(deck, given, words, tmp_path):
     state = [("restart", __file__)] if deck == RELAXED else []
     ranks = 2 if given[0] in {"alpha", "phi_start"} else 1
     done = lmp(tmp_path, deck, *variables(given, *state), ranks=ranks)
-    [sentence] = re.findall("^.*(?:ERROR|Error|Traceback).*$", done.stdout, re.MULTILINE)
+    [sentence] = complaints_of(done)
     assert sentence.startswith("ERROR: ")
     assert re.search(words, sentence)
     assert done.returncode == 1
@@ -104,8 +105,15 @@ def test_decks_of_a_repository_of_any_name_work(ranks, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {STRANGE, "run"}
 
 
-@pytest.mark.parametrize("name", ["a b", "$(touch X)${HOME}$n", "it's", 'a "q"', "[*]#&;`touch X`"])
+OF_DEBIAN_12 = 20210929
+READ_BY_ALL = ["a b", 'a "q"', "[*]#&;`touch X`"]
+READ_ONCE = ["$(touch X)${HOME}$n", "it's"]
+
+
+@pytest.mark.parametrize("name", READ_BY_ALL + READ_ONCE)
 def test_the_line_that_a_deck_needs_can_be_read(name, tmp_path):
+    if name in READ_ONCE and built_for() > OF_DEBIAN_12:
+        pytest.skip("this LAMMPS reads paths twice, and such ones are refused: see below")
     script = tmp_path / name / "load_plugin.lmp"
     script.parent.mkdir()
     script.write_bytes((INPUTS / script.name).read_bytes())
@@ -115,12 +123,18 @@ def test_the_line_that_a_deck_needs_can_be_read(name, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {name, "own.in", "log.lammps"}
 
 
-@pytest.mark.parametrize("name", ["é", 'it\'s "q"'])
-def test_a_path_that_lammps_cannot_read_in_a_deck_is_refused(name):
+@pytest.mark.parametrize(
+    ("name", "version"),
+    [
+        *product(["é", 'it\'s "q"'], [OF_DEBIAN_12, 20250204]),
+        *product(READ_ONCE, [20250204, 20250722]),
+    ],
+)
+def test_a_path_that_lammps_cannot_read_in_a_deck_is_refused(name, version):
     with pytest.raises(
         PluginError, match="LAMMPS cannot read in a deck, expected a path of ASCII letters"
     ):
-        include_line(Path("/home") / name / "load_plugin.lmp")
+        include_line(Path("/home") / name / "load_plugin.lmp", version)
 
 
 def test_decks_have_the_ranges_of_the_library():

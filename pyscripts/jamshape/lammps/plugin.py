@@ -10,6 +10,10 @@ from pathlib import Path
 PLUGIN_NAME = "jamshape_plugin.so"
 LOADER_NAME = "load_plugin.lmp"
 
+# The version of Debian 12, whose `include` takes its path as it is.
+_READS_ONCE = 20210929
+_QUOTES = ('"', "'")
+
 # The plugin says it of itself: outside LAMMPS it cannot be loaded and asked.
 _LABEL = re.compile(rb"jamshape plugin for LAMMPS (\d+)\0")
 
@@ -107,32 +111,39 @@ def load_script_path() -> Path:
     return decks_path() / LOADER_NAME
 
 
-def include_line(script: Path | None = None) -> str:
+def include_line(script: Path | None = None, version: int | None = None) -> str:
     """Line of a deck that includes `load_plugin.lmp`.
 
     Parameters
     ----------
     script
         The file; that of this installation when left out.
+    version
+        Of the LAMMPS that reads the deck; that of the plugin when left out.
 
     Raises
     ------
     PluginError
         When there is none, or LAMMPS could not read its path in a deck: in quotes LAMMPS changes letters that are not
-        ASCII, and there is no way to write both kinds of quotes.
+        ASCII, and there is no way to write both kinds of quotes. LAMMPS later than 29Sep2021 takes the path without
+        its quotes for input once more, so that dollars and a single quote mean something there.
 
     Examples
     --------
-    >>> include_line(Path("/home/you/jamshape/inputs/load_plugin.lmp"))
+    >>> include_line(Path("/home/you/jamshape/inputs/load_plugin.lmp"), 20250204)
     'include "/home/you/jamshape/inputs/load_plugin.lmp"'
     """
     path = str(script or load_script_path())
-    for quote in ('"', "'"):
-        if path.isascii() and path.isprintable() and quote not in path:
+    is_plain = path.isascii() and path.isprintable()
+    if (version or built_for()) > _READS_ONCE:
+        is_plain &= "$" not in path and all(path.count(quote) % 2 == 0 for quote in _QUOTES)
+    for quote in _QUOTES:
+        if is_plain and quote not in path:
             return f"include {quote}{path}{quote}"
     msg = (
         f"Found {path}, which LAMMPS cannot read in a deck, expected a path of ASCII letters with at most one kind of "
-        f"quotes: copy the file beside your deck, write 'include {LOADER_NAME}', and set JAMSHAPE_PLUGIN to the plugin."
+        f"quotes, in pairs, and no $: copy the file beside your deck, write 'include {LOADER_NAME}', and set "
+        "JAMSHAPE_PLUGIN to the plugin."
     )
     raise PluginError(msg)
 
