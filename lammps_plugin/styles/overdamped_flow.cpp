@@ -12,6 +12,7 @@
 #include "modify.h"
 #include "neighbor.h"
 #include "pair_contact.h"
+#include "refusal.h"
 #include "text.hpp"
 #include "update.h"
 
@@ -216,9 +217,10 @@ template <int D> void OverdampedFlow::require_small(int i, const RateIn<D> &move
     return;
   }
   if (scale * scale * norm_sq(moved.shift) <= limit * limit) return;  // false for NaN
-  error->one(FLERR, "fix overdamped/affine found that one step moves atom " +
-                        std::to_string(atom->tag[i]) + " by " + shown(scale * norm(moved.shift)) +
-                        ", expected at most half its radius: use a smaller timestep.");
+  refuse(lmp, FLERR,
+         "fix overdamped/affine found that one step moves atom " + std::to_string(atom->tag[i]) +
+             " by " + shown(scale * norm(moved.shift)) +
+             ", expected at most half its radius: use a smaller timestep.");
 }
 
 template <int D> void OverdampedFlow::move_in(const Move &m, Pass pass)

@@ -7,6 +7,7 @@
 #include "force.h"
 #include "memory.h"
 #include "neighbor.h"
+#include "refusal.h"
 #include "text.hpp"
 #include "update.h"
 #include "utils.h"
@@ -106,10 +107,10 @@ void PairContact::measure_particles()
     const Vec<3> semi_axes = particles.semi_axes(i);
     if (!is_valid_shape(semi_axes, type)) {
       const Vec<3> diameters = 2.0 * semi_axes;
-      error->one(FLERR, style_name() + " found atom " + std::to_string(atom->tag[i]) +
-                            " with diameters " + shown(diameters[0]) + " " + shown(diameters[1]) +
-                            " " + shown(diameters[2]) + ", expected that " + shape_rule() +
-                            ": correct its shape.");
+      refuse(lmp, FLERR,
+             style_name() + " found atom " + std::to_string(atom->tag[i]) + " with diameters " +
+                 shown(diameters[0]) + " " + shown(diameters[1]) + " " + shown(diameters[2]) +
+                 ", expected that " + shape_rule() + ": correct its shape.");
     }
     mine[type] = std::max(mine[type], bounding_radius(semi_axes, type));
     const Shortcut its = shortcut(semi_axes, type);
@@ -253,9 +254,10 @@ void PairContact::require_same_bound(int i, const Vec<3> &semi_axes) const
 {
   const int type = atom->type[i];
   if (bounding_radius(semi_axes, type) <= largest_radius[type]) return;
-  error->one(FLERR, "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
-                        " larger than at the start of the run, so the ghost cutoff is too short: "
-                        "do not use 'pre no' in the run after changing shapes.");
+  refuse(lmp, FLERR,
+         "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+             " larger than at the start of the run, so the ghost cutoff is too short: "
+             "do not use 'pre no' in the run after changing shapes.");
 }
 
 /// Contacts of a particle that is nowhere would be dropped in silence.
@@ -265,12 +267,12 @@ void PairContact::require_numbers(int n) const
     const double *const x = atom->x[i];
     const Quaternion q = particles.orientation(i);
     if (std::isfinite(x[0] + x[1] + x[2] + q.w + q.i + q.j + q.k)) continue;
-    error->one(FLERR, "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
-                          " at " + shown(x[0]) + " " + shown(x[1]) + " " + shown(x[2]) +
-                          " with quaternion " + shown(q.w) + " " + shown(q.i) + " " + shown(q.j) +
-                          " " + shown(q.k) +
-                          ", expected finite numbers: use a smaller timestep, or correct its "
-                          "start.");
+    refuse(lmp, FLERR,
+           "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) + " at " +
+               shown(x[0]) + " " + shown(x[1]) + " " + shown(x[2]) + " with quaternion " +
+               shown(q.w) + " " + shown(q.i) + " " + shown(q.j) + " " + shown(q.k) +
+               ", expected finite numbers: use a smaller timestep, or correct its "
+               "start.");
   }
 }
 
@@ -279,28 +281,29 @@ void PairContact::require_in_plane(int n) const
   for (int i = 0; i < n; ++i) {
     const Quaternion q = particles.orientation(i);
     if (q.i != 0.0 || q.j != 0.0) {
-      error->one(FLERR,
-                 "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
-                     " turned out of the plane, expected a quaternion (w, 0, 0, k) in dimension "
-                     "2: turn it about z only.");
+      refuse(lmp, FLERR,
+             "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+                 " turned out of the plane, expected a quaternion (w, 0, 0, k) in dimension "
+                 "2: turn it about z only.");
     }
   }
 }
 
 void PairContact::stop_at_crossing(int i, int j)
 {
-  error->one(FLERR,
-             "pair_style " + style_name() + " found atoms " + std::to_string(atom->tag[i]) +
-                 " and " + std::to_string(atom->tag[j]) + " with " + without_force() +
-                 ", where no contact force exists: start from a state without overlap, or use a "
-                 "smaller timestep.");
+  refuse(lmp, FLERR,
+         "pair_style " + style_name() + " found atoms " + std::to_string(atom->tag[i]) + " and " +
+             std::to_string(atom->tag[j]) + " with " + without_force() +
+             ", where no contact force exists: start from a state without overlap, or use a "
+             "smaller timestep.");
 }
 
 void PairContact::stop_at_unconverged(int i, int j)
 {
-  error->one(FLERR, "pair_style " + style_name() + " found no converged contact of atoms " +
-                        std::to_string(atom->tag[i]) + " and " + std::to_string(atom->tag[j]) +
-                        ": use semi-axes within a factor 100 and exponents from 0.55 to 10.");
+  refuse(lmp, FLERR,
+         "pair_style " + style_name() + " found no converged contact of atoms " +
+             std::to_string(atom->tag[i]) + " and " + std::to_string(atom->tag[j]) +
+             ": use semi-axes within a factor 100 and exponents from 0.55 to 10.");
 }
 
 bool PairContact::is_mine(int i, int j) const

@@ -2,6 +2,7 @@
 
 #include "atom.h"
 #include "error.h"
+#include "refusal.h"
 
 namespace jamshape {
 
@@ -14,9 +15,10 @@ void ParticleView::require_ellipsoids(const std::string &style) const
   }
   for (int i = 0; i < atom->nlocal; ++i) {
     if (atom->ellipsoid[i] < 0) {
-      error->one(FLERR, style + " found atom " + std::to_string(atom->tag[i]) +
-                            " without a shape, expected an ellipsoid: list it in the data file's "
-                            "Ellipsoids section or use 'set atom ... shape'.");
+      refuse(lmp, FLERR,
+             style + " found atom " + std::to_string(atom->tag[i]) +
+                 " without a shape, expected an ellipsoid: list it in the data file's "
+                 "Ellipsoids section or use 'set atom ... shape'.");
     }
   }
 }

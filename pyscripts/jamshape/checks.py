@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import os
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -277,3 +278,31 @@ def _said(value: Any) -> str:
     text = value if isinstance(value, numbers.Real) else repr(value)
     said = str(text)
     return said if len(said) <= 80 else f"{said[:77]}..."
+
+
+RANKS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
+"""What mpirun of Open MPI, of MPICH, and srun tell each process that they start: how many there are. (SLURM_NTASKS is
+what a job was given, in which one process may run.)"""
+
+
+def require_one_process() -> None:
+    """Refuse to be one of several ranks, which were all told to write the same file.
+
+    Raises
+    ------
+    RuntimeError
+        One sentence, if mpirun or srun started several.
+
+    Examples
+    --------
+    >>> require_one_process()
+    """
+    for name in RANKS:
+        ranks = os.environ.get(name, "1")
+        if ranks.isdecimal() and int(ranks) > 1:
+            msg = (
+                f"found {ranks} MPI ranks ({name}), expected one process, since each would write the same file;"
+                " start it without mpirun or srun (jamshape sweep makes packings on all cores), or unset"
+                f" {name} where each writes a file of its own"
+            )
+            raise RuntimeError(msg)

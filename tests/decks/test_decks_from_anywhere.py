@@ -19,23 +19,12 @@ from jamshape.lammps.session import Session
 
 sys.path.append(str(Path(__file__).parents[1] / "styles"))
 
+from deck_settings import LEFT, SMALL
 from lammps_scenes import ENVIRONMENT, MPIRUN, REPOSITORY, complaints_of
 
 pytestmark = pytest.mark.lammps
 
 PAGE = REPOSITORY / "docs" / "how-to" / "decks.md"
-SMALL = {
-    "compress_spherocylinder": {"n": 16, "kappa": 1e-2, "dt": 0.1, "phi_end": 0.8},
-    "compress_superellipsoid": {"n": 12, "kappa": 4e-3, "phi_end": 0.6},
-    "minimize_spherocylinder": {"maxiter": 10},
-    "minimize_superellipsoid": {"maxiter": 10},
-}
-LEFT = {
-    "compress_spherocylinder": {"initial.data", "particles.dump", "contacts.dump"},
-    "compress_superellipsoid": {"initial.data", "particles.dump", "contacts.dump", "final.data"},
-    "minimize_spherocylinder": {"final.data"},
-    "minimize_superellipsoid": {"final.data"},
-}
 NOT_FOUND = (
     "ERROR: Found no jamshape_plugin.so, expected the plugin of jamshape: run './run setup' in its "
     "folder, or set JAMSHAPE_PLUGIN to the path of the plugin."

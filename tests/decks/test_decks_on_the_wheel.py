@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from deck_settings import LEFT, SMALL
 from lammps_scenes import ENVIRONMENT, REPOSITORY
 
 from jamshape.files.lammps_text import read_dump
+from jamshape.lammps.plugin import PLUGIN_NAME, plugin_path
 
 LMP = os.environ.get("JAMSHAPE_TEST_LMP", "")
 pytestmark = [
@@ -24,18 +27,6 @@ pytestmark = [
 ]
 
 STRANGE = "my $(runs) $x é 'r' [a]"
-SETTINGS = {
-    "compress_spherocylinder": {"n": 16, "kappa": 1e-2, "dt": 0.1, "phi_end": 0.8, "frames": 4},
-    "compress_superellipsoid": {"n": 12, "kappa": 4e-3, "phi_end": 0.6, "frames": 4},
-    "minimize_spherocylinder": {"maxiter": 10},
-    "minimize_superellipsoid": {"maxiter": 10},
-}
-LEFT = {
-    "compress_spherocylinder": {"initial.data", "particles.dump", "contacts.dump"},
-    "compress_superellipsoid": {"initial.data", "particles.dump", "contacts.dump", "final.data"},
-    "minimize_spherocylinder": {"final.data"},
-    "minimize_superellipsoid": {"final.data"},
-}
 
 
 def bare_environment():
@@ -58,7 +49,7 @@ def variables(settings):
 
 def run_deck(name, folder, ranks=1, **settings):
     deck = REPOSITORY / "inputs" / f"{name}.in"
-    done = lmp(folder, "-in", deck, *variables(SETTINGS[name] | settings), ranks=ranks)
+    done = lmp(folder, "-in", deck, *variables(SMALL[name] | settings), ranks=ranks)
     assert done.returncode == 0, done.stdout[-3000:]
     assert "Traceback" not in done.stdout
     return done.stdout
@@ -88,7 +79,7 @@ def test_decks_run_and_leave_nothing_where_they_were_started(shape, ranks, tmp_p
     ],
 )
 def test_a_compression_through_jamming_is_that_of_debian_to_the_last_bit(name, settings, tmp_path):
-    deck, words = REPOSITORY / "inputs" / f"{name}.in", variables(SETTINGS[name] | settings)
+    deck, words = REPOSITORY / "inputs" / f"{name}.in", variables(SMALL[name] | settings)
     run_deck(name, tmp_path, out="wheel", **settings)
     done = subprocess.run(
         ["lmp", "-in", deck, *words, "-var", "out", "debian"], cwd=tmp_path, timeout=300, check=False,
@@ -160,6 +151,29 @@ def test_where_nothing_loads_the_plugin_a_sentence_says_what_to_do(tmp_path):
         [sentence] = re.findall("^ERROR.*$", done.stdout, re.MULTILINE)
         assert sentence.startswith("ERROR: Found LAMMPS without the plugin of jamshape, expected")
         assert done.returncode == 1
+
+
+@pytest.mark.parametrize("plugin", ["/no/where.so", "of the tests"])
+def test_a_named_plugin_that_is_none_of_this_lammps_is_one_sentence(plugin, tmp_path):
+    plugin = {"of the tests": str(plugin_path())}.get(plugin, plugin)
+    loader = f'include "{REPOSITORY}/inputs/load_plugin.lmp"\n'
+    done = not_loaded(tmp_path, loader, JAMSHAPE_PLUGIN=plugin)
+    [sentence] = re.findall("^ERROR.*$", done.stdout, re.MULTILINE)
+    assert sentence.startswith("ERROR: Found LAMMPS without the plugin of jamshape, expected")
+    assert f"Open of file {plugin} failed: " in done.stdout
+    assert done.returncode == 1
+
+
+def test_an_installation_whose_plugin_was_taken_away_says_where_it_looked(tmp_path):
+    """The `lmp` of the environment asks it, and goes on without."""
+    package = next(Path(LMP).parents[1].glob("lib/python3*/site-packages/jamshape"))
+    shutil.copytree(package, tmp_path / "jamshape", ignore=shutil.ignore_patterns(PLUGIN_NAME))
+    (tmp_path / "own.in").write_text("jamshape styles\n")
+    done = lmp(tmp_path, "-in", "own.in", PYTHONPATH=str(tmp_path))
+    missing = f"WARNING: Found no LAMMPS plugin at {tmp_path}/jamshape/{PLUGIN_NAME}, expected one"
+    assert missing in done.stdout
+    [sentence] = re.findall("^ERROR.*$", done.stdout, re.MULTILINE)
+    assert sentence.startswith("ERROR: Unknown command: jamshape styles")
 
 
 def test_a_plugin_that_is_named_is_loaded(tmp_path):

@@ -137,6 +137,12 @@ def error_of(done):
     return re.sub(r" \(\S+:\d+\)$", "", found[1])
 
 
+def refusals(value, sentence):
+    """What may be said of a number: newer LAMMPS refuses those beyond all doubles before we see them."""
+    too_large = f"Floating point number {value} in input script or data file is out of range"
+    return {sentence, too_large} if np.isinf(float(value)) else {sentence}
+
+
 @contextmanager
 def loaded(packing, folder, **keywords):
     """A LAMMPS instance in this process that holds a packing and its pair style."""

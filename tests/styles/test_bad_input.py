@@ -14,6 +14,7 @@ from lammps_scenes import (
     environment,
     error_of,
     load_plugin,
+    refusals,
     rods,
     rods_3d,
     run_lmp,
@@ -71,12 +72,12 @@ def test_what_is_not_a_number_is_named(command, word, sentence_of):
 @pytest.mark.parametrize("value", ["0.0", "-2.0", "1e400"])
 def test_drag_must_be_positive(value, sentence_of):
     expected = f"fix overdamped/affine found drag {value}, expected a positive number."
-    assert sentence_of(FIX.replace("1.0", value)) == expected
+    assert sentence_of(FIX.replace("1.0", value)) in refusals(value, expected)
 
 
 def test_rate_must_be_finite(sentence_of):
     expected = "fix overdamped/affine found compress -1e400, expected a finite rate."
-    assert sentence_of(FIX.replace("1e-3", "-1e400")) == expected
+    assert sentence_of(FIX.replace("1e-3", "-1e400")) in refusals("-1e400", expected)
 
 
 @pytest.mark.parametrize("words", ["sides three", "sides", "", "side one", "sides one two"])
@@ -174,7 +175,8 @@ def test_unset_coefficients_are_noticed(tmp_path):
     packing = two_rods(species=np.array([1, 2]))
     text = scene(packing, tmp_path / "s.data").replace("pair_coeff * *", "pair_coeff 1 1")
     done = run_lmp(f"{load_plugin()}\n{text}\nrun 0", tmp_path)
-    assert error_of(done) == "All pair coeffs are not set"
+    # Newer LAMMPS lists them below.
+    assert re.fullmatch(r"All pair coeffs are not set(\. Status:)?", error_of(done))
 
 
 # --- particles that are nowhere --------------------------------------------------------------------

@@ -11,7 +11,6 @@ from __future__ import annotations
 import difflib
 import importlib
 import importlib.metadata
-import os
 import sys
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -33,10 +32,6 @@ COMMANDS = {
 """Subcommands, each a module of this package, and what they do."""
 
 OLDEST_PYTHON = (3, 11)
-
-RANKS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
-"""What mpirun of Open MPI, of MPICH, and srun tell each process that they start: how many there are. (SLURM_NTASKS is
-what a job was given, in which one process may run.)"""
 
 _NAME = "jamshape"
 _WRONG_USE = 2  # as of argparse
@@ -92,7 +87,7 @@ def _run(command: str, arguments: list[str], called: _Called) -> NoReturn:
         module = importlib.import_module(f"{__name__}.{command}")
         # The rest ends in a moment, and a rank of something else may ask for it, as decks do for `initial`.
         if hasattr(module, "GO_ON"):
-            _require_one_process()
+            importlib.import_module("jamshape.checks").require_one_process()
     parser = module.options_of()
     parser.prog = called.name
     parser.description = parser.description.replace(f"{_NAME} {command} ", f"{called.words} ")
@@ -107,19 +102,6 @@ def _require_python() -> None:
         found, least = (".".join(map(str, v[:2])) for v in (sys.version_info, OLDEST_PYTHON))
         msg = f"{sys.executable} is Python {found}, expected {least} or newer; {SET_UP}"
         raise RuntimeError(msg)
-
-
-def _require_one_process() -> None:
-    """Refuse to be one of several ranks, which were all told to write the same file."""
-    for name in RANKS:
-        ranks = os.environ.get(name, "1")
-        if ranks.isdecimal() and int(ranks) > 1:
-            msg = (
-                f"found {ranks} MPI ranks ({name}), expected one process, since each would write the same file;"
-                f" start it without mpirun or srun ({_NAME} sweep makes packings on all cores), or unset {name}"
-                " where each writes a file of its own"
-            )
-            raise RuntimeError(msg)
 
 
 def _help() -> str:

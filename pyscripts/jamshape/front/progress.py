@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+from jamshape.checks import require_one_process
+
 _Step = TypeVar("_Step")
 
 # Between two lines of a log, and between two looks of a bar, in seconds.
@@ -174,6 +176,7 @@ def place(file: str | Path | None, name: str) -> Place:
     if file is None:
         folder = Folder()
         return Place(folder.path / name, folder)
+    require_one_process()
     path = Path(file)
     path.parent.mkdir(parents=True, exist_ok=True)
     return Place(path)

@@ -7,7 +7,8 @@ import sys
 import pytest
 from lammps_scenes import ENVIRONMENT, MPIRUN
 
-from jamshape.commands import RANKS
+import jamshape as js
+from jamshape.checks import RANKS
 
 pytestmark = pytest.mark.lammps
 
@@ -35,6 +36,22 @@ def test_one_of_several_ranks_is_refused(jamshape, tmp_path, monkeypatch, name, 
         f" cores), or unset {name} where each writes a file of its own"
     )
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("call", [js.make_packing, js.compress, js.slow_compress])
+def test_so_is_a_call_from_python_that_writes_a_file(call, tmp_path, monkeypatch):
+    monkeypatch.setenv(RANKS[1], "2")
+    with pytest.raises(RuntimeError, match=rf"^found 2 MPI ranks \({RANKS[1]}\), expected one"):
+        call(js.Spherocylinders(alpha=1), n=16, file=tmp_path / "new" / "out.h5")
+    assert not list(tmp_path.iterdir())
+
+
+def test_each_rank_may_make_a_packing_of_its_own(monkeypatch):
+    """In memory: nothing of it is shared."""
+    monkeypatch.setenv(RANKS[1], "2")
+    rods = js.Spherocylinders(alpha=1)
+    made = js.make_packing(rods, n=16, phi_start=0.55, u0=1e-6, progress=False)
+    assert made.u == pytest.approx(1e-6)
 
 
 def test_one_rank_and_a_job_of_several_tasks_are_not(jamshape, tmp_path, monkeypatch):

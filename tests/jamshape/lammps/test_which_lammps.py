@@ -5,7 +5,8 @@ from importlib import metadata
 
 import pytest
 
-from jamshape.lammps import module, plugin
+from jamshape import commands
+from jamshape.lammps import module, plugin, session
 from jamshape.lammps.module import lammps_class, sentence_of
 from jamshape.lammps.plugin import PluginError
 
@@ -42,6 +43,47 @@ def test_a_wheel_without_a_plugin_goes_on(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(plugin, "_folder_of_binaries", lambda: tmp_path)
     assert plugin.plugin_folder() == ""
     assert capsys.readouterr().err.startswith("WARNING: Found no LAMMPS plugin at ")
+
+
+@pytest.fixture
+def moved(monkeypatch, tmp_path):
+    """An installation whose plugin was taken away; its path."""
+    monkeypatch.setattr(plugin, "_folder_of_binaries", lambda: tmp_path)
+    return tmp_path / "jamshape_plugin.so"
+
+
+def moved_sentence(path):
+    return (
+        f"Found no LAMMPS plugin at {path}, expected one: install a wheel of jamshape that has it, or LAMMPS with its "
+        "headers (Debian's lammps, liblammps-dev and python3-lammps) and then jamshape again."
+    )
+
+
+@pytest.mark.lammps
+def test_a_session_without_its_plugin_starts_no_lammps(moved, monkeypatch):
+    monkeypatch.setattr(session, "start_lammps", lambda _: pytest.fail("LAMMPS was started"))
+    with pytest.raises(PluginError) as refused:
+        session.Session()
+    assert str(refused.value) == moved_sentence(moved)
+
+
+@pytest.mark.lammps
+@pytest.mark.parametrize("words", [["plugin"], ["compress", "--n", "16", "--out", "run.h5"]])
+def test_a_command_without_the_plugin_says_so_and_leaves_nothing(words, moved, monkeypatch):
+    folder = moved.parent
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "argv", ["jamshape", *words])
+    with pytest.raises(SystemExit) as ended:
+        commands.main()
+    assert ended.value.code == f"jamshape {words[0]}: {moved_sentence(moved)}"
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize("size", [0, 100])
+def test_what_is_no_plugin_is_named(moved, size):
+    moved.write_bytes(bytes(size))
+    with pytest.raises(PluginError, match=rf"^Found no label of jamshape in {moved}, expected"):
+        plugin.built_for()
 
 
 def test_where_no_lammps_is_there_it_says_what_to_install(monkeypatch):

