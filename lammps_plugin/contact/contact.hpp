@@ -99,7 +99,8 @@ struct NoStart {};
 
 /// What the drag on the substrate needs of a particle (Marschall & Teitel 2018, Eqs. 8-12): its
 /// area (volume in 3D) and, per body axis, the integral of the squared distance from that axis over
-/// it, divided by it (their I, Eq. 10, about z in 2D).
+/// it, divided by it (their I, Eq. 10, about z; in the plane those about x and y are of its
+/// own flat body).
 struct SubstrateDrag {
   double measure;
   Vec<3> moment;

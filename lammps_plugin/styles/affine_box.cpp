@@ -3,6 +3,7 @@
 #include "domain.h"
 #include "update.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace jamshape {
@@ -10,48 +11,84 @@ namespace jamshape {
 using LAMMPS_NS::bigint;
 using LAMMPS_NS::imageint;
 
-AffineBox::AffineBox(LAMMPS_NS::LAMMPS *lmp, double kappa, Reference fixed_point) :
+namespace {
+
+bool operator==(const Upper &a, const Upper &b)
+{
+  return std::equal(a.diagonal.c, a.diagonal.c + 3, b.diagonal.c) && a.xy == b.xy && a.xz == b.xz &&
+         a.yz == b.yz;
+}
+
+Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
+
+}  // namespace
+
+AffineBox::AffineBox(LAMMPS_NS::LAMMPS *lmp, const Upper &gradient, Reference fixed_point) :
     Pointers(lmp), fixed(fixed_point), dimension(domain->dimension), now{}, started(false)
 {
-  now.rate = kappa;
+  now.rate = gradient;
 }
 
 void AffineBox::restore(const State &from)
 {
-  const double kappa = now.rate;
+  const Upper gradient = now.rate;
   now = from;
   started = true;
-  if (kappa != from.rate) {
-    now.strain_base = strain(update->ntimestep);
-    now.step_base = update->ntimestep;
-    now.rate = kappa;
-  }
+  if (!(gradient == from.rate)) go_on_from(update->ntimestep);
+  now.rate = gradient;
 }
 
 void AffineBox::begin_run()
 {
   const bigint step = update->ntimestep;
-  bool same_box = started;
-  if (started) {
-    double lo[3], hi[3];
-    edges(scale(step), lo, hi);
-    for (int k = 0; k < 3; ++k) {
-      same_box = same_box && lo[k] == domain->boxlo[k] && hi[k] == domain->boxhi[k];
-    }
-  }
-  if (!same_box) {
-    for (int k = 0; k < 3; ++k) {
-      now.lo[k] = domain->boxlo[k];
-      now.hi[k] = domain->boxhi[k];
-    }
-    now.strain_base = 0.0;
-    now.step_base = step;
+  if (!started || !is_in_box(bounds(deformation(step)))) {
+    start_here(step);
   } else if (now.dt != update->dt) {
-    now.strain_base = strain(step);
-    now.step_base = step;
+    go_on_from(step);
   }
   now.dt = update->dt;
   started = true;
+}
+
+bool AffineBox::is_in_box(const Bounds &at) const
+{
+  bool same = at.xy == domain->xy && at.xz == domain->xz && at.yz == domain->yz;
+  for (int k = 0; k < 3; ++k) {
+    same = same && at.lo[k] == domain->boxlo[k] && at.hi[k] == domain->boxhi[k];
+  }
+  return same;
+}
+
+void AffineBox::start_here(bigint step)
+{
+  const Upper gradient = now.rate;
+  now = State{};
+  for (int k = 0; k < 3; ++k) {
+    now.lo[k] = domain->boxlo[k];
+    now.hi[k] = domain->boxhi[k];
+  }
+  if (domain->triclinic) {
+    now.xy = domain->xy;
+    now.xz = domain->xz;
+    now.yz = domain->yz;
+  }
+  now.rate = gradient;
+  now.step_base = step;
+}
+
+void AffineBox::go_on_from(bigint step)
+{
+  const double elapsed = time(step);
+  const Upper present = deformation(step);
+  now.stretch_base = stretch(elapsed);
+  const double shears[3] = {present.xy, present.xz, present.yz};
+  const double rates[3] = {now.rate.xy, now.rate.xz, now.rate.yz};
+  for (int k = 0; k < 3; ++k) {
+    now.base[k] = shears[k];
+    now.sheared[k] += rates[k] * elapsed;
+  }
+  now.flips = {0.0, 0.0, 0.0};
+  now.step_base = step;
 }
 
 double AffineBox::time(bigint step) const
@@ -59,40 +96,151 @@ double AffineBox::time(bigint step) const
   return static_cast<double>(step - now.step_base) * now.dt;
 }
 
-double AffineBox::strain(bigint step) const { return now.strain_base + now.rate * time(step); }
-
-double AffineBox::scale(bigint step) const { return std::exp(-strain(step)); }
-
-double AffineBox::scale(bigint step, double time_after) const
+/// Logarithms of the diagonal of F.
+Vec<3> AffineBox::stretch(double elapsed) const
 {
-  return std::exp(-(now.strain_base + now.rate * (time(step) + time_after)));
+  Vec<3> found;
+  for (int k = 0; k < 3; ++k) found[k] = now.stretch_base[k] + now.rate.diagonal[k] * elapsed;
+  return found;
 }
 
-void AffineBox::edges(double scale, double *lo, double *hi) const
+double AffineBox::strain(bigint step) const
 {
-  for (int k = 0; k < 3; ++k) {
-    const bool shrinks = k < dimension;
-    const double point = fixed_point(k);
-    lo[k] = shrinks ? point + scale * (now.lo[k] - point) : now.lo[k];
-    hi[k] = shrinks ? point + scale * (now.hi[k] - point) : now.hi[k];
+  const Vec<3> log = stretch(time(step));
+  double uneven = 0.0;
+  for (int k = 1; k < dimension; ++k) uneven += log[k] - log[0];
+  return -(log[0] + uneven / dimension);
+}
+
+double AffineBox::shear_strain(bigint step) const
+{
+  return now.sheared[0] + now.rate.xy * time(step);
+}
+
+double AffineBox::pure_strain(bigint step) const
+{
+  const Vec<3> log = stretch(time(step));
+  return 0.5 * (log[0] - log[1]);
+}
+
+double AffineBox::speed() const
+{
+  const Upper &g = now.rate;
+  const Vec<3> &d = g.diagonal;
+  return std::max({std::abs(d[0]) + std::abs(g.xy) + std::abs(g.xz),
+                   std::abs(d[1]) + std::abs(g.yz), std::abs(d[2])});
+}
+
+bool AffineBox::is_isotropic() const
+{
+  const Vec<3> &d = now.rate.diagonal;
+  return !now.rate.has_shear() && d[0] == d[1] && (dimension == 2 || d[0] == d[2]);
+}
+
+/// F but for the flips.
+Upper AffineBox::unflipped(double elapsed) const
+{
+  Upper base{{}, now.base[0], now.base[1], now.base[2]};
+  for (int k = 0; k < 3; ++k) base.diagonal[k] = std::exp(now.stretch_base[k]);
+  Upper found = exponential(elapsed * now.rate) * base;
+  const Vec<3> log = stretch(elapsed);
+  for (int k = 0; k < 3; ++k) found.diagonal[k] = std::exp(log[k]);
+  return found;
+}
+
+Upper AffineBox::deformation(bigint step, double time_after) const
+{
+  const Upper found = unflipped(time(step) + time_after);
+  return now.flips.is_none() ? found : found * flips_in_reference(now.flips);
+}
+
+/* ----------------------------------------------------------------------
+   the cell
+------------------------------------------------------------------------- */
+
+Upper AffineBox::cell_at_start() const
+{
+  return {vec3(now.hi) - vec3(now.lo), now.xy, now.xz, now.yz};
+}
+
+Vec<3> AffineBox::fixed_point() const
+{
+  if (fixed == Reference::CORNER) return vec3(now.lo);
+  const Vec<3> tilts{{now.xy + now.xz, now.yz, 0.0}};
+  Vec<3> found;
+  for (int k = 0; k < 3; ++k) found[k] = 0.5 * (now.lo[k] + now.hi[k] + tilts[k]);
+  return found;
+}
+
+AffineBox::Bounds AffineBox::bounds(const Upper &deformation) const
+{
+  const Vec<3> point = fixed_point();
+  const Upper cell = deformation * cell_at_start();
+  const Vec<3> lo = vec3(now.lo), from_point = lo - point;
+  const Upper shear{{}, deformation.xy, deformation.xz, deformation.yz};
+  const Vec<3> sheared = shear * from_point;
+  Bounds found{lo, vec3(now.hi), cell.xy, cell.xz, cell.yz};
+  for (int k = 0; k < dimension; ++k) {
+    const double stretch = deformation.diagonal[k];
+    found.lo[k] = point[k] + (stretch * (now.lo[k] - point[k]) + sheared[k]);
+    found.hi[k] = point[k] + (stretch * (now.hi[k] - point[k]) + sheared[k]);
   }
+  return found;
 }
 
-void AffineBox::set_box(double scale)
+void AffineBox::set_box(const Upper &deformation)
 {
-  edges(scale, domain->boxlo, domain->boxhi);
+  const Bounds at = bounds(deformation);
+  std::copy_n(at.lo.c, 3, domain->boxlo);
+  std::copy_n(at.hi.c, 3, domain->boxhi);
+  if (domain->triclinic) {
+    domain->xy = at.xy;
+    domain->xz = at.xz;
+    domain->yz = at.yz;
+  }
   domain->set_global_box();
   domain->set_local_box();
 }
 
-Vec<3> AffineBox::reference(const double *x, imageint image, double scale) const
+Vec<3> AffineBox::reference(const double *x, imageint image, const Upper &deformation) const
 {
-  const Vec<3> images = image_counts(image);
+  const Vec<3> images = image_counts(image), turns = cell_at_start() * images;
+  const Vec<3> offset = vec3(x) - fixed_point();
+  const Upper shear = divided(1.0, deformation);
+  const Vec<3> sheared = Upper{{}, shear.xy, shear.xz, shear.yz} * offset;
   Vec<3> y{};
   for (int k = 0; k < dimension; ++k) {
-    y[k] = (x[k] - fixed_point(k)) / scale + images[k] * edge_at_start(k);
+    y[k] = offset[k] / deformation.diagonal[k] + sheared[k] + turns[k];
   }
   return y;
+}
+
+AffineBox::Flip AffineBox::flip_needed(bigint step, double most) const
+{
+  const Upper cell = deformation(step) * cell_at_start();
+  const Vec<3> &edge = cell.diagonal;
+  const auto turns = [&](double tilt, double along) {
+    return std::abs(tilt) > most * along ? -std::nearbyint(tilt / along) : 0.0;
+  };
+  Flip found{turns(cell.xy, edge[0]), 0.0, turns(cell.yz, edge[1])};
+  // c takes the tilt of the new b along.
+  found.n = turns(cell.xz + found.p * cell.xy, edge[0]);
+  return found;
+}
+
+/// H M H^-1 with H the cell at strain 0, M the flip: from coordinates of its new choice to the old.
+Upper AffineBox::flips_in_reference(const Flip &by) const
+{
+  const Upper cell = cell_at_start();
+  return cell * Upper{{{1.0, 1.0, 1.0}}, by.m, by.n, by.p} * divided(1.0, cell);
+}
+
+Upper AffineBox::flip(const Flip &by)
+{
+  // The product of both, which is of whole numbers.
+  Flip &all = now.flips;
+  all = {all.m + by.m, all.n + by.n + all.m * by.p, all.p + by.p};
+  return divided(1.0, flips_in_reference(by));
 }
 
 }  // namespace jamshape

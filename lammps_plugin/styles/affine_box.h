@@ -3,76 +3,104 @@
 #include "contact/math/vec.hpp"
 
 #include "pointers.h"
+#include "upper.h"
 
 namespace jamshape {
 
-/// The shrinking box (Marschall & Teitel 2018, Eq. 6): dL/dt = -kappa L towards a fixed point.
-/// Edges and positions follow from the absolute strain kappa t, never from multiplying step by
-/// step: at kappa = 1e-10 one step changes L by 1e-12, and the rounding of a product would add up.
+/// The box that a host of constant velocity gradient G carries with it, dx/dt = G x about a fixed
+/// point: G = -kappa 1 is the shrinking box of Marschall & Teitel 2018, Eq. 6. Cell and positions
+/// follow from the deformation F = exp(G t) since strain 0, never from multiplying step by step: at
+/// a rate of 1e-10 one step changes them by 1e-12, and the rounding of a product would add up.
 class AffineBox : protected LAMMPS_NS::Pointers {
  public:
   /// Which point of the box stays where it is.
   enum class Reference { CENTER, CORNER };
 
+  /// Another choice of the cell vectors of the same lattice: b + m a and c + p b + n a.
+  struct Flip {
+    double m, n, p;
+    bool is_none() const { return m == 0.0 && n == 0.0 && p == 0.0; }
+  };
+
   /// What a restart must bring back to the last bit.
   struct State {
-    double lo[3], hi[3];  // at strain 0
-    double strain_base;   // strain at step_base
-    double rate, dt;      // since then
+    double lo[3], hi[3];         // at strain 0
+    double xy, xz, yz;           // the same cell's tilt
+    Vec<3> stretch_base;         // logarithms of the diagonal of F at step_base
+    double base[3], sheared[3];  // its xy, xz, yz, flips apart; integrals of those of G until then
+    Flip flips;                  // since step_base
+    Upper rate;                  // G, since then
+    double dt;
     LAMMPS_NS::bigint step_base;
   };
 
-  AffineBox(LAMMPS_NS::LAMMPS *lmp, double kappa, Reference fixed_point);
+  AffineBox(LAMMPS_NS::LAMMPS *lmp, const Upper &gradient, Reference fixed_point);
 
   const State &state() const { return now; }
   void restore(const State &from);
 
   /// At the start of a run: takes the present box as strain 0 unless it is the box of the present
-  /// strain, and goes on from the present strain when the rate or the time step changed.
+  /// strain, and goes on from the present strain when the rates or the time step changed.
   void begin_run();
 
-  /// Time since the rate or the time step last changed.
+  /// Time since the rates or the time step last changed.
   double time(LAMMPS_NS::bigint step) const;
+  /// By how much all lengths have shrunk on the mean, -ln(V) / D; the integrals of G_xy, and of
+  /// (G_xx - G_yy) / 2.
   double strain(LAMMPS_NS::bigint step) const;
-  /// L / L(strain 0), at a step and at a time after it.
-  double scale(LAMMPS_NS::bigint step) const;
-  double scale(LAMMPS_NS::bigint step, double time_after) const;
-  /// Gives LAMMPS the box of that scale.
-  void set_box(double scale);
+  double shear_strain(LAMMPS_NS::bigint step) const;
+  double pure_strain(LAMMPS_NS::bigint step) const;
+  /// How fast the flow strains: the largest sum of a row of |G|.
+  double speed() const;
+  /// Whether it does anything but shrink or grow the box evenly.
+  bool is_isotropic() const;
 
-  /// The box of one scale: positions from coordinates in the box of strain 0 (relative to the fixed
-  /// point, unwrapped). `image` holds LAMMPS's periodic image counts.
-  template <int D> struct Scaled {
-    Vec<D> fixed_point, edge_at_start;
-    double scale;
+  /// F, at a step and at a time after it.
+  Upper deformation(LAMMPS_NS::bigint step, double time_after = 0.0) const;
+  /// Gives LAMMPS the box of that deformation.
+  void set_box(const Upper &deformation);
+
+  /// Flips that bring back a tilt of more than `most` of the edge that it goes along.
+  Flip flip_needed(LAMMPS_NS::bigint step, double most) const;
+  /// Takes them, and returns what coordinates in the box of strain 0 are to be multiplied with: the
+  /// cell at strain 0 stays as it was.
+  Upper flip(const Flip &by);
+
+  /// The box of one deformation: positions from coordinates in the box of strain 0 (relative to the
+  /// fixed point, unwrapped). `image` holds LAMMPS's periodic image counts.
+  template <int D> struct Deformed {
+    Vec<D> fixed_point;
+    Upper cell_at_start, deformation;
 
     Vec<D> position(const Vec<D> &reference, LAMMPS_NS::imageint image) const
     {
-      const Vec<3> images = image_counts(image);
-      Vec<D> x;
-      for (int k = 0; k < D; ++k) {
-        x[k] = fixed_point[k] + scale * (reference[k] - images[k] * edge_at_start[k]);
-      }
-      return x;
+      const Vec<3> all = image_counts(image);
+      Vec<D> images;
+      for (int k = 0; k < D; ++k) images[k] = all[k];
+      return fixed_point + deformation * (reference - cell_at_start * images);
     }
   };
-  template <int D> Scaled<D> scaled(double scale) const
+  template <int D> Deformed<D> deformed(const Upper &deformation) const
   {
-    Scaled<D> found{{}, {}, scale};
-    for (int k = 0; k < D; ++k) {
-      found.fixed_point[k] = fixed_point(k);
-      found.edge_at_start[k] = edge_at_start(k);
-    }
+    const Vec<3> point = fixed_point();
+    Deformed<D> found{{}, cell_at_start(), deformation};
+    for (int k = 0; k < D; ++k) found.fixed_point[k] = point[k];
     return found;
   }
   /// And back.
-  Vec<3> reference(const double *x, LAMMPS_NS::imageint image, double scale) const;
+  Vec<3> reference(const double *x, LAMMPS_NS::imageint image, const Upper &deformation) const;
 
  private:
   const Reference fixed;
   const int dimension;
   State now;
   bool started;
+
+  /// LAMMPS's numbers of a box.
+  struct Bounds {
+    Vec<3> lo, hi;
+    double xy, xz, yz;
+  };
 
   /// Signed image counts from LAMMPS's packed ones.
   static Vec<3> image_counts(LAMMPS_NS::imageint image)
@@ -82,12 +110,15 @@ class AffineBox : protected LAMMPS_NS::Pointers {
              static_cast<double>((image >> IMG2BITS) - IMGMAX)}};
   }
 
-  double fixed_point(int k) const
-  {
-    return fixed == Reference::CENTER ? 0.5 * (now.lo[k] + now.hi[k]) : now.lo[k];
-  }
-  double edge_at_start(int k) const { return now.hi[k] - now.lo[k]; }
-  void edges(double scale, double *lo, double *hi) const;
+  Vec<3> fixed_point() const;
+  Upper cell_at_start() const;
+  Bounds bounds(const Upper &deformation) const;
+  bool is_in_box(const Bounds &at) const;
+  Vec<3> stretch(double elapsed) const;
+  Upper unflipped(double elapsed) const;
+  Upper flips_in_reference(const Flip &by) const;
+  void go_on_from(LAMMPS_NS::bigint step);
+  void start_here(LAMMPS_NS::bigint step);
 };
 
 }  // namespace jamshape

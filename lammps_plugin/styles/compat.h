@@ -27,6 +27,7 @@ class Command : protected Pointers {
 
 namespace LAMMPS_NS {
 
+class LAMMPS;
 class Pair;
 
 class AtomVecEllipsoid {
@@ -42,6 +43,18 @@ class Min {
  public:
   /// Asks LAMMPS's minimiser for `ndof` more degrees of freedom an atom, kept by the pair style.
   int request(Pair *pair, int ndof, double maxmove);
+};
+
+/// Sends atoms to the ranks that they belong to, however far these are.
+class Irregular {
+ public:
+  explicit Irregular(LAMMPS *lmp);
+  ~Irregular();
+  /// Positions are parts of the cell's edges; none of the arguments is needed.
+  void migrate_atoms(int sorted, int assigned, int *ranks);
+
+ private:
+  alignas(64) unsigned char members[4096];  // LAMMPS's own, in a few hundred bytes
 };
 
 }  // namespace LAMMPS_NS

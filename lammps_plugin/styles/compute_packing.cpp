@@ -20,7 +20,30 @@ namespace jamshape {
 
 namespace {
 
-enum Value { PHI, U, P, Z, S_2, S_4, F_MAX, F_RMS, Z_SINGLE, RATTLERS, BONDS, OVERLAP, T_MAX, C_4 };
+enum Value {
+  PHI,
+  U,
+  P,
+  Z,
+  S_2,
+  S_4,
+  F_MAX,
+  F_RMS,
+  Z_SINGLE,
+  RATTLERS,
+  BONDS,
+  OVERLAP,
+  T_MAX,
+  C_4,
+  N_1,
+  P_XY,
+  SIGMA,
+  MU,
+  P_XZ,
+  P_YZ,
+  N_2,
+  DIRECTOR
+};
 
 /// Directions that the cubatic order tries are the axes of at most so many particles.
 constexpr LAMMPS_NS::bigint MOST_TRIED = 512;
@@ -120,7 +143,7 @@ void ComputePacking::compute_vector()
 void ComputePacking::compute_density_and_stress()
 {
   const int d = domain->dimension;
-  double volume = 1.0, measure = 0.0, trace = 0.0;
+  double volume = 1.0, measure = 0.0, trace = 0.0, stress[6];
   for (int k = 0; k < d; ++k) {
     volume *= domain->prd[k];
     trace += pair->virial[k];
@@ -131,6 +154,14 @@ void ComputePacking::compute_density_and_stress()
   vector[PHI] = sum(measure) / volume;
   vector[U] = sum(pair->eng_vdwl) / volume;
   vector[P] = sum(trace) / (d * volume);
+  MPI_Allreduce(pair->virial, stress, 6, MPI_DOUBLE, MPI_SUM, world);  // xx, yy, zz, xy, xz, yz
+  vector[N_1] = (stress[0] - stress[1]) / volume;
+  vector[N_2] = d == 3 ? (stress[1] - stress[2]) / volume : 0.0;
+  vector[P_XY] = stress[3] / volume;
+  vector[P_XZ] = stress[4] / volume;
+  vector[P_YZ] = stress[5] / volume;
+  vector[SIGMA] = std::hypot(0.5 * vector[N_1], vector[P_XY]);
+  vector[MU] = vector[P] > 0.0 ? vector[SIGMA] / vector[P] : 0.0;
 }
 
 void ComputePacking::compute_order()
@@ -142,7 +173,7 @@ void ComputePacking::compute_order()
     if (along) axes.push_back(body_axis(view.orientation(i), *along));
   }
   const double n = sum(static_cast<double>(axes.size()));
-  vector[S_2] = vector[S_4] = 0.0;
+  vector[S_2] = vector[S_4] = vector[DIRECTOR] = 0.0;
   if (n == 0.0) return;
 
   if (domain->dimension == 2) {
@@ -157,6 +188,7 @@ void ComputePacking::compute_order()
     MPI_Allreduce(mine, all, 4, MPI_DOUBLE, MPI_SUM, world);
     vector[S_2] = std::hypot(all[0], all[1]) / n;
     vector[S_4] = std::hypot(all[2], all[3]) / n;
+    vector[DIRECTOR] = 0.5 * std::atan2(all[1], all[0]);
     return;
   }
 

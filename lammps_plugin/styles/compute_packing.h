@@ -26,6 +26,14 @@ namespace jamshape {
 ///   13 tmax      largest net torque over mean bond force times the particle's radius of gyration
 ///   14 C_4       cubatic order (Yuan et al. 2019, Eq. 7) of shapes with three axes, in 3D, else 0;
 ///                directions tried are the axes of all particles, or of about 512 of many
+///   15 n_1       normal stress difference p_xx - p_yy of the pressure tensor, virial / L^d
+///   16 p_xy      shear pressure; the shear stress of rheology is -p_xy
+///   17 sigma     deviatoric stress in the plane of x and y, ((n_1 / 2)^2 + p_xy^2)^(1/2)
+///   18 mu        sigma / p
+///   19 p_xz
+///   20 p_yz
+///   21 n_2       p_yy - p_zz; 0 in 2D
+///   22 director  angle of the nematic director to x in 2D, in (-pi / 2, pi / 2]; 0 in 3D
 class ComputePacking : public LAMMPS_NS::Compute {
  public:
   ComputePacking(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);
@@ -35,7 +43,7 @@ class ComputePacking : public LAMMPS_NS::Compute {
   void compute_vector() override;
 
  private:
-  static constexpr int N_VALUES = 14;
+  static constexpr int N_VALUES = 22;
   PairContact *pair;
 
   double sum(double mine) const;

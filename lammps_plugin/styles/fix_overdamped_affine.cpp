@@ -2,6 +2,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "compat.h"
 #include "domain.h"
 #include "error.h"
 #include "modify.h"
@@ -31,31 +32,33 @@ constexpr double STRAIN_BETWEEN_CHECKS = 0.005;
 /// A step of LAMMPS may shrink the box by this strain: output between has to see something.
 constexpr double LARGEST_STRAIN = 1.0;
 
-constexpr int N_OF_SUBSTEPS = 8;
+constexpr int N_OF_SUBSTEPS = 8, N_OF_FLOW = 4;
 
 constexpr const char *SYNTAX =
-    "'drag k_d compress kappa [integrator NAME] [tolerance T] [stages MAX] "
-    "[reference center|corner] [check N]'.";
+    "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [flip F] [integrator NAME] "
+    "[tolerance T] [stages MAX] [reference center|corner] [check N]'.";
 
 /// What is global in a restart file.
 struct Saved {
   AffineBox::State box;
   StepState steps;
+  double mean_turn;
 };
 
 }  // namespace
 
 /// What the words of the command say, beside how often to check.
 struct FixOverdampedAffine::Command {
-  double k_d, kappa;
+  double k_d;
+  Upper gradient{};
   std::string method = "heun";
   IntegratorOptions of_method{};
   AffineBox::Reference reference = AffineBox::Reference::CENTER;
 };
 
 FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
-    Fix(lmp, narg, arg), check_every(1000), next_check(0), largest_rate(0.0), warned(false),
-    was_told(false), running(false)
+    Fix(lmp, narg, arg), check_every(1000), next_check(0), largest_rate(0.0), largest_tilt(0.5),
+    warned(false), was_told(false), running(false), inside_step(false)
 {
   make_parts(read(narg, arg));
   tell_what_this_is();
@@ -73,20 +76,76 @@ void FixOverdampedAffine::fail(const std::string &found_and_expected) const
 FixOverdampedAffine::Command FixOverdampedAffine::read(int narg, char **arg)
 {
   if (igroup != 0) fail("a group other than all, expected 'all': the whole box moves.");
-  if (narg < 7 || narg % 2 == 0 || std::strcmp(arg[3], "drag") || std::strcmp(arg[5], "compress")) {
+  if (narg < 5 || std::strcmp(arg[3], "drag")) {
     fail(std::string("a wrong list of arguments, expected ") + SYNTAX);
   }
   Command command;
-  command.k_d = LAMMPS_NS::utils::numeric(FLERR, arg[4], false, lmp);
-  command.kappa = LAMMPS_NS::utils::numeric(FLERR, arg[6], false, lmp);
+  command.k_d = number(arg[4]);
   if (!(command.k_d > 0.0) || !std::isfinite(command.k_d)) {
     fail(std::string("drag ") + arg[4] + ", expected a positive number.");
   }
-  if (!std::isfinite(command.kappa)) {
-    fail(std::string("compress ") + arg[6] + ", expected a finite rate.");
+  for (int k = 5; k < narg;) {
+    const int taken = read_flow(k, narg, arg, command);
+    if (taken == 0 && k + 1 >= narg) fail(std::string("'") + arg[k] + "', expected " + SYNTAX);
+    if (taken == 0) read_option(arg[k], arg[k + 1], command);
+    k += taken > 0 ? taken : 2;
   }
-  for (int k = 7; k < narg; k += 2) read_option(arg[k], arg[k + 1], command);
   return command;
+}
+
+double FixOverdampedAffine::number(const char *text) const
+{
+  return LAMMPS_NS::utils::numeric(FLERR, text, false, lmp);
+}
+
+/// Adds what a word says of the flow; how many words that took, 0 for one of another kind.
+int FixOverdampedAffine::read_flow(int k, int narg, char **arg, Command &to) const
+{
+  const std::string keyword = arg[k];
+  const int d = domain->dimension;
+  if (keyword == "gradient") {
+    if (k + d * d >= narg) {
+      fail("gradient with " + std::to_string(narg - k - 1) + " numbers, expected " +
+           std::to_string(d * d) + ", row by row.");
+    }
+    to.gradient = to.gradient + read_gradient(arg + k + 1);
+    return 1 + d * d;
+  }
+  if (keyword != "compress" && keyword != "shear" && keyword != "pure") return 0;
+  if (k + 1 >= narg) fail(keyword + " without a number, expected a rate.");
+  const double rate = number(arg[k + 1]);
+  if (!std::isfinite(rate)) fail(keyword + " " + arg[k + 1] + ", expected a finite rate.");
+  Upper added{};
+  if (keyword == "compress") {
+    for (int j = 0; j < d; ++j) added.diagonal[j] = -rate;
+  } else if (keyword == "shear") {
+    added.xy = rate;
+  } else {
+    added.diagonal = {{rate, -rate, 0.0}};
+  }
+  to.gradient = to.gradient + added;
+  return 2;
+}
+
+Upper FixOverdampedAffine::read_gradient(char **arg) const
+{
+  const int d = domain->dimension;
+  double entry[3][3] = {};
+  for (int row = 0; row < d; ++row) {
+    for (int column = 0; column < d; ++column) {
+      const char *const text = arg[d * row + column];
+      entry[row][column] = number(text);
+      if (!std::isfinite(entry[row][column])) {
+        fail(std::string("gradient with ") + text + ", expected finite rates.");
+      }
+      if (row > column && entry[row][column] != 0.0) {
+        fail(std::string("gradient with ") + text +
+             " below the diagonal, expected 0: turn the axes so that the flow keeps the first cell "
+             "vector along x and the second one in the plane of x and y.");
+      }
+    }
+  }
+  return {{{entry[0][0], entry[1][1], entry[2][2]}}, entry[0][1], entry[0][2], entry[1][2]};
 }
 
 void FixOverdampedAffine::read_option(const std::string &keyword, const char *text, Command &to)
@@ -95,11 +154,16 @@ void FixOverdampedAffine::read_option(const std::string &keyword, const char *te
   if (keyword == "integrator") {
     to.method = value;
   } else if (keyword == "tolerance") {
-    to.of_method.tolerance = LAMMPS_NS::utils::numeric(FLERR, text, false, lmp);
+    to.of_method.tolerance = number(text);
   } else if (keyword == "stages") {
     to.of_method.stages = LAMMPS_NS::utils::inumeric(FLERR, text, false, lmp);
   } else if (keyword == "reference" && (value == "center" || value == "corner")) {
     to.reference = value == "center" ? AffineBox::Reference::CENTER : AffineBox::Reference::CORNER;
+  } else if (keyword == "flip") {
+    largest_tilt = number(text);
+    if (!(largest_tilt >= 0.5 && std::isfinite(largest_tilt))) {
+      fail("flip " + value + ", expected a part of an edge of at least 0.5.");
+    }
   } else if (keyword == "check") {
     check_every = LAMMPS_NS::utils::bnumeric(FLERR, text, false, lmp);
     if (check_every < 0) fail("check " + value + ", expected a number of steps, or 0 for never.");
@@ -110,7 +174,8 @@ void FixOverdampedAffine::read_option(const std::string &keyword, const char *te
 
 void FixOverdampedAffine::make_parts(const Command &of)
 {
-  box = std::make_unique<AffineBox>(lmp, of.kappa, of.reference);
+  require_cell(of.gradient);
+  box = std::make_unique<AffineBox>(lmp, of.gradient, of.reference);
   try {
     integrator = make_integrator(of.method, *box, of.of_method);
   } catch (const std::invalid_argument &problem) {
@@ -129,13 +194,20 @@ void FixOverdampedAffine::tell_what_this_is()
   time_integrate = 1;
   time_depend = 1;
   no_change_box = 1;
-  box_change = BOX_CHANGE_X | BOX_CHANGE_Y | (domain->dimension == 3 ? BOX_CHANGE_Z : 0);
+  box_change = BOX_CHANGE_X | BOX_CHANGE_Y;
+  if (domain->dimension == 3) box_change |= BOX_CHANGE_Z;
+  if (domain->triclinic) {
+    box_change |= BOX_CHANGE_XY;
+    if (domain->dimension == 3) box_change |= BOX_CHANGE_XZ | BOX_CHANGE_YZ;
+    force_reneighbor = 1;
+    next_reneighbor = -1;
+  }
   restart_global = restart_peratom = 1;
   create_attribute = 1;
   maxexchange = flow->width();
   comm_forward = flow->width();
   vector_flag = 1;
-  size_vector = 8 + N_OF_SUBSTEPS;
+  size_vector = 8 + N_OF_SUBSTEPS + N_OF_FLOW;
   global_freq = 1;
   extvector = 0;
 }
@@ -149,7 +221,8 @@ FixOverdampedAffine::~FixOverdampedAffine()
 
 int FixOverdampedAffine::setmask()
 {
-  return LAMMPS_NS::FixConst::INITIAL_INTEGRATE | LAMMPS_NS::FixConst::POST_NEIGHBOR;
+  using namespace LAMMPS_NS::FixConst;
+  return INITIAL_INTEGRATE | POST_NEIGHBOR | (domain->triclinic ? PRE_EXCHANGE : 0);
 }
 
 void FixOverdampedAffine::init()
@@ -160,7 +233,7 @@ void FixOverdampedAffine::init()
           FLERR,
           std::string(
               "fix overdamped/affine found a box that is not periodic, expected 'boundary p p "
-              "p': the whole box shrinks."));
+              "p': the whole box moves."));
     }
   }
   // A contact that a late rebuild misses is lost without a word.
@@ -177,6 +250,18 @@ void FixOverdampedAffine::init()
   running = false;
 }
 
+/// A flow that shears needs a cell that can tilt.
+void FixOverdampedAffine::require_cell(const Upper &gradient) const
+{
+  const bool is_plane = domain->dimension == 2;
+  if (gradient.has_shear() && !domain->triclinic) {
+    fail("a box without tilt, expected one that shear can tilt: use 'change_box all triclinic'.");
+  }
+  if (is_plane && (gradient.diagonal[2] != 0.0 || gradient.xz != 0.0 || gradient.yz != 0.0)) {
+    fail("a flow along z, expected one in the plane.");
+  }
+}
+
 /* ---------------------------------------------------------------------- */
 
 void FixOverdampedAffine::setup_post_neighbor()
@@ -191,7 +276,7 @@ void FixOverdampedAffine::setup_post_neighbor()
 
 void FixOverdampedAffine::require_timestep() const
 {
-  const double strain = std::abs(box->state().rate) * update->dt;
+  const double strain = box->speed() * update->dt;
   if (!integrator->state()) return require_strain(std::abs(strain));
   if (update->dt >= 0.0 && strain <= LARGEST_STRAIN) return;
   flow->stop("found timestep " + shown(update->dt) + ", a strain of " + shown(strain) +
@@ -239,7 +324,32 @@ void FixOverdampedAffine::initial_integrate(int)
   const bigint to = update->ntimestep, from = to - 1;
   if (from >= next_check) check_stability(from);
   flow->count_evaluation();  // LAMMPS's own, at the end of the last step
+  inside_step = true;
   integrator->step(*flow, to, update->dt);
+  inside_step = false;
+  ask_for_flip();
+}
+
+/// Atoms change their images with the cell, which they can only where LAMMPS makes its lists.
+void FixOverdampedAffine::ask_for_flip()
+{
+  const bigint step = update->ntimestep;
+  if (domain->triclinic && !box->flip_needed(step, largest_tilt).is_none()) next_reneighbor = step;
+}
+
+void FixOverdampedAffine::pre_exchange()
+{
+  const bigint step = update->ntimestep;
+  if (!running || inside_step) return;
+  const AffineBox::Flip flip = box->flip_needed(step, largest_tilt);
+  if (flip.is_none()) return;
+  flow->change_reference(box->flip(flip));
+  box->set_box(box->deformation(step));
+  domain->image_flip(static_cast<int>(flip.m), static_cast<int>(flip.n), static_cast<int>(flip.p));
+  for (int i = 0; i < atom->nlocal; ++i) domain->remap(atom->x[i], atom->image[i]);
+  domain->x2lamda(atom->nlocal);
+  LAMMPS_NS::Irregular(lmp).migrate_atoms(0, 0, nullptr);
+  domain->lamda2x(atom->nlocal);
 }
 
 double FixOverdampedAffine::largest_stable_dt() const
@@ -258,7 +368,7 @@ void FixOverdampedAffine::check_stability(bigint step)
 {
   if (check_every == 0 || update->dt == 0.0 || integrator->state()) return;
   if (step < next_check) return;
-  const double strain_a_step = std::abs(box->state().rate) * update->dt;
+  const double strain_a_step = box->speed() * update->dt;
   const double until_strained = std::ceil(STRAIN_BETWEEN_CHECKS / strain_a_step);
   next_check = step + (until_strained < static_cast<double>(check_every)
                            ? static_cast<bigint>(until_strained)
@@ -303,6 +413,14 @@ double FixOverdampedAffine::compute_vector(int n)
       return static_cast<double>(flow->n_rebuilds());
     case 7:
       return flow->stage_difference();
+    case 16:
+      return box->shear_strain(step);
+    case 17:
+      return box->pure_strain(step);
+    case 18:
+      return flow->mean_turn();
+    case 19:
+      return flow->power_of_host();
     default:
       return of_substeps(n - 8);
   }
@@ -332,9 +450,10 @@ double FixOverdampedAffine::memory_usage() { return flow->memory_usage(); }
 
 void FixOverdampedAffine::write_restart(FILE *fp)
 {
+  const double mean_turn = flow->mean_turn();
   if (comm->me != 0) return;
   const StepState *const of_steps = integrator->state();
-  const Saved saved{box->state(), of_steps ? *of_steps : StepState{}};
+  const Saved saved{box->state(), of_steps ? *of_steps : StepState{}, mean_turn};
   const int size = sizeof(saved);
   fwrite(&size, sizeof(int), 1, fp);
   fwrite(&saved, size, 1, fp);
@@ -346,6 +465,7 @@ void FixOverdampedAffine::restart(char *buf)
   std::memcpy(&saved, buf, sizeof(saved));
   box->restore(saved.box);
   if (StepState *const of_steps = integrator->state()) *of_steps = saved.steps;
+  flow->set_mean_turn(saved.mean_turn);
 }
 
 void FixOverdampedAffine::grow_arrays(int nmax) { flow->grow(nmax); }

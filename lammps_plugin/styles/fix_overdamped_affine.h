@@ -10,15 +10,22 @@
 
 namespace jamshape {
 
-/// fix ID all overdamped/affine drag k_d compress kappa
+/// fix ID all overdamped/affine drag k_d [compress kappa] [shear gdot] [pure edot]
+///     [gradient xx xy yx yy | xx xy xz yx yy yz zx zy zz] [flip F]
 ///     [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]
 ///
-/// Overdamped motion on a substrate that shrinks affinely with the box (Marschall & Teitel 2018,
-/// Eqs. 6-14). Global vector: time since strain 0, strain, largest relaxation rate, largest stable
-/// time step, dissipated power, force evaluations, list rebuilds inside steps, largest difference
-/// of the stages of the last step; of integrators that choose their steps: accepted, rejected and
-/// forced substeps, the next one's length, and of the last step of LAMMPS the shortest substep,
-/// largest local error and most stages; the mean overlap length that errors are measured by.
+/// Overdamped motion on a substrate that moves affinely with the box, with the sum of the velocity
+/// gradients named: -kappa 1 (Marschall & Teitel 2018, Eqs. 6-14), G_xy = gdot (Marschall, Keta,
+/// Olsson & Teitel, Phys. Rev. Lett. 122, 188002), G_xx = -G_yy = edot, or any without entries
+/// below its diagonal. The box takes another choice of cell vectors when its tilt passes the part F
+/// of an edge. Global vector: time since strain 0, strain (of all lengths, on the mean), largest
+/// relaxation rate, largest stable time step, dissipated power, force evaluations, list rebuilds
+/// inside steps, largest difference of the stages of the last step; of integrators that choose
+/// their steps: accepted, rejected and forced substeps, the next one's length, and of the last step
+/// of LAMMPS the shortest substep, largest local error and most stages; the mean overlap length
+/// that errors are measured by; then the strains of simple and of pure shear, the mean angle about
+/// z by which particles have turned, and the power of torques on the rotation that the host alone
+/// gives.
 class FixOverdampedAffine : public LAMMPS_NS::Fix {
  public:
   FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);
@@ -29,6 +36,7 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   void setup(int vflag) override;
   void setup_post_neighbor() override;
   void post_neighbor() override;
+  void pre_exchange() override;
   void initial_integrate(int vflag) override;
   double compute_vector(int n) override;
   double memory_usage() override;
@@ -53,17 +61,22 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   std::unique_ptr<OverdampedFlow> flow;
   std::unique_ptr<Integrator> integrator;
   LAMMPS_NS::bigint check_every, next_check;
-  double largest_rate;
-  bool warned, was_told, running;
+  double largest_rate, largest_tilt;
+  bool warned, was_told, running, inside_step;
 
   struct Command;
   Command read(int narg, char **arg);
+  int read_flow(int k, int narg, char **arg, Command &to) const;
+  Upper read_gradient(char **arg) const;
+  double number(const char *text) const;
   void read_option(const std::string &keyword, const char *text, Command &to);
   void make_parts(const Command &of);
   void tell_what_this_is();
   [[noreturn]] void fail(const std::string &found_and_expected) const;
   void require_timestep() const;
   void require_strain(double strain) const;
+  void require_cell(const Upper &gradient) const;
+  void ask_for_flip();
   void tell_what_is_left_out();
   double present_rate() const;
   double largest_stable_dt() const;

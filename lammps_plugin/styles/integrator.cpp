@@ -23,7 +23,7 @@ class Heun : public Integrator {
 
   void step(OverdampedFlow &flow, LAMMPS_NS::bigint step, double dt) override
   {
-    const double from = box.scale(step - 1), to = box.scale(step);
+    const Upper from = box.deformation(step - 1), to = box.deformation(step);
     box.set_box(to);
     flow.start_by({dt, 0.0, from, to});
     flow.evaluate_forces();
@@ -88,13 +88,13 @@ class Rkc2 : public StepControl {
   {
     const RungeKuttaChebyshev method(static_cast<int>(stages(span.z)));
     const double h = span.h;
-    double scale = span.from();
+    Upper reached = span.from();
     for (int j = 1; j <= method.s; ++j) {
       const RungeKuttaChebyshev::Stage &stage = method.stage[j];
-      const double before = scale;
-      scale = j == method.s ? span.to() : span.scale(stage.c * h);
-      box.set_box(scale);
-      const bool fits = flow.move_by({h * stage.of_start, h * stage.of_last_rate, before, scale,
+      const Upper before = reached;
+      reached = j == method.s ? span.to() : span.deformation(stage.c * h);
+      box.set_box(reached);
+      const bool fits = flow.move_by({h * stage.of_start, h * stage.of_last_rate, before, reached,
                                       stage.of_last, stage.of_one_before});
       if (!fits) return INFINITY;
       flow.evaluate_forces();

@@ -100,8 +100,8 @@ OverdampedFlow::OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineB
                                LAMMPS_NS::Fix *owner, int registers) :
     Pointers(lmp), box(affine_box), dimension(domain->dimension), n_rates(rate_width(dimension)),
     n_turns(dimension == 2 ? 2 : 4), n_registers(registers), pair(nullptr), values(nullptr),
-    can_retry(false), farthest(0.0), seen(0.0), largest_difference(0.0), evaluations(0),
-    rebuilds(0), mobilities(lmp, k_d), relaxation(lmp, owner, mobilities)
+    can_retry(false), farthest(0.0), turned_so_far(0.0), seen(0.0), largest_difference(0.0),
+    evaluations(0), rebuilds(0), mobilities(lmp, k_d), relaxation(lmp, owner, mobilities)
 {
 }
 
@@ -117,7 +117,7 @@ bool OverdampedFlow::begin_run()
   measure_particles();
   double moved = 0.0;
   in_dimension(dimension, [&](auto D) {
-    const auto present = box.scaled<D>(box.scale(update->ntimestep));
+    const auto present = box.deformed<D>(box.deformation(update->ntimestep));
     for (int i = 0; i < atom->nlocal; ++i) {
       if (is_as_it_was<D>(i, present)) continue;
       set(i);
@@ -127,7 +127,8 @@ bool OverdampedFlow::begin_run()
   return sum(moved) == 0.0;
 }
 
-template <int D> bool OverdampedFlow::is_as_it_was(int i, const AffineBox::Scaled<D> &present) const
+template <int D>
+bool OverdampedFlow::is_as_it_was(int i, const AffineBox::Deformed<D> &present) const
 {
   const Vec<D> expected = present.position(Row<D>{row(i)}.coordinates(), atom->image[i]);
   bool same = true;
@@ -159,29 +160,63 @@ template <int D> void add(RateIn<D> &to, double weight, const RateIn<D> &rate)
 
 }  // namespace
 
-void OverdampedFlow::hold_start(double scale)
+/// How the host alone turns some particles, at their present orientations: nothing that is computed
+/// where it turns none.
+template <int D> struct OverdampedFlow::Spins {
+  const bool exist;
+  const int first;
+  Torque<D> of[ParticleView::BLOCK];
+
+  Spins(const OverdampedFlow &flow, int begin, int end) : exist(flow.host_turns()), first(begin)
+  {
+    if (!exist) return;
+    const Upper &gradient = flow.box.state().rate;
+    flow.pair->particle_view().for_each_orientation(begin, end, [&](int i, const Quaternion &q) {
+      of[i - first] = host_spin<D>(gradient, flow.mobilities[i].bretherton, q);
+    });
+  }
+
+  /// That of atom i added to a rate.
+  RateIn<D> added_to(RateIn<D> rate, int i) const
+  {
+    if (exist) rate.turn += of[i - first];
+    return rate;
+  }
+};
+
+bool OverdampedFlow::host_turns() const { return pair->particles_turn() && !box.is_isotropic(); }
+
+void OverdampedFlow::hold_start(const Upper &deformation)
 {
-  in_dimension(dimension, [&](auto D) { hold<D>(0, atom->nlocal, scale); });
+  const Upper inverse = divided(1.0, deformation);
+  in_dimension(dimension, [&](auto D) {
+    ParticleView::in_blocks(atom->nlocal,
+                            [&](int begin, int end) { hold<D>(begin, end, inverse); });
+  });
 }
 
-template <int D> void OverdampedFlow::hold(int begin, int end, double scale)
+/// Of at most a block of particles.
+template <int D> void OverdampedFlow::hold(int begin, int end, const Upper &inverse)
 {
   if (pair->particles_turn()) {
     pair->particle_view().for_each_orientation(
         begin, end, [&](int i, const Quaternion &q) { Row<D>{row(i)}.set_orientation(q); });
   }
+  const Spins<D> spins(*this, begin, end);
   for (int i = begin; i < end; ++i) {
-    const RateIn<D> rate = mobilities.present_rate_in<D>(i);
-    Row<D>{row(i)}.store_rate({(1.0 / scale) * rate.shift, rate.turn});
+    const RateIn<D> rate = spins.added_to(mobilities.present_rate_in<D>(i), i);
+    Row<D>{row(i)}.store_rate({inverse * rate.shift, rate.turn});
   }
 }
 
 /// What a move's parts are multiplied by, without a division for each particle.
 struct OverdampedFlow::Weights {
-  double stored, present_shift, present, last, before;
+  double stored;
+  Upper present_shift;
+  double present, last, before;
 
   explicit Weights(const Move &m) :
-      stored(m.stored), present_shift(m.present / m.from), present(m.present), last(m.last),
+      stored(m.stored), present_shift(divided(m.present, m.from)), present(m.present), last(m.last),
       before(m.before)
   {
   }
@@ -206,33 +241,37 @@ RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Weights &m, RateIn<D> p
   return sum;
 }
 
-template <int D> void OverdampedFlow::require_small(int i, const RateIn<D> &moved, double scale)
+template <int D>
+void OverdampedFlow::require_small(int i, const RateIn<D> &moved, const Upper &deformation)
 {
   const Mobilities::Mobility &of = mobilities[i];
   const double limit = step_limit(of);
   if (can_retry) {
-    const double reached = scale * norm(moved.shift) + of.longest * norm(moved.turn);
+    const double reached = norm(deformation * moved.shift) + of.longest * norm(moved.turn);
     const double ratio = reached / (LARGEST_TRIAL * limit);
     farthest = ratio <= farthest ? farthest : ratio;  // NaN too
     return;
   }
-  if (scale * scale * norm_sq(moved.shift) <= limit * limit) return;  // false for NaN
+  const double distance_sq = norm_sq(deformation * moved.shift);
+  if (distance_sq <= limit * limit) return;  // false for NaN
   refuse(lmp, FLERR,
          "fix overdamped/affine found that one step moves atom " + std::to_string(atom->tag[i]) +
-             " by " + shown(scale * norm(moved.shift)) +
+             " by " + shown(std::sqrt(distance_sq)) +
              ", expected at most half its radius: use a smaller timestep.");
 }
 
 template <int D> void OverdampedFlow::move_in(const Move &m, Pass pass)
 {
   const Weights weights(m);
-  const auto target = box.scaled<D>(m.to);
+  const auto target = box.deformed<D>(m.to);
+  const Upper back = divided(1.0, m.from);
   const bool is_last = pass == Pass::FINISH, compares = !can_retry && m.present != 0.0;
   double largest_sq = 0.0;
   farthest = 0.0;
-  const auto place = [&](int i) {
+  const auto place = [&](int i, const Spins<D> &spins) {
     const Row<D> its{row(i)};
-    const RateIn<D> present = m.present != 0.0 ? mobilities.present_rate_in<D>(i) : RateIn<D>{};
+    const RateIn<D> present =
+        m.present != 0.0 ? spins.added_to(mobilities.present_rate_in<D>(i), i) : RateIn<D>{};
     if (compares) {
       const Vec<D> change = present.shift - m.to * its.stored_rate().shift;
       largest_sq = std::max(largest_sq, norm_sq(change));
@@ -247,11 +286,15 @@ template <int D> void OverdampedFlow::move_in(const Move &m, Pass pass)
     return moved.turn;
   };
   ParticleView::in_blocks(atom->nlocal, [&](int begin, int end) {
-    if (pass == Pass::START) hold<D>(begin, end, m.from);
+    if (pass == Pass::START) hold<D>(begin, end, back);
+    const Spins<D> spins(*this, begin, m.present != 0.0 ? end : begin);
     // Two loops, so that many of the roots and quotients of `turned` are under way at a time.
     Torque<D> turns[ParticleView::BLOCK];
-    for (int i = begin; i < end; ++i) turns[i - begin] = place(i);
+    for (int i = begin; i < end; ++i) turns[i - begin] = place(i, spins);
     if (!pair->particles_turn()) return;
+    if (is_last) {
+      for (int i = begin; i < end; ++i) turned_so_far += turns[i - begin][ROTATIONS<D> - 1];
+    }
     pair->particle_view().set_orientations(
         begin, end, [&](int i) { return turned(Row<D>{row(i)}.orientation(), turns[i - begin]); });
   });
@@ -284,9 +327,10 @@ bool OverdampedFlow::start_by(const Move &m)
 
 void OverdampedFlow::finish_step(const Move &m) { move(m, Pass::FINISH); }
 
-template <int D> double OverdampedFlow::length_of(int i, const RateIn<D> &of, double scale) const
+template <int D>
+double OverdampedFlow::length_of(int i, const RateIn<D> &of, const Upper &deformation) const
 {
-  const Vec<D> shift = scale * of.shift;
+  const Vec<D> shift = deformation * of.shift;
   const Torque<D> turn = mobilities[i].gyration * of.turn;
   return std::sqrt(dot(shift, shift) + dot(turn, turn));
 }
@@ -294,21 +338,26 @@ template <int D> double OverdampedFlow::length_of(int i, const RateIn<D> &of, do
 template <int D> void OverdampedFlow::add_lengths(const Move &m, double *sums)
 {
   const Weights weights(m);
-  for (int i = 0; i < atom->nlocal; ++i) {
+  const Upper back = divided(1.0, m.from);
+  const auto add_one = [&](int i, const Spins<D> &spins) {
     const Row<D> its{row(i)};
     const RateIn<D> stored = its.stored_rate();
-    if (norm(stored.shift) == 0.0 && norm(vec3(atom->f[i])) == 0.0) continue;
-    const RateIn<D> present = mobilities.present_rate_in<D>(i);
+    if (norm(stored.shift) == 0.0 && norm(vec3(atom->f[i])) == 0.0) return;
+    const RateIn<D> present = spins.added_to(mobilities.present_rate_in<D>(i), i);
     const double length = length_of<D>(i, sum_of<D>(its, weights, present), m.to);
     largest_difference = std::max(largest_difference, length);
     sums[0] += length * length;
     sums[1] += 1.0;
-    if (n_registers == 0) continue;
-    RateIn<D> change{(1.0 / m.from) * present.shift, present.turn};
+    if (n_registers == 0) return;
+    RateIn<D> change{back * present.shift, present.turn};
     add(change, -1.0, stored);
     sums[2] += length * length_of<D>(i, change, m.to);
     sums[3] += length * length_of<D>(i, its.displacement(0), m.to);
-  }
+  };
+  ParticleView::in_blocks(atom->nlocal, [&](int begin, int end) {
+    const Spins<D> spins(*this, begin, end);
+    for (int i = begin; i < end; ++i) add_one(i, spins);
+  });
 }
 
 double OverdampedFlow::rms_of(const Move &m)
@@ -333,6 +382,7 @@ void OverdampedFlow::clear_forces()
 void OverdampedFlow::rebuild_lists()
 {
   if (modify->n_pre_exchange) modify->pre_exchange();
+  if (domain->triclinic) domain->x2lamda(atom->nlocal);
   domain->pbc();
   if (domain->box_change) {
     domain->reset_box();
@@ -341,6 +391,7 @@ void OverdampedFlow::rebuild_lists()
   }
   comm->exchange();
   comm->borders();
+  if (domain->triclinic) domain->lamda2x(atom->nlocal + atom->nghost);
   if (modify->n_pre_neighbor) modify->pre_neighbor();
   neighbor->build(1);
   if (modify->n_post_neighbor) modify->post_neighbor();
@@ -412,11 +463,46 @@ double OverdampedFlow::dissipated_power() const
   return sum(mine);
 }
 
+double OverdampedFlow::power_of_host() const
+{
+  double mine = 0.0;
+  if (!host_turns()) return 0.0;
+  const Upper &gradient = box.state().rate;
+  pair->particle_view().for_each_orientation(atom->nlocal, [&](int i, const Quaternion &q) {
+    const Vec<3> torque = vec3(atom->torque[i]);
+    in_dimension(dimension, [&](auto D) {
+      const Torque<D> spin = host_spin<D>(gradient, mobilities[i].bretherton, q);
+      for (int k = 0; k < ROTATIONS<D>; ++k) mine += spin[k] * torque[3 - ROTATIONS<D> + k];
+    });
+  });
+  return sum(mine);
+}
+
+double OverdampedFlow::mean_turn() const
+{
+  return sum(turned_so_far) / static_cast<double>(atom->natoms);
+}
+
+void OverdampedFlow::set_mean_turn(double angle)
+{
+  turned_so_far = comm->me == 0 ? angle * static_cast<double>(atom->natoms) : 0.0;
+}
+
 double OverdampedFlow::stage_difference() const
 {
   double all;
   MPI_Allreduce(&largest_difference, &all, 1, MPI_DOUBLE, MPI_MAX, world);
   return all;
+}
+
+void OverdampedFlow::change_reference(const Upper &factor)
+{
+  in_dimension(dimension, [&](auto D) {
+    for (int i = 0; i < atom->nlocal; ++i) {
+      const Row<D> its{row(i)};
+      its.set_coordinates(factor * its.coordinates());
+    }
+  });
 }
 
 /* ----------------------------------------------------------------------
@@ -433,7 +519,7 @@ void OverdampedFlow::copy(int from, int to) { std::copy_n(row(from), width(), ro
 
 void OverdampedFlow::set(int i)
 {
-  const Vec<3> y = box.reference(atom->x[i], atom->image[i], box.scale(update->ntimestep));
+  const Vec<3> y = box.reference(atom->x[i], atom->image[i], box.deformation(update->ntimestep));
   std::fill_n(row(i), width(), 0.0);
   std::copy_n(y.c, dimension, row(i));
 }

@@ -33,12 +33,12 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   void measure_particles() { mobilities.measure(*pair); }
 
   /* stages of a step, for integrators: from `hold_start` to `finish_step`, coordinates and rates at
-     the start of the step and registers stay with their atoms on whatever rank. Scales are those of
-     the box, L / L(strain 0) */
+     the start of the step and registers stay with their atoms on whatever rank. Deformations are
+     those of the box since strain 0 */
 
   /// The present state is where every move starts, until the step is finished; the rates of the
-  /// present forces, which belong to the box of this scale, are stored.
-  void hold_start(double scale);
+  /// present forces, which belong to the box of this deformation, are stored.
+  void hold_start(const Upper &deformation);
   /// Moves every particle from its coordinates at the start of the step, into the box `to`, by
   ///
   ///     stored * (stored rate) + present * (rate of the present forces in the box `from`)
@@ -47,7 +47,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   /// The last two need registers.
   struct Move {
     double stored, present;
-    double from, to;
+    Upper from, to;
     double last = 0.0, before = 0.0;
   };
   /// Without registers, stops the run at a move of more than half a radius; `allow_retries` makes
@@ -59,6 +59,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   bool start_by(const Move &move);
   /// As move_by, and makes it the state.
   void finish_step(const Move &move);
+  /// Coordinates in the box of strain 0 become those in another one; between steps only.
+  void change_reference(const Upper &factor);
   /// The same sum as a length: rms over all particles that a force moves, turns times the radius of
   /// gyration.
   double rms_of(const Move &sum);
@@ -89,6 +91,11 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   [[noreturn]] void stop(const std::string &found) const;
   /// Power that the drag takes: sum F^2/(k_d A) + tau^2/(k_d A I), over all ranks.
   double dissipated_power() const;
+  /// Power of the torques on particles that turn with the host alone.
+  double power_of_host() const;
+  /// Mean angle about z by which particles have turned since strain 0 [rad].
+  double mean_turn() const;
+  void set_mean_turn(double angle);
   /// Largest distance between the end of the last step and where the stored rates alone had led: of
   /// the order of the local error of Euler's method, a bound of Heun's.
   double stage_difference() const;
@@ -127,7 +134,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   // (displacements of the last move and of the one before).
   double *values;
   bool can_retry;
-  double farthest;  // of the last move, over what is allowed
+  double farthest;       // of the last move, over what is allowed
+  double turned_so_far;  // about z, summed over what this rank has moved
   double seen;
   double largest_difference;
   LAMMPS_NS::bigint evaluations, rebuilds;
@@ -137,12 +145,14 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   double *row(int i) const { return values + static_cast<std::size_t>(width()) * i; }
 
   template <int D> struct Row;
-  template <int D> bool is_as_it_was(int i, const AffineBox::Scaled<D> &present) const;
-  template <int D> void hold(int begin, int end, double scale);
+  template <int D> bool is_as_it_was(int i, const AffineBox::Deformed<D> &present) const;
+  template <int D> void hold(int begin, int end, const Upper &inverse);
+  template <int D> struct Spins;
+  bool host_turns() const;
   struct Weights;
   template <int D> RateIn<D> sum_of(const Row<D> &row, const Weights &of, RateIn<D> present) const;
-  template <int D> double length_of(int i, const RateIn<D> &of, double scale) const;
-  template <int D> void require_small(int i, const RateIn<D> &moved, double scale);
+  template <int D> double length_of(int i, const RateIn<D> &of, const Upper &deformation) const;
+  template <int D> void require_small(int i, const RateIn<D> &moved, const Upper &deformation);
   /// What a pass over the particles does beside moving them.
   enum class Pass { MOVE, START, FINISH };
   template <int D> void move_in(const Move &move, Pass pass);

@@ -22,6 +22,13 @@ namespace jamshape {
 
 using LAMMPS_NS::bigint;
 
+namespace {
+
+/// What two ways to compute a length may differ by, relative.
+constexpr double ROUNDING = 1e-12;
+
+}  // namespace
+
 PairContact::PairContact(LAMMPS_NS::LAMMPS *lmp) :
     Pair(lmp), particles(lmp), k_e(nullptr), any_turns(true), instructions(InstructionSet::scalar),
     any_round(false), any_ellipsoids(false), is_new_run(false)
@@ -131,11 +138,6 @@ void PairContact::measure_particles()
 void PairContact::init_style()
 {
   particles.require_ellipsoids("pair_style " + style_name());
-  if (domain->triclinic) {
-    error->all(FLERR,
-               "pair_style " + style_name() +
-                   " found a triclinic box, expected an orthogonal one: use a box without tilt.");
-  }
   choose_instructions();
   measure_particles();
   neighbor->request(this, instance_me);
@@ -178,10 +180,14 @@ void PairContact::setup()
 {
   is_new_run = true;
   const double needed = cutforce + neighbor->skin;
+  // Of a tilted box LAMMPS counts cutoffs in parts of the distance between its faces.
+  const double *const h = domain->h_inv;  // xx, yy, zz, yz, xz, xy
+  const double inverse[3] = {std::hypot(h[0], h[5], h[4]), std::hypot(h[1], h[3]), h[2]};
   for (int k = 0; k < domain->dimension; ++k) {
-    if (comm->mode == LAMMPS_NS::Comm::SINGLE && comm->cutghost[k] < needed) {
-      error->all(FLERR, "pair_style " + style_name() + " found a ghost cutoff of " +
-                            shown(comm->cutghost[k]) + ", expected at least " + shown(needed) +
+    const double cutoff = comm->cutghost[k] / (domain->triclinic ? inverse[k] : 1.0);
+    if (comm->mode == LAMMPS_NS::Comm::SINGLE && cutoff < (1.0 - ROUNDING) * needed) {
+      error->all(FLERR, "pair_style " + style_name() + " found a ghost cutoff of " + shown(cutoff) +
+                            ", expected at least " + shown(needed) +
                             ": raise it with 'comm_modify cutoff' so that no contact is missed.");
     }
   }
@@ -388,6 +394,14 @@ double PairContact::memory_usage()
 ------------------------------------------------------------------------- */
 
 int PairContact::rotations() const { return domain->dimension == 2 ? 1 : 3; }
+
+Upper PairContact::cell() const
+{
+  const double *const edge = domain->prd;
+  const Vec<3> edges{{edge[0], edge[1], edge[2]}};
+  if (!domain->triclinic) return {edges, 0.0, 0.0, 0.0};
+  return {edges, domain->xy, domain->xz, domain->yz};
+}
 
 void PairContact::min_xf_pointers(int, double **x, double **f)
 {

@@ -6,6 +6,7 @@
 
 #include "pair.h"
 #include "particle_view.h"
+#include "upper.h"
 
 #include <functional>
 #include <optional>
@@ -86,6 +87,8 @@ class PairContact : public LAMMPS_NS::Pair {
   const ParticleView &particle_view() const { return particles; }
 
  protected:
+  /// The present cell of LAMMPS's box.
+  Upper cell() const;
   ParticleView particles;
   double **k_e;
   bool any_turns;

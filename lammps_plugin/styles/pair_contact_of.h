@@ -16,6 +16,7 @@
 #include "neigh_list.h"
 #include "neighbor.h"
 #include "pair_contact.h"
+#include "upper.h"
 
 #include <algorithm>
 #include <cmath>
@@ -145,7 +146,7 @@ template <class Model> class PairContactOf : public PairContact {
 
     BodiesOf<Model, D> now;
     std::vector<Pose> then;  // when pairs were last chosen
-    Vec<D> box_then;
+    Upper cell_then;
 
     double memory_usage() const
     {
@@ -434,7 +435,7 @@ template <class Model> class PairContactOf : public PairContact {
     // A ghost of this rank's own particle moves with it.
     resize_closely(bodies.then, comm->nprocs == 1 ? atom->nlocal : bodies.now.size());
     for (std::size_t i = 0; i < bodies.then.size(); ++i) bodies.then[i] = bodies.now.pose(i);
-    for (int k = 0; k < D; ++k) bodies.box_then[k] = domain->prd[k];
+    bodies.cell_then = cell();
   }
 
   /// Whether two particles may have come closer by the margin, or a pose is no number: their own
@@ -443,23 +444,22 @@ template <class Model> class PairContactOf : public PairContact {
   template <int D> bool have_outrun_margin()
   {
     const Bodies<D> &bodies = all<D>();
-    Vec<D> centre, scale;
-    double strain = 0.0;
+    const Upper now_cell = cell(), since = now_cell * divided(1.0, bodies.cell_then);
+    const Vec<3> half = now_cell * Vec<3>{{0.5, 0.5, 0.5}};
+    double stretch = 0.0;
+    Vec<D> centre;
     for (int k = 0; k < D; ++k) {
-      centre[k] = 0.5 * (domain->boxlo[k] + domain->boxhi[k]);
-      scale[k] = domain->prd[k] / bodies.box_then[k];
-      strain = std::max(strain, std::abs(1.0 - scale[k]));
+      centre[k] = domain->boxlo[k] + half[k];
+      stretch = std::max(stretch, std::abs(1.0 - since.diagonal[k]));
     }
+    const double strain = stretch + std::hypot(since.xy, since.xz, since.yz);
     const double left =
         margin - strain * (cutforce + margin) - BodiesOf<Model, D>::POSE_ERROR * cutforce;
     if (!(left > 0.0)) return true;
     for (std::size_t i = 0; i < bodies.then.size(); ++i) {
       const Body<D> &now = bodies.now[i];
       const auto &then = bodies.now.pose_of(i, bodies.then[i]);
-      Vec<D> shift;
-      for (int k = 0; k < D; ++k) {
-        shift[k] = now.centre[k] - centre[k] - scale[k] * (then.centre[k] - centre[k]);
-      }
+      const Vec<D> shift = (now.centre - centre) - since * (then.centre - centre);
       if (!(4.0 * Model::template motion_sq<D>(shift, now, then) < left * left)) return true;
     }
     return false;

@@ -91,7 +91,7 @@ void StepControl::refresh(OverdampedFlow &flow)
 StepControl::Span StepControl::choose(const Span &left) const
 {
   Span span = left;
-  const double speed = std::abs(box.state().rate), rate = now.margin * now.rate;
+  const double speed = box.speed(), rate = now.margin * now.rate;
   double h = now.h;
   if (rate > 0.0) h = std::min(h, stability_interval() / rate);
   if (speed > 0.0) h = std::min(h, LARGEST_STRAIN / speed);
@@ -168,7 +168,7 @@ void StepControl::accept(OverdampedFlow &flow, const Span &span, double error, b
 double StepControl::allowed_error(const OverdampedFlow &flow, const Span &span) const
 {
   const OverdampedFlow::Touching &t = now.touching;
-  const double pushed = t.rate > 0.0 ? std::abs(box.state().rate) * t.reach / t.rate : 0.0;
+  const double pushed = t.rate > 0.0 ? box.speed() * t.reach / t.rate : 0.0;
   const double rounding = std::numeric_limits<double>::epsilon() * flow.largest_edge();
   return tolerance * std::max(t.overlap, pushed) + (1.0 + span.z) * rounding;
 }

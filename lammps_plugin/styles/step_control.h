@@ -27,9 +27,9 @@ class StepControl : public Integrator {
     bool is_last;  // ends exactly at the next step of LAMMPS
     double z;      // h times the largest relaxation rate, with a margin
 
-    double scale(double after) const { return box.scale(at, begin + after); }
-    double from() const { return scale(0.0); }
-    double to() const { return is_last ? box.scale(at + 1) : scale(h); }
+    Upper deformation(double after) const { return box.deformation(at, begin + after); }
+    Upper from() const { return deformation(0.0); }
+    Upper to() const { return is_last ? box.deformation(at + 1) : deformation(h); }
   };
 
   AffineBox &box;

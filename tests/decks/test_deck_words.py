@@ -256,6 +256,15 @@ def test_one_that_was_cut_short_gives_way_to_the_other(here):
     assert not whole.is_whole_restart(here / "none")
 
 
+def test_a_run_that_was_killed_in_its_last_moments_goes_on_from_its_end(here):
+    """The deck has removed what it would go on from, and has yet to name the columns of its dump."""
+    (here / "final.restart").write_bytes(STATE)
+    assert restart.newest_whole(here) == here / "final.restart"
+    assert restart.newest_whole(here / "restart.a") == here / "final.restart"
+    pair(here, newest="restart.a")
+    assert restart.newest_whole(here) == here / "restart.a"
+
+
 def test_another_file_is_not_replaced_by_one_beside_it(here):
     pair(here, newest="restart.a")
     (here / "final.restart").write_bytes(STATE)

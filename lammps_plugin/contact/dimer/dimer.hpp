@@ -30,7 +30,8 @@ template <> inline SubstrateDrag substrate_drag<2>(const Dimer &shape)
   const double x = 2.0 / 3.0 * R * R * R * s * s * s;  // integrals of x, x^2 and y^2 over the part
   const double xx = 0.25 * R * R * R * R * (angle + by_angle);
   const double yy = R * R * R * R * (0.25 * angle + cs / 3.0 - by_angle / 12.0);
-  return {2.0 * area, {{0.0, 0.0, A * A + (2.0 * A * x + xx + yy) / area}}};
+  const double about_y = A * A + (2.0 * A * x + xx) / area;
+  return {2.0 * area, {{yy / area, about_y, A * A + (2.0 * A * x + xx + yy) / area}}};
 }
 
 template <> inline SubstrateDrag substrate_drag<3>(const Dimer &shape)

@@ -34,8 +34,11 @@ template <> inline SubstrateDrag substrate_drag<2>(const Spherocylinder &shape)
   const double side = 4.0 * A * R, caps = M_PI * R * R;
   const double about_z =
       side * (A * A + R * R) / 3.0 + caps * (0.5 * R * R + A * A + 8.0 * A * R / (3.0 * M_PI));
+  const double about_x = side * R * R / 3.0 + caps * 0.25 * R * R;
+  const double about_y =
+      side * A * A / 3.0 + caps * (0.25 * R * R + A * A + 8.0 * A * R / (3.0 * M_PI));
   const double area = side + caps;
-  return {area, {{0.0, 0.0, about_z / area}}};
+  return {area, {{about_x / area, about_y / area, about_z / area}}};
 }
 
 template <> inline SubstrateDrag substrate_drag<3>(const Spherocylinder &shape)

@@ -91,7 +91,7 @@ template <int D> SubstrateDrag substrate_drag(const Superellipsoid &shape)
   Vec<3> mean_sq{};
   for (int k = 0; k < D; ++k) mean_sq[k] = ratio * shape.semi_axes[k] * shape.semi_axes[k];
   const double about_z = mean_sq[0] + mean_sq[1];
-  if (D == 2) return {volume, {{0.0, 0.0, about_z}}};
+  if (D == 2) return {volume, {{mean_sq[1], mean_sq[0], about_z}}};
   return {volume, {{mean_sq[1] + mean_sq[2], mean_sq[0] + mean_sq[2], about_z}}};
 }
 

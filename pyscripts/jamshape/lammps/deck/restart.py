@@ -1,7 +1,7 @@
 """A compression that goes on after a kill: from a restart file that is whole, with what it will write again cut off.
 
 LAMMPS writes restart.a and restart.b in turn. One that a kill cut short lacks its end, and then the other is taken.
-What is read is written last: the variable `restarts` names both, in the order in which to write them.
+A run that was killed in its last moments has neither any more, but its end, final.restart. What is read is written last: the variable `restarts` names both, in the order in which to write them.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from jamshape.lammps.deck.asking import Deck, Refused, quoted
 from jamshape.lammps.deck.whole import cut_dump, is_whole_restart
 
 _PAIR = ("restart.a", "restart.b")
+_END = "final.restart"
 _DUMPS = ("particles.dump", "contacts.dump")
 
 
@@ -50,7 +51,8 @@ def newest_whole(place: Path) -> Path | None:
         return None
     folder = place if place.is_dir() else place.parent
     pair = [path for path in (folder / name for name in _PAIR) if is_whole_restart(path)]
-    return max(pair, key=lambda path: path.stat().st_mtime_ns, default=None)
+    end = folder / _END if is_whole_restart(folder / _END) else None
+    return max(pair, key=lambda path: path.stat().st_mtime_ns, default=end)
 
 
 def mend(deck: Deck, _: list[str]) -> None:

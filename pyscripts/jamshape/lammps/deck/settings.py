@@ -27,6 +27,8 @@ RANGES: dict[str, tuple[float, ...]] = {
     "w1": (0.1, 1.0),
     "w2": (1.0, 10.0),
     "kappa": (1e-14, 0.1),
+    "gdot": (1e-14, 0.1),
+    "strain": (1e-6, 1e6),
     "dt": (1e-6, 10.0),
     "phi_start": (1e-9, 0.999),
     "phi_end": (1e-6, 2.0),
@@ -120,7 +122,14 @@ def wrong_value(name: str, value: str) -> str | None:
 
 
 def wrong_run(value: dict[str, str]) -> str | None:
-    """Say what is wrong with a compression that does not compress, or does not end."""
+    """Say what is wrong with a compression that does not compress, or a run that does not end."""
+    if {"strain", "gdot", "dt"} <= value.keys():
+        strain, gdot, dt = (float(value[name]) for name in ("strain", "gdot", "dt"))
+        if strain > _MOST_STEPS * gdot * dt:
+            return (
+                f"gdot = {gdot:g} and dt = {dt:g} take more than {_MOST_STEPS:g} steps, "
+                "expected a larger rate or time step."
+            )
     if not {"phi_start", "phi_end", "kappa", "dt"} <= value.keys():
         return None
     start, end, kappa, dt = (float(value[name]) for name in ("phi_start", "phi_end", "kappa", "dt"))
