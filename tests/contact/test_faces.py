@@ -92,7 +92,7 @@ def test_derivatives_tell_the_same_faces(extended):
     near = [
         (i, j) for i in range(40) for j in range(i) if np.linalg.norm(position[i] - position[j]) < 2
     ]
-    poses = (position, turn, np.full(3, 50.0))
+    poses = (position, turn, 50.0 * np.eye(3))
     arguments = [np.stack([x, np.zeros_like(x)]) for x in poses]
     arguments += [np.array(near), np.zeros((len(near), 3), np.int64)]
     contacts, other = shape.contacts(*arguments), shape.derivatives(*arguments, extended)
