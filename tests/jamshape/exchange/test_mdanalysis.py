@@ -101,6 +101,7 @@ def test_a_box_with_a_tilt_is_that_of_mdanalysis(dimension):
         # Edge vectors are its rows, of angles in single precision.
         atol = 1e-5 * one.box.edges.max()
         np.testing.assert_allclose(rows[:D, :D], one.box.matrix.T, rtol=0, atol=atol)
+    universe.trajectory[1]
     atoms = universe.atoms
     i, j = np.triu_indices(packing.n, 1)
     found = MDAnalysis.lib.distances.calc_bonds(
