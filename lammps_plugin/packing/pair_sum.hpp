@@ -98,10 +98,8 @@ template <class Model, int D, class S> class PosedPairs {
       apart[k] = difference(at(poses.position, D * i + k), at(poses.position, D * j + k));
     }
     for (int m = 0; m < D; ++m) {
-      const auto turns = static_cast<double>(pairs.shift[D * p + m]);
-      if (turns == 0.0) continue;
-      for (int k = 0; k <= m; ++k)
-        apart[k] = difference(apart[k], at(poses.cell, D * k + m), turns);
+      const std::int64_t turns = pairs.shift[D * p + m];
+      if (turns != 0) move_along(m, static_cast<double>(turns), apart);
     }
     Vec<D, S> r;
     for (int k = 0; k < D; ++k) r[k] = strained(apart[k]);
@@ -176,6 +174,14 @@ template <class Model, int D, class S> class PosedPairs {
   typename Model::Law law;
   std::vector<typename Model::template Body<D, S>> body;  // at the origin
   std::vector<double> around;                             // radii of the spheres around them
+
+  /// The second of a pair by so many of one of the cell vectors; most pairs need none.
+  void move_along(int vector, double turns, Split *apart) const
+  {
+    for (int k = 0; k <= vector; ++k) {
+      apart[k] = difference(apart[k], at(poses.cell, D * k + vector), turns);
+    }
+  }
 
   S strained(const Split &length) const
   {
