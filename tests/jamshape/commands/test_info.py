@@ -53,11 +53,11 @@ def test_a_tilt_is_told(jamshape, tmp_path):
     lines, report = info(jamshape, tmp_path / "plain.h5")
     assert "tilt" not in report
     assert "tilt" not in lines["box"]
-    tilted = packing.with_(box=Box(packing.box.lo, [12, 13], [-2.5]))
+    tilted = packing.with_(box=Box(packing.box.lo, [60, 65], [-2.5]))
     write_packing(tmp_path / "tilted.h5", tilted)
     lines, report = info(jamshape, tmp_path / "tilted.h5")
-    assert (report["box"], report["tilt"]) == ([12, 13], [-2.5])
-    assert lines["box"] == "12 x 13, tilt -2.5"
+    assert (report["box"], report["tilt"]) == ([60, 65], [-2.5])
+    assert lines["box"] == "60 x 65, tilt -2.5"
 
 
 def test_a_packing_of_which_nothing_is_known_is_measured(jamshape, tiny, tmp_path):
