@@ -147,6 +147,6 @@ def show_box(axes: Axes, box: Box) -> None:
     """Show the rectangle around a box, at equal scales and without ticks; in it the box, if it is tilted."""
     if box.is_tilted:
         corners = box.lo + box.vectors(np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]))
-        axes.plot(*corners.T, color="k", lw=1.0)
+        axes.plot(*corners.T, color="k", lw=1.2, ls="--")
     (left, bottom), (right, top) = box.bounds
     axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xticks=[], yticks=[])
