@@ -96,9 +96,9 @@ def measure(path: Path) -> dict[str, Any]:
 
 def tiled(packing: Packing, k: int) -> tuple[Packing, State]:
     """Put k copies beside each other along each edge."""
-    position, orientation, edges = packing.poses()
+    position, orientation, cell = packing.poses()
     shifts = np.array(list(np.ndindex(*(k,) * packing.dimension)))
-    where = np.concatenate([position + shift * edges for shift in shifts])
+    where = np.concatenate([position + cell @ shift for shift in shifts])
     turned, diameters = (
         np.concatenate([x] * len(shifts)) for x in (orientation, packing.diameters)
     )
@@ -109,9 +109,9 @@ def tiled(packing: Packing, k: int) -> tuple[Packing, State]:
         exponent=np.tile(packing.exponent, len(shifts)),
         species=np.tile(packing.species, len(shifts)),
         id=np.arange(1, packing.n * len(shifts) + 1),
-        box=Box(packing.box.lo, k * packing.box.edges),
+        box=Box.of(packing.box.lo, k * packing.box.matrix),
         shape_style=packing.shape_style,
-    ).with_poses(where, turned, k * edges)
+    ).with_poses(where, turned, k * cell)
     return large, State.of(large)
 
 

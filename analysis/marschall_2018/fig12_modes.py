@@ -74,7 +74,7 @@ def window(packing: Packing, motion: Motion) -> Box:
     weight = motion.size**2 + motion.turn**2
     box, center = packing.box, packing.position[np.argmax(weight)]
     away = packing.position - center
-    away -= box.edges * np.rint(away / box.edges)
+    away -= box.vectors(np.rint(box.fractions(away)))
     distance = np.abs(away).max(axis=1)
     order = np.argsort(distance)
     held = np.cumsum(weight[order]) / weight.sum()
@@ -89,8 +89,10 @@ def window(packing: Packing, motion: Motion) -> Box:
 def draw_mode(axes: Axes, packing: Packing, held: BoolArray, drawn: tuple[Motion, Box]) -> Any:
     """Draw particles and arrows in a part of the box; return what the colours are of."""
     motion, seen = drawn
-    edges, middle = packing.box.edges, seen.lo + 0.5 * seen.edges
-    part = Box(middle - 0.5 * edges, edges)  # of the same periodic packing
+    box = packing.box
+    part = Box(
+        seen.center - (box.center - box.lo), box.edges, box.tilt
+    )  # of the same periodic packing
     width = float(seen.edges.max())
     line = float(np.clip(12 / width, 0.2, 0.8))
     most = np.arange(packing.n) == np.hypot(motion.size, motion.turn).argmax()
@@ -101,7 +103,7 @@ def draw_mode(axes: Axes, packing: Packing, held: BoolArray, drawn: tuple[Motion
         loose = {"facecolors": RATTLER, "edgecolors": "0.25", "lw": line}
         draw_bodies(axes, taken(packing, ~held), part, **loose)
     draw_arrows(axes, packing, motion, (part, LONGEST * width))
-    show_box(axes, seen.lo, seen.edges)
+    show_box(axes, seen)
     return bodies
 
 

@@ -114,6 +114,24 @@ inline void require_edges(const double *edges, std::size_t D)
           "edges hold what is no length, expected positive ones.");
 }
 
+/// Throws unless (2, D, D) are the cell vectors of a box, columns that are upper triangular, as
+/// doubles and their small rests.
+inline void require_cell(const Array3<double> &cell, std::size_t D)
+{
+  require(cell.shape(0) == 2 && cell.shape(1) == D && cell.shape(2) == D,
+          "cell has no shape (2, D, D).");
+  require_finite(cell, "cell");
+  for (std::size_t part = 0; part < 2; ++part) {
+    for (std::size_t k = 0; k < D; ++k) {
+      const double *const row = cell.data() + (part * D + k) * D;
+      require(std::all_of(row, row + k, [](double x) { return x == 0.0; }),
+              "cell is not upper triangular, expected cell vectors as columns, the first along x.");
+      require(part == 1 || row[k] > 0.0,
+              "cell holds an edge that is no length, expected positive ones.");
+    }
+  }
+}
+
 /// Throws unless n orientations, angles or quaternions, turn a particle somewhere.
 inline void require_orientations(const double *from, std::size_t n, std::size_t D)
 {

@@ -24,13 +24,12 @@ inline void require_pairs(const Array2<std::int64_t> &pairs, const Array2<std::i
 struct PairArrays {
   const Array3<double> &position;     // (2, N, D)
   const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
-  const Array2<double> &edges;        // (2, D)
+  const Array3<double> &cell;         // (2, D, D)
   const Array2<std::int64_t> &pairs;  // (M, 2)
   const Array2<std::int64_t> &shift;  // (M, D)
 
   void check(std::size_t N, std::size_t D) const
   {
-    require(edges.shape(0) == 2 && edges.shape(1) == D, "edges have no shape (2, D).");
     require(position.shape(0) == 2 && position.shape(1) == N && position.shape(2) == D,
             "position has no shape (2, N, D).");
     require(orientation.shape(0) == 2 && orientation.shape(1) == N &&
@@ -39,8 +38,7 @@ struct PairArrays {
     require_finite(position, "position");
     require_finite(orientation, "orientation");
     require_orientations(orientation.data(), N, D);
-    require_finite(edges, "edges");
-    require_edges(edges.data(), D);
+    require_cell(cell, D);
     require_pairs(pairs, shift, D, N);
   }
 
@@ -49,7 +47,7 @@ struct PairArrays {
     const auto parts = [](const auto &of) {
       return SplitPoses::View{of.data(), of.data() + of.size() / 2};
     };
-    return {parts(position), parts(orientation), parts(edges)};
+    return {parts(position), parts(orientation), parts(cell)};
   }
 
   PairList list() const { return {pairs.shape(0), pairs.data(), shift.data()}; }

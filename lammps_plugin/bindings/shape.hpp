@@ -95,12 +95,12 @@ void def_over_pairs(nb::class_<ShapeOf<Model>> of, const char *name, const Funct
   of.def(
       name,
       [function](const ShapeOf<Model> &self, const Array3<double> &position,
-                 const Array3<double> &orientation, const Array2<double> &edges,
+                 const Array3<double> &orientation, const Array3<double> &cell,
                  const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
                  More... more) {
-        return function(self, PairArrays{position, orientation, edges, pairs, shift}, more...);
+        return function(self, PairArrays{position, orientation, cell, pairs, shift}, more...);
       },
-      "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, extra...);
+      "position"_a, "orientation"_a, "cell"_a, "pairs"_a, "shift"_a, extra...);
 }
 
 /// Binds `function(D, S(), shape, arrays)` as such a method that is asked for doubles or for long

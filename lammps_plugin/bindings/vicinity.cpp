@@ -16,7 +16,7 @@ namespace {
 struct PoseArrays {
   const Array3<double> &position;     // (2, N, D)
   const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
-  const Array2<double> &edges;        // (2, D)
+  const Array3<double> &cell;         // (2, D, D)
 
   Poses read() const
   {
@@ -28,7 +28,7 @@ struct PoseArrays {
     };
     fill(poses.position, position);
     fill(poses.orientation, orientation);
-    fill(poses.edges, edges);
+    fill(poses.cell, cell);
     return poses;
   }
 };
@@ -78,15 +78,12 @@ void check_poses(const PoseArrays &poses, const Vicinity &about)
   const auto has_shape = [&](const Array3<double> &of, std::size_t columns) {
     return of.shape(0) == 2 && of.shape(1) == N && of.shape(2) == columns;
   };
-  require(has_shape(poses.position, D) && has_shape(poses.orientation, D == 2 ? 1 : 4) &&
-              poses.edges.shape(0) == 2 && poses.edges.shape(1) == D,
-          D == 2
-              ? "position, orientation and edges have no shapes (2, N, 2), (2, N, 1) and (2, 2)."
-              : "position, orientation and edges have no shapes (2, N, 3), (2, N, 4) and (2, 3).");
+  require(has_shape(poses.position, D) && has_shape(poses.orientation, D == 2 ? 1 : 4),
+          D == 2 ? "position and orientation have no shapes (2, N, 2) and (2, N, 1)."
+                 : "position and orientation have no shapes (2, N, 3) and (2, N, 4).");
   require_finite(poses.position, "position");
   require_orientations(poses.orientation.data(), N, D);
-  require_finite(poses.edges, "edges");
-  require_edges(poses.edges.data(), D);
+  require_cell(poses.cell, D);
 }
 
 void take(Vicinity &of, const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
@@ -132,31 +129,32 @@ std::shared_ptr<Factors> factorise(Vicinity &of, const Array1<double> &x, double
 }
 
 void move_to(Vicinity &of, const Array3<double> &position, const Array3<double> &orientation,
-             const Array2<double> &edges)
+             const Array3<double> &cell)
 {
-  const PoseArrays poses{position, orientation, edges};
+  const PoseArrays poses{position, orientation, cell};
   check_poses(poses, of);
   of.move_to(poses.read());
 }
 
-nb::object tuple_of(const Poses &poses)
+nb::object poses_of(const Vicinity &about)
 {
-  const std::size_t D = poses.edges[0].size(), N = poses.position[0].size() / D;
-  const std::size_t turns = poses.orientation[0].size() / std::max<std::size_t>(N, 1);
-  NewArray<double> position({2, N, D}), orientation({2, N, turns}), edges({2, D});
+  const std::size_t D = about.dimension(), N = about.n_particles();
+  const Poses &poses = about.poses();
+  const std::size_t turns = D == 2 ? 1 : 4;
+  NewArray<double> position({2, N, D}), orientation({2, N, turns}), cell({2, D, D});
   const auto fill = [](NewArray<double> &to, const Poses::Numbers &from) {
     std::copy(from[1].begin(), from[1].end(), std::copy(from[0].begin(), from[0].end(), &to[0]));
   };
   fill(position, poses.position);
   fill(orientation, poses.orientation);
-  fill(edges, poses.edges);
-  return nb::make_tuple(position.release(), orientation.release(), edges.release());
+  fill(cell, poses.cell);
+  return nb::make_tuple(position.release(), orientation.release(), cell.release());
 }
 
 nb::object move(Vicinity &of, const Array1<double> &x, double strain)
 {
   of.move(checked(of, x, strain));
-  return tuple_of(of.poses());
+  return poses_of(of);
 }
 
 nb::object solve(const Factors &factors, const Array2<double> &right)
@@ -182,12 +180,12 @@ void export_vicinity(nb::module_ &m)
   m.attr("LEAST_SHIFT") = LEAST_SHIFT;
 
   nb::class_<Vicinity>(m, "Vicinity", "The energy of a packing about a base.")
-      .def("move_to", &move_to, "position"_a, "orientation"_a, "edges"_a,
+      .def("move_to", &move_to, "position"_a, "orientation"_a, "cell"_a,
            "Count coordinates from these poses, doubles and their small rests.")
       .def("move", &move, "x"_a, "strain"_a,
            "Count coordinates from a point near the base; gives its poses as move_to takes them.")
       .def_prop_ro(
-          "poses", [](const Vicinity &of) { return tuple_of(of.poses()); },
+          "poses", [](const Vicinity &of) { return poses_of(of); },
           "Of the base, as move_to takes them.")
       .def(
           "share",
@@ -214,11 +212,11 @@ void export_vicinity(nb::module_ &m)
       .def(
           "take_pairs",
           [](Vicinity &of, const Array3<double> &position, const Array3<double> &orientation,
-             const Array2<double> &edges, const Array2<std::int64_t> &pairs,
+             const Array3<double> &cell, const Array2<std::int64_t> &pairs,
              const Array2<std::int64_t> &shift, double wide, double reach, double skin) {
-            take(of, pairs, shift, {position, orientation, edges}, {{wide, reach, skin}});
+            take(of, pairs, shift, {position, orientation, cell}, {{wide, reach, skin}});
           },
-          "position"_a, "orientation"_a, "edges"_a, "pairs"_a, "shift"_a, "wide"_a, "reach"_a,
+          "position"_a, "orientation"_a, "cell"_a, "pairs"_a, "shift"_a, "wide"_a, "reach"_a,
           "skin"_a,
           "All pairs of surfaces that are closer than a wide skin at these poses, and centres "
           "than\n"

@@ -343,7 +343,8 @@ class Descent {
   {
     const double seconds = std::chrono::duration<double>(Clock::now() - began).count();
     double volume = 1.0;
-    for (const double edge : about.poses().edges[0]) volume *= edge;
+    const int D = about.dimension();
+    for (int k = 0; k < D; ++k) volume *= about.poses().cell[0][(D + 1) * k];
     rows.push_back({seconds, evaluations, residual_of(about, sums), sums.energy / volume});
     const double left = rows.back().residual, density = rows.back().energy_density;
     if (density < LESS_ENERGY * least_energy || left < LESS_RESIDUAL * least_residual) {

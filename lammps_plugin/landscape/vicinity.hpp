@@ -16,12 +16,12 @@
 
 namespace jamshape {
 
-/// Poses of N particles and the edges of the box, every number a double [0] and its small rest [1].
+/// Poses of N particles and the box, every number a double [0] and its small rest [1].
 struct Poses {
   using Numbers = std::vector<double>[2];
   Numbers position;     // (N, D)
   Numbers orientation;  // (N,) angles in the plane, (N, 4) quaternions in space
-  Numbers edges;        // (D,)
+  Numbers cell;         // (D, D) cell vectors as columns, upper triangular
 
   static Split get(const Numbers &of, std::size_t k) { return {of[0][k], of[1][k]}; }
   static void set(Numbers &of, std::size_t k, const Split &to)
@@ -34,7 +34,7 @@ struct Poses {
   SplitPoses view(double strain) const
   {
     const auto parts = [](const Numbers &of) { return std::array{of[0].data(), of[1].data()}; };
-    return {parts(position), parts(orientation), parts(edges), strain};
+    return {parts(position), parts(orientation), parts(cell), strain};
   }
 };
 
@@ -422,21 +422,34 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return {{static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])}};
   }
 
-  /// How an edge of the box has grown since a list was made.
-  double growth(const NearPairs &list, int k) const
+  /// How the box has changed since a list was made: what takes its cell vectors then to those now,
+  /// upper triangular like both.
+  std::array<Vec<D>, D> growth(const NearPairs &list) const
   {
-    return base.edges[0][k] / list.then.edges[0][k];
+    const std::vector<double> &now = base.cell[0], &then = list.then.cell[0];
+    std::array<Vec<D>, D> change{};
+    for (int k = 0; k < D; ++k) {
+      for (int m = k; m < D; ++m) {
+        double left = now[D * k + m];
+        for (int l = k; l < m; ++l) left -= change[k][l] * then[D * l + m];
+        change[k][m] = left / then[D * m + m];
+      }
+    }
+    return change;
   }
 
   void measure(NearPairs &list) const
   {
     list.moved.resize(D * shapes.size());
     list.turned.resize(TURNS * shapes.size());
-    for (int k = 0; k < D; ++k) {
-      const double scale = growth(list, k);
-      for (std::size_t c = k; c < list.moved.size(); c += D) {
-        list.moved[c] = base.position[0][c] - scale * list.then.position[0][c];
+    const auto change = growth(list);
+    for (std::size_t c = 0; c < list.moved.size(); ++c) {
+      const std::size_t k = c % D;
+      double affine = change[k][k] * list.then.position[0][c];
+      for (std::size_t m = k + 1; m < D; ++m) {
+        affine += change[k][m] * list.then.position[0][c - k + m];
       }
+      list.moved[c] = base.position[0][c] - affine;
     }
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       if (turns(i)) measure_turn(list, i);
@@ -477,15 +490,25 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   static double angle_of(const Vec<1> &turn) { return turn[0]; }
   static double angle_of(const Vec<3> &turn) { return norm(turn); }
 
+  /// By what part of its length the box's change, and then a stretch, changes a vector at most.
+  double box_strain(const NearPairs &list, double stretch) const
+  {
+    const auto change = growth(list);
+    double scaled = 0.0, sheared_sq = 0.0;
+    for (int k = 0; k < D; ++k) {
+      scaled = std::max(scaled, std::abs(stretch * change[k][k] - 1.0));
+      for (int m = k + 1; m < D; ++m) {
+        sheared_sq += stretch * change[k][m] * stretch * change[k][m];
+      }
+    }
+    return scaled + std::sqrt(sheared_sq);
+  }
+
   /// Whether two surfaces may have come closer by the skin, or by what is left of it.
   bool is_beyond(const NearPairs &list, const Displacement &at, double kept = 0.0) const
   {
-    double most = 0.0, scaled = 0.0;
-    const double stretch = 1.0 + at.strain;
-    for (int k = 0; k < D; ++k) {
-      const double scale = stretch * growth(list, k);
-      scaled = std::max(scaled, std::abs(scale - 1.0));
-    }
+    double most = 0.0;
+    const double stretch = 1.0 + at.strain, scaled = box_strain(list, stretch);
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       Vec<D> by = shift(at, i);
       for (int k = 0; k < D; ++k) by[k] += list.moved[D * i + k];
@@ -578,7 +601,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   static void settle(Poses &poses, double strain)
   {
     const long double stretch = 1.0L + strain;
-    for (Poses::Numbers *lengths : {&poses.position, &poses.edges}) {
+    for (Poses::Numbers *lengths : {&poses.position, &poses.cell}) {
       for (std::size_t k = 0; k < (*lengths)[0].size(); ++k) {
         Poses::set(*lengths, k, split(stretch * joined(Poses::get(*lengths, k))));
       }

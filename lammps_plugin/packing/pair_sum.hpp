@@ -27,7 +27,7 @@ struct SplitPoses {
   using View = std::array<const double *, 2>;
   View position;     // (N, D)
   View orientation;  // (N,) angles in 2D, (N, 4) quaternions w i j k in 3D
-  View edges;        // (D,)
+  View cell;         // (D, D) cell vectors of the box as columns, upper triangular
   double strain = 0.0;
 };
 
@@ -37,7 +37,8 @@ inline Split at(const SplitPoses::View &view, std::size_t index)
   return {view[0][index], view[1][index]};
 }
 
-/// Pairs that may touch: (M, 2) particles and (M, D) box edges to add to the second one's position.
+/// Pairs that may touch: (M, 2) particles and (M, D) cell vectors to add to the second one's
+/// position.
 struct PairList {
   std::size_t n;
   const std::int64_t *particles;
@@ -92,12 +93,16 @@ template <class Model, int D, class S> class PosedPairs {
   Vec<D, S> separation(std::size_t p) const
   {
     const std::size_t i = first(p), j = second(p);
-    Vec<D, S> r;
+    Split apart[D];
     for (int k = 0; k < D; ++k) {
-      const auto turns = static_cast<double>(pairs.shift[D * p + k]);
-      r[k] = strained(difference(at(poses.position, D * i + k), at(poses.position, D * j + k),
-                                 at(poses.edges, k), turns));
+      apart[k] = difference(at(poses.position, D * i + k), at(poses.position, D * j + k));
     }
+    for (int m = 0; m < D; ++m) {
+      const std::int64_t turns = pairs.shift[D * p + m];
+      if (turns != 0) move_along(m, static_cast<double>(turns), apart);
+    }
+    Vec<D, S> r;
+    for (int k = 0; k < D; ++k) r[k] = strained(apart[k]);
     return r;
   }
 
@@ -169,6 +174,14 @@ template <class Model, int D, class S> class PosedPairs {
   typename Model::Law law;
   std::vector<typename Model::template Body<D, S>> body;  // at the origin
   std::vector<double> around;                             // radii of the spheres around them
+
+  /// The second of a pair by so many of one of the cell vectors; most pairs need none.
+  void move_along(int vector, double turns, Split *apart) const
+  {
+    for (int k = 0; k <= vector; ++k) {
+      apart[k] = difference(apart[k], at(poses.cell, D * k + vector), turns);
+    }
+  }
 
   S strained(const Split &length) const
   {

@@ -32,18 +32,21 @@ inline Split split(long double x)
 inline long double joined(const Split &x) { return static_cast<long double>(x.value) + x.rest; }
 
 /// One coordinate of x_i - x_j, of which the leading digits cancel, as it is before it is rounded,
-/// in doubles alone: j stands so many edges of the box further on.
-inline Split difference(const Split &i, const Split &j, const Split &edge, double turns)
+/// in doubles alone.
+inline Split difference(const Split &i, const Split &j)
 {
   Split found = two_sum(i.value, -j.value);
   found.rest += i.rest - j.rest;
-  if (turns != 0.0) {
-    const double image = turns * edge.value;
-    const Split there = two_sum(found.value, -image);
-    found = {there.value,
-             found.rest + there.rest - std::fma(turns, edge.value, -image) - turns * edge.rest};
-  }
   return found;
+}
+
+/// That coordinate where j stands so many lengths further on, likewise.
+inline Split difference(const Split &apart, const Split &length, double turns)
+{
+  const double image = turns * length.value;
+  const Split there = two_sum(apart.value, -image);
+  return {there.value,
+          apart.rest + there.rest - std::fma(turns, length.value, -image) - turns * length.rest};
 }
 
 }  // namespace jamshape

@@ -1,6 +1,6 @@
 """Packings of M separate pairs (particles 2m and 2m + 1) with poses in long double.
 
-The second particle of a pair sits some box edges away from the first, so that every contact is with
+The second particle of a pair sits some cell vectors away from the first, so that every contact is with
 a periodic image.
 """
 
@@ -101,7 +101,7 @@ class PairPacking:
         return 1 if self.dimension == 2 else 3
 
     def arguments(self):
-        poses = (split(x) for x in (self.position, self.orientation, self.edges))
+        poses = (split(x) for x in (self.position, self.orientation, np.diag(self.edges)))
         return (*poses, np.arange(2 * len(self)).reshape(-1, 2), self.shift)
 
     def compiled(self, sides, k_e):

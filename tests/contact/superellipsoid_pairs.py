@@ -143,7 +143,7 @@ def packed(i, j):
     return (
         split(position),
         split(turn),
-        split(np.full(dimension, 100.0)),
+        split(100.0 * np.eye(dimension)),
         np.arange(2 * n).reshape(n, 2),
         np.zeros((n, dimension), np.int64),
     )

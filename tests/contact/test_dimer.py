@@ -196,13 +196,13 @@ def test_discs_on_each_other_are_four_times_one(dimension):
 
 def two(dimension, distance, diameters=(3.0, 1.0, 1.0)):
     """Parallel dimers, A = 1 and R = 1/2, the second this far along x from the first."""
-    position, edges = np.zeros((2, 2, dimension)), np.zeros((2, dimension))
-    position[0, 1, 0], edges[0] = distance, 20.0
+    position, cell = np.zeros((2, 2, dimension)), np.zeros((2, dimension, dimension))
+    position[0, 1, 0], cell[0] = distance, 20.0 * np.eye(dimension)
     orientation = np.zeros((2, 2, 1 if dimension == 2 else 4))
     orientation[0, :, 0] = dimension == 3
     shape = _contact.Dimers(np.tile(diameters, (2, 1)), np.ones(2), dimension, K_E, 1)
     pairs, shift = np.array([[0, 1]]), np.zeros((1, dimension), np.int64)
-    return shape, (position, orientation, edges, pairs, shift)
+    return shape, (position, orientation, cell, pairs, shift)
 
 
 @pytest.mark.parametrize("extended", [False, True])
@@ -262,7 +262,8 @@ def test_hard_dimers_stay_apart(dimension):
     pairs = np.array([(i, j) for i in range(n) for j in range(i)])
     apart = found["position"][pairs[:, 0]] - found["position"][pairs[:, 1]]
     shift = np.round(apart / edges).astype(np.int64)
-    poses = [np.stack([x, 0 * x]) for x in (found["position"], found["orientation"], edges)]
+    doubles = (found["position"], found["orientation"], np.diag(edges))
+    poses = [np.stack([x, 0 * x]) for x in doubles]
     assert not shape.overlaps(*poses, pairs, shift).any()
 
 

@@ -10,13 +10,14 @@ from jamshape import _contact
 FACE = 0.1  # of the curvature of the ellipsoid of the same axes
 
 
-def found(shape, position, orientation, edges):
+def found(shape, position, orientation, edge):
     """Contacts of all pairs of a few particles, in boxes where no image is near."""
     position = np.asarray(position, float)
     n, dimension = position.shape
     pairs = np.array([(i, j) for i in range(n) for j in range(i + 1, n)])
     shift = np.zeros((len(pairs), dimension), np.int64)
-    poses = (position, np.asarray(orientation, float).reshape(n, -1), np.full(dimension, edges))
+    turn = np.asarray(orientation, float).reshape(n, -1)
+    poses = (position, turn, edge * np.eye(dimension))
     return shape.contacts(*(np.stack([x, np.zeros_like(x)]) for x in poses), pairs, shift)
 
 
@@ -91,7 +92,7 @@ def test_derivatives_tell_the_same_faces(extended):
     near = [
         (i, j) for i in range(40) for j in range(i) if np.linalg.norm(position[i] - position[j]) < 2
     ]
-    poses = (position, turn, np.full(3, 50.0))
+    poses = (position, turn, 50.0 * np.eye(3))
     arguments = [np.stack([x, np.zeros_like(x)]) for x in poses]
     arguments += [np.array(near), np.zeros((len(near), 3), np.int64)]
     contacts, other = shape.contacts(*arguments), shape.derivatives(*arguments, extended)

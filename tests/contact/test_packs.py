@@ -120,6 +120,6 @@ def test_packs_that_are_not_full_count_no_pair_twice(instructions, n, monkeypatc
 def test_a_set_that_this_machine_has_not_is_refused(monkeypatch):
     monkeypatch.setenv("JAMSHAPE_SIMD", "mmx")
     discs = rods(np.ones((2, 3)), 2)
-    pose = np.zeros((2, 2, 2)), np.zeros((2, 2, 1)), np.array([[9.0, 9.0], [0.0, 0.0]])
+    pose = np.zeros((2, 2, 2)), np.zeros((2, 2, 1)), np.stack([9 * np.eye(2), 0 * np.eye(2)])
     with pytest.raises(ValueError, match=r"JAMSHAPE_SIMD=mmx, expected no value or scalar"):
         discs.sums(*pose, np.array([[0, 1]]), np.zeros((1, 2), int), False)

@@ -55,8 +55,8 @@ def compressed(mixture, dimension):
 
 def arguments(packing):
     near = near_particles(packing, packing.compiled())
-    position, orientation, edges = packing.poses()
-    poses = (split(x) for x in (position, orientation.reshape(packing.n, -1), edges))
+    position, orientation, cell = packing.poses()
+    poses = (split(x) for x in (position, orientation.reshape(packing.n, -1), cell))
     return [*poses, np.column_stack([near.first, near.second]), near.shift]
 
 
@@ -109,11 +109,11 @@ def test_forces_and_torques_of_a_packing_balance(dimension, measured):
 def test_a_particle_touches_its_own_image(extended):
     """A rod in a box lower than its width: two bonds with its image, which push on nothing."""
     rod = rods(np.array([[13.0, 1.0, 1.0]]), 2, K_E, 2)  # long, and so with two whole bonds
-    position, edges = np.zeros((2, 1, 2)), np.zeros((2, 2))
-    position[0], edges[0] = (0.3, -7.1), (40.0, 0.9)
+    position, cell = np.zeros((2, 1, 2)), np.zeros((2, 2, 2))
+    position[0], cell[0] = (0.3, -7.1), np.diag([40.0, 0.9])
     orientation = np.zeros((2, 1, 1))
     pairs, shift = np.zeros((1, 2), np.int64), np.array([[0, -1]])
-    found = rod.sums(position, orientation, edges, pairs, shift, extended)
+    found = rod.sums(position, orientation, cell, pairs, shift, extended)
     overlap = 1.0 - 0.9
     assert found["n_bonds"] == 2
     np.testing.assert_allclose(found["energy"], K_E * overlap**2)
@@ -154,7 +154,8 @@ def with_other_digits(rng, parts, bits):
 def test_digits_may_stand_in_the_doubles_or_in_their_rests(dimension, sides, measured):
     rng = np.random.default_rng([52, dimension])
     packing = shallow_pairs(dimension)
-    position, orientation, edges, pairs, shift = packing.arguments()
+    position, orientation, cell, pairs, shift = packing.arguments()
+    edges = np.diagonal(cell, axis1=1, axis2=2)
     d = packing.plain().d.astype(float)
     found = packing.sums(sides, K_E)
     coordinate = np.abs(position[0]).max()
@@ -162,7 +163,7 @@ def test_digits_may_stand_in_the_doubles_or_in_their_rests(dimension, sides, mea
         other = (
             with_other_digits(rng, position, bits),
             with_other_digits(rng, orientation, bits),
-            with_other_digits(rng, edges, bits),
+            np.stack([np.diag(part) for part in with_other_digits(rng, edges, bits)]),
         )
         again = packing.compiled(sides, K_E).sums(*other, pairs, shift, True)
         force = np.abs(again["force"] - found["force"])[::2].max(axis=1) * d**2 / K_E
@@ -191,10 +192,10 @@ def test_overlaps_of_1e_12_far_from_the_origin_keep_six_digits(dimension, measur
     position[0, ::2], position[0, 1::2], position[1, 1::2] = first, second, rest
     orientation = np.zeros((2, 2 * n, 1 if dimension == 2 else 4))
     orientation[0, :, 0] = 1.0
-    edges = np.stack([np.full(dimension, 3000.0), np.zeros(dimension)])
+    cell = np.stack([3000.0 * np.eye(dimension), np.zeros((dimension, dimension))])
     pairs, shift = np.arange(2 * n).reshape(n, 2), np.zeros((n, dimension), np.int64)
     discs = rods(np.ones((2 * n, 3)), dimension, K_E, 2)
-    poses = (position, orientation, edges, pairs, shift)
+    poses = (position, orientation, cell, pairs, shift)
     found = discs.sums(*poses, True)
     assert found["n_bonds"] == n
     force = np.linalg.norm(found["force"][::2], axis=1) / K_E
@@ -229,13 +230,13 @@ def test_precisions_agree_to_the_rounding_of_doubles(mixture, dimension, measure
 # --- arguments ---------------------------------------------------------------------------------
 
 
-def sums(*, diameters, k_e, sides, edges, **poses):
-    """Of new particles; the dimension is that of the edges."""
-    return rods(diameters, edges.shape[1], k_e, sides).sums(edges=edges, **poses)
+def sums(*, diameters, k_e, sides, cell, **poses):
+    """Of new particles; the dimension is that of the box."""
+    return rods(diameters, cell.shape[1], k_e, sides).sums(cell=cell, **poses)
 
 
-def derivatives(*, diameters, k_e, sides, edges, **poses):
-    return rods(diameters, edges.shape[1], k_e, sides).derivatives(edges=edges, **poses)
+def derivatives(*, diameters, k_e, sides, cell, **poses):
+    return rods(diameters, cell.shape[1], k_e, sides).derivatives(cell=cell, **poses)
 
 
 FUNCTIONS = pytest.mark.parametrize("function", [sums, derivatives])
@@ -247,13 +248,13 @@ def two_rods(dimension):
     orientation[0, :, 0] = 1.0
     position = np.zeros((2, 2, dimension))
     position[0, 1, 1] = 0.9
-    edges = np.zeros((2, dimension))
-    edges[0] = 20.0
+    cell = np.zeros((2, dimension, dimension))
+    cell[0] = 20.0 * np.eye(dimension)
     return {
         "diameters": np.tile([3.0, 1.0, 1.0], (2, 1)),
         "position": position,
         "orientation": orientation,
-        "edges": edges,
+        "cell": cell,
         "pairs": np.array([[0, 1]]),
         "shift": np.zeros((1, dimension), np.int64),
         "k_e": K_E,
@@ -268,7 +269,8 @@ BAD = {
     "position": [np.zeros((1, 2, 2)), np.zeros((2, 3, 2)), np.zeros((2, 2, 3)),
                  np.zeros((2, 2, 1))],
     "orientation": [np.zeros((1, 2, 1)), np.zeros((2, 1, 1)), np.zeros((2, 2, 4))],
-    "edges": [np.ones((1, 2)), np.ones((2, 1)), np.ones((2, 4)), np.ones((2, 3))],
+    "cell": [np.ones((1, 2, 2)), np.ones((2, 1, 2)), np.ones((2, 2, 3)), np.ones((2, 2, 2)),
+             np.zeros((2, 2, 2)), np.full((2, 2, 2), np.inf)],
     "pairs": [np.array([[0, 1, 1]]), np.array([[0, 2]]), np.array([[-1, 1]]),
               np.array([[0, 1], [0, 1]])],
     "shift": [np.zeros((1, 3), np.int64), np.zeros((2, 2), np.int64), np.zeros((1, 1), np.int64)],
@@ -351,20 +353,21 @@ def test_centres_on_each_other_are_crossing(dimension):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("images", [0, 1, 3])
-def test_separations_are_right_to_the_last_bit_of_doubles(images, dimension):
+@pytest.mark.parametrize(("images", "tilted"), [(0, 0), (1, 0), (3, 0), (1, 1), (3, 1)])
+def test_separations_are_right_to_the_last_bit_of_doubles(images, tilted, dimension):
     """Of particles 40 diameters out, from 1e-9 to 1 apart, in the same image and in others."""
     rng, n = np.random.default_rng(17), 300
-    edges = LONG(1) * rng.uniform(35.0, 45.0, dimension)
+    cell = LONG(1) * np.triu(rng.uniform(-20.0, 20.0, (dimension, dimension)), 1) * tilted
+    cell += np.diag(LONG(1) * rng.uniform(35.0, 45.0, dimension))
     shift = rng.integers(-images, images + 1, (n, dimension))
     apart = LONG(1) * 10.0 ** rng.uniform(-9.0, -0.3, (n, 1)) * rng.normal(size=(n, dimension))
-    second = edges * rng.uniform(-1.0, 1.0, (n, dimension))
-    position = split(np.stack([second + shift * edges + apart, second], 1).reshape(2 * n, -1))
+    second = rng.uniform(-40.0, 40.0, (n, dimension)).astype(LONG)
+    position = split(np.stack([second + shift @ cell.T + apart, second], 1).reshape(2 * n, -1))
     turn = split(np.tile([[0.0]] if dimension == 2 else np.eye(1, 4), (2 * n, 1)))
     pairs, discs = np.arange(2 * n).reshape(-1, 2), rods(np.full((2 * n, 3), 20.0), dimension)
-    found = discs.derivatives(position, turn, split(edges), pairs, shift, False)["separation"]
-    x, edge = exactly(position), exactly(split(edges))
-    expected = x[::2] - x[1::2] - edge * np.vectorize(Fraction)(shift)
+    found = discs.derivatives(position, turn, split(cell), pairs, shift, False)["separation"]
+    x, vectors = exactly(position), exactly(split(cell))
+    expected = x[::2] - x[1::2] - np.vectorize(Fraction)(shift) @ vectors.T
     error = np.abs((np.vectorize(Fraction)(found) - expected).astype(float))
     assert found.shape == (n, dimension)
     assert np.all(error <= 0.5001 * np.spacing(np.abs(found)))

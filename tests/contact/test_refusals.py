@@ -30,7 +30,14 @@ def poses(dimension):
     position = np.zeros((N, dimension))
     position[:, 0] = 0.0, 3.5, 9.0
     turn = np.zeros((N, 1)) if dimension == 2 else np.tile([1.0, 0.0, 0.0, 0.0], (N, 1))
-    return {"position": position, "orientation": turn, "edges": np.full(dimension, 30.0)}
+    return {"position": position, "orientation": turn, "cell": 30.0 * np.eye(dimension)}
+
+
+def hard_poses(dimension):
+    """Three that are apart, as Monte Carlo takes them."""
+    given = poses(dimension)
+    given["position"][:, 0] = 0.0, 10.0, 20.0
+    return given | {"edges": np.diagonal(given.pop("cell")).copy()}
 
 
 def split(of):
@@ -55,7 +62,7 @@ def call(of, method, given):
 @every_shape
 @in_each_space
 @pytest.mark.parametrize("method", OVER_PAIRS)
-@pytest.mark.parametrize("name", ["position", "orientation", "edges"])
+@pytest.mark.parametrize("name", ["position", "orientation", "cell"])
 def test_poses_that_are_no_numbers_are_refused(shape, dimension, method, name):
     of, given = particles(shape, dimension), arguments(dimension)
     call(of, method, given)
@@ -76,8 +83,9 @@ def test_what_is_no_box_orientation_or_pair_is_refused(shape, dimension):
     no_turn = given["orientation"].copy()
     no_turn[0, 1] = 0.0
     wrong = [
-        ({"edges": 0.0 * given["edges"]}, "edges hold what is no length"),
-        ({"edges": given["edges"][:1].copy()}, r"no shape \(2, D\)"),
+        ({"cell": 0.0 * given["cell"]}, "cell holds an edge that is no length"),
+        ({"cell": given["cell"][:1].copy()}, r"no shape \(2, D, D\)"),
+        ({"cell": np.ones((2, dimension, dimension))}, "cell is not upper triangular"),
         ({"pairs": given["pairs"] + 2}, "a particle that does not exist"),
         ({"pairs": given["pairs"] - 1}, "a particle that does not exist"),
         ({"shift": given["shift"][:1]}, "pairs and shift"),
@@ -99,8 +107,7 @@ def test_what_is_no_box_orientation_or_pair_is_refused(shape, dimension):
 @every_shape
 @in_each_space
 def test_sweeps_of_particles_that_are_nowhere_are_refused(shape, dimension):
-    of, given = particles(shape, dimension), poses(dimension)
-    given["position"][:, 0] = 0.0, 10.0, 20.0
+    of, given = particles(shape, dimension), hard_poses(dimension)
     moves = {"shift": 0.1, "turn": 0.1, "n_sweeps": 1, "seed": 1}
     assert of.sweeps(**given, **moves)["tried"] == N
     for name in given:
@@ -120,8 +127,7 @@ def test_sweeps_of_particles_that_are_nowhere_are_refused(shape, dimension):
 
 @in_each_space
 def test_sweeps_keep_to_a_box_however_wide_it_is(dimension):
-    of, given = particles(_contact.Spherocylinders, dimension), poses(dimension)
-    given["position"][:, 0] = 0.0, 10.0, 20.0
+    of, given = particles(_contact.Spherocylinders, dimension), hard_poses(dimension)
     for edge in (1e9, 1e300):
         given["edges"] = np.full(dimension, edge)
         found = of.sweeps(**given, shift=edge, turn=1.0, n_sweeps=5, seed=1)

@@ -9,7 +9,7 @@ from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Kind, Particles
 from jamshape.shapes.table import SHAPES
 
-RESTS = ("position_rest", "orientation_rest", "edges_rest")
+RESTS = ("position_rest", "orientation_rest", "edges_rest", "tilt_rest")
 
 PLACES = [(name, dimension) for name in SHAPES for dimension in (2, 3)]
 
@@ -31,6 +31,13 @@ def mixed(name, dimension, spread=0.05, n=12):
         step=12345678901,
         time=1 / 7,
     )
+
+
+def tilted(name, dimension):
+    """The same in a box with a tilt."""
+    packing = mixed(name, dimension)
+    tilt = packing.box.edges[0] * np.array([0.3, -0.4, 0.2])[: 2 * dimension - 3]
+    return packing.with_(box=Box(packing.box.lo, packing.box.edges, tilt))
 
 
 def assert_same(a, b):

@@ -41,14 +41,23 @@ def assert_identical(a, b):
         assert (x.dtype, x.shape, x.tobytes()) == (y.dtype, y.shape, y.tobytes()), name
     assert a.box.lo.tobytes() == b.box.lo.tobytes()
     assert a.box.edges.tobytes() == b.box.edges.tobytes()
+    assert a.box.tilt.tobytes() == b.box.tilt.tobytes()
     assert (a.shape_style, a.step, a.time) == (b.shape_style, b.step, b.time)
 
 
-def with_rests(dimension):
+def tilted_box(dimension):
+    """A box whose tilts have no short decimals."""
+    tilt = np.array([1 / 3, -2 / 7, np.nextafter(3, 4)])
+    return Box(np.full(dimension, -1 / 3), np.full(dimension, 23 / 3), tilt[: 2 * dimension - 3])
+
+
+def with_rests(dimension, **changes):
     """A packing whose poses are known to more digits than doubles hold."""
-    packing = nasty_packing(dimension).with_(position=nasty_packing(dimension).position.clip(-9, 9))
+    packing = nasty_packing(dimension, **changes)
+    packing = packing.with_(position=packing.position.clip(-9, 9))
     finer = [
         x + np.longdouble(1) / 3 * np.spacing(np.longdouble(1) * 1e-3) for x in packing.poses()
     ]
     finer = [x + np.spacing(np.abs(x).astype(float)) / np.longdouble(7) for x in finer]
+    finer[2] = np.where(packing.box.matrix, finer[2], 0)
     return packing.with_poses(*finer)

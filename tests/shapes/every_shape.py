@@ -24,6 +24,9 @@ ROUNDING = 1e-13
 # Particles of a scene.
 NUMBER = {2: 12, 3: 8}
 
+# Minimised enough for the next step.
+ROUGH = Stop(tolerance=0.03, evaluations=200)
+
 # The phi of random starts, and the overlap 1 - r/d of the deepest bond of a pressed scene.
 _PHI, _DEEPEST = {2: 0.25, 3: 0.12}, 0.1
 
@@ -85,10 +88,13 @@ def deepest(packing):
 @cache
 def squeezed(case, n=None, overlap=_DEEPEST, seed=1):
     """Squeezed in steps, each followed by a rough minimisation, to an overlap of the deepest bond."""
-    packing = scattered(case, n, seed=seed)
+    return _squeezed(scattered(case, n, seed=seed), overlap)
+
+
+def _squeezed(packing, overlap):
     landscape, state = Landscape(packing, sides=SIDES), State.of(packing)
     for _ in range(300):
-        found = minimise(landscape, state, "lbfgs", Stop(tolerance=0.03, evaluations=200))
+        found = minimise(landscape, state, "lbfgs", ROUGH)
         if deepest(found.state.packing(packing)) > overlap:
             return in_doubles(found.state.packing(packing))
         step = 0.03 if found.outcome is Outcome.UNJAMMED else 0.01
@@ -100,6 +106,27 @@ def squeezed(case, n=None, overlap=_DEEPEST, seed=1):
 def pressed(case):
     """Squeezed, and kicked off the minimum, so that forces do not cancel."""
     return kicked(squeezed(case), 0.031)
+
+
+@cache
+def tilted(case):
+    """Sheared in steps to tilts of half an edge and less, of either sign, then pressed like the others."""
+    packing = scattered(case)
+    landscape, state = Landscape(packing, sides=SIDES), State.of(packing)
+    D, steps = case.dimension, 20
+    shear = np.zeros((D, D))
+    shear[np.triu_indices(D, 1)] = [0.5, -0.4, 0.3][: D * (D - 1) // 2]
+    there = np.eye(D)
+    for step in range(steps):
+        before, there = there, np.eye(D) + (step + 1) / steps * shear
+        state = sheared(state, there @ np.linalg.inv(before))
+        state = minimise(landscape, state, "lbfgs", ROUGH).state
+    return kicked(_squeezed(in_doubles(state.packing(packing)), _DEEPEST), 0.031)
+
+
+def sheared(state, change):
+    """Particles and box moved by a linear map, an upper triangular matrix."""
+    return State(state.position @ change.T, state.orientation, change @ state.cell)
 
 
 def kicked(packing, size, seed=2):
@@ -117,7 +144,7 @@ def in_a_small_box(case):
     packing = scattered(case, 2)
     landscape, state = Landscape(packing, sides=SIDES), State.of(packing)
     for _ in range(300):
-        state = minimise(landscape, state, "lbfgs", Stop(tolerance=0.03, evaluations=200)).state
+        state = minimise(landscape, state, "lbfgs", ROUGH).state
         found = in_doubles(state.packing(packing))
         i, j = find_contacts(found, sides=SIDES).pairs.T
         if (
@@ -145,7 +172,7 @@ def taken(packing, rows, **others):
 
 def apart(packing, factor=20.0):
     """The same places in so large a box that no image is near: an open cluster."""
-    return packing.with_(box=Box(packing.box.lo, factor * packing.box.edges))
+    return packing.with_(box=Box.of(packing.box.lo, factor * packing.box.matrix))
 
 
 def laws(packing):
@@ -176,8 +203,8 @@ def replicated(packing, times):
     shifts = np.array(list(np.ndindex(*[times] * packing.dimension)))
     copies = len(shifts)
     rows = np.tile(np.arange(packing.n), copies)
-    moved = packing.position[rows] + np.repeat(shifts, packing.n, axis=0) * packing.box.edges
-    box = Box(packing.box.lo, times * packing.box.edges)
+    moved = packing.position[rows] + packing.box.vectors(np.repeat(shifts, packing.n, axis=0))
+    box = Box.of(packing.box.lo, times * packing.box.matrix)
     return taken(packing, rows, id=1 + np.arange(len(rows)), position=moved, box=box)
 
 

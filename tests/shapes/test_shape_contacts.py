@@ -147,7 +147,7 @@ def test_neither_order_nor_names_nor_places_in_the_box_matter(packing):
     mixed = taken(packing, rows).with_(id=1 + 3 * rng.permutation(packing.n))
     assert_same_but_for_rounding(packing, mixed, rows)
     turns = rng.integers(-2, 3, packing.position.shape)
-    wrapped = packing.with_(position=packing.position + turns * packing.box.edges)
+    wrapped = packing.with_(position=packing.position + packing.box.vectors(turns))
     assert_same_but_for_rounding(packing, wrapped)
     moved = packing.with_(position=packing.position + 0.3 * packing.box.edges)
     assert_same_but_for_rounding(packing, moved)

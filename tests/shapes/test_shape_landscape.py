@@ -14,14 +14,15 @@ from every_shape import (
     as_vectors,
     close_to,
     pressed,
+    sheared,
     size_of,
 )
 from slopes import assert_is_slope
 
-from jamshape.contacts import forces, sum_forces
+from jamshape.contacts import find_contacts, forces, sum_forces
 from jamshape.landscape import CrossingError, Landscape
 from jamshape.landscape.vicinity import Vicinity
-from jamshape.packing import State
+from jamshape.packing import Box, State
 
 
 def directions(landscape, number=3, seed=5):
@@ -98,22 +99,70 @@ def test_strain_derivatives_are_slopes(packing):
     assert_is_slope(curvature.coupling, lambda s: at(s).gradient, h, scale)
 
 
-def test_the_virial_is_the_slope_of_the_energy_along_each_axis(packing):
+def test_the_virial_is_the_slope_of_the_energy_by_every_strain(packing):
     landscape, state = Landscape(packing), State.of(packing)
     found = forces(packing, sides=SIDES)
     scale = np.abs(found.virial).max()
     assert np.trace(found.virial) / (packing.dimension * packing.box.volume) == close_to(
         found.pressure, 4 * EPS
     )
-    for axis in range(packing.dimension):
+    # A strain of x_a by x_b; the cell stays upper triangular for a <= b.
+    for a, b in zip(*np.triu_indices(packing.dimension), strict=True):
 
-        def energy(s, axis=axis):
-            factor = np.ones(packing.dimension, np.longdouble)
-            factor[axis] += np.longdouble(s)
-            there = State(factor * state.position, state.orientation, factor * state.edges)
-            return landscape.evaluate(there).energy
+        def energy(s, a=a, b=b):
+            change = np.eye(packing.dimension, dtype=np.longdouble)
+            change[a, b] += np.longdouble(s)
+            return landscape.evaluate(sheared(state, change)).energy
 
-        assert_is_slope(-found.virial[axis, axis], energy, 1e-6, scale)
+        assert_is_slope(-found.virial[b, a], energy, 1e-6, scale)
+
+
+def test_the_cell_of_a_lattice_does_not_matter(packing):
+    """Other cell vectors, whole cell vectors added to them, and the tilts as small as they may be."""
+    whole = np.eye(packing.dimension)
+    whole[np.triu_indices(packing.dimension, 1)] = [1, -2, 1][: len(packing.box.tilt)]
+    matrix = packing.box.matrix @ whole
+    for k in range(packing.dimension - 2, -1, -1):  # a tilt of a row changes those above it
+        for m in range(k + 1, packing.dimension):
+            matrix[:, m] -= np.rint(matrix[k, m] / matrix[k, k]) * matrix[:, k]
+    reduced = Box.of(packing.box.lo, matrix)
+    assert (np.abs(reduced.tilt_factors) <= 0.5 + EPS).all()
+    for box in (reduced, Box.of(packing.box.lo, packing.box.matrix @ whole)):
+        assert_same_landscape(packing, packing.with_(box=box))
+
+
+def assert_same_landscape(packing, other):
+    one, same = forces(packing, sides=SIDES), forces(other, sides=SIDES)
+    force, torque = size_of(find_contacts(packing, sides=SIDES))
+    assert same.energy == close_to(one.energy, 10 * ROUNDING)
+    np.testing.assert_allclose(same.force, one.force, rtol=0, atol=10 * ROUNDING * force)
+    atol = 10 * ROUNDING * max(force, torque)
+    np.testing.assert_allclose(same.torque, one.torque, rtol=0, atol=atol)
+    atol = 10 * ROUNDING * np.abs(one.virial).max()
+    np.testing.assert_allclose(same.virial, one.virial, rtol=0, atol=atol)
+    here, there = (Landscape(x).curvature(State.of(x), extended=True) for x in (packing, other))
+    stiff = abs(here.hessian).max()
+    assert abs(there.hessian - here.hessian).max() <= 10 * ROUNDING * stiff
+    assert there.strain_hessian == close_to(here.strain_hessian, 100 * ROUNDING)
+
+
+def test_a_vicinity_follows_a_box_that_shears(packing):
+    """Its list of pairs holds as long as it says so: energies and forces are those of new lists."""
+    state = State.of(packing)
+    shear = np.eye(packing.dimension)
+    shear[0, 1] = 4e-3
+    vicinity, still = Vicinity(Landscape(packing), state), np.zeros(Landscape(packing).size)
+    kept = Landscape(packing)
+    for _ in range(12):
+        state = sheared(state, shear)
+        vicinity.move_to(state)
+        fresh = Landscape(packing).evaluate(state, extended=False)
+        for found in (
+            vicinity.evaluate(still, 0.0, extended=False), kept.evaluate(state, extended=False)
+        ):  # fmt: skip
+            assert found.n_bonds == fresh.n_bonds
+            assert found.energy == close_to(fresh.energy, ROUNDING)
+            assert found.strain_gradient == close_to(fresh.strain_gradient, ROUNDING)
 
 
 # --- the same by other ways ---------------------------------------------------------------------

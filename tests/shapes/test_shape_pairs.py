@@ -50,14 +50,15 @@ def rows_of(near):
 
 def all_images(packing):
     """Pairs and images near enough for bounding spheres to touch, found by trying all."""
-    edges, reach = packing.box.edges, packing.outer_radius
+    box, reach = packing.box, packing.outer_radius
     apart_by = packing.position[:, None] - packing.position
-    whole = np.rint(apart_by / edges)
+    whole = np.rint(box.fractions(apart_by))
     found = set()
-    most = np.ceil(2 * reach.max() / edges + 0.5).astype(int)
+    # Across the box, where it is narrowest, and half of it along each edge.
+    most = np.ceil(2 * reach.max() / box.spacings + 0.5).astype(int)
     for turn in itertools.product(*(range(-m, m + 1) for m in most)):
         shift = whole + turn
-        distance = np.linalg.norm(apart_by - shift * edges, axis=2)
+        distance = np.linalg.norm(apart_by - shift @ box.matrix.T, axis=2)
         i, j = np.nonzero(distance < reach[:, None] + reach)
         found |= set(map(tuple, np.column_stack([i, j, shift[i, j].astype(int)]).tolist()))
     zero = (0,) * packing.dimension
@@ -97,9 +98,9 @@ def test_pairs_that_are_not_near_do_not_touch_when_moved_by_the_margin(packing):
     every = every_pair(packing, margin)
     rows = np.column_stack([every.first, every.second, every.shift]).tolist()
     far = every.take(np.array([tuple(row) not in near for row in rows], bool))
-    position, orientation, edges = State.of(packing).split
+    position, orientation, cell = State.of(packing).split
     apart_by = packing.position[far.first] - packing.position[far.second]
-    apart_by -= far.shift * packing.box.edges
+    apart_by -= far.shift @ packing.box.matrix.T
     for _ in range(20):
         step = apart_by / np.linalg.norm(apart_by, axis=1, keepdims=True)
         step += rng.normal(size=step.shape)
@@ -109,5 +110,5 @@ def test_pairs_that_are_not_near_do_not_touch_when_moved_by_the_margin(packing):
             moved[0, far.second[k]] += step[k]
             if far.first[k] == far.second[k]:
                 continue
-            arrays = PairArrays.of(State.joined(moved, orientation, edges), far.take(np.array([k])))
+            arrays = PairArrays.of(State.joined(moved, orientation, cell), far.take(np.array([k])))
             assert not len(bodies.contacts(*arrays, False)["pair"])

@@ -81,7 +81,7 @@ class Crowd:
     @property
     def poses(self):
         """Without rests, as the classes take them."""
-        arrays = (self.position, self.orientation, self.edges)
+        arrays = (self.position, self.orientation, np.diag(self.edges))
         return tuple(np.stack([x, np.zeros_like(x)]) for x in arrays)
 
     def pairs(self, margin=0.0):

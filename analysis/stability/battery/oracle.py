@@ -155,10 +155,10 @@ def spines_of(packing: Packing, quaternion: FloatArray | None) -> tuple[IntArray
     """All pairs that may touch, with all images, as (M, 2) particles and their spines."""
     pairs, shift = every_image(packing)
     i, j = pairs.T
-    x, _, edges = packing.poses()
+    x, _, cell = packing.poses()
     u = long_axes(packing, quaternion)
     A, R = (np.asarray(length, np.longdouble) for length in (packing.half_length, packing.radius))
-    return pairs, Spines(x[i] - x[j] - shift * edges, u[i], u[j], A[i], A[j], R[i] + R[j])
+    return pairs, Spines(x[i] - x[j] - shift @ cell.T, u[i], u[j], A[i], A[j], R[i] + R[j])
 
 
 def of_rods(packing: Packing, k_e: float = 1.0, quaternion: FloatArray | None = None) -> Found:

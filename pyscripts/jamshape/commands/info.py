@@ -19,7 +19,7 @@ from jamshape.commands.contents import contents_of
 # Lines of what is known; each part is said where its number is there.
 _LINES = {
     "particles": ("{n} {shape}s in {dimension}D", "{kinds_text}"),
-    "box": ("{box_text}",),
+    "box": ("{box_text}", "tilt {tilt_text}"),
     "state": (
         "phi {phi:.8g}",
         "pressure {pressure:.4g}",
@@ -71,9 +71,11 @@ def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
     """Say what is known, a line for each subject."""
     known = {name: value for name, value in found.items() if value is not None}
     known["error_of"] = _ERRORS.get(found["kind"], "of the last step:")
-    known |= (
-        {"box_text": " x ".join(f"{edge:.6g}" for edge in found["box"])} if "box" in found else {}
-    )
+    known |= {
+        f"{name}_text": sign.join(f"{length:.6g}" for length in found[name])
+        for name, sign in (("box", " x "), ("tilt", " "))
+        if name in found
+    }
     if found.get("kinds"):
         known["kinds_text"] = "; ".join(_kind(kind, found["unit"]) for kind in found["kinds"])
     if "bands" in found:

@@ -35,7 +35,7 @@ class NearPairs(NamedTuple):
     first: IntArray
     second: IntArray
     shift: IntArray
-    """(M, D) box edges to add to the second."""
+    """(M, D) cell vectors of the box to add to the second."""
 
     def take(self, rows: NDArray[Any]) -> NearPairs:
         """Select rows by index or mask."""
@@ -49,8 +49,8 @@ class PairArrays(NamedTuple):
     """(2, N, D) doubles and their small rests."""
     orientation: FloatArray
     """(2, N, 1) or (2, N, 4)"""
-    edges: FloatArray
-    """(2, D)"""
+    cell: FloatArray
+    """(2, D, D) cell vectors of the box as columns."""
     pairs: IntArray
     """(M, 2)"""
     shift: IntArray
@@ -93,13 +93,13 @@ class Surroundings:
 
     def __init__(self, spheres: Spheres, box: Box, reach: float) -> None:
         self.box, self._bound = box, _bound(spheres)
-        inside, self._turn = self._inside(spheres)
-        self._owner, self._shift = _images_near_box(inside, box.edges, reach)
-        self._tree = cKDTree(inside[self._owner] + self._shift * box.edges)
+        inside, self._turn = box.wrapped(spheres.centre)
+        self._owner, self._shift = _images_near_box(inside, box, reach)
+        self._tree = cKDTree(inside[self._owner] + box.vectors(self._shift))
 
     def near(self, first: Spheres) -> NearPairs:
         """Find all pairs of other spheres and these that overlap; as `near_pairs`."""
-        inside, turn = self._inside(first)
+        inside, turn = self.box.wrapped(first.centre)
         bound = _bound(first)
         reach = bound.max(initial=0) + self._bound.max(initial=0)
         if _MANY_MORE * len(inside) < self._tree.n:
@@ -114,7 +114,7 @@ class Surroundings:
 
     def nearest(self, first: Spheres, most: int) -> NearPairs:
         """Find of these pairs those with the centres nearest to each other sphere's, at most so many of each."""
-        inside, turn = self._inside(first)
+        inside, turn = self.box.wrapped(first.centre)
         apart, image = self._tree.query(inside, np.arange(1, 1 + most))
         i, k = np.nonzero(np.isfinite(apart))
         return self._kept(i, image[i, k], apart[i, k], (_bound(first), turn))
@@ -128,12 +128,6 @@ class Surroundings:
         i, image = i[keep], image[keep]
         j = self._owner[image]
         return NearPairs(i, j, self._shift[image] + turn[i] - self._turn[j])
-
-    def _inside(self, spheres: Spheres) -> tuple[FloatArray, IntArray]:
-        """Centres in [0, edge), and how many edges they were moved."""
-        from_corner = spheres.centre - self.box.lo
-        turn = np.floor(from_corner / self.box.edges).astype(np.int64)
-        return from_corner - turn * self.box.edges, turn
 
 
 def _bound(spheres: Spheres) -> FloatArray:
@@ -180,15 +174,15 @@ def nearer(state: State, bodies: Any, near: NearPairs, margin: float) -> NearPai
     return near.take(is_near)
 
 
-def _images_near_box(
-    inside: FloatArray, edges: FloatArray, reach: float
-) -> tuple[IntArray, IntArray]:
-    """List all images of points in [0, edges) within `reach` of it: their owner, their shift."""
+def _images_near_box(inside: FloatArray, box: Box, reach: float) -> tuple[IntArray, IntArray]:
+    """List all images of points in the box within `reach` of its faces: their owner, their shift."""
     owner = np.arange(len(inside))
     shift = np.zeros((len(inside), 0), dtype=np.int64)
-    for d, edge in enumerate(edges):
-        turns = np.arange(-np.ceil(reach / edge), np.ceil(reach / edge) + 1, dtype=np.int64)
-        coordinate = inside[owner, d, None] + turns * edge
-        row, column = np.nonzero((coordinate > -reach) & (coordinate < edge + reach))
+    # A cell vector moves points along its own direction between faces, and along no other.
+    heights = box.heights(inside)
+    for d, spacing in enumerate(box.spacings):
+        turns = np.arange(-np.ceil(reach / spacing), np.ceil(reach / spacing) + 1, dtype=np.int64)
+        height = heights[owner, d, None] + turns * spacing
+        row, column = np.nonzero((height > -reach) & (height < spacing + reach))
         owner, shift = owner[row], np.column_stack([shift[row], turns[column]])
     return owner, shift

@@ -76,7 +76,7 @@ class ContactNetwork:
     pairs : (M, 2) array of int64
         Rows i <= j of the packing; i = j where a particle touches its own periodic image.
     shift : (M, D) array of int64
-        Box edges that bring j next to i: r_ij = x_i - (x_j + shift * edges).
+        Cell vectors of the box that bring j next to i: r_ij = x_i - (x_j + matrix shift), of `Box.matrix`.
     separation : (M, D) array of float64, [length]
         That r_ij.
     kind : (M,) array of int64
@@ -239,7 +239,7 @@ def refuse_unconverged(packing: Packing, failed: NearPairs) -> None:
 
 
 def _separation(state: State, near: NearPairs) -> FloatArray:
-    x, shift = state.position, near.shift * state.edges
+    x, shift = state.position, near.shift @ state.cell.T
     return np.asarray(x[near.first] - x[near.second] - shift, np.float64)
 
 

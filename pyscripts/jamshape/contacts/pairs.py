@@ -8,7 +8,7 @@ import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.contacts.near import NearPairs
-from jamshape.packing import State
+from jamshape.packing import State, affine_change
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +18,7 @@ class Pairs:
     particles: IntArray
     """(M, 2)"""
     shift: IntArray
-    """(M, D) box edges to add to the second."""
+    """(M, D) cell vectors of the box to add to the second."""
     then: State
     skin: float
     reach: float
@@ -37,14 +37,20 @@ class Pairs:
 
     def outrun_by(self, now: State, turning_radius: FloatArray, kept: float = 0.0) -> bool:
         """Whether two surfaces may have come closer by `skin`, or by what is left of it."""
-        position, orientation, edges = (part[0] for part in now.split)
-        position_then, orientation_then, edges_then = (part[0] for part in self.then.split)
-        scale = edges / edges_then
-        left = self.skin - kept - float(np.abs(scale - 1).max()) * self.reach
-        moved = np.sqrt(((position - scale * position_then) ** 2).sum(axis=1))
+        position, orientation, cell = (part[0] for part in now.split)
+        position_then, orientation_then, cell_then = (part[0] for part in self.then.split)
+        grown = affine_change(cell_then, cell)
+        left = self.skin - kept - _strain_of(grown) * self.reach
+        moved = np.sqrt(((position - position_then @ grown.T) ** 2).sum(axis=1))
         turn = orientation - orientation_then
         if now.dimension == 2:
             turned = np.abs(turn - 2 * np.pi * np.rint(turn / (2 * np.pi)))[:, 0]
         else:  # the chord of the quaternions is half of the angle, or a little less
             turned = 2.3 * np.sqrt((turn**2).sum(axis=1))
         return bool(2 * (moved + turning_radius * turned).max(initial=0.0) >= left)
+
+
+def _strain_of(change: FloatArray) -> float:
+    """By what part of its length an upper triangular map changes a vector at most, or a little more."""
+    stretched = np.abs(np.diagonal(change) - 1).max()
+    return float(stretched + np.linalg.norm(np.triu(change, 1)))

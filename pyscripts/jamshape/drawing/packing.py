@@ -82,12 +82,13 @@ def draw_packing(axes: Axes, found: Contacts, colored: Coloring, look: Look | No
     plane.draw_bodies(axes, packing, packing.box, **style)
     plane.draw_spines(axes, packing, 1.5 * shown.line)
     plane.draw_contacts(axes, packing, found.network, shown.dot)
-    plane.show_box(axes, packing.box.lo, packing.box.edges)
+    plane.show_box(axes, packing.box)
 
 
 def shown_at(axes: Axes, found: Contacts) -> plane.Shown:
     """Tell how thick lines are where a packing fills the axes."""
-    inch = float((found.packing.box.edges / inches_of(axes)).max())
+    low, high = found.packing.box.bounds
+    inch = float(((high - low) / inches_of(axes)).max())
     return plane.Shown(inch, float(found.packing.diameters[:, :2].min()))
 
 

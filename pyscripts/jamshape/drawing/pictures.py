@@ -136,15 +136,14 @@ def title_of(found: Contacts, more: Sequence[str] = (), *, narrow: bool = False)
 
 
 def _make_panels(pictures: Sequence[Picture], *, with_bar: bool) -> tuple[Figure, Any]:
-    """Make a figure with a panel for each packing, as long and wide as its box."""
+    """Make a figure with a panel for each packing, as long and wide as the rectangle around its box."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     columns = min(COLUMNS, len(pictures))
     rows = -(-len(pictures) // columns)
-    shapes = [
-        one.found.packing.box.edges[:2] for one in pictures if one.found.packing.dimension == 2
-    ]
-    ratios = [edges / edges.max() for edges in shapes] or [np.ones(2)]
+    boxes = [one.found.packing.box for one in pictures if one.found.packing.dimension == 2]
+    shapes = [box.bounds[1] - box.bounds[0] for box in boxes]
+    ratios = [shape / shape.max() for shape in shapes] or [np.ones(2)]
     width, height = INCHES[columns - 1] * np.max(ratios, axis=0)
     size = (columns * width + 0.1 + 0.7 * with_bar, rows * (height + ROOM[len(pictures) > 1]))
     figure = Figure(figsize=size)

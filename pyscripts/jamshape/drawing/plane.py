@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -50,14 +51,17 @@ class Shown(NamedTuple):
 
 
 def images(position: FloatArray, reach: FloatArray, box: Box) -> Images:
-    """Find all periodic images of bodies of these (N,) radii that reach into the box."""
-    inside = box.lo + (position - box.lo) % box.edges
-    turns = np.ceil(reach.max(initial=0) / box.edges).astype(int)
-    near = reach[:, None]
+    """Find all periodic images of bodies of these (N,) radii that reach into the rectangle around the box."""
+    inside, near = box.lo + box.wrapped(position)[0], reach[:, None]
+    low, high = box.bounds
+    around = np.array(list(itertools.product(*zip(low, high, strict=True)))) - box.lo
+    farthest = reach.max(initial=0) / box.spacings
+    first = np.floor(box.fractions(around).min(axis=0) - farthest).astype(int)
+    last = np.ceil(box.fractions(around).max(axis=0) + farthest).astype(int)
     found = []
-    for shift in np.ndindex(*(2 * turns + 1)):
-        moved = inside + (np.array(shift) - turns) * box.edges
-        seen = ((moved > box.lo - near) & (moved < box.lo + box.edges + near)).all(axis=1)
+    for shift in np.ndindex(*(last - first)):
+        moved = inside + box.vectors(first + shift)
+        seen = ((moved > low - near) & (moved < high + near)).all(axis=1)
         found.append((np.flatnonzero(seen), moved[seen]))
     return Images(np.concatenate([i for i, _ in found]), np.concatenate([x for _, x in found]))
 
@@ -91,7 +95,7 @@ def discs(center: FloatArray, radius: float) -> list[FloatArray]:
 
 
 def draw_bodies(axes: Axes, packing: Packing, box: Box, **style: Any) -> PolyCollection:
-    """Draw particles as far as they are in a box, which may be another part of the periodic packing.
+    """Draw particles as far as they are in or around a box, which may be another part of the periodic packing.
 
     Parameters
     ----------
@@ -139,7 +143,10 @@ def draw_contacts(axes: Axes, packing: Packing, network: ContactNetwork, dot: fl
         axes.plot([], [], "o", color=CONTACT, ms=4, label="points of contact")
 
 
-def show_box(axes: Axes, lo: FloatArray, edges: FloatArray) -> None:
-    """Show this part of the plane, at equal scales and without ticks."""
-    (left, bottom), (right, top) = lo, lo + edges
+def show_box(axes: Axes, box: Box) -> None:
+    """Show the rectangle around a box, at equal scales and without ticks; in it the box, if it is tilted."""
+    if box.is_tilted:
+        corners = box.lo + box.vectors(np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]))
+        axes.plot(*corners.T, color="k", lw=1.2, ls="--")
+    (left, bottom), (right, top) = box.bounds
     axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xticks=[], yticks=[])

@@ -80,7 +80,7 @@ def faces_of(packing: Packing, level: int, seen_from: View) -> Faces:
     Particles stand where their centres are in the box; equal shapes share one mesh.
     """
     box = packing.box
-    centers = box.lo + (packing.position - box.lo) % box.edges
+    centers = box.lo + box.wrapped(packing.position)[0]
     turned = np.stack([packing.body_axes(k) for k in range(3)], axis=1)
     kinds = np.column_stack([packing.diameters, packing.exponent])
     found = []
@@ -123,7 +123,7 @@ def box_edges(packing: Packing, seen_from: View) -> tuple[FloatArray, FloatArray
     """Project the edges of the box: (3, 2, 2) those that end in the farthest corner, (9, 2, 2) others."""
     box = packing.box
     corner = np.array(list(np.ndindex(2, 2, 2)))
-    place = box.lo + corner * box.edges
+    place = box.lo + box.vectors(corner)
     farthest = int(np.argmin(place @ seen_from.eye))
     hidden: list[FloatArray] = []
     seen: list[FloatArray] = []

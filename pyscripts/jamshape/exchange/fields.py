@@ -24,16 +24,18 @@ def particle_fields(packing: Packing, *, rests: bool) -> Fields:
     return {name: getattr(packing, name) for name in PARTICLES + PARTICLE_RESTS * rests}
 
 
-def box_fields(packing: Packing, *, rests: bool) -> Fields:
-    """Give the arrays (D,) of the box."""
+def box_fields(packing: Packing, *, rests: bool, tilted: bool) -> Fields:
+    """Give the arrays of the box; without its tilt where no box has one."""
     fields = {"lo": packing.box.lo, "edges": packing.box.edges}
-    return fields | ({"edges_rest": packing.edges_rest} if rests else {})
+    fields |= {"tilt": packing.box.tilt} if tilted else {}
+    fields |= {"edges_rest": packing.edges_rest} if rests else {}
+    return fields | ({"tilt_rest": packing.tilt_rest} if rests and tilted else {})
 
 
 def packing_of(fields: Mapping[str, Any], shape_style: str, step: int, time: float) -> Packing:
     """Put a packing together from the fields of particles and box; errors as `Packing`."""
     known = dict(fields)
-    box = Box(lo=known.pop("lo"), edges=known.pop("edges"))
+    box = Box(known.pop("lo"), known.pop("edges"), known.pop("tilt", np.empty(0)))
     return Packing(box=box, shape_style=shape_style, step=step, time=time, **known)
 
 
@@ -41,20 +43,21 @@ class Centered(NamedTuple):
     """Particles in a box whose centre is the origin, always with three components."""
 
     position: FloatArray
-    """(N, 3), [length], each from minus half an edge to half an edge."""
+    """(N, 3), [length], each from minus half a cell vector to half a cell vector."""
     image: IntArray
-    """(N, 3) box edges that lead from there to where the particle has come."""
-    edges: FloatArray
-    """(3,), [length]; 0 along z in 2D."""
+    """(N, 3) cell vectors that lead from there to where the particle has come."""
+    box: FloatArray
+    """(6,) edges, [length], and tilt factors xy, xz, yz; 0 along z in 2D."""
 
 
 def centered(packing: Packing) -> Centered:
     """Move a packing into a box around 0."""
-    edges = packing.box.edges
-    offset = packing.position - (packing.box.lo + edges / 2)
-    turns = np.rint(offset / edges)
+    box = packing.box
+    offset = packing.position - box.center
+    turns = np.rint(box.fractions(offset))
     image = np.clip(packing.image + turns, _INT32.min, _INT32.max).astype(np.int64)
-    return Centered(in_space(offset - turns * edges), in_space(image), in_space(edges))
+    sizes = np.concatenate([in_space(box.edges), in_space(box.tilt_factors)])
+    return Centered(in_space(offset - box.vectors(turns)), in_space(image), sizes)
 
 
 def in_space(vectors: NDArray[Any]) -> NDArray[Any]:

@@ -59,7 +59,7 @@ def to_freud(packing: Packing) -> FreudSystem:
     """
     freud, seen = tool("freud", "freud-analysis"), centered(packing)
     return FreudSystem(
-        box=freud.box.Box(*seen.edges, is2D=packing.dimension == 2),
+        box=freud.box.Box(*seen.box, is2D=packing.dimension == 2),
         points=seen.position.astype(np.float32),
         orientations=packing.quaternions.astype(np.float32),
         directors=in_space(packing.directors).astype(np.float32),

@@ -26,6 +26,7 @@ from jamshape.exchange.fields import (
 )
 from jamshape.exchange.tools import tool
 from jamshape.files.disk import PathLike, replacing
+from jamshape.files.frames import Form
 from jamshape.files.layout import FileFormatError
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
@@ -71,10 +72,12 @@ def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
         msg = f"the packings are in {dimensions} dimensions, expected one or more of one dimension"
         raise ValueError(msg)
     hoomd = tool("gsd.hoomd", "gsd")
-    rests = any(packing.has_rests for packing in frames)
+    form = Form()
+    for packing in frames:
+        form = form.joined(Form.of(packing))
     with replacing(path) as temporary, hoomd.open(str(temporary), "w") as file:
         for packing in frames:
-            file.append(_frame(hoomd, packing, rests=rests))
+            file.append(_frame(hoomd, packing, form))
 
 
 def read_gsd(path: PathLike, frame: int = -1) -> Packing:
@@ -110,13 +113,13 @@ def read_gsd(path: PathLike, frame: int = -1) -> Packing:
         return _packing(path, file[frame % len(file)])
 
 
-def _frame(hoomd: Any, packing: Packing, *, rests: bool) -> Any:
-    """Make a frame; with rests where another frame of the file has some."""
+def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
+    """Make a frame, with what another frame of the file has: what one lacks is read from the first."""
     seen, frame = centered(packing), hoomd.Frame()
     kinds = alike(packing, packing.species)
     frame.configuration.step = packing.step
     frame.configuration.dimensions = packing.dimension
-    frame.configuration.box = [*seen.edges, 0, 0, 0]
+    frame.configuration.box = seen.box
     frame.particles.N = packing.n
     frame.particles.position = seen.position
     frame.particles.image = seen.image
@@ -126,8 +129,9 @@ def _frame(hoomd: Any, packing: Packing, *, rests: bool) -> Any:
     frame.particles.types = _names([str(k) for k in species])
     level = _FINE if len(species) <= _FEW else _COARSE + (len(species) <= _MANY)
     frame.particles.type_shapes = [_type_shape(_Body.of(packing, i, level)) for i in kinds.first]
-    exact = {_PARTICLES + name: x for name, x in particle_fields(packing, rests=rests).items()}
-    exact |= {_LOG + name: x for name, x in box_fields(packing, rests=rests).items()}
+    exact = {_PARTICLES + name: x for name, x in particle_fields(packing, rests=form.rests).items()}
+    of_box = box_fields(packing, rests=form.rests, tilted=form.tilted)
+    exact |= {_LOG + name: x for name, x in of_box.items()}
     exact[_LOG + "time"] = np.array([packing.time])
     # As numbers: OVITO before 3.17 fails on texts.
     exact[_LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)

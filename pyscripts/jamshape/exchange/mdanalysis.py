@@ -159,10 +159,12 @@ def _write(file: h5py.File, source: Source) -> Packing:
 
 def _values(packing: Packing) -> dict[str, Any]:
     """Give what a frame holds; the box begins at 0, as MDAnalysis has it."""
-    edges = in_space(packing.box.edges)
+    # Always edge vectors as rows: frames with and without a tilt are of one form.
+    edges = _HEIGHT * np.eye(3)
+    edges[: packing.dimension, : packing.dimension] = packing.box.matrix.T
     return {
         "position": in_space(packing.position - packing.box.lo),
-        "box/edges": np.where(edges > 0, edges, _HEIGHT),
+        "box/edges": edges,
         "orientation": packing.quaternions,
     }
 

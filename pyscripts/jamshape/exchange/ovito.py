@@ -8,6 +8,7 @@ shapes in single precision; so the doubles go along as properties whose names be
 
 from __future__ import annotations
 
+import itertools
 from functools import singledispatch
 from typing import Any, NamedTuple
 
@@ -25,7 +26,7 @@ from jamshape.exchange.fields import (
 )
 from jamshape.exchange.tools import tool
 from jamshape.files.layout import FileFormatError
-from jamshape.packing import Packing
+from jamshape.packing import Lengths, Packing
 from jamshape.packing.rotation import product
 from jamshape.shapes.solid import RoundedSegment, Solid, Superquadric
 
@@ -103,8 +104,9 @@ def to_ovito(packing: Packing, rattlers: BoolArray | None = None) -> Any:
             particles.create_property(title, data=values)
     data.attributes["Timestep"], data.attributes["Time"] = packing.step, packing.time
     data.attributes[_PREFIX + "shape style"] = packing.shape_style
-    for axis, rest in zip("xyz", packing.edges_rest.tolist(), strict=False):
-        data.attributes[f"{_PREFIX}edges rest {axis}"] = rest
+    for field, titles in _rests_of_box(packing.dimension).items():
+        for title, rest in zip(titles, getattr(packing, field).tolist(), strict=True):
+            data.attributes[title] = rest
     return data
 
 
@@ -124,11 +126,13 @@ def from_ovito(data: Any) -> Packing:
     try:
         D = 2 if cell.is2D else 3
         matrix = np.asarray(cell[...])
+        lengths = Lengths.of(matrix[:D, :D])
         fields = {
             "position": np.asarray(particles["Position"][...])[:, :D],
             "id": np.asarray(particles["Particle Identifier"][...]),
             "lo": matrix[:D, 3],
-            "edges": np.diag(matrix[:D, :D]),
+            "edges": lengths.edges,
+            "tilt": lengths.tilt,
         }
         names = ("orientation", "diameters", "exponent", "species", "image", *PARTICLE_RESTS)
         for name in names:
@@ -136,8 +140,8 @@ def from_ovito(data: Any) -> Packing:
             if name not in PARTICLE_RESTS or title in particles:
                 fields[name] = np.asarray(particles[title][...])
         known = data.attributes
-        rests = [float(known[f"{_PREFIX}edges rest {axis}"]) for axis in "xyz"[:D]]
-        fields["edges_rest"] = np.array(rests)
+        for field, titles in _rests_of_box(D).items():
+            fields[field] = np.array([float(known[title]) for title in titles])
         style = str(known[_PREFIX + "shape style"])
         return packing_of(fields, style, int(known["Timestep"]), float(known["Time"]))
     except (KeyError, AttributeError, TypeError) as error:
@@ -145,12 +149,22 @@ def from_ovito(data: Any) -> Packing:
         raise FileFormatError(msg) from error
 
 
+def _rests_of_box(dimension: int) -> dict[str, list[str]]:
+    """Name the attributes that hold what the doubles of the box leave out, by the field of a packing."""
+    axes = "xyz"[:dimension]
+    tilts = ["".join(two) for two in itertools.combinations(axes, 2)]
+    return {
+        "edges_rest": [f"{_PREFIX}edges rest {axis}" for axis in axes],
+        "tilt_rest": [f"{_PREFIX}tilt rest {tilt}" for tilt in tilts],
+    }
+
+
 def _add_cell(data: Any, packing: Packing) -> None:
     """Add the box; planar ones are as high as they are drawn, around z = 0."""
     D = packing.dimension
     matrix = np.zeros((3, 4))
     matrix[2, 2:] = 1.0, -0.5
-    matrix[:D, :D] = np.diag(packing.box.edges)
+    matrix[:D, :D] = packing.box.matrix
     matrix[:D, 3] = packing.box.lo
     cell = data.create_cell(matrix, pbc=(True, True, D == 3))
     cell.is2D = D == 2

@@ -6,12 +6,15 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
                         it is not there)
     /particles/all      +shape_style
         box             +dimension D   +boundary D times "periodic"
-            edges, lo   {step, time, value (T, D)}, lo is the lower corner (not in H5MD)
+            edges       {step, time, value (T, D), or (T, D, D) with the edge vectors as rows: of all
+                        frames of a file that has a tilted box, the transposes of `Box.matrix`}
+            lo          {step, time, value (T, D)}, the lower corner (not in H5MD)
         position        {step, time, value (T, N, D)}
         orientation     {step, time, value (T, N) angles in 2D, (T, N, 4) quaternions w i j k in 3D}
         image           {step, time, value (T, N, D)}
         position_rest, orientation_rest, box/edges_rest    what the doubles of these leave out, as more
-                        doubles, in files of states that are known to more digits (not in H5MD)
+                        doubles of their shapes, in files of states that are known to more digits (not
+                        in H5MD)
         species, id     (N,)
         diameters       (N, 3), the shape columns of LAMMPS (not in H5MD)
         exponent        (N,), of shapes that have one (not in H5MD)
@@ -44,6 +47,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.files import layout
 from jamshape.files.disk import PathLike, replacing
+from jamshape.files.frames import Form
 from jamshape.files.layout import (
     FileFormatError,
     Report,
@@ -154,8 +158,8 @@ def write_run(
         for frame in frames[1:]:
             check_same_particles(path, first, frame)
             check_after("position", last, frame.step)
-            rests = frame.has_rests or "position_rest" in file["particles/all"]
-            layout.append_table(file, layout.FRAMES, layout.frames_table(frame, rests=rests))
+            form = Form.found(file).joined(Form.of(frame))
+            layout.append_table(file, layout.FRAMES, layout.frames_table(frame, form))
             last = frame.step
 
 

@@ -3,7 +3,8 @@
 Numbers are written with 17 significant digits and read back to the last bit. Two numbers of a
 `Packing` are not among those of the files and may change in the last bit: an angle in 2D, which
 goes through its quaternion, and an edge of the box, which goes through its upper end (and is
-exact where the lower corner is 0 or half an edge below it).
+exact where the lower corner is 0 or half an edge below it). Dumps of a box with a tilt tell the bounds of
+the cuboid around it, from which its own are found with as much rounding.
 
 Neither format names the shape style: the first shape of `jamshape.shapes.table` that can have such
 diameters, and an exponent where the file tells one, is taken; use ``packing.with_(shape_style=...)`` for
@@ -26,7 +27,7 @@ import numpy as np
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.h5md import FileFormatError, PathLike, read_packing, replacing
 from jamshape.files.signature import DUMP, HDF5, format_of
-from jamshape.packing import Box, Packing, angle_from_quaternion
+from jamshape.packing import Box, Lengths, Packing, angle_from_quaternion, cuboid_around
 from jamshape.shapes.table import guess_shape_style
 
 _PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional file
@@ -48,6 +49,8 @@ class _Frame(NamedTuple):
     """Under the names of a dump's columns, each (N,), in the order of the ids."""
     bounds: FloatArray
     """(3, 2) lower and upper ends."""
+    tilt: FloatArray
+    """(3,) xy, xz, yz."""
     step: int = 0
     time: float = 0.0
 
@@ -206,6 +209,9 @@ def _header_text(packing: Packing) -> str:
         f"{packing.species.max()} atom types",
         f"{packing.n} ellipsoids",
     ]
+    if packing.box.is_tilted:
+        tilt = [*packing.box.tilt.tolist(), 0.0, 0.0][:3]
+        sides.append(" ".join(f"{x:.17g}" for x in tilt) + " xy xz yz")
     return "\n".join(["LAMMPS data file by jamshape", "", *counts, "", *sides, ""])
 
 
@@ -214,11 +220,11 @@ def _packing(frame: _Frame, dimension: int | None) -> Packing:
         return np.column_stack([frame.columns[name] for name in names])
 
     quaternion, diameters = stack(_QUATERNION), stack(_DIAMETERS)
-    flat = not (frame.columns["z"].any() or quaternion[:, 1:3].any())
+    flat = not (frame.columns["z"].any() or quaternion[:, 1:3].any() or frame.tilt[1:].any())
     if dimension is None:
         dimension = 2 if flat and tuple(frame.bounds[2]) == _PLANE else 3
     if dimension == 2 and not flat:
-        msg = "a z or a rotation out of the plane is not 0, expected a two-dimensional packing"
+        msg = "a z, a rotation or a tilt out of the plane is not 0, expected a two-dimensional packing"
         raise ValueError(msg)
     lo, hi = frame.bounds[:dimension].T
     has_image = set(_IMAGE) <= set(frame.columns)
@@ -230,7 +236,7 @@ def _packing(frame: _Frame, dimension: int | None) -> Packing:
         species=_whole(frame.columns["type"]),
         id=_whole(frame.columns["id"]),
         image=_whole(stack(_IMAGE[:dimension])) if has_image else np.empty((0, 0), np.int64),
-        box=Box(lo=lo, edges=hi - lo),
+        box=Box(lo=lo, edges=hi - lo, tilt=frame.tilt[: 1 if dimension == 2 else 3]),
         shape_style=guess_shape_style(diameters, has_exponent=len(exponent) > 0),
         exponent=exponent,
         step=frame.step,
@@ -290,7 +296,7 @@ def _data_frame(text: str) -> _Frame:
     if not np.array_equal(atoms["id"], ellipsoids["id"]):
         msg = "Atoms and Ellipsoids hold different ids, expected one ellipsoid for each atom"
         raise ValueError(msg)
-    return _Frame({**atoms, **ellipsoids}, _bounds(header))
+    return _Frame({**atoms, **ellipsoids}, *_bounds(header))
 
 
 def _sections(text: str) -> dict[str, list[str]]:
@@ -324,12 +330,16 @@ def _section(sections: Mapping[str, list[str]], name: str, n: int) -> list[str]:
     return rows
 
 
-def _bounds(header: Mapping[str, list[str]]) -> FloatArray:
+def _bounds(header: Mapping[str, list[str]]) -> tuple[FloatArray, FloatArray]:
     bounds = [header.get(f"{x}lo {x}hi", []) for x in "xyz"]
-    if any(len(ends) != 2 for ends in bounds) or any(map(float, header.get("xy xz yz", []))):
-        msg = "the header describes no orthogonal box, expected 'xlo xhi', 'ylo yhi', 'zlo zhi'"
+    tilt = header.get("xy xz yz", ["0"] * 3)
+    if any(len(ends) != 2 for ends in bounds) or len(tilt) != 3:
+        msg = (
+            "the header describes no box, expected 'xlo xhi', 'ylo yhi', 'zlo zhi', and 'xy xz yz' of"
+            " one with a tilt"
+        )
         raise ValueError(msg)
-    return np.array(bounds, dtype=np.float64)
+    return np.array(bounds, dtype=np.float64), np.array(tilt, dtype=np.float64)
 
 
 def _dump_frame(title: str, lines: TextIO) -> _Frame:
@@ -349,7 +359,7 @@ def _dump_frame(title: str, lines: TextIO) -> _Frame:
     rows = _take(lines, int(items["NUMBER OF ATOMS"][1]))
     columns = _dump_columns([_plain_name(name) for name in title.split()[2:]], rows)
     step, time = int(items["TIMESTEP"][1]), float(items.get("TIME", ["", "0"])[1])
-    return _Frame(columns, _dump_bounds(items["BOX BOUNDS"]), step, time)
+    return _Frame(columns, *_dump_bounds(items["BOX BOUNDS"]), step, time)
 
 
 def _plain_name(column: str) -> str:
@@ -375,9 +385,18 @@ def _dump_columns(names: Sequence[str], rows: Sequence[str]) -> dict[str, FloatA
     return _columns(rows, names, [*_DUMP_COLUMNS, *others])
 
 
-def _dump_bounds(item: Sequence[str]) -> FloatArray:
+def _dump_bounds(item: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     boundary, *rows = item
-    if boundary != "pp pp pp":
-        msg = f"box bounds are {boundary!r}, expected 'pp pp pp', orthogonal and periodic"
+    if boundary not in {"pp pp pp", "xy xz yz pp pp pp"}:
+        msg = f"box bounds are {boundary!r}, expected 'pp pp pp', periodic, or 'xy xz yz pp pp pp'"
         raise ValueError(msg)
-    return np.array([row.split() for row in rows], dtype=np.float64)
+    is_tilted = boundary.startswith("xy")
+    columns = np.array([row.split() for row in rows], dtype=np.float64)
+    if columns.shape != (3, 2 + is_tilted):
+        msg = f"box bounds {boundary!r} have rows of {columns.shape[1]} numbers, expected {2 + is_tilted}"
+        raise ValueError(msg)
+    if not is_tilted:
+        return columns, np.zeros(3)
+    # LAMMPS tells the cuboid around the box.
+    around, tilt = columns[:, :2], columns[:, 2]
+    return around - np.transpose(cuboid_around(Lengths(np.zeros(3), tilt).matrix)), tilt

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.disk import PathLike, store
+from jamshape.files.frames import EDGES, EDGES_REST, RESTS, Form, frame_values, lengths_of
 from jamshape.files.journal import Pending, Table, read_journal
 from jamshape.files.rows import Columns, Stored, as_column, gathered, table
 from jamshape.files.signature import HDF5, format_of
@@ -28,12 +29,6 @@ if TYPE_CHECKING:
 # Large enough for a long series to be a few chunks, small enough to keep a packing's file small.
 _CHUNK_BYTES = 1024
 _ATTRIBUTE_BYTES = 60_000  # HDF5 refuses attributes of 64 kB and more
-# Fields of a packing and their elements under /particles/all.
-RESTS = {
-    "position_rest": "position_rest",
-    "orientation_rest": "orientation_rest",
-    "edges_rest": "box/edges_rest",
-}
 REPORT = {"step": np.int64, "wall_seconds": np.float64, "error": np.float64}
 # Tables of a journal.
 FRAMES, OBSERVABLES, REPORT_TABLE = "frames", "observables", "report"
@@ -260,25 +255,11 @@ def create_file(
     file.create_group("observables")
     for name, dtype in REPORT.items():
         create_rows(file.require_group("report"), name, np.zeros((), dtype))
-    append_table(file, FRAMES, frames_table(packing, rests=packing.has_rests))
+    append_table(file, FRAMES, frames_table(packing, Form.of(packing)))
     columns = {name: as_column(value) for name, value in observables.items()}
     Stored().check_observables(packing.step, columns)
     append_table(file, OBSERVABLES, table([packing.step], [packing.time], columns))
     set_attributes(file.create_group("parameters"), attributes)
-
-
-def frame_values(packing: Packing, *, rests: bool) -> dict[str, NDArray[Any]]:
-    """Give what a frame holds, by element."""
-    values = {
-        "position": packing.position,
-        "orientation": packing.orientation,
-        "image": packing.image,
-        "box/edges": packing.box.edges,
-        "box/lo": packing.box.lo,
-    }
-    if rests:
-        values |= {element: getattr(packing, name) for name, element in RESTS.items()}
-    return values
 
 
 def create_particles(group: h5py.Group, packing: Packing) -> None:
@@ -288,7 +269,7 @@ def create_particles(group: h5py.Group, packing: Packing) -> None:
         group[name] = getattr(packing, name)
     if packing.shape.has_exponent:
         group["exponent"] = packing.exponent
-    for name, value in frame_values(packing, rests=packing.has_rests).items():
+    for name, value in frame_values(packing, Form.of(packing)).items():
         element = group.create_group(name)
         create_rows(element, "value", value)
         if name == "position":
@@ -374,13 +355,24 @@ def _append_frames(group: h5py.Group, clock: Columns, columns: Columns) -> None:
     for key, column in columns.items():
         if key not in group:
             create_rest(group, key, column[0], n)
+        if column.ndim > group[key]["value"].ndim:
+            _make_matrices(group[key])
         extend_dataset(group[key]["value"], n, column)
     extend(group["position"], clock)
 
 
-def frames_table(packing: Packing, *, rests: bool) -> Table:
+def _make_matrices(element: h5py.Group) -> None:
+    """Turn edges (T, D) of boxes without tilt into matrices (T, D, D)."""
+    edges = element["value"][()]
+    matrices = edges[:, :, None] * np.eye(edges.shape[1])
+    del element["value"]
+    create_rows(element, "value", np.eye(edges.shape[1]))
+    extend_dataset(element["value"], 0, matrices)
+
+
+def frames_table(packing: Packing, form: Form) -> Table:
     """Put a frame into a table of one row."""
-    columns = {name: value[None] for name, value in frame_values(packing, rests=rests).items()}
+    columns = {name: value[None] for name, value in frame_values(packing, form).items()}
     return table([packing.step], [packing.time], columns)
 
 
@@ -400,7 +392,7 @@ def extend_dataset(dataset: h5py.Dataset, n: int, rows: NDArray[Any]) -> None:
 def truncate_all(file: h5py.File, step: int) -> None:
     """Drop all frames, observables and rows of the report after a step."""
     frames = file["particles/all"]
-    names = ("position", "orientation", "image", "box/edges", "box/lo", *RESTS.values())
+    names = ("position", "orientation", "image", EDGES, "box/lo", *RESTS.values(), EDGES_REST)
     values = [frames[name]["value"] for name in names if name in frames]
     truncate(step, frames["position"], values)
     for element in (*file["observables"].values(), file["report"]):
@@ -452,9 +444,12 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
             fields[name] = row(f"{element}/value")
     fields["shape_style"] = require_item(file, "particles/all").attrs.get("shape_style")
     fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
-    lo, edges = row("box/lo/value"), row("box/edges/value")
+    lo, edges = row("box/lo/value"), row(f"{EDGES}/value")
     try:
-        return Packing(box=Box(lo=lo, edges=edges), **fields)
+        if f"particles/all/{EDGES_REST}" in file:
+            rest = lengths_of(row(f"{EDGES_REST}/value"))
+            fields |= {"edges_rest": rest.edges, "tilt_rest": rest.tilt}
+        return Packing(box=Box(lo, *lengths_of(edges)), **fields)
     except ValueError as error:
         msg = f"{file.filename}: {error}; write it again"
         raise FileFormatError(msg) from error

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jamshape.files.disk import PathLike
+from jamshape.files.frames import Form
 from jamshape.files.journal import Record, Table
 from jamshape.packing import Packing
 
@@ -45,7 +46,8 @@ class Stored:
     observables: dict[str, Kind] = field(default_factory=dict)
     last: dict[str, int] = field(default_factory=dict)
     """Step of the last row of each observable that has one."""
-    has_rests: bool = False
+    form: Form = field(default_factory=Form)
+    """Of the frames."""
     scalars: Scalars | None = None
 
     @classmethod
@@ -67,7 +69,7 @@ class Stored:
             last(file["report"]),
             {name: kind(group) for name, group in groups.items()},
             {name: step for name, step in steps.items() if step is not None},
-            "position_rest" in file["particles/all"],
+            Form.found(file),
         )
 
     def check_observables(self, step: int, columns: Columns) -> None:

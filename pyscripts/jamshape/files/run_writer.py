@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from jamshape.files import layout
 from jamshape.files.disk import PathLike, real
+from jamshape.files.frames import Form
 from jamshape.files.h5md import read_packing
 from jamshape.files.journal import Journal, Table, journal_of, new_token
 from jamshape.files.rows import (
@@ -153,12 +154,12 @@ class RunWriter:
         check_after("position", stored.frame, step)
         columns = {name: as_column(value) for name, value in (observables or {}).items()}
         stored.check_observables(step, columns)
-        has_rests = stored.has_rests or packing.has_rests
-        tables = {layout.FRAMES: layout.frames_table(packing, rests=has_rests)}
+        form = stored.form.joined(Form.of(packing))
+        tables = {layout.FRAMES: layout.frames_table(packing, form)}
         if columns:
             tables[layout.OBSERVABLES] = table([step], [packing.time], columns)
         self._append(tables)
-        stored.frame, stored.has_rests = step, has_rests
+        stored.frame, stored.form = step, form
         stored.add_observables(step, columns)
 
     def append_observables(

@@ -169,6 +169,8 @@ class Session:
             path = Path(folder) / "start.data"
             rank = 1 + np.argsort(np.argsort(packing.id))
             write_data(path, packing.with_(species=types, id=rank))
+            if packing.box.is_tilted:
+                self.commands("box tilt large")
             self.commands(f'read_data "{path}"')
         self.commands(_POSES)
 
@@ -211,7 +213,7 @@ class Session:
         """
         lmp = self.lmp
         n = lmp.get_natoms()
-        lo, hi, *_ = lmp.extract_box()
+        lo, hi, xy, yz, xz, *_ = lmp.extract_box()
         d = int(lmp.extract_setting("dimension"))
 
         def rows(name: str, kind: int, width: int) -> NDArray[Any]:
@@ -224,7 +226,11 @@ class Session:
             diameters=diameters,
             **self._known(diameters, rows("type", 0, 1)[:, 0]),
             image=rows("image", 0, 3)[:, :d],
-            box=Box(np.array(lo[:d]), np.array(hi[:d]) - np.array(lo[:d])),
+            box=Box(
+                np.array(lo[:d]),
+                np.array(hi[:d]) - np.array(lo[:d]),
+                np.array([xy] if d == 2 else [xy, xz, yz]),
+            ),
             step=self.step,
             time=time,
         )

@@ -8,67 +8,20 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray
+from jamshape.packing.box import Box, Lengths, number_of_tilts
+from jamshape.packing.given import as_floats, as_integers
 from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
 from jamshape.shapes.shape import Interaction, Shape
 from jamshape.shapes.table import DEFAULT, shape_named
 
 # What goes with each of these when it is replaced.
 _REST_OF = {
-    "position": "position_rest",
-    "orientation": "orientation_rest",
-    "box": "edges_rest",
+    "position": ("position_rest",),
+    "orientation": ("orientation_rest",),
+    "box": ("edges_rest", "tilt_rest"),
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Box:
-    """Orthogonal periodic box.
-
-    Parameters
-    ----------
-    lo : (D,) array of float64, [length]
-        Lower corner.
-    edges : (D,) array of float64, [length]
-        Edge lengths.
-
-    Raises
-    ------
-    ValueError
-        If D is neither 2 nor 3, a number is not finite, or an edge is not positive.
-
-    Examples
-    --------
-    >>> from jamshape import Box
-    >>> Box(lo=[0, 0], edges=[10, 12]).volume
-    120.0
-    """
-
-    lo: FloatArray
-    edges: FloatArray
-
-    def __post_init__(self) -> None:
-        shape = np.shape(self.edges)
-        if shape not in {(2,), (3,)}:
-            msg = f"box edges have shape {shape}, expected (2,) or (3,)"
-            raise ValueError(msg)
-        for name in ("lo", "edges"):
-            object.__setattr__(self, name, _floats(f"box {name}", getattr(self, name), shape))
-        if not (self.edges > 0).all():
-            msg = f"box edges are {self.edges.tolist()}, expected positive lengths"
-            raise ValueError(msg)
-
-    @property
-    def dimension(self) -> int:
-        """Number of dimensions, 2 or 3."""
-        return len(self.edges)
-
-    @property
-    def volume(self) -> float:
-        """Area in 2D, volume in 3D, [length^D]."""
-        return float(np.prod(self.edges))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,9 +51,9 @@ class Packing:
         p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1, of shapes that have one; ones when left out.
     step : int
     time : float, [time]
-    position_rest, orientation_rest, edges_rest : arrays as above, of float64, optional
-        What the doubles of position, orientation and box edges leave out of coordinates that are
-        known to more digits; zeros when left out. See `poses`.
+    position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional
+        What the doubles of position, orientation, edges and tilt of the box leave out of coordinates
+        that are known to more digits; zeros when left out. See `poses`.
 
     Raises
     ------
@@ -133,6 +86,7 @@ class Packing:
     position_rest: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     orientation_rest: FloatArray = field(default_factory=lambda: np.empty(0))
     edges_rest: FloatArray = field(default_factory=lambda: np.empty(0))
+    tilt_rest: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         n, dimension = len(self.position), self.box.dimension
@@ -146,15 +100,16 @@ class Packing:
         vector = (n, dimension)
         rotation = (n,) if dimension == 2 else (n, 4)
         rests = {"position_rest": vector, "orientation_rest": rotation, "edges_rest": (dimension,)}
+        rests["tilt_rest"] = (number_of_tilts(dimension),)
         for name, shape in rests.items():
             if np.size(getattr(self, name)) == 0:
                 object.__setattr__(self, name, np.zeros(shape))
         floats = {"position": vector, "orientation": rotation, "diameters": (n, 3), **rests}
         floats["exponent"] = (n,)
         for name, shape in floats.items():
-            object.__setattr__(self, name, _floats(name, getattr(self, name), shape))
+            object.__setattr__(self, name, as_floats(name, getattr(self, name), shape))
         for name, shape in (("species", (n,)), ("id", (n,)), ("image", vector)):
-            object.__setattr__(self, name, _integers(name, getattr(self, name), shape))
+            object.__setattr__(self, name, as_integers(name, getattr(self, name), shape))
         _check_labels(self)
         _check_shapes(self)
 
@@ -279,32 +234,37 @@ class Packing:
     @property
     def has_rests(self) -> bool:
         """Whether coordinates are known to more digits than doubles hold."""
-        return any(getattr(self, rest).any() for rest in _REST_OF.values())
+        return any(getattr(self, rest).any() for rests in _REST_OF.values() for rest in rests)
 
     def poses(self) -> tuple[LongArray, LongArray, LongArray]:
-        """Position, orientation and box edges to all digits that are known, as longdouble."""
+        """Position, orientation and the box to all digits that are known, as longdouble.
+
+        The box is the matrix (D, D) of its cell vectors, the columns.
+        """
         pairs = (
             (self.position, self.position_rest),
             (self.orientation, self.orientation_rest),
-            (self.box.edges, self.edges_rest),
+            (self.box.matrix, Lengths(self.edges_rest, self.tilt_rest).matrix),
         )
-        position, orientation, edges = (np.longdouble(x) + rest for x, rest in pairs)
-        return position, orientation, edges
+        position, orientation, cell = (np.longdouble(x) + rest for x, rest in pairs)
+        return position, orientation, cell
 
-    def with_poses(self, position: LongArray, orientation: LongArray, edges: LongArray) -> Packing:
-        """Return the packing with these poses, each number kept as a double and its rest."""
-        doubles = [np.asarray(x, np.float64) for x in (position, orientation, edges)]
+    def with_poses(self, position: LongArray, orientation: LongArray, cell: LongArray) -> Packing:
+        """Return the packing with poses as `poses` gives them, each number kept as a double and its rest."""
+        doubles = [np.asarray(x, np.float64) for x in (position, orientation, cell)]
         rests = [
             np.asarray(x - double, np.float64)
-            for x, double in zip((position, orientation, edges), doubles, strict=True)
+            for x, double in zip((position, orientation, cell), doubles, strict=True)
         ]
+        edges_rest, tilt_rest = Lengths.of(rests[2])
         return self.with_(
             position=doubles[0],
             orientation=doubles[1],
-            box=Box(self.box.lo, doubles[2]),
+            box=Box.of(self.box.lo, doubles[2]),
             position_rest=rests[0],
             orientation_rest=rests[1],
-            edges_rest=rests[2],
+            edges_rest=edges_rest,
+            tilt_rest=tilt_rest,
         )
 
     def sorted_by_id(self) -> Packing:
@@ -316,37 +276,10 @@ class Packing:
 
     def with_(self, **changes: Any) -> Packing:
         """Return a new packing with the named fields replaced; new poses are exact doubles."""
-        for name, rest in _REST_OF.items():
-            if name in changes:
+        for name, rests in _REST_OF.items():
+            for rest in rests if name in changes else ():
                 changes.setdefault(rest, np.empty(0))
         return dataclasses.replace(self, **changes)
-
-
-def _floats(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    array = np.array(values, dtype=np.float64, order="C")
-    _check_shape(name, array.shape, shape)
-    if not np.isfinite(array).all():
-        msg = f"{name} holds NaN or infinity, expected finite numbers"
-        raise ValueError(msg)
-    array.flags.writeable = False
-    return array
-
-
-def _integers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> IntArray:
-    given = np.asarray(values)
-    if given.dtype.kind not in "iu":
-        msg = f"{name} has dtype {given.dtype}, expected integers"
-        raise ValueError(msg)
-    array = np.array(given, dtype=np.int64, order="C")
-    _check_shape(name, array.shape, shape)
-    array.flags.writeable = False
-    return array
-
-
-def _check_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
-    if found != expected:
-        msg = f"{name} has shape {found}, expected {expected}"
-        raise ValueError(msg)
 
 
 def _check_labels(packing: Packing) -> None:

@@ -35,5 +35,5 @@ def with_spines(discs: Packing, alpha: float, seed: int) -> Packing:
         orientation=np.random.default_rng(seed).uniform(0, np.pi, discs.n),
     )
     factor = 1 + np.longdouble(math.sqrt(rods.phi / discs.phi) - 1)
-    position, orientation, edges = rods.poses()
-    return rods.with_poses(factor * position, orientation, factor * edges)
+    position, orientation, cell = rods.poses()
+    return rods.with_poses(factor * position, orientation, factor * cell)

@@ -26,34 +26,40 @@ class State:
     ----------
     position : (N, D) array of longdouble, [length]
     orientation : (N, 1) angles in 2D, (N, 4) quaternions w i j k in 3D, of longdouble
-    edges : (D,) array of longdouble, [length]
+    cell : (D, D) array of longdouble, [length]
+        The box: its cell vectors are the columns, as of `Box.matrix`.
     """
 
     position: LongArray
     orientation: LongArray
-    edges: LongArray
+    cell: LongArray
 
     @classmethod
     def of(cls, packing: Packing) -> State:
         """Take the poses of a packing, its small rests included."""
-        position, orientation, edges = (np.asarray(x, np.longdouble) for x in packing.poses())
-        return cls(position, orientation.reshape(packing.n, -1), edges)
+        position, orientation, cell = (np.asarray(x, np.longdouble) for x in packing.poses())
+        return cls(position, orientation.reshape(packing.n, -1), cell)
 
     @cached_property
     def split(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Position, orientation, edges, each (2, ...): doubles and their small rests."""
-        position, orientation, edges = map(_split, (self.position, self.orientation, self.edges))
-        return position, orientation, edges
+        """Position, orientation, cell, each (2, ...): doubles and their small rests."""
+        position, orientation, cell = map(_split, (self.position, self.orientation, self.cell))
+        return position, orientation, cell
 
     @classmethod
-    def joined(cls, position: FloatArray, orientation: FloatArray, edges: FloatArray) -> State:
+    def joined(cls, position: FloatArray, orientation: FloatArray, cell: FloatArray) -> State:
         """Add doubles and their small rests, each array (2, ...) as `split` gives them."""
-        return cls(*(np.longdouble(x[0]) + x[1] for x in (position, orientation, edges)))
+        return cls(*(np.longdouble(x[0]) + x[1] for x in (position, orientation, cell)))
 
     @property
     def dimension(self) -> int:
         """Number of dimensions, 2 or 3."""
-        return len(self.edges)
+        return len(self.cell)
+
+    @property
+    def edges(self) -> LongArray:
+        """(D,) as of `Box.edges`, [length]."""
+        return np.diagonal(self.cell)
 
     @property
     def volume(self) -> float:
@@ -63,7 +69,7 @@ class State:
     def strained(self, strain: float) -> State:
         """Scale box and positions by 1 + strain; rotations stay (Marschall & Teitel 2018, Eq. 20)."""
         factor = 1 + np.longdouble(strain)
-        return replace(self, position=factor * self.position, edges=factor * self.edges)
+        return replace(self, position=factor * self.position, cell=factor * self.cell)
 
     def displaced(self, shift: FloatArray, turn: FloatArray) -> State:
         """Add (N, D) displacements and (N, 1) or (N, 3) rotation vectors."""
@@ -78,7 +84,7 @@ class State:
     def packing(self, like: Packing) -> Packing:
         """Return the packing of these poses and of the particles of `like`."""
         orientation = self.orientation[:, 0] if self.dimension == 2 else self.orientation
-        return like.with_poses(self.position, orientation, self.edges)
+        return like.with_poses(self.position, orientation, self.cell)
 
 
 def _split(values: LongArray) -> FloatArray:

@@ -322,11 +322,11 @@ class _Insertion:
         sizes = (particles.diameters[index], particles.exponent[index])
         bodies = particles.shape.compiled(sizes, particles.dimension, Interaction())
         turned = self.orientation[index].reshape(len(index), -1)
-        position, orientation, edges = (
-            np.stack([x, np.zeros_like(x)]) for x in (poses.position, turned, particles.box.edges)
+        position, orientation, cell = (
+            np.stack([x, np.zeros_like(x)]) for x in (poses.position, turned, particles.box.matrix)
         )
         pairs = np.column_stack([near.first, near.second])
-        arrays = PairArrays(position, orientation, edges, pairs, near.shift)
+        arrays = PairArrays(position, orientation, cell, pairs, near.shift)
         hit: BoolArray = bodies.overlaps(*arrays)
         return near.take(hit)
 

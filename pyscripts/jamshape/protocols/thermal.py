@@ -67,8 +67,8 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
     Raises
     ------
     ValueError
-        If particles overlap at the start, the box is shorter than two of them, or moves have no positive
-        size.
+        If particles overlap at the start, the box is tilted or shorter than two of them, or moves have no
+        positive size.
     """
     _check(thermal)
     while thermal.n_done < n_sweeps:
@@ -99,6 +99,12 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
 
 
 def _check(thermal: Thermal) -> None:
+    if thermal.packing.box.is_tilted:
+        msg = (
+            f"the box has the tilt {thermal.packing.box.tilt.tolist()}, expected none for Monte Carlo;"
+            " begin from an orthogonal one"
+        )
+        raise ValueError(msg)
     if not (math.isfinite(thermal.size) and thermal.size > 0):
         msg = f"size is {thermal.size}, expected a positive number of radii"
         raise ValueError(msg)
@@ -111,7 +117,7 @@ def without_overlaps(packing: Packing) -> Packing:
         factor = 1 + opening
         wider = packing.with_(
             position=packing.box.lo + factor * (packing.position - packing.box.lo),
-            box=Box(packing.box.lo, factor * packing.box.edges),
+            box=Box.of(packing.box.lo, factor * packing.box.matrix),
         )
         if not _overlaps(wider):
             return wider

@@ -7,6 +7,8 @@ import pytest
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.files.lammps_text import write_data
 from jamshape.lammps.session import Session
+from jamshape.packing import Box
+from jamshape.protocols.random_start import random_packing
 
 pytestmark = pytest.mark.lammps
 
@@ -43,6 +45,19 @@ def test_a_packing(jamshape, tiny, name, rate, made):
     assert lines["made with"] == made
     assert "format 2" in lines["written by"]
     assert "go on with" not in lines
+
+
+def test_a_tilt_is_told(jamshape, tmp_path):
+    packing = random_packing(8, 0.1, 1)
+    write_packing(tmp_path / "plain.h5", packing)
+    lines, report = info(jamshape, tmp_path / "plain.h5")
+    assert "tilt" not in report
+    assert "tilt" not in lines["box"]
+    tilted = packing.with_(box=Box(packing.box.lo, [60, 65], [-2.5]))
+    write_packing(tmp_path / "tilted.h5", tilted)
+    lines, report = info(jamshape, tmp_path / "tilted.h5")
+    assert (report["box"], report["tilt"]) == ([60, 65], [-2.5])
+    assert lines["box"] == "60 x 65, tilt -2.5"
 
 
 def test_a_packing_of_which_nothing_is_known_is_measured(jamshape, tiny, tmp_path):

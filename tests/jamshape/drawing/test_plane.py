@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from jamshape.drawing.plane import images, outlines, spines
+from jamshape.drawing.plane import images, outlines, show_box, spines
 from jamshape.packing import Box, Packing
 from jamshape.shapes.table import SHAPES
 
@@ -34,6 +35,37 @@ def test_images_that_reach_into_the_box():
     assert sorted(at.center[at.owner == 0].tolist()) == [[0.0, 2.1], [0.0, 9.1]]
     # One that is longer than the box is there many times.
     assert len(images(np.zeros((1, 2)), np.array([20.0]), BOX).owner) > 20
+
+
+def test_images_fill_the_rectangle_around_a_tilted_box():
+    """As many as a search over far more images finds, beside a box of which the tilt is long."""
+    rng = np.random.default_rng(1)
+    for tilt in (2.0, -5.5, 13.0):
+        box = Box(BOX.lo, BOX.edges, [tilt])
+        position, reach = rng.uniform(-20, 20, (9, 2)), rng.uniform(0.1, 3.0, 9)
+        at = images(position, reach, box)
+        shifts = np.array(list(np.ndindex(61, 61))) - 30
+        every = position[:, None] + box.vectors(shifts)
+        low, high = box.bounds
+        near = reach[:, None, None]
+        seen = ((every > low - near) & (every < high + near)).all(axis=2)
+        assert sorted(at.owner.tolist()) == sorted(np.nonzero(seen)[0].tolist())
+        found = np.column_stack([at.owner, at.center])
+        expected = np.column_stack([np.nonzero(seen)[0], every[seen]])
+        found, expected = (x[np.lexsort(np.round(x, 6).T)] for x in (found, expected))
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_a_tilted_box_is_drawn_as_a_parallelogram():
+    axes = Figure().subplots()
+    show_box(axes, Box(BOX.lo, BOX.edges, [-2.0]))
+    (line,) = axes.lines
+    assert line.get_xydata().tolist() == [[-1, 2], [3, 2], [1, 9], [-3, 9], [-1, 2]]
+    assert (axes.get_xlim(), axes.get_ylim()) == ((-3, 3), (2, 9))
+    plain = Figure().subplots()
+    show_box(plain, BOX)
+    assert not len(plain.lines)
+    assert (plain.get_xlim(), plain.get_ylim()) == ((-1, 3), (2, 9))
 
 
 @pytest.mark.parametrize("shape", SHAPES)

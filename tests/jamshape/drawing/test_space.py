@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from jamshape.drawing.space import faces_of, painted, view
+from jamshape.drawing.space import box_edges, faces_of, painted, view
 from jamshape.packing import Box, Packing
 from jamshape.shapes.table import SHAPES
 
@@ -46,3 +46,19 @@ def test_faces_look_outwards_and_cover_what_is_seen(shape):
     (x, y), (u, v) = (b - a).T, (c - a).T
     area = 0.5 * np.abs(x * v - y * u).sum()
     assert area == pytest.approx(np.pi, rel=0.03)
+
+
+def test_a_tilted_box_is_drawn_by_its_cell_vectors():
+    eye, box = view(20, 30), Box(np.full(3, -1.0), [4, 5, 6], [1, -2, 2.5])
+    packing = spheres("superellipsoid", [[5.0, 5.0, 5.0]]).with_(box=box)
+    hidden, seen = box_edges(packing, eye)
+    assert (len(hidden), len(seen)) == (3, 9)
+    lines = np.concatenate([hidden, seen])
+    drawn = np.abs(lines[:, 1] - lines[:, 0])
+    expected = np.abs(np.repeat([eye.flat(vector) for vector in box.matrix.T], 4, axis=0))
+    found, expected = (np.sort(np.round(x, 9).view("f8,f8"), axis=0) for x in (drawn, expected))
+    assert found.tolist() == expected.tolist()
+    # The particle is drawn in the box.
+    center = faces_of(packing, 2, eye).corners.mean(axis=(0, 1)) - eye.eye / 2
+    inside = box.fractions(center - box.lo)
+    assert ((inside > 0) & (inside < 1)).all()

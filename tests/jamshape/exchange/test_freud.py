@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from exchanged import PLACES, mixed
+from exchanged import PLACES, mixed, tilted
 from scenes import pressed
 
 from jamshape.contacts import find_contacts
@@ -14,15 +14,17 @@ SINGLE = 1e-6  # freud computes in single precision
 
 
 @pytest.mark.parametrize(("name", "dimension"), PLACES)
-def test_box_points_and_orientations_are_those_of_the_packing(name, dimension):
-    packing = mixed(name, dimension)
+@pytest.mark.parametrize("make", [mixed, tilted])
+def test_box_points_and_orientations_are_those_of_the_packing(make, name, dimension):
+    packing = make(name, dimension)
     found = to_freud(packing)
     D, box = dimension, found.box
     assert box.is2D == (D == 2)
     np.testing.assert_allclose(box.L[:D], packing.box.edges, rtol=SINGLE)
+    np.testing.assert_allclose(box.to_matrix()[:D, :D], packing.box.matrix, rtol=SINGLE)
     np.testing.assert_allclose(box.wrap(found.points), found.points, atol=1e-5)
-    middle = packing.box.lo + packing.box.edges / 2
-    turns = (packing.position - middle - found.points[:, :D]) / packing.box.edges
+    apart = packing.position - packing.box.center - found.points[:, :D]
+    turns = packing.box.fractions(apart)
     np.testing.assert_allclose(turns, np.rint(turns), atol=1e-5)
     np.testing.assert_allclose(found.orientations, packing.quaternions, atol=SINGLE)
     np.testing.assert_allclose(found.directors[:, :D], packing.directors, atol=SINGLE)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from exchanged import PLACES, assert_same, mixed
-from nasty import with_rests
+from exchanged import PLACES, assert_same, mixed, tilted
+from nasty import tilted_box, with_rests
 
 from jamshape.exchange.gsd import read_gsd, write_gsd
 from jamshape.files.h5md import FileFormatError
@@ -36,9 +36,31 @@ def test_what_doubles_leave_out_is_kept(path, dimension):
     assert_same(read_gsd(path), packing)
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_tilt_is_kept_and_other_programs_see_it(path, dimension):
+    packing, D = tilted("spherocylinder", dimension), dimension
+    plain = mixed("spherocylinder", dimension)
+    fine = with_rests(dimension, box=tilted_box(dimension))
+    frames = [packing, plain.with_(step=1), fine, plain.with_(step=2)]
+    write_gsd(path, frames)
+    for k, one in enumerate(frames):
+        assert_same(read_gsd(path, k), one)
+    frame = native(path, 0)
+    lx, ly, lz, xy, xz, yz = frame.configuration.box
+    matrix = np.array([[lx, xy * ly, xz * lz], [0, ly, yz * lz], [0, 0, lz]])
+    np.testing.assert_allclose(matrix[:D, :D], packing.box.matrix, rtol=1e-6)
+    inside = np.linalg.solve(packing.box.matrix, frame.particles.position[:, :D].T)
+    assert np.abs(inside).max() <= 0.5 + 1e-6
+    # Each particle is where it was.
+    been = frame.particles.position + frame.particles.image @ matrix.T
+    moved = packing.position + packing.box.vectors(packing.image) - packing.box.center
+    np.testing.assert_allclose(been[:, :D], moved, rtol=0, atol=4e-6 * np.abs(moved).max())
+
+
 def test_frames_are_packings_of_their_own(path):
     plain = mixed("spherocylinder", 2)
-    fine = plain.with_poses(*(x + np.longdouble(1e-20) for x in plain.poses()))
+    position, orientation, cell = (x + np.longdouble(1e-20) for x in plain.poses())
+    fine = plain.with_poses(position, orientation, np.diag(np.diag(cell)))
     frames = [plain, fine.with_(step=5), mixed("dimer", 2, n=7), plain.with_(step=9)]
     frames[1] = fine
     write_gsd(path, frames)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from exchanged import PLACES, mixed
+from exchanged import PLACES, mixed, tilted
 from scenes import pressed, scaled
 
 from jamshape.contacts import find_contacts
@@ -89,6 +89,30 @@ def test_distances_around_the_box_are_those_of_our_contacts(dimension):
         atoms.positions[i], atoms.positions[j], box=atoms.dimensions
     )
     np.testing.assert_allclose(found, distance[near], rtol=1e-5)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_box_with_a_tilt_is_that_of_mdanalysis(dimension):
+    plain, packing = mixed("dimer", dimension), tilted("dimer", dimension)
+    universe = to_mdanalysis([plain.with_(step=0), packing.with_(step=1)])
+    matrices = [np.array(ts.triclinic_dimensions) for ts in universe.trajectory]
+    D = dimension
+    for rows, one in zip(matrices, (plain, packing), strict=True):
+        # Edge vectors are its rows, of angles in single precision.
+        atol = 1e-5 * one.box.edges.max()
+        np.testing.assert_allclose(rows[:D, :D], one.box.matrix.T, rtol=0, atol=atol)
+    universe.trajectory[1]
+    atoms = universe.atoms
+    i, j = np.triu_indices(packing.n, 1)
+    found = MDAnalysis.lib.distances.calc_bonds(
+        atoms.positions[i], atoms.positions[j], box=atoms.dimensions
+    )
+    apart = packing.position[i] - packing.position[j]
+    shifts = np.array(list(np.ndindex(*[5] * D))) - 2
+    apart -= packing.box.vectors(np.rint(packing.box.fractions(apart)))
+    images = apart[:, None] + packing.box.vectors(shifts)
+    nearest = np.linalg.norm(images, axis=2).min(axis=1)
+    np.testing.assert_allclose(found, nearest, rtol=0, atol=1e-4)
 
 
 def test_frames_of_other_particles_are_refused(tmp_path):

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from exchanged import PLACES, assert_same, mixed, touching
+from exchanged import PLACES, assert_same, mixed, tilted, touching
 from matplotlib.colors import to_rgb
 from mixtures import bidisperse
 from nasty import with_rests
@@ -110,9 +110,13 @@ def test_ovito_draws_the_same_of_our_gsd_file(name, tmp_path):
 
 
 @pytest.mark.parametrize(("name", "dimension"), PLACES)
-def test_a_packing_is_read_back_to_the_last_bit(name, dimension):
-    packing = mixed(name, dimension)
-    assert_same(from_ovito(to_ovito(packing)), packing)
+@pytest.mark.parametrize("make", [mixed, tilted])
+def test_a_packing_is_read_back_to_the_last_bit(make, name, dimension):
+    packing = make(name, dimension)
+    data = to_ovito(packing)
+    cell = np.asarray(data.cell[...])
+    np.testing.assert_array_equal(cell[:dimension, :dimension], packing.box.matrix)
+    assert_same(from_ovito(data), packing)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

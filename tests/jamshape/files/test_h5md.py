@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from nasty import assert_identical, nasty_packing, with_rests
+from nasty import assert_identical, nasty_packing, tilted_box, with_rests
 
 from jamshape.files.h5md import (
     FileFormatError,
@@ -15,6 +15,7 @@ from jamshape.files.h5md import (
     read_report,
     read_series,
     write_packing,
+    write_run,
 )
 from jamshape.files.run_writer import RunWriter
 
@@ -441,6 +442,66 @@ def test_rests_come_back_to_the_last_bit(path, dimension):
     for name in ("position_rest", "orientation_rest", "edges_rest"):
         assert getattr(found, name).tobytes() == getattr(packing, name).tobytes()
         assert getattr(found, name).any()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("make", [nasty_packing, with_rests])
+def test_a_tilt_comes_back_to_the_last_bit(path, dimension, make):
+    packing = make(dimension, box=tilted_box(dimension))
+    write_packing(path, packing)
+    found = read_packing(path)
+    assert_identical(found, packing)
+    assert_same_poses(found, packing)
+    assert found.tilt_rest.any() == (make is with_rests)
+    with h5py.File(path) as file:
+        # H5MD: edge vectors are the rows.
+        rows = file["particles/all/box/edges/value"][0]
+    np.testing.assert_array_equal(rows, packing.box.matrix.T)
+    assert rows[1].tolist()[:2] == [packing.box.tilt[0], packing.box.edges[1]]
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_frames_with_and_without_a_tilt_are_in_one_file(path, dimension, tmp_path):
+    plain, tilted = frame(0, dimension), frame(0, dimension).with_(box=tilted_box(dimension))
+    fine = with_rests(dimension, box=tilted_box(dimension))
+    frames = [
+        one.with_(step=10 * k, time=k / 3)
+        for k, one in enumerate([plain, plain, tilted, plain, fine, plain])
+    ]
+    writer = RunWriter.create(path, frames[0])
+    for packing in frames[1:]:
+        writer.append(packing)  # of the journal too, before they are folded
+        assert_same_poses(read_packing(path), packing)
+    writer.close()
+    write_run(tmp_path / "other.h5", frames)
+    for file in (path, tmp_path / "other.h5"):
+        for k, packing in enumerate(frames):
+            assert_identical(read_packing(file, k), packing)
+            assert_same_poses(read_packing(file, k), packing)
+        with h5py.File(file) as found:
+            assert found["particles/all/box/edges/value"].shape == (6, dimension, dimension)
+    writer = RunWriter.open(path)
+    writer.truncate(10)
+    writer.append(frames[2])
+    writer.append(frames[3])
+    writer.close()
+    for k, packing in enumerate(frames[:4]):
+        assert_same_poses(read_packing(path, k), packing)
+
+
+def test_boxes_without_a_tilt_are_stored_by_their_edges(path):
+    write_packing(path, nasty_packing(3))
+    with h5py.File(path) as file:
+        assert file["particles/all/box/edges/value"].shape == (1, 3)
+
+
+def test_edge_vectors_that_are_turned_are_refused(path):
+    write_packing(path, nasty_packing(2, box=tilted_box(2)))
+    with h5py.File(path, "r+") as file:
+        rows = file["particles/all/box/edges/value"]
+        rows[0] = rows[0].T
+    with pytest.raises(FileFormatError, match="expected the first one along x"):
+        read_packing(path)
 
 
 def test_packings_of_doubles_have_no_rests_in_their_files(path):

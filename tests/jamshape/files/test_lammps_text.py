@@ -3,7 +3,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from nasty import NASTY, assert_identical, nasty_packing
+from nasty import NASTY, assert_identical, nasty_packing, tilted_box
 
 from jamshape.files.h5md import FileFormatError
 from jamshape.files.lammps_text import iter_dump, read_any, read_data, read_dump, write_data
@@ -31,12 +31,16 @@ def dump_frame(packing, columns=COLUMNS, header=""):
     values |= zip(COLUMNS[5:9], packing.quaternions.T, strict=True)
     values |= zip(COLUMNS[9:], packing.diameters.T, strict=True)
     box, flat = packing.box, [(-0.5, 0.5)] * (3 - packing.dimension)
-    bounds = [*zip(box.lo, box.lo + box.edges, strict=True), *flat]
+    bounds = [*zip(*box.bounds, strict=True), *flat]
+    tilts = [*box.tilt, 0, 0][:3]
     rows = zip(*(values[name] for name in columns), strict=True)
     lines = [
         f"{header}ITEM: TIMESTEP\n{packing.step}\nITEM: NUMBER OF ATOMS\n{packing.n}",
-        "ITEM: BOX BOUNDS pp pp pp",
-        *(f"{lo:.16e} {hi:.16e}" for lo, hi in bounds),
+        f"ITEM: BOX BOUNDS {'xy xz yz ' * box.is_tilted}pp pp pp",
+        *(
+            f"{lo:.16e} {hi:.16e}" + f" {tilt:.16e}" * box.is_tilted
+            for (lo, hi), tilt in zip(bounds, tilts, strict=True)
+        ),
         f"ITEM: ATOMS {' '.join(columns)} ",
         *(" ".join(x if isinstance(x, str) else f"{x:.17g}" for x in row) + " " for row in rows),
     ]
@@ -45,7 +49,8 @@ def dump_frame(packing, columns=COLUMNS, header=""):
 
 def from_text(packing, **changes):
     """Return what a text file can hold of a packing, in the order of its reader."""
-    box = Box(lo=packing.box.lo, edges=(packing.box.lo + packing.box.edges) - packing.box.lo)
+    lo, edges, tilt = packing.box.lo, packing.box.edges, packing.box.tilt
+    box = Box(lo=lo, edges=(lo + edges) - lo, tilt=tilt)
     changes = {"box": box, "time": 0.0} | changes
     return packing.sorted_by_id().with_(**changes)
 
@@ -64,6 +69,34 @@ def test_data_file_comes_back_to_the_last_bit(path, dimension, given):
     write_data(path, packing)
     found = read_data(path, dimension if given else None)
     assert_identical_but_angles(found, from_text(packing, step=0))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("given", [True, False])
+def test_a_tilt_is_kept_in_data_files(path, dimension, given):
+    packing = nasty_packing(dimension, box=tilted_box(dimension))
+    write_data(path, packing)
+    found = read_data(path, dimension if given else None)
+    assert_identical_but_angles(found, from_text(packing, step=0))
+    if dimension == 2:
+        path.write_text(path.read_text().replace(" 0 0 xy xz yz", " 0 0.5 xy xz yz"))
+        assert read_data(path).dimension == 3
+        with pytest.raises(FileFormatError, match="a tilt out of the plane is not 0"):
+            read_data(path, 2)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_tilt_is_kept_in_dumps(path, dimension):
+    """Which tell the cuboid around the box."""
+    packing = nasty_packing(dimension, box=tilted_box(dimension))
+    frames = [packing, nasty_packing(dimension)]
+    path.write_text("".join(dump_frame(one, [*COLUMNS, "ix", "iy", "iz"]) for one in frames))
+    found, plain = read_dump(path)
+    expected = from_text(packing)
+    np.testing.assert_allclose(found.box.lo, expected.box.lo, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found.box.matrix, expected.box.matrix, rtol=1e-15)
+    assert_identical_but_angles(found.with_(box=expected.box), expected)
+    assert not plain.box.is_tilted
 
 
 def test_edges_are_exact_from_a_corner_at_zero_or_a_centred_box(path):
@@ -114,9 +147,14 @@ def test_data_file_without_images_with_comments_and_other_sections(path):
         ("6 atoms", "7 atoms", "section Atoms has 6 rows for 7 atoms, expected one for each"),
         ("6 atoms", "", "the header has no line 'N atoms', expected a LAMMPS data file"),
         ("Ellipsoids", "Lines", "section Ellipsoids has 0 rows for 6 atoms"),
-        ("xlo xhi", "x", "the header describes no orthogonal box, expected 'xlo xhi'"),
-        ("zlo zhi\n", "zlo zhi\n0.1 0 0 xy xz yz\n", "the header describes no orthogonal box"),
-        ("-0.5 0.5 zlo", "-0.5 nan zlo", "the header describes no orthogonal box"),
+        ("xlo xhi", "x", "the header describes no box, expected 'xlo xhi'"),
+        (
+            "zlo zhi\n",
+            "zlo zhi\n0.1 0 xy xz yz\n",
+            "the header describes no box, expected 'xlo xhi'",
+        ),
+        ("zlo zhi\n", "zlo zhi\n0.1 0 -inf xy xz yz\n", "box tilt holds NaN or infinity"),
+        ("-0.5 0.5 zlo", "-0.5 nan zlo", "the header describes no box"),
         ("\n1 1 1 ", "\n1 1 ", r"row '1 1 .* has 9 columns, expected 'id type ellipsoidflag"),
         ("\n1 1 1 ", "\n9 1 1 ", "Atoms and Ellipsoids hold different ids"),
         ("\n1 1 1 ", "\n1.5 1 1 ", "Atoms and Ellipsoids hold different ids"),
@@ -148,7 +186,7 @@ def test_data_file_cut_anywhere_is_refused(path):
 
 def test_dimension_two_is_refused_out_of_the_plane(path):
     write_data(path, nasty_packing(3))
-    with pytest.raises(FileFormatError, match="rotation out of the plane is not 0, expected a two"):
+    with pytest.raises(FileFormatError, match="out of the plane is not 0, expected a two"):
         read_data(path, dimension=2)
 
 
@@ -222,8 +260,9 @@ def test_dump_cut_anywhere_gives_the_complete_frames_before(path):
         (
             "pp pp pp",
             "xy xz yz pp pp pp",
-            "box bounds are 'xy xz yz pp pp pp', expected 'pp pp pp'",
+            "box bounds 'xy xz yz pp pp pp' have rows of 2 numbers, expected 3",
         ),
+        ("pp pp pp", "abc origin pp pp pp", "box bounds are 'abc origin pp pp pp', expected 'pp"),
         ("pp pp pp", "pp ff pp", "box bounds are 'pp ff pp', expected 'pp pp pp'"),
         ("ITEM: TIMESTEP\n7\n", "", r"items \['TIMESTEP'\] are missing before the atoms"),
         (
@@ -290,13 +329,17 @@ def test_read_any_refuses_other_files(path):
 
 @pytest.mark.lammps
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_lammps_reads_our_data_file_and_we_read_its_files(tmp_path, dimension):
+@pytest.mark.parametrize("tilted", [False, True])
+def test_lammps_reads_our_data_file_and_we_read_its_files(tmp_path, dimension, tilted):
     lmp = shutil.which("lmp") or pytest.skip("lmp is not installed")
     rng = np.random.default_rng(3)
+    edges = np.full(dimension, 7.1)
+    tilt = np.array([3.1, -2.2, 1.3])[: 2 * dimension - 3]
+    box = Box(np.zeros(dimension), edges, tilt if tilted else 0 * np.abs(tilt))
     packing = nasty_packing(
         dimension,
-        position=rng.uniform(0, 7, (6, dimension)),
-        box=Box(lo=np.zeros(dimension), edges=np.full(dimension, 7.1)),
+        position=box.vectors(rng.uniform(0, 7, (6, dimension)) / edges),
+        box=box,
         step=0,
         time=0.0,
     )
@@ -313,7 +356,14 @@ def test_lammps_reads_our_data_file_and_we_read_its_files(tmp_path, dimension):
     for found in (read_any(tmp_path / "dump.out"), read_any(tmp_path / "data.out")):
         # LAMMPS normalises quaternions as it reads them.
         np.testing.assert_allclose(found.orientation, expected.orientation, rtol=0, atol=1e-15)
-        assert_identical(found.with_(orientation=expected.orientation), expected)
+        # And rounds what goes through the cell vectors.
+        rounding = {"rtol": 0, "atol": 1e-14 * tilted}
+        np.testing.assert_allclose(found.position, expected.position, **rounding)
+        np.testing.assert_allclose(found.box.lo, box.lo, **rounding)
+        np.testing.assert_allclose(found.box.matrix, box.matrix, **rounding)
+        known = {"orientation": expected.orientation}
+        known |= {"position": expected.position, "box": box} if tilted else {}
+        assert_identical(found.with_(**known), expected)
 
 
 ROUNDNESS = ["SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta"]

@@ -203,7 +203,7 @@ def test_extended_precision_resolves_overlaps_that_doubles_do_not(half_length):
     packing = make([[31.3, 30.1], [31.3, 31.1]], 0.0, half_length, edges=(40.0, 40.0))
     position = State.of(packing).position.copy()
     position[1, 1] = position[0, 1] + (1 - np.longdouble(1e-12))
-    state = State.of(packing.with_poses(position, packing.orientation, packing.box.edges))
+    state = State.of(packing.with_poses(position, packing.orientation, packing.box.matrix))
     bonds = 1 if half_length == 0 else 2  # flat sides touch at both ends
     found = Landscape(packing).evaluate(state)
     assert found.n_bonds == bonds

@@ -2,9 +2,9 @@ import math
 
 import numpy as np
 import pytest
-from nasty import ARRAYS, nasty_packing, with_rests
+from nasty import ARRAYS, nasty_packing, tilted_box, with_rests
 
-from jamshape.packing import Box, angle_from_quaternion
+from jamshape.packing import Box, State, angle_from_quaternion
 from jamshape.shapes.table import guess_shape_style
 
 
@@ -171,6 +171,22 @@ def test_new_poses_are_exact_doubles_and_other_rests_stay(changed, dropped):
         np.testing.assert_array_equal(getattr(stepped, name), getattr(packing, name))
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_tilt_is_kept_to_all_digits(dimension):
+    packing = with_rests(dimension, box=tilted_box(dimension))
+    position, orientation, cell = packing.poses()
+    assert packing.tilt_rest.all()
+    np.testing.assert_array_equal(cell.astype(float), packing.box.matrix)
+    again = packing.with_poses(position, orientation, cell)
+    for one, other in zip(again.poses(), (position, orientation, cell), strict=True):
+        np.testing.assert_array_equal(one, other)
+    strained = State.of(packing).strained(-1e-3).packing(packing).poses()[2]
+    np.testing.assert_array_equal(strained, (1 - np.longdouble(1e-3)) * cell)
+    exact = packing.with_(box=packing.box)
+    assert not exact.tilt_rest.any()
+    assert not exact.edges_rest.any()
+
+
 def test_rests_follow_their_particles():
     packing = with_rests(3)
     order, ordered = packing.id.argsort(), packing.sorted_by_id()
@@ -184,6 +200,8 @@ def test_rests_follow_their_particles():
     [
         ({"position_rest": np.ones((6, 3))}, r"position_rest has shape \(6, 3\), expected \(6, 2"),
         ({"edges_rest": np.full(2, np.nan)}, "edges_rest holds NaN or infinity"),
+        ({"tilt_rest": np.full(1, np.inf)}, "tilt_rest holds NaN or infinity"),
+        ({"tilt_rest": np.zeros(3)}, r"tilt_rest has shape \(3,\), expected \(1,\)"),
     ],
 )
 def test_packing_refuses_rests(changes, sentence):

@@ -37,7 +37,7 @@ def row_of_discs():
         box=Box(np.zeros(2), edges.astype(np.float64)),
     )
     position = np.array([[a / 2, 5], [3 * a / 2, 5]], np.longdouble)
-    return packing.with_poses(position, np.zeros(2, np.longdouble), edges), a
+    return packing.with_poses(position, np.zeros(2, np.longdouble), np.diag(edges)), a
 
 
 def all_coordinates(packing):

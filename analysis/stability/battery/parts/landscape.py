@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -104,7 +105,7 @@ def moved_error(scene: Scene) -> float:
     names = ("diameters", "exponent", "species", "id")
     mixed = packing.with_(**{name: getattr(packing, name)[order] for name in names})
     other = Landscape(mixed)
-    there = State(x[order], state.orientation[order], state.edges)
+    there = State(x[order], state.orientation[order], state.cell)
     found = other.components(other.evaluate(there).gradient)
     return float(np.abs(found - expected[order]).max() / np.abs(expected).max())
 
@@ -151,11 +152,10 @@ def at_one_place(scene: Scene) -> str:
 
 def barely_touching(overlap: float) -> float:
     """Resolve in long double what a double drops: relative error of one force in a box of 1000."""
-    state_edges = np.full(2, np.longdouble(1000))
     packing = rods([[-400.3, 0.0], [-399.3, 0.0]], [0.0, 0.0], 0.0, 0.5, [1000.0, 1000.0])
     x = np.array([[-400.3, 0.1], [0.0, 0.1]], np.longdouble)
     x[1, 0] = x[0, 0] + 1 - np.longdouble(overlap)
-    state = State(x, State.of(packing).orientation, state_edges)
+    state = replace(State.of(packing), position=x)
     found = Landscape(packing).evaluate(state)
     true = 1 - (x[1, 0] - x[0, 0])
     rounding = LONG_EPS * 400 / overlap

@@ -50,10 +50,10 @@ def scaled(packing: Packing, factor: float) -> Packing:
     factor_long = np.longdouble(factor)
     larger = packing.with_(
         diameters=factor * packing.diameters,
-        box=Box(factor * packing.box.lo, factor * packing.box.edges),
+        box=Box.of(factor * packing.box.lo, factor * packing.box.matrix),
     )
     orientation = state.orientation[:, 0] if packing.dimension == 2 else state.orientation
-    return larger.with_poses(factor_long * state.position, orientation, factor_long * state.edges)
+    return larger.with_poses(factor_long * state.position, orientation, factor_long * state.cell)
 
 
 def in_doubles(packing: Packing) -> Packing:

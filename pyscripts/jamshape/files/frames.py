@@ -1,0 +1,69 @@
+"""What a frame of a file holds, and how its box lies there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jamshape.arrays import FloatArray
+from jamshape.packing import Lengths, Packing
+
+if TYPE_CHECKING:
+    import h5py
+
+# Elements under /particles/all, some by the fields of a packing.
+RESTS = {"position_rest": "position_rest", "orientation_rest": "orientation_rest"}
+EDGES, EDGES_REST = "box/edges", "box/edges_rest"
+
+_MATRICES = 3  # dimensions of a dataset (T, D, D)
+
+
+class Form(NamedTuple):
+    """What the frames of a file hold beside what all do."""
+
+    rests: bool = False
+    """What doubles leave out."""
+    tilted: bool = False
+    """Boxes as matrices, whether they have a tilt or not."""
+
+    @classmethod
+    def of(cls, packing: Packing) -> Form:
+        """Of a file of this frame alone."""
+        return cls(packing.has_rests, packing.box.is_tilted or bool(packing.tilt_rest.any()))
+
+    @classmethod
+    def found(cls, file: h5py.File) -> Form:
+        """Look into a file."""
+        frames = file["particles/all"]
+        return cls("position_rest" in frames, frames[EDGES]["value"].ndim == _MATRICES)
+
+    def joined(self, other: Form) -> Form:
+        """Of a file of all these frames."""
+        return Form(self.rests or other.rests, self.tilted or other.tilted)
+
+
+def frame_values(packing: Packing, form: Form) -> dict[str, NDArray[Any]]:
+    """Give what a frame holds, by element."""
+
+    def stored(edges: FloatArray, tilt: FloatArray) -> FloatArray:
+        # H5MD has edge vectors as rows.
+        return np.ascontiguousarray(Lengths(edges, tilt).matrix.T) if form.tilted else edges
+
+    values = {
+        "position": packing.position,
+        "orientation": packing.orientation,
+        "image": packing.image,
+        EDGES: stored(packing.box.edges, packing.box.tilt),
+        "box/lo": packing.box.lo,
+    }
+    if form.rests:
+        values |= {element: getattr(packing, name) for name, element in RESTS.items()}
+        values[EDGES_REST] = stored(packing.edges_rest, packing.tilt_rest)
+    return values
+
+
+def lengths_of(edges: FloatArray) -> Lengths:
+    """Take a box as H5MD has it: edges (D,), or (D, D) edge vectors as rows."""
+    return Lengths.of(edges.T) if edges.ndim > 1 else Lengths(edges, np.empty(0))

@@ -1,0 +1,212 @@
+"""The periodic box: a rectangle (cuboid), or with a tilt a parallelogram (parallelepiped).
+
+Its cell vectors are the columns of an upper triangular matrix, as in LAMMPS: [[lx, xy], [0, ly]] in the plane,
+[[lx, xy, xz], [0, ly, yz], [0, 0, lz]] in space. What is computed of a box without tilt has the bits that the edges
+alone would give: all that is added is zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.packing.given import as_floats
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Periodic box, orthogonal unless it has a tilt.
+
+    Parameters
+    ----------
+    lo : (D,) array of float64, [length]
+        Corner from which the cell vectors begin.
+    edges : (D,) array of float64, [length]
+        The diagonal of the matrix: lx, ly, lz. They are the lengths of the edges where there is no tilt.
+    tilt : (D (D - 1) / 2,) array of float64, [length], optional
+        The matrix above its diagonal, in the order of LAMMPS: (xy,) in 2D, (xy, xz, yz) in 3D; zeros when
+        left out.
+
+    Raises
+    ------
+    ValueError
+        If D is neither 2 nor 3, a number is not finite, or an edge is not positive.
+
+    Examples
+    --------
+    >>> from jamshape import Box
+    >>> Box(lo=[0, 0], edges=[10, 12]).volume
+    120.0
+    >>> Box(lo=[0, 0], edges=[10, 12], tilt=[3]).matrix.tolist()
+    [[10.0, 3.0], [0.0, 12.0]]
+    """
+
+    lo: FloatArray
+    edges: FloatArray
+    tilt: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        shape = np.shape(self.edges)
+        if shape not in {(2,), (3,)}:
+            msg = f"box edges have shape {shape}, expected (2,) or (3,)"
+            raise ValueError(msg)
+        n_tilts = number_of_tilts(shape[0])
+        if np.size(self.tilt) == 0:
+            object.__setattr__(self, "tilt", np.zeros(n_tilts))
+        for name, expected in (("lo", shape), ("edges", shape), ("tilt", (n_tilts,))):
+            value = as_floats(f"box {name}", getattr(self, name), expected)
+            object.__setattr__(self, name, value)
+        if not (self.edges > 0).all():
+            msg = f"box edges are {self.edges.tolist()}, expected positive lengths"
+            raise ValueError(msg)
+
+    @classmethod
+    def of(cls, lo: ArrayLike, matrix: ArrayLike) -> Box:
+        """Make a box of its cell vectors.
+
+        Parameters
+        ----------
+        lo : (D,) array_like, [length]
+        matrix : (D, D) array_like, [length]
+            Cell vectors as columns.
+
+        Raises
+        ------
+        ValueError
+            As `Box`, or if the matrix is not upper triangular.
+        """
+        return cls(np.asarray(lo), *Lengths.of(np.asarray(matrix, np.float64)))
+
+    @property
+    def dimension(self) -> int:
+        """Number of dimensions, 2 or 3."""
+        return len(self.edges)
+
+    @property
+    def volume(self) -> float:
+        """Area in 2D, volume in 3D, [length^D]."""
+        return float(np.prod(self.edges))
+
+    @property
+    def is_tilted(self) -> bool:
+        """Whether a tilt is not zero."""
+        return bool(self.tilt.any())
+
+    @cached_property
+    def matrix(self) -> FloatArray:
+        """(D, D) cell vectors as columns, [length]."""
+        return Lengths(self.edges, self.tilt).matrix
+
+    @property
+    def tilt_factors(self) -> FloatArray:
+        """(D (D - 1) / 2,) each tilt over the edge along its direction: those of HOOMD-blue and freud."""
+        return Lengths.of(self.matrix / self.edges).tilt
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper corner (D,) of the rectangle (cuboid) around the box, [length]."""
+        low, high = cuboid_around(self.matrix)
+        return self.lo + low, self.lo + high
+
+    @property
+    def center(self) -> FloatArray:
+        """(D,) where the diagonals cross, [length]."""
+        return np.asarray(self.lo + self.matrix.sum(axis=1) / 2)
+
+    @property
+    def spacings(self) -> FloatArray:
+        """(D,) distances between opposite faces, [length]; at most as long as the edges."""
+        return np.asarray(self.edges / np.linalg.norm(self._unsheared, axis=1))
+
+    def heights(self, offset: FloatArray) -> FloatArray:
+        """Distances of points from the faces through the lower corner, each between 0 and a spacing in the box.
+
+        Parameters
+        ----------
+        offset : (..., D) array of float64, [length]
+            From the lower corner.
+
+        Returns
+        -------
+        (..., D) array of float64, [length]
+        """
+        along = offset @ self._unsheared.T
+        return np.asarray(along / np.linalg.norm(self._unsheared, axis=1))
+
+    def fractions(self, offset: FloatArray) -> FloatArray:
+        """Components (..., D) of vectors (..., D) along the cell vectors, in units of these."""
+        return np.asarray(offset @ self._unsheared.T / self.edges)
+
+    def vectors(self, turns: NDArray[Any]) -> FloatArray:
+        """Add up so many (..., D) cell vectors, [length]."""
+        return np.asarray(turns @ self.matrix.T)
+
+    def wrapped(self, position: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Move points (M, D) into the box.
+
+        Returns
+        -------
+        (M, D) offsets from the lower corner, and (M, D) the cell vectors that were taken away
+        """
+        offset = position - self.lo
+        turns = np.floor(self.fractions(offset)).astype(np.int64)
+        return offset - self.vectors(turns), turns
+
+    @cached_property
+    def _unsheared(self) -> FloatArray:
+        """(D, D) what takes the tilt out of vectors and leaves the last component; 1 without tilt."""
+        return np.asarray(np.linalg.inv(self.matrix / self.edges), np.float64)
+
+
+class Lengths(NamedTuple):
+    """The entries of a matrix of cell vectors that may differ from zero, of any type of numbers."""
+
+    edges: NDArray[Any]
+    """(D,)"""
+    tilt: NDArray[Any]
+    """(D (D - 1) / 2,) in the order of LAMMPS."""
+
+    @classmethod
+    def of(cls, matrix: NDArray[Any]) -> Lengths:
+        """Take them out of a matrix (D, D).
+
+        Raises
+        ------
+        ValueError
+            If it is no upper triangular matrix.
+        """
+        if matrix.shape not in {(2, 2), (3, 3)} or np.tril(matrix, -1).any():
+            msg = (
+                f"the cell vectors are the columns of {matrix.tolist()}, expected the first one along x"
+                " and the second one in the x-y plane; turn box and particles"
+            )
+            raise ValueError(msg)
+        return cls(np.diagonal(matrix).copy(), matrix[np.triu_indices(len(matrix), 1)])
+
+    @property
+    def matrix(self) -> NDArray[Any]:
+        """(D, D), zero below the diagonal."""
+        matrix = np.diag(self.edges)
+        matrix[np.triu_indices(len(matrix), 1)] = self.tilt
+        return matrix
+
+
+def cuboid_around(vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Give the lower and the upper corner (D,) of what sums of some of the columns (D, D) reach, from 0 on."""
+    return np.minimum(vectors, 0).sum(axis=1), np.maximum(vectors, 0).sum(axis=1)
+
+
+def number_of_tilts(dimension: int) -> int:
+    """Count the tilts of a box: 1 or 3."""
+    return dimension * (dimension - 1) // 2
+
+
+def affine_change(then: FloatArray, now: FloatArray) -> FloatArray:
+    """Give the (D, D) linear map that takes cell vectors, the columns of (D, D), to others."""
+    edges = np.diagonal(then)
+    return np.asarray(now / edges @ np.linalg.inv(then / edges))
