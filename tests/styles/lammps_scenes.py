@@ -191,8 +191,11 @@ class State:
         return ExactPacking(**vars(self.packing), quaternion=self.quaternion)
 
 
-def state_from(table, lo, hi, step=0, exponents=None):
-    """State of a table with the columns POSE and FORCE; of superellipsoids with exponents by type."""
+def state_from(table, lo, hi, step=0, exponents=None, tilt=(0.0, 0.0, 0.0)):
+    """State of a table with the columns POSE and FORCE; of superellipsoids with exponents by type.
+
+    The tilt is xy, xz, yz, as in files of LAMMPS.
+    """
     table = table[np.argsort(table[:, 0])]
     D = 2 if (lo[2], hi[2]) == (-0.5, 0.5) else 3
     lo, hi = np.array(lo[:D]), np.array(hi[:D])
@@ -213,7 +216,7 @@ def state_from(table, lo, hi, step=0, exponents=None):
         species=species,
         id=table[:, 0].astype(int),
         image=table[:, 5 : 5 + D].astype(int),
-        box=Box(lo=lo, edges=hi - lo),
+        box=Box(lo=lo, edges=hi - lo, tilt=tilt[: 1 if D == 2 else 3]),
         step=step,
         **style,
     )
@@ -224,8 +227,8 @@ def state_of(session, exponents=None):
     """State and forces of the last run."""
     per_atom, array = 1, 2
     table = session.lmp.numpy.extract_compute("state", per_atom, array)
-    lo, hi = session.lmp.extract_box()[:2]
-    return state_from(table.copy(), lo, hi, session.step, exponents)
+    lo, hi, xy, yz, xz = session.lmp.extract_box()[:5]
+    return state_from(table.copy(), lo, hi, session.step, exponents, (xy, xz, yz))
 
 
 def states_from_dump(path, exponents=None):

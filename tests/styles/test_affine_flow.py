@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,13 +10,15 @@ from lammps_scenes import (
     after_restart,
     angle_between,
     dense,
+    difference_from_bindings,
     dump,
+    error_of,
     fix_vector,
     global_vector,
     load_plugin,
     loaded,
     rods,
-    rods_3d,
+    run_lmp,
     run_lmp_well,
     scene,
     state_of,
@@ -38,25 +39,10 @@ def drive(flow, dt, options="", k_d=1.0):
         timestep {dt}"""
 
 
-@dataclass(frozen=True)
-class Cell:
-    """LAMMPS's box: lower corner, and cell vectors as columns."""
-
-    lo: np.ndarray
-    matrix: np.ndarray
-
-
-def cell_of(session, dimension):
-    lo, hi, xy, yz, xz = session.lmp.extract_box()[:5]
-    matrix = np.diag(np.array(hi) - np.array(lo))
-    matrix[0, 1], matrix[0, 2], matrix[1, 2] = xy, xz, yz
-    return Cell(np.array(lo)[:dimension], matrix[:dimension, :dimension])
-
-
-def unwrapped(session, dimension, exponents=None):
+def unwrapped(session, exponents=None):
     """Positions of the particles that the box's images bring back, (N, D)."""
     packing = state_of(session, exponents).packing
-    return packing.position + packing.image @ cell_of(session, dimension).matrix.T
+    return packing.position + packing.image @ packing.box.matrix.T
 
 
 # --- no contact: closed forms --------------------------------------------------------------------
@@ -64,9 +50,9 @@ def unwrapped(session, dimension, exponents=None):
 
 def mean_squares(alpha):
     """Mean of x^2 and of y^2 over a spherocylinder of R = 1 in the plane, x along it."""
-    height = lambda x: np.sqrt(max(1 - max(abs(x) - alpha, 0.0) ** 2, 0.0))  # noqa: E731
+    height = lambda x: np.sqrt(max(1 - max(abs(x) - alpha, 0.0) ** 2, 0.0))
     parts = [(0, alpha), (alpha, alpha + 1)]
-    over = lambda f: sum(quad(f, *part, epsabs=1e-14)[0] for part in parts)  # noqa: E731
+    over = lambda f: sum(quad(f, *part, epsabs=1e-14)[0] for part in parts)
     area = over(height)
     return over(lambda x: x * x * height(x)) / area, over(lambda x: height(x) ** 3 / 3) / area
 
@@ -95,9 +81,9 @@ def test_isolated_rods_turn_as_the_closed_form_of_simple_shear(alpha, tmp_path, 
     with loaded(packing, tmp_path, extra="box tilt large") as session:
         session.commands("pair_style spherocylinder/harmonic sides one general rotation")
         session.commands(f"pair_coeff * * 1.0\n{TILT}\n{drive(f'shear {rate}', dt)}\nrun 0")
-        start = unwrapped(session, 2)
+        start = unwrapped(session)
         session.commands(f"run {steps}")
-        end, angle = unwrapped(session, 2), state_of(session).packing.orientation
+        end, angle = unwrapped(session), state_of(session).packing.orientation
         strain, mean_turn = (fix_vector(session, "drive", k) for k in (17, 19))
     turn = rate * dt * steps
     expected = angle_under_shear(packing.orientation, turn, c)
@@ -139,9 +125,9 @@ def test_isolated_rods_align_with_pure_shear(rate, tmp_path, measured):
     packing = lonely_rods(alpha)
     with loaded(packing, tmp_path) as session:
         session.commands(f"{drive(f'pure {rate}', dt)}\nrun 0")
-        start = unwrapped(session, 2)
+        start = unwrapped(session)
         session.commands(f"run {steps}")
-        end, angle = unwrapped(session, 2), state_of(session).packing.orientation
+        end, angle = unwrapped(session), state_of(session).packing.orientation
         told = fix_vector(session, "drive", 18)
     u = np.stack([np.cos(packing.orientation), np.sin(packing.orientation)])
     expected = np.arctan2(u[1] * np.exp(-c * strain), u[0] * np.exp(c * strain))
@@ -158,7 +144,9 @@ def spinning(matrix, gradient, squares):
     Q = matrix.reshape(3, 3)
     second = Q @ np.diag(squares) @ Q.T
     moved = gradient @ second
-    drag = np.array([moved[2, 1] - moved[1, 2], moved[0, 2] - moved[2, 0], moved[1, 0] - moved[0, 1]])
+    drag = np.array(
+        [moved[2, 1] - moved[1, 2], moved[0, 2] - moved[2, 0], moved[1, 0] - moved[0, 1]]
+    )
     w = np.linalg.solve(np.trace(second) * np.eye(3) - second, drag)
     return (np.cross(w, Q.T).T).ravel()
 
@@ -185,13 +173,13 @@ def test_isolated_bodies_in_space_turn_as_their_moments_say(semi_axes, tmp_path,
     with loaded(packing, tmp_path) as session:
         session.commands("pair_style superellipsoid/harmonic\npair_coeff * * 1.0 1.0")
         session.commands(f"{TILT}\n{drive(in_words(GRADIENT_3D), dt)}\nrun 0")
-        start = unwrapped(session, 3, [1.0])
+        start = unwrapped(session, [1.0])
         session.commands(f"run {steps}")
-        end, quaternion = unwrapped(session, 3, [1.0]), state_of(session, [1.0]).quaternion
+        end, quaternion = unwrapped(session, [1.0]), state_of(session, [1.0]).quaternion
     time, squares = dt * steps, np.array(semi_axes) ** 2 / 5
     error = 0.0
     for before, after in zip(rotations(packing.orientation), rotations(quaternion), strict=True):
-        found = solve_ivp(lambda t, y: spinning(y, GRADIENT_3D, squares), (0, time), before.ravel(),
+        found = solve_ivp(lambda _, y: spinning(y, GRADIENT_3D, squares), (0, time), before.ravel(),
                           method="DOP853", rtol=1e-12, atol=1e-13)  # fmt: skip
         error = max(error, np.abs(found.y[:, -1].reshape(3, 3) - after).max())
     moved = np.abs(end - start @ expm(GRADIENT_3D * time).T).max() / 16.0
@@ -219,23 +207,24 @@ def packings():
 
 
 def run_flow(packing, folder, flow, *, dt=0.05, steps=200, before="", sides="two", options=""):
-    """State and box after some steps."""
+    """State after some steps."""
     with loaded(packing, folder, sides=sides, extra="box tilt large") as session:
         session.commands(f"{before}\n{drive(flow, dt, options)}\nrun {steps}")
-        state = state_of(session)
-        return state, cell_of(session, packing.dimension)
+        return state_of(session)
 
 
-@pytest.mark.parametrize("integrator", ["heun", "rkc2 tolerance 1e-3", "heun/adaptive tolerance 1e-3"])
+@pytest.mark.parametrize(
+    "integrator", ["heun", "rkc2 tolerance 1e-3", "heun/adaptive tolerance 1e-3"]
+)
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_an_even_gradient_is_compression_to_the_last_bit(dimension, integrator, packings, tmp_path):
     kappa, options = 1.3e-4, f"integrator {integrator}"
     even = in_words(-kappa * np.eye(dimension))
-    a, in_a = run_flow(packings[dimension], tmp_path, f"compress {kappa}", options=options)
-    b, in_b = run_flow(packings[dimension], tmp_path, even, options=options)
+    a = run_flow(packings[dimension], tmp_path, f"compress {kappa}", options=options)
+    b = run_flow(packings[dimension], tmp_path, even, options=options)
     assert a.packing.position.tobytes() == b.packing.position.tobytes()
     assert a.quaternion.tobytes() == b.quaternion.tobytes()
-    assert in_a.matrix.tobytes() == in_b.matrix.tobytes()
+    assert a.packing.box.matrix.tobytes() == b.packing.box.matrix.tobytes()
 
 
 # --- the tilt and its flips ----------------------------------------------------------------------
@@ -247,10 +236,19 @@ SHEAR = {
 }
 
 
-def modulo_cell(state, cell, other):
+def modulo_cell(packing, other):
     """Largest distance of two states' particles, images and cell vectors aside, over an edge."""
-    apart = np.linalg.solve(cell.matrix, (state.packing.position - other.packing.position).T)
+    apart = np.linalg.solve(packing.box.matrix, (packing.position - other.position).T)
     return np.abs(apart - np.round(apart)).max()
+
+
+@pytest.mark.parametrize("steps", [3000, 5060])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_forces_in_a_tilted_box_are_those_of_the_bindings(dimension, steps, packings, tmp_path):
+    state = run_flow(packings[dimension], tmp_path, SHEAR[dimension], before=TILT, steps=steps)
+    assert abs(state.packing.box.tilt[0]) > 0.2 * state.packing.box.edges[0]
+    assert np.abs(state.force).max() > 1e-4
+    assert difference_from_bindings(state, "two") < 1e-11
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -259,16 +257,14 @@ def test_flips_change_nothing(dimension, integrator, packings, tmp_path, measure
     """Flips of b, and in space of c along a and along b, beside the same run without any."""
     packing, options = packings[dimension], f"integrator {integrator}"
     keywords = {"before": TILT, "steps": 5060}
-    flipped, in_flipped = run_flow(packing, tmp_path, SHEAR[dimension], options=options, **keywords)
-    never, in_never = run_flow(
-        packing, tmp_path, SHEAR[dimension], options=f"{options} flip 100", **keywords
-    )
-    a, b = in_flipped.matrix, in_never.matrix
+    flipped = run_flow(packing, tmp_path, SHEAR[dimension], options=options, **keywords)
+    never = run_flow(packing, tmp_path, SHEAR[dimension], options=f"{options} flip 100", **keywords)
+    a, b = flipped.packing.box.matrix, never.packing.box.matrix
     for k in range(dimension - 1):
         assert b[k, k + 1] > 0.5 * b[k, k]
         assert a[k, k + 1] < 0
     whole = np.linalg.solve(b, a)
-    apart = modulo_cell(flipped, in_flipped, never)
+    apart = modulo_cell(flipped.packing, never.packing)
     turned = angle_between(flipped.quaternion, never.quaternion).max()
     measured(position=apart, angle=turned, cell=np.abs(whole - np.round(whole)).max())
     np.testing.assert_allclose(whole, np.round(whole), rtol=0, atol=1e-13)
@@ -361,7 +357,9 @@ def test_restarts_before_and_after_a_flip_go_on_as_if_never_stopped(
     whole, second = tmp_path / "whole.dump", tmp_path / "second.dump"
     assert cell_lines(whole) == cell_lines(second)
     # Forces are summed up in the order of the atoms, which the file does not keep.
-    apart, turned = (np.abs(a - b).max() for a, b in zip(*map(rows_of_dump, (whole, second)), strict=True))
+    apart, turned = (
+        np.abs(a - b).max() for a, b in zip(*map(rows_of_dump, (whole, second)), strict=True)
+    )
     measured(position=apart, quaternion=turned)
     assert apart < 1e-12
     assert turned < 1e-12
@@ -376,9 +374,9 @@ def test_simple_shear_keeps_its_volume_for_a_strain_of_a_thousand(tmp_path, meas
     packing = dense(alpha=1.0, n=8, phi=0.5)
     with loaded(packing, tmp_path, sides="one") as session:
         session.commands(f"{TILT}\n{drive('shear 0.1', 0.2)}\nrun 0")
-        before = cell_of(session, 2)
+        before = state_of(session).packing.box
         session.commands("run 50000")
-        after = cell_of(session, 2)
+        after = state_of(session).packing.box
         assert fix_vector(session, "drive", 17) == pytest.approx(1000, rel=1e-12)
     change = abs(np.linalg.det(after.matrix) / np.linalg.det(before.matrix) - 1)
     measured(volume=change)
@@ -394,7 +392,7 @@ def test_rates_may_change_between_runs(packings, tmp_path):
         session.commands(TILT)
         for flow in flows:
             session.commands(f"{drive(flow, dt)}\nrun {steps}\nunfix drive")
-        found = cell_of(session, 2).matrix
+        found = state_of(session).packing.box.matrix
     time, one, shear = dt * steps, np.eye(2), rate * np.eye(2, k=1)
     wanted = expm((kappa * one + shear) * time) @ expm(shear * time) @ expm(-kappa * one * time)
     np.testing.assert_allclose(found, wanted @ np.diag(packing.box.edges), rtol=0, atol=1e-13)
@@ -414,7 +412,9 @@ def test_stress_is_how_the_energy_changes_with_each_strain(dimension, packings, 
     step, volume = 1e-6, float(np.prod(packings[dimension].box.edges))
     places = {(0, 0): None, (0, 1): 16, (0, 2): 19, (1, 2): 20}
     with loaded(packings[dimension], tmp_path, sides="two", extra="box tilt large") as session:
-        session.commands(f"compute p all packing\nthermo_style custom step pe c_p[1]\n{TILT}\nrun 0")
+        session.commands(
+            f"compute p all packing\nthermo_style custom step pe c_p[1]\n{TILT}\nrun 0"
+        )
         vector = global_vector(session, "p")
         p, n_1, n_2 = vector[2], vector[14], vector[20]
         yy = p - n_1 / 2 if dimension == 2 else p + (n_2 - n_1) / 3
@@ -422,7 +422,7 @@ def test_stress_is_how_the_energy_changes_with_each_strain(dimension, packings, 
         tensor |= {at: vector[place - 1] for at, place in places.items() if place}
         worst = 0.0
         for k, j in directions(dimension):
-            slope = (energy_strained(session, k, j, step) - energy_strained(session, k, j, -step))
+            slope = energy_strained(session, k, j, step) - energy_strained(session, k, j, -step)
             worst = max(worst, abs(slope / (2 * step) + volume * tensor[k, j]) / (volume * p))
     measured(stress=worst)
     assert worst < 1e-7
@@ -500,10 +500,10 @@ def test_flows_that_cannot_be_are_refused(flow, sentence, sentence_of_flow):
 
 @pytest.fixture
 def sentence_of_flow(packings, tmp_path):
-    from lammps_scenes import error_of, run_lmp
-
     def sentence(flow):
-        text = f"{load_plugin()}\n{scene(packings[2], tmp_path / 'start.data')}\n{drive(flow, 0.01)}"
+        text = (
+            f"{load_plugin()}\n{scene(packings[2], tmp_path / 'start.data')}\n{drive(flow, 0.01)}"
+        )
         return error_of(run_lmp(f"{text}\nrun 0", tmp_path))
 
     return sentence

@@ -286,13 +286,6 @@ def test_crossing_spines_and_coinciding_centres(packing, ranks, sentence_of):
 # --- box and communication -----------------------------------------------------------------------
 
 
-def test_triclinic_box_is_refused(sentence_of):
-    assert sentence_of("change_box all triclinic\nrun 0") == (
-        "pair_style spherocylinder/harmonic found a triclinic box, expected an orthogonal one: use "
-        "a box without tilt."
-    )
-
-
 @pytest.mark.parametrize("boundary", ["f p p", "p s p", "p m p"])
 def test_fix_needs_a_periodic_box(boundary, sentence_of):
     assert sentence_of(f"change_box all boundary {boundary}\n{FIX}\nrun 1") == (
