@@ -12,6 +12,7 @@
 #include "utils.h"
 
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
@@ -38,8 +39,11 @@ constexpr const char *SYNTAX =
     "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [flip F] [integrator NAME] "
     "[tolerance T] [stages MAX] [reference center|corner] [check N]'.";
 
-/// What is global in a restart file.
+/// What is global in a restart file. The first number tells files of other versions apart.
+constexpr std::uint64_t SAVED_AS = 0x6a616d7368617002;
+
 struct Saved {
+  std::uint64_t format;
   AffineBox::State box;
   StepState steps;
   double mean_turn;
@@ -453,7 +457,7 @@ void FixOverdampedAffine::write_restart(FILE *fp)
   const double mean_turn = flow->mean_turn();
   if (comm->me != 0) return;
   const StepState *const of_steps = integrator->state();
-  const Saved saved{box->state(), of_steps ? *of_steps : StepState{}, mean_turn};
+  const Saved saved{SAVED_AS, box->state(), of_steps ? *of_steps : StepState{}, mean_turn};
   const int size = sizeof(saved);
   fwrite(&size, sizeof(int), 1, fp);
   fwrite(&saved, size, 1, fp);
@@ -462,6 +466,11 @@ void FixOverdampedAffine::write_restart(FILE *fp)
 void FixOverdampedAffine::restart(char *buf)
 {
   Saved saved;
+  std::memcpy(&saved.format, buf, sizeof(saved.format));
+  if (saved.format != SAVED_AS) {
+    fail("a restart file that another version of jamshape wrote, expected one of this version: go "
+         "on with that version, or start from a data file.");
+  }
   std::memcpy(&saved, buf, sizeof(saved));
   box->restore(saved.box);
   if (StepState *const of_steps = integrator->state()) *of_steps = saved.steps;

@@ -9,11 +9,13 @@ from lammps_scenes import (
     angle_between,
     dense,
     dump,
+    error_of,
     fix_vector,
     load_plugin,
     loaded,
     pose_differences,
     restarted,
+    run_lmp,
     run_lmp_well,
     scene,
     state_of,
@@ -201,3 +203,14 @@ def test_state_that_something_else_changed_is_taken_as_it_is(change, packings, t
     np.testing.assert_array_equal(seen.packing.position, changed.packing.position)
     np.testing.assert_array_equal(seen.packing.box.edges, changed.packing.box.edges)
     assert pose_differences(after, changed)[0] < 1e-3
+
+
+def test_a_restart_file_of_another_version_is_refused(packings, tmp_path):
+    path, mark = tmp_path / "half.restart", (0x6A616D7368617002).to_bytes(8, "little")
+    with loaded(packings["rods"], tmp_path) as session:
+        session.commands(f"{fix()}\nrun 1\nwrite_restart {path}")
+    content = path.read_bytes()
+    assert content.count(mark) == 1
+    path.write_bytes(content.replace(mark, (7.9).hex().encode()[:8]))
+    done = run_lmp(f"{load_plugin()}\nread_restart {path}\n{after_restart()}\n{fix()}", tmp_path)
+    assert "found a restart file that another version of jamshape wrote" in error_of(done)
