@@ -215,6 +215,15 @@ Vec<3> AffineBox::reference(const double *x, imageint image, const Upper &deform
   return y;
 }
 
+Vec<3> AffineBox::recounted(const Vec<3> &reference, imageint image) const
+{
+  const Upper cell = cell_at_start();
+  const Vec<3> apart = divided(1.0, cell) * reference - image_counts(image);
+  Vec<3> turns{};
+  for (int k = 0; k < dimension; ++k) turns[k] = -IMAGES * std::nearbyint(apart[k] / IMAGES);
+  return cell * turns;
+}
+
 AffineBox::Flip AffineBox::flip_needed(bigint step, double most) const
 {
   const Upper cell = deformation(step) * cell_at_start();

@@ -87,6 +87,11 @@ class AffineBox : protected LAMMPS_NS::Pointers {
     for (int k = 0; k < D; ++k) found.fixed_point[k] = point[k];
     return found;
   }
+  /// LAMMPS counts images modulo this. What to add to coordinates in the box of strain 0 where a
+  /// count has begun anew, which flips bring about: each changes the counts of particles that have
+  /// left the first image.
+  static constexpr double IMAGES = 2.0 * IMGMAX;
+  Vec<3> recounted(const Vec<3> &reference, LAMMPS_NS::imageint image) const;
   /// And back.
   Vec<3> reference(const double *x, LAMMPS_NS::imageint image, const Upper &deformation) const;
 

@@ -312,7 +312,9 @@ void FixOverdampedAffine::tell_what_is_left_out()
 
 void FixOverdampedAffine::post_neighbor()
 {
-  if (running) flow->measure_particles();
+  if (!running) return;
+  flow->measure_particles();
+  if (domain->triclinic) flow->follow_images();
 }
 
 void FixOverdampedAffine::setup(int)

@@ -505,6 +505,17 @@ void OverdampedFlow::change_reference(const Upper &factor)
   });
 }
 
+void OverdampedFlow::follow_images()
+{
+  for (int i = 0; i < atom->nlocal; ++i) {
+    double *const y = coordinates(i);
+    Vec<3> at{};
+    std::copy_n(y, dimension, at.c);
+    const Vec<3> added = box.recounted(at, atom->image[i]);
+    for (int k = 0; k < dimension; ++k) y[k] += added[k];
+  }
+}
+
 /* ----------------------------------------------------------------------
    storage
 ------------------------------------------------------------------------- */

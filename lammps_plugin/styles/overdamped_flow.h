@@ -61,6 +61,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   void finish_step(const Move &move);
   /// Coordinates in the box of strain 0 become those in another one; between steps only.
   void change_reference(const Upper &factor);
+  /// Coordinates follow LAMMPS's counts of images where these have begun anew.
+  void follow_images();
   /// The same sum as a length: rms over all particles that a force moves, turns times the radius of
   /// gyration.
   double rms_of(const Move &sum);

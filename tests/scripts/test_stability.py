@@ -50,7 +50,13 @@ _DEEP_KINK_IN_SPACE = (
 KNOWN = {
     **{
         f"quasistatic compression: {case}": _FLAT_ON_FLAT
-        for case in ("2D, p 10, w 0.1", "2D, p 10, w 1", "3D, p 10, w 0.1", "3D, p 10, w 1", "3D, p 10, w 10")
+        for case in (
+            "2D, p 10, w 0.1",
+            "2D, p 10, w 1",
+            "3D, p 10, w 0.1",
+            "3D, p 10, w 1",
+            "3D, p 10, w 10",
+        )
     },
     "quasistatic compression: 3D, alpha 0.01": _TWISTED,
     "minimisers: overlaps of a third, to the end": _DEEP_KINK,

@@ -410,16 +410,16 @@ def directions(dimension):
 def test_stress_is_how_the_energy_changes_with_each_strain(dimension, packings, tmp_path, measured):
     """-V P_kj = dU / d(strain), particles moved with the box at fixed orientations."""
     step, volume = 1e-6, float(np.prod(packings[dimension].box.edges))
-    places = {(0, 0): None, (0, 1): 16, (0, 2): 19, (1, 2): 20}
+    places = {(0, 1): 16, (0, 2): 19, (1, 2): 20}
     with loaded(packings[dimension], tmp_path, sides="two", extra="box tilt large") as session:
         session.commands(
-            f"compute p all packing\nthermo_style custom step pe c_p[1]\n{TILT}\nrun 0"
+            f"compute p all packing\nthermo_style custom step pe c_p[1]\nthermo_modify norm no\n{TILT}\nrun 0"
         )
         vector = global_vector(session, "p")
         p, n_1, n_2 = vector[2], vector[14], vector[20]
         yy = p - n_1 / 2 if dimension == 2 else p + (n_2 - n_1) / 3
         tensor = {(0, 0): yy + n_1, (1, 1): yy, (2, 2): yy - n_2}
-        tensor |= {at: vector[place - 1] for at, place in places.items() if place}
+        tensor |= {at: vector[place - 1] for at, place in places.items()}
         worst = 0.0
         for k, j in directions(dimension):
             slope = energy_strained(session, k, j, step) - energy_strained(session, k, j, -step)
@@ -444,12 +444,15 @@ def energy_strained(session, k, j, by):
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_power_balance_along_a_driven_run(dimension, packings, tmp_path, measured):
     """dU/dt = -V P:G - sum torque.w_host - what the drag takes, integrated by Simpson's rule."""
-    packing, dt, steps, every = packings[dimension], 0.01, 4000, 2
+    packing, steps, every = packings[dimension], 4000, 2
+    dt = {2: 0.01, 3: 0.0025}[dimension]  # forces of twisted rods in space have kinks
     gradient = {2: np.array([[-1e-4, 2e-3], [0, 2e-4]]), 3: GRADIENT_3D / 5}[dimension]
     rows = []
     with loaded(packing, tmp_path, sides="two") as session:
         session.commands(f"{TILT}\n{drive(in_words(gradient), dt)}")
-        session.commands("compute p all packing\nthermo_style custom step pe vol c_p[1]")
+        session.commands(
+            "compute p all packing\nthermo_style custom step pe vol c_p[1]\nthermo_modify norm no"
+        )
         session.commands("run 2000\nrun 0")
         for k in range(steps // every + 1):
             rows.append(powers(session, gradient, dimension))
