@@ -47,8 +47,7 @@ template <class Model> void export_sizes(nb::class_<ShapeOf<Model>> &of)
   length(
       "measure", [](auto D, Shape s) { return Model::template drag<D>(s).measure; },
       "(N,) areas in 2D, volumes in 3D.");
-  of.def_prop_ro("moment", &moments<Model>,
-                 "(N, 3) mean squared distances from the body's axes.");
+  of.def_prop_ro("moment", &moments<Model>, "(N, 3) mean squared distances from the body's axes.");
   length(
       "outer_radius", [](auto D, Shape s) { return Model::template outer_radius<D>(s); },
       "(N,) radii of the spheres around the particles.");
