@@ -82,6 +82,14 @@ class Image(io.BytesIO):
         """Give the path, which h5py takes as the name of the file."""
         return str(self._path)
 
+    def store(self) -> None:
+        """Write it to its path; errors as `replacing`.
+
+        An error that keeps a view of what is in memory would be told a second time where that is freed.
+        """
+        with self.getbuffer() as whole:
+            store(self._path, whole)
+
 
 @contextmanager
 def written(path: PathLike) -> Iterator[h5py.File]:
@@ -95,7 +103,7 @@ def written(path: PathLike) -> Iterator[h5py.File]:
     image = Image(path)
     with hdf5().File(image, "w") as file:
         yield file
-    store(path, image.getbuffer())
+    image.store()
 
 
 @contextmanager
@@ -106,7 +114,7 @@ def rewritten(path: PathLike) -> Iterator[h5py.File]:
         with hdf5().File(image, "r+") as file:
             check_h5md(file)
             yield file
-    store(path, image.getbuffer())
+    image.store()
 
 
 @contextmanager

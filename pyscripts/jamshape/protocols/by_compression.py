@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 from jamshape.files.h5md import count_frames, read_observables, read_packing
 from jamshape.files.journal import remove_run
-from jamshape.files.run_writer import fold
 from jamshape.flow import recording
 from jamshape.flow.compression import Compression, Row
 from jamshape.flow.recording import Recording
@@ -127,7 +126,7 @@ class ByCompression:
 
     def _compress(self) -> Iterator[Progress]:
         if recording.is_finished(self.run_file):
-            fold(self.run_file)
+            recording.tidy(self.run_file)
             return
         assert self.recipe.target is not None
         with Session() as session:

@@ -258,6 +258,12 @@ def test_a_compression_through_jamming_is_not_opened(tmp_path):
     assert not math.isnan(told["phi_J"])
     assert list(tmp_path.glob("*restart*")) == []
     # The run is there to be searched from, too: it leads to the same packing.
+    # A kill between the run's last frame and the removal of its restart files leaves these.
+    left = tmp_path / "packing.h5.run.h5.restart.a"
+    left.write_bytes(b"of a run that was finished")
+    out.unlink()
+    packed(out, particles=RODS, **quick)
+    assert not left.exists()
     other = packed(tmp_path / "other.h5", start=tmp_path / "packing.h5.run.h5")
     np.testing.assert_array_equal(other.position, read_packing(out).position)
     with pytest.raises(ValueError, match=r"kappa = 0.0001, expected 1e-05"):
