@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import math
+import signal
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterator, Mapping
@@ -106,6 +107,8 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
     except ImportError as error:
         sys.exit(f"{name}: {what_is_missing(error)}")
     except KeyboardInterrupt:
+        # Pressed again, it would cut the end of LAMMPS and MPI off, which takes a while on a busy machine.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         # Below a bar of progress.
         print(f"\n{name}: interrupted; {go_on}", file=sys.stderr)
         sys.exit(_INTERRUPTED)

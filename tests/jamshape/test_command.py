@@ -1,4 +1,6 @@
 import json
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -65,6 +67,28 @@ def test_a_mistake_of_the_script_is_not_hidden(monkeypatch):
     monkeypatch.setattr(sys, "argv", ["script.py"])
     with pytest.raises(KeyError):
         run(parser_of("What it does."), main)
+
+
+INTERRUPTED = """
+import atexit, os, signal, time
+from jamshape.command import sentences
+atexit.register(os.kill, os.getpid(), signal.SIGINT)
+with sentences("x"):
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(30)
+"""
+
+
+def test_a_second_ctrl_c_does_not_cut_the_end_off():
+    # Whoever started the tests may have told them to ignore it.
+    heard = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        command = [sys.executable, "-c", INTERRUPTED]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    finally:
+        signal.signal(signal.SIGINT, heard)
+    assert done.stderr == "\nx: interrupted; it may be started again\n"
+    assert done.returncode == 130
 
 
 def test_help_is_the_docstring(monkeypatch, capsys):
