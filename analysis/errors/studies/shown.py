@@ -52,6 +52,7 @@ def median_and_largest(axis: Any, color: str, points: Sequence[tuple[float, floa
 
 def name_median_and_largest(axis: Any) -> None:
     """Say which is which."""
+    axis.xaxis.set_minor_formatter("")  # within a decade they would run into each other
     axis.plot([], [], "o-", color="0.3", label="median")
     axis.plot([], [], "s--", color="0.3", mfc="none", label="largest")
     axis.legend(fontsize=8)
