@@ -113,7 +113,8 @@ def test_pair_coeff_has_three_arguments(sentence_of):
 
 
 SYNTAX = (
-    "'drag k_d compress kappa [integrator NAME] [tolerance T] [stages MAX] "
+    "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [flip F] [integrator NAME] "
+    "[tolerance T] [stages MAX] "
     "[reference center|corner] [check N]'."
 )
 
@@ -124,7 +125,7 @@ SYNTAX = (
         (f"{FIX} integrator leapfrog", r"integrator leapfrog, expected one of: heun, .*"),
         (f"{FIX} reference middle", f"'reference middle', expected {re.escape(SYNTAX)}"),
         (f"{FIX} speed 3", f"'speed 3', expected {re.escape(SYNTAX)}"),
-        (f"{FIX} integrator", f"a wrong list of arguments, expected {re.escape(SYNTAX)}"),
+        (f"{FIX} integrator", f"'integrator', expected {re.escape(SYNTAX)}"),
         ("fix drive all overdamped/affine", f"a wrong list .* expected {re.escape(SYNTAX)}"),
         (
             "fix drive all overdamped/affine compress 1.0 drag 1.0",
@@ -290,7 +291,7 @@ def test_crossing_spines_and_coinciding_centres(packing, ranks, sentence_of):
 def test_fix_needs_a_periodic_box(boundary, sentence_of):
     assert sentence_of(f"change_box all boundary {boundary}\n{FIX}\nrun 1") == (
         "fix overdamped/affine found a box that is not periodic, expected 'boundary p p p': the "
-        "whole box shrinks."
+        "whole box moves."
     )
 
 

@@ -219,8 +219,10 @@ def expected_vector(state, sides):
     found = contacts.sum_forces(packing, network)
     counted = contacts.coordination(packing, network)
     has_axis = packing.half_length > 0
+    director = 0.0
     if packing.dimension == 2:
         angles = packing.orientation[has_axis]
+        director = np.angle(np.exp(2j * angles).sum()) / 2
         orders = [orientational_order(angles, n).S_n if has_axis.any() else 0.0 for n in (2, 4)]
         side_bonds = np.where(network.kind == 2, 2, network.n_bonds).sum()
     else:
@@ -245,6 +247,26 @@ def expected_vector(state, sides):
         "overlap": (1 - network.bonds.distance / network.bonds.reach).max(),
         "tmax": (torque / np.sqrt(moment.max(axis=1))).max() / bond_force,
         "C_4": 0.0,
+        **expected_stress(found, packing.box.volume),
+        "director": director,
+    }
+
+
+def expected_stress(found, volume):
+    """What of the pressure tensor p_kl = sum r_l f_k / V is told beside its trace."""
+    D = len(found.virial)
+    tensor = np.zeros((3, 3))
+    tensor[:D, :D] = found.virial.T / volume
+    n_1, p_xy = tensor[0, 0] - tensor[1, 1], tensor[0, 1]
+    sigma = np.hypot(n_1 / 2, p_xy)
+    return {
+        "n_1": n_1,
+        "p_xy": p_xy,
+        "sigma": sigma,
+        "mu": sigma / found.pressure,
+        "p_xz": tensor[0, 2],
+        "p_yz": tensor[1, 2],
+        "n_2": tensor[1, 1] - tensor[2, 2] if D == 3 else 0.0,
     }
 
 
@@ -276,7 +298,7 @@ def test_packing_vector(dimension, alpha, sides, tmp_path, measured):
         run 0""",
         tmp_path, ranks=2,
     )  # fmt: skip
-    row = out.split("c_packing[14]")[1].strip().split("\n")[0].split()
+    row = out.split("c_packing[22]")[1].strip().split("\n")[0].split()
     assert_same_vector(np.array(row[1:], float), expected)
 
 

