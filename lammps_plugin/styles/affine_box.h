@@ -52,7 +52,7 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   double pure_strain(LAMMPS_NS::bigint step) const;
   /// How fast the flow strains: the largest sum of a row of |G|.
   double speed() const;
-  /// Whether it does anything but shrink or grow the box evenly.
+  /// Whether it only shrinks or grows the box, evenly.
   bool is_isotropic() const;
 
   /// F, at a step and at a time after it.

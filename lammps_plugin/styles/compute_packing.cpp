@@ -143,26 +143,23 @@ void ComputePacking::compute_vector()
 void ComputePacking::compute_density_and_stress()
 {
   const int d = domain->dimension;
-  double volume = 1.0, measure = 0.0, trace = 0.0, mine[6], torque[3] = {};
-  for (int k = 0; k < d; ++k) {
-    volume *= domain->prd[k];
-    trace += pair->virial[k];
-  }
+  double volume = 1.0, measure = 0.0, trace = 0.0, mine[6], sums[6], torque[3] = {};
+  for (int k = 0; k < d; ++k) volume *= domain->prd[k];
   for (int i = 0; i < atom->nlocal; ++i) {
     measure += pair->drag(pair->particle_view().semi_axes(i), atom->type[i]).measure;
     for (int k = 0; k < 3; ++k) torque[k] += atom->torque[i][k];
   }
   vector[PHI] = sum(measure) / volume;
   vector[U] = sum(pair->eng_vdwl) / volume;
-  vector[P] = sum(trace) / (d * volume);
   // LAMMPS's virial is xx, yy, zz, xy, xz, yz of r_k f_l. What shear of x along y works against is
   // r_y f_x: forces and torques of a contact balance, and so that differs by the torques.
-  double sums[6];
   std::copy_n(pair->virial, 6, mine);
   mine[3] += torque[2];
   mine[4] -= torque[1];
   mine[5] += torque[0];
   MPI_Allreduce(mine, sums, 6, MPI_DOUBLE, MPI_SUM, world);
+  for (int k = 0; k < d; ++k) trace += sums[k];
+  vector[P] = trace / (d * volume);
   vector[N_1] = (sums[0] - sums[1]) / volume;
   vector[N_2] = d == 3 ? (sums[1] - sums[2]) / volume : 0.0;
   vector[P_XY] = sums[3] / volume;

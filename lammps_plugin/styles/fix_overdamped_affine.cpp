@@ -257,12 +257,8 @@ void FixOverdampedAffine::init()
 /// A flow that shears needs a cell that can tilt.
 void FixOverdampedAffine::require_cell(const Upper &gradient) const
 {
-  const bool is_plane = domain->dimension == 2;
   if (gradient.has_shear() && !domain->triclinic) {
     fail("a box without tilt, expected one that shear can tilt: use 'change_box all triclinic'.");
-  }
-  if (is_plane && (gradient.diagonal[2] != 0.0 || gradient.xz != 0.0 || gradient.yz != 0.0)) {
-    fail("a flow along z, expected one in the plane.");
   }
 }
 

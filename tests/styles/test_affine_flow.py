@@ -401,11 +401,6 @@ def test_rates_may_change_between_runs(packings, tmp_path):
 # --- pressure tensor and work --------------------------------------------------------------------
 
 
-def directions(dimension):
-    pairs = list(itertools.combinations_with_replacement(range(dimension), 2))
-    return [(k, j) for k, j in pairs]
-
-
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_stress_is_how_the_energy_changes_with_each_strain(dimension, packings, tmp_path, measured):
     """-V P_kj = dU / d(strain), particles moved with the box at fixed orientations."""
@@ -421,7 +416,7 @@ def test_stress_is_how_the_energy_changes_with_each_strain(dimension, packings, 
         tensor = {(0, 0): yy + n_1, (1, 1): yy, (2, 2): yy - n_2}
         tensor |= {at: vector[place - 1] for at, place in places.items()}
         worst = 0.0
-        for k, j in directions(dimension):
+        for k, j in itertools.combinations_with_replacement(range(dimension), 2):
             slope = energy_strained(session, k, j, step) - energy_strained(session, k, j, -step)
             worst = max(worst, abs(slope / (2 * step) + volume * tensor[k, j]) / (volume * p))
     measured(stress=worst)
