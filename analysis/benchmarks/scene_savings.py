@@ -57,12 +57,17 @@ class Scene(NamedTuple):
 
 FLOW = "fix flow all overdamped/affine drag 1 compress 1e-4\ntimestep 0.05"
 SCENES = {
-    "discs": Scene(Particles.of(alpha=0.0), 2, 0.4, Compression(1e-3, 0.86, 0.1)),
-    "rods": Scene(Particles.of(alpha=4.0), 2, 0.4, Compression(1e-3, 0.86, 0.1)),
-    "dimers": Scene(Particles.of("dimer"), 2, 0.4, Compression(1e-3, 0.86, 0.1)),
-    "spheres": Scene(Particles.of("superellipsoid"), 3, 0.3, Compression(2e-3, 0.66, 0.5)),
+    "discs": Scene(Particles.of(alpha=0.0), 2, 0.4, Compression(kappa=1e-3, phi_end=0.86, dt=0.1)),
+    "rods": Scene(Particles.of(alpha=4.0), 2, 0.4, Compression(kappa=1e-3, phi_end=0.86, dt=0.1)),
+    "dimers": Scene(Particles.of("dimer"), 2, 0.4, Compression(kappa=1e-3, phi_end=0.86, dt=0.1)),
+    "spheres": Scene(
+        Particles.of("superellipsoid"), 3, 0.3, Compression(kappa=2e-3, phi_end=0.66, dt=0.5)
+    ),
     "spheroids": Scene(
-        Particles.of("superellipsoid", w2=1.5), 3, 0.3, Compression(2e-3, 0.72, 0.5)
+        Particles.of("superellipsoid", w2=1.5),
+        3,
+        0.3,
+        Compression(kappa=2e-3, phi_end=0.72, dt=0.5),
     ),
 }
 

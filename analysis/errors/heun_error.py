@@ -58,7 +58,7 @@ def start_state(folder: Path, n: int) -> Packing:
 
     def make() -> Packing:
         start = random_packing(n, PHI_START, 1, Particles.of(alpha=ALPHA))
-        return compressed(start, Compression(KAPPA, PHI_FROM))
+        return compressed(start, Compression(kappa=KAPPA, phi_end=PHI_FROM))
 
     return kept_packing(folder / f"start_{n}.h5", make)
 
@@ -68,7 +68,9 @@ def run_with(start: Packing, dt: float, sides: int) -> dict[str, Any]:
     every = round(INTERVAL / dt)
     pressures, limits = [], []
     with Session() as session:
-        compression = CompressionRun(session, Compression(KAPPA, PHI_TO, dt, sides), start)
+        compression = CompressionRun(
+            session, Compression(kappa=KAPPA, phi_end=PHI_TO, dt=dt, sides=sides), start
+        )
         began = time.perf_counter()
         for k in range(1, round(compression.last_step * dt / INTERVAL) + 1):
             compression.advance(k * every)

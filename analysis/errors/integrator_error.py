@@ -60,7 +60,9 @@ class Case(NamedTuple):
     def settings(self, method: str, tolerance: float) -> Compression:
         """Return what the run is told."""
         phi_from, phi_to = PHI[self.alpha]
-        told = Compression(self.kappa, phi_to, sides=2, integrator=method, tolerance=tolerance)
+        told = Compression(
+            kappa=self.kappa, phi_end=phi_to, sides=2, integrator=method, tolerance=tolerance
+        )
         return told.in_steps(phi_from, ROWS)
 
 
@@ -90,7 +92,9 @@ def start_state(folder: Path, case: Case) -> Packing:
 
     def make() -> Packing:
         start = random_packing(case.n, PHI_START, 1, Particles.of(alpha=case.alpha))
-        return compressed(start, Compression(KAPPA_START, PHI[case.alpha][0], 0.1, sides=2))
+        return compressed(
+            start, Compression(kappa=KAPPA_START, phi_end=PHI[case.alpha][0], dt=0.1, sides=2)
+        )
 
     return kept_packing(folder / f"start_n{case.n}_alpha{case.alpha:g}.h5", make)
 
@@ -112,10 +116,10 @@ def run_with(start: Packing, settings: Compression, steps: int) -> dict[str, Any
 def heun_stretch(start: Packing, case: Case) -> dict[str, Any]:
     """Heun's method for a while: its cost for the whole, and its error at the end of the stretch."""
     whole = case.settings("heun", 1.0)
-    fine = Compression(case.kappa, whole.phi_end, HEUN_STEPS * HEUN_DT, sides=2,
+    fine = Compression(kappa=case.kappa, phi_end=whole.phi_end, dt=HEUN_STEPS * HEUN_DT, sides=2,
                        integrator=REFERENCE[0], tolerance=REFERENCE[1])  # fmt: skip
     exact = run_with(start, fine, 1)["pressure"][-1]
-    settings = Compression(case.kappa, whole.phi_end, HEUN_DT, sides=2)
+    settings = Compression(kappa=case.kappa, phi_end=whole.phi_end, dt=HEUN_DT, sides=2)
     with Session() as session:
         compression = CompressionRun(session, settings, start)
         began = time.process_time()

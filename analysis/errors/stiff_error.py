@@ -110,7 +110,9 @@ def end_of(step: Step) -> dict[str, Any]:
 def heun_cost(start: Packing) -> dict[str, float]:
     """Seconds of an evaluation in LAMMPS, by a stretch of Heun steps, in processor time."""
     with Session() as session:
-        compression = CompressionRun(session, Compression(1e-6, 10.0, HEUN_DT, 2), start)
+        compression = CompressionRun(
+            session, Compression(kappa=1e-6, phi_end=10.0, dt=HEUN_DT, sides=2), start
+        )
         compression.advance(session.step + 100)
         began = time.process_time()
         compression.advance(session.step + HEUN_STEPS)

@@ -1,7 +1,6 @@
 """Jamming of soft, frictionless, athermal particles that are not round; see `jamshape.__init__`."""
 
 from .front.compressing import compress as compress
-from .front.compressing import resume as resume
 from .front.compressing import slow_compress as slow_compress
 from .front.files import load as load
 from .front.files import save as save
@@ -10,7 +9,10 @@ from .front.modes import Modes as Modes
 from .front.modes import modes as modes
 from .front.packing import MeasuredPacking as MeasuredPacking
 from .front.pictures import plot as plot
+from .front.recorded import resume as resume
 from .front.run import RunFile as RunFile
+from .front.run import ShearFile as ShearFile
+from .front.shearing import shear as shear
 from .packing import Box as Box
 from .packing import Packing as Packing
 from .shapes.named import Dimers as Dimers

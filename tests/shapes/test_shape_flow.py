@@ -53,7 +53,7 @@ def assert_followed_the_box(start, end, strain):
 def test_lone_particles_follow_the_box_and_keep_their_angles(case, integrator):
     start = lone(case)
     phi_end = start.phi * math.exp(case.dimension * 0.1)
-    settings = Compression(0.01, phi_end, 0.1, sides=SIDES, integrator=integrator)
+    settings = Compression(kappa=0.01, phi_end=phi_end, dt=0.1, sides=SIDES, integrator=integrator)
     with Session() as session:
         run = CompressionRun(session, settings, start)
         run.advance(run.last_step)

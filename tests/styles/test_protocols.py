@@ -17,7 +17,7 @@ def compressed(path=None):
     start = random_packing(64, 0.35, 1, bidisperse(4.0))
     rows = []
     with Session() as session:
-        run = CompressionRun(session, Compression(1e-4, phi_end=1e3, dt=0.25), start)
+        run = CompressionRun(session, Compression(kappa=1e-4, phi_end=1e3, dt=0.25), start)
         for row in range(1, ROWS + 1):
             run.advance(row * STEPS)
             if path and row % ROWS_PER_RESTART == 0:

@@ -21,7 +21,7 @@ PAPER = {0.0: 0.8412, 1.0: 0.8875, 4.0: 0.866}
 
 def compress(alpha, kappa, seed):
     start = random_packing(N, 0.4, seed, bidisperse(alpha))
-    settings = Compression(kappa, phi_end=0.92, dt=0.3)
+    settings = Compression(kappa=kappa, phi_end=0.92, dt=0.3)
     with Session() as session:
         run = CompressionRun(session, settings, start)
         rows = [sample.observables for sample in run.samples(max(1, run.last_step // 600))]

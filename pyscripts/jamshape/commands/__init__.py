@@ -21,6 +21,7 @@ COMMANDS = {
     "compress": "compress particles through jamming; record p(phi) and snapshots",
     "pack": "make one mechanically stable packing at a chosen energy",
     "slow": "compress at any rate, however slow, in the plane; record p(phi)",
+    "shear": "shear at a constant rate; record stress, order and snapshots",
     "sweep": "make many packings on all cores",
     "modes": "find the modes of vibration of a packing, and its moduli",
     "draw": "draw packings",

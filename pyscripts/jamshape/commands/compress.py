@@ -18,7 +18,8 @@ from jamshape.checks import require_free
 from jamshape.command import parser_of, report
 from jamshape.commands.onset import add_onset_options, tell_onset
 from jamshape.flow.recording import summary_of
-from jamshape.front.compressing import compress, resume
+from jamshape.front.compressing import compress
+from jamshape.front.recorded import resume
 from jamshape.shapes.command_line import add_particle_options, particles_of
 
 GO_ON = "the same command with --resume goes on from the last restart file"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence, Sized
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,8 +14,20 @@ from jamshape.shapes.particles import parse_kind
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import SHAPES, shape_named
 
-_NUMBERS = {"n": "N", "size_ratio": "R_b/R_s", "kappa": r"\kappa", "u0": "u_0"}
+_NUMBERS = {"n": "N", "size_ratio": "R_b/R_s", "kappa": r"\kappa", "u0": "u_0",
+            "phi": r"\phi", "gdot": r"\dot\gamma"}  # fmt: skip
+_SMALL = frozenset({"u0", "kappa", "gdot"})
 _OF_ENSEMBLES = ("n", "size_ratio", "kappa")
+
+
+class Grouped(Protocol):
+    """What runs that differ in their seed only have in common: a system, and numbers by name."""
+
+    @property
+    def system(self) -> System:
+        """What they are of."""
+
+    def _asdict(self) -> dict[str, Any]: ...
 
 
 def scientific(value: float) -> str:
@@ -97,8 +109,7 @@ def _told(name: str, known: Mapping[str, Any]) -> str:
     value = float(np.ravel(known[name])[-1])
     if name == "u0" and value == 0:
         return "first jammed"
-    small = name in {"u0", "kappa"}
-    return f"${_NUMBERS[name]}={scientific(value) if small else f'{value:g}'}$"
+    return f"${_NUMBERS[name]}={scientific(value) if name in _SMALL else f'{value:g}'}$"
 
 
 def systems_text(systems: Iterable[System]) -> str:
@@ -176,8 +187,8 @@ def system_labels(systems: Collection[System]) -> dict[System, str]:
     return labels
 
 
-def ensemble_text(ensemble: Ensemble, names: Iterable[str] = ("n", "kappa")) -> str:
-    """Name an ensemble of compressions by its system and the numbers of these names."""
+def ensemble_text(ensemble: Grouped, names: Iterable[str] = ("n", "kappa")) -> str:
+    """Name an ensemble of runs by its system and the numbers of these names."""
     told = [_told(name, ensemble._asdict()) for name in names]
     return ", ".join([systems_text([ensemble.system]), *told])
 

@@ -1,4 +1,4 @@
-"""Compressions in files: a run of `jamshape.flow.compression` recorded in H5MD, which goes on after a kill."""
+"""Flows in files: a run of `jamshape.flow.motion` recorded in H5MD, which goes on after a kill."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.restarts import RestartFiles
 from jamshape.files.run_writer import RunWriter, fold
-from jamshape.flow.compression import Compression, CompressionRun, Row
+from jamshape.flow.compression import Compression
+from jamshape.flow.motion import FlowRun, Motion, Row
+from jamshape.flow.shear import Shear
 from jamshape.measures.runs import onset_report
 from jamshape.packing import Packing
 
@@ -33,7 +35,7 @@ _SUMMARY = ("phi", "pressure", "z", "S_2", "S_4")
 
 @dataclass(frozen=True)
 class Recording:
-    """What a compression leaves in its H5MD file.
+    """What a run leaves in its H5MD file.
 
     Parameters
     ----------
@@ -81,36 +83,35 @@ def tidy(path: Path) -> None:
 
 
 def is_finished(path: Path) -> bool:
-    """Whether the file holds a compression that reached its end."""
+    """Whether the file holds a run that reached its end."""
     return path.exists() and bool(read_attributes(path).get("finished"))
 
 
-def require_same(to: Recording, settings: Compression, dimension: int) -> None:
+def require_same(to: Recording, settings: Motion, dimension: int) -> None:
     """Refuse the file of another run.
 
     Raises
     ------
     ValueError
     """
+    what = f"a {settings.name}"
     if "finished" not in read_attributes(to.path):
-        msg = (
-            f"{to.path} holds no compression, expected one; write to another file, or make it again"
-        )
+        msg = f"{to.path} holds no {settings.name}, expected one; write to another file, or make it again"
         raise ValueError(msg)
     expected = dataclasses.asdict(settings) | dict(to.attributes)
-    require_attributes(to.path, expected | {"rows": to.rows, "frames": to.frames}, "a compression")
+    require_attributes(to.path, expected | {"rows": to.rows, "frames": to.frames}, what)
     found = read_style(to.path)[1]
     if found != dimension:
         msg = (
-            f"{to.path} holds a compression in {found} dimensions, expected {dimension};"
+            f"{to.path} holds {what} in {found} dimensions, expected {dimension};"
             " write to another file, or make it again"
         )
         raise ValueError(msg)
 
 
-def begin(session: Session, settings: Compression, start: Packing, to: Recording) -> CompressionRun:
-    """Start a compression and its file."""
-    run = CompressionRun(session, settings, start)
+def begin(session: Session, settings: Motion, start: Packing, to: Recording) -> FlowRun[Motion]:
+    """Start a run and its file."""
+    run = FlowRun(session, settings, start)
     to.restarts.forget()  # of another run, which was cut off and is begun anew
     first = run.measure()
     run.write_restart(to.restarts.next())
@@ -121,8 +122,15 @@ def begin(session: Session, settings: Compression, start: Packing, to: Recording
     return run
 
 
-def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
-    """Go on with a compression that was killed, from its newest whole restart file, as it was set.
+def settings_of(stored: Mapping[str, Any]) -> Motion:
+    """Read how a run was set from the attributes of its file."""
+    kind = Shear if "gdot" in stored else Compression
+    names = {f.name for f in dataclasses.fields(kind)} & set(stored)
+    return kind(**{name: stored[name] for name in names})
+
+
+def resume(session: Session, path: Path) -> tuple[FlowRun[Motion], Recording]:
+    """Go on with a run that was killed, from its newest whole restart file, as it was set.
 
     Without any it begins anew from its first frame.
 
@@ -132,13 +140,11 @@ def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
         If rows between the last one and the restart file are not there.
     """
     stored = read_attributes(path)
-    names = {f.name for f in dataclasses.fields(Compression)} & set(stored)
-    settings = Compression(**{name: stored[name] for name in names})
     to = Recording(path, stored["rows"], stored["frames"])
     with RunWriter.open(path) as writer:
-        run = CompressionRun(session, settings, writer.first, to.restarts.newest())
+        run = FlowRun(session, settings_of(stored), writer.first, to.restarts.newest())
         last = int(read_series(path, "pressure").step[-1])
-        if session.step > last + _every(run, to, writer.first, stored):
+        if session.step > last + _every(run, to, writer.first):
             msg = (
                 f"{path}: has rows up to step {last}, expected those up to step {session.step} of its"
                 " restart file; bring its journal back beside it, or make it again"
@@ -151,14 +157,14 @@ def resume(session: Session, path: Path) -> tuple[CompressionRun, Recording]:
     return run, to
 
 
-def record(run: CompressionRun, to: Recording) -> Iterator[Row]:
+def record(run: FlowRun[Motion], to: Recording) -> Iterator[Row]:
     """Run to the end and yield each sample, which is in the file by then.
 
     What a restart file goes on from is there before it: all samples up to its step.
     """
-    stored, last = read_attributes(to.path), read_series(to.path, "pressure").step[-1]
+    last = read_series(to.path, "pressure").step[-1]
     with RunWriter.open(to.path) as writer:
-        every = _every(run, to, writer.first, stored)
+        every = _every(run, to, writer.first)
         per_frame = every * max(1, to.rows // to.frames)
 
         def keep(sample: Row) -> Row:
@@ -179,10 +185,9 @@ def record(run: CompressionRun, to: Recording) -> Iterator[Row]:
     to.restarts.forget()
 
 
-def _every(run: CompressionRun, to: Recording, first: Packing, stored: Mapping[str, Any]) -> int:
+def _every(run: FlowRun[Motion], to: Recording, first: Packing) -> int:
     """Count the steps from row to row."""
-    whole = run.settings.steps(float(stored["phi_start"]), first.dimension)
-    return max(1, whole // to.rows)
+    return max(1, run.settings.all_steps(first) // to.rows)
 
 
 def _write_row(writer: RunWriter, row: Row) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,14 @@ from jamshape.checks import (
     require_rising,
     require_stated,
 )
-from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
 from jamshape.flow import recording, slow_recording
-from jamshape.flow.compression import Compression, Row
-from jamshape.flow.implicit import Protocol, Step
+from jamshape.flow.compression import Compression
+from jamshape.flow.implicit import Protocol
 from jamshape.flow.recording import Recording
-from jamshape.front.packing import MeasuredPacking
-from jamshape.front.progress import Told, follow, place
+from jamshape.front.progress import place
+from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import RunFile
-from jamshape.lammps.session import Session
+from jamshape.front.starts import start_of, told_of
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.random_start import random_packing
@@ -112,8 +111,9 @@ def compress(
         require_stated(dt=dt)
     integrator = integrator or ("rkc2" if dt is None and sides == 2 else "heun")
     settings = Compression(
-        kappa, phi[1], 0.05 if dt is None else dt, sides, integrator=integrator, tolerance=tolerance
-    )
+        kappa=kappa, phi_end=phi[1], dt=0.05 if dt is None else dt,
+        sides=sides, integrator=integrator, tolerance=tolerance,
+    )  # fmt: skip
     if settings.chooses_steps:
         settings = settings.in_steps(phi[0], rows, dimension)
     settings.steps(phi[0], dimension)  # refuses what does not end
@@ -123,75 +123,11 @@ def compress(
     to = Recording(at.path, rows, frames, made_from)
     if again or not at.path.exists():
         start = random_packing(n, phi[0], seed, particles, dimension)
-        _record(lambda session: recording.begin(session, settings, start, to), to, progress)
+        record_flow(lambda session: recording.begin(session, settings, start, to), to, progress)
     else:
         recording.require_same(to, settings, dimension)
         resume(at.path, progress=progress)
     return RunFile(*at)
-
-
-def resume(file: str | Path, *, progress: bool = True) -> RunFile:
-    """Go on with a compression that was cut off, as it was set; a finished one is loaded.
-
-    Parameters
-    ----------
-    file : path
-        Of a run of `compress` or `slow_compress`.
-    progress : bool
-        Whether a bar on standard error says how far it is.
-
-    Returns
-    -------
-    RunFile
-
-    Raises
-    ------
-    FileFormatError, OSError
-        If it is no such file, or not to be read.
-
-    Examples
-    --------
-    >>> import jamshape as js
-    >>> rods = js.Spherocylinders(alpha=4)
-    >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
-    >>> js.resume("run.h5").about["finished"]
-    True
-    """
-    path = Path(file)
-    stored = read_attributes(path)
-    if not ({"rows", "frames"} <= stored.keys() or "flow_steps" in stored):
-        msg = f"{path} holds no compression, expected a file of compress or slow_compress"
-        raise FileFormatError(msg)
-    if not stored.get("finished"):
-        if "flow_steps" in stored:
-            _record_slowly(path, progress)
-        else:
-            require_path_for_lammps(path)
-            to = Recording(path, stored["rows"], stored["frames"])
-            _record(lambda session: recording.resume(session, path)[0], to, progress)
-    recording.tidy(path)
-    return RunFile(path)
-
-
-def _record(start: Any, to: Recording, progress: bool) -> None:
-    """Run to the end; `start` makes the run in a session."""
-    with Session() as session:
-        run = start(session)
-        phi_start = float(read_attributes(to.path)["phi_start"])
-        told = _told(phi_start, run.settings.phi_end)
-        begun = told(run.sample()).part
-        follow(recording.record(run, to), told, shown=progress, begun=begun or 0.0)
-
-
-def _told(phi_start: float, phi_end: float) -> Callable[[Row], Told]:
-    """Return what says how far a compression is: the strain that is done of the whole one."""
-
-    def told(row: Row) -> Told:
-        phi, pressure = row.observables["phi"], row.observables["pressure"]
-        part = min(1.0, math.log(phi / phi_start) / math.log(phi_end / phi_start))
-        return Told("compression", f"phi {phi:.4f} of {phi_end:g}, pressure {pressure:.2e}", part)
-
-    return told
 
 
 def slow_compress(
@@ -287,37 +223,12 @@ def _slow_start(
     start: Packing | str | Path | None,
 ) -> tuple[Packing, dict[str, Any]]:
     """Take or make the start of n, phi and a seed, and say what it was made from."""
-    if isinstance(start, str | Path):
-        start = MeasuredPacking.read(Path(start))
     if start is not None:
-        known = start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
-        return start, _known(known) | {"start": str(known.file or "")}
+        known = start_of(start)
+        return known, told_of(known)
     if particles is None:
         msg = "there are neither particles nor a start, expected one of them"
         raise ValueError(msg)
     n, phi, seed = numbers
     random = random_packing(n, _PHI_RANDOM, seed, particles)
     return compressed_start(random, phi), dict(particles.told) | {"n": n, "seed": seed}
-
-
-def _known(start: MeasuredPacking) -> dict[str, Any]:
-    """Pick what is said of the particles of a start."""
-    own = [parameter.name for parameter in start.shape.parameters]
-    names, results = (*own, "size_ratio", "kinds", "seed"), start.results
-    return {name: results[name] for name in names if name in results} | {"n": start.n}
-
-
-def _record_slowly(path: Path, progress: bool) -> None:
-    stored = read_attributes(path)
-    first, end = float(stored["phi_start"]), float(stored["phi_end"])
-    until = f" or {stored['p_end']:.3g}" if math.isfinite(stored["p_end"]) else ""
-
-    def part_at(phi: float) -> float:
-        return min(1.0, (phi - first) / (end - first))
-
-    def told(step: Step) -> Told:
-        where = f"phi {step.phi:.6f} of {end:g}, pressure {step.pressure:.3e}{until}"
-        return Told("slow compression", f"{where}, step {step.dt:.1e}", part_at(step.phi))
-
-    begun = part_at(read_packing(path).phi)
-    follow(slow_recording.record(path), told, shown=progress, begun=begun)

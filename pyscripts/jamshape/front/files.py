@@ -10,12 +10,12 @@ from jamshape.files.lammps_text import read_any, write_data
 from jamshape.files.signature import GSD, HDF5, format_of
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.run import RunFile
+from jamshape.front.run import Recorded, run_file
 from jamshape.packing import Packing
 from jamshape.vibration.table import holds_modes
 
 
-def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | RunFile | Modes:
+def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | Recorded | Modes:
     """Load what is in a file.
 
     Parameters
@@ -28,7 +28,7 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | RunFil
 
     Returns
     -------
-    MeasuredPacking, RunFile or Modes
+    MeasuredPacking, RunFile, ShearFile or Modes
 
     Raises
     ------
@@ -57,7 +57,7 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | RunFil
     if holds_modes(path):
         return Modes.read(path)
     if frame is None and "finished" in read_attributes(path):
-        return RunFile(path)
+        return run_file(path)
     return MeasuredPacking.read(path, -1 if frame is None else frame)
 
 

@@ -11,10 +11,12 @@ from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
 from jamshape.drawing.pressure import draw_pressure
+from jamshape.drawing.shear import draw_stress
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.run import RunFile
+from jamshape.front.run import Recorded, RunFile, ShearFile
 from jamshape.measures.runs import read_run
+from jamshape.measures.shears import read_shear
 from jamshape.packing import Packing
 
 if TYPE_CHECKING:
@@ -27,13 +29,13 @@ _DPI = 100
 
 
 def plot(
-    thing: Packing | RunFile | Modes, axes: Axes | None = None, *, color: str = "kind"
+    thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str = "kind"
 ) -> Axes:
-    """Draw a packing, the pressure of a run, or the density of modes.
+    """Draw a packing, the pressure of a compression, the stress of a shear, or the density of modes.
 
     Parameters
     ----------
-    thing : Packing, RunFile or Modes
+    thing : Packing, RunFile, ShearFile or Modes
     axes : matplotlib Axes, optional
         Where to draw; a new figure of `matplotlib.pyplot` when left out.
     color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}
@@ -46,7 +48,7 @@ def plot(
     Raises
     ------
     TypeError
-        If it is none of the three.
+        If it is none of these.
     ValueError
         If the packing's dimension knows no such order.
 
@@ -69,7 +71,7 @@ def plot(
     return axes
 
 
-def html(thing: MeasuredPacking | RunFile | Modes) -> str:
+def html(thing: MeasuredPacking | Recorded | Modes) -> str:
     """Show it in a notebook: what it is, and a picture."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - only notebooks ask
 
@@ -112,6 +114,11 @@ def _run(run: RunFile, axes: Axes, color: str) -> None:
     draw_pressure(axes, read_run(run.file))
 
 
+def _shear(run: ShearFile, axes: Axes, color: str) -> None:
+    del color
+    draw_stress(axes, read_shear(run.file))
+
+
 def _modes(modes: Modes, axes: Axes, color: str) -> None:
     del color
     draw_density(axes, modes.told)
@@ -122,5 +129,6 @@ def _modes(modes: Modes, axes: Axes, color: str) -> None:
 _DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {
     Packing: _packing,
     RunFile: _run,
+    ShearFile: _shear,
     Modes: _modes,
 }

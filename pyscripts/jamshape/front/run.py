@@ -1,4 +1,4 @@
-"""A compression and its file: p(phi), frames, the onset of jamming."""
+"""Runs and their files: what was measured on the way, frames, and what follows from it."""
 
 from __future__ import annotations
 
@@ -24,30 +24,21 @@ from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
+from jamshape.measures.steady import SteadyState, steady_state
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
-class RunFile:
-    """A compression in its H5MD file.
+class Recorded:
+    """A run in its H5MD file, whatever it is a run of.
 
     Parameters
     ----------
     file : Path
     folder : object, optional
         What removes the file when nobody needs this any more, of runs that were given none.
-
-    Examples
-    --------
-    >>> import jamshape as js
-    >>> rods = js.Spherocylinders(alpha=4)
-    >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
-    >>> run.phi.shape, len(run), run.packing().n
-    ((401,), 21, 24)
-    >>> round(float(run.phi[-1]), 6), round(run.onset().phi_J, 2)
-    (0.95, 0.7)
     """
 
     file: Path
@@ -76,6 +67,53 @@ class RunFile:
     def pressure(self) -> FloatArray:
         """(T,) pressures, [energy / length^D]."""
         return self["pressure"]
+
+    def __len__(self) -> int:
+        """Count the frames."""
+        return count_frames(self.file)
+
+    def packing(self, frame: int = -1) -> MeasuredPacking:
+        """Read a frame, counted from 0, or with negative numbers from the end."""
+        return MeasuredPacking.read(self.file, frame)
+
+    def __iter__(self) -> Iterator[MeasuredPacking]:
+        return map(self.packing, range(len(self)))
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw its pressure; arguments as `jamshape.plot`."""
+        from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows runs
+
+        return plot(self, axes)
+
+    def _repr_html_(self) -> str:
+        from jamshape.front.pictures import html  # noqa: PLC0415 - only notebooks ask
+
+        return html(self)
+
+    def _who(self) -> str:
+        """Say how many particles of which shape there are, and whether the run is whole."""
+        shape, dimension = read_style(self.file)
+        n = self.about.get("n") or self.packing().n
+        return f"{n} {shape}s in {dimension}D"
+
+    def _where(self) -> str:
+        state = "" if self.about.get("finished") else ", not finished"
+        return f"{state}, in {self.file}"
+
+
+class RunFile(Recorded):
+    """A compression in its H5MD file; parameters as of `Recorded`.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> rods = js.Spherocylinders(alpha=4)
+    >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
+    >>> run.phi.shape, len(run), run.packing().n
+    ((401,), 21, 24)
+    >>> round(float(run.phi[-1]), 6), round(run.onset().phi_J, 2)
+    (0.95, 0.7)
+    """
 
     @property
     def kappa(self) -> float:
@@ -140,34 +178,64 @@ class RunFile:
             self.__dict__.pop("about", None)
         return found
 
-    def __len__(self) -> int:
-        """Count the frames."""
-        return count_frames(self.file)
+    def __repr__(self) -> str:
+        end = f"phi = {self.phi[-1]:.5g}, pressure = {self.pressure[-1]:.3g}"
+        return f"<Run of {self._who()} at kappa = {self.kappa:g}: {len(self)} frames to {end}{self._where()}>"
 
-    def packing(self, frame: int = -1) -> MeasuredPacking:
-        """Read a frame, counted from 0, or with negative numbers from the end."""
-        return MeasuredPacking.read(self.file, frame)
 
-    def __iter__(self) -> Iterator[MeasuredPacking]:
-        return map(self.packing, range(len(self)))
+class ShearFile(Recorded):
+    """A shear in its H5MD file; parameters as of `Recorded`.
 
-    def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw its pressure; arguments as `jamshape.plot`."""
-        from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows runs
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> rods = js.Spherocylinders(alpha=4)
+    >>> run = js.shear(rods, n=24, phi=0.6, gdot=1e-2, strain=3, file="shear.h5", progress=False)
+    >>> run
+    <Shear of 24 spherocylinders in 2D at gdot = 0.01, phi = 0.6: 21 frames to strain = 3, pressure = ..., in shear.h5>
+    >>> found = run.steady()
+    >>> found["rotation"].value > 0 and found["S_2"].value > 0
+    True
+    """
 
-        return plot(self, axes)
+    @property
+    def strain(self) -> FloatArray:
+        """(T,) strains of the box since the start."""
+        return self["pure_strain" if self.about["flow"] == "pure" else "shear_strain"]
+
+    @property
+    def gdot(self) -> float:
+        """Rate, [1/time]."""
+        return float(self.about["gdot"])
+
+    def steady(self, after: float | None = None) -> SteadyState:
+        """Average over the steady state, apart from the start-up.
+
+        Parameters
+        ----------
+        after : float, optional
+            Strain from which to average; chosen when left out.
+
+        Returns
+        -------
+        SteadyState
+            Averages by name, each with its error and the strain over which the packing remembers;
+            see `jamshape.measures.steady`.
+
+        Raises
+        ------
+        ValueError
+            If fewer than 8 samples are left.
+        """
+        return steady_state(self.observables, self.strain, after)
 
     def __repr__(self) -> str:
-        shape, dimension = read_style(self.file)
-        end = f"phi = {self.phi[-1]:.5g}, pressure = {self.pressure[-1]:.3g}"
-        state = "" if self.about.get("finished") else ", not finished"
-        n = self.about.get("n") or self.packing().n
-        return (
-            f"<Run of {n} {shape}s in {dimension}D at kappa = {self.kappa:g}: {len(self)} frames to"
-            f" {end}{state}, in {self.file}>"
-        )
+        start = f"gdot = {self.gdot:g}, phi = {self.phi[0]:.5g}"
+        end = f"strain = {self.strain[-1]:.5g}, pressure = {self.pressure[-1]:.3g}"
+        return f"<Shear of {self._who()} at {start}: {len(self)} frames to {end}{self._where()}>"
 
-    def _repr_html_(self) -> str:
-        from jamshape.front.pictures import html  # noqa: PLC0415 - only notebooks ask
 
-        return html(self)
+def run_file(path: Path, folder: Any = None) -> Recorded:
+    """Give a run in its file, of the class that knows what it is a run of."""
+    kind = ShearFile if "gdot" in read_attributes(path) else RunFile
+    return kind(path, folder)

@@ -256,6 +256,11 @@ class Session:
         )
 
     @property
+    def is_tilted(self) -> bool:
+        """Whether the box may tilt (LAMMPS: is triclinic)."""
+        return bool(self.lmp.extract_setting("triclinic"))
+
+    @property
     def step(self) -> int:
         """The current time step."""
         return int(self.lmp.extract_global("ntimestep"))

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.checks import require_positive
-from jamshape.flow.compression import Compression, CompressionRun, Row
+from jamshape.flow.compression import Compression, CompressionRun
+from jamshape.flow.motion import Row
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
 
@@ -92,8 +93,10 @@ class ApproachError(RuntimeError):
 def compressed_start(start: Packing, phi: float) -> Packing:
     """Compress a random packing fast, in LAMMPS, to where slow compressions begin."""
     with Session() as session:
-        fast = Compression(_KAPPA_FAST, phi, _DT_FAST, sides=2)
-        run = CompressionRun(session, fast, start)
+        fast = Compression(kappa=_KAPPA_FAST, phi_end=phi, dt=_DT_FAST, sides=2)
+        # Whole steps that end where they shall.
+        steps = max(1, fast.all_steps(start))
+        run = CompressionRun(session, fast.in_steps(start.phi, steps, start.dimension), start)
         run.advance(run.last_step)
         return run.packing()
 

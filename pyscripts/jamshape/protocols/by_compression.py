@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 from jamshape.files.h5md import count_frames, read_observables, read_packing
 from jamshape.files.journal import remove_run
 from jamshape.flow import recording
-from jamshape.flow.compression import Compression, Row
+from jamshape.flow.compression import Compression
+from jamshape.flow.motion import Row
 from jamshape.flow.recording import Recording
 from jamshape.lammps.session import Session
 from jamshape.landscape import Landscape
@@ -115,7 +116,9 @@ class ByCompression:
 
     def _flow(self) -> Compression:
         """How to compress: two bonds side to side, and an integrator that bounds its error."""
-        flow = Compression(self.way.kappa, self.way.phi_end, sides=2, integrator="rkc2")
+        flow = Compression(
+            kappa=self.way.kappa, phi_end=self.way.phi_end, sides=2, integrator="rkc2"
+        )
         return flow.in_steps(self.recipe.phi_start, _ROWS, self.recipe.dimension)
 
     def _recording(self) -> Recording:

@@ -1,0 +1,66 @@
+"""Shear particles of any shape at a constant rate and packing fraction; record stress and snapshots in one H5MD file.
+
+    jamshape shear --alpha 4 --n 256 --phi 0.8 --gdot 1e-4 --strain 5 --out shear.h5
+
+Starts from a random packing that is compressed fast to --phi, or from the last frame of a run or packing file
+(--start). The last line of standard output is one JSON object with averages over the steady state, each with its
+error and the strain over which the packing remembers (memory); what comes before (startup) is left out of them, but not
+of the file. --after says from which strain on to average. Run again after a kill, it goes on; a finished run is left
+alone, and its averages are told again.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from jamshape.checks import RANGES, require_in
+from jamshape.command import parser_of, report
+from jamshape.flow.shear import FLOWS
+from jamshape.front.shearing import shear
+from jamshape.measures.shears import shear_report
+from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
+
+GO_ON = "the same command goes on from the last restart file"
+
+
+def options_of() -> ArgumentParser:
+    """Make the parser."""
+    parser = parser_of(__doc__)
+    add_particle_options(parser)
+    for name, default, meaning in (
+        ("--n", 256, "particles"),
+        ("--dimension", 2, "2 or 3"),
+        ("--phi", 0.8, "packing fraction"),
+        ("--gdot", 1e-4, "shear rate"),
+        ("--strain", 5.0, "strain to reach"),
+        ("--sides", 2, "bonds of a side-to-side contact"),
+        ("--tolerance", 1e-4, "of rkc2 and heun/adaptive: local error over the typical overlap"),
+        ("--seed", 1, "of the random start"),
+        ("--rows", 1000, "samples of stress and order"),
+        ("--frames", 20, "snapshots"),
+    ):
+        parser.add_argument(
+            name, type=type(default), default=default, help=f"{meaning} ({default})"
+        )
+    parser.add_argument("--flow", choices=FLOWS, default=FLOWS[0], help="(%(default)s)")
+    usual = "rkc2; heun with --dt or --sides 1"
+    parser.add_argument("--integrator", help=f"heun, heun/adaptive or rkc2 ({usual})")
+    parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
+    parser.add_argument("--after", type=float, help="strain from which to average (chosen)")
+    parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
+    parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
+    parser.add_argument("--again", action="store_true", help="begin anew where --out is there")
+    return parser
+
+
+def main(options: Namespace) -> None:
+    """Begin, or go on; a finished run is left alone."""
+    if options.after is not None:
+        require_in("--after", options.after, RANGES["strain"]._replace(also=(0.0,)))
+    names = ("n", "dimension", "phi", "gdot", "strain", "flow", "seed", "start", "sides",
+             "integrator", "dt", "tolerance", "rows", "frames", "again")  # fmt: skip
+    given = {name: getattr(options, name) for name in names}
+    particles = particles_of(options) if are_particles_given(options) or not options.start else None
+    shear(particles, **given, file=options.out)
+    report(shear_report(options.out, options.after))

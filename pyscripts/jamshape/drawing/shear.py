@@ -1,0 +1,39 @@
+"""Stress of a sheared packing against strain, with its start-up and its steady state."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from jamshape.drawing.text import ensemble_text, pressure_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from jamshape.measures.shears import ShearOf
+
+
+def draw_stress(axes: Axes, run: ShearOf) -> None:
+    """Draw pressure and shear stress of a run, and their means where it has become steady."""
+    steady, strain = run.steady, run.strain
+    series = (
+        ("pressure", "C0", run.observables["pressure"], "pressure $p$"),
+        ("shear_stress", "C1", -run.observables["p_xy"], "shear stress $-p_{xy}$"),
+    )
+    for name, color, values, label in series:
+        mean = f", steady ${steady[name].mean.tex}$" if steady else ""
+        axes.plot(strain, values, color=color, lw=0.8, label=f"{label}{mean}")
+        if steady:
+            axes.plot(
+                [steady.startup, steady.strain], [steady[name].value] * 2, "k", lw=1, zorder=3
+            )
+    if steady:
+        axes.axvspan(0, steady.startup, color="0.85", lw=0, label="start-up, left out of means")
+    unit = pressure_unit([run.ensemble.system])
+    axes.set(xlabel=r"strain $\gamma$", ylabel=rf"stress  ${unit}$", xlim=(0, strain[-1]))
+    axes.set_title(title_of(run), size=9)
+    axes.legend(fontsize=8)
+
+
+def title_of(run: ShearOf) -> str:
+    """Write what is sheared, and how."""
+    return f"{ensemble_text(run.ensemble, ('n', 'phi', 'gdot'))}, {run.ensemble.flow} shear"

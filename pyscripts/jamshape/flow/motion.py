@@ -1,0 +1,249 @@
+"""Overdamped motion of particles in a host that flows, driven in LAMMPS: what every flow shares."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+
+from jamshape.checks import require_one_of, require_positive
+from jamshape.packing import Packing
+from jamshape.shapes.shape import Interaction
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from jamshape.lammps.session import Session
+
+# Columns of `compute packing` and elements of `fix overdamped/affine`, as their doc comments list them.
+_PACKING = {
+    "phi": 0, "u": 1, "pressure": 2, "z": 3, "S_2": 4, "S_4": 5, "fmax": 6, "frms": 7,
+    "z_single": 8, "rattlers": 9, "bonds": 10, "overlap": 11, "tmax": 12,
+}  # fmt: skip
+_FLOW = {"strain": 1, "lambda_max": 2, "dt_max": 3, "evaluations": 5, "step_error": 7}
+_SUBSTEPS = {"substeps": 8, "rejected": 9, "forced": 10, "substep": 11, "substep_shortest": 12,
+             "local_error": 13, "stages": 14, "overlap_length": 15}  # fmt: skip
+
+INTEGRATORS = ("heun", "heun/adaptive", "rkc2")
+"""Those that `fix overdamped/affine` knows; all but the first choose their own steps."""
+
+_LONGEST_RUN = 1_000_000_000  # steps in one `run` command, which counts in 32 bits
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion(ABC):
+    """How particles move in a host: what a flow has beside its rate.
+
+    Parameters
+    ----------
+    dt
+        Time step, [time]; an integrator that chooses its own steps divides it as it needs.
+    sides
+        Bonds of a side-to-side contact, 1 or 2.
+    k_e, k_d
+        Stiffness [energy] and drag [energy time / length^(D + 2)].
+    integrator
+        One of `INTEGRATORS`.
+    tolerance
+        Of those that choose their own steps: local error over the typical overlap.
+
+    Raises
+    ------
+    ValueError
+        If a step, stiffness, drag or tolerance is not positive, `sides` neither 1 nor 2, or there is no
+        such integrator.
+    """
+
+    dt: float = 0.05
+    sides: int = 1
+    k_e: float = 1.0
+    k_d: float = 1.0
+    integrator: str = "heun"
+    tolerance: float = 1e-4
+
+    of_packing: ClassVar[Mapping[str, int]] = _PACKING
+    """Observables, and where `compute packing` has them."""
+    of_fix: ClassVar[Mapping[str, int]] = _FLOW
+    """The same of `fix overdamped/affine`."""
+    tilts: ClassVar[bool] = False
+    """Whether the box does."""
+    name: ClassVar[str] = "flow"
+    """What it is called in sentences."""
+
+    def __post_init__(self) -> None:
+        require_positive(
+            **{name: getattr(self, name) for name in ("dt", "k_e", "k_d", "tolerance")}
+        )
+        require_one_of("sides", self.sides, (1, 2))
+        # It is a word of LAMMPS's input, and may come from a file.
+        require_one_of("integrator", self.integrator, INTEGRATORS)
+
+    @property
+    def chooses_steps(self) -> bool:
+        """Whether the integrator divides the time step as accuracy asks."""
+        return self.integrator != "heun"
+
+    @property
+    @abstractmethod
+    def gradient(self) -> str:
+        """The flow in the words of `fix overdamped/affine`."""
+
+    @abstractmethod
+    def all_steps(self, start: Packing) -> int:
+        """Count the time steps from a packing to the end."""
+
+    @abstractmethod
+    def steps_left(self, found: Mapping[str, float], dimension: int) -> int:
+        """Count those from where observables were found to the end.
+
+        Raises
+        ------
+        ValueError
+            If the end lies behind.
+        """
+
+    @abstractmethod
+    def where(self, found: Mapping[str, float]) -> str:
+        """Say where it is, and where it ends."""
+
+    @abstractmethod
+    def part(self, found: Mapping[str, float], phi_start: float) -> float:
+        """Give the part that is done where observables were found, from 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a run: where it is and what it measures."""
+
+    step: int
+    time: float
+    wall_seconds: float
+    observables: dict[str, float]
+
+
+_Motion = TypeVar("_Motion", bound=Motion)
+
+
+class FlowRun(Generic[_Motion]):
+    """A flow in a LAMMPS session, from a packing or from a restart file.
+
+    Parameters
+    ----------
+    session
+        A fresh one.
+    settings
+    start
+        The state to begin with; of an earlier run, any state of it.
+    restart
+        Restart file of an earlier run, to go on from.
+    time
+        Of that state; step times time step when left out.
+
+    Raises
+    ------
+    ValueError
+        If the end lies behind the state.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        settings: _Motion,
+        start: Packing,
+        restart: str | Path | None = None,
+        time: float | None = None,
+    ) -> None:
+        self.session, self.settings = session, settings
+        self._began = perf_counter()
+        self._time, self._step_of_time, self._evaluations = 0.0, 0, 0.0
+        if restart is None:
+            session.load(start)
+        else:
+            session.load_restart(restart, start)
+        self._set_up()
+        self.last_step = session.step + settings.steps_left(self.measure(), start.dimension)
+        if time is not None:
+            self._time, self._step_of_time = time, session.step
+
+    def _set_up(self) -> None:
+        s = self.settings
+        self.session.interact(Interaction(s.k_e, s.sides))
+        # That of a restart file tilts if it did.
+        tilt = "change_box all triclinic" if s.tilts and not self.session.is_tilted else ""
+        self.session.commands(f"""
+            {tilt}
+            {self.session.neighbours()}
+            {self._fix()}
+            timestep {s.dt!r}
+            compute packing all packing
+            thermo_style custom step c_packing[1]
+            thermo_modify norm no lost error
+            run 0 post no
+        """)
+
+    def _fix(self) -> str:
+        s = self.settings
+        return (
+            f"fix flow all overdamped/affine drag {s.k_d!r} {s.gradient}"
+            f" integrator {s.integrator}"
+            f"{f' tolerance {s.tolerance!r}' if s.chooses_steps else ''}"
+        )
+
+    def change(self, **changes: Any) -> None:
+        """Go on with another rate or time step, by their names in the settings."""
+        self._time, self._step_of_time = self.time, self.session.step
+        self._evaluations = self.measure()["evaluations"]
+        self.settings = dataclasses.replace(self.settings, **changes)
+        self.session.commands(
+            f"unfix flow\n{self._fix()}\ntimestep {self.settings.dt!r}\nrun 0 post no"
+        )
+
+    def count_from(self, evaluations: float) -> None:
+        """Go on counting evaluations of the forces from those of an earlier process."""
+        self._evaluations = evaluations
+
+    @property
+    def time(self) -> float:
+        """Since the start, also if the time step has changed."""
+        return self._time + (self.session.step - self._step_of_time) * self.settings.dt
+
+    def write_restart(self, path: Path) -> None:
+        """Write a LAMMPS restart file of the present state; errors as `Session.write_restart`."""
+        self.session.write_restart(path)
+        # That moves atoms into the box and orders them anew, which neighbour lists must follow.
+        self.session.commands("run 0 post no")
+
+    def samples(self, every: int) -> Iterator[Row]:
+        """Run to the end and yield a row at each multiple of `every` steps, and at the end."""
+        while self.session.step < self.last_step:
+            self.advance(min(self.last_step, (self.session.step // every + 1) * every))
+            yield self.sample()
+
+    def advance(self, step: int) -> None:
+        """Run to `step`."""
+        while self.session.step < step:
+            steps = min(step - self.session.step, _LONGEST_RUN)
+            self.session.commands(f"run {steps} pre no post no")
+
+    def sample(self) -> Row:
+        """Measure the present state."""
+        step = self.session.step
+        wall = perf_counter() - self._began
+        return Row(step, self.time, wall, self.measure())
+
+    def measure(self) -> dict[str, float]:
+        """Return observables of the present state, named as in `compute packing`."""
+        lmp = self.session.lmp
+        values = lmp.extract_compute("packing", 0, 1)
+        found = {name: float(values[k]) for name, k in self.settings.of_packing.items()}
+        flow = dict(self.settings.of_fix) | (_SUBSTEPS if self.settings.chooses_steps else {})
+        found |= {name: float(lmp.extract_fix("flow", 0, 1, k)) for name, k in flow.items()}
+        found["evaluations"] += self._evaluations
+        return found
+
+    def packing(self) -> Packing:
+        """Return the present state, sorted by ID."""
+        return self.session.packing(self.time)

@@ -1,0 +1,120 @@
+"""Shear at a constant rate and packing fraction, driven in LAMMPS (Marschall, Keta, Olsson & Teitel 2019)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from jamshape.checks import MOST_STEPS, require_one_of, require_positive
+from jamshape.flow.motion import FlowRun, Motion
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from jamshape.packing import Packing
+
+_WORDS = {"simple": "shear", "pure": "pure"}
+
+FLOWS = tuple(_WORDS)
+"""Simple shear, u_x = gdot y, and pure shear, which stretches x and shrinks y."""
+
+# In one time step, the box may shear by so much: neighbours pass each other in steps.
+_LARGEST_STRAIN = 0.01
+
+_STRAINS = {"simple": "shear_strain", "pure": "pure_strain"}
+
+
+@dataclass(frozen=True)
+class Shear(Motion):
+    """How to shear.
+
+    Parameters
+    ----------
+    gdot
+        Rate, [1/time]: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
+    strain_end
+        Strain to reach, the rate times the time since the start.
+    flow
+        One of `FLOWS`.
+
+    Others as of `Motion`.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive, there is no such flow, the box would shear by more than 0.01 in a
+        time step, or as `Motion`.
+    """
+
+    gdot: float = 1e-4
+    strain_end: float = 5.0
+    flow: str = "simple"
+
+    of_packing: ClassVar[Mapping[str, int]] = dict(Motion.of_packing) | {
+        "normal_difference": 14, "p_xy": 15, "sigma": 16, "mu": 17, "director": 21,
+    }  # fmt: skip
+    of_fix: ClassVar[Mapping[str, int]] = dict(Motion.of_fix) | {
+        "shear_strain": 16, "pure_strain": 17, "turned": 18,
+    }  # fmt: skip
+    tilts: ClassVar[bool] = True
+    name: ClassVar[str] = "shear"
+
+    def __post_init__(self) -> None:
+        require_positive(gdot=self.gdot, strain_end=self.strain_end)
+        require_one_of("flow", self.flow, FLOWS)
+        super().__post_init__()
+        if self.gdot * self.dt > _LARGEST_STRAIN * (1 + 1e-9):
+            msg = (
+                f"gdot = {self.gdot:g} and dt = {self.dt:g} shear by {self.gdot * self.dt:g} in a step,"
+                f" expected at most {_LARGEST_STRAIN:g}; take a smaller time step"
+            )
+            raise ValueError(msg)
+
+    @property
+    def gradient(self) -> str:
+        """The flow in the words of `fix overdamped/affine`."""
+        return f"{_WORDS[self.flow]} {self.gdot!r}"
+
+    def in_steps(self, rows: int) -> Shear:
+        """Return the same with a time step that goes from row to row, or a whole part of that."""
+        steps = rows * math.ceil(self.strain_end / (rows * _LARGEST_STRAIN))
+        return dataclasses.replace(self, dt=self.strain_end / (self.gdot * steps))
+
+    def all_steps(self, start: Packing) -> int:
+        """Count the time steps from a packing to the end."""
+        del start
+        return self._steps(self.strain_end)
+
+    def steps_left(self, found: Mapping[str, float], dimension: int) -> int:
+        """Count those from where observables were found to the end."""
+        del dimension
+        return self._steps(self.strain_end - self.strained(found))
+
+    def strained(self, found: Mapping[str, float]) -> float:
+        """Look the strain up among observables."""
+        return found[_STRAINS[self.flow]]
+
+    def where(self, found: Mapping[str, float]) -> str:
+        """Say where it is, and where it ends."""
+        strain = f"strain {self.strained(found):.4f} of {self.strain_end:g}"
+        return f"{strain}, shear stress {-found['p_xy']:.2e}"
+
+    def part(self, found: Mapping[str, float], phi_start: float) -> float:
+        """Give the part of the whole strain that is done."""
+        del phi_start
+        return min(1.0, self.strained(found) / self.strain_end)
+
+    def _steps(self, strain: float) -> int:
+        if strain > MOST_STEPS * self.gdot * self.dt:
+            msg = (
+                f"gdot = {self.gdot:g} and dt = {self.dt:g} take more than {MOST_STEPS:g} steps to a strain"
+                f" of {self.strain_end:g}, expected a larger rate or time step"
+            )
+            raise ValueError(msg)
+        return max(0, math.ceil(strain / (self.gdot * self.dt) - 1e-6))
+
+
+ShearRun = FlowRun[Shear]
+"""A shear in a LAMMPS session."""

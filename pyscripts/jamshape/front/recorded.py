@@ -1,0 +1,96 @@
+"""Runs in files: recorded as they go, and gone on with after they were cut off, whatever their flow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+from jamshape.checks import require_path_for_lammps
+from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
+from jamshape.flow import recording, slow_recording
+from jamshape.flow.implicit import Step
+from jamshape.flow.motion import FlowRun, Motion, Row
+from jamshape.flow.recording import Recording
+from jamshape.front.progress import Told, follow
+from jamshape.front.run import Recorded, run_file
+from jamshape.lammps.session import Session
+
+
+def resume(file: str | Path, *, progress: bool = True) -> Recorded:
+    """Go on with a run that was cut off, as it was set; a finished one is loaded.
+
+    Parameters
+    ----------
+    file : path
+        Of a run of `compress`, `slow_compress` or `shear`.
+    progress : bool
+        Whether a bar on standard error says how far it is.
+
+    Returns
+    -------
+    RunFile or ShearFile
+
+    Raises
+    ------
+    FileFormatError, OSError
+        If it is no such file, or not to be read.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> rods = js.Spherocylinders(alpha=4)
+    >>> run = js.compress(rods, n=24, phi=(0.4, 0.95), kappa=1e-3, file="run.h5", progress=False)
+    >>> js.resume("run.h5").about["finished"]
+    True
+    """
+    path = Path(file)
+    stored = read_attributes(path)
+    if not ({"rows", "frames"} <= stored.keys() or "flow_steps" in stored):
+        msg = f"{path} holds no run, expected a file of compress, slow_compress or shear"
+        raise FileFormatError(msg)
+    if not stored.get("finished"):
+        if "flow_steps" in stored:
+            _record_slowly(path, progress)
+        else:
+            require_path_for_lammps(path)
+            to = Recording(path, stored["rows"], stored["frames"])
+            record_flow(lambda session: recording.resume(session, path)[0], to, progress)
+    recording.tidy(path)
+    return run_file(path)
+
+
+def record_flow(start: Callable[[Session], FlowRun[Motion]], to: Recording, progress: bool) -> None:
+    """Run to the end in LAMMPS; `start` makes the run in a session."""
+    with Session() as session:
+        run = start(session)
+        told = _told(run.settings, float(read_attributes(to.path)["phi_start"]))
+        begun = told(run.sample()).part
+        follow(recording.record(run, to), told, shown=progress, begun=begun or 0.0)
+
+
+def _told(settings: Motion, phi_start: float) -> Callable[[Row], Told]:
+    """Return what says how far a run is: the strain that is done of the whole one."""
+
+    def told(row: Row) -> Told:
+        found = row.observables
+        text = f"{settings.where(found)}, pressure {found['pressure']:.2e}"
+        return Told(settings.name, text, settings.part(found, phi_start))
+
+    return told
+
+
+def _record_slowly(path: Path, progress: bool) -> None:
+    stored = read_attributes(path)
+    first, end = float(stored["phi_start"]), float(stored["phi_end"])
+    until = f" or {stored['p_end']:.3g}" if math.isfinite(stored["p_end"]) else ""
+
+    def part_at(phi: float) -> float:
+        return min(1.0, (phi - first) / (end - first))
+
+    def told(step: Step) -> Told:
+        where = f"phi {step.phi:.6f} of {end:g}, pressure {step.pressure:.3e}{until}"
+        return Told("slow compression", f"{where}, step {step.dt:.1e}", part_at(step.phi))
+
+    begun = part_at(read_packing(path).phi)
+    follow(slow_recording.record(path), told, shown=progress, begun=begun)

@@ -1,0 +1,165 @@
+"""Shear at a constant rate, in LAMMPS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jamshape.checks import (
+    RANGES,
+    require_in,
+    require_one_of,
+    require_path_for_lammps,
+    require_stated,
+)
+from jamshape.flow import recording
+from jamshape.flow.recording import Recording
+from jamshape.flow.shear import FLOWS, Shear
+from jamshape.front.progress import place
+from jamshape.front.recorded import record_flow, resume
+from jamshape.front.run import ShearFile
+from jamshape.front.starts import start_of, told_of
+from jamshape.packing import Packing
+from jamshape.protocols.approach import compressed_start
+from jamshape.protocols.random_start import random_packing
+from jamshape.shapes.particles import Particles
+
+if TYPE_CHECKING:
+    from jamshape.front.packing import MeasuredPacking
+
+# Random starts are no denser: they are compressed from there.
+_PHI_RANDOM = 0.4
+
+
+def shear(
+    particles: Particles | None = None,
+    *,
+    n: int = 256,
+    dimension: int = 2,
+    phi: float = 0.8,
+    gdot: float = 1e-4,
+    strain: float = 5.0,
+    flow: str = "simple",
+    seed: int = 1,
+    start: Packing | str | Path | None = None,
+    sides: int = 2,
+    integrator: str | None = None,
+    dt: float | None = None,
+    tolerance: float = 1e-4,
+    rows: int = 1000,
+    frames: int = 20,
+    file: str | Path | None = None,
+    again: bool = False,
+    progress: bool = True,
+) -> ShearFile:
+    """Shear particles at a constant rate and packing fraction in LAMMPS, as Marschall, Keta, Olsson & Teitel 2019.
+
+    Parameters
+    ----------
+    particles : Particles
+        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+    n : int
+        Number of particles.
+    dimension : {2, 3}
+    phi : float
+        Packing fraction, to which a random packing is compressed fast.
+    gdot : float, [1/time]
+        Rate: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
+    strain : float
+        Strain to reach, the rate times the time.
+    flow : {"simple", "pure"}
+    seed : int
+        Of the random start.
+    start : Packing or path, optional
+        What to begin with, at its own packing fraction; of a path, its last frame.
+    sides : {1, 2}
+        Bonds of a side-to-side contact of rods.
+    integrator : {"rkc2", "heun/adaptive", "heun"}, optional
+        As of `compress`.
+    dt : float, [time], optional
+        Time step of ``heun``; 0.05 when left out.
+    tolerance : float
+        Of the others: local error of a step over the typical overlap.
+    rows, frames : int
+        How many samples of stress and order and how many snapshots to keep.
+    file : path, optional
+        H5MD file of the run, as of `compress`: a finished run of these settings is loaded from it, and one
+        that was cut off goes on.
+    again : bool
+        Begin anew, whatever the file holds.
+    progress : bool
+        Whether a bar on standard error says how far it is.
+
+    Returns
+    -------
+    ShearFile
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, the file holds another run, or neither particles nor a start
+        is given.
+    PluginError
+        If there is no LAMMPS or no plugin for it.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> discs = js.Spherocylinders(alpha=0)
+    >>> run = js.shear(discs, n=24, phi=0.8, gdot=1e-2, strain=4, file="discs.h5", progress=False)
+    >>> found = run.steady()
+    >>> found.startup < 2 and 0 < found["mu"].value < 1
+    True
+    """
+    require_stated(n=n, phi=phi, gdot=gdot, strain=strain, seed=seed, tolerance=tolerance)
+    require_stated(rows=rows, frames=frames)
+    require_one_of("dimension", dimension, (2, 3))
+    require_one_of("flow", flow, FLOWS)
+    if flow == "pure":
+        require_in("strain", strain, RANGES["pure_strain"])
+    if dt is not None:
+        require_stated(dt=dt)
+    integrator = integrator or ("rkc2" if dt is None and sides == 2 else "heun")
+    settings = Shear(
+        gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
+        sides=sides, integrator=integrator, tolerance=tolerance,
+    )  # fmt: skip
+    if settings.chooses_steps:
+        settings = settings.in_steps(rows)
+    at = place(file, "shear.h5")
+    require_path_for_lammps(at.path)  # restart files lie beside it
+    known = start_of(start) if start is not None else None
+    made_from = _made_from(particles, (n, phi, seed), known)
+    to = Recording(at.path, rows, frames, made_from)
+    if again or not at.path.exists():
+        first = known or _random_start(particles, (n, phi, seed), dimension)
+        settings.all_steps(first)  # refuses what does not end
+        record_flow(lambda session: recording.begin(session, settings, first, to), to, progress)
+    else:
+        recording.require_same(to, settings, known.dimension if known else dimension)
+        resume(at.path, progress=progress)
+    return ShearFile(*at)
+
+
+def _made_from(
+    particles: Particles | None,
+    numbers: tuple[int, float, int],
+    start: MeasuredPacking | None,
+) -> dict[str, Any]:
+    """Tell what a run is of: a start, or particles with n, phi and a seed."""
+    if start is not None:
+        return told_of(start)
+    if particles is None:
+        msg = "there are neither particles nor a start, expected one of them"
+        raise ValueError(msg)
+    n, phi, seed = numbers
+    return dict(particles.told) | {"n": n, "phi_sheared": phi, "seed": seed}
+
+
+def _random_start(
+    particles: Particles | None, numbers: tuple[int, float, int], dimension: int
+) -> Packing:
+    assert particles is not None
+    n, phi, seed = numbers
+    random = random_packing(n, min(phi, _PHI_RANDOM), seed, particles, dimension)
+    return random if phi <= _PHI_RANDOM else compressed_start(random, phi)

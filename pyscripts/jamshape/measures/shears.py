@@ -1,0 +1,87 @@
+"""Shears in files: stress against strain and steady states, grouped by what they are samples of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.files.h5md import read_observables
+from jamshape.files.sets import PackingFile, System
+from jamshape.measures.steady import SteadyState, steady_state
+
+
+class Sheared(NamedTuple):
+    """What shears that differ in their seed only have in common."""
+
+    system: System
+    n: int
+    size_ratio: float
+    """1 where it is not told."""
+    phi: float
+    gdot: float
+    flow: str
+
+    def report(self) -> dict[str, Any]:
+        """Name it in JSON."""
+        own = {name: getattr(self, name) for name in ("n", "size_ratio", "phi", "gdot", "flow")}
+        return self.system.report() | own
+
+
+class ShearOf(NamedTuple):
+    """A shear and its steady state, or the sentence that says why there is none."""
+
+    path: Path
+    ensemble: Sheared
+    seed: int
+    strain: FloatArray
+    observables: dict[str, FloatArray]
+    steady: SteadyState | None
+    problem: str = ""
+
+    def number(self, name: str) -> float:
+        """Look up an average over the steady state; NaN where there is none."""
+        return self.steady[name].value if self.steady and name in self.steady.averages else np.nan
+
+
+def strain_of(observables: dict[str, FloatArray], flow: str) -> FloatArray:
+    """(T,) strains of a run since its start."""
+    return np.asarray(observables["pure_strain" if flow == "pure" else "shear_strain"], np.float64)
+
+
+def read_shear(path: Path, after: float | None = None) -> ShearOf:
+    """Read a shear and average over its steady state, from a strain on or as `steady_state` chooses.
+
+    Raises
+    ------
+    ValueError
+        If the file holds none.
+    """
+    file = PackingFile.read(path)
+    known = file.attributes
+    if "gdot" not in known:
+        msg = f"{path}: holds no shear at a rate, expected a run of shear.py"
+        raise ValueError(msg)
+    found = {name: np.asarray(x, np.float64) for name, x in read_observables(path).items()}
+    phi, flow = round(float(found["phi"][0]), 9), str(known["flow"])
+    ensemble = Sheared(
+        file.system(), int(known["n"]), float(known.get("size_ratio", 1.0)), phi,
+        float(known["gdot"]), flow,
+    )  # fmt: skip
+    strain = strain_of(found, flow)
+    run = ShearOf(path, ensemble, int(known.get("seed", 0)), strain, found, None)
+    try:
+        return run._replace(steady=steady_state(found, strain, after))
+    except ValueError as error:  # too short
+        return run._replace(problem=f"{path}: {error}")
+
+
+def shear_report(path: Path, after: float | None = None) -> dict[str, Any]:
+    """Summarise a shear: its end, and averages over its steady state."""
+    run = read_shear(path, after)
+    found: dict[str, Any] = {"out": str(path), "phi": run.ensemble.phi, "gdot": run.ensemble.gdot}
+    found["strain"] = float(run.strain[-1])
+    steady = run.steady.report() if run.steady else {"steady": run.problem}
+    return found | steady

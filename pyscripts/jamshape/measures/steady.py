@@ -1,0 +1,223 @@
+"""Averages over the steady state of a sheared packing: where it begins, and errors that know its memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.measures.averages import Mean
+
+# Where the start-up may end, in parts of a run: so many places up to half of it are tried.
+_TRIED, _LATEST = 16, 0.5
+
+# Series shorter than this have no error that means anything.
+_FEWEST = 8
+
+# What tells where the steady state begins.
+_SLOW = ("pressure", "shear_stress", "S_2_x", "S_2_y")
+
+
+class SteadyMean(NamedTuple):
+    """An average over a steady state."""
+
+    value: float
+    error: float
+    """Standard error, of blocks longer than the memory."""
+    memory: float
+    """Strain over which samples count once: twice the integral of their autocorrelation."""
+    independent: float
+    """How many such strains the average is over."""
+
+    @property
+    def mean(self) -> Mean:
+        """The value with its error, as figures show it."""
+        return Mean(self.value, self.error, max(1, round(self.independent)))
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """What a sheared packing is like once it has forgotten its start.
+
+    Parameters
+    ----------
+    startup
+        Strain before which nothing is averaged.
+    strain
+        Strain at the end.
+    averages
+        By name: ``pressure``, ``sigma``, ``mu``, ``shear_stress`` (-p_xy), ``normal_difference``
+        (p_xx - p_yy), ``z``, and where particles are not round ``S_2`` and ``rotation`` (-dtheta/dgamma); ``sigma``
+        and ``S_2`` are those of the mean tensors, so that fluctuations of few particles do not add to them.
+    director
+        Angle of the mean nematic director to x, from -pi/2 to pi/2.
+    """
+
+    startup: float
+    strain: float
+    averages: Mapping[str, SteadyMean]
+    director: float
+
+    def __getitem__(self, name: str) -> SteadyMean:
+        """Look up an average by its name."""
+        return self.averages[name]
+
+    def report(self) -> dict[str, Any]:
+        """Return all of it by name, for JSON and attributes of files."""
+        found: dict[str, Any] = {"startup": self.startup, "director": self.director}
+        for name, one in self.averages.items():
+            parts = ("", "_error", "_memory", "_independent")
+            found |= {f"{name}{part}": value for part, value in zip(parts, one, strict=True)}
+        return found
+
+
+class Blocks(NamedTuple):
+    """The mean of a series whose samples know of each other."""
+
+    mean: float
+    error: float
+    inefficiency: float
+    """So many samples count for one."""
+
+
+def block_average(values: FloatArray) -> Blocks:
+    """Average a series, with an error from blocks that are long enough.
+
+    Neighbours are averaged in pairs again and again (Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989)); of
+    the errors that these blocks tell the first one is taken with B^3 > 2 n g^2, of B samples a block and the inefficiency g
+    that they tell (Lee et al., Phys. Rev. E 83, 066706 (2011)), and where no blocks are so long, the largest one.
+
+    Parameters
+    ----------
+    values : (T,) array of float64
+
+    Returns
+    -------
+    Blocks
+        With an error of NaN where there are fewer than 8 values.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> noise = np.random.default_rng(1).normal(size=4096)
+    >>> found = block_average(noise)
+    >>> round(found.error * 64, 1), round(found.inefficiency, 1)
+    (1.0, 1.0)
+    """
+    n, mean = len(values), float(np.mean(values)) if len(values) else math.nan
+    if n < _FEWEST:
+        return Blocks(mean, math.nan, math.nan)
+    first = _error(values)
+    if first == 0:
+        return Blocks(mean, 0.0, 1.0)
+    largest, length, blocks = first, 1, values
+    while len(blocks) >= _FEWEST:
+        error = _error(blocks)
+        largest = max(largest, error)
+        if length**3 > 2 * n * (error / first) ** 4:
+            return Blocks(mean, error, (error / first) ** 2)
+        even = len(blocks) // 2 * 2
+        blocks = blocks[len(blocks) - even :].reshape(-1, 2).mean(axis=1)
+        length *= 2
+    return Blocks(mean, largest, (largest / first) ** 2)
+
+
+def steady_state(
+    observables: Mapping[str, FloatArray], strain: FloatArray, after: float | None = None
+) -> SteadyState:
+    """Average over the steady state of a shear.
+
+    Parameters
+    ----------
+    observables
+        (T,) arrays by name, as a run of `jamshape.flow.shear` has them.
+    strain : (T,) array of float64
+        Equally spaced.
+    after : float, optional
+        Strain from which to average. When left out it is chosen so that as many independent samples as can be
+        are left of the slowest of pressure, shear stress and order (Chodera, J. Chem. Theory Comput. 12, 1799 (2016)).
+
+    Returns
+    -------
+    SteadyState
+
+    Raises
+    ------
+    ValueError
+        If fewer than 8 samples are left.
+    """
+    series = _series_of(observables, strain)
+    first = _begin(series) if after is None else int(np.searchsorted(strain, after))
+    left = len(strain) - 1 - first
+    if left < _FEWEST:
+        msg = (
+            f"{max(left, 0)} samples were found after a strain of {strain[min(first, len(strain) - 1)]:.4g}, expected"
+            f" {_FEWEST} or more; shear further, or average from an earlier strain on"
+        )
+        raise ValueError(msg)
+    part = {name: values[first:] for name, values in series.items()}
+    apart = float(strain[-1] - strain[first]) / left
+    averages = {name: _averaged(values, apart) for name, values in _projected(part).items()}
+    director = 0.5 * math.atan2(part["S_2_y"].mean(), part["S_2_x"].mean())
+    return SteadyState(float(strain[first]), float(strain[-1]), averages, director)
+
+
+def _series_of(observables: Mapping[str, FloatArray], strain: FloatArray) -> dict[str, FloatArray]:
+    """Pick (T - 1,) series, all of the ends of the strains between two samples."""
+    found = {name: np.asarray(observables[name], np.float64)[1:]
+             for name in ("pressure", "p_xy", "normal_difference", "z", "S_2", "director")}  # fmt: skip
+    director, order = found.pop("director"), found.pop("S_2")
+    turned = np.diff(np.asarray(observables["turned"], np.float64))
+    return found | {
+        "shear_stress": -found.pop("p_xy"),
+        "S_2_x": order * np.cos(2 * director),
+        "S_2_y": order * np.sin(2 * director),
+        "rotation": -turned / np.diff(strain),
+    }
+
+
+def _begin(series: Mapping[str, FloatArray]) -> int:
+    """Choose the sample at which the slowest of them has become steady."""
+    n = len(series["pressure"])
+    tried = np.unique(np.linspace(0, _LATEST * n, _TRIED).astype(int))
+
+    def begin_of(values: FloatArray) -> int:
+        left = [(n - k) / block_average(values[k:]).inefficiency for k in tried]
+        return int(tried[int(np.nanargmax(left))]) if np.isfinite(left).any() else 0
+
+    return max(begin_of(series[name]) for name in _SLOW)
+
+
+def _projected(part: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Turn tensors into their components along the axes of their means."""
+    half, stress = part["normal_difference"] / 2, part["shear_stress"]
+    sigma, pressure = _along_mean(half, stress), part["pressure"]
+    found = {name: part[name] for name in ("pressure", "shear_stress", "normal_difference", "z")}
+    found["sigma"] = sigma
+    if part["rotation"].any():  # that of round particles is left out
+        found |= {"rotation": part["rotation"], "S_2": _along_mean(part["S_2_x"], part["S_2_y"])}
+    if pressure.mean() > 0:
+        # The ratio of means, whose error is that of what is left of sigma - mu p.
+        mu = sigma.mean() / pressure.mean()
+        found["mu"] = mu + (sigma - mu * pressure) / pressure.mean()
+    return found
+
+
+def _along_mean(x: FloatArray, y: FloatArray) -> FloatArray:
+    """(T,) components of vectors along their mean."""
+    size = math.hypot(x.mean(), y.mean())
+    return (x * x.mean() + y * y.mean()) / size if size > 0 else np.zeros_like(x)
+
+
+def _averaged(values: FloatArray, apart: float) -> SteadyMean:
+    found = block_average(values)
+    memory = found.inefficiency * apart
+    return SteadyMean(found.mean, found.error, memory, len(values) / found.inefficiency)
+
+
+def _error(values: FloatArray) -> float:
+    return float(np.std(values, ddof=1) / math.sqrt(len(values)))

@@ -1,0 +1,19 @@
+"""Shear particles of any shape at a constant rate; record stress, order and snapshots in one H5MD file.
+
+    python pyscripts/shear.py --alpha 4 --n 256 --phi 0.8 --gdot 1e-4 --strain 5 --out shear.h5
+
+The same as ``jamshape shear``; --help tells the options.
+"""
+
+import sys
+
+try:
+    from jamshape.commands import start
+except ImportError as error:
+    sys.exit(
+        f"shear.py: {error} in {sys.executable}, expected a Python with jamshape;"
+        " run ./run setup in the repository, then use .venv/bin/python"
+    )
+
+if __name__ == "__main__":
+    start("shear")
