@@ -19,6 +19,7 @@ from jamshape.files.lammps_text import read_data
 from jamshape.flow.compression import Compression
 from jamshape.flow.implicit import Protocol
 from jamshape.flow.recording import Recording
+from jamshape.flow.shear import Shear
 from jamshape.minima.target import Target
 from jamshape.packing import Box
 from jamshape.protocols.approach import Approach
@@ -30,6 +31,10 @@ from jamshape.shapes.table import SHAPES
 
 NAN = math.nan
 RODS = js.Spherocylinders(alpha=1)
+
+
+def shear(**options):
+    return lambda: js.shear(RODS, **({"n": 8, "file": "new.h5", "progress": False} | options))
 
 
 def compress(**options):
@@ -59,6 +64,7 @@ def packing(**changes):
 def cases():
     of_classes = {
         Compression: ("kappa", "dt", "phi_end", "k_e", "k_d", "tolerance"),
+        Shear: ("gdot", "strain_end", "dt", "k_e", "k_d", "tolerance"),
         Protocol: ("kappa", "phi_end", "tolerance", "k_d", "largest_strain"),
         Approach: ("kappa", "p_end", "dt"),
         Quasistatic: ("step", "energy"),
@@ -91,6 +97,17 @@ def cases():
         "compress file": compress(file="start.h5"),
         "compress dollar": compress(file="$HOME.h5"),
         "compress newline": compress(file="a\nshell touch X"),
+        "shear gdot": shear(gdot=0.0),
+        "shear rate": shear(gdot=1.0),
+        "shear flow": shear(flow="complex"),
+        "shear strain": shear(strain=-1.0),
+        "shear too far": shear(flow="pure", strain=5.0),
+        "shear long step": shear(gdot=0.05, dt=1.0),
+        "shear phi": shear(phi=NAN),
+        "shear file": shear(file="start.h5"),
+        "shear run": shear(file="run.h5"),
+        "shear start": shear(start="none.h5"),
+        "shear no particles": lambda: js.shear(file="new.h5", progress=False),
         "make kappa": make(way="dynamics", kappa=-1.0),
         "make dimension": make(dimension=0),
         "make protocol": make(protocol=3),

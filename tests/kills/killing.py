@@ -35,7 +35,7 @@ CLOCKS = {"wall_seconds", "flow_wall_seconds"}
 OF_THE_PROCESS = ("report/",)
 
 _SECONDS = 120
-_COMMANDS = ("compress", "pack", "slow", "sweep", "modes", "draw", "export", "initial")
+_COMMANDS = ("compress", "pack", "slow", "shear", "sweep", "modes", "draw", "export", "initial")
 _PRELOADED = [
     *(f"jamshape.commands.{name}" for name in _COMMANDS),
     "matplotlib.figure",

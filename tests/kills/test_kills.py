@@ -128,6 +128,10 @@ CASES = {
         ("slow.h5",),
         patches=(("jamshape.flow.slow_recording.STEPS_PER_FRAME", 20),),
     ),
+    "shear": Case(
+        ("shear", *RODS, "--phi", 0.7, "--gdot", 1e-3, "--strain", 0.5, "--rows", 100),
+        ("shear.h5",),
+    ),
     "sweep": Case(
         ("sweep", "--alpha", 0, 1, *DYNAMICS[2:], "--samples", 1, "--jobs", 2),
         tuple(f"alpha{alpha}_seed1.h5" for alpha in (0, 1)),

@@ -29,7 +29,8 @@ from jamshape.vibration.sets import TOLD, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
 _STATE = ("phi", "pressure", "u", "z", "rattlers")
-_MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "outcome")
+_MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",
+         "flow", "strain_end", "outcome")  # fmt: skip
 
 
 class _Stored(NamedTuple):
@@ -42,15 +43,17 @@ class _Stored(NamedTuple):
     """Where it is not finished."""
 
 
+_SAME_COMMAND = "start the command that began it again"
 _OTHER_COMMAND = "start the command that makes {result} again, which goes on from this file"
 
 # The first that fits.
 _STORED = (
     _Stored("search for an energy", "search_step", _OTHER_COMMAND),
     _Stored("steps on the way to a packing", "loose_phi", _OTHER_COMMAND),
-    _Stored("slow run", "flow_steps", "start the command that began it again"),
+    _Stored("slow run", "flow_steps", _SAME_COMMAND),
     _Stored("compression on the way to a packing", "restart_step", _OTHER_COMMAND),
     _Stored("compression on the way to a packing", "of_packing", _OTHER_COMMAND),
+    _Stored("shear", "gdot", _SAME_COMMAND),
     _Stored("run", "finished", "jamshape compress --resume --out {path}"),
     _Stored("packing", "", ""),
 )
@@ -217,7 +220,8 @@ def _restart(path: Path) -> dict[str, Any]:
     known = {"lammps": entries[0], "step": entries[6], "dimension": entries[7]}
     go_on = f"lmp -in DECK -var restart {path}, with all other settings as before"
     if path.suffix in {".a", ".b"} and (run := path.with_suffix("").with_suffix("")).exists():
-        go_on = f"jamshape compress --resume --out {run}"
+        stored = next(one for one in _STORED if not one.mark or one.mark in read_attributes(run))
+        go_on = stored.go_on.format(path=run, result=_result_of(run))
     return {"kind": "LAMMPS restart file", **known, "finished": False, "go_on": go_on}
 
 

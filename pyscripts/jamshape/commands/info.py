@@ -34,6 +34,8 @@ _LINES = {
         "protocol {protocol}",
         "phi from {phi_start:g}",
         "to {phi_end:g}",
+        "{flow} shear at gdot {gdot:g}",
+        "to strain {strain_end:g}",
     ),
     "modes": ("{modes} of {n_modes}", "{bands_text}", "by the method {method!r}"),
     "holds": ("{frames} frames", "{rows} rows of error and time", "step {step}", "time {time:.6g}"),

@@ -80,6 +80,9 @@ class Motion(ABC):
         require_one_of("sides", self.sides, (1, 2))
         # It is a word of LAMMPS's input, and may come from a file.
         require_one_of("integrator", self.integrator, INTEGRATORS)
+        for f in dataclasses.fields(self):
+            if isinstance(f.default, float):  # not a number of numpy, which LAMMPS cannot read
+                object.__setattr__(self, f.name, float(getattr(self, f.name)))
 
     @property
     def chooses_steps(self) -> bool:

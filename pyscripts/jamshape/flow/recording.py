@@ -140,9 +140,9 @@ def resume(session: Session, path: Path) -> tuple[FlowRun[Motion], Recording]:
         If rows between the last one and the restart file are not there.
     """
     stored = read_attributes(path)
-    to = Recording(path, stored["rows"], stored["frames"])
+    to, settings = Recording(path, stored["rows"], stored["frames"]), settings_of(stored)
     with RunWriter.open(path) as writer:
-        run = FlowRun(session, settings_of(stored), writer.first, to.restarts.newest())
+        run = FlowRun(session, settings, writer.first, to.restarts.newest())
         last = int(read_series(path, "pressure").step[-1])
         if session.step > last + _every(run, to, writer.first):
             msg = (

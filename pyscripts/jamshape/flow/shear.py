@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from jamshape.checks import MOST_STEPS, require_one_of, require_positive
+from jamshape.checks import MOST_STEPS, RANGES, require_in, require_one_of, require_positive
 from jamshape.flow.motion import FlowRun, Motion
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Shear(Motion):
     Raises
     ------
     ValueError
-        If a number is not positive, there is no such flow, the box would shear by more than 0.01 in a
+        If a number is not positive, there is no such flow, pure shear goes beyond 3, the box would shear by more than 0.01 in a
         time step, or as `Motion`.
     """
 
@@ -64,6 +64,8 @@ class Shear(Motion):
     def __post_init__(self) -> None:
         require_positive(gdot=self.gdot, strain_end=self.strain_end)
         require_one_of("flow", self.flow, FLOWS)
+        if self.flow == "pure":
+            require_in("strain", self.strain_end, RANGES["pure_strain"])
         super().__post_init__()
         if self.gdot * self.dt > _LARGEST_STRAIN * (1 + 1e-9):
             msg = (

@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jamshape.checks import (
-    RANGES,
-    require_in,
     require_one_of,
     require_path_for_lammps,
     require_stated,
 )
 from jamshape.flow import recording
 from jamshape.flow.recording import Recording
-from jamshape.flow.shear import FLOWS, Shear
+from jamshape.flow.shear import Shear
 from jamshape.front.progress import place
 from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import ShearFile
 from jamshape.front.starts import start_of, told_of
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
-from jamshape.protocols.random_start import random_packing
+from jamshape.protocols.random_start import InsertionError, random_packing
 from jamshape.shapes.particles import Particles
 
 if TYPE_CHECKING:
     from jamshape.front.packing import MeasuredPacking
 
-# Random starts are no denser: they are compressed from there.
-_PHI_RANDOM = 0.4
+# Random starts are as dense as the first of these at which particles find room: they are compressed from there.
+_PHI_RANDOM = (0.4, 0.2, 0.1, 0.05)
 
 
 def shear(
@@ -114,9 +113,6 @@ def shear(
     require_stated(n=n, phi=phi, gdot=gdot, strain=strain, seed=seed, tolerance=tolerance)
     require_stated(rows=rows, frames=frames)
     require_one_of("dimension", dimension, (2, 3))
-    require_one_of("flow", flow, FLOWS)
-    if flow == "pure":
-        require_in("strain", strain, RANGES["pure_strain"])
     if dt is not None:
         require_stated(dt=dt)
     integrator = integrator or ("rkc2" if dt is None and sides == 2 else "heun")
@@ -161,5 +157,8 @@ def _random_start(
 ) -> Packing:
     assert particles is not None
     n, phi, seed = numbers
-    random = random_packing(n, min(phi, _PHI_RANDOM), seed, particles, dimension)
-    return random if phi <= _PHI_RANDOM else compressed_start(random, phi)
+    for densest in _PHI_RANDOM:
+        with suppress(InsertionError):
+            random = random_packing(n, min(phi, densest), seed, particles, dimension)
+            return random if phi <= densest else compressed_start(random, phi)
+    return compressed_start(random_packing(n, _PHI_RANDOM[-1] / 2, seed, particles, dimension), phi)

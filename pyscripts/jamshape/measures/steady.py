@@ -18,6 +18,9 @@ _TRIED, _LATEST = 16, 0.5
 # Series shorter than this have no error that means anything.
 _FEWEST = 8
 
+# What changes by less than this part of itself does not.
+_ROUNDING = 1e-13
+
 # What tells where the steady state begins.
 _SLOW = ("pressure", "shear_stress", "S_2_x", "S_2_y")
 
@@ -112,7 +115,7 @@ def block_average(values: FloatArray) -> Blocks:
     if n < _FEWEST:
         return Blocks(mean, math.nan, math.nan)
     first = _error(values)
-    if first == 0:
+    if first <= _ROUNDING * np.abs(values).max():
         return Blocks(mean, 0.0, 1.0)
     largest, length, blocks = first, 1, values
     while len(blocks) >= _FEWEST:

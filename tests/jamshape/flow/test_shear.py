@@ -1,0 +1,114 @@
+"""Shear in LAMMPS, recorded in a file: what it holds, starts, isolated particles."""
+
+import numpy as np
+import pytest
+
+import jamshape as js
+from jamshape.files.h5md import read_attributes
+from jamshape.measures.shears import read_shear, shear_report
+
+pytestmark = pytest.mark.lammps
+
+RODS = js.Spherocylinders(alpha=4)
+QUIET = {"n": 16, "progress": False}
+
+
+@pytest.fixture(scope="module")
+def sheared(tmp_path_factory):
+    file = tmp_path_factory.mktemp("shear") / "shear.h5"
+    return js.shear(RODS, phi=0.7, gdot=1e-2, strain=4, file=file, rows=200, frames=4, **QUIET)
+
+
+def test_the_packing_fraction_stays_what_was_asked_for(sheared):
+    np.testing.assert_allclose(sheared.phi, 0.7, rtol=1e-13)
+    assert sheared.strain[-1] == pytest.approx(4, rel=1e-12)
+    assert len(sheared.strain) == 201
+    assert len(sheared) == 5
+
+
+def test_cells_of_frames_tilt_with_the_strain(sheared):
+    """The tilt over the height is the strain, but for whole cells that were taken off."""
+    for frame, strain in zip(sheared, sheared.strain[::50], strict=True):
+        (xy,), (lx, ly) = frame.box.tilt, frame.box.edges
+        assert abs(xy) <= 0.5 * lx * (1 + 1e-9)
+        cells = (strain * ly - xy) / lx
+        assert cells == pytest.approx(round(cells), abs=1e-9)
+
+
+def test_stress_of_the_last_frame_is_that_of_the_last_row(sheared):
+    contacts = js.load(sheared.file, -1)
+    assert contacts.pressure == pytest.approx(sheared.pressure[-1], rel=1e-9)
+
+
+def test_a_lonely_rod_turns_as_the_closed_form_says(tmp_path):
+    """PHYSICS C: the period is 2 pi / (gdot sqrt(1 - c^2)); over whole periods S_2 is (1 - sqrt(1 - c^2)) / c."""
+    rod = js.Spherocylinders(alpha=1)
+    one = js.shear(
+        rod, n=1, phi=1e-3, gdot=1e-2, strain=0.1, file=tmp_path / "a.h5", progress=False
+    )
+    body = one.packing(0)
+    a, r = (
+        float(x)
+        for x in (body.diameters[0, 0] / 2 - body.diameters[0, 1] / 2, body.diameters[0, 1] / 2)
+    )
+    # Second moments of a rectangle 2a by 2r with half discs at its ends.
+    along = 4 * a**3 * r / 3 + np.pi * r**4 / 4 + a**2 * np.pi * r**2 + 8 * a * r**3 / 3
+    across = 4 * a * r**3 / 3 + np.pi * r**4 / 4
+    c = (along - across) / (along + across)
+    root = np.sqrt(1 - c**2)
+    period = 2 * np.pi / root
+    run = js.shear(rod, n=1, phi=1e-3, gdot=1e-2, strain=4 * period, rows=4000, file=tmp_path / "b.h5",
+                   tolerance=1e-8, progress=False)  # fmt: skip
+    found = run.steady(after=0.0)
+    assert found["rotation"].value == pytest.approx(root / 2, rel=1e-6)
+    # S_2 of one rod is 1 at every moment; that of the mean tensor is the one of the closed form.
+    assert found["S_2"].value == pytest.approx((1 - root) / c, rel=1e-5)
+    assert found.director == pytest.approx(0, abs=1e-6)
+    assert found["pressure"].value == 0
+
+
+def test_a_run_begins_with_a_packing_and_says_so(sheared, tmp_path):
+    start = js.load(sheared.file, -1)
+    run = js.shear(start=start, gdot=1e-2, strain=0.5, flow="pure", rows=20, file=tmp_path / "b.h5",
+                   progress=False)  # fmt: skip
+    assert run.strain[-1] == pytest.approx(0.5, rel=1e-12)
+    np.testing.assert_allclose(run.phi, 0.7, rtol=1e-12)
+    edges = run.packing(-1).box.edges / run.packing(0).box.edges
+    np.testing.assert_allclose(edges, np.exp([0.5, -0.5]), rtol=1e-12)
+    stored = read_attributes(run.file)
+    assert (stored["alpha"], stored["n"], stored["start"]) == (4.0, 16, str(sheared.file))
+
+
+def test_another_run_in_the_file_is_refused(sheared):
+    for other in ({"gdot": 1e-3}, {"phi": 0.71}, {"strain": 3}, {"flow": "pure", "strain": 2}):
+        asked = {"phi": 0.7, "gdot": 1e-2, "strain": 4, "rows": 200, "frames": 4} | other
+        with pytest.raises(ValueError, match="expected"):
+            js.shear(RODS, file=sheared.file, **QUIET, **asked)
+    with pytest.raises(ValueError, match="expected"):
+        js.compress(RODS, n=16, file=sheared.file, progress=False)
+
+
+def test_it_is_loaded_resumed_and_shown_as_what_it_is(sheared):
+    assert isinstance(js.load(sheared.file), js.ShearFile)
+    assert js.resume(sheared.file, progress=False).gdot == 0.01
+    assert "shear of" in sheared._repr_html_().lower()
+    axes = sheared.plot()
+    assert "simple shear" in axes.get_title()
+
+
+def test_averages_of_a_file_are_reported(sheared, tmp_path):
+    told = shear_report(sheared.file, 1.0)
+    found = sheared.steady(1.0)
+    assert told["pressure"] == found["pressure"].value
+    assert told["S_2_error"] == found["S_2"].error
+    short = js.shear(RODS, gdot=1e-2, strain=0.01, rows=4, file=tmp_path / "c.h5", **QUIET)
+    assert "shear further" in shear_report(short.file)["steady"]
+    assert np.isnan(read_shear(short.file).number("pressure"))
+
+
+def test_spheroids_shear_in_space(tmp_path):
+    bodies = js.Superellipsoids(w1=0.6)
+    run = js.shear(bodies, n=12, dimension=3, phi=0.5, gdot=1e-2, strain=0.6, rows=30, file=tmp_path / "d.h5",
+                   progress=False)  # fmt: skip
+    np.testing.assert_allclose(run.phi, 0.5, rtol=1e-12)
+    assert run.steady(0.1)["pressure"].value > 0
