@@ -84,7 +84,7 @@ CASES = [
     ("compress --n 8 --out 'a\nb.h5'", "control character"),
     ("compress --n 8 --out text.h5/new.h5", "text.h5"),
     *((f"compress --resume --out {name}", words) for name, words in (
-        ("start.h5", "holds no compression"), ("other.h5", "expected"), ("empty.h5", "expected"),
+        ("start.h5", "holds no run"), ("other.h5", "expected"), ("empty.h5", "expected"),
         ("text.h5", "expected"), ("cut.h5", "expected"), ("start.data", "expected"),
         ("'a folder'", "folder"),
         ("newline.h5", "integrator is"), ("euler.h5", "integrator is"), ("backwards.h5", "kappa is nan"),

@@ -37,6 +37,12 @@ def shear(**options):
     return lambda: js.shear(RODS, **({"n": 8, "file": "new.h5", "progress": False} | options))
 
 
+def aqs(**options):
+    return lambda: js.quasistatic_shear(
+        RODS, **({"n": 8, "file": "new.h5", "progress": False} | options)
+    )
+
+
 def compress(**options):
     return lambda: js.compress(RODS, **({"n": 8, "file": "new.h5", "progress": False} | options))
 
@@ -108,6 +114,12 @@ def cases():
         "shear run": shear(file="run.h5"),
         "shear start": shear(start="none.h5"),
         "shear no particles": lambda: js.shear(file="new.h5", progress=False),
+        "aqs step": aqs(step=0.0),
+        "aqs long step": aqs(step=0.1, strain=0.05),
+        "aqs flow": aqs(flow="complex"),
+        "aqs pressure": aqs(pressure=-1.0),
+        "aqs file": aqs(file="run.h5"),
+        "aqs no particles": lambda: js.quasistatic_shear(file="new.h5", progress=False),
         "make kappa": make(way="dynamics", kappa=-1.0),
         "make dimension": make(dimension=0),
         "make protocol": make(protocol=3),

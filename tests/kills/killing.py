@@ -31,11 +31,22 @@ GIVEN = "given"
 
 # The time that something took, which differs from run to run, and the history of a search, which is that
 # of the process that ended it.
-CLOCKS = {"wall_seconds", "flow_wall_seconds"}
+CLOCKS = {"wall_seconds", "flow_wall_seconds", "shear_wall_seconds"}
 OF_THE_PROCESS = ("report/",)
 
 _SECONDS = 120
-_COMMANDS = ("compress", "pack", "slow", "shear", "sweep", "modes", "draw", "export", "initial")
+_COMMANDS = (
+    "compress",
+    "pack",
+    "slow",
+    "shear",
+    "aqs",
+    "sweep",
+    "modes",
+    "draw",
+    "export",
+    "initial",
+)
 _PRELOADED = [
     *(f"jamshape.commands.{name}" for name in _COMMANDS),
     "matplotlib.figure",

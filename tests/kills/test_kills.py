@@ -132,6 +132,10 @@ CASES = {
         ("shear", *RODS, "--phi", 0.7, "--gdot", 1e-3, "--strain", 0.5, "--rows", 100),
         ("shear.h5",),
     ),
+    "aqs": Case(
+        ("aqs", *RODS, "--phi", 0.9, "--step", 1e-3, "--strain", 0.1),
+        ("aqs.h5",),
+    ),
     "sweep": Case(
         ("sweep", "--alpha", 0, 1, *DYNAMICS[2:], "--samples", 1, "--jobs", 2),
         tuple(f"alpha{alpha}_seed1.h5" for alpha in (0, 1)),

@@ -22,6 +22,7 @@ COMMANDS = {
     "pack": "make one mechanically stable packing at a chosen energy",
     "slow": "compress at any rate, however slow, in the plane; record p(phi)",
     "shear": "shear at a constant rate; record stress, order and snapshots",
+    "aqs": "shear by small steps with a minimisation after each; record stress and its drops",
     "sweep": "make many packings on all cores",
     "modes": "find the modes of vibration of a packing, and its moduli",
     "draw": "draw packings",

@@ -30,7 +30,7 @@ from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
 _STATE = ("phi", "pressure", "u", "z", "rattlers")
 _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",
-         "flow", "strain_end", "outcome")  # fmt: skip
+         "flow", "strain_step", "strain_end", "hold_pressure", "outcome")  # fmt: skip
 
 
 class _Stored(NamedTuple):
@@ -53,6 +53,7 @@ _STORED = (
     _Stored("slow run", "flow_steps", _SAME_COMMAND),
     _Stored("compression on the way to a packing", "restart_step", _OTHER_COMMAND),
     _Stored("compression on the way to a packing", "of_packing", _OTHER_COMMAND),
+    _Stored("quasistatic shear", "shear_steps", _SAME_COMMAND),
     _Stored("shear", "gdot", _SAME_COMMAND),
     _Stored("run", "finished", "jamshape compress --resume --out {path}"),
     _Stored("packing", "", ""),
@@ -161,7 +162,7 @@ def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
     if len(report.step):
         found = {"error": float(report.error[-1]), "wall_seconds": float(report.wall_seconds[-1])}
         found["rows"] = len(report.step)
-    for name in ("wall_seconds", "flow_wall_seconds"):
+    for name in ("wall_seconds", "flow_wall_seconds", "shear_wall_seconds"):
         found |= {"wall_seconds": float(known[name])} if name in known else {}
     return found | ({"error": float(known["residual"])} if "residual" in known else {})
 

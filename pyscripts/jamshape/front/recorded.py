@@ -8,7 +8,7 @@ from pathlib import Path
 
 from jamshape.checks import require_path_for_lammps
 from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
-from jamshape.flow import recording, slow_recording
+from jamshape.flow import quasistatic, quasistatic_recording, recording, slow_recording
 from jamshape.flow.implicit import Step
 from jamshape.flow.motion import FlowRun, Motion, Row
 from jamshape.flow.recording import Recording
@@ -23,13 +23,13 @@ def resume(file: str | Path, *, progress: bool = True) -> Recorded:
     Parameters
     ----------
     file : path
-        Of a run of `compress`, `slow_compress` or `shear`.
+        Of a run of `compress`, `slow_compress`, `shear` or `quasistatic_shear`.
     progress : bool
         Whether a bar on standard error says how far it is.
 
     Returns
     -------
-    RunFile or ShearFile
+    RunFile, ShearFile or QuasistaticShearFile
 
     Raises
     ------
@@ -46,12 +46,13 @@ def resume(file: str | Path, *, progress: bool = True) -> Recorded:
     """
     path = Path(file)
     stored = read_attributes(path)
-    if not ({"rows", "frames"} <= stored.keys() or "flow_steps" in stored):
+    if "finished" not in stored or not stored.keys() & {"rows", *_OTHERS}:
         msg = f"{path} holds no run, expected a file of compress, slow_compress or shear"
         raise FileFormatError(msg)
     if not stored.get("finished"):
-        if "flow_steps" in stored:
-            _record_slowly(path, progress)
+        record = next((record for mark, record in _OTHERS.items() if mark in stored), None)
+        if record:
+            record(path, progress)
         else:
             require_path_for_lammps(path)
             to = Recording(path, stored["rows"], stored["frames"])
@@ -94,3 +95,22 @@ def _record_slowly(path: Path, progress: bool) -> None:
 
     begun = part_at(read_packing(path).phi)
     follow(slow_recording.record(path), told, shown=progress, begun=begun)
+
+
+def _record_steps(path: Path, progress: bool) -> None:
+    stored = read_attributes(path)
+    end = float(stored["strain_end"])
+
+    def told(row: quasistatic.Row) -> Told:
+        text = f"strain {row.strain:.4f} of {end:g}, stress {row.stress:.2e}, pressure {row.pressure:.2e}"
+        return Told("quasistatic shear", text, row.strain / end)
+
+    begun = max(0, int(stored["shear_steps"])) * float(stored["strain_step"]) / end
+    follow(quasistatic_recording.record(path), told, shown=progress, begun=min(1.0, begun))
+
+
+_OTHERS: dict[str, Callable[[Path, bool], None]] = {
+    "flow_steps": _record_slowly,
+    "shear_steps": _record_steps,
+}
+"""What goes on with runs that are not LAMMPS's, by an attribute that only these have."""

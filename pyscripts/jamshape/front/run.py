@@ -22,6 +22,7 @@ from jamshape.files.h5md import (
 from jamshape.files.run_writer import RunWriter
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow
+from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.steady import SteadyState, steady_state
@@ -235,7 +236,62 @@ class ShearFile(Recorded):
         return f"<Shear of {self._who()} at {start}: {len(self)} frames to {end}{self._where()}>"
 
 
+class QuasistaticShearFile(Recorded):
+    """A quasistatic shear in its H5MD file; parameters as of `Recorded`.
+
+    Its first row is the start as it was minimised. Frame 0 is the start itself.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> run = js.quasistatic_shear(rods, n=16, phi=0.95, step=2e-3, strain=0.2, file="aqs.h5", progress=False)
+    >>> run
+    <Quasistatic shear of 16 spherocylinders in 2D: 100 steps to strain = 0.2, phi = 0.95, stress = ..., in aqs.h5>
+    >>> all(event.drop > 0 for event in run.events())
+    True
+    """
+
+    @property
+    def strain(self) -> FloatArray:
+        """(T,) strains since the first minimum."""
+        return self["strain"]
+
+    @property
+    def stress(self) -> FloatArray:
+        """(T,) dU/d(strain) over the volume, [energy / length^D]: the shear stress of simple shear."""
+        return self["stress"]
+
+    def events(self, least: float = 1e-2) -> list[Event]:
+        """List the drops of the stress.
+
+        Parameters
+        ----------
+        least : float
+            Drops below this part of the largest stress are left out.
+        """
+        return stress_drops(self.observables, least)
+
+    def modulus(self) -> float:
+        """Slope of the stress in the first step, [energy / length^D]; that of the Hessian where the step is small."""
+        return float((self.stress[1] - self.stress[0]) / (self.strain[1] - self.strain[0]))
+
+    def steady(self, after: float | None = None) -> SteadyState:
+        """Average over the steady state, as `ShearFile.steady`."""
+        return steady_state(self.observables, self.strain, after)
+
+    def __repr__(self) -> str:
+        end = f"strain = {self.strain[-1]:.5g}, phi = {self.phi[-1]:.5g}, stress = {self.stress[-1]:.3g}"
+        steps = len(self.strain) - 1
+        return f"<Quasistatic shear of {self._who()}: {steps} steps to {end}{self._where()}>"
+
+
 def run_file(path: Path, folder: Any = None) -> Recorded:
     """Give a run in its file, of the class that knows what it is a run of."""
-    kind = ShearFile if "gdot" in read_attributes(path) else RunFile
+    known = read_attributes(path)
+    kind = next((kind for mark, kind in _KINDS.items() if mark in known), RunFile)
     return kind(path, folder)
+
+
+_KINDS: dict[str, type[Recorded]] = {"gdot": ShearFile, "shear_steps": QuasistaticShearFile}
+"""Classes by an attribute that only their files have."""

@@ -163,6 +163,16 @@ class Landscape:
             n_bonds=n_bonds,
         )
 
+    def stress(self, state: State) -> FloatArray:
+        """(D, D) pressure tensor, p_kl the sum of r_l f_k over contacts and volume; errors as `evaluate`.
+
+        -p_xy is the energy's derivative by a simple shear that moves x by gamma y, at fixed orientations.
+        """
+        pairs = self.pairs_at(state)
+        found = self.bodies.sums(*self._arrays(state, pairs), True)
+        self.refuse(pairs, found["crossing"], found["unconverged"])
+        return np.asarray(found["virial"].T / state.volume, np.float64)
+
     def refuse(self, pairs: Pairs, crossing: int, unconverged: int) -> None:
         """Raise as `evaluate` does for a pair that crosses or is unconverged, unless it is -1."""
         if crossing >= 0:

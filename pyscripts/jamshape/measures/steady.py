@@ -174,13 +174,11 @@ def _series_of(observables: Mapping[str, FloatArray], strain: FloatArray) -> dic
     found = {name: np.asarray(observables[name], np.float64)[1:]
              for name in ("pressure", "p_xy", "normal_difference", "z", "S_2", "director")}  # fmt: skip
     director, order = found.pop("director"), found.pop("S_2")
-    turned = np.diff(np.asarray(observables["turned"], np.float64))
-    return found | {
-        "shear_stress": -found.pop("p_xy"),
-        "S_2_x": order * np.cos(2 * director),
-        "S_2_y": order * np.sin(2 * director),
-        "rotation": -turned / np.diff(strain),
-    }
+    found |= {"shear_stress": -found.pop("p_xy"), "S_2_x": order * np.cos(2 * director),
+              "S_2_y": order * np.sin(2 * director)}  # fmt: skip
+    if "turned" in observables:
+        found["rotation"] = -np.diff(np.asarray(observables["turned"])) / np.diff(strain)
+    return found
 
 
 def _begin(series: Mapping[str, FloatArray]) -> int:
@@ -201,8 +199,9 @@ def _projected(part: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     sigma, pressure = _along_mean(half, stress), part["pressure"]
     found = {name: part[name] for name in ("pressure", "shear_stress", "normal_difference", "z")}
     found["sigma"] = sigma
-    if part["rotation"].any():  # that of round particles is left out
-        found |= {"rotation": part["rotation"], "S_2": _along_mean(part["S_2_x"], part["S_2_y"])}
+    if part["S_2_x"].any():  # that of round particles is left out
+        found["S_2"] = _along_mean(part["S_2_x"], part["S_2_y"])
+        found |= {"rotation": part["rotation"]} if "rotation" in part else {}
     if pressure.mean() > 0:
         # The ratio of means, whose error is that of what is left of sigma - mu p.
         mu = sigma.mean() / pressure.mean()

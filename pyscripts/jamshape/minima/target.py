@@ -302,7 +302,7 @@ class _Led:
             strain = _strain_to(self.jammed, root)
             wanted = replace(target, tolerance=tolerance)
             yield
-            strained = replace(self.jammed, state=_followed(self.landscape, self.jammed, strain))
+            strained = replace(self.jammed, state=followed(self.landscape, self.jammed, strain))
             found = _relaxed(self.landscape, strained, wanted, root**2)
             if found.outcome is not Outcome.UNJAMMED:
                 self.jammed, part = found, min(2 * part, 1.0)
@@ -337,11 +337,24 @@ def nearer(landscape: Landscape, at: Minimum, u0: float) -> State:
     State
         To be minimised.
     """
-    return _followed(landscape, at, _strain_to(at, _towards(at, u0)))
+    return followed(landscape, at, _strain_to(at, _towards(at, u0)))
 
 
-def _followed(landscape: Landscape, at: Minimum, strain: float) -> State:
-    """Strain the box of a minimum, and move particles to where forces balance as long as contacts stay."""
+def followed(landscape: Landscape, at: Minimum, strain: float) -> State:
+    """Strain the box of a minimum, and move particles to where forces balance as long as contacts stay.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    at : Minimum
+    strain : float
+        As of `State.strained`.
+
+    Returns
+    -------
+    State
+        To be minimised.
+    """
     vicinity = Vicinity(landscape, at.state)
     newton = vicinity.newton(least_shift(landscape, at.evaluation))
     newton.prepare()

@@ -71,6 +71,21 @@ class State:
         factor = 1 + np.longdouble(strain)
         return replace(self, position=factor * self.position, cell=factor * self.cell)
 
+    def deformed(self, gradient: LongArray) -> State:
+        """Move box and positions by an upper triangular matrix (D, D); rotations stay."""
+        return replace(self, position=self.position @ gradient.T, cell=gradient @ self.cell)
+
+    def with_least_tilt(self) -> State:
+        """Choose other cell vectors of the same lattice, each with a tilt of at most half of the edge along it.
+
+        Every particle and every image stays where it is.
+        """
+        cell = self.cell.copy()
+        for column in range(1, self.dimension):
+            for row in reversed(range(column)):
+                cell[:, column] -= np.rint(cell[row, column] / cell[row, row]) * cell[:, row]
+        return replace(self, cell=cell)
+
     def displaced(self, shift: FloatArray, turn: FloatArray) -> State:
         """Add (N, D) displacements and (N, 1) or (N, 3) rotation vectors."""
         if self.dimension == 2:

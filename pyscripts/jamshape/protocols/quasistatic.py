@@ -255,3 +255,34 @@ def _minimised(landscape: Landscape, compression: QuasistaticRun, protocol: Quas
 
 def _phi(landscape: Landscape, state: State) -> float:
     return float(landscape.particles.measures.sum()) / state.volume
+
+
+def compressed_to(landscape: Landscape, start: State, phi: float, step: float = 2e-3) -> State:
+    """Compress a state to a packing fraction by equal steps, each followed by a minimisation.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    start : State
+        Below phi.
+    phi : float
+    step : float
+        Of the packing fraction, at most.
+
+    Returns
+    -------
+    State
+        A minimum, jammed or not.
+
+    Raises
+    ------
+    CrossingError
+        If spines cross in a step: it is too long.
+    """
+    state, begun = start, _phi(landscape, start)
+    n_steps = max(1, math.ceil((phi - begun) / step))
+    for k in range(n_steps):
+        aim = begun + (phi - begun) * (k + 1) / n_steps
+        strain = (_phi(landscape, state) / aim) ** (1 / state.dimension) - 1
+        state = minimise(landscape, state.strained(strain), "auto", Stop(1e-4)).state
+    return state

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +44,10 @@ _DIRECTIONS = 4096
 # Of the packing fraction where insertion stalls, what it reaches when asked for no more: the long
 # particles, placed first, fill their share of a box that is too small better than all do together.
 _SAFE = 0.85
+
+
+# Packing fractions at which starts are tried that are to be compressed.
+_DENSEST, _LOOSEST = (0.4, 0.2, 0.1, 0.05), 0.02
 
 
 class InsertionError(ValueError):
@@ -90,6 +95,19 @@ def random_packing(
     insertion = _Insertion(_boxed(ordered, ordered.phi, phi), rng)
     insertion.run(_ATTEMPTS + _ATTEMPTS_PER_PARTICLE * n)
     return insertion.shuffled()
+
+
+def start_below(
+    phi: float, n: int, seed: int, particles: Particles | None = None, dimension: int = 2
+) -> Packing:
+    """Make a random packing to compress to phi: as dense as long particles find room at random.
+
+    Arguments and errors as of `random_packing`.
+    """
+    for densest in _DENSEST:
+        with suppress(InsertionError):
+            return random_packing(n, min(phi, densest), seed, particles, dimension)
+    return random_packing(n, min(phi, _LOOSEST), seed, particles, dimension)
 
 
 def dilute_packing(

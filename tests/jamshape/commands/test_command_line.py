@@ -16,6 +16,7 @@ SCRIPTS = {
     "pyscripts/compress.py": "compress",
     "pyscripts/make_initial.py": "initial",
     "pyscripts/make_packing.py": "pack",
+    "pyscripts/shear.py": "shear",
     "pyscripts/slow_compress.py": "slow",
     "pyscripts/sweep.py": "sweep",
     "analysis/draw.py": "draw",

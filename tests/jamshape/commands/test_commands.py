@@ -61,7 +61,7 @@ def test_what_is_no_run_is_not_gone_on_with(tiny, jamshape):
     assert again.report["phi"] == said["slow.h5"].report["phi"]
     refused = jamshape("compress", "--resume", "--out", folder / "packing.h5").code
     assert refused.startswith("jamshape compress: ")
-    assert "holds no compression, expected" in refused
+    assert "holds no run, expected" in refused
 
 
 def interrupted(out, *options):

@@ -25,6 +25,7 @@ QUICK = {
     "pack": f"--alpha 1 {SMALL}",
     "slow": "--alpha 1 --n 16 --phi-start 0.7 --phi-end 0.72 --kappa 1e-6",
     "shear": "--alpha 1 --n 16 --gdot 1e-2 --strain 0.5 --rows 20 --frames 4",
+    "aqs": "--alpha 1 --n 16 --step 1e-2 --strain 0.1",
     "sweep": f"--alpha 1 --samples 1 {SMALL}",
     "draw": "--dpi 50",
 }

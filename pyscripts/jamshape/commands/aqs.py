@@ -1,0 +1,65 @@
+"""Shear particles of any shape by small steps, each followed by a minimisation (athermal quasistatic shear, AQS).
+
+    jamshape aqs --alpha 4 --n 256 --phi 0.9 --step 1e-3 --strain 0.5 --out aqs.h5
+
+Starts from the last frame of a packing or run file (--start), or compresses a random packing to --phi by such steps, too.
+The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the stress at
+the end, the modulus of the first step, and the drops of the stress, each with the strain and the stress before it, and the
+energy over the volume that is lost. Needs no LAMMPS. Run again after a kill, it goes on; a finished run is left alone.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from jamshape.checks import RANGES, require_in
+from jamshape.command import parser_of, report
+from jamshape.flow.shear import FLOWS
+from jamshape.front.shearing import quasistatic_shear
+from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
+
+GO_ON = "the same command goes on from the last frame"
+
+
+def options_of() -> ArgumentParser:
+    """Make the parser."""
+    parser = parser_of(__doc__)
+    add_particle_options(parser)
+    for name, default, meaning in (
+        ("--n", 256, "particles"),
+        ("--dimension", 2, "2 or 3"),
+        ("--phi", 0.9, "packing fraction"),
+        ("--step", 1e-3, "strain of each step"),
+        ("--strain", 0.5, "strain to reach"),
+        ("--pressure", 0.0, "pressure to hold; the volume where it is 0"),
+        ("--tolerance", 1e-8, "largest net force over the mean bond force"),
+        ("--seed", 1, "of the random start"),
+        ("--frames", 20, "snapshots"),
+    ):
+        parser.add_argument(
+            name, type=type(default), default=default, help=f"{meaning} ({default})"
+        )
+    parser.add_argument("--flow", choices=FLOWS, default=FLOWS[0], help="(%(default)s)")
+    least = "leave drops below this part of the largest stress out of the list (%(default)s)"
+    parser.add_argument("--least-drop", type=float, default=1e-2, help=least)
+    parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
+    parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
+    parser.add_argument("--again", action="store_true", help="begin anew where --out is there")
+    return parser
+
+
+def main(options: Namespace) -> None:
+    """Begin, or go on; a finished run is left alone."""
+    require_in(
+        "--least-drop", options.least_drop, RANGES["share"]._replace(meaning="a part", also=(0.0,))
+    )
+    names = ("n", "dimension", "phi", "step", "strain", "flow", "pressure", "tolerance", "seed",
+             "start", "frames", "again")  # fmt: skip
+    given = {name: getattr(options, name) for name in names}
+    particles = particles_of(options) if are_particles_given(options) or not options.start else None
+    run = quasistatic_shear(particles, **given, file=options.out)
+    at_end = ("strain", "phi", "stress", "pressure", "sigma", "mu", "z")
+    found = {name: float(run[name][-1]) for name in at_end}
+    events = run.events(options.least_drop)
+    report({"out": options.out, **found, "modulus": run.modulus(), "events": events})

@@ -1,0 +1,268 @@
+"""Athermal quasistatic shear: small steps of the strain, each followed by a minimisation.
+
+The limit of shear at a rate as the rate goes to zero: between two rearrangements a packing stays in one minimum that
+moves with the box, and where that minimum ends the packing falls to another one. Maloney & Lemaitre, Phys. Rev. E 74,
+016118 (2006). At constant volume, or at constant pressure, where the box is also strained equally in all directions. Of any
+shape and dimension; needs no LAMMPS.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray, LongArray
+from jamshape.checks import require_one_of, require_positive
+from jamshape.contacts import Contacts
+from jamshape.flow.shear import FLOWS
+from jamshape.landscape import Landscape, State
+from jamshape.measures.order import OrientationalOrder, orientational_order
+from jamshape.minima import Minimum, Stop, minimise
+from jamshape.minima.target import followed
+from jamshape.packing import Packing
+
+# Pressures are led to the asked one to this part, by at most so many minimisations.
+_ACCURACY, _MOST_MINIMA = 1e-6, 60
+
+# The box is strained by at most the first part, and where there is no pressure by the second, and twice as much each time.
+_LARGEST_STRAIN, _FIRST_STRAIN = 2e-3, 1e-5
+
+# Below this part of the asked pressure a packing is unjammed.
+_UNJAMMED = 0.01
+
+# Strain from which the stiffness is taken.
+_TRIED = 1e-8
+
+
+class PressureError(RuntimeError):
+    """The pressure could not be held; the sentence says where it was."""
+
+
+@dataclass(frozen=True)
+class QuasistaticShear:
+    """How to shear.
+
+    Parameters
+    ----------
+    strain_step
+        Strain of each step.
+    strain_end
+        Strain to reach.
+    flow
+        One of `jamshape.flow.shear.FLOWS`; pure shear by gamma stretches x by exp(gamma).
+    hold_pressure
+        Pressure to hold, [energy / length^D]; the volume is held where it is left out or 0.
+    tolerance
+        Largest net force and torque of a particle over the mean bond force.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive, the step longer than the strain, or there is no such flow.
+    """
+
+    strain_step: float = 1e-3
+    strain_end: float = 0.5
+    flow: str = "simple"
+    hold_pressure: float = 0.0
+    tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        require_positive(
+            strain_step=self.strain_step, strain_end=self.strain_end, tolerance=self.tolerance
+        )
+        if self.hold_pressure != 0:
+            require_positive(hold_pressure=self.hold_pressure)
+        require_one_of("flow", self.flow, FLOWS)
+        if self.strain_step > self.strain_end:
+            msg = f"the step is {self.strain_step:g}, expected at most the strain to reach, {self.strain_end:g}"
+            raise ValueError(msg)
+
+    @property
+    def steps(self) -> int:
+        """How many lead to the end."""
+        return math.ceil(self.strain_end / self.strain_step - 1e-9)
+
+    def gradient(self, dimension: int, strain: float) -> LongArray:
+        """(D, D) matrix that shears by a strain."""
+        found: LongArray = np.eye(dimension, dtype=np.longdouble)
+        if self.flow == "simple":
+            found[0, 1] = strain
+        else:
+            found[0, 0] = np.exp(np.longdouble(strain))
+            found[1, 1] = 1 / found[0, 0]
+        return found
+
+    def resisted(self, pressure: FloatArray) -> float:
+        """Give the energy's derivative by the strain over the volume, of a pressure tensor (D, D)."""
+        if self.flow == "simple":
+            return -float(pressure[0, 1])
+        return float(pressure[1, 1] - pressure[0, 0])
+
+
+class Row(NamedTuple):
+    """A minimum on the way."""
+
+    step: int
+    strain: float
+    phi: float
+    u: float
+    pressure: float
+    p_xy: float
+    normal_difference: float
+    sigma: float
+    mu: float
+    z: float
+    z_single: float
+    rattlers: int
+    S_2: float
+    director: float
+    stress: float
+    """The energy's derivative by the strain over the volume: -p_xy of simple shear."""
+    lost: float
+    """Energy over the volume that the step dissipated: what the stress gave less what is still there."""
+    residual: float
+    evaluations: int
+    wall_seconds: float
+
+
+@dataclass(eq=False)
+class Sheared:
+    """A packing on its way: all that is needed to go on.
+
+    Parameters
+    ----------
+    state : State
+        A minimum, once there was a step.
+    steps
+        How many were made; -1 before the first minimisation.
+    u, stress
+        Energy and resisting stress there, [energy / length^D].
+    """
+
+    state: State
+    steps: int = -1
+    u: float = 0.0
+    stress: float = 0.0
+    evaluations: int = 0
+    wall_seconds: float = 0.0
+
+
+def shear(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Iterator[Row]:
+    """Minimise, then shear step by step to the end.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    run : Sheared
+        Where to begin, or to go on; moved along.
+    how : QuasistaticShear
+
+    Yields
+    ------
+    Row
+        Of the first minimum, and of that after each step.
+
+    Raises
+    ------
+    PressureError
+        If no packing has the pressure that is to be held.
+    CrossingError
+        If spines cross in a step: it is too long.
+    """
+    while run.steps < how.steps:
+        began, evaluations = time.perf_counter(), landscape.evaluations
+        strain = 0.0 if run.steps < 0 else _strain_of(how, run.steps)
+        state = run.state.deformed(how.gradient(run.state.dimension, strain))
+        # What follows depends on the state alone, also where it is read from a file.
+        landscape.forget_pairs()
+        found = _minimum(landscape, state.with_least_tilt(), how)
+        run.state = found.state
+        run.steps += 1
+        row = _row(landscape, found, run, how)
+        run.evaluations += landscape.evaluations - evaluations
+        run.wall_seconds += time.perf_counter() - began
+        run.u, run.stress = row.u, row.stress
+        yield row._replace(evaluations=run.evaluations, wall_seconds=run.wall_seconds)
+
+
+def _strain_of(how: QuasistaticShear, done: int) -> float:
+    """Give the strain of the step after so many: the last one may be shorter."""
+    return min(how.strain_end, (done + 1) * how.strain_step) - done * how.strain_step
+
+
+def _minimum(landscape: Landscape, state: State, how: QuasistaticShear) -> Minimum:
+    stop = Stop(how.tolerance)
+    found = minimise(landscape, state, "auto", stop)
+    return _at_pressure(landscape, found, stop, how.hold_pressure) if how.hold_pressure else found
+
+
+def pressure_of(found: Minimum) -> float:
+    """Give the pressure of a minimum, [energy / length^D]."""
+    D = found.state.dimension
+    return -found.evaluation.strain_gradient / (D * found.state.volume)
+
+
+def _at_pressure(landscape: Landscape, found: Minimum, stop: Stop, asked: float) -> Minimum:
+    """Strain the box equally in all directions until a minimum has the pressure that is asked for."""
+    tried = _FIRST_STRAIN
+    for _ in range(_MOST_MINIMA):
+        pressure = pressure_of(found)
+        if abs(pressure / asked - 1) <= _ACCURACY:
+            return found
+        if pressure < _UNJAMMED * asked:
+            state, tried = found.state.strained(-tried), min(2 * tried, _LARGEST_STRAIN)
+        else:
+            state = followed(landscape, found, _strain_to(landscape, found, asked))
+        found = minimise(landscape, state, "auto", stop)
+    msg = (
+        f"the pressure was {pressure_of(found):.6g} after {_MOST_MINIMA} minimisations, expected {asked:g};"
+        " hold a larger pressure"
+    )
+    raise PressureError(msg)
+
+
+def _strain_to(landscape: Landscape, found: Minimum, asked: float) -> float:
+    """Give the strain that takes the pressure to the asked one, as far as contacts stay."""
+    pressure = pressure_of(found)
+    there = followed(landscape, found, -_TRIED)
+    evaluation = landscape.evaluate(there)
+    stiffness = (
+        pressure_of(replace(found, state=there, evaluation=evaluation)) - pressure
+    ) / _TRIED
+    if stiffness <= 0:  # it slides
+        return math.copysign(_TRIED, pressure - asked)
+    return float(np.clip((pressure - asked) / stiffness, -_LARGEST_STRAIN, _LARGEST_STRAIN))
+
+
+def _row(landscape: Landscape, found: Minimum, run: Sheared, how: QuasistaticShear) -> Row:
+    """Measure a minimum."""
+    packing = found.state.packing(landscape.particles)
+    tensor = landscape.stress(found.state)
+    u, stress = found.energy_density, how.resisted(tensor)
+    order, counts = _order(packing), Contacts.of(packing, landscape.k_e, landscape.sides).counts
+    half, p_xy = 0.5 * float(tensor[0, 0] - tensor[1, 1]), float(tensor[0, 1])
+    sigma, pressure = math.hypot(half, p_xy), pressure_of(found)
+    strain = min(how.strain_end, run.steps * how.strain_step)
+    done = strain - min(how.strain_end, max(run.steps - 1, 0) * how.strain_step)
+    given = 0.5 * (run.stress + stress) * done
+    return Row(
+        step=run.steps, strain=strain, phi=packing.phi, u=u, pressure=pressure, p_xy=p_xy,
+        normal_difference=2 * half, sigma=sigma, mu=sigma / pressure if pressure > 0 else 0.0,
+        z=counts.z, z_single=counts.z_single, rattlers=counts.n_rattlers,
+        S_2=order.S_n, director=order.theta_n, stress=stress,
+        lost=run.u + given - u if run.steps > 0 else 0.0, residual=found.residual.largest,
+        evaluations=0, wall_seconds=0.0,
+    )  # fmt: skip
+
+
+def _order(packing: Packing) -> OrientationalOrder:
+    """Nematic order in the plane; of bodies in space it is found from frames."""
+    if packing.dimension == 2:
+        return orientational_order(packing.orientation, 2)
+    return OrientationalOrder(math.nan, math.nan)

@@ -1,0 +1,66 @@
+"""Plastic events of quasistatic shear: where the stress drops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+
+
+class Event(NamedTuple):
+    """A drop of the stress, over one step of the strain or several in a row."""
+
+    strain: float
+    """After which it begins."""
+    stress: float
+    """Before it, [energy / length^D]."""
+    drop: float
+    """By so much it falls, [energy / length^D]."""
+    lost: float
+    """Energy over the volume that went, [energy / length^D]."""
+    steps: int
+
+
+def stress_drops(observables: Mapping[str, FloatArray], least: float = 1e-2) -> list[Event]:
+    """List where the stress falls from one minimum to the next.
+
+    A packing that is sheared resists more and more until its minimum ends, or slides; steps in a row in which the stress
+    falls are one event.
+
+    Parameters
+    ----------
+    observables
+        (T,) arrays ``strain``, ``stress`` and ``lost`` of a run of `jamshape.flow.quasistatic`.
+    least : float
+        Drops below this part of the largest stress are left out.
+
+    Returns
+    -------
+    list of Event
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> stress = np.array([0.0, 1.0, 2.0, 1.5, 0.5, 1.0, 0.999])
+    >>> [event] = stress_drops({"strain": np.arange(7.0), "stress": stress, "lost": np.zeros(7)})
+    >>> event
+    Event(strain=2.0, stress=2.0, drop=1.5, lost=0.0, steps=2)
+    """
+    strain, stress, lost = (np.asarray(observables[name]) for name in ("strain", "stress", "lost"))
+    falls = np.concatenate([[False], np.diff(stress) < 0, [False]])
+    begins, ends = (
+        np.flatnonzero(np.diff(falls.astype(int)) == 1),
+        np.flatnonzero(np.diff(falls.astype(int)) == -1),
+    )
+    found = [
+        Event(
+            float(strain[a]), float(stress[a]), float(stress[a] - stress[b]),
+            float(lost[a + 1 : b + 1].sum()), int(b - a),
+        )
+        for a, b in zip(begins, ends, strict=True)
+    ]  # fmt: skip
+    bound = least * float(np.abs(stress).max(initial=0.0))
+    return [event for event in found if event.drop > bound]

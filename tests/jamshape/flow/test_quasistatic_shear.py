@@ -1,0 +1,151 @@
+"""Quasistatic shear: moduli, energies, what is held, and files that go on."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from small_packings import jammed
+
+import jamshape as js
+from jamshape.files.h5md import count_frames, read_observables, read_packing
+from jamshape.flow import quasistatic_recording
+from jamshape.flow.quasistatic import QuasistaticShear, Sheared, shear
+from jamshape.landscape import Landscape, State
+from jamshape.protocols.quasistatic import compressed_to
+from jamshape.protocols.random_start import random_packing
+from jamshape.vibration.elasticity import moduli
+from jamshape.vibration.hessian import dynamical_matrix
+
+# Of few particles at this energy moduli are those of the Hessian over strains of 1e-8.
+U0 = 1e-6
+
+
+def rows_of(name, **how):
+    landscape, found = jammed(name, U0)
+    return list(shear(landscape, Sheared(found.state), QuasistaticShear(**how)))
+
+
+@pytest.mark.parametrize("name", ["discs", "rods of alpha 1"])
+def test_the_first_step_has_the_shear_modulus_of_the_hessian(name, measured):
+    landscape, found = jammed(name, U0)
+    known = moduli(dynamical_matrix(landscape, found.state))
+    step = 1e-9
+    for flow, modulus, of_strain in (
+        ("simple", known.simple_shear, 1),
+        ("pure", known.pure_shear, 4),
+    ):
+        rows = rows_of(name, strain_step=step, strain_end=step, flow=flow, tolerance=1e-10)
+        slope = (rows[1].stress - rows[0].stress) / step
+        measured(**{flow: slope / (of_strain * modulus.relaxed) - 1})
+        assert slope == pytest.approx(of_strain * modulus.relaxed, rel=2e-3)
+
+
+def test_small_steps_lose_no_energy():
+    """Where nothing rearranges, the work of the stress is all there: less is left of it as the cube of the step."""
+    rows = rows_of("discs", strain_step=1e-6, strain_end=1e-5, tolerance=1e-10)
+    gained = rows[-1].u - rows[0].u
+    work = 0.5 * sum((a.stress + b.stress) * 1e-6 for a, b in pairwise(rows))
+    assert gained == pytest.approx(work, rel=1e-6)
+    assert sum(row.lost for row in rows) == pytest.approx(work - gained, abs=1e-6 * abs(work))
+
+
+def test_the_stress_is_that_of_finite_differences_of_the_energy():
+    landscape, found = jammed("rods of alpha 4", U0)
+    strain = 1e-8
+    for flow in ("simple", "pure"):
+        how = QuasistaticShear(flow=flow)
+        up, down = (
+            landscape.evaluate(found.state.deformed(how.gradient(2, s))).energy
+            for s in (strain, -strain)
+        )
+        expected = (up - down) / (2 * strain * found.state.volume)
+        assert how.resisted(landscape.stress(found.state)) == pytest.approx(expected, rel=1e-5)
+
+
+def test_the_volume_is_held_and_every_step_is_a_minimum():
+    rows = rows_of("rods of alpha 1", strain_step=2e-3, strain_end=0.1)
+    assert len(rows) == 51
+    np.testing.assert_allclose([row.phi for row in rows], rows[0].phi, rtol=1e-13)
+    assert max(row.residual for row in rows if row.u > 1e-20) < 1e-6
+    assert rows[-1].strain == pytest.approx(0.1, rel=1e-12)
+
+
+def test_the_pressure_is_held():
+    rows = rows_of("rods of alpha 1", strain_step=2e-3, strain_end=0.06, hold_pressure=1e-3)
+    np.testing.assert_allclose([row.pressure for row in rows], 1e-3, rtol=1.1e-6)
+    assert len({row.phi for row in rows}) > 20
+
+
+def test_a_box_with_the_least_tilt_is_the_same_packing():
+    found = jammed("rods of alpha 4", U0)[1]
+    cell = found.state.cell.copy()
+    cell[:, 1] += 7 * cell[:, 0]
+    least = replace(found.state, cell=cell).with_least_tilt()
+    np.testing.assert_allclose(least.cell, found.state.cell, rtol=1e-17)
+    bodies = random_packing(8, 0.1, 1, js.Superellipsoids(w1=0.6), 3)
+    cell = State.of(bodies).cell @ np.array([[1, 0.3, 0.2], [0, 1, -0.4], [0, 0, 1]])
+    far = cell @ np.array([[1, 3, -8], [0, 1, 5], [0, 0, 1]])
+    found = replace(State.of(bodies), cell=far).with_least_tilt()
+    np.testing.assert_allclose(found.cell, cell, rtol=1e-14)
+
+
+def test_spheroids_in_space_shear(measured):
+    bodies = js.Superellipsoids(w1=0.6)
+    start = random_packing(8, 0.2, 1, bodies, 3)
+    landscape = Landscape(start)
+    state = compressed_to(landscape, State.of(start), 0.8, 0.02)
+    rows = list(shear(landscape, Sheared(state), QuasistaticShear(2e-3, 0.04)))
+    np.testing.assert_allclose([row.phi for row in rows], 0.8, rtol=1e-12)
+    measured(stress=rows[-1].stress)
+    assert rows[0].pressure > 0
+    assert rows[-1].stress > rows[0].stress
+
+
+@pytest.fixture
+def cut_off(tmp_path, monkeypatch):
+    """The same run twice: to the end, and cut off after 17 steps."""
+    monkeypatch.setattr(quasistatic_recording, "MOST_STEPS_PER_FRAME", 5)
+    landscape, found = jammed("discs", U0)
+    how = QuasistaticShear(2e-3, 0.06)
+    paths = [tmp_path / name for name in ("whole.h5", "cut.h5")]
+    for path in paths:
+        quasistatic_recording.begin(path, found.state.packing(landscape.particles), how, {"n": 16})
+    list(quasistatic_recording.record(paths[0]))
+    steps = quasistatic_recording.record(paths[1])
+    for _ in range(17):
+        next(steps)
+    steps.close()
+    return paths
+
+
+def test_a_run_that_was_cut_off_goes_on_as_if_nothing_had_happened(cut_off):
+    assert not js.load(cut_off[1]).about["finished"]
+    js.resume(cut_off[1], progress=False)
+    whole, cut = map(read_observables, cut_off)
+    assert len(whole["strain"]) == 31
+    for name, values in whole.items():
+        np.testing.assert_array_equal(cut[name], values, err_msg=name)
+    assert count_frames(cut_off[0]) == count_frames(cut_off[1])
+    last = [State.of(read_packing(path)) for path in cut_off]
+    np.testing.assert_array_equal(last[0].position, last[1].position)
+    np.testing.assert_array_equal(last[0].cell, last[1].cell)
+
+
+def test_drops_of_the_stress_are_listed(cut_off):
+    run = js.load(cut_off[0])
+    stress = run.stress
+    fallen = -np.minimum(np.diff(stress), 0).sum()
+    events = run.events(least=0.0)
+    assert sum(event.drop for event in events) == pytest.approx(fallen, rel=1e-12)
+    assert len(run.events(least=0.5)) < len(events)
+
+
+def test_wrong_numbers_are_refused():
+    for numbers, words in (
+        ({"strain_step": 0.2, "strain_end": 0.1}, "expected at most the strain to reach"),
+        ({"hold_pressure": -1.0}, "expected a positive number"),
+        ({"flow": "none"}, "expected one of simple, pure"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            QuasistaticShear(**numbers)
