@@ -1,8 +1,11 @@
 #include "bindings/shapes.hpp"
 
+#include "contact/host_spin.hpp"
+
 #include "bindings/contact_arrays.hpp"
 #include "bindings/shape.hpp"
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -34,8 +37,37 @@ template <class Model> nb::object moments(const ShapeOf<Model> &of)
   return moment.release();
 }
 
+Quaternion orientation_from(std::integral_constant<int, 2>, const double *angle)
+{
+  return {std::cos(0.5 * *angle), 0.0, 0.0, std::sin(0.5 * *angle)};
+}
+Quaternion orientation_from(std::integral_constant<int, 3>, const double *q)
+{
+  return {q[0], q[1], q[2], q[3]};
+}
+
+template <class Model>
+nb::object host_spins(const ShapeOf<Model> &of, const Array2<double> &orientation,
+                      const Array2<double> &gradient)
+{
+  return of.in_space([&](auto D) {
+    require(orientation.shape(0) == of.n() && orientation.shape(1) == (D == 2 ? 1 : 4) &&
+                gradient.shape(0) == D && gradient.shape(1) == D,
+            "orientation and gradient have no shapes (N, 1 or 4) and (D, D).");
+    const Upper g = upper_from<D>(gradient.data());
+    NewArray<double> spin({of.n(), ROTATIONS<D>});
+    for (std::size_t i = 0; i < of.n(); ++i) {
+      const Vec<3> moment = Model::template drag<D>(of.shapes()[i]).moment;
+      const Quaternion q = orientation_from(D, orientation.data() + orientation.shape(1) * i);
+      write_vec(host_spin<D>(g, bretherton_parameters(moment), q), spin.row(i));
+    }
+    return spin.release();
+  });
+}
+
 template <class Model> void export_sizes(nb::class_<ShapeOf<Model>> &of)
 {
+  using namespace nb::literals;
   using Self = const ShapeOf<Model> &;
   using Shape = const typename Model::Shape &;
   const auto length = [&](const char *name, const auto &value, const char *text) {
@@ -48,6 +80,10 @@ template <class Model> void export_sizes(nb::class_<ShapeOf<Model>> &of)
       "measure", [](auto D, Shape s) { return Model::template drag<D>(s).measure; },
       "(N,) areas in 2D, volumes in 3D.");
   of.def_prop_ro("moment", &moments<Model>, "(N, 3) mean squared distances from the body's axes.");
+  of.def(
+      "host_spin", &host_spins<Model>, "orientation"_a, "gradient"_a,
+      "Angular velocities (N, 1 or 3) of particles on which no torque acts, in a host with a\n"
+      "constant upper triangular velocity gradient (D, D); angles (N, 1) or quaternions (N, 4).");
   length(
       "outer_radius", [](auto D, Shape s) { return Model::template outer_radius<D>(s); },
       "(N,) radii of the spheres around the particles.");

@@ -136,6 +136,19 @@ void move_to(Vicinity &of, const Array3<double> &position, const Array3<double> 
   of.move_to(poses.read());
 }
 
+void deform(Vicinity &of, const Array3<double> &matrix, const Array2<double> &turns)
+{
+  const std::size_t D = of.dimension();
+  require(matrix.shape(0) == 2 && matrix.shape(1) == D && matrix.shape(2) == D &&
+              turns.shape(0) == of.n_particles() && turns.shape(1) == (D == 2 ? 1 : 3),
+          "matrix and turns have no shapes (2, D, D) and (N, 1 or 3).");
+  std::vector<long double> rows(D * D);
+  for (std::size_t k = 0; k < D * D; ++k) {
+    rows[k] = static_cast<long double>(matrix.data()[k]) + matrix.data()[D * D + k];
+  }
+  of.deform(rows, turns.data());
+}
+
 nb::object poses_of(const Vicinity &about)
 {
   const std::size_t D = about.dimension(), N = about.n_particles();
@@ -184,6 +197,11 @@ void export_vicinity(nb::module_ &m)
            "Count coordinates from these poses, doubles and their small rests.")
       .def("move", &move, "x"_a, "strain"_a,
            "Count coordinates from a point near the base; gives its poses as move_to takes them.")
+      .def("hold", &Vicinity::hold, "Keep the base, from which deform begins.")
+      .def("deform", &deform, "matrix"_a, "turns"_a,
+           "Count coordinates from where an upper triangular matrix (2, D, D), doubles and their\n"
+           "small rests, takes the base that was kept, and rotation vectors (N, 1 or 3) its\n"
+           "particles.")
       .def_prop_ro(
           "poses", [](const Vicinity &of) { return poses_of(of); },
           "Of the base, as move_to takes them.")

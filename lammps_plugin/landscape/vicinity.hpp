@@ -97,6 +97,11 @@ class Vicinity {
   virtual void move_to(const Poses &poses) = 0;
   /// To a point near the base.
   virtual void move(const Displacement &at) = 0;
+  /// Keeps the base, from which `deform` begins.
+  virtual void hold() = 0;
+  /// To where an upper triangular matrix, rows (D, D), takes positions and cell vectors of the base
+  /// that was kept, and rotation vectors (N, 1 or 3) the particles that can turn.
+  virtual void deform(const std::vector<long double> &matrix, const double *turns) = 0;
   /// Pairs of a wide skin, from which those within a smaller one are chosen again and again.
   virtual void take(NearPairs wider, double smaller_skin) = 0;
   /// Whether the pairs that there are hold at a point, chosen anew if need be; if not, others are
@@ -183,6 +188,22 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   {
     displace(base, at);
     settle(base, at.strain);
+    if (has_pairs()) measure(pairs);
+  }
+
+  void hold() override { held = base; }
+
+  void deform(const std::vector<long double> &matrix, const double *by) override
+  {
+    base = held;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      map_vector(base.position, D * i, 1, matrix);
+      Torque<D> turning;
+      for (int k = 0; k < ROTATIONS<D>; ++k) turning[k] = by[ROTATIONS<D> * i + k];
+      if (turns(i)) turn_pose(base, turning, i);
+    }
+    for (int column = 0; column < D; ++column) map_vector(base.cell, column, D, matrix);
+    settle(base, 0.0);
     if (has_pairs()) measure(pairs);
   }
 
@@ -346,6 +367,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   mutable std::vector<Start> starts;  // (M,) of `pairs`
   bool is_outrun = false;             // `pairs`, at a point where `wide` is so too
   Law law;
+  Poses held;
   Poses base;
   mutable Poses there;                   // at the last point
   std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
@@ -574,6 +596,19 @@ template <class Model, int D> class VicinityOf : public Vicinity {
       const Vec<D> by = shift(at, i);
       for (int k = 0; k < D; ++k) add(poses.position, D * i + k, by[k]);
       if (turns(i)) turn_pose(poses, turn(at, i), i);
+    }
+  }
+
+  /// The vector of every `stride`-th number from `first` on.
+  static void map_vector(Poses::Numbers &of, std::size_t first, std::size_t stride,
+                         const std::vector<long double> &matrix)
+  {
+    for (int k = 0; k < D; ++k) {  // what is still to be read stands behind
+      long double sum = 0.0L;
+      for (int m = k; m < D; ++m) {
+        sum += matrix[D * k + m] * joined(Poses::get(of, first + stride * m));
+      }
+      Poses::set(of, first + stride * k, split(sum));
     }
   }
 

@@ -3,7 +3,7 @@
 #include "contact/math/vec.hpp"
 
 #include "pointers.h"
-#include "upper.h"
+#include "contact/math/upper.hpp"
 
 namespace jamshape {
 

@@ -48,11 +48,9 @@ Mobilities::Mobility Mobilities::mobility_of(const Vec<3> &semi_axes, int type) 
   Mobility m;
   m.shift = 1.0 / (drag * of_particle.measure);
   for (int k = 0; k < 3; ++k) {
-    const bool turns = moment[k] > 0.0;
-    m.turn[k] = turns ? m.shift / moment[k] : 0.0;
-    // M_l - M_m of the other two axes, from the moments about them.
-    m.bretherton[k] = turns ? (moment[(k + 2) % 3] - moment[(k + 1) % 3]) / moment[k] : 0.0;
+    m.turn[k] = moment[k] > 0.0 ? m.shift / moment[k] : 0.0;
   }
+  m.bretherton = bretherton_parameters(moment);
   m.shortest = *std::min_element(semi_axes.c, semi_axes.c + domain->dimension);
   m.longest = *std::max_element(semi_axes.c, semi_axes.c + domain->dimension);
   m.gyration = std::sqrt(*std::max_element(moment.c, moment.c + 3));

@@ -1,12 +1,12 @@
 #pragma once
 
+#include "contact/host_spin.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 
 #include "atom.h"
 #include "domain.h"
 #include "pointers.h"
-#include "upper.h"
 
 #include <vector>
 
@@ -39,35 +39,6 @@ template <int D> void write_rate(double *to, const RateIn<D> &rate)
 /// The same where the dimension is known at run time only.
 Rate read_rate(const double *from, int dimension);
 void write_rate(double *to, const Rate &rate, int dimension);
-
-/// How a host of velocity gradient G turns a particle on which no torque acts: the drag on its
-/// surface elements balances for <s x G s> over <s^2 - (s.e)^2> about each body axis e, s from its
-/// centre. That is Jeffery's equation, half the vorticity and a part B of the strain rate, with B =
-/// (M_2 - M_3) / (M_2 + M_3) about axis 1 the Bretherton parameter, M_k the mean of s_k^2.
-template <int D>
-Torque<D> host_spin(const Upper &gradient, const Vec<3> &bretherton, const Quaternion &q)
-{
-  const Upper &g = gradient;
-  if constexpr (D == 2) {
-    const Vec<2> u = long_axis<2>(q);
-    const double stretch = (g.diagonal[1] - g.diagonal[0]) * u[0] * u[1];
-    const double shear = 0.5 * g.xy * (u[0] - u[1]) * (u[0] + u[1]);
-    return {{-0.5 * g.xy + bretherton[2] * (stretch + shear)}};
-  } else {
-    Vec<3> spin{{-0.5 * g.yz, 0.5 * g.xz, -0.5 * g.xy}};
-    Vec<3> axis[3], moved[3];
-    for (int k = 0; k < 3; ++k) {
-      axis[k] = body_axis(q, k);
-      moved[k] = g * axis[k];
-    }
-    for (int k = 0; k < 3; ++k) {
-      const int l = (k + 1) % 3, m = (k + 2) % 3;
-      const double strain = 0.5 * (dot(axis[l], moved[m]) + dot(axis[m], moved[l]));
-      spin += (bretherton[k] * strain) * axis[k];
-    }
-    return spin;
-  }
-}
 
 /// What forces do to the particles of this rank against the drag of the substrate (Marschall &
 /// Teitel 2018, Eqs. 8-12).

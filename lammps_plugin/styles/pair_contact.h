@@ -6,7 +6,7 @@
 
 #include "pair.h"
 #include "particle_view.h"
-#include "upper.h"
+#include "contact/math/upper.hpp"
 
 #include <functional>
 #include <optional>

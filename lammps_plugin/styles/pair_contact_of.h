@@ -16,7 +16,7 @@
 #include "neigh_list.h"
 #include "neighbor.h"
 #include "pair_contact.h"
-#include "upper.h"
+#include "contact/math/upper.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -34,6 +34,9 @@ class _Shape:
         k_e: float,
         sides: int,
     ) -> None: ...
+    def host_spin(
+        self, orientation: NDArray[np.float64], gradient: NDArray[np.float64]
+    ) -> NDArray[np.float64]: ...
     def near(
         self,
         position: NDArray[np.float64],
@@ -218,6 +221,8 @@ class Vicinity:
     def move(
         self, x: NDArray[np.float64], strain: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    def hold(self) -> None: ...
+    def deform(self, matrix: NDArray[np.float64], turns: NDArray[np.float64]) -> None: ...
     def take_pairs(
         self,
         position: NDArray[np.float64],

@@ -1,7 +1,8 @@
-"""Overdamped compression at any rate, however slow: adaptive, implicit and L-stable.
+"""Overdamped flow at any rate, however slow: adaptive, implicit and L-stable.
 
-The motion of Marschall & Teitel 2018, Eqs. 6-13, in coordinates scaled by the box, where the affine part is
-exact and what is left is mobility times force: a gradient flow, stiff as soon as particles touch. Explicit
+The motion of Marschall & Teitel 2018, Eqs. 6-13, for compression and shear. In coordinates that move with the host the affine
+part is exact, and what is left is mobility times force: a gradient flow, stiff as soon as particles touch. Each stage of a
+step begins where the host alone would take particles, box and angles in the time of the stage. Explicit
 methods must resolve the relaxation of a contact whatever the rate; here the step follows the path of the
 packing, and its cost hardly depends on the rate. Where a packing rearranges, the step falls to the
 relaxation time and grows again. In two dimensions; needs no LAMMPS.
@@ -14,11 +15,13 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
+from typing import Protocol as Proto
 
 import numpy as np
 
-from jamshape.arrays import FloatArray
+from jamshape.arrays import FloatArray, IntArray, LongArray
 from jamshape.checks import require_one_of, require_positive
+from jamshape.flow.host import Host
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
 from jamshape.landscape.vicinity import Stage, StageFactors, Units, Vicinity
 
@@ -41,6 +44,9 @@ _HELD = 2
 # Factors of a step serve another one whose size differs by less than this factor.
 _SAME_STEP = 1.5
 
+# A box that is tilted by more takes other cell vectors.
+_LARGEST_TILT = 0.6
+
 # Below this fraction of drag over stiffness steps are explicit, so many in a row.
 _EXPLICIT_BELOW, _EXPLICIT_IN_A_ROW = 0.5, 20
 _LEAST_STEP = 1e-3
@@ -50,6 +56,10 @@ _AT_ONCE = 1e-9
 
 # Doubles are too short where their rounding is above this fraction of the accuracy of a stage.
 _ROUNDING = 0.1
+
+
+_AT_REST = np.stack([np.eye(2), np.zeros((2, 2))])
+"""A host that has not moved."""
 
 
 class Method(NamedTuple):
@@ -78,6 +88,13 @@ METHODS = {
 }
 
 _HEUN_EULER = Method(((0.0,), (1.0, 0.0), (0.5, 0.5, 0.0)), (-0.5, 0.5, 0.0), 2)
+
+
+class Leg(NamedTuple):
+    """A host that does not change for a while."""
+
+    host: Host
+    time: float
 
 
 @dataclass(frozen=True)
@@ -148,7 +165,23 @@ class Protocol:
             return self.kappa
         return ((0.0, self.kappa),)
 
-    def leg(self, phi: float) -> tuple[float, float]:
+    def leg(self, flow: Flow, phi: float) -> Leg:
+        """Give the host at a packing fraction, and how long it moves like this."""
+        del flow
+        kappa, end = self._rate_at(phi)
+        return Leg(Host.compressing(kappa), 0.5 * math.log(end / phi) / kappa)
+
+    def is_over(self, flow: Flow, phi: float) -> bool:
+        """Whether the end is reached."""
+        del flow
+        return phi >= self.phi_end * (1 - 1e-12)
+
+    def where(self, phi: float) -> str:
+        """Say where it is, for sentences."""
+        kappa, _ = self._rate_at(phi)
+        return f"at phi = {phi:.6g} at the rate kappa = {kappa:g}"
+
+    def _rate_at(self, phi: float) -> tuple[float, float]:
         """Give the rate at phi, and the packing fraction up to which it holds."""
         nearly = phi * (1 + 1e-13)
         kappa = next((rate for start, rate in reversed(self.rates) if start <= nearly),
@@ -179,7 +212,7 @@ class Flow:
     acceleration: FloatArray = field(default_factory=lambda: np.empty(0))
     time: float = 0.0
     strain: float = 0.0
-    """Of the box since the start, -ln L / L_0."""
+    """Of the box since the start: -ln L / L_0 of compression."""
     steps: int = 0
     rejected: int = 0
     explicit: int = 0
@@ -244,8 +277,22 @@ def compress(landscape: Landscape, flow: Flow, protocol: Protocol) -> Iterator[S
     CrossingError
         If spines cross at the start, or at a rate that their contacts do not withstand.
     """
-    run = _Run(landscape, flow, protocol)
-    while run.phi < protocol.phi_end * (1 - 1e-12):
+    for step in follow(landscape, flow, protocol):
+        yield step
+        if step.pressure >= protocol.p_end:
+            return
+
+
+def follow(landscape: Landscape, flow: Flow, how: Course) -> Iterator[Step]:
+    """Flow to the end of a course; errors as `compress`.
+
+    Yields
+    ------
+    Step
+        After each accepted step.
+    """
+    run = _Run(landscape, flow, how)
+    while not how.is_over(flow, run.phi):
         began, evaluations = time.perf_counter(), landscape.evaluations
         found, error, dt = run.step()
         flow.wall_seconds += time.perf_counter() - began
@@ -257,8 +304,39 @@ def compress(landscape: Landscape, flow: Flow, protocol: Protocol) -> Iterator[S
             flow.steps, flow.time, flow.strain, run.phi, pressure, found.energy / volume, dt, error,
             flow.evaluations, flow.factorisations, flow.rejected, flow.explicit, flow.wall_seconds,
         )  # fmt: skip
-        if pressure >= protocol.p_end:
-            return
+
+
+class Course(Proto):
+    """What a flow follows: its host, how far it goes, and how well."""
+
+    @property
+    def tolerance(self) -> float:
+        """Local error of a step over the typical overlap."""
+
+    @property
+    def k_d(self) -> float:
+        """Drag, [energy time / length^(D + 2)]."""
+
+    @property
+    def largest_strain(self) -> float:
+        """Of the box in a step."""
+
+    @property
+    def largest_drop(self) -> float:
+        """Part of the elastic energy that a step may lose."""
+
+    @property
+    def method(self) -> str:
+        """One of `METHODS`."""
+
+    def leg(self, flow: Flow, phi: float) -> Leg:
+        """Give the host, and how long it moves like this."""
+
+    def is_over(self, flow: Flow, phi: float) -> bool:
+        """Whether the end is reached."""
+
+    def where(self, phi: float) -> str:
+        """Say where it is, for sentences."""
 
 
 def drag_coefficients(landscape: Landscape, k_d: float = 1.0) -> FloatArray:
@@ -294,7 +372,7 @@ class _Attempt(NamedTuple):
     """A step that was tried."""
 
     x: FloatArray
-    velocities: list[FloatArray]
+    path: _Path
     error: float
     evaluation: Evaluation
 
@@ -302,15 +380,18 @@ class _Attempt(NamedTuple):
 class _Run:
     """A flow on its landscape."""
 
-    def __init__(self, landscape: Landscape, flow: Flow, protocol: Protocol) -> None:
+    def __init__(self, landscape: Landscape, flow: Flow, protocol: Course) -> None:
         self.landscape, self.flow, self.protocol = landscape, flow, protocol
         self.vicinity = Vicinity(landscape, flow.state)
-        self._still = np.zeros(landscape.size)
+        self.still = np.zeros(landscape.size)
         self.drag = drag_coefficients(landscape, protocol.k_d)
         self._least_drag = float(self.drag.min())
         self.area = float(landscape.particles.measures.sum())
         self.size = 2 * float(landscape.inner_radius.mean())
-        self.kappa = 0.0
+        self.host = Host(np.zeros((2, 2)))
+        self.columns = tuple(_as_slice(landscape.column[:, k]) for k in (0, 1))
+        self.no_turns = np.zeros(landscape.particles.n)
+        self.angle = self.no_turns
         self._crossing: CrossingError | None = None
 
     @property
@@ -321,15 +402,17 @@ class _Run:
         """Take a step; give the evaluation at its end, its error and size."""
         flow = self.flow
         if flow._is_fresh:
+            flow.state = flow.state.with_least_tilt()
             self.vicinity.move_to(flow.state)
             self.vicinity.forget_pairs()
             flow._is_fresh = False
-        self.kappa, phi_end = self.protocol.leg(self.phi)
+        self.vicinity.hold()
+        self.angle = flow.state.orientation[:, 0].astype(np.float64)
+        self.host, longest = self.protocol.leg(flow, self.phi)
         # What units and energies are taken from may be as little off as stages are.
         here = flow._here or self._evaluated()
         if not flow.velocity.size:
             self._begin(here)
-        longest = 0.5 * math.log(phi_end / self.phi) / self.kappa
         while True:
             trial = self._next_trial(longest)
             if trial.explicit and here is flow._here:
@@ -346,7 +429,7 @@ class _Run:
     def _next_trial(self, longest: float) -> _Trial:
         """Choose the step to try, not beyond the end of this rate."""
         flow = self.flow
-        dt = min(flow.dt, self.protocol.largest_strain / self.kappa)
+        dt = min(flow.dt, self.protocol.largest_strain / self.host.rate)
         clipped = dt >= 0.999 * longest
         dt = longest if clipped else dt
         explicit = flow.explicit_left > 0 or dt < self._stable
@@ -402,21 +485,22 @@ class _Run:
 
     def _evaluated(self) -> Evaluation:
         """Evaluate the present state."""
-        return self.vicinity.evaluate(self._still, 0.0, extended=False)
+        self.vicinity.deform(_AT_REST, self.no_turns[:, None])
+        return self.vicinity.evaluate(self.still, 0.0, extended=False)
 
     def _refuse_crossing(self, dt: float) -> None:
-        if self._crossing is None or dt > _AT_ONCE * min(self._stable, 1 / self.kappa):
+        if self._crossing is None or dt > _AT_ONCE * min(self._stable, 1 / self.host.rate):
             return
         spines = str(self._crossing).partition(",")[0]
         msg = (
-            f"{spines} at phi = {self.phi:.6g} at the rate kappa = {self.kappa:g}, expected a rate that their"
-            " contacts withstand; compress more slowly, or end at a smaller phi"
+            f"{spines} {self.protocol.where(self.phi)}, expected a rate that their contacts withstand; flow"
+            " more slowly, or end earlier"
         )
         raise CrossingError(msg)
 
     def _falls_too_far(self, now: Evaluation, before: Evaluation) -> bool:
         # Contacts no stronger than what the box's motion pushes come and go without an event.
-        push = self.kappa * self._least_drag * float(self.flow.state.edges.max())
+        push = self.host.rate * self._least_drag * float(self.flow.state.edges.max())
         least = self.landscape.particles.n * (push * self.size) ** 2 / self.landscape.k_e
         return before.energy - now.energy > self.protocol.largest_drop * max(before.energy, least)
 
@@ -437,12 +521,12 @@ class _Run:
             speed = self._rms(flow.velocity)
             flow.dt = min(
                 0.1 * self.protocol.tolerance**0.5 * self._unit(here) / max(speed, 1e-300),
-                0.01 * self.protocol.largest_strain / self.kappa,
+                0.01 * self.protocol.largest_strain / self.host.rate,
             )
 
     def _unit(self, evaluation: Evaluation) -> float:
         """Typical overlap, at least what the drag on a particle a diameter from the centre makes."""
-        least = self.kappa * self._least_drag * self.size
+        least = self.host.rate * self._least_drag * self.size
         return max(evaluation.bond_force, least) * self.size**2 / self.landscape.k_e
 
     def _rms(self, vector: FloatArray) -> float:
@@ -476,75 +560,152 @@ class _Run:
         accuracy = _STAGE_ACCURACY * self.protocol.tolerance
         if not 1 / _SAME_STEP < dt / max(flow._dt_of_factors, 1e-300) < _SAME_STEP:
             flow._factors = None
-        times = method.times
-        velocities: list[FloatArray] = []
-        evaluation, last = here, self._still
+        path = _Path(self, [dt * part for part in method.times])
+        evaluation, last = here, self.still
         for k, row in enumerate(method.weights):
             own = row[k] * dt
-            centre = self._combined(row, velocities, dt)
+            centre = path.combined(row, dt)
             if own == 0.0:
-                velocities.append(flow.velocity)
+                path.add(flow.velocity)
                 continue
-            strain = math.expm1(-self.kappa * times[k] * dt)
-            drag = self.drag * self.vicinity.stretch(strain) ** 2 / own
-            guess = centre + own * self._predicted(times[k] * dt, velocities, times, dt)
-            stage = Stage(strain, drag, centre, (guess, last), self._is_extended(unit))
+            drag = self.drag / own
+            guess = centre + own * self._predicted(path)
+            path.go_to_stage()
+            pushed = centre + own * path.excess_spin(guess)
+            stage = Stage(0.0, drag, pushed, (guess, last), self._is_extended(unit))
             found = self.vicinity.solve(stage, flow._factors, units, accuracy)
             flow.factorisations += found.factorisations
             flow._factors, flow._dt_of_factors = found.factors, dt
             if not found.solved:
                 return None
             evaluation, last = found.evaluation, found.x
-            velocities.append((found.x - centre) / own)
-        error = self._combined(method.error, velocities, dt)
+            path.add((found.x - centre) / own)
+        error = path.combined(method.error, dt)
         force = drag * error
         assert found.factors is not None
         size = self._units(evaluation).size(found.factors.factors.solve(force), force, drag)
-        return _Attempt(found.x, velocities, size, evaluation)
+        return _Attempt(found.x, path, size, evaluation)
 
-    def _combined(
-        self, weights: tuple[float, ...], velocities: list[FloatArray], dt: float
-    ) -> FloatArray:
-        """Displacement by the velocities that there are so far."""
-        known = zip(weights, velocities, strict=False)
-        return sum((dt * weight * velocity for weight, velocity in known), start=self._still)
-
-    def _predicted(
-        self, after: float, velocities: list[FloatArray], times: list[float], dt: float
-    ) -> FloatArray:
-        """Extrapolate the velocity to a time after the start of the step, or hold it."""
-        flow = self.flow
+    def _predicted(self, path: _Path) -> FloatArray:
+        """Extrapolate the velocity to the next stage, or hold it."""
+        flow, known = self.flow, len(path.velocities)
+        last = path.velocity(known - 1) if known else path.carried(flow.velocity, 0.0)
         if not flow.extrapolates:
-            return velocities[-1] if velocities else flow.velocity
-        if velocities and times[len(velocities) - 1] > 0:
-            last = times[len(velocities) - 1] * dt
-            slope = (velocities[-1] - flow.velocity) / last
-            return velocities[-1] + (after - last) * slope
-        return flow.velocity + after * flow.acceleration
+            return last
+        if known and path.times[known - 1] > 0:
+            before = path.times[known - 1]
+            slope = (last - path.carried(flow.velocity, 0.0)) / before
+            return last + (path.next_time - before) * slope
+        return path.carried(flow.velocity + path.next_time * flow.acceleration, 0.0)
 
     def _explicit(self, dt: float, here: Evaluation) -> _Attempt:
         extended = self._is_extended(self._unit(here))
-        velocities, evaluation = [-here.gradient / self.drag], here
-        for after, row in zip(_HEUN_EULER.times[1:], _HEUN_EULER.weights[1:], strict=True):
-            x = self._combined(row, velocities, dt)
-            strain = math.expm1(-self.kappa * after * dt)
-            evaluation = self.vicinity.evaluate(x, strain, extended=extended)
-            stretch = self.vicinity.stretch(strain)
-            velocities.append(-evaluation.gradient / (stretch * self.drag))
-        error = 0.5 * dt * (velocities[1] - velocities[0])
-        return _Attempt(x, velocities, self._rms(error) / self._unit(evaluation), evaluation)
+        path = _Path(self, [dt * part for part in _HEUN_EULER.times])
+        path.add(-here.gradient / self.drag)
+        evaluation = here
+        for row in _HEUN_EULER.weights[1:]:
+            x = path.combined(row, dt)
+            path.go_to_stage()
+            evaluation = self.vicinity.evaluate(x, 0.0, extended=extended)
+            path.add(-evaluation.gradient / self.drag + path.excess_spin(x))
+        error = 0.5 * dt * (path.velocity(1) - path.velocity(0))
+        return _Attempt(x, path, self._rms(error) / self._unit(evaluation), evaluation)
 
     def _accept(self, attempt: _Attempt, dt: float) -> None:
-        flow = self.flow
-        strain = math.expm1(-self.kappa * dt)
-        stretch = self.vicinity.stretch(strain)
-        self.vicinity.move(attempt.x, strain)
+        flow, path = self.flow, attempt.path
+        begun, acceleration = (path.carried(v, 0.0) for v in (flow.velocity, flow.acceleration))
+        self.vicinity.move(attempt.x, 0.0)
         flow.state, flow._here = self.vicinity.base, attempt.evaluation
         # Contacts that open and close make velocities jump: then what extrapolates them is farther off.
-        jump = attempt.velocities[-1] - flow.velocity
-        missed = np.linalg.norm(jump - dt * flow.acceleration)
+        jump = path.velocities[-1] - begun
+        missed = np.linalg.norm(jump - dt * acceleration)
         flow.extrapolates = int(missed < _TOLD * np.linalg.norm(jump))
-        flow.acceleration = stretch * jump / dt
-        flow.velocity = stretch * attempt.velocities[-1]
+        flow.acceleration = jump / dt
+        flow.velocity = path.velocities[-1]
         flow.time += dt
-        flow.strain += self.kappa * dt
+        flow.strain += self.host.rate * dt
+        cell = flow.state.cell
+        if abs(cell[0, 1]) > _LARGEST_TILT * cell[0, 0]:  # shifts of pairs count other cell vectors
+            flow._is_fresh = True
+
+
+def _as_slice(numbers: IntArray) -> slice | IntArray:
+    """Give numbers at equal distances, as those of particles that all turn or none, as a slice: it is faster."""
+    apart = np.diff(numbers)
+    if len(apart) and (apart == apart[0]).all() and apart[0] > 0:
+        return slice(int(numbers[0]), int(numbers[-1]) + 1, int(apart[0]))
+    return numbers
+
+
+class _Path:
+    """A step that is tried: where the host is at each stage, and the velocities there.
+
+    Velocities and displacements are those that forces give, in the box at their stage; the host carries them to others.
+    """
+
+    def __init__(self, run: _Run, times: list[float]) -> None:
+        self.run, self.times = run, times
+        self.velocities: list[FloatArray] = []
+        self._turned = run.no_turns
+        self._deformations: dict[float, LongArray] = {}
+
+    @property
+    def next_time(self) -> float:
+        """Of the stage to come, since the start of the step; of the last one at the end."""
+        return self.times[min(len(self.velocities), len(self.times) - 1)]
+
+    def add(self, velocity: FloatArray) -> None:
+        """Keep the velocity of a stage."""
+        self.velocities.append(velocity)
+
+    def velocity(self, stage: int) -> FloatArray:
+        """Give a velocity, as it is carried to the next stage."""
+        return self.carried(self.velocities[stage], self.times[stage])
+
+    def carried(self, vector: FloatArray, begun: float) -> FloatArray:
+        """Carry displacements, or velocities, of a time of the step to the next stage."""
+        after = self.next_time - begun
+        if after == 0.0:
+            return vector
+        (xx, xy), (_, yy) = self._deformation(after).astype(np.float64)
+        x, y = self.run.columns
+        found = vector.copy()
+        found[x] = xx * vector[x] + xy * vector[y]
+        found[y] = yy * vector[y]
+        return found
+
+    def _deformation(self, after: float) -> LongArray:
+        if after not in self._deformations:
+            self._deformations[after] = self.run.host.deformation(after)
+        return self._deformations[after]
+
+    def combined(self, weights: tuple[float, ...], dt: float) -> FloatArray:
+        """Displacement at the next stage by the velocities that there are so far."""
+        used = zip(range(len(self.velocities)), weights, strict=False)
+        parts = (dt * weight * self.velocity(k) for k, weight in used if weight)
+        return sum(parts, start=self.run.still)
+
+    def go_to_stage(self) -> None:
+        """Take box, positions and angles to where the host alone has them at the next stage."""
+        run, after = self.run, self.next_time
+        matrix = self._deformation(after)
+        double = matrix.astype(np.float64)
+        turns = run.no_turns
+        if run.host.turns_particles:
+            angle = run.angle
+            turns = run.host.turns(run.landscape.bodies, angle, after)
+            self._turned = angle + turns
+        rest = (matrix - double).astype(np.float64)
+        run.vicinity.deform(np.stack([double, rest]), turns[:, None])
+
+    def excess_spin(self, x: FloatArray) -> FloatArray:
+        """(n,) what the host turns particles by that forces have turned by x, beyond what it turns others."""
+        run, landscape = self.run, self.run.landscape
+        if not run.host.turns_particles:
+            return run.still
+        turned = landscape.motion(x)[1][:, 0]
+        spin = run.host.spin(landscape.bodies, self._turned + turned)
+        spin -= run.host.spin(landscape.bodies, self._turned)
+        components = np.zeros((len(spin), 3))
+        components[:, 2] = spin * landscape.rotation_length
+        return landscape.coordinates(components)

@@ -109,6 +109,22 @@ class Vicinity:
         self.base = base
         self._compiled.move_to(*base.split)
 
+    def hold(self) -> None:
+        """Keep the base, from which `deform` begins."""
+        self._compiled.hold()
+
+    def deform(self, matrix: FloatArray, turns: FloatArray) -> None:
+        """Count coordinates from where a matrix takes the base that was kept; `base` follows with the next `move`.
+
+        Parameters
+        ----------
+        matrix : (2, D, D) array of float64
+            Upper triangular, doubles and their small rests: for positions and cell vectors.
+        turns : (N, 1) or (N, 3) array of float64
+            Rotation vectors.
+        """
+        self._compiled.deform(matrix, turns)
+
     def forget_pairs(self) -> None:
         """Look for pairs anew, so that what follows depends on the base alone, to the last bit."""
         self.landscape.forget_pairs()

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "contact/math/vec.hpp"
+#include "vec.hpp"
 
 #include <cmath>
 
@@ -17,6 +17,13 @@ struct Upper {
 
   bool has_shear() const { return xy != 0.0 || xz != 0.0 || yz != 0.0; }
 };
+
+/// From the rows of a matrix (D, D), whose entries below the diagonal are not read.
+template <int D> Upper upper_from(const double *rows)
+{
+  const auto at = [&](int k, int m) { return k < D && m < D ? rows[D * k + m] : 0.0; };
+  return {{{at(0, 0), at(1, 1), at(2, 2)}}, at(0, 1), at(0, 2), at(1, 2)};
+}
 
 inline Vec<2> operator*(const Upper &a, const Vec<2> &x)
 {
