@@ -176,6 +176,11 @@ class Protocol:
         del flow
         return phi >= self.phi_end * (1 - 1e-12)
 
+    def measured(self, landscape: Landscape, flow: Flow) -> dict[str, float]:
+        """Measure more than a `Step` has: nothing."""
+        del landscape, flow
+        return {}
+
     def where(self, phi: float) -> str:
         """Say where it is, for sentences."""
         kappa, _ = self._rate_at(phi)
@@ -213,6 +218,8 @@ class Flow:
     time: float = 0.0
     strain: float = 0.0
     """Of the box since the start: -ln L / L_0 of compression."""
+    turned: float = 0.0
+    """Mean angle by which particles have turned since the start."""
     steps: int = 0
     rejected: int = 0
     explicit: int = 0
@@ -334,6 +341,9 @@ class Course(Proto):
 
     def is_over(self, flow: Flow, phi: float) -> bool:
         """Whether the end is reached."""
+
+    def measured(self, landscape: Landscape, flow: Flow) -> dict[str, float]:
+        """Measure more than a `Step` has, by name."""
 
     def where(self, phi: float) -> str:
         """Say where it is, for sentences."""
@@ -623,6 +633,7 @@ class _Run:
         flow.acceleration = jump / dt
         flow.velocity = path.velocities[-1]
         flow.time += dt
+        flow.turned += path.mean_turn(attempt.x)
         flow.strain += self.host.rate * dt
         cell = flow.state.cell
         if abs(cell[0, 1]) > _LARGEST_TILT * cell[0, 0]:  # shifts of pairs count other cell vectors
@@ -697,6 +708,12 @@ class _Path:
             self._turned = angle + turns
         rest = (matrix - double).astype(np.float64)
         run.vicinity.deform(np.stack([double, rest]), turns[:, None])
+
+    def mean_turn(self, x: FloatArray) -> float:
+        """Average by how much host and forces have turned particles by the end."""
+        forces = self.run.landscape.motion(x)[1][:, 0]
+        host = self._turned - self.run.angle if self.run.host.turns_particles else self._turned
+        return float((host + forces).mean())
 
     def excess_spin(self, x: FloatArray) -> FloatArray:
         """(n,) what the host turns particles by that forces have turned by x, beyond what it turns others."""

@@ -1,17 +1,18 @@
-"""Slow compressions in files: a run of `jamshape.flow.implicit` recorded in H5MD, which goes on after a kill."""
+"""Slow flows in files: a run of `jamshape.flow.implicit` recorded in H5MD, which goes on after a kill."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, require_attributes
 from jamshape.files.run_writer import RunWriter
-from jamshape.flow.implicit import Flow, Protocol, Step, compress
+from jamshape.flow.implicit import Flow, Protocol, Step, compress, follow
+from jamshape.flow.slow_shear import SlowShear
 from jamshape.landscape import Landscape, State
 from jamshape.measures.runs import onset_report
 from jamshape.packing import Packing
@@ -32,12 +33,15 @@ _ROW = (
     "explicit",
 )
 
-_COUNTS = ("dt", "time", "strain", "steps", "rejected", "explicit", "evaluations", "factorisations",
+_COUNTS = ("dt", "time", "strain", "turned", "steps", "rejected", "explicit", "evaluations", "factorisations",
            "wall_seconds", "explicit_left", "held", "extrapolates")  # fmt: skip
 
 
 def begin(
-    path: Path, start: Packing, protocol: Protocol, attributes: Mapping[str, Any] | None = None
+    path: Path,
+    start: Packing,
+    protocol: Protocol | SlowShear,
+    attributes: Mapping[str, Any] | None = None,
 ) -> None:
     """Write the file of a run with its first frame."""
     stored = _as_attributes(protocol) | {"sides": 2}
@@ -47,14 +51,15 @@ def begin(
     RunWriter.create(path, _as_frame(flow, first), stored | _counts(flow)).close()
 
 
-def require_same(path: Path, protocol: Protocol) -> None:
+def require_same(path: Path, protocol: Protocol | SlowShear) -> None:
     """Refuse the file of a run with another protocol.
 
     Raises
     ------
     ValueError
     """
-    require_attributes(path, _as_attributes(protocol), "a compression")
+    what = "a shear" if isinstance(protocol, SlowShear) else "a compression"
+    require_attributes(path, _as_attributes(protocol), what)
 
 
 def is_finished(path: Path) -> bool:
@@ -81,13 +86,13 @@ def record(path: Path) -> Iterator[Step]:
         After each accepted step; rows are in the file with the next frame.
     """
     stored = read_attributes(path)
-    protocol, landscape = _protocol(stored), Landscape(read_packing(path, 0))
-    rows: list[Step] = []
+    course, landscape = course_of(stored), Landscape(read_packing(path, 0))
+    rows: list[_Row] = []
     with RunWriter.open(path) as writer:
         writer.truncate(int(stored["flow_steps"]))
         flow = _flow(path, stored)
-        for step in compress(landscape, flow, protocol):
-            rows.append(step)
+        for step in _steps(landscape, flow, course):
+            rows.append(_Row(step, course.measured(landscape, flow)))
             if step.step % STEPS_PER_FRAME == 0:
                 _keep(writer, rows, flow, landscape.particles)
             yield step
@@ -96,12 +101,25 @@ def record(path: Path) -> Iterator[Step]:
         writer.set_attributes({"finished": True})
 
 
-def _keep(writer: RunWriter, rows: list[Step], flow: Flow, like: Packing) -> None:
+class _Row(NamedTuple):
+    step: Step
+    more: dict[str, float]
+
+
+def _steps(landscape: Landscape, flow: Flow, course: Protocol | SlowShear) -> Iterator[Step]:
+    if isinstance(course, Protocol):
+        return compress(landscape, flow, course)  # which ends at a pressure, too
+    return follow(landscape, flow, course)
+
+
+def _keep(writer: RunWriter, rows: list[_Row], flow: Flow, like: Packing) -> None:
     """Write a frame, and the rows up to it; what follows depends on the frame alone."""
     flow.forget()
-    steps, times = [row.step for row in rows], [row.time for row in rows]
-    writer.append_series(steps, times, {k: [getattr(row, k) for row in rows] for k in _ROW})
-    seconds, errors = [row.wall_seconds for row in rows], [row.error for row in rows]
+    steps, times = [row.step.step for row in rows], [row.step.time for row in rows]
+    series = {name: [getattr(row.step, name) for row in rows] for name in _ROW}
+    series |= {name: [row.more[name] for row in rows] for name in rows[0].more}
+    writer.append_series(steps, times, series)
+    seconds, errors = [row.step.wall_seconds for row in rows], [row.step.error for row in rows]
     writer.append_report(steps, seconds, errors)
     motion = {"velocity": flow.velocity, "acceleration": flow.acceleration}
     writer.append(_as_frame(flow, like), motion)
@@ -113,8 +131,9 @@ def _as_frame(flow: Flow, like: Packing) -> Packing:
     return dataclasses.replace(flow.state.packing(like), step=flow.steps, time=flow.time)
 
 
-def _as_attributes(protocol: Protocol) -> dict[str, Any]:
-    return dataclasses.asdict(protocol) | {"kappa": np.array(protocol.kappa)}
+def _as_attributes(protocol: Protocol | SlowShear) -> dict[str, Any]:
+    found = dataclasses.asdict(protocol)
+    return found | ({"kappa": np.array(protocol.kappa)} if isinstance(protocol, Protocol) else {})
 
 
 def _counts(flow: Flow) -> dict[str, float]:
@@ -131,8 +150,12 @@ def _flow(path: Path, stored: Mapping[str, Any]) -> Flow:
     return flow
 
 
-def _protocol(stored: Mapping[str, Any]) -> Protocol:
-    values = {field.name: stored[field.name] for field in dataclasses.fields(Protocol)}
+def course_of(stored: Mapping[str, Any]) -> Protocol | SlowShear:
+    """Read what a run follows from the attributes of its file."""
+    kind = SlowShear if "gdot" in stored else Protocol
+    values = {field.name: stored[field.name] for field in dataclasses.fields(kind)}
+    if kind is SlowShear:
+        return SlowShear(**values)
     rates = np.asarray(values.pop("kappa"))
     kappa = tuple((float(a), float(b)) for a, b in rates) if rates.ndim else float(rates)
     return Protocol(kappa=kappa, **values)

@@ -1,0 +1,85 @@
+"""Shear at any rate, however slow: the course of implicit steps. In two dimensions; needs no LAMMPS."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from jamshape.checks import RANGES, require_in, require_one_of, require_positive
+from jamshape.contacts import Contacts
+from jamshape.flow.host import Host
+from jamshape.flow.implicit import METHODS, Flow, Leg
+from jamshape.flow.shear import FLOWS
+from jamshape.landscape import Landscape
+from jamshape.measures.order import orientational_order
+
+
+@dataclass(frozen=True)
+class SlowShear:
+    """How to shear by implicit steps.
+
+    Parameters
+    ----------
+    gdot, strain_end, flow
+        As of `jamshape.flow.shear.Shear`.
+    tolerance, k_d, largest_strain, largest_drop, method
+        As of `jamshape.flow.implicit.Protocol`.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, or there is no such flow or method.
+    """
+
+    gdot: float = 1e-7
+    strain_end: float = 1.0
+    flow: str = "simple"
+    tolerance: float = 1e-3
+    k_d: float = 1.0
+    largest_strain: float = 1e-3
+    largest_drop: float = math.inf
+    method: str = "tr-bdf2"
+
+    def __post_init__(self) -> None:
+        names = ("gdot", "strain_end", "tolerance", "k_d", "largest_strain")
+        require_positive(**{name: getattr(self, name) for name in names})
+        if self.largest_drop != math.inf:
+            require_positive(largest_drop=self.largest_drop)
+        require_one_of("flow", self.flow, FLOWS)
+        require_one_of("the method", self.method, METHODS)
+        if self.flow == "pure":
+            require_in("strain", self.strain_end, RANGES["pure_strain"])
+
+    def leg(self, flow: Flow, phi: float) -> Leg:
+        """Give the host, and how long it moves like this."""
+        del phi
+        return Leg(Host.shearing(self.gdot, self.flow), (self.strain_end - flow.strain) / self.gdot)
+
+    def is_over(self, flow: Flow, phi: float) -> bool:
+        """Whether the end is reached."""
+        del phi
+        return flow.strain >= self.strain_end * (1 - 1e-12)
+
+    def measured(self, landscape: Landscape, flow: Flow) -> dict[str, float]:
+        """Measure stress, contacts, order and rotation, named as those of `jamshape.flow.shear`."""
+        state = flow.state
+        tensor, packing = landscape.stress(state), state.packing(landscape.particles)
+        half, p_xy = 0.5 * float(tensor[0, 0] - tensor[1, 1]), float(tensor[0, 1])
+        sigma, pressure = math.hypot(half, p_xy), 0.5 * float(tensor.trace())
+        order = orientational_order(packing.orientation, 2)
+        has_order = bool(landscape.rotation_length.any())
+        return {
+            f"{'shear' if self.flow == 'simple' else 'pure'}_strain": flow.strain,
+            "normal_difference": 2 * half,
+            "p_xy": p_xy,
+            "sigma": sigma,
+            "mu": sigma / pressure if pressure > 0 else 0.0,
+            "z": Contacts.of(packing, landscape.k_e, landscape.sides).z,
+            "S_2": order.S_n if has_order else 0.0,
+            "director": order.theta_n if has_order else 0.0,
+            "turned": flow.turned if has_order else 0.0,
+        }
+
+    def where(self, phi: float) -> str:
+        """Say where it is, for sentences."""
+        return f"at phi = {phi:.6g} at the rate gdot = {self.gdot:g}"
