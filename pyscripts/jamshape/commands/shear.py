@@ -16,6 +16,8 @@ from pathlib import Path
 
 from jamshape.checks import RANGES, require_in
 from jamshape.command import parser_of, report
+from jamshape.flow.implicit import METHODS
+from jamshape.flow.motion import INTEGRATORS
 from jamshape.flow.shear import FLOWS
 from jamshape.front.shearing import shear
 from jamshape.measures.shears import shear_report
@@ -35,7 +37,6 @@ def options_of() -> ArgumentParser:
         ("--gdot", 1e-4, "shear rate"),
         ("--strain", 5.0, "strain to reach"),
         ("--sides", 2, "bonds of a side-to-side contact"),
-        ("--tolerance", 1e-4, "of rkc2 and heun/adaptive: local error over the typical overlap"),
         ("--seed", 1, "of the random start"),
         ("--rows", 1000, "samples of stress and order"),
         ("--frames", 20, "snapshots"),
@@ -44,8 +45,11 @@ def options_of() -> ArgumentParser:
             name, type=type(default), default=default, help=f"{meaning} ({default})"
         )
     parser.add_argument("--flow", choices=FLOWS, default=FLOWS[0], help="(%(default)s)")
-    usual = "rkc2; heun with --dt or --sides 1"
-    parser.add_argument("--integrator", help=f"heun, heun/adaptive or rkc2 ({usual})")
+    usual = "heun with --dt or --sides 1, tr-bdf2 in the plane up to --gdot 1e-6, else rkc2"
+    names = f"{', '.join(INTEGRATORS)}; implicit: {', '.join(METHODS)}"
+    parser.add_argument("--integrator", help=f"{names} ({usual})")
+    error = "local error over the typical overlap, but of heun (1e-4; of implicit steps 1e-3)"
+    parser.add_argument("--tolerance", type=float, help=error)
     parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
     parser.add_argument("--after", type=float, help="strain from which to average (chosen)")
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")

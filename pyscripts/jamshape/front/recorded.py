@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from jamshape.checks import require_path_for_lammps
 from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
@@ -12,6 +13,7 @@ from jamshape.flow import quasistatic, quasistatic_recording, recording, slow_re
 from jamshape.flow.implicit import Step
 from jamshape.flow.motion import FlowRun, Motion, Row
 from jamshape.flow.recording import Recording
+from jamshape.flow.slow_shear import SlowShear
 from jamshape.front.progress import Told, follow
 from jamshape.front.run import Recorded, run_file
 from jamshape.lammps.session import Session
@@ -83,6 +85,16 @@ def _told(settings: Motion, phi_start: float) -> Callable[[Row], Told]:
 
 def _record_slowly(path: Path, progress: bool) -> None:
     stored = read_attributes(path)
+    course = slow_recording.course_of(stored)
+    if isinstance(course, SlowShear):
+        told, begun = _of_shear(course), float(stored["flow_strain"]) / course.strain_end
+    else:
+        told, begun = _of_compression(stored, read_packing(path).phi)
+    follow(slow_recording.record(path), told, shown=progress, begun=begun)
+
+
+def _of_compression(stored: Mapping[str, Any], phi: float) -> tuple[Callable[[Step], Told], float]:
+    """Return what says how far a slow compression is, and the part that is done at phi."""
     first, end = float(stored["phi_start"]), float(stored["phi_end"])
     until = f" or {stored['p_end']:.3g}" if math.isfinite(stored["p_end"]) else ""
 
@@ -93,8 +105,16 @@ def _record_slowly(path: Path, progress: bool) -> None:
         where = f"phi {step.phi:.6f} of {end:g}, pressure {step.pressure:.3e}{until}"
         return Told("slow compression", f"{where}, step {step.dt:.1e}", part_at(step.phi))
 
-    begun = part_at(read_packing(path).phi)
-    follow(slow_recording.record(path), told, shown=progress, begun=begun)
+    return told, part_at(phi)
+
+
+def _of_shear(course: SlowShear) -> Callable[[Step], Told]:
+    def told(step: Step) -> Told:
+        where = f"strain {step.strain:.5f} of {course.strain_end:g}, pressure {step.pressure:.3e}"
+        part = min(1.0, step.strain / course.strain_end)
+        return Told("slow shear", f"{where}, step {step.dt:.1e}", part)
+
+    return told
 
 
 def _record_steps(path: Path, progress: bool) -> None:

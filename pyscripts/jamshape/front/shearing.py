@@ -1,4 +1,4 @@
-"""Shear: at a constant rate in LAMMPS, and by quasistatic steps."""
+"""Shear: at a constant rate, in LAMMPS or by implicit steps, and by quasistatic steps."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from jamshape.checks import (
     require_path_for_lammps,
     require_stated,
 )
-from jamshape.flow import quasistatic_recording, recording
+from jamshape.flow import quasistatic_recording, recording, slow_recording
+from jamshape.flow.implicit import METHODS
 from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.flow.recording import Recording
 from jamshape.flow.shear import Shear
-from jamshape.front.progress import place
+from jamshape.flow.slow_shear import SlowShear
+from jamshape.front.progress import Place, place
 from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import QuasistaticShearFile, ShearFile
 from jamshape.front.starts import start_of, told_of
@@ -28,6 +30,11 @@ from jamshape.shapes.particles import Particles
 
 if TYPE_CHECKING:
     from jamshape.front.packing import MeasuredPacking
+
+
+# At such rates and below implicit steps are faster than explicit ones; their errors where nothing else is asked for.
+_SLOW = 1e-6
+_ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
 
 
 def shear(
@@ -44,14 +51,14 @@ def shear(
     sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
-    tolerance: float = 1e-4,
+    tolerance: float | None = None,
     rows: int = 1000,
     frames: int = 20,
     file: str | Path | None = None,
     again: bool = False,
     progress: bool = True,
 ) -> ShearFile:
-    """Shear particles at a constant rate and packing fraction in LAMMPS, as Marschall, Keta, Olsson & Teitel 2019.
+    """Shear particles at a constant rate and packing fraction, as Marschall, Keta, Olsson & Teitel 2019.
 
     Parameters
     ----------
@@ -73,14 +80,18 @@ def shear(
         What to begin with, at its own packing fraction; of a path, its last frame.
     sides : {1, 2}
         Bonds of a side-to-side contact of rods.
-    integrator : {"rkc2", "heun/adaptive", "heun"}, optional
-        As of `compress`.
+    integrator : {"rkc2", "heun/adaptive", "heun", "tr-bdf2", "sdirk2"}, optional
+        The first three are LAMMPS's, as of `compress`; the last two take implicit steps in the plane, without LAMMPS, at a
+        cost that hardly grows as the rate falls. ``heun`` with one bond or where `dt` is given; else ``tr-bdf2`` in
+        the plane at rates of 1e-6 and below, and ``rkc2`` otherwise.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 when left out.
-    tolerance : float
-        Of the others: local error of a step over the typical overlap.
+    tolerance : float, optional
+        Of the others: local error of a step over the typical overlap; 1e-4 in LAMMPS and 1e-3 of implicit steps
+        when left out.
     rows, frames : int
-        How many samples of stress and order and how many snapshots to keep.
+        How many samples of stress and order and how many snapshots to keep; implicit steps
+        are as many as samples, or more.
     file : path, optional
         H5MD file of the run, as of `compress`: a finished run of these settings is loaded from it, and one
         that was cut off goes on.
@@ -110,32 +121,28 @@ def shear(
     >>> found.startup < 2 and 0 < found["mu"].value < 1
     True
     """
-    require_stated(n=n, phi=phi, gdot=gdot, strain=strain, seed=seed, tolerance=tolerance)
-    require_stated(rows=rows, frames=frames)
+    require_stated(n=n, phi=phi, gdot=gdot, strain=strain, seed=seed, rows=rows, frames=frames)
     require_one_of("dimension", dimension, (2, 3))
     if dt is not None:
         require_stated(dt=dt)
-    integrator = integrator or ("rkc2" if dt is None and sides == 2 else "heun")
+    if tolerance is not None:
+        require_stated(tolerance=tolerance)
+    at = place(file, "shear.h5")
+    of = _Start.of(particles, _Numbers(n, phi, seed, dimension), start)
+    integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
+    if integrator in METHODS:
+        longest = min(SlowShear.largest_strain, strain / rows)
+        error = tolerance or _IMPLICIT_ERROR
+        slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
+        return _shear_slowly(slow, of, at, _How(again, progress))
     settings = Shear(
         gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
-        sides=sides, integrator=integrator, tolerance=tolerance,
+        sides=sides, integrator=integrator, tolerance=tolerance or _ERROR,
     )  # fmt: skip
     if settings.chooses_steps:
         settings = settings.in_steps(rows)
-    at = place(file, "shear.h5")
-    require_path_for_lammps(at.path)  # restart files lie beside it
-    known = start_of(start) if start is not None else None
-    numbers = _Numbers(n, phi, seed, dimension)
-    made_from = _made_from(particles, numbers, known)
-    to = Recording(at.path, rows, frames, made_from)
-    if again or not at.path.exists():
-        first = known or _flowing_start(particles, numbers)
-        settings.all_steps(first)  # refuses what does not end
-        record_flow(lambda session: recording.begin(session, settings, first, to), to, progress)
-    else:
-        recording.require_same(to, settings, known.dimension if known else dimension)
-        resume(at.path, progress=progress)
-    return ShearFile(*at)
+    to = Recording(at.path, rows, frames, of.made_from)
+    return _shear_in_lammps(settings, of, _Into(at, to), _How(again, progress))
 
 
 def quasistatic_shear(
@@ -210,55 +217,117 @@ def quasistatic_shear(
     how = QuasistaticShear(step, strain, flow, pressure, tolerance)
     at = place(file, "aqs.h5")
     require_path(at.path)
-    known = start_of(start) if start is not None else None
-    numbers = _Numbers(n, phi, seed, dimension)
-    made_from = _made_from(particles, numbers, known) | {"frames": frames}
+    of = _Start.of(particles, _Numbers(n, phi, seed, dimension), start)
+    made_from = of.made_from | {"frames": frames}
     if again or not at.path.exists():
-        first = known or _still_start(particles, numbers)
-        quasistatic_recording.begin(at.path, first, how, made_from)
+        quasistatic_recording.begin(at.path, of.still(), how, made_from)
     else:
         quasistatic_recording.require_same(at.path, how, made_from)
     resume(at.path, progress=progress)
     return QuasistaticShearFile(*at)
 
 
+class _How(NamedTuple):
+    again: bool
+    progress: bool
+
+
+class _Into(NamedTuple):
+    at: Place
+    to: Recording
+
+
 class _Numbers(NamedTuple):
-    """What a start is made with."""
+    """What a random start is made with."""
 
     n: int
     phi: float
     seed: int
     dimension: int
 
-    def start(self, particles: Particles | None) -> Packing:
-        """Make a random packing from which to compress to phi."""
-        return start_below(self.phi, self.n, self.seed, particles, self.dimension)
+
+class _Start(NamedTuple):
+    """What a run begins with: a packing, or particles with their numbers."""
+
+    known: MeasuredPacking | None
+    particles: Particles | None
+    numbers: _Numbers
+
+    @classmethod
+    def of(
+        cls, particles: Particles | None, numbers: _Numbers, start: Packing | str | Path | None
+    ) -> _Start:
+        if start is not None:
+            return cls(start_of(start), None, numbers)
+        if particles is None:
+            msg = "there are neither particles nor a start, expected one of them"
+            raise ValueError(msg)
+        return cls(None, particles, numbers)
+
+    @property
+    def dimension(self) -> int:
+        return self.known.dimension if self.known else self.numbers.dimension
+
+    @property
+    def made_from(self) -> dict[str, Any]:
+        """Tell what the run is of."""
+        if self.known:
+            return told_of(self.known)
+        assert self.particles
+        n, phi, seed, _ = self.numbers
+        return dict(self.particles.told) | {"n": n, "phi_sheared": phi, "seed": seed}
+
+    def _random(self) -> Packing:
+        n, phi, seed, dimension = self.numbers
+        return start_below(phi, n, seed, self.particles, dimension)
+
+    def flowing(self) -> Packing:
+        """Give the start, compressed at a rate."""
+        if self.known:
+            return self.known
+        random = self._random()
+        phi = self.numbers.phi
+        return compressed_start(random, phi) if random.phi < phi else random
+
+    def still(self) -> Packing:
+        """Give the start, compressed by minimisations."""
+        if self.known:
+            return self.known
+        random = self._random()
+        landscape = Landscape(random)
+        return compressed_to(landscape, State.of(random), self.numbers.phi).packing(random)
 
 
-def _made_from(
-    particles: Particles | None, numbers: _Numbers, start: MeasuredPacking | None
-) -> dict[str, Any]:
-    """Tell what a run is of: a start, or particles with their numbers."""
-    if start is not None:
-        return told_of(start)
-    if particles is None:
-        msg = "there are neither particles nor a start, expected one of them"
-        raise ValueError(msg)
-    return dict(particles.told) | {
-        "n": numbers.n,
-        "phi_sheared": numbers.phi,
-        "seed": numbers.seed,
-    }
+def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
+    """Choose an integrator."""
+    if not whole:
+        return "heun"
+    return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
 
 
-def _flowing_start(particles: Particles | None, numbers: _Numbers) -> Packing:
-    """Compress a random packing at a rate."""
-    random = numbers.start(particles)
-    return compressed_start(random, numbers.phi) if random.phi < numbers.phi else random
+def _shear_in_lammps(settings: Shear, of: _Start, into: _Into, how: _How) -> ShearFile:
+    at, to = into
+    require_path_for_lammps(at.path)  # restart files lie beside it
+    if how.again or not at.path.exists():
+        first = of.flowing()
+        settings.all_steps(first)  # refuses what does not end
+        record_flow(lambda session: recording.begin(session, settings, first, to), to, how.progress)
+    else:
+        recording.require_same(to, settings, of.dimension)
+        resume(at.path, progress=how.progress)
+    return ShearFile(*at)
 
 
-def _still_start(particles: Particles | None, numbers: _Numbers) -> Packing:
-    """Compress a random packing by minimisations."""
-    random = numbers.start(particles)
-    landscape = Landscape(random)
-    return compressed_to(landscape, State.of(random), numbers.phi).packing(random)
+def _shear_slowly(settings: SlowShear, of: _Start, at: Place, how: _How) -> ShearFile:
+    require_path(at.path)
+    if at.path.exists() and not how.again:
+        slow_recording.require_same(at.path, settings)
+    else:
+        if of.dimension != 2:
+            msg = (
+                f"implicit steps were asked for in {of.dimension} dimensions, expected 2; take rkc2"
+            )
+            raise ValueError(msg)
+        slow_recording.begin(at.path, of.flowing(), settings, of.made_from)
+    resume(at.path, progress=how.progress)
+    return ShearFile(*at)

@@ -139,7 +139,7 @@ def steady_state(
     observables
         (T,) arrays by name, as a run of `jamshape.flow.shear` has them.
     strain : (T,) array of float64
-        Equally spaced.
+        Ascending; steps may differ.
     after : float, optional
         Strain from which to average. When left out it is chosen so that as many independent samples as can be
         are left of the slowest of pressure, shear stress and order (Chodera, J. Chem. Theory Comput. 12, 1799 (2016)).
@@ -153,32 +153,49 @@ def steady_state(
     ValueError
         If fewer than 8 samples are left.
     """
-    series = _series_of(observables, strain)
-    first = _begin(series) if after is None else int(np.searchsorted(strain, after))
+    edges = np.linspace(strain[0], strain[-1], len(strain))
+    series = _series_of(observables, strain) if len(strain) > 1 else {}
+    chosen = _begin(series) if after is None and series else 0
+    first = chosen if after is None else int(np.searchsorted(edges, after))
     left = len(strain) - 1 - first
     if left < _FEWEST:
         msg = (
-            f"{max(left, 0)} samples were found after a strain of {strain[min(first, len(strain) - 1)]:.4g}, expected"
+            f"{max(left, 0)} samples were found after a strain of {edges[min(first, len(edges) - 1)]:.4g}, expected"
             f" {_FEWEST} or more; shear further, or average from an earlier strain on"
         )
         raise ValueError(msg)
     part = {name: values[first:] for name, values in series.items()}
-    apart = float(strain[-1] - strain[first]) / left
+    apart = float(edges[-1] - edges[first]) / left
     averages = {name: _averaged(values, apart) for name, values in _projected(part).items()}
     director = 0.5 * math.atan2(part["S_2_y"].mean(), part["S_2_x"].mean())
-    return SteadyState(float(strain[first]), float(strain[-1]), averages, director)
+    return SteadyState(float(edges[first]), float(edges[-1]), averages, director)
 
 
 def _series_of(observables: Mapping[str, FloatArray], strain: FloatArray) -> dict[str, FloatArray]:
-    """Pick (T - 1,) series, all of the ends of the strains between two samples."""
-    found = {name: np.asarray(observables[name], np.float64)[1:]
-             for name in ("pressure", "p_xy", "normal_difference", "z", "S_2", "director")}  # fmt: skip
-    director, order = found.pop("director"), found.pop("S_2")
-    found |= {"shear_stress": -found.pop("p_xy"), "S_2_x": order * np.cos(2 * director),
-              "S_2_y": order * np.sin(2 * director)}  # fmt: skip
-    if "turned" in observables:
-        found["rotation"] = -np.diff(np.asarray(observables["turned"])) / np.diff(strain)
+    """Pick (T - 1,) series, means over as many equal strains."""
+    known = {name: np.asarray(values, np.float64) for name, values in observables.items()}
+    found = {name: known[name] for name in ("pressure", "normal_difference", "z")}
+    found |= {
+        "shear_stress": -known["p_xy"],
+        "S_2_x": known["S_2"] * np.cos(2 * known["director"]),
+        "S_2_y": known["S_2"] * np.sin(2 * known["director"]),
+    }
+    edges = np.linspace(strain[0], strain[-1], len(strain))
+    found = {name: _means_between(edges, strain, values) for name, values in found.items()}
+    if "turned" in known:
+        found["rotation"] = -np.diff(np.interp(edges, strain, known["turned"])) / np.diff(edges)
     return found
+
+
+def _means_between(edges: FloatArray, strain: FloatArray, values: FloatArray) -> FloatArray:
+    """Average lines through samples over the parts between edges."""
+    done = np.concatenate([[0.0], np.cumsum(np.diff(strain) * (values[1:] + values[:-1]) / 2)])
+    # The integral within a piece is a parabola.
+    piece = np.clip(np.searchsorted(strain, edges, side="right") - 1, 0, len(strain) - 2)
+    into, width = edges - strain[piece], np.diff(strain)[piece]
+    slope = np.diff(values)[piece] / width
+    integral = done[piece] + into * (values[piece] + 0.5 * slope * into)
+    return np.asarray(np.diff(integral) / np.diff(edges))
 
 
 def _begin(series: Mapping[str, FloatArray]) -> int:

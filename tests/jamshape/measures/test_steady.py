@@ -86,3 +86,15 @@ def test_mu_is_the_ratio_of_means_with_the_error_of_what_is_left():
     found = steady_state(observables, strain)
     assert found["mu"].value == pytest.approx(0.5, rel=1e-12)
     assert found["mu"].error < 1e-6 * found["sigma"].error
+
+
+def test_steps_that_differ_count_by_their_strain():
+    """A signal with means that are known, sampled densely where it is high."""
+    observables, _ = sheared(0.0, np.random.default_rng(5))
+    strain = np.sort(np.concatenate([np.linspace(0, 10, 3000), np.linspace(10, 20, 1000)[1:]]))
+    values = np.where(strain <= 10, 1.0, 3.0)
+    observables = {name: of[: len(strain)] for name, of in observables.items()}
+    observables |= {"pressure": values, "turned": -0.25 * strain}
+    found = steady_state(observables, strain, after=0.0)
+    assert found["pressure"].value == pytest.approx(2, rel=1e-3)
+    assert found["rotation"].value == pytest.approx(0.25, rel=1e-9)

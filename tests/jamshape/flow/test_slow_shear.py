@@ -1,0 +1,154 @@
+"""Shear by implicit steps: against closed forms and LAMMPS, what stays, and files that go on."""
+
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import jamshape as js
+from jamshape.files.h5md import read_attributes, read_observables, read_packing
+from jamshape.flow import slow_recording
+from jamshape.flow.host import Host
+from jamshape.flow.implicit import Flow, follow
+from jamshape.flow.slow_shear import SlowShear
+from jamshape.landscape import Landscape, State
+from jamshape.protocols.quasistatic import compressed_to
+from jamshape.protocols.random_start import random_packing
+
+RODS = js.Spherocylinders(alpha=4)
+
+
+def dense(particles=RODS, n=16, phi=0.9):
+    start = random_packing(n, 0.3, 1, particles)
+    landscape = Landscape(start)
+    return compressed_to(landscape, State.of(start), phi, 5e-3).packing(start)
+
+
+def flowed(start, **how):
+    landscape, flow = Landscape(start), Flow(State.of(start))
+    course = SlowShear(**how)
+    rows = [(step, course.measured(landscape, flow)) for step in follow(landscape, flow, course)]
+    return flow, rows
+
+
+@pytest.mark.parametrize("gradient", [[[0, 3], [0, 0]], [[2, 0], [0, -2]], [[-1, 0.5], [0, 0.3]]])
+def test_a_host_deforms_by_the_exponential_of_its_gradient(gradient):
+    host = Host(np.array(gradient, float))
+    for time in (1e-6, 0.7, 3.0):
+        found = host.deformation(time).astype(float)
+        np.testing.assert_allclose(found, expm(host.gradient * time), rtol=1e-13, atol=1e-15)
+
+
+def test_a_host_whose_rates_nearly_agree_loses_no_digits():
+    """There the exponential has (exp(a) - exp(d)) / (a - d), of two numbers that agree."""
+    found = Host(np.array([[1, 2], [0, 1 + 1e-9]])).deformation(3.0)
+    assert float(found[0, 1]) == pytest.approx(6 * np.exp(3 + 1.5e-9), rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("alpha", "flow"), [(1.0, "simple"), (4.0, "simple"), (4.0, "pure"), (0.01, "simple")]
+)
+def test_a_lonely_rod_follows_its_orbit(alpha, flow, measured):
+    """PHYSICS C: tan theta' = sqrt((1-c)/(1+c)) tan(...) of simple shear, tan theta exp(-2 e c t) of pure shear."""
+    start = random_packing(1, 1e-3, 3, js.Spherocylinders(alpha=alpha))
+    m = Landscape(start).bodies.moment[0]
+    c = (m[1] - m[0]) / m[2]
+    theta = float(start.orientation[0])
+    gamma = 0.5
+    flow_end, _ = flowed(start, gdot=1e-3, strain_end=gamma, flow=flow)
+    found = float(flow_end.state.orientation[0, 0])
+    if flow == "pure":
+        expected = np.arctan(np.tan(theta) * np.exp(-2 * c * gamma))
+    else:
+        ratio = np.sqrt((1 - c) / (1 + c))
+        phase = np.arctan(np.tan(theta) / ratio) - 0.5 * gamma * np.sqrt(1 - c**2)
+        expected = np.arctan(ratio * np.tan(phase))
+    off = (found - expected + np.pi / 2) % np.pi - np.pi / 2
+    measured(off=off)
+    assert abs(off) < 1e-10
+    assert flow_end.turned == pytest.approx(found - theta, abs=1e-9) or abs(found - theta) > 1
+
+
+def test_area_and_shape_of_the_box_are_exact():
+    flow, rows = flowed(dense(), gdot=1e-4, strain_end=1.3, tolerance=1e-2)
+    np.testing.assert_allclose([step.phi for step, _ in rows], 0.9, rtol=1e-14)
+    cells = (1.3 * flow.state.cell[1, 1] - flow.state.cell[0, 1]) / flow.state.cell[0, 0]
+    assert abs(flow.state.cell[0, 1]) <= 0.61 * flow.state.cell[0, 0]
+    assert float(cells) == pytest.approx(round(float(cells)), abs=1e-12)
+
+
+@pytest.mark.lammps
+@pytest.mark.parametrize(
+    "particles", [RODS, js.Spherocylinders(alpha=0), js.Dimers(alpha=1)], ids=str
+)
+def test_it_is_the_motion_that_lammps_integrates(particles, tmp_path, measured):
+    """At the rate where both are fast; before the first rearrangement both are within their errors."""
+    start = dense(particles)
+    strain = 5e-3
+    exact = js.shear(start=start, gdot=1e-4, strain=strain, integrator="rkc2", tolerance=1e-8, rows=10,
+                     file=tmp_path / "a.h5", progress=False)  # fmt: skip
+    _, rows = flowed(start, gdot=1e-4, strain_end=strain, tolerance=1e-5)
+    step, more = rows[-1]
+    measured(pressure=step.pressure / exact.pressure[-1] - 1)
+    assert step.pressure == pytest.approx(exact.pressure[-1], rel=1e-5)
+    for name in ("p_xy", "sigma", "S_2", "director", "turned"):
+        scale = step.pressure if name in {"p_xy", "sigma"} else 1.0
+        assert more[name] == pytest.approx(exact[name][-1], abs=2e-5 * scale), name
+
+
+def test_errors_fall_with_the_tolerance(measured):
+    start = dense()
+    ends = {}
+    for tolerance in (1e-3, 1e-5, 1e-7):
+        flow, _ = flowed(start, gdot=1e-4, strain_end=5e-3, tolerance=tolerance)
+        ends[tolerance] = flow.state.position.astype(float)
+    off = {t: np.abs(ends[t] - ends[1e-7]).max() for t in (1e-3, 1e-5)}
+    measured(**{f"off_{t:g}": x for t, x in off.items()})
+    assert off[1e-3] < 1e-4
+    assert off[1e-5] < 0.6 * off[1e-3]
+
+
+def test_the_cost_hardly_grows_as_the_rate_falls():
+    start = dense()
+    steps = [len(flowed(start, gdot=gdot, strain_end=2e-3)[1]) for gdot in (1e-6, 1e-9)]
+    assert steps[1] < 3 * steps[0]
+
+
+def test_a_run_that_was_cut_off_goes_on_as_if_nothing_had_happened(tmp_path, monkeypatch):
+    monkeypatch.setattr(slow_recording, "STEPS_PER_FRAME", 10)
+    # Of discs, in a box that is about to take other cell vectors.
+    first = dense(js.Spherocylinders(alpha=0.01), n=12, phi=0.86)
+    start = State.of(first).deformed(Host.shearing(0.5, "simple").deformation(1.1)).packing(first)
+    course = SlowShear(gdot=1e-3, strain_end=0.15, tolerance=1e-2)
+    paths = [tmp_path / name for name in ("whole.h5", "cut.h5")]
+    for path in paths:
+        slow_recording.begin(path, start, course, {"alpha": 0.01, "n": 12})
+    list(slow_recording.record(paths[0]))
+    steps = slow_recording.record(paths[1])
+    list(islice(steps, 37))
+    steps.close()
+    assert not read_attributes(paths[1])["finished"]
+    run = js.resume(paths[1], progress=False)
+    assert isinstance(run, js.ShearFile)
+    whole, cut = map(read_observables, paths)
+    for name, values in whole.items():
+        np.testing.assert_array_equal(cut[name], values, err_msg=name)
+    last = [State.of(read_packing(path)) for path in paths]
+    np.testing.assert_array_equal(last[0].position, last[1].position)
+    assert run.strain[-1] == pytest.approx(0.15, rel=1e-12)
+    tilts = [float(frame.box.tilt[0]) for frame in run]
+    assert min(tilts) < 0 < max(tilts)
+    assert run.steady(0.05)["pressure"].value > 0
+
+
+def test_slow_rates_take_implicit_steps_by_themselves(tmp_path):
+    start = dense()
+    run = js.shear(start=start, gdot=1e-7, strain=1e-3, file=tmp_path / "a.h5", progress=False)
+    assert run.about["method"] == "tr-bdf2"
+    assert run.steady(0.0)["mu"].value > 0
+    again = js.shear(start=start, gdot=1e-7, strain=1e-3, file=tmp_path / "a.h5", progress=False)
+    assert len(again) == len(run)
+    with pytest.raises(ValueError, match="expected 2; take rkc2"):
+        js.shear(js.Superellipsoids(w1=0.6), n=8, dimension=3, phi=0.1, gdot=1e-7, integrator="tr-bdf2",
+                 file=tmp_path / "b.h5", progress=False)  # fmt: skip
