@@ -1,0 +1,43 @@
+"""How fast the particles of a sheared packing turn at a moment: by the host, and by the torques of their contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.flow.host import Host
+from jamshape.flow.implicit import drag_coefficients
+from jamshape.landscape import Landscape, State
+from jamshape.packing import Packing
+from jamshape.shapes.shape import Interaction
+
+
+def rotation_rates(
+    packing: Packing, host: Host, law: Interaction | None = None, k_d: float = 1.0
+) -> FloatArray:
+    """Give the angular velocity of each particle of a packing in the plane.
+
+    Parameters
+    ----------
+    packing : Packing
+    host : Host
+    law : Interaction, optional
+        With k_e = 1 and two bonds side to side when left out.
+    k_d : float, [energy time / length^4]
+
+    Returns
+    -------
+    (N,) array of float64, [1/time]
+        dtheta/dt = w + tau / (k_d A I), with w of the host (Marschall & Teitel 2019, Phys. Rev. E 100, 032906).
+
+    Raises
+    ------
+    ValueError
+        If the packing is not in two dimensions.
+    """
+    law = law or Interaction(1.0, 2)
+    landscape = Landscape(packing, law.k_e, law.sides)
+    velocity = -landscape.evaluate(State.of(packing)).gradient / drag_coefficients(landscape, k_d)
+    _, turns = landscape.motion(velocity)
+    angle = np.asarray(packing.orientation, np.float64)
+    return np.asarray(host.spin(landscape.bodies, angle) + turns[:, 0])
