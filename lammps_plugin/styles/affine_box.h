@@ -1,9 +1,9 @@
 #pragma once
 
+#include "contact/math/upper.hpp"
 #include "contact/math/vec.hpp"
 
 #include "pointers.h"
-#include "contact/math/upper.hpp"
 
 namespace jamshape {
 

@@ -15,6 +15,7 @@ namespace jamshape {
 ///   bond                  number in its contact, from 0
 ///   dist sumrad overlap   r, d and 1 - r/d
 ///   fx fy fz              force on i
+///   rx ry rz              from the centre of j to that of i
 ///   nx ny nz              unit normal into i
 ///   cx cy cz              point of contact
 ///   energy stiffness      V and its second derivative with respect to r

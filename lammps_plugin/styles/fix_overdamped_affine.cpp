@@ -11,10 +11,12 @@
 #include "update.h"
 #include "utils.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -36,8 +38,8 @@ constexpr double LARGEST_STRAIN = 1.0;
 constexpr int N_OF_SUBSTEPS = 8, N_OF_FLOW = 4;
 
 constexpr const char *SYNTAX =
-    "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [flip F] [integrator NAME] "
-    "[tolerance T] [stages MAX] [reference center|corner] [check N]'.";
+    "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [volume free|constant] "
+    "[flip F] [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]'.";
 
 /// What is global in a restart file. The first number tells files of other versions apart.
 constexpr std::uint64_t SAVED_AS = 0x6a616d7368617002;
@@ -58,6 +60,7 @@ struct FixOverdampedAffine::Command {
   std::string method = "heun";
   IntegratorOptions of_method{};
   AffineBox::Reference reference = AffineBox::Reference::CENTER;
+  bool holds_volume = false;
 };
 
 FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
@@ -94,7 +97,19 @@ FixOverdampedAffine::Command FixOverdampedAffine::read(int narg, char **arg)
     if (taken == 0) read_option(arg[k], arg[k + 1], command);
     k += taken > 0 ? taken : 2;
   }
+  if (command.holds_volume) require_no_trace(command.gradient);
   return command;
+}
+
+void FixOverdampedAffine::require_no_trace(const Upper &gradient) const
+{
+  const Vec<3> &d = gradient.diagonal;
+  const double trace = d[0] + d[1] + d[2];
+  const double largest = std::max({std::fabs(d[0]), std::fabs(d[1]), std::fabs(d[2])});
+  if (std::fabs(trace) > 8.0 * std::numeric_limits<double>::epsilon() * largest) {
+    fail("volume constant and a flow whose trace is " + shown(trace) +
+         ", expected one whose diagonal adds up to 0.");
+  }
 }
 
 double FixOverdampedAffine::number(const char *text) const
@@ -163,6 +178,8 @@ void FixOverdampedAffine::read_option(const std::string &keyword, const char *te
     to.of_method.stages = LAMMPS_NS::utils::inumeric(FLERR, text, false, lmp);
   } else if (keyword == "reference" && (value == "center" || value == "corner")) {
     to.reference = value == "center" ? AffineBox::Reference::CENTER : AffineBox::Reference::CORNER;
+  } else if (keyword == "volume" && (value == "constant" || value == "free")) {
+    to.holds_volume = value == "constant";
   } else if (keyword == "flip") {
     largest_tilt = number(text);
     if (!(largest_tilt >= 0.5 && std::isfinite(largest_tilt))) {

@@ -71,6 +71,7 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   double number(const char *text) const;
   void read_option(const std::string &keyword, const char *text, Command &to);
   void make_parts(const Command &of);
+  void require_no_trace(const Upper &gradient) const;
   void tell_what_this_is();
   [[noreturn]] void fail(const std::string &found_and_expected) const;
   void require_timestep() const;

@@ -2,11 +2,11 @@
 
 #include "contact/contact.hpp"
 #include "contact/instruction_set.hpp"
+#include "contact/math/upper.hpp"
 #include "contact/math/vec.hpp"
 
 #include "pair.h"
 #include "particle_view.h"
-#include "contact/math/upper.hpp"
 
 #include <functional>
 #include <optional>

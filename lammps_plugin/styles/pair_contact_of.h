@@ -4,6 +4,7 @@
 #include "contact/contact_block.hpp"
 #include "contact/math/dimension.hpp"
 #include "contact/math/rotation.hpp"
+#include "contact/math/upper.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/packs.hpp"
 #include "contact/pair_derivatives.hpp"
@@ -16,7 +17,6 @@
 #include "neigh_list.h"
 #include "neighbor.h"
 #include "pair_contact.h"
-#include "contact/math/upper.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -488,6 +488,12 @@ def powers(session, gradient, dimension):
         ("gradient 1e-3 0 0", "gradient with 3 numbers, expected 4"),
         ("gradient 0 0 1e-3 0", "below the diagonal, expected 0"),
         ("flip 0.4 shear 0", "flip 0.4, expected a part of an edge of at least 0.5"),
+        (
+            "gradient 1e-3 0 0 1e-3 volume constant",
+            "trace is 0.002, expected one whose diagonal adds up to 0",
+        ),
+        ("compress 1e-3 volume constant", "trace is -0.002, expected"),
+        ("shear 0 volume fixed", "'volume fixed', expected"),
         ("shear", "shear without a number, expected a rate"),
         ("twist 3", "'twist 3', expected"),
     ],

@@ -160,6 +160,26 @@ def test_two_ranks_report_the_same_rows(newton, tmp_path):
         assert_same_rows(found, expected_rows(state.exact, "two"), state.packing)
 
 
+@pytest.mark.parametrize("name", SCENES)
+def test_stress_of_the_kinds_of_contacts_adds_up(name, tmp_path):
+    """Sums of ry fx over the rows of each kind are what compute packing has as a whole."""
+    columns = ["kind", "fx", "fy", "fz", "rx", "ry", "rz"]
+    packing = SCENES[name]()
+    with loaded(packing, tmp_path, sides="two") as session:
+        session.commands(f"compute bonds all contact/local {' '.join(columns)}")
+        session.commands("compute p all packing\nrun 0")
+        found, whole = found_rows(session, columns), global_vector(session, "p")
+    D = packing.dimension
+    tensors = [
+        of[:, 1 : 1 + D].T @ of[:, 4 : 4 + D] / packing.box.volume
+        for of in (found[found[:, 0] == kind] for kind in np.unique(found[:, 0]))
+    ]
+    assert len(tensors) > 1
+    total = sum(tensors)
+    assert total[0, 1] == pytest.approx(whole[15], rel=1e-12, abs=1e-12 * whole[2])
+    assert np.trace(total) / D == pytest.approx(whole[2], rel=1e-12)
+
+
 def test_columns_come_in_any_order(tmp_path):
     packing = SCENES["rods"]()
     rng = np.random.default_rng(1)
