@@ -65,7 +65,11 @@ class AngleCurve(NamedTuple):
 
 def angle_curve(alpha: float, files: Sequence[PackingFile]) -> AngleCurve:
     """Average P over samples in the same bins; `alpha` says where flat sides begin."""
-    found = [angles_of(file) for file in files]
+    return curve_of_angles(alpha, [angles_of(file) for file in files])
+
+
+def curve_of_angles(alpha: float, found: Sequence[FloatArray]) -> AngleCurve:
+    """Average P over the angles (K,) of packings, or of frames of a run, in the same bins."""
     edges = angle_edges(np.concatenate(found))
     densities = np.array([angle_density(angles, edges).density for angles in found])
     corner = np.arctan2(1, alpha)

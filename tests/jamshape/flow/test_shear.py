@@ -112,3 +112,26 @@ def test_spheroids_shear_in_space(tmp_path):
                    progress=False)  # fmt: skip
     np.testing.assert_allclose(run.phi, 0.5, rtol=1e-12)
     assert run.steady(0.1)["pressure"].value > 0
+
+
+# alpha, n, phi, gdot, strain: boxes of two rods are shorter than the longer one.
+EXTREMES = {
+    "fast, nearly discs": (1e-6, 16, 0.84, 1e-1, 1.0),
+    "slow, nearly discs": (1e-6, 16, 0.86, 1e-8, 0.02),
+    "fast, a box shorter than a rod": (4.0, 2, 0.6, 1e-1, 2.0),
+    "slow, a box shorter than a rod": (4.0, 2, 0.9, 1e-8, 0.02),
+    "long rods": (50.0, 4, 0.3, 1e-4, 0.1),
+    "long rods, slow": (50.0, 4, 0.3, 1e-8, 0.02),
+}
+
+
+@pytest.mark.parametrize("case", EXTREMES)
+def test_extremes_are_sheared_and_stay_what_they_were(case, tmp_path, measured):
+    alpha, n, phi, gdot, strain = EXTREMES[case]
+    run = js.shear(js.Spherocylinders(alpha=alpha), n=n, phi=phi, gdot=gdot, strain=strain, rows=20,
+                   file=tmp_path / "a.h5", progress=False)  # fmt: skip
+    measured(pressure=run.pressure.max(), evaluations=float(run["evaluations"][-1]))
+    assert run.strain[-1] == pytest.approx(strain, rel=1e-12)
+    np.testing.assert_allclose(run.phi, phi, rtol=1e-12)
+    assert np.isfinite([*run.pressure, *run["p_xy"], *run["turned"]]).all()
+    assert 0 <= run.pressure.min() < run.pressure.max() < 0.2
