@@ -121,7 +121,7 @@ EXTREMES = {
     "fast, a box shorter than a rod": (4.0, 2, 0.6, 1e-1, 2.0),
     "slow, a box shorter than a rod": (4.0, 2, 0.9, 1e-8, 0.02),
     "long rods": (50.0, 4, 0.3, 1e-4, 0.1),
-    "long rods, slow": (50.0, 4, 0.3, 1e-8, 0.02),
+    "long rods, slow": (50.0, 4, 0.3, 1e-8, 0.1),
 }
 
 
@@ -134,4 +134,4 @@ def test_extremes_are_sheared_and_stay_what_they_were(case, tmp_path, measured):
     assert run.strain[-1] == pytest.approx(strain, rel=1e-12)
     np.testing.assert_allclose(run.phi, phi, rtol=1e-12)
     assert np.isfinite([*run.pressure, *run["p_xy"], *run["turned"]]).all()
-    assert 0 <= run.pressure.min() < run.pressure.max() < 0.2
+    assert 0 <= run.pressure.min() <= run.pressure.max() < 0.2
