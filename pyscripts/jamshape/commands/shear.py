@@ -45,7 +45,7 @@ def options_of() -> ArgumentParser:
             name, type=type(default), default=default, help=f"{meaning} ({default})"
         )
     parser.add_argument("--flow", choices=FLOWS, default=FLOWS[0], help="(%(default)s)")
-    usual = "heun with --dt or --sides 1, tr-bdf2 in the plane up to --gdot 1e-6, else rkc2"
+    usual = "heun with --dt or --sides 1, tr-bdf2 in the plane up to --gdot 3e-7, else rkc2"
     names = f"{', '.join(INTEGRATORS)}; implicit: {', '.join(METHODS)}"
     parser.add_argument("--integrator", help=f"{names} ({usual})")
     error = "local error over the typical overlap, but of heun (1e-4; of implicit steps 1e-3)"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jamshape.drawing.text import ensemble_text, pressure_unit
+from jamshape.measures.flow_curves import yielded
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,7 +56,7 @@ def _draw_onset(axes: Axes, curves: Sequence[FlowCurve], onset: ShearOnset) -> N
     axes.plot(phi, eta, "o-", color="C0", lw=0.8, ms=4, label=r"$p/\dot\gamma$ at the lowest rate")
     axes.set(yscale="log", xlabel=r"packing fraction $\phi$", ylabel=r"$p/\dot\gamma$")
     other = axes.twinx()
-    above = [curve for curve in curves if curve.has_yielded]
+    above = yielded(curves)
     values = ([c.phi for c in above], [c.yields for c in above], [c.yields_error for c in above])
     other.errorbar(*values, fmt="s", color="C1", ms=4, label="yield pressure $p_0$")
     other.set_ylabel("$p_0$")

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 # At such rates and below implicit steps are faster than explicit ones; their errors where nothing else is asked for.
-_SLOW = 1e-6
+_SLOW = 3e-7
 _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
 
 
@@ -83,7 +83,7 @@ def shear(
     integrator : {"rkc2", "heun/adaptive", "heun", "tr-bdf2", "sdirk2"}, optional
         The first three are LAMMPS's, as of `compress`; the last two take implicit steps in the plane, without LAMMPS, at a
         cost that hardly grows as the rate falls. ``heun`` with one bond or where `dt` is given; else ``tr-bdf2`` in
-        the plane at rates of 1e-6 and below, and ``rkc2`` otherwise.
+        the plane at rates of 3e-7 and below, and ``rkc2`` otherwise.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 when left out.
     tolerance : float, optional

@@ -125,13 +125,20 @@ def shear_onset(curves: Sequence[FlowCurve]) -> ShearOnset:
         NaN where there are fewer than three packing fractions on that side. For viscosities those count whose pressure is
         proportional to the rate to a fifth.
     """
-    above = [curve for curve in curves if curve.has_yielded]
+    above = yielded(curves)
     below = [curve for curve in curves if _is_newtonian(curve)]
     unknown = Mean(math.nan)
     from_yield = _zero_of_line(above) if len(above) >= _FEWEST_RATES else unknown
     if len(below) < _FEWEST_RATES:
         return ShearOnset(from_yield, unknown, unknown)
     return ShearOnset(from_yield, *_divergence(below))
+
+
+def yielded(curves: Sequence[FlowCurve]) -> list[FlowCurve]:
+    """Pick those with a yield pressure that are denser than all whose law tells of none."""
+    known = [curve for curve in curves if math.isfinite(curve.yields)]
+    loose = max((curve.phi for curve in known if not curve.has_yielded), default=-math.inf)
+    return [curve for curve in known if curve.phi > loose]
 
 
 def _is_newtonian(curve: FlowCurve) -> bool:

@@ -12,8 +12,8 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.measures.averages import Mean
 
-# Where the start-up may end, in parts of a run: so many places up to half of it are tried.
-_TRIED, _LATEST = 16, 0.5
+# Where the start-up may end, in parts of a run: so many places between these are tried.
+_EARLIEST, _LATEST, _TRIED = 1 / 16, 0.5, 16
 
 # Series shorter than this have no error that means anything.
 _FEWEST = 8
@@ -142,7 +142,7 @@ def steady_state(
         Ascending; steps may differ.
     after : float, optional
         Strain from which to average. When left out it is chosen so that as many independent samples as can be
-        are left of the slowest of pressure, shear stress and order (Chodera, J. Chem. Theory Comput. 12, 1799 (2016)).
+        are left of the slowest of pressure, shear stress and order, a sixteenth of the run at least (Chodera, J. Chem. Theory Comput. 12, 1799 (2016)).
 
     Returns
     -------
@@ -173,7 +173,9 @@ def steady_state(
 
 def _series_of(observables: Mapping[str, FloatArray], strain: FloatArray) -> dict[str, FloatArray]:
     """Pick (T - 1,) series, means over as many equal strains."""
-    known = {name: np.asarray(values, np.float64) for name, values in observables.items()}
+    known = {name: np.array(values, np.float64) for name, values in observables.items()}
+    for name in known.keys() - {"turned"}:
+        known[name][0] = known[name][1]  # the start itself was not sheared
     found = {name: known[name] for name in ("pressure", "normal_difference", "z")}
     found |= {
         "shear_stress": -known["p_xy"],
@@ -201,7 +203,7 @@ def _means_between(edges: FloatArray, strain: FloatArray, values: FloatArray) ->
 def _begin(series: Mapping[str, FloatArray]) -> int:
     """Choose the sample at which the slowest of them has become steady."""
     n = len(series["pressure"])
-    tried = np.unique(np.linspace(0, _LATEST * n, _TRIED).astype(int))
+    tried = np.unique(np.linspace(_EARLIEST * n, _LATEST * n, _TRIED).astype(int))
 
     def begin_of(values: FloatArray) -> int:
         left = [(n - k) / block_average(values[k:]).inefficiency for k in tried]
