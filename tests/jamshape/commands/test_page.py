@@ -75,6 +75,29 @@ def test_the_commands_of_protocols_run_in_their_order(jamshape, tmp_path, monkey
         assert not ended.code or (may_fail and ended.code == 1), f"{line}: {ended}"
 
 
+SHEAR = (PAGES / "shear.md").read_text(encoding="utf-8")
+
+
+def test_the_commands_and_lines_of_python_about_shear_run(jamshape, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    first, steps = OF_COMMAND.findall(SHEAR)
+    assert not jamshape(*shlex.split(first), *QUICK["shear"].split()).code
+    for code in re.findall(r"```python\n(.*?)```", SHEAR, re.DOTALL):
+        script = "import jamshape as js\n" + code.replace("n=64", "n=16").replace(
+            "strain=4", "strain=1"
+        )
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-c", script],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+    # From the packing that the lines have made.
+    assert not jamshape(*shlex.split(steps), "--step", 1e-2).code
+
+
 CLUSTER = (PAGES / "cluster.md").read_text(encoding="utf-8")
 
 
