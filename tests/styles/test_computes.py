@@ -357,7 +357,7 @@ NO_PAIR_STYLE = (
         (
             "compute c all contact/local itag nonsense",
             "compute contact/local found column 'nonsense', expected one of: "
-            + " ".join(sorted(COLUMNS))
+            + " ".join(sorted([*COLUMNS, "rx", "ry", "rz"]))
             + ".",
         ),
         (
