@@ -20,7 +20,7 @@ from jamshape.landscape import Landscape
 from jamshape.minima import Minimum, Outcome, Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.packing import State
-from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
 from jamshape.vibration.sliding import Sliding, Step
 from jamshape.vibration.sparse_modes import lowest
 from jamshape.vibration.spectrum import Spectrum, spectrum
@@ -36,6 +36,12 @@ _RELAXED, _EVALUATIONS = 1e-6, 400
 
 # Residual at which what slides has met its walls.
 _SETTLED = 1e-10
+
+# What so few modes have left may lean on walls with less than digits tell. Nudges of so many smallest radii close them;
+# forces then balance to this.
+_FEW_NEGATIVE = 3
+_NUDGES = (1e-10, 1e-9, 1e-8, 1e-7)
+_TOUCHING = 1e-9
 
 # The energy falls by a larger part only where particles rearrange, which is believed of steps that are so short, and
 # of shorter ones also where the packing unjams.
@@ -74,12 +80,7 @@ class Proof:
     @classmethod
     def of(cls, landscape: Landscape, state: State) -> Proof:
         """Find the modes of a state, by `vibration.spectrum` of relative accuracy."""
-        matrix = dynamical_matrix(landscape, state, Scope(force=True))
-        most = matrix.size - matrix.translations.shape[1] - 2
-        if matrix.size <= _DENSE or most <= _SOFTEST:
-            found: Spectrum = spectrum(matrix)
-        else:
-            found = lowest(matrix, _SOFTEST)
+        _, found = _modes(landscape, state)
         own = np.flatnonzero(~found.is_translation)
         first = own[np.argmin(found.eigenvalues[own])]
         n_negative = int((found.sign[own] < 0).sum())
@@ -239,7 +240,7 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     """Lead what has met its walls to the energy, and look whether it is a minimum."""
     minimum = _settled(landscape, find(landscape, search.minimum.state, target))
     search.n_closed += 1
-    search.proof = Proof.of(landscape, minimum.state)
+    minimum, search.proof = _against_walls(landscape, minimum)
     balanced = minimum.residual.largest <= target.tolerance
     if search.proof.n_negative == 0 and balanced:
         search.minimum = replace(minimum, outcome=Outcome.CONVERGED)
@@ -249,6 +250,41 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     search.minimum = replace(minimum, outcome=left)
     search.farthest, search.last = _everywhere(landscape, _CAREFUL), None
     search.keeping = search.proof.n_negative > 0
+
+
+def _modes(landscape: Landscape, state: State) -> tuple[DynamicalMatrix, Spectrum]:
+    """Find the modes of a state: all, or of large packings the softest."""
+    matrix = dynamical_matrix(landscape, state, Scope(force=True))
+    most = matrix.size - matrix.translations.shape[1] - 2
+    if matrix.size <= _DENSE or most <= _SOFTEST:
+        return matrix, spectrum(matrix)
+    return matrix, lowest(matrix, _SOFTEST)
+
+
+def _against_walls(landscape: Landscape, minimum: Minimum) -> tuple[Minimum, Proof]:
+    """Bring what leans on a wall with less than digits tell into contact with it.
+
+    Whether such a wall is open or closed is decided by rounding; with forces balanced as well, the state in which it is closed
+    is the minimum. Nudges along the mode that it stops, both ways, find that state where there is one.
+    """
+    proof = Proof.of(landscape, minimum.state)
+    if not 0 < proof.n_negative <= _FEW_NEGATIVE:
+        return minimum, proof
+    matrix, found = _modes(landscape, minimum.state)
+    own = np.flatnonzero(~found.is_translation)
+    mode = found.vectors[:, own[np.argmin(found.eigenvalues[own])]]
+    shift, turn = matrix.coordinates.motion(mode / np.abs(mode).max() * 0.5 * landscape.length)
+    for size in (sign * nudge for nudge in _NUDGES for sign in (1, -1)):
+        nudged = replace(minimum, state=minimum.state.displaced(size * shift, size * turn))
+        there = minimise(
+            landscape, nudged.state, "newton", Stop(_SETTLED, evaluations=_EVALUATIONS)
+        )
+        if there.residual.largest > max(minimum.residual.largest, _TOUCHING):
+            continue
+        closed = Proof.of(landscape, there.state)
+        if closed.n_negative < proof.n_negative:
+            return replace(there, outcome=minimum.outcome), closed
+    return minimum, proof
 
 
 def _settled(landscape: Landscape, minimum: Minimum) -> Minimum:
