@@ -24,7 +24,6 @@ StageEnd solve_stage(Vicinity &of, const PosedStage &stage, const std::shared_pt
             "a part of a stage has another length than there are coordinates.");
     require_finite(*part, "a part of a stage");
   }
-  require_finite(stage.equation.strain, "strain");
   require_base(of);
   require(!factors || factors->size() == of.n(),
           "the factors are of another number of coordinates.");
@@ -60,20 +59,19 @@ void export_stages(nb::module_ &m)
             new (place) StageLimits{accuracy, {longest_step, widest_turn}};
           },
           "accuracy"_a, "longest_step"_a, "widest_turn"_a);
-  nb::class_<PosedStage>(m, "Stage", "drag (x - centre) + dU/dx = 0 in a box of given strain.")
+  nb::class_<PosedStage>(m, "Stage", "drag (x - centre) + dU/dx = 0, with x from the base.")
       .def(
           "__init__",
-          [](PosedStage *place, double strain, const Array1<double> &drag,
-             const Array1<double> &centre, bool extended, const StageUnits &units,
-             const StageLimits &limits, const Array1<double> &guess, const Array1<double> &other) {
-            new (place) PosedStage{{strain, vector(drag), vector(centre), extended},
+          [](PosedStage *place, const Array1<double> &drag, const Array1<double> &centre,
+             bool extended, const StageUnits &units, const StageLimits &limits,
+             const Array1<double> &guess, const Array1<double> &other) {
+            new (place) PosedStage{{vector(drag), vector(centre), extended},
                                    units,
                                    limits,
                                    vector(guess),
                                    vector(other)};
           },
-          "strain"_a, "drag"_a, "centre"_a, "extended"_a, "units"_a, "limits"_a, "guess"_a,
-          "other"_a);
+          "drag"_a, "centre"_a, "extended"_a, "units"_a, "limits"_a, "guess"_a, "other"_a);
   nb::class_<StageEnd>(m, "StageEnd")
       .def_prop_ro("x", [](const StageEnd &end) { return array_of(end.x.data(), end.x.size()); })
       .def_prop_ro("sums", [](const StageEnd &end) { return tuple_of(end.sums); })

@@ -218,12 +218,6 @@ void export_vicinity(nb::module_ &m)
           "None where the pairs no longer hold, or energy, gradient (n,), derivative by the\n"
           "strain, sum of the magnitudes of bond forces, number of bonds, and a pair that crosses\n"
           "and one that is unconverged, or -1.")
-      .def(
-          "stretch",
-          [](const Vicinity &of, double strain) {
-            return array_of(of.stretch(strain).data(), of.n());
-          },
-          "strain"_a, "(n,) 1 + strain for displacements, 1 for rotations.")
       .def("factorise", &factorise, "x"_a, "strain"_a, "diagonal"_a,
            "Factors of the Hessian by these coordinates plus a diagonal (n,), shifted if it is\n"
            "not positive definite.")

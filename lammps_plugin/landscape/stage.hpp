@@ -13,11 +13,10 @@
 
 namespace jamshape {
 
-/// The equation of one stage of an implicit step: in a box of given strain the displacement x obeys
+/// The equation of one stage of an implicit step: the displacement x from the base obeys
 ///     drag (x - centre) + dU/dx = 0,
 /// the minimum of U + (x - centre).drag (x - centre) / 2. Drag coefficients (n,) are over the time.
 struct Stage {
-  double strain;
   Eigen::VectorXd drag, centre;
   bool extended;  // whether doubles are too short
 };
@@ -80,7 +79,7 @@ class StageSolver {
   StageSolver(Vicinity &landscape, const Stage &equation, const StageUnits &scales,
               const StageLimits &bounds, Renew renew) :
       about(landscape), stage(equation), units(scales), limits(bounds),
-      renew_pairs(std::move(renew)), stretch(landscape.stretch(equation.strain))
+      renew_pairs(std::move(renew))
   {
   }
 
@@ -155,7 +154,6 @@ class StageSolver {
   const StageUnits &units;
   const StageLimits &limits;
   Renew renew_pairs;
-  Vector stretch;
   StageFactors known;
   std::vector<Kink> kinks;
   int evaluations = 0, factorisations = 0, directions = 0;
@@ -169,12 +167,11 @@ class StageSolver {
 
   Point point(Vector x)
   {
-    const Displacement at{x.data(), stage.strain};
+    const Displacement at{x.data(), 0.0};
     if (!about.holds(at)) renew(at);
     ++evaluations;
     LandscapeSums sums = about.evaluate(at, stage.extended);
-    Vector gradient =
-        stretch.cwiseProduct(sums.gradient) + stage.drag.cwiseProduct(x - stage.centre);
+    Vector gradient = sums.gradient + stage.drag.cwiseProduct(x - stage.centre);
     return {std::move(x), std::move(sums), std::move(gradient)};
   }
 
@@ -200,7 +197,7 @@ class StageSolver {
       if (serve(at, found.size)) return found;
     }
     size_before = 0.0;
-    known = {about.factorise({at.x.data(), stage.strain}, stage.drag), at.sums.n_bonds};
+    known = {about.factorise({at.x.data(), 0.0}, stage.drag), at.sums.n_bonds};
     ++factorisations;
     return known.factors ? newton(at) : Correction{};
   }

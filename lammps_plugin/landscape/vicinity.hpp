@@ -117,8 +117,6 @@ class Vicinity {
   virtual void share(std::size_t threads) = 0;
 
   virtual LandscapeSums evaluate(const Displacement &at, bool extended) const = 0;
-  /// (n,) by how much a coordinate moves its particle: 1 + strain, and 1 for rotations.
-  virtual Eigen::VectorXd stretch(double strain) const = 0;
   /// At most 1: the part of a step (n,) that moves no particle too far and turns none too wide.
   virtual double part_within(const double *step, const StepBounds &bounds) const = 0;
   /// The largest length of a particle's part, force or torque, of a vector (n,).
@@ -241,13 +239,6 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   LandscapeSums evaluate(const Displacement &at, bool extended) const override
   {
     return extended ? sums<long double>(at) : sums<double>(at);
-  }
-
-  Eigen::VectorXd stretch(double strain) const override
-  {
-    Eigen::VectorXd found(n());
-    each_coordinate([&](std::int64_t c, bool is_turn) { found[c] = is_turn ? 1.0 : 1.0 + strain; });
-    return found;
   }
 
   double part_within(const double *step, const StepBounds &bounds) const override

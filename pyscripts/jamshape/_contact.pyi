@@ -160,7 +160,6 @@ class StageLimits:
 class Stage:
     def __init__(
         self,
-        strain: float,
         drag: NDArray[np.float64],
         centre: NDArray[np.float64],
         extended: bool,
@@ -238,7 +237,6 @@ class Vicinity:
     def evaluate(
         self, x: NDArray[np.float64], strain: float, extended: bool
     ) -> tuple[float, NDArray[np.float64], float, float, int, int, int] | None: ...
-    def stretch(self, strain: float) -> NDArray[np.float64]: ...
     def part_within(
         self, x: NDArray[np.float64], longest_step: float, widest_turn: float
     ) -> float: ...

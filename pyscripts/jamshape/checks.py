@@ -36,7 +36,7 @@ RANGES = {
     "kappa": Range(1e-14, 0.1, "a rate"),
     "gdot": Range(1e-14, 0.1, "a rate"),
     "strain": Range(1e-6, 1e6, "a strain"),
-    "pure_strain": Range(1e-6, 3.0, "a strain of pure shear"),
+    "pure_strain": Range(1e-12, 3.0, "a strain of pure shear"),
     "strain_step": Range(1e-12, 0.1, "a step of the strain"),
     "strain_end": Range(1e-12, 1e6, "a strain"),
     "hold_pressure": Range(1e-12, 1.0, "a pressure", also=(0.0,)),

@@ -53,6 +53,14 @@ def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser
     return parser
 
 
+def add_numbers(parser: ArgumentParser, *rows: tuple[str, int | float, str]) -> None:
+    """Add options that are numbers, each with its name, what it is where it is left out, and what it means."""
+    for name, default, meaning in rows:
+        parser.add_argument(
+            name, type=type(default), default=default, help=f"{meaning} ({default})"
+        )
+
+
 def report(found: Mapping[str, Any]) -> None:
     """Print one line of JSON with what `plain` makes of it."""
     print(json.dumps(plain(found), allow_nan=False))

@@ -117,6 +117,7 @@ def cases():
         "aqs step": aqs(step=0.0),
         "aqs long step": aqs(step=0.1, strain=0.05),
         "aqs flow": aqs(flow="complex"),
+        "aqs too far": aqs(flow="pure", strain=5.0),
         "aqs pressure": aqs(pressure=-1.0),
         "aqs file": aqs(file="run.h5"),
         "aqs no particles": lambda: js.quasistatic_shear(file="new.h5", progress=False),

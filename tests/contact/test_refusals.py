@@ -253,7 +253,7 @@ def test_points_of_a_landscape_that_are_no_numbers_are_refused(bad):
 def stage(**parts):
     units = _contact.StageUnits(1.0, 1.0, 1.0, N)
     given = {"drag": np.ones(9), "centre": np.zeros(9), "guess": np.zeros(9), "other": np.zeros(9)}
-    given |= {"strain": 0.0, "extended": False} | parts
+    given |= {"extended": False} | parts
     return _contact.Stage(units=units, limits=_contact.StageLimits(1e-9, 0.1, 0.1), **given)
 
 

@@ -14,7 +14,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from jamshape.checks import RANGES, require_in
-from jamshape.command import parser_of, report
+from jamshape.command import add_numbers, parser_of, report
 from jamshape.flow.shear import FLOWS
 from jamshape.front.shearing import quasistatic_shear
 from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
@@ -26,7 +26,8 @@ def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_of(__doc__)
     add_particle_options(parser)
-    for name, default, meaning in (
+    add_numbers(
+        parser,
         ("--n", 256, "particles"),
         ("--dimension", 2, "2 or 3"),
         ("--phi", 0.9, "packing fraction"),
@@ -36,10 +37,7 @@ def options_of() -> ArgumentParser:
         ("--tolerance", 1e-8, "largest net force over the mean bond force"),
         ("--seed", 1, "of the random start"),
         ("--frames", 20, "snapshots"),
-    ):
-        parser.add_argument(
-            name, type=type(default), default=default, help=f"{meaning} ({default})"
-        )
+    )
     parser.add_argument("--flow", choices=FLOWS, default=FLOWS[0], help="(%(default)s)")
     least = "leave drops below this part of the largest stress out of the list (%(default)s)"
     parser.add_argument("--least-drop", type=float, default=1e-2, help=least)

@@ -15,7 +15,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from jamshape.checks import require_free
-from jamshape.command import parser_of, report
+from jamshape.command import add_numbers, parser_of, report
 from jamshape.commands.onset import add_onset_options, tell_onset
 from jamshape.flow.recording import summary_of
 from jamshape.front.compressing import compress
@@ -29,7 +29,8 @@ def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_of(__doc__)
     add_particle_options(parser)
-    for name, default, meaning in (
+    add_numbers(
+        parser,
         ("--n", 256, "particles"),
         ("--dimension", 2, "2 or 3"),
         ("--kappa", 1e-5, "compression rate"),
@@ -40,10 +41,7 @@ def options_of() -> ArgumentParser:
         ("--seed", 1, "of the random start"),
         ("--rows", 400, "samples of p(phi)"),
         ("--frames", 20, "snapshots"),
-    ):
-        parser.add_argument(
-            name, type=type(default), default=default, help=f"{meaning} ({default})"
-        )
+    )
     usual = "rkc2; heun with --dt or --sides 1"
     parser.add_argument("--integrator", help=f"heun, heun/adaptive or rkc2 ({usual})")
     parser.add_argument("--dt", type=float, help="time step of heun (0.05)")

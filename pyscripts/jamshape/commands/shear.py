@@ -15,7 +15,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from jamshape.checks import RANGES, require_in
-from jamshape.command import parser_of, report
+from jamshape.command import add_numbers, parser_of, report
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.motion import INTEGRATORS
 from jamshape.flow.shear import FLOWS
@@ -30,7 +30,8 @@ def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_of(__doc__)
     add_particle_options(parser)
-    for name, default, meaning in (
+    add_numbers(
+        parser,
         ("--n", 256, "particles"),
         ("--dimension", 2, "2 or 3"),
         ("--phi", 0.8, "packing fraction"),
@@ -40,10 +41,7 @@ def options_of() -> ArgumentParser:
         ("--seed", 1, "of the random start"),
         ("--rows", 1000, "samples of stress and order"),
         ("--frames", 20, "snapshots"),
-    ):
-        parser.add_argument(
-            name, type=type(default), default=default, help=f"{meaning} ({default})"
-        )
+    )
     parser.add_argument("--flow", choices=FLOWS, default=FLOWS[0], help="(%(default)s)")
     usual = "heun with --dt or --sides 1, tr-bdf2 in the plane up to --gdot 3e-7, else rkc2"
     names = f"{', '.join(INTEGRATORS)}; implicit: {', '.join(METHODS)}"

@@ -15,7 +15,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from jamshape.checks import RANGES, Range, require_in
-from jamshape.command import parser_of, report
+from jamshape.command import add_numbers, parser_of, report
 from jamshape.commands.onset import add_onset_options, tell_onset
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.slow_recording import summary_of
@@ -32,7 +32,8 @@ def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_of(__doc__)
     add_particle_options(parser)
-    for name, default, meaning in (
+    add_numbers(
+        parser,
         ("--n", 256, "particles"),
         ("--kappa", 1e-8, "compression rate"),
         ("--phi-start", 0.8, "packing fraction where the fast compression ends"),
@@ -43,10 +44,7 @@ def options_of() -> ArgumentParser:
         ("--seed", 1, "of the random start"),
         ("--tolerance", 1e-3, "local error of a step over the typical overlap"),
         ("--largest-drop", math.inf, "part of the energy that a step may lose (plastic events)"),
-    ):
-        parser.add_argument(
-            name, type=type(default), default=default, help=f"{meaning} ({default})"
-        )
+    )
     parser.add_argument("--method", choices=METHODS, default="tr-bdf2")
     add_onset_options(parser)
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")

@@ -582,7 +582,7 @@ class _Run:
             guess = centre + own * self._predicted(path)
             path.go_to_stage()
             pushed = centre + own * path.excess_spin(guess)
-            stage = Stage(0.0, drag, pushed, (guess, last), self._is_extended(unit))
+            stage = Stage(drag, pushed, (guess, last), self._is_extended(unit))
             found = self.vicinity.solve(stage, flow._factors, units, accuracy)
             flow.factorisations += found.factorisations
             flow._factors, flow._dt_of_factors = found.factors, dt

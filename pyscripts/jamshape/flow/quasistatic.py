@@ -17,11 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray, LongArray
-from jamshape.checks import require_one_of, require_positive
+from jamshape.checks import RANGES, require_in, require_one_of, require_positive
 from jamshape.contacts import Contacts
+from jamshape.flow.host import Host
 from jamshape.flow.shear import FLOWS
 from jamshape.landscape import Landscape, State
 from jamshape.measures.order import OrientationalOrder, orientational_order
+from jamshape.measures.stress import ShearStress
 from jamshape.minima import Minimum, Stop, minimise
 from jamshape.minima.target import followed
 from jamshape.packing import Packing
@@ -63,7 +65,8 @@ class QuasistaticShear:
     Raises
     ------
     ValueError
-        If a number is not positive, the step longer than the strain, or there is no such flow.
+        If a number is not positive, the step longer than the strain, pure shear goes beyond 3, or there is no
+        such flow.
     """
 
     strain_step: float = 1e-3
@@ -79,6 +82,8 @@ class QuasistaticShear:
         if self.hold_pressure != 0:
             require_positive(hold_pressure=self.hold_pressure)
         require_one_of("flow", self.flow, FLOWS)
+        if self.flow == "pure":
+            require_in("strain", self.strain_end, RANGES["pure_strain"])
         if self.strain_step > self.strain_end:
             msg = f"the step is {self.strain_step:g}, expected at most the strain to reach, {self.strain_end:g}"
             raise ValueError(msg)
@@ -91,18 +96,17 @@ class QuasistaticShear:
     def gradient(self, dimension: int, strain: float) -> LongArray:
         """(D, D) matrix that shears by a strain."""
         found: LongArray = np.eye(dimension, dtype=np.longdouble)
-        if self.flow == "simple":
-            found[0, 1] = strain
-        else:
-            found[0, 0] = np.exp(np.longdouble(strain))
-            found[1, 1] = 1 / found[0, 0]
+        found[:2, :2] = self._host.deformation(strain)
         return found
 
     def resisted(self, pressure: FloatArray) -> float:
         """Give the energy's derivative by the strain over the volume, of a pressure tensor (D, D)."""
-        if self.flow == "simple":
-            return -float(pressure[0, 1])
-        return float(pressure[1, 1] - pressure[0, 0])
+        return -float((pressure[:2, :2] * self._host.gradient).sum())
+
+    @property
+    def _host(self) -> Host:
+        """One that shears by the strain 1 in the time 1."""
+        return Host.shearing(1.0, self.flow)
 
 
 class Row(NamedTuple):
@@ -125,7 +129,7 @@ class Row(NamedTuple):
     stress: float
     """The energy's derivative by the strain over the volume: -p_xy of simple shear."""
     lost: float
-    """Energy over the volume that the step dissipated: what the stress gave less what is still there."""
+    """Energy over the volume that the step dissipated: what stress and pressure gave less what is still there."""
     residual: float
     evaluations: int
     wall_seconds: float
@@ -141,14 +145,18 @@ class Sheared:
         A minimum, once there was a step.
     steps
         How many were made; -1 before the first minimisation.
-    u, stress
-        Energy and resisting stress there, [energy / length^D].
+    u, stress, pressure
+        Energy, resisting stress and pressure there, [energy / length^D].
+    volume
+        Of its box.
     """
 
     state: State
     steps: int = -1
     u: float = 0.0
     stress: float = 0.0
+    pressure: float = 0.0
+    volume: float = 0.0
     evaluations: int = 0
     wall_seconds: float = 0.0
 
@@ -187,7 +195,8 @@ def shear(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Iterator
         row = _row(landscape, found, run, how)
         run.evaluations += landscape.evaluations - evaluations
         run.wall_seconds += time.perf_counter() - began
-        run.u, run.stress = row.u, row.stress
+        run.u, run.stress, run.pressure = row.u, row.stress, row.pressure
+        run.volume = found.state.volume
         yield row._replace(evaluations=run.evaluations, wall_seconds=run.wall_seconds)
 
 
@@ -246,17 +255,17 @@ def _row(landscape: Landscape, found: Minimum, run: Sheared, how: QuasistaticShe
     tensor = landscape.stress(found.state)
     u, stress = found.energy_density, how.resisted(tensor)
     order, counts = _order(packing), Contacts.of(packing, landscape.k_e, landscape.sides).counts
-    half, p_xy = 0.5 * float(tensor[0, 0] - tensor[1, 1]), float(tensor[0, 1])
-    sigma, pressure = math.hypot(half, p_xy), pressure_of(found)
+    pressure, volume = pressure_of(found), found.state.volume
     strain = min(how.strain_end, run.steps * how.strain_step)
     done = strain - min(how.strain_end, max(run.steps - 1, 0) * how.strain_step)
-    given = 0.5 * (run.stress + stress) * done
+    given = 0.5 * (run.stress * run.volume + stress * volume) * done
+    given += 0.5 * (run.pressure + pressure) * (run.volume - volume)
+    lost = (run.u * run.volume + given) / volume - u
     return Row(
-        step=run.steps, strain=strain, phi=packing.phi, u=u, pressure=pressure, p_xy=p_xy,
-        normal_difference=2 * half, sigma=sigma, mu=sigma / pressure if pressure > 0 else 0.0,
-        z=counts.z, z_single=counts.z_single, rattlers=counts.n_rattlers,
+        step=run.steps, strain=strain, phi=packing.phi, u=u, pressure=pressure,
+        **ShearStress.of(tensor)._asdict(), z=counts.z, z_single=counts.z_single, rattlers=counts.n_rattlers,
         S_2=order.S_n, director=order.theta_n, stress=stress,
-        lost=run.u + given - u if run.steps > 0 else 0.0, residual=found.residual.largest,
+        lost=lost if run.steps > 0 else 0.0, residual=found.residual.largest,
         evaluations=0, wall_seconds=0.0,
     )  # fmt: skip
 

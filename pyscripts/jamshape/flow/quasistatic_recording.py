@@ -19,7 +19,7 @@ from jamshape.packing import Packing
 MOST_STEPS_PER_FRAME = 50
 
 _ROW = tuple(name for name in Row._fields if name not in {"step", "wall_seconds", "residual"})
-_COUNTS = ("steps", "u", "stress", "evaluations", "wall_seconds")
+_COUNTS = ("steps", "u", "stress", "pressure", "volume", "evaluations", "wall_seconds")
 
 
 def begin(

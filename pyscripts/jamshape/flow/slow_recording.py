@@ -51,7 +51,9 @@ def begin(
     RunWriter.create(path, _as_frame(flow, first), stored | _counts(flow)).close()
 
 
-def require_same(path: Path, protocol: Protocol | SlowShear) -> None:
+def require_same(
+    path: Path, protocol: Protocol | SlowShear, attributes: Mapping[str, Any] | None = None
+) -> None:
     """Refuse the file of a run with another protocol.
 
     Raises
@@ -59,7 +61,7 @@ def require_same(path: Path, protocol: Protocol | SlowShear) -> None:
     ValueError
     """
     what = "a shear" if isinstance(protocol, SlowShear) else "a compression"
-    require_attributes(path, _as_attributes(protocol), what)
+    require_attributes(path, _as_attributes(protocol) | dict(attributes or {}), what)
 
 
 def is_finished(path: Path) -> bool:

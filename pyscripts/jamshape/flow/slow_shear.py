@@ -12,6 +12,7 @@ from jamshape.flow.implicit import METHODS, Flow, Leg
 from jamshape.flow.shear import FLOWS
 from jamshape.landscape import Landscape
 from jamshape.measures.order import orientational_order
+from jamshape.measures.stress import ShearStress
 
 
 @dataclass(frozen=True)
@@ -63,17 +64,12 @@ class SlowShear:
     def measured(self, landscape: Landscape, flow: Flow) -> dict[str, float]:
         """Measure stress, contacts, order and rotation, named as those of `jamshape.flow.shear`."""
         state = flow.state
-        tensor, packing = landscape.stress(state), state.packing(landscape.particles)
-        half, p_xy = 0.5 * float(tensor[0, 0] - tensor[1, 1]), float(tensor[0, 1])
-        sigma, pressure = math.hypot(half, p_xy), 0.5 * float(tensor.trace())
+        packing = state.packing(landscape.particles)
+        stress = ShearStress.of(landscape.stress(state))._asdict()
         order = orientational_order(packing.orientation, 2)
         has_order = bool(landscape.rotation_length.any())
-        return {
+        return stress | {
             f"{'shear' if self.flow == 'simple' else 'pure'}_strain": flow.strain,
-            "normal_difference": 2 * half,
-            "p_xy": p_xy,
-            "sigma": sigma,
-            "mu": sigma / pressure if pressure > 0 else 0.0,
             "z": Contacts.of(packing, landscape.k_e, landscape.sides).z,
             "S_2": order.S_n if has_order else 0.0,
             "director": order.theta_n if has_order else 0.0,

@@ -17,7 +17,7 @@ from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.flow.recording import Recording
 from jamshape.flow.shear import Shear
 from jamshape.flow.slow_shear import SlowShear
-from jamshape.front.progress import Place, place
+from jamshape.front.progress import place
 from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import QuasistaticShearFile, ShearFile
 from jamshape.front.starts import start_of, told_of
@@ -134,7 +134,9 @@ def shear(
         longest = min(SlowShear.largest_strain, strain / rows)
         error = tolerance or _IMPLICIT_ERROR
         slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
-        return _shear_slowly(slow, of, at, _How(again, progress))
+        _shear_slowly(slow, of, at.path, again=again, sides=sides)
+        resume(at.path, progress=progress)
+        return ShearFile(*at)
     settings = Shear(
         gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
         sides=sides, integrator=integrator, tolerance=tolerance or _ERROR,
@@ -142,7 +144,8 @@ def shear(
     if settings.chooses_steps:
         settings = settings.in_steps(rows)
     to = Recording(at.path, rows, frames, of.made_from)
-    return _shear_in_lammps(settings, of, _Into(at, to), _How(again, progress))
+    _shear_in_lammps(settings, of, to, _How(again, progress))
+    return ShearFile(*at)
 
 
 def quasistatic_shear(
@@ -232,11 +235,6 @@ class _How(NamedTuple):
     progress: bool
 
 
-class _Into(NamedTuple):
-    at: Place
-    to: Recording
-
-
 class _Numbers(NamedTuple):
     """What a random start is made with."""
 
@@ -305,29 +303,27 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
     return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
 
 
-def _shear_in_lammps(settings: Shear, of: _Start, into: _Into, how: _How) -> ShearFile:
-    at, to = into
-    require_path_for_lammps(at.path)  # restart files lie beside it
-    if how.again or not at.path.exists():
+def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> None:
+    require_path_for_lammps(to.path)  # restart files lie beside it
+    if how.again or not to.path.exists():
         first = of.flowing()
         settings.all_steps(first)  # refuses what does not end
         record_flow(lambda session: recording.begin(session, settings, first, to), to, how.progress)
     else:
         recording.require_same(to, settings, of.dimension)
-        resume(at.path, progress=how.progress)
-    return ShearFile(*at)
+        resume(to.path, progress=how.progress)
 
 
-def _shear_slowly(settings: SlowShear, of: _Start, at: Place, how: _How) -> ShearFile:
-    require_path(at.path)
-    if at.path.exists() and not how.again:
-        slow_recording.require_same(at.path, settings)
+def _shear_slowly(settings: SlowShear, of: _Start, path: Path, *, again: bool, sides: int) -> None:
+    """Begin the file of a run by implicit steps, or see that it holds this one."""
+    require_path(path)
+    if of.dimension != 2 or sides != 2:
+        msg = (
+            f"implicit steps were asked for in {of.dimension} dimensions with {sides} bonds side to side,"
+            " expected 2 and 2; take another integrator"
+        )
+        raise ValueError(msg)
+    if path.exists() and not again:
+        slow_recording.require_same(path, settings, of.made_from)
     else:
-        if of.dimension != 2:
-            msg = (
-                f"implicit steps were asked for in {of.dimension} dimensions, expected 2; take rkc2"
-            )
-            raise ValueError(msg)
-        slow_recording.begin(at.path, of.flowing(), settings, of.made_from)
-    resume(at.path, progress=how.progress)
-    return ShearFile(*at)
+        slow_recording.begin(path, of.flowing(), settings, of.made_from)

@@ -37,12 +37,10 @@ class DescentEnd(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """One stage of an implicit step: drag (x - centre) + dU/dx = 0 in a box of given strain.
+    """One stage of an implicit step: drag (x - centre) + dU/dx = 0, with x from the base.
 
     Parameters
     ----------
-    strain : float
-        Of the box since the base: x moves particles by (1 + strain) x and turns them by x.
     drag : (n,) array
         Drag coefficients in these coordinates, over the time: [energy / length^2].
     centre : (n,) array
@@ -53,7 +51,6 @@ class Stage:
         Whether doubles are too short.
     """
 
-    strain: float
     drag: FloatArray
     centre: FloatArray
     guesses: tuple[FloatArray, FloatArray]
@@ -168,7 +165,7 @@ class Vicinity:
         """
         limits = _contact.StageLimits(accuracy, self._longest_step, WIDEST_TURN)
         posed = _contact.Stage(
-            stage.strain, stage.drag, stage.centre, stage.extended, units, limits, *stage.guesses
+            stage.drag, stage.centre, stage.extended, units, limits, *stage.guesses
         )
         known = (factors.factors.compiled, factors.n_bonds) if factors else (None, 0)
         end = self._compiled.solve_stage(posed, *known, self._renew)
@@ -208,11 +205,6 @@ class Vicinity:
     def part_within(self, x: FloatArray) -> float:
         """Give the part, at most 1, of a step along (n,) coordinates that is as long as a step may be."""
         return float(self._compiled.part_within(x, self._longest_step, WIDEST_TURN))
-
-    def stretch(self, strain: float) -> FloatArray:
-        """(n,) 1 + strain for displacements, 1 for rotations."""
-        found: FloatArray = self._compiled.stretch(strain)
-        return found
 
     @property
     def _longest_step(self) -> float:

@@ -41,10 +41,6 @@ class ShearOf(NamedTuple):
     steady: SteadyState | None
     problem: str = ""
 
-    def number(self, name: str) -> float:
-        """Look up an average over the steady state; NaN where there is none."""
-        return self.steady[name].value if self.steady and name in self.steady.averages else np.nan
-
 
 def strain_of(observables: dict[str, FloatArray], flow: str) -> FloatArray:
     """(T,) strains of a run since its start."""

@@ -80,7 +80,11 @@ class Proof:
     @classmethod
     def of(cls, landscape: Landscape, state: State) -> Proof:
         """Find the modes of a state, by `vibration.spectrum` of relative accuracy."""
-        _, found = _modes(landscape, state)
+        return cls.by(_modes(landscape, state)[1])
+
+    @classmethod
+    def by(cls, found: Spectrum) -> Proof:
+        """Tell what modes prove."""
         own = np.flatnonzero(~found.is_translation)
         first = own[np.argmin(found.eigenvalues[own])]
         n_negative = int((found.sign[own] < 0).sum())
@@ -238,9 +242,13 @@ def _next_farthest(search: StrictSearch, moved: FloatArray, longest: float) -> F
 
 def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     """Lead what has met its walls to the energy, and look whether it is a minimum."""
-    minimum = _settled(landscape, find(landscape, search.minimum.state, target))
+    minimum = find(landscape, search.minimum.state, target)
+    settled = _settled(landscape, minimum.state)
+    is_better = settled.residual.largest < minimum.residual.largest
+    if is_better and target.is_met(settled.energy_density):  # it has not fallen apart
+        minimum = replace(settled, outcome=minimum.outcome)
     search.n_closed += 1
-    minimum, search.proof = _against_walls(landscape, minimum)
+    minimum, search.proof = _against_walls(landscape, minimum, target)
     balanced = minimum.residual.largest <= target.tolerance
     if search.proof.n_negative == 0 and balanced:
         search.minimum = replace(minimum, outcome=Outcome.CONVERGED)
@@ -261,25 +269,23 @@ def _modes(landscape: Landscape, state: State) -> tuple[DynamicalMatrix, Spectru
     return matrix, lowest(matrix, _SOFTEST)
 
 
-def _against_walls(landscape: Landscape, minimum: Minimum) -> tuple[Minimum, Proof]:
+def _against_walls(landscape: Landscape, minimum: Minimum, target: Target) -> tuple[Minimum, Proof]:
     """Bring what leans on a wall with less than digits tell into contact with it.
 
     Whether such a wall is open or closed is decided by rounding; with forces balanced as well, the state in which it is closed
     is the minimum. Nudges along the mode that it stops, both ways, find that state where there is one.
     """
-    proof = Proof.of(landscape, minimum.state)
+    matrix, found = _modes(landscape, minimum.state)
+    proof = Proof.by(found)
     if not 0 < proof.n_negative <= _FEW_NEGATIVE:
         return minimum, proof
-    matrix, found = _modes(landscape, minimum.state)
     own = np.flatnonzero(~found.is_translation)
     mode = found.vectors[:, own[np.argmin(found.eigenvalues[own])]]
     shift, turn = matrix.coordinates.motion(mode / np.abs(mode).max() * 0.5 * landscape.length)
     for size in (sign * nudge for nudge in _NUDGES for sign in (1, -1)):
-        nudged = replace(minimum, state=minimum.state.displaced(size * shift, size * turn))
-        there = minimise(
-            landscape, nudged.state, "newton", Stop(_SETTLED, evaluations=_EVALUATIONS)
-        )
-        if there.residual.largest > max(minimum.residual.largest, _TOUCHING):
+        there = _settled(landscape, minimum.state.displaced(size * shift, size * turn))
+        balanced = there.residual.largest <= max(minimum.residual.largest, _TOUCHING)
+        if not (balanced and target.is_met(there.energy_density)):
             continue
         closed = Proof.of(landscape, there.state)
         if closed.n_negative < proof.n_negative:
@@ -287,15 +293,13 @@ def _against_walls(landscape: Landscape, minimum: Minimum) -> tuple[Minimum, Pro
     return minimum, proof
 
 
-def _settled(landscape: Landscape, minimum: Minimum) -> Minimum:
+def _settled(landscape: Landscape, state: State) -> Minimum:
     """Let forces balance at a fixed box as well as digits allow.
 
     What slides is pushed against its wall by so little that forces balance to any usual tolerance before it is there:
     the wall is still open, and the mode that it would stop has a negative eigenvalue.
     """
-    found = minimise(landscape, minimum.state, "newton", Stop(_SETTLED, evaluations=_EVALUATIONS))
-    is_better = found.residual.largest < minimum.residual.largest
-    return replace(found, outcome=minimum.outcome) if is_better else minimum
+    return minimise(landscape, state, "newton", Stop(_SETTLED, evaluations=_EVALUATIONS))
 
 
 def _relaxed(landscape: Landscape, state: State) -> Minimum:

@@ -15,7 +15,7 @@ class Posed:
     """A stage of h in time about a state, and what is minimised."""
 
     def __init__(self, landscape, state, h, extended=False, strain=STRAIN):
-        self.vicinity, self.n, self.strain = Vicinity(landscape, state), landscape.size, strain
+        self.vicinity, self.n = Vicinity(landscape, state.strained(strain)), landscape.size
         self.drag, self.extended = drag_coefficients(landscape) / h, extended
         found = landscape.evaluate(state)
         overlap = found.bond_force
@@ -24,12 +24,12 @@ class Posed:
         )
 
     def solve(self, *guesses, factors=None, accuracy=ACCURACY):
-        stage = Stage(self.strain, self.drag, np.zeros(self.n), guesses, self.extended)
+        stage = Stage(self.drag, np.zeros(self.n), guesses, self.extended)
         return self.vicinity.solve(stage, factors, self.units, accuracy)
 
     def evaluate(self, x):
-        found = self.vicinity.evaluate(x, self.strain, extended=self.extended)
-        return found, self.vicinity.stretch(self.strain) * found.gradient + self.drag * x
+        found = self.vicinity.evaluate(x, 0.0, extended=self.extended)
+        return found, found.gradient + self.drag * x
 
     def size(self, x, force):
         return self.units.size(x, force, self.drag)
