@@ -1,6 +1,6 @@
 #pragma once
 
-#include "vec.hpp"
+#include "contact/math/vec.hpp"
 
 #include <cmath>
 
