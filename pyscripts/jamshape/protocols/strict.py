@@ -4,6 +4,10 @@ Minimisers leave packings of long rods at saddles: what slides along flat sides 
 force tells (Marschall & Teitel 2018, Appendix B). Here all that slides goes downhill in long steps, limited by new contacts
 (`vibration.sliding`); after each step what is stiff is relaxed. A rod that slides off another one unjams the packing, which is
 then led to its energy again. Of any shape and dimension.
+
+A minimum may lie on a kink of the energy, where the tips of two rods are level (`vibration.kinks`). Second derivatives of one
+side are then negative, and no step lowers the energy: such a state is a minimum if its energy rises to both sides of the kink
+and no motion along the kink has a negative eigenvalue. What kinks take is counted apart, as `Proof.n_kinked`.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ from jamshape.minima import Minimum, Outcome, Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.packing import State
 from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
+from jamshape.vibration.kinks import held_at, kinks_across
 from jamshape.vibration.sliding import Sliding, Step
 from jamshape.vibration.sparse_modes import lowest
 from jamshape.vibration.spectrum import Spectrum, spectrum
@@ -68,23 +73,33 @@ class Proof:
     Parameters
     ----------
     n_negative
-        Number of modes with an eigenvalue below zero by more than its numerical bound.
+        Number of modes with an eigenvalue below zero by more than its numerical bound, of motions that cross no kink
+        on which the minimum lies.
     lowest, bound
-        The lowest eigenvalue but those of translations, and the bound of its error, [energy / length^2].
+        The lowest eigenvalue of these but those of translations, and the bound of its error, [energy / length^2].
+    n_kinked
+        Number of negative eigenvalues that kinks take: the energy rises to both sides of them (`vibration.kinks`).
     """
 
     n_negative: int
     lowest: float
     bound: float
+    n_kinked: int
 
     @classmethod
     def of(cls, landscape: Landscape, state: State) -> Proof:
         """Find the modes of a state, by `vibration.spectrum` of relative accuracy."""
-        _, found = _modes(landscape, state)
+        matrix = dynamical_matrix(landscape, state, Scope(force=True))
+        found = _modes(matrix)
+        is_falling = (found.sign < 0) & ~found.is_translation
+        kinks = kinks_across(landscape, state, matrix, found.vectors[:, is_falling])
+        if kinks.shape[1]:
+            found = _modes(held_at(matrix, kinks))
         own = np.flatnonzero(~found.is_translation)
         first = own[np.argmin(found.eigenvalues[own])]
         n_negative = int((found.sign[own] < 0).sum())
-        return cls(n_negative, float(found.eigenvalues[first]), float(found.bound[first]))
+        lowest_one, bound = float(found.eigenvalues[first]), float(found.bound[first])
+        return cls(n_negative, lowest_one, bound, int(is_falling.sum()) - n_negative)
 
     def attributes(self) -> dict[str, Any]:
         """Return what a packing's file says of it."""
@@ -92,6 +107,7 @@ class Proof:
             "n_negative": self.n_negative,
             "lowest_eigenvalue": self.lowest,
             "lowest_eigenvalue_bound": self.bound,
+            "n_kinked": self.n_kinked,
         }
 
 
@@ -252,13 +268,12 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     search.keeping = search.proof.n_negative > 0
 
 
-def _modes(landscape: Landscape, state: State) -> tuple[DynamicalMatrix, Spectrum]:
-    """Find the modes of a state: all, or of large packings the softest."""
-    matrix = dynamical_matrix(landscape, state, Scope(force=True))
+def _modes(matrix: DynamicalMatrix) -> Spectrum:
+    """Find the modes of a matrix: all, or of large packings the softest."""
     most = matrix.size - matrix.translations.shape[1] - 2
     if matrix.size <= _DENSE or most <= _SOFTEST:
-        return matrix, spectrum(matrix)
-    return matrix, lowest(matrix, _SOFTEST)
+        return spectrum(matrix)
+    return lowest(matrix, _SOFTEST)
 
 
 def _against_walls(landscape: Landscape, minimum: Minimum) -> tuple[Minimum, Proof]:
@@ -270,7 +285,8 @@ def _against_walls(landscape: Landscape, minimum: Minimum) -> tuple[Minimum, Pro
     proof = Proof.of(landscape, minimum.state)
     if not 0 < proof.n_negative <= _FEW_NEGATIVE:
         return minimum, proof
-    matrix, found = _modes(landscape, minimum.state)
+    matrix = dynamical_matrix(landscape, minimum.state, Scope(force=True))
+    found = _modes(matrix)
     own = np.flatnonzero(~found.is_translation)
     mode = found.vectors[:, own[np.argmin(found.eigenvalues[own])]]
     shift, turn = matrix.coordinates.motion(mode / np.abs(mode).max() * 0.5 * landscape.length)
