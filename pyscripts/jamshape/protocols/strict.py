@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -89,17 +89,7 @@ class Proof:
     @classmethod
     def of(cls, landscape: Landscape, state: State) -> Proof:
         """Find the modes of a state, by `vibration.spectrum` of relative accuracy."""
-        matrix = dynamical_matrix(landscape, state, Scope(force=True))
-        found = _modes(matrix)
-        is_falling = (found.sign < 0) & ~found.is_translation
-        kinks = kinks_across(landscape, state, matrix, found.vectors[:, is_falling])
-        if kinks.shape[1]:
-            found = _modes(held_at(matrix, kinks))
-        own = np.flatnonzero(~found.is_translation)
-        first = own[np.argmin(found.eigenvalues[own])]
-        n_negative = int((found.sign[own] < 0).sum())
-        lowest_one, bound = float(found.eigenvalues[first]), float(found.bound[first])
-        return cls(n_negative, lowest_one, bound, int(is_falling.sum()) - n_negative)
+        return _proven(landscape, state).proof
 
     def attributes(self) -> dict[str, Any]:
         """Return what a packing's file says of it."""
@@ -256,7 +246,7 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     """Lead what has met its walls to the energy, and look whether it is a minimum."""
     minimum = _settled(landscape, find(landscape, search.minimum.state, target))
     search.n_closed += 1
-    minimum, search.proof = _against_walls(landscape, minimum)
+    minimum, search.proof = _against_walls(landscape, minimum, target)
     balanced = minimum.residual.largest <= target.tolerance
     if search.proof.n_negative == 0 and balanced:
         search.minimum = replace(minimum, outcome=Outcome.CONVERGED)
@@ -268,6 +258,33 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     search.keeping = search.proof.n_negative > 0
 
 
+class _Proven(NamedTuple):
+    """What is known of a state, and from what: modes of motions that cross no kink on which it lies."""
+
+    proof: Proof
+    matrix: DynamicalMatrix
+    found: Spectrum
+    first: int
+    """Which of them is the lowest but those of translations."""
+
+
+def _proven(landscape: Landscape, state: State) -> _Proven:
+    """Find the modes of a state, and what kinks take of them."""
+    matrix = dynamical_matrix(landscape, state, Scope(force=True))
+    found = _modes(matrix)
+    is_falling = (found.sign < 0) & ~found.is_translation
+    kinks = kinks_across(landscape, state, matrix, found.vectors[:, is_falling])
+    if kinks.shape[1]:
+        matrix = held_at(matrix, kinks)
+        found = _modes(matrix)
+    own = np.flatnonzero(~found.is_translation)
+    first = int(own[np.argmin(found.eigenvalues[own])])
+    n_negative = int((found.sign[own] < 0).sum())
+    value, bound = float(found.eigenvalues[first]), float(found.bound[first])
+    proof = Proof(n_negative, value, bound, int(is_falling.sum()) - n_negative)
+    return _Proven(proof, matrix, found, first)
+
+
 def _modes(matrix: DynamicalMatrix) -> Spectrum:
     """Find the modes of a matrix: all, or of large packings the softest."""
     most = matrix.size - matrix.translations.shape[1] - 2
@@ -276,26 +293,23 @@ def _modes(matrix: DynamicalMatrix) -> Spectrum:
     return lowest(matrix, _SOFTEST)
 
 
-def _against_walls(landscape: Landscape, minimum: Minimum) -> tuple[Minimum, Proof]:
+def _against_walls(landscape: Landscape, minimum: Minimum, target: Target) -> tuple[Minimum, Proof]:
     """Bring what leans on a wall with less than digits tell into contact with it.
 
     Whether such a wall is open or closed is decided by rounding; with forces balanced as well, the state in which it is closed
-    is the minimum. Nudges along the mode that it stops, both ways, find that state where there is one.
+    is the minimum. Nudges along the mode that it stops, both ways, find that state where there is one. On a kink, which
+    keeps forces from balancing better, they are to balance as well as is asked for.
     """
-    proof = Proof.of(landscape, minimum.state)
+    proof, matrix, found, first = _proven(landscape, minimum.state)
     if not 0 < proof.n_negative <= _FEW_NEGATIVE:
         return minimum, proof
-    matrix = dynamical_matrix(landscape, minimum.state, Scope(force=True))
-    found = _modes(matrix)
-    own = np.flatnonzero(~found.is_translation)
-    mode = found.vectors[:, own[np.argmin(found.eigenvalues[own])]]
+    most = target.tolerance if proof.n_kinked else max(minimum.residual.largest, _TOUCHING)
+    mode = found.vectors[:, first]
     shift, turn = matrix.coordinates.motion(mode / np.abs(mode).max() * 0.5 * landscape.length)
     for size in (sign * nudge for nudge in _NUDGES for sign in (1, -1)):
-        nudged = replace(minimum, state=minimum.state.displaced(size * shift, size * turn))
-        there = minimise(
-            landscape, nudged.state, "newton", Stop(_SETTLED, evaluations=_EVALUATIONS)
-        )
-        if there.residual.largest > max(minimum.residual.largest, _TOUCHING):
+        nudged = minimum.state.displaced(size * shift, size * turn)
+        there = minimise(landscape, nudged, "newton", Stop(_SETTLED, evaluations=_EVALUATIONS))
+        if there.residual.largest > most:
             continue
         closed = Proof.of(landscape, there.state)
         if closed.n_negative < proof.n_negative:

@@ -27,8 +27,8 @@ def kinks_across(
 ) -> FloatArray:
     """Find the kinks at a state along modes of negative eigenvalues.
 
-    Where pieces are concave the energy falls on one side at least. If it rises on both, with the same bonds, its
-    slope jumps in between.
+    Where pieces are concave the energy falls on one side at least. If it rises on both, and bonds are the same where
+    that begins, its slope jumps in between.
 
     Parameters
     ----------
@@ -77,8 +77,9 @@ def _normal(
             return None
         jumps.append(sides[0].gradient - sides[1].gradient)
         rises = min(mode @ sides[0].gradient, -(mode @ sides[1].gradient)) > clear
-        # A bond more or less is a wall, which can be closed.
-        if not rises or any(side.n_bonds != matrix.n_bonds for side in sides):
+        # A bond more or less so near is a wall, which can be closed; further away it has nothing to do with the kink.
+        is_wall = len(jumps) == 1 and any(side.n_bonds != matrix.n_bonds for side in sides)
+        if is_wall or not rises:
             return None
     jump = jumps[0] - matrix.translations @ (matrix.translations.T @ jumps[0])
     return np.asarray(jump / np.linalg.norm(jump))
