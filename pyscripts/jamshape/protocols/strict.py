@@ -4,13 +4,14 @@ Minimisers leave packings of long rods at saddles: what slides along flat sides 
 force tells (Marschall & Teitel 2018, Appendix B). Here all that slides goes downhill in long steps, limited by new contacts
 (`vibration.sliding`); after each step what is stiff is relaxed. A rod that slides off another one unjams the packing, which is
 then led to its energy again. Of any shape and dimension.
+
+When nothing slides any more, `protocols.strict_proof` tells whether the state is a minimum.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -20,10 +21,8 @@ from jamshape.landscape import Landscape
 from jamshape.minima import Minimum, Outcome, Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.packing import State
-from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
+from jamshape.protocols.strict_proof import ModesOffKinks, Proof
 from jamshape.vibration.sliding import Sliding, Step
-from jamshape.vibration.sparse_modes import lowest
-from jamshape.vibration.spectrum import Spectrum, spectrum
 
 # No particle moves by more in one step, over the smallest radius; after a minimum that is none, by less.
 _LONGEST, _CAREFUL = 0.1, 1e-4
@@ -52,51 +51,9 @@ _SHORT, _SHORTER = 0.02, 2e-3
 _TURNED = 0.3
 _LESS = 4.0
 
-# All modes are found up to so many coordinates, beyond only the softest.
-_DENSE = 3000
-_SOFTEST = 60
-
 # A search ends after so many steps for each particle, and more, or when so many states were taken for a minimum.
 _STEPS, _MORE_STEPS = 4, 400
 _MOST_CLOSED = 30
-
-
-@dataclass(frozen=True)
-class Proof:
-    """What is known of the modes of a minimum.
-
-    Parameters
-    ----------
-    n_negative
-        Number of modes with an eigenvalue below zero by more than its numerical bound.
-    lowest, bound
-        The lowest eigenvalue but those of translations, and the bound of its error, [energy / length^2].
-    """
-
-    n_negative: int
-    lowest: float
-    bound: float
-
-    @classmethod
-    def of(cls, landscape: Landscape, state: State) -> Proof:
-        """Find the modes of a state, by `vibration.spectrum` of relative accuracy."""
-        return cls.by(_modes(landscape, state)[1])
-
-    @classmethod
-    def by(cls, found: Spectrum) -> Proof:
-        """Tell what modes prove."""
-        own = np.flatnonzero(~found.is_translation)
-        first = own[np.argmin(found.eigenvalues[own])]
-        n_negative = int((found.sign[own] < 0).sum())
-        return cls(n_negative, float(found.eigenvalues[first]), float(found.bound[first]))
-
-    def attributes(self) -> dict[str, Any]:
-        """Return what a packing's file says of it."""
-        return {
-            "n_negative": self.n_negative,
-            "lowest_eigenvalue": self.lowest,
-            "lowest_eigenvalue_bound": self.bound,
-        }
 
 
 @dataclass(eq=False)
@@ -260,32 +217,23 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     search.keeping = search.proof.n_negative > 0
 
 
-def _modes(landscape: Landscape, state: State) -> tuple[DynamicalMatrix, Spectrum]:
-    """Find the modes of a state: all, or of large packings the softest."""
-    matrix = dynamical_matrix(landscape, state, Scope(force=True))
-    most = matrix.size - matrix.translations.shape[1] - 2
-    if matrix.size <= _DENSE or most <= _SOFTEST:
-        return matrix, spectrum(matrix)
-    return matrix, lowest(matrix, _SOFTEST)
-
-
 def _against_walls(landscape: Landscape, minimum: Minimum, target: Target) -> tuple[Minimum, Proof]:
     """Bring what leans on a wall with less than digits tell into contact with it.
 
     Whether such a wall is open or closed is decided by rounding; with forces balanced as well, the state in which it is closed
-    is the minimum. Nudges along the mode that it stops, both ways, find that state where there is one.
+    is the minimum. Nudges along the mode that it stops, both ways, find that state where there is one. On a kink, which
+    keeps forces from balancing better, they are to balance as well as is asked for.
     """
-    matrix, found = _modes(landscape, minimum.state)
-    proof = Proof.by(found)
+    modes = ModesOffKinks.of(landscape, minimum.state)
+    proof = modes.proof()
     if not 0 < proof.n_negative <= _FEW_NEGATIVE:
         return minimum, proof
-    own = np.flatnonzero(~found.is_translation)
-    mode = found.vectors[:, own[np.argmin(found.eigenvalues[own])]]
-    shift, turn = matrix.coordinates.motion(mode / np.abs(mode).max() * 0.5 * landscape.length)
+    most = target.tolerance if proof.n_kinked else max(minimum.residual.largest, _TOUCHING)
+    radius = 0.5 * landscape.length
+    shift, turn = (radius * part for part in modes.lowest_motion())
     for size in (sign * nudge for nudge in _NUDGES for sign in (1, -1)):
         there = _settled(landscape, minimum.state.displaced(size * shift, size * turn))
-        balanced = there.residual.largest <= max(minimum.residual.largest, _TOUCHING)
-        if not (balanced and target.is_met(there.energy_density)):
+        if there.residual.largest > most or not target.is_met(there.energy_density):
             continue
         closed = Proof.of(landscape, there.state)
         if closed.n_negative < proof.n_negative:

@@ -85,6 +85,8 @@ def lead_strictly(
 def _told(at: StrictSearch, landscape: Landscape) -> Progress:
     phi = float(landscape.particles.measures.sum()) / at.minimum.state.volume
     left = "" if at.proof is None else f", {at.proof.n_negative} negative eigenvalues of 0"
+    if at.proof is not None and at.proof.n_kinked:
+        left += f", {at.proof.n_kinked} more at kinks, to both sides of which the energy rises"
     text = (
         f"step {at.n_steps} of at most {at.most_steps}, {at.n_free} motions slide, {at.n_met} of"
         f" them up to new contacts, longest step {at.farthest.max():.1e}{left}"

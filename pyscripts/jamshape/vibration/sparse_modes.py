@@ -64,7 +64,7 @@ class ShiftedInverse:
         if shift == 0.0:
             first = np.abs(matrix.translations).argmax(axis=0)
             held[first] = -self.scale
-        one = scipy.sparse.identity(matrix.n_bonds)
+        one = scipy.sparse.identity(C.shape[0])
         blocks = [
             [-(S + scipy.sparse.diags(held)) / self.scale, C.T],
             [C, -self.scale * one],
@@ -73,7 +73,8 @@ class ShiftedInverse:
 
     def solve(self, b: FloatArray) -> Solution:
         """Solve for (n, k) or (n,) right-hand sides, which push no cluster as a whole if shift is 0."""
-        return self._solved(b / self.scale, np.zeros((self.matrix.n_bonds, *b.shape[1:])))
+        n_rows = self.matrix.compatibility.shape[0]
+        return self._solved(b / self.scale, np.zeros((n_rows, *b.shape[1:])))
 
     def solve_both(self, b: FloatArray, c: FloatArray) -> Solution:
         """Solve -(S + shift) v + C^T y = b, C v - y = c for (n, k) and (m, k) right-hand sides."""

@@ -14,10 +14,13 @@ from jamshape.minima.target import Target
 from jamshape.packing import Box, Packing
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import make
-from jamshape.protocols.strict import Proof, descend, start
+from jamshape.protocols.strict import descend, start
+from jamshape.protocols.strict_proof import Proof
 from jamshape.shapes.particles import Particles
 from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.kinks import held_at
 from jamshape.vibration.sliding import Sliding
+from jamshape.vibration.spectrum import spectrum
 
 OVERLAP = 1e-7
 
@@ -123,6 +126,54 @@ def test_what_is_pushed_by_next_to_nothing_meets_its_wall(n, seed, tmp_path):
     assert (stored["outcome"], stored["n_negative"]) == ("converged", 0)
     assert max(stored["residual_force"], stored["residual_torque"]) <= stored["tolerance"]
     assert stored["strict_steps"] < 100
+
+
+def energies_beside(landscape, minimum, size):
+    """Energies to both sides along the mode of the lowest eigenvalue, what is stiff relaxed, over that of a state."""
+    matrix = dynamical_matrix(landscape, minimum, Scope(force=True))
+    found = spectrum(matrix)
+    own = np.flatnonzero(~found.is_translation)
+    assert found.sign[own[0]] < 0
+    shift, turn = matrix.coordinates.motion(found.vectors[:, own[0]])
+    beside = [minimum.displaced(sign * size * shift, sign * size * turn) for sign in (1, -1)]
+    stop = Stop(1e-6, evaluations=400)
+    energies = [minimise(landscape, at, "newton", stop).evaluation.energy for at in beside]
+    return np.array(energies) / landscape.evaluate(minimum).energy
+
+
+@pytest.mark.parametrize(
+    ("n", "seed"), [(32, 36), pytest.param(128, 5, marks=pytest.mark.validate)]
+)
+def test_minimum_on_a_kink_is_proven_by_its_two_sides(n, seed, tmp_path):
+    """The tips of two rods are level: a bond passes from one to the other. In the second, others meet walls below the digits."""
+    out = tmp_path / "packing.h5"
+    for _ in make(recipe_for(bidisperse(4.0), n=n, seed=seed, strict=True), out):
+        pass
+    stored, packing = read_attributes(out), read_packing(out)
+    assert (stored["outcome"], stored["n_negative"], stored["n_kinked"]) == ("converged", 0, 1)
+    assert max(stored["residual_force"], stored["residual_torque"]) <= stored["tolerance"]
+    assert stored["strict_steps"] < 100
+    landscape, state = Landscape(packing), State.of(packing)
+    for size in (1e-5, 1e-4, 1e-3):
+        assert (energies_beside(landscape, state, size) > 1 + 1e-5 * size).all()
+    assert stored["lowest_eigenvalue"] > -stored["lowest_eigenvalue_bound"]
+
+
+def test_a_saddle_is_no_kink():
+    landscape, minimum = between_flat_sides()
+    assert Proof.of(landscape, minimum.state).n_kinked == 0
+    assert energies_beside(landscape, minimum.state, 1e-2).min() < 1
+
+
+def test_a_kink_takes_the_eigenvalue_of_what_crosses_it_and_no_other():
+    landscape, minimum = between_flat_sides()
+    matrix = dynamical_matrix(landscape, minimum.state, Scope(force=True))
+    found = spectrum(matrix)
+    falling, stiffest = found.vectors[:, [0]], found.vectors[:, [-1]]
+    assert spectrum(held_at(matrix, falling)).eigenvalues[0] > 1e-8 * found.eigenvalues[0]
+    beside = spectrum(held_at(matrix, stiffest))
+    assert beside.eigenvalues[0] == pytest.approx(found.eigenvalues[0], rel=1e-6)
+    assert (found.sign[0], beside.sign[0]) == (-1, -1)
 
 
 def test_strict_search_goes_on_from_its_file(strict, tmp_path, monkeypatch):
