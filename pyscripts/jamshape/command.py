@@ -16,6 +16,7 @@ import json
 import math
 import signal
 import sys
+import warnings
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -108,6 +109,7 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
     go_on : str
         How to go on after Ctrl-C.
     """
+    warnings.showwarning = lambda said, *_: print(f"{name}: warning: {said}", file=sys.stderr)
     try:
         yield
     except PROBLEMS as error:

@@ -23,6 +23,9 @@ FLOWS = tuple(_WORDS)
 # In one time step, the box may shear by so much: neighbours pass each other in steps.
 _LARGEST_STRAIN = 0.01
 
+# A particle that others hold is dragged along by this part of what a contact bears, or more, where rods begin to cross.
+_BEARABLE = 0.5
+
 _STRAINS = {"simple": "shear_strain", "pure": "pure_strain"}
 
 
@@ -83,6 +86,25 @@ class Shear(Motion):
         """Return the same with a time step that goes from row to row, or a whole part of that."""
         steps = rows * math.ceil(self.strain_end / (rows * _LARGEST_STRAIN))
         return dataclasses.replace(self, dt=self.strain_end / (self.gdot * steps))
+
+    def drag_over_force(self, packing: Packing) -> float:
+        """Return how hard the host pulls at a particle that others hold, over what one contact bears.
+
+        The pull is the drag of the particle times the host's velocity at its outer radius; a harmonic contact bears its
+        stiffness over the distance of first touch.
+        """
+        pull = self.k_d * packing.measures * self.gdot * packing.outer_radius
+        return float((pull * packing.diameters.min(axis=1)).max() / self.k_e)
+
+    def warning(self, packing: Packing) -> str:
+        """Say that the rate may drive particles through each other; nothing where contacts bear it."""
+        ratio = self.drag_over_force(packing)
+        if ratio < _BEARABLE:
+            return ""
+        return (
+            f"gdot = {self.gdot:g} drags particles with up to {ratio:.2g} times the force that a contact bears, so that long"
+            f" ones may cross, which ends the run; contacts bear rates below {self.gdot * _BEARABLE / ratio:.2g}"
+        )
 
     def all_steps(self, start: Packing) -> int:
         """Count the time steps from a packing to the end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -111,6 +112,11 @@ def shear(
         is given.
     PluginError
         If there is no LAMMPS or no plugin for it.
+
+    Warns
+    -----
+    UserWarning
+        If the rate is so large that long particles may be driven through each other, which ends the run.
 
     Examples
     --------
@@ -308,6 +314,8 @@ def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> N
     if how.again or not to.path.exists():
         first = of.flowing()
         settings.all_steps(first)  # refuses what does not end
+        if said := settings.warning(first):
+            warnings.warn(said, stacklevel=3)
         record_flow(lambda session: recording.begin(session, settings, first, to), to, how.progress)
     else:
         recording.require_same(to, settings, of.dimension)

@@ -125,6 +125,7 @@ EXTREMES = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:gdot = 0.1 drags particles")
 @pytest.mark.parametrize("case", EXTREMES)
 def test_extremes_are_sheared_and_stay_what_they_were(case, tmp_path, measured):
     alpha, n, phi, gdot, strain = EXTREMES[case]
@@ -135,3 +136,16 @@ def test_extremes_are_sheared_and_stay_what_they_were(case, tmp_path, measured):
     np.testing.assert_allclose(run.phi, phi, rtol=1e-12)
     assert np.isfinite([*run.pressure, *run["p_xy"], *run["turned"]]).all()
     assert 0 <= run.pressure.min() <= run.pressure.max() < 0.2
+
+
+def test_a_rate_that_contacts_do_not_bear_is_told_before_the_run(tmp_path):
+    def sheared(gdot):
+        js.shear(js.Spherocylinders(alpha=4), n=2, phi=0.3, gdot=gdot, strain=0.05, rows=5, again=True,
+                 file=tmp_path / "a.h5", progress=False)  # fmt: skip
+
+    with pytest.warns(UserWarning, match="so that long ones may cross") as said:
+        sheared(0.1)
+    bearable = float(str(said[0].message).split()[-1])
+    # Area (4 alpha + pi) R^2 and outer radius (alpha + 1) R of the large rods, R = 0.7; contacts of theirs bear 1/(2R).
+    assert bearable == pytest.approx(0.5 / ((16 + np.pi) * 0.7**2 * 5 * 0.7 * 1.4), rel=0.02)
+    sheared(0.9 * bearable)
