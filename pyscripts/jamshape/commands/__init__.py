@@ -13,9 +13,12 @@ import importlib
 import importlib.metadata
 import sys
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 from jamshape.command import SET_UP, sentences
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser
 
 COMMANDS = {
     "compress": "compress particles through jamming; record p(phi) and snapshots",
@@ -83,6 +86,13 @@ def start(command: str) -> NoReturn:
     _run(command, sys.argv[1:], _Called(Path(script).name, f"python {script}"))
 
 
+def options_of(command: str) -> ArgumentParser:
+    """Make the parser of a subcommand; its help is what ``jamshape COMMAND --help`` prints."""
+    parser: ArgumentParser = importlib.import_module(f"{__name__}.{command}").options_of()
+    parser.prog = f"{_NAME} {command}"
+    return parser
+
+
 def _run(command: str, arguments: list[str], called: _Called) -> NoReturn:
     with sentences(called.name):
         _require_python()
@@ -90,9 +100,11 @@ def _run(command: str, arguments: list[str], called: _Called) -> NoReturn:
         # The rest ends in a moment, and a rank of something else may ask for it, as decks do for `initial`.
         if hasattr(module, "GO_ON"):
             importlib.import_module("jamshape.checks").require_one_process()
-    parser = module.options_of()
+    parser = options_of(command)
     parser.prog = called.name
-    parser.description = parser.description.replace(f"{_NAME} {command} ", f"{called.words} ")
+    parser.description = (parser.description or "").replace(
+        f"{_NAME} {command} ", f"{called.words} "
+    )
     options = parser.parse_args(arguments)
     with sentences(called.name, *([module.GO_ON] if hasattr(module, "GO_ON") else [])):
         sys.exit(module.main(options))

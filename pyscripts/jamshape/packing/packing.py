@@ -48,7 +48,7 @@ class Packing:
     shape_style : str
         A name of `jamshape.shapes.table.SHAPES`.
     exponent : (N,) array of float64, optional
-        p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1, of shapes that have one; ones when left out.
+        p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones when left out.
     step : int
     time : float, [time]
     position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional

@@ -60,7 +60,7 @@ def Superellipsoids(
     size_ratio: float | None = None,
     **kinds: ArrayLike,
 ) -> Particles:
-    """Superellipsoids |x/a|^2p + |y/b|^2p + |z/c|^2p = 1 (Yuan et al. 2019, Eqs. 1 and 2).
+    """Superellipsoids ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1`` (Yuan et al. 2019, Eqs. 1 and 2).
 
     Parameters
     ----------

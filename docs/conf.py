@@ -1,0 +1,103 @@
+"""How Sphinx builds the site: ./run docs, into build/docs."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+import jamshape
+from jamshape.commands import COMMANDS, options_of
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+
+project = "jamshape"
+copyright = "the jamshape developers"
+version = release = jamshape.__version__
+language = "en"
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+myst_enable_extensions = ["deflist", "dollarmath"]
+myst_heading_anchors = 4
+# Examples are run when the site is built, so that every output is a real one; an error in one ends the build.
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(ROOT / "build" / "docs" / "executed")
+nb_execution_in_temp = True
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_execution_show_tb = True
+nb_merge_streams = True
+
+autodoc_typehints = "none"  # the docstrings have them, with shapes and units
+autodoc_member_order = "bysource"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+
+html_theme = "furo"
+html_title = "jamshape"
+html_show_sourcelink = False
+
+# Pages that stand beside the code, where readers of the code look for them, and are shown in the site as well.
+BESIDE_CODE = {
+    "development/architecture": "ARCHITECTURE.md",
+    "development/changelog": "CHANGELOG.md",
+    "development/contributing": "CONTRIBUTING.md",
+    "reference/analysis-scripts": "analysis/README.md",
+    "reference/decks": "inputs/README.md",
+}
+_LINK = re.compile(r"\[([^\]]*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
+
+
+def read_page(app: Sphinx, name: str, source: list[str]) -> None:
+    """Take pages beside the code from there, and lead links to where the site has what they name."""
+    del app
+    beside = BESIDE_CODE.get(name)
+    path = ROOT / beside if beside else DOCS / f"{name}.md"
+    if beside or path.exists():  # a notebook has no links to other pages
+        text = path.read_text(encoding="utf-8") if beside else source[0]
+        source[0] = _LINK.sub(lambda link: _led(link, path.parent, name), text)
+
+
+def _led(link: re.Match[str], folder: Path, name: str) -> str:
+    """Return a link as the site has it; the text alone of one to a file of the repository that is no page."""
+    text, target, anchor = link[1], link[2], link[3] or ""
+    if not target or "://" in target:
+        return link[0]
+    found = (folder / target).resolve()
+    for page, beside in BESIDE_CODE.items():
+        if found == ROOT / beside:
+            found = DOCS / f"{page}.md"
+    if found == ROOT / "README.md":
+        found = DOCS / "index.md"
+    if DOCS in found.parents and found.is_file():
+        return f"[{text}]({os.path.relpath(found, (DOCS / name).parent)}{anchor})"
+    return text
+
+
+class CommandsHelp(SphinxDirective):
+    """A section for each subcommand with its help, as the terminal shows it."""
+
+    def run(self) -> list[nodes.Node]:
+        """Return the sections."""
+        os.environ["COLUMNS"] = "100"
+        found: list[nodes.Node] = []
+        for name in COMMANDS:
+            text = options_of(name).format_help()
+            section = nodes.section(ids=[name])
+            section += nodes.title(name, name)
+            section += nodes.literal_block(text, text, language="text")
+            found.append(section)
+        return found
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Add what pages of this site need."""
+    app.connect("source-read", read_page)
+    app.add_directive("commands-help", CommandsHelp)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
