@@ -18,7 +18,7 @@ DOCS = Path(__file__).parent
 ROOT = DOCS.parent
 
 project = "jamshape"
-copyright = "the jamshape developers"
+project_copyright = "the jamshape developers"
 version = release = jamshape.__version__
 language = "en"
 
