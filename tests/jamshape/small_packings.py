@@ -82,6 +82,7 @@ def as_matrix(C, S, translations=None):
         compatibility=C,
         prestress=S,
         prestress_sizes=abs(S),
+        prestress_rounding=0 * abs(S),
         stiffness=C.T @ C,
         matrix=C.T @ C - S,
         translations=np.zeros((n, 0)) if translations is None else translations,

@@ -62,6 +62,7 @@ def made_up(alpha, u, seed, *, n=N):
         "sign": np.sign(values).astype(np.int64),
         "solver_error": 1e-3 * np.abs(values),
         "entry_error": 0.0 * values,
+        "overlap_error": 0.0 * values,
         "state_error": np.where(band == 0, 2e-16, 0.0),
         "is_translation": band == -1,
         "participation": np.where(band == 2, 0.7, 1 / n),

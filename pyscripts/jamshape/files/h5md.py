@@ -18,6 +18,7 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
         species, id     (N,)
         diameters       (N, 3), the shape columns of LAMMPS (not in H5MD)
         exponent        (N,), of shapes that have one (not in H5MD)
+        half_length, radius (N,), A and R of the others, as contacts are computed with them (not in H5MD)
     /observables/NAME   {step, time, value (T', ...)}, each sampled when its caller likes
     /parameters         +every attribute that the caller gives, results too
     /report             step, wall_seconds, error (T'',): the convergence history

@@ -277,6 +277,8 @@ def create_particles(group: h5py.Group, packing: Packing) -> None:
         group[name] = getattr(packing, name)
     if packing.shape.has_exponent:
         group["exponent"] = packing.exponent
+    else:  # to form overlaps as exactly as they were, without the rounding of 2(A + R)
+        group["half_length"], group["radius"] = packing.half_length, packing.radius
     for name, value in frame_values(packing, Form.of(packing)).items():
         element = group.create_group(name)
         create_rows(element, "value", value)

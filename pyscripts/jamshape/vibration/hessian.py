@@ -20,6 +20,10 @@ from scipy.sparse.csgraph import connected_components
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.landscape import Evaluation, Landscape, State
 from jamshape.minima import Residual, residual_of
+from jamshape.vibration.extended import EPS
+
+# Lengths are off by so many roundings of long doubles at most: sums of squares, roots, and where feet lie.
+_ROUNDINGS = 4.0
 
 # A state with a larger residual is no minimum, and has no modes.
 LARGEST_RESIDUAL = 1e-4
@@ -130,6 +134,8 @@ class DynamicalMatrix:
         S, symmetric to the last bit.
     prestress_sizes : (n, n) scipy.sparse CSR matrix
         Sums of the magnitudes of what was added to each entry of S.
+    prestress_rounding : (n, n) scipy.sparse CSR matrix
+        How far each entry of S may be off because overlaps are differences of lengths in long double.
     coordinates : Coordinates
     bonds : Bonds
     curvature : (C, v, v) array of float64
@@ -150,6 +156,7 @@ class DynamicalMatrix:
     compatibility: Any
     prestress: Any
     prestress_sizes: Any
+    prestress_rounding: Any
     coordinates: Coordinates
     bonds: Bonds
     curvature: FloatArray
@@ -386,18 +393,32 @@ def _parts(
     bonds = _bonds(contacts)
     scatter = _Scatter(contacts["particles"], coordinates)
     prestress, sizes = scatter.blocks(-contacts["curvature"])
+    _, rounding = scatter.blocks(
+        _rounding_of_forces(contacts)[:, None, None] * contacts["curvature"]
+    )
     return {
         "compatibility": scatter.rows(
             np.sqrt(bonds.stiffness)[:, None] * bonds.gradient, bonds.contact
         ),
         "prestress": prestress,
         "prestress_sizes": sizes,
+        "prestress_rounding": rounding,
         "coordinates": coordinates,
         "bonds": bonds,
         "curvature": contacts["curvature"],
         "contacts": contacts,
         "n_left_out": int((held & ~strong).sum()),
     }
+
+
+def _rounding_of_forces(contacts: dict[str, NDArray[Any]]) -> FloatArray:
+    """(C,) How far the forces of contacts may be off, over these forces.
+
+    A force is the stiffness times the overlap, a small difference of lengths of the size of the separation.
+    """
+    distance = np.linalg.norm(contacts["separation"], axis=1)
+    lost = _ROUNDINGS * EPS * contacts["stiffness"].sum(axis=1) * distance
+    return np.asarray(lost / contacts["bond_force"].sum(axis=1))
 
 
 def _bonds(contacts: dict[str, NDArray[Any]]) -> Bonds:

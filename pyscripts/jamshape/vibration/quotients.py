@@ -36,6 +36,8 @@ class Quotients(NamedTuple):
     """(k,) of the value itself."""
     entries: FloatArray
     """(k,) how much rounding the entries of C and S can change the value."""
+    overlaps: FloatArray
+    """(k,) how much rounding of the overlaps, from which S comes, can change it."""
 
 
 class Images(NamedTuple):
@@ -58,6 +60,7 @@ class Products:
         self.Ct = SparseRows(matrix.compatibility.T)
         self.S = SparseRows(matrix.prestress)
         self._sizes_C, self._sizes_S = abs(matrix.compatibility), matrix.prestress_sizes
+        self._of_overlaps = matrix.prestress_rounding
 
     def images(self, vectors: NDArray[Any]) -> Images:
         """Multiply unit columns (n, k)."""
@@ -76,6 +79,7 @@ class Products:
             residual=norms(residual),
             rounding=digits * sizes + EPS * np.abs(value).astype(np.float64),
             entries=_ROUNDINGS * EPS * sizes,
+            overlaps=(size * (self._of_overlaps @ size)).sum(axis=0),
         )
         return Images(stretched, pushed, quotients, residual)
 

@@ -34,7 +34,7 @@ _RESOLVED = 1e-9
 _FAR = 100.0
 _CLIMBS = 4
 
-_COLUMNS = ("eigenvalues", "solver_error", "entry_error", "is_translation")
+_COLUMNS = ("eigenvalues", "solver_error", "entry_error", "overlap_error", "is_translation")
 
 
 class Solution(NamedTuple):
@@ -211,6 +211,7 @@ def _bounded(inverse: ShiftedInverse, v: FloatArray, seconds: float) -> Spectrum
         vectors=w[:, order],
         solver_error=error[order],
         entry_error=at.quotients.entries[order],
+        overlap_error=at.quotients.overlaps[order],
         is_translation=np.zeros(len(order), bool),
         method="sparse",
         wall_seconds=seconds,

@@ -40,6 +40,9 @@ class Spectrum:
         Bound of the distance to an eigenvalue of the matrix as it is stored.
     entry_error : (k,) array of float64
         Bound of what the rounding of the matrix's entries can change.
+    overlap_error : (k,) array of float64
+        Bound of what the rounding of overlaps can change, small differences of lengths in long double: most of the error
+        of modes that the prestress holds.
     is_translation : (k,) array of bool
         Modes of the packing's clusters as wholes, whose eigenvalues are exactly 0.
     method : str
@@ -54,6 +57,7 @@ class Spectrum:
     vectors: FloatArray
     solver_error: FloatArray
     entry_error: FloatArray
+    overlap_error: FloatArray
     is_translation: NDArray[np.bool_]
     method: str
     wall_seconds: float
@@ -63,7 +67,7 @@ class Spectrum:
     @property
     def bound(self) -> FloatArray:
         """(k,) bound of the error of each eigenvalue of this state."""
-        return self.solver_error + self.entry_error
+        return self.solver_error + self.entry_error + self.overlap_error
 
     @property
     def sign(self) -> NDArray[np.int64]:
@@ -122,6 +126,7 @@ def spectrum(matrix: DynamicalMatrix, method: str = "projected") -> Spectrum:
         vectors=found.vectors[:, order],
         solver_error=found.solver_error[order],
         entry_error=found.entry_error[order],
+        overlap_error=found.overlap_error[order],
         is_translation=is_translation[order],
         method=method,
         wall_seconds=time.perf_counter() - began,
@@ -194,7 +199,7 @@ def _found_as_is(
     """Take eigenvalues as they are; their residuals bound their errors."""
     at = Products(matrix).quotients(vectors)
     off = np.abs(values - at.value).astype(np.float64)
-    return Found(values, vectors, at.residual + at.rounding + off, at.entries, sigma)
+    return Found(values, vectors, at.residual + at.rounding + off, at.entries, at.overlaps, sigma)
 
 
 def _projected(matrix: DynamicalMatrix) -> Found:

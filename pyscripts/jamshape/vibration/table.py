@@ -2,8 +2,8 @@
 
 ::
 
-    /modes          eigenvalues, omega, sign, solver_error, entry_error, state_error, is_translation,
-                    participation, parallel, perpendicular, rotation, of_round (k,); band (k,) as in `BANDS`;
+    /modes          eigenvalues, omega, sign, solver_error, entry_error, overlap_error (0 of earlier versions),
+                    state_error, is_translation, participation, parallel, perpendicular, rotation, of_round (k,); band (k,) as in `BANDS`;
                     vectors (n, k) if asked for
     /coordinates    particle, kind (n,), direction (n, D + T): see `jamshape.vibration.hessian.Coordinates`
     /singular_values
@@ -34,8 +34,11 @@ if TYPE_CHECKING:
 
 BANDS = {-1: "translation", 0: "low", 1: "middle", 2: "high", 3: "not told"}
 
+# Of each eigenvalue, which together bound it.
+_ERRORS = ("solver_error", "entry_error", "overlap_error")
+
 _COLUMNS = (
-    *("eigenvalues", "omega", "sign", "solver_error", "entry_error", "state_error"),
+    *("eigenvalues", "omega", "sign", *_ERRORS, "state_error"),
     *(
         "is_translation",
         "participation",
@@ -76,7 +79,7 @@ class ModeTable:
     @property
     def bound(self) -> FloatArray:
         """(k,) bound of the error of each eigenvalue of the state as it is."""
-        return np.asarray(self["solver_error"] + self["entry_error"])
+        return np.asarray(np.sum([self[name] for name in _ERRORS], axis=0))
 
     def in_band(self, name: str) -> IntArray:
         """Rows of the modes of one band."""
@@ -201,7 +204,10 @@ def holds_modes(path: PathLike) -> bool:
 
 def _read(file: h5py.File) -> ModeTable:
     group, of = file["modes"], file["coordinates"]
-    columns = {name: group[name][()] for name in _COLUMNS}
+    since = {
+        "overlap_error": np.zeros(len(group["eigenvalues"]))
+    }  # files of earlier versions are without
+    columns = {name: group[name][()] if name in group else since[name] for name in _COLUMNS}
     particle, kind, direction = (of[name][()] for name in ("particle", "kind", "direction"))
     n_all, dimension = int(of.attrs["n_all"]), int(of.attrs["dimension"])
     coordinates = Coordinates(particle, kind, direction, n_all, dimension)

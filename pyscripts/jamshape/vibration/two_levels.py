@@ -48,6 +48,7 @@ class Found(NamedTuple):
     vectors: FloatArray
     solver_error: FloatArray
     entry_error: FloatArray
+    overlap_error: FloatArray
     singular_values: FloatArray
 
 
@@ -79,6 +80,7 @@ def two_levels(matrix: DynamicalMatrix, *, refine: bool) -> Found:
         vectors=np.column_stack([low.vectors, vectors]),
         solver_error=np.concatenate([low_error, high_error]),
         entry_error=np.concatenate([low.quotients.entries, high.entries]),
+        overlap_error=np.concatenate([low.quotients.overlaps, high.overlaps]),
         singular_values=split.singular_values,
     )
 

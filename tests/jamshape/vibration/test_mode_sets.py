@@ -34,7 +34,7 @@ def table(dimension=2, **packing):
         "participation": np.arange(k) / k,
         "band": BAND,
     }
-    rest = ("solver_error", "entry_error", "state_error", "of_round")
+    rest = ("solver_error", "entry_error", "overlap_error", "state_error", "of_round")
     rest += ("parallel", "perpendicular", "rotation")
     columns |= dict.fromkeys(rest, zero)
     size = 3 * N

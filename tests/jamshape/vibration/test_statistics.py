@@ -105,6 +105,7 @@ def test_bands_of_a_spectrum_with_all_three():
     made = replace(
         found, eigenvalues=values, is_translation=translation, singular_values=sigma,
         solver_error=np.full(matrix.size, 1e-20), entry_error=np.zeros(matrix.size),
+        overlap_error=np.zeros(matrix.size),
     )  # fmt: skip
     low, middle, high = bands(matrix, made)
     assert (low.n_modes, middle.n_modes, high.n_modes) == (2, 2, matrix.size - 6)
