@@ -4,18 +4,20 @@
 
 Starts from the last frame of a packing or run file (--start), or compresses a random packing to --phi by such steps, too.
 The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the stress at
-the end, the modulus of the first step, and the drops of the stress, each with the strain and the stress before it, and the
-energy over the volume that is lost. Needs no LAMMPS. Run again after a kill, it goes on; a finished run is left alone.
+the end, the modulus of the first step, averages over the steady state, and the drops of the stress, each with the strain and the
+stress before it, and the energy over the volume that is lost. Needs no LAMMPS. Run again after a kill, it goes on; a finished run is left alone.
 """
 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import Any
 
 from jamshape.checks import RANGES, require_in
 from jamshape.command import add_numbers, parser_of, report
 from jamshape.flow.shear import FLOWS
+from jamshape.front.run import QuasistaticShearFile
 from jamshape.front.shearing import quasistatic_shear
 from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
 
@@ -60,4 +62,13 @@ def main(options: Namespace) -> None:
     at_end = ("strain", "phi", "stress", "pressure", "sigma", "mu", "z")
     found = {name: float(run[name][-1]) for name in at_end}
     events = run.events(options.least_drop)
-    report({"out": options.out, **found, "modulus": run.modulus(), "events": events})
+    found = {"out": options.out, **found, "modulus": run.modulus(), **_steady(run)}
+    report(found | {"events": events})
+
+
+def _steady(run: QuasistaticShearFile) -> dict[str, Any]:
+    """Average over the steady state, or say why there is none."""
+    try:
+        return run.steady().report()
+    except ValueError as error:  # too short
+        return {"steady": str(error)}

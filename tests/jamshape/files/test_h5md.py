@@ -575,3 +575,13 @@ def test_series_is_refused_and_changes_nothing(path, steps, times, p, sentence):
     with pytest.raises(ValueError, match=sentence):
         writer.append_series(steps, times, {"pressure": p})
     assert path.read_bytes() == before
+
+
+def test_a_reader_finds_the_half_lengths_and_radii_that_contacts_are_computed_with(path):
+    """Not to be had from 2(A + R), which is rounded."""
+    packing = nasty_packing(2)
+    write_packing(path, packing)
+    with h5py.File(path) as file:
+        group = file["particles/all"]
+        np.testing.assert_array_equal(group["half_length"], packing.half_length)
+        np.testing.assert_array_equal(2 * group["radius"][()], packing.diameters[:, 1])
