@@ -88,7 +88,8 @@ def run_with(start: Packing, options: Namespace, kappa: float, tolerance: float)
     phi, p, began = [], [], time.process_time()
     bar = tqdm(total=SAMPLES, desc=f"kappa {kappa:g} tolerance {tolerance:g}", leave=False)
     for step in compress(Landscape(start), Flow(State.of(start)), protocol):
-        if abs(samples - step.phi).min() < 1e-11:
+        # A short first step is no sample yet.
+        if len(phi) < SAMPLES and abs(step.phi - samples[1 + len(phi)]) < 1e-11:
             phi.append(step.phi)
             p.append(step.pressure)
             bar.update()
