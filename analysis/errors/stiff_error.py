@@ -85,7 +85,8 @@ def run_with(start: Packing, options: Namespace, kappa: float, tolerance: float)
     # Steps end where the rate may change.
     rates = tuple((float(phi), kappa) for phi in samples[:-1])
     protocol = Protocol(rates, options.phi_to, tolerance=tolerance, method=options.method)
-    phi, p, began = [], [], time.process_time()
+    phi: list[float] = []
+    p, began = [], time.process_time()
     bar = tqdm(total=SAMPLES, desc=f"kappa {kappa:g} tolerance {tolerance:g}", leave=False)
     for step in compress(Landscape(start), Flow(State.of(start)), protocol):
         # A short first step is no sample yet.

@@ -22,7 +22,7 @@ from jamshape.contacts import Contacts
 from jamshape.flow.host import Host
 from jamshape.flow.shear import FLOWS
 from jamshape.landscape import Landscape, State
-from jamshape.measures.order import OrientationalOrder, orientational_order
+from jamshape.measures.order import OrientationalOrder, planar_order
 from jamshape.measures.stress import ShearStress
 from jamshape.minima import Minimum, Stop, minimise
 from jamshape.minima.target import followed
@@ -273,5 +273,5 @@ def _row(landscape: Landscape, found: Minimum, run: Sheared, how: QuasistaticShe
 def _order(packing: Packing) -> OrientationalOrder:
     """Nematic order in the plane; of bodies in space it is found from frames."""
     if packing.dimension == 2:
-        return orientational_order(packing.orientation, 2)
+        return planar_order(packing)
     return OrientationalOrder(math.nan, math.nan)

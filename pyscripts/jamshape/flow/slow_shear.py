@@ -11,7 +11,7 @@ from jamshape.flow.host import Host
 from jamshape.flow.implicit import METHODS, Flow, Leg
 from jamshape.flow.shear import FLOWS
 from jamshape.landscape import Landscape
-from jamshape.measures.order import orientational_order
+from jamshape.measures.order import planar_order
 from jamshape.measures.stress import ShearStress
 
 
@@ -66,14 +66,13 @@ class SlowShear:
         state = flow.state
         packing = state.packing(landscape.particles)
         stress = ShearStress.of(landscape.stress(state))._asdict()
-        order = orientational_order(packing.orientation, 2)
-        has_order = bool(landscape.rotation_length.any())
+        order = planar_order(packing)
         return stress | {
             f"{'shear' if self.flow == 'simple' else 'pure'}_strain": flow.strain,
             "z": Contacts.of(packing, landscape.k_e, landscape.sides).z,
-            "S_2": order.S_n if has_order else 0.0,
-            "director": order.theta_n if has_order else 0.0,
-            "turned": flow.turned if has_order else 0.0,
+            "S_2": order.S_n,
+            "director": order.theta_n,
+            "turned": flow.turned if landscape.rotation_length.any() else 0.0,
         }
 
     def where(self, phi: float) -> str:

@@ -14,7 +14,7 @@ from jamshape.contacts import Contacts
 from jamshape.files.h5md import read_attributes, write_packing
 from jamshape.landscape import Landscape
 from jamshape.measures.contact_statistics import contact_scale, residuals
-from jamshape.measures.order import orientational_order
+from jamshape.measures.order import planar_order
 from jamshape.measures.order3d import cubatic_order, nematic_order
 from jamshape.minima import History, Minimum, Outcome, residual_of, rounding_floor
 from jamshape.packing import Packing, body_axes
@@ -134,8 +134,7 @@ def order(packing: Packing) -> dict[str, float]:
     if not len(directors):
         return {"S2": math.nan, ("S4" if packing.dimension == 2 else "C4"): math.nan}
     if packing.dimension == 2:
-        angles = np.arctan2(directors[:, 1], directors[:, 0])
-        return {f"S{n}": orientational_order(angles, n).S_n for n in (2, 4)}
+        return {f"S{n}": planar_order(packing, n).S_n for n in (2, 4)}
     return {
         "S2": float(nematic_order(directors).magnitude),
         "C4": float(cubatic_order(body_axes(packing.quaternions)).magnitude),

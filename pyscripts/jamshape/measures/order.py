@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jamshape.packing import Packing
+
 
 class OrientationalOrder(NamedTuple):
     """Magnitude and direction of n-fold orientational order."""
@@ -50,3 +52,14 @@ def orientational_order(angles: ArrayLike, n: int) -> OrientationalOrder:
         raise ValueError(msg)
     c, s = np.cos(n * theta).mean(), np.sin(n * theta).mean()
     return OrientationalOrder(float(np.hypot(c, s)), float(np.arctan2(s, c) / n))
+
+
+def planar_order(packing: Packing, n: int = 2) -> OrientationalOrder:
+    """Order of those particles of a packing in the plane that have a direction; 0 where none has one.
+
+    As `compute packing` has it in LAMMPS.
+    """
+    directors = packing.directors[~np.isnan(packing.directors[:, 0])]
+    if not len(directors):
+        return OrientationalOrder(0.0, 0.0)
+    return orientational_order(np.arctan2(directors[:, 1], directors[:, 0]), n)

@@ -82,7 +82,9 @@ def test_area_and_shape_of_the_box_are_exact():
 
 @pytest.mark.lammps
 @pytest.mark.parametrize(
-    "particles", [RODS, js.Spherocylinders(alpha=0), js.Dimers(alpha=1)], ids=str
+    "particles",
+    [RODS, js.Spherocylinders(alpha=0), js.Spherocylinders(alpha=[0, 2]), js.Dimers(alpha=1)],
+    ids=str,
 )
 def test_it_is_the_motion_that_lammps_integrates(particles, tmp_path, measured):
     """At the rate where both are fast; before the first rearrangement both are within their errors."""
