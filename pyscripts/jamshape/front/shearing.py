@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 _SLOW = 3e-7
 _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
 
+# A random start that is as dense as was asked for is so to this part.
+_ROUNDING = 1e-9
+
 
 def shear(
     particles: Particles | None = None,
@@ -291,7 +294,8 @@ class _Start(NamedTuple):
             return self.known
         random = self._random()
         phi = self.numbers.phi
-        return compressed_start(random, phi) if random.phi < phi else random
+        is_looser = random.phi < phi * (1 - _ROUNDING)
+        return compressed_start(random, phi) if is_looser else random
 
     def still(self) -> Packing:
         """Give the start, compressed by minimisations."""

@@ -149,3 +149,10 @@ def test_a_rate_that_contacts_do_not_bear_is_told_before_the_run(tmp_path):
     # Area (4 alpha + pi) R^2 and outer radius (alpha + 1) R of the large rods, R = 0.7; contacts of theirs bear 1/(2R).
     assert bearable == pytest.approx(0.5 / ((16 + np.pi) * 0.7**2 * 5 * 0.7 * 1.4), rel=0.02)
     sheared(0.9 * bearable)
+
+
+@pytest.mark.parametrize("phi", [0.3, 0.4, 0.4 * (1 + 1e-12), 0.45])
+def test_a_packing_fraction_that_a_random_start_has_needs_no_compression(phi, tmp_path):
+    run = js.shear(js.Spherocylinders(alpha=1), n=16, phi=phi, gdot=1e-2, strain=0.1, rows=5,
+                   file=tmp_path / "a.h5", progress=False)  # fmt: skip
+    np.testing.assert_allclose(run.phi, phi, rtol=1e-9)
