@@ -1,14 +1,16 @@
-"""Packings of discs and spheres beside those of spheropack: core seconds, packing fractions and contacts, in turns.
+"""Packings of discs and spheres beside those of spheropack and JaxDEM: core seconds, packing fractions and contacts, in turns.
 
-    python -m venv peers && peers/bin/pip install spheropack
-    python analysis/benchmarks/peer_packings.py --peer peers/bin/python --seeds 3 --out runs/peer_packings
+    python -m venv peers && peers/bin/pip install spheropack git+https://github.com/cdelv/JaxDEM
+    python analysis/benchmarks/peer_packings.py --spheropack peers/bin/python --seeds 3 --out runs/peer_packings
+    python analysis/benchmarks/peer_packings.py --jaxdem peers/bin/python --cases discs --n 64 256 --out runs/peer_packings
 
-Each packing is made in a process of its own with one thread, one of ours and one of spheropack 0.2 after the other;
+Each packing is made in a process of its own with one thread, one of ours and one of the other's after it;
 its seconds are those in which the processor was busy, without imports. Ours are by the usual way, of soft particles
-whose forces balance; spheropack's are of hard ones by the event-driven algorithm of Lubachevsky and Stillinger, with the
-slow steps with which its documentation has 98 % of the isostatic contacts, Jammed(step=0.1). Discs are of two sizes, 1 and
-1.4, as many of each. Contacts are told over those of an isostatic packing of what is no rattler. What is finished is
-kept. The last line of standard output is one JSON object.
+whose forces balance. spheropack's are of hard ones by the event-driven algorithm of Lubachevsky and Stillinger, with the
+slow steps with which its documentation has 98 % of the isostatic contacts, Jammed(step=0.1). JaxDEM's are of soft ones as its
+example jam_spheres makes them (its `bisection_jam` with FIRE, to an energy of 1e-16 a particle, compilation included), with its
+neighbour list. Discs are of two sizes, 1 and 1.4, as many of each. Contacts are told over those of an isostatic packing of what is
+no rattler; JaxDEM's are not counted. What is finished is kept. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -53,6 +55,32 @@ contacts = sp.analysis.isostaticity(found)
 print(json.dumps({{"seconds": seconds, "phi": found.density, "contacts": contacts, "outcome": found.status}}))
 """
 
+JAXDEM = """
+import json, time
+import jax, jax.numpy as jnp, jaxdem
+jax.config.update("jax_enable_x64", True)
+D, n = {D}, {n}
+radius = jnp.array([0.7 if D == 2 and k % 2 else 0.5 for k in range(n)])
+volume = (jnp.pi * radius**2 if D == 2 else 4 / 3 * jnp.pi * radius**3)
+edge = (volume.sum() / 0.4) ** (1 / D)
+began = time.process_time()
+position = jax.random.uniform(jax.random.PRNGKey({seed}), (n, D), minval=0.0, maxval=edge)
+material = jaxdem.Material.create("elastic", young=1.0, poisson=0.5, density=1.0)
+table = jaxdem.MaterialTable.from_materials([material], matcher=jaxdem.MaterialMatchmaker.create("harmonic"))
+state = jaxdem.State.create(pos=position, rad=radius, mass=jnp.ones(n), volume=volume)
+near = dict(state=state, cutoff=2 * float(radius.max()), skin=0.3, max_neighbors=24 if D == 2 else 40)
+system = jaxdem.System.create(
+    state_shape=state.shape, dt=1e-2, minimizer=jaxdem.minimizers.fire, minimizer_kw=dict(dt=1e-2), domain_type="periodic",
+    force_model_type="spring", collider_type="neighbor_list", collider_kw=near, mat_table=table,
+    domain_kw=dict(box_size=edge * jnp.ones(D)))
+found = jaxdem.utils.jamming.bisection_jam(state, system, verbose=False)
+phi = float(found.packing_fraction)
+seconds = time.process_time() - began
+print(json.dumps({{"seconds": seconds, "phi": phi, "contacts": None, "outcome": "jammed"}}))
+"""
+
+PEERS = {"spheropack": PEER, "jaxdem": JAXDEM}
+
 
 class Task(NamedTuple):
     """One packing, and who makes it."""
@@ -66,7 +94,7 @@ class Task(NamedTuple):
     def code(self) -> str:
         """What makes it and prints what it took."""
         D, shape, _ = CASES[self.case]
-        code = OURS if self.maker == "jamshape" else PEER
+        code = PEERS.get(self.maker, OURS)
         return code.format(D=D, shape=shape, n=self.n, seed=self.seed)
 
 
@@ -74,7 +102,8 @@ def parser() -> ArgumentParser:
     """Make the parser."""
     found = parser_of(__doc__, "runs/peer_packings")
     add = found.add_argument
-    add("--peer", type=Path, required=True, help="a Python that has spheropack")
+    for name in PEERS:
+        add(f"--{name}", type=Path, help=f"a Python that has {name}")
     add("--cases", nargs="*", default=list(CASES), choices=list(CASES), help="(all)")
     add("--n", type=int, nargs="*", help="particles (those of each case)")
     add("--seeds", type=int, default=3, help="packings of each (3)")
@@ -83,6 +112,9 @@ def parser() -> ArgumentParser:
 
 def main(options: Namespace) -> None:
     """Make what is missing and print the table."""
+    if not peers_of(options):
+        msg = "no peer was given, expected --spheropack or --jaxdem with a Python that has it"
+        raise ValueError(msg)
     options.out.mkdir(parents=True, exist_ok=True)
     rows = [made(task, options) for task in tasks(options)]
     print("| | N | | core s, median (range) | phi_J | contacts over isostatic | ends |")
@@ -93,12 +125,18 @@ def main(options: Namespace) -> None:
     report({"out": options.out, "rows": rows})
 
 
+def peers_of(options: Namespace) -> dict[str, Path]:
+    """Say which peers take part, and by which Python."""
+    found = {name: getattr(options, name) for name in PEERS}
+    return {name: python for name, python in found.items() if python}
+
+
 def tasks(options: Namespace) -> Iterator[Task]:
     """List all packings, in turns."""
     for case in options.cases:
         for n in options.n or CASES[case][2]:
             for seed in range(1, options.seeds + 1):
-                for maker in ("jamshape", "spheropack"):
+                for maker in ("jamshape", *peers_of(options)):
                     yield Task(case, n, seed, maker)
 
 
@@ -108,8 +146,9 @@ def made(task: Task, options: Namespace) -> dict[str, Any]:
     if path.exists():
         kept: dict[str, Any] = json.loads(path.read_text())
         return kept
-    python = sys.executable if task.maker == "jamshape" else str(options.peer)
+    python = str(peers_of(options).get(task.maker, sys.executable))
     threads = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
+    threads["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false"
     done = subprocess.run(
         [python, "-c", task.code],
         capture_output=True,
@@ -134,7 +173,7 @@ def told(group: list[dict[str, Any]]) -> list[str]:
         first["maker"],
         f"{np.median(seconds):.3g} ({min(seconds):.3g} to {max(seconds):.3g})",
         f"{np.mean([row['phi'] for row in group]):.4f}",
-        f"{np.mean([row['contacts'] for row in group]):.4f}",
+        f"{np.mean([row['contacts'] for row in group]):.4f}" if first["contacts"] else "",
         ", ".join(sorted({row["outcome"] for row in group})),
     ]
 
