@@ -53,9 +53,14 @@ def add(group, name, command, after=()):
 
 
 def words(*values):
-    """Write options, lists of them among others, as words of a command."""
-    flat = [v for value in values for v in (value if isinstance(value, list | tuple) else [value])]
-    return " ".join(f"{value:g}" if isinstance(value, float) else str(value) for value in flat)
+    """Write options, and lists of them, as words of a command."""
+    found = []
+    for value in values:
+        if isinstance(value, list | tuple):
+            found += [words(*value)] * bool(value)
+        else:
+            found.append(f"{value:g}" if isinstance(value, float) else str(value))
+    return " ".join(found)
 
 
 def add_sweep(group, options, chunk):
