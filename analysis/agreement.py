@@ -258,14 +258,21 @@ def read_jobs(folder: Path) -> list[Took]:
     return found
 
 
+# What jobs say of packings that could not be made, led to an energy, or have no modes; the others of a job go on.
+COMPLAINT = re.compile(r"^(?:jamshape modes: .+|\S+\.h5: .+)$", re.MULTILINE)
+
+
 def failures(folder: Path) -> list[str]:
-    """List packings that could not be made, each in a sentence."""
+    """List what could not be made, each in a sentence."""
     found = []
     for path in sorted((folder / "reports").glob("*.json")):
         told = json.loads(path.read_text(encoding="utf-8"))
         failed = told.get("failed") if isinstance(told, dict) else None
         found += [str(one) for one in failed] if isinstance(failed, list) else []
-    return found
+    for path in sorted((folder / "logs").glob("*.err")):
+        said = path.read_text(encoding="utf-8", errors="replace").replace("\r", "\n")
+        found += COMPLAINT.findall(said)
+    return list(dict.fromkeys(found))
 
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

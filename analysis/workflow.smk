@@ -86,14 +86,18 @@ def add_sweep(group, options, chunk):
     return files
 
 
-def add_modes(group, of, files, options=""):
-    """Add the modes of the packings of a sweep, a job for each of its jobs; packings that stalled have none."""
+def modes_of(files, group):
+    """Write a loop over packings that finds the modes of each; one that is not there, or no minimum, has none."""
+    return (
+        f"mkdir -p modes/{group}; for f in {files}; do if [ -f $f ]; then"
+        f" jamshape modes $f --out modes/{group}/$(basename $f .h5).modes.h5 || true; fi; done"
+    )
+
+
+def add_modes(group, of, files):
+    """Add the modes of the packings of a sweep, a job for each of its jobs."""
     for name, paths in files.items():
-        loop = (
-            f"for f in {shlex.join(paths)}; do m=modes/{group}/$(basename $f .h5).modes.h5;"
-            f" if [ -f $f ]; then jamshape modes $f {options}--out $m || true; fi; done"
-        )
-        add(group, f"{group}_{name}", loop, after=[of])
+        add(group, f"{group}_{name}", modes_of(shlex.join(paths), group), after=[of])
 
 
 def figure(name, script, inputs, after, *, draws=None):
@@ -119,7 +123,8 @@ RUN = (
     "printf '%s\\n' {params.command:q} >commands/{wildcards.name}.sh;"
     " bash -euo pipefail commands/{wildcards.name}.sh >logs/{wildcards.name}.out 2>logs/{wildcards.name}.err"
     " || {{ tail -n 1 logs/{wildcards.name}.err >&2; exit 1; }};"
-    " tail -n 1 logs/{wildcards.name}.out >{output.said:q}; test -s {output.said:q}"
+    " tail -n 1 logs/{wildcards.name}.out >{output.said:q};"
+    " test -s {output.said:q} || {{ tail -n 1 logs/{wildcards.name}.err >&2; exit 1; }}"
 )
 for folder in ("commands", "logs", "runs", "packings", "figures"):
     Path(folder).mkdir(exist_ok=True)

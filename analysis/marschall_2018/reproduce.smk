@@ -41,9 +41,7 @@ for alpha in OF_MODES[1:]:
         "ladder",
         f"ladder_alpha{alpha:g}",
         f'python "$analysis/energy_ladder.py" {words(packings(alpha, AT["ladder_samples"]))}'
-        f' --u0 {words(AT["ladder_u0"])} --out {ladder} || true;'
-        f" for f in {ladder}/*.h5; do m=modes/ladder/$(basename $f .h5).modes.h5;"
-        " jamshape modes $f --out $m || true; done",
+        f' --u0 {words(AT["ladder_u0"])} --out {ladder} || true; {modes_of(f"{ladder}/*.h5", "ladder")}',
         after=["rods"],
     )
 
