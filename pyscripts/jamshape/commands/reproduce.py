@@ -59,7 +59,7 @@ def options_of() -> ArgumentParser:
     parser.add_argument("paper", choices=PAPERS)
     parser.add_argument("--scale", choices=SCALES, default="demo", help="how large (%(default)s)")
     parser.add_argument("--jobs", type=int, default=cores(), help="processes (all cores)")
-    parser.add_argument("--out", type=Path, help="folder (reproduced/PAPER_SCALE)")
+    parser.add_argument("--out", type=Path, help="folder (runs/PAPER_SCALE)")
     parser.add_argument("--dry-run", action="store_true", help="list the jobs, and run none")
     return parser
 
@@ -245,7 +245,7 @@ def main(options: Namespace) -> int:
         raise ValueError(msg)
     workflow = workflow_of(options.paper)
     require_snakemake()
-    options.out = options.out or Path("reproduced") / f"{options.paper}_{options.scale}"
+    options.out = options.out or Path("runs") / f"{options.paper}_{options.scale}"
     options.out.mkdir(parents=True, exist_ok=True)
     failures: list[str] = []
 
