@@ -19,16 +19,20 @@ import os
 import platform
 import re
 import shlex
+import subprocess
 import tomllib
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import jamshape
 from jamshape.checks import require_one_of
 from jamshape.command import parser_of, report, run
+from jamshape.lammps.plugin import PluginError, built_for, plugin_path
 
 HERE = Path(__file__).parent
 WITHIN = 2.0  # joint errors
@@ -39,11 +43,13 @@ AGREES, DIFFERS, UNJUDGED, UNMEASURED = (
 RULE = f"""\
 The joint error is the root of the sum of the squares of both errors; ours is the standard error of the mean over
 samples, or that of a fit. A number of ours *{AGREES}* if it differs from the paper's by at most {WITHIN:g} joint errors,
-and *{DIFFERS}* if by more. It is *{UNJUDGED}* where there is no error of ours, as of a single sample, and
-*{UNMEASURED}* where there is no such number. Errors know nothing of what another number of particles, rate or protocol
-changes: at a smaller size than the paper's, `differs` may mean no more than that, and `agrees` no more than that the
-errors are large. Ours of a few samples are uncertain themselves. With {WITHIN:g} joint errors as the bound, about one of
-twenty numbers differs by chance."""
+and *{DIFFERS}* if by more. What the paper states exactly, with an error of 0, must be the same. A number is *{UNJUDGED}*
+where there is no error of ours, as of a single sample, or where what the paper counts was found in no sample. It is
+*{UNMEASURED}* where there is no such number.
+
+Errors know nothing of what another number of particles, rate or protocol changes: at a smaller size than the paper's,
+`{DIFFERS}` may mean no more than that, and `{AGREES}` no more than that the errors are large. Errors of a few samples are
+uncertain themselves. With {WITHIN:g} joint errors as the bound, about one of twenty numbers differs by chance."""
 
 HEADER = ("quantity", "where", "paper", "ours", "difference in joint errors", "verdict", "remark")
 
@@ -211,10 +217,14 @@ def judged(published: Published, ours: Ours | None) -> Row:
     """Compare two numbers."""
     if ours is None:
         return Row(published, None, math.nan, UNMEASURED)
-    if not math.isfinite(ours.error):
+    off = ours.value - published.value
+    if published.error == 0:
+        same = math.isclose(ours.value, published.value, rel_tol=1e-9)
+        return Row(published, ours, math.nan, AGREES if same else DIFFERS)
+    # Of what is rare all samples may have none, which says nothing of its error.
+    if not math.isfinite(ours.error) or (ours.value == ours.error == 0 and off):
         return Row(published, ours, math.nan, UNJUDGED)
-    off, joint = ours.value - published.value, math.hypot(ours.error, published.error)
-    difference = off / joint if joint else (math.copysign(math.inf, off) if off else 0.0)
+    difference = off / math.hypot(ours.error, published.error)
     return Row(published, ours, difference, AGREES if abs(difference) <= WITHIN else DIFFERS)
 
 
@@ -228,7 +238,7 @@ def number(value: float, error: float = math.nan) -> str:
     """
     if not math.isfinite(error) or error == 0:
         return f"{value:.5g}" + (" +- 0" if error == 0 else "")
-    if max(abs(value), error) < 1e-3:
+    if 0 < abs(value) < 1e-3:
         scale = math.floor(math.log10(max(abs(value), error)))
         digits = max(scale - math.floor(math.log10(error)) + 1, 0)
         return f"{value:.{digits}e} +- {error:.1e}"
@@ -282,15 +292,40 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def versions() -> list[tuple[str, str]]:
-    """Tell on what it was run."""
-    known = [("Python", platform.python_version())]
-    for name in ("jamshape", "numpy", "scipy", "h5py", "lammps", "snakemake"):
-        try:
+    """Tell with what and on what this page was made."""
+    known = [("jamshape", jamshape.__version__), ("its commit", commit()), ("LAMMPS", lammps())]
+    known.append(("Python", platform.python_version()))
+    for name in ("numpy", "scipy", "h5py", "snakemake"):
+        with suppress(PackageNotFoundError):
             known.append((name, version(name)))
-        except PackageNotFoundError:
-            known.append((name, "in a folder, not installed"))
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return [*known, ("system", f"{platform.system()} {platform.machine()}"), ("cores", str(cores))]
+    return [*known, ("processor", processor()), ("cores", str(cores))]
+
+
+def commit() -> str:
+    """Name the commit of the clone, with a word where files were changed since."""
+    command = ["git", "-C", str(HERE), "describe", "--always", "--dirty=, changed since"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    except OSError:
+        return "not known"
+    return done.stdout.strip() or "not known"
+
+
+def lammps() -> str:
+    """Tell for which LAMMPS the plugin was built."""
+    try:
+        return str(built_for(plugin_path()))
+    except PluginError:
+        return "no plugin"
+
+
+def processor() -> str:
+    """Name the processor."""
+    told = Path("/proc/cpuinfo")
+    text = told.read_text(encoding="utf-8", errors="replace") if told.is_file() else ""
+    found = re.search(r"^model name\s*: (.*)$", text, re.MULTILINE)
+    return found[1] if found else platform.machine()
 
 
 def where_it_ran(folder: Path, at: Mapping[str, Any]) -> str:
@@ -320,12 +355,12 @@ def where_it_ran(folder: Path, at: Mapping[str, Any]) -> str:
 def page(title: str, rows: Sequence[Row], options: Namespace, at: Mapping[str, Any]) -> str:
     """Write the page."""
     counts = Counter(row.verdict for row in rows)
-    summary = ", ".join(f"{counts[v]} {v}" for v in (AGREES, DIFFERS, UNJUDGED, UNMEASURED))
+    summary = ", ".join(f"{counts[v]} *{v}*" for v in (AGREES, DIFFERS, UNJUDGED, UNMEASURED))
     figures = sorted(path.name for path in (options.folder / "figures").glob("*.png"))
     return "\n\n".join(
         (
             f"# {title}, reproduced at the scale `{options.scale}`",
-            f"Of {len(rows)} numbers of the paper: {summary}.",
+            f"Verdicts on {len(rows)} numbers of the paper: {summary}.",
             RULE,
             markdown(HEADER, [cells(row) for row in rows]),
             "## Figures",

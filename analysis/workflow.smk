@@ -7,6 +7,7 @@
 # A workflow is a list of jobs, each a line of the shell that anybody may type. `scales.toml` beside it says how large
 # they are. A job declares to Snakemake what it said (reports/, figures/), and not the packings and runs themselves:
 # Snakemake removes what jobs declare when they fail or are to run again, and jamshape goes on from its own files.
+import json
 import shlex
 import sys
 import tomllib
@@ -80,9 +81,7 @@ def add_sweep(group, options, chunk):
             add(group, name, f"{line} --jobs 1 --out {out} || true")
             made = [sweep.file_of(particle, seed, parsed) for seed in own]
             files[name] = [str(path) for path in made]
-            # A report without its packings tells nothing.
-            if not all(path.exists() for path in made):
-                report_of(name).unlink(missing_ok=True)
+            forget_if_gone(name, made)
     return files
 
 
@@ -92,6 +91,17 @@ def modes_of(files, group):
         f"mkdir -p modes/{group}; for f in {files}; do if [ -f $f ]; then"
         f" jamshape modes $f --out modes/{group}/$(basename $f .h5).modes.h5 || true; fi; done"
     )
+
+
+def forget_if_gone(name, packings):
+    """Remove a report that tells of more packings than are there.
+
+    Samples that could not be made count as told of: jobs on a cluster, which read this file as well, would else
+    remove reports that others wait for.
+    """
+    if (report := report_of(name)).exists():
+        if json.loads(report.read_text())["made"] > sum(path.exists() for path in packings):
+            report.unlink()
 
 
 def add_modes(group, of, files):

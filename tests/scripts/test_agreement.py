@@ -85,6 +85,20 @@ def test_verdicts(made):
     assert sum(v for name, v in said.items() if name not in ("out", "figures")) == len(rows)
 
 
+def test_what_is_rare_and_what_is_exact(folder, report):
+    counts = {
+        "conditions": {"n": 64},
+        "contact_numbers": [{"alpha": 4, "rattlers": mean(0.0, 0.0)}],
+    }
+    (folder / "figures" / "fig08.json").write_text(json.dumps(counts))
+    assert report(SCRIPT, folder, "--paper", PAPER, "--out", folder / "a.md")["not judged"] == 2
+    for on_line, verdict in ((7, "agrees"), (6, "differs")):
+        lines = {"on_line": on_line, "packings": 7}
+        (folder / "figures" / "fig09b.json").write_text(json.dumps(lines))
+        said = report(SCRIPT, folder, "--paper", YUAN, "--out", folder / "a.md")
+        assert said[verdict] == 1
+
+
 def test_values_are_found_where_the_table_says(made):
     _, _, rows = made
     slowest = rows["phi_J(kappa) of the slowest rate here, alpha = 4"]
