@@ -99,9 +99,10 @@ def forget_if_gone(name, packings):
     Samples that could not be made count as told of: jobs on a cluster, which read this file as well, would else
     remove reports that others wait for.
     """
-    if (report := report_of(name)).exists():
-        if json.loads(report.read_text())["made"] > sum(path.exists() for path in packings):
-            report.unlink()
+    said = report_of(name)
+    if said.exists():
+        if json.loads(said.read_text())["made"] > sum(path.exists() for path in packings):
+            said.unlink()
 
 
 def add_modes(group, of, files):
