@@ -122,6 +122,11 @@ def report_of(name):
     return Path("reports") / f"{name}.json"
 
 
+def everything(_):
+    """List the page and the reports of all jobs: of these, too, since Snakemake makes what lies between again only if asked."""
+    return ["agreement.md", *(str(report_of(name)) for name in JOBS)]
+
+
 def needs(jobs):
     """Say which reports a job needs before it."""
     return lambda wildcards: [

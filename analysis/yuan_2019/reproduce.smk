@@ -5,7 +5,7 @@ include: "../workflow.smk"
 
 rule all:
     input:
-        "agreement.md",
+        everything,
 
 
 FOLDER = "yuan_2019"

@@ -142,36 +142,81 @@ def test_the_command_lists_its_jobs(tmp_path):
     assert {"fig02", "fig14", "ladder1"} <= set(found)
 
 
-def test_a_job_that_fails_is_told_and_the_others_go_on(tmp_path):
-    """Of a workflow with one figure that works and one that does not, in a clone of its own."""
+HEAD = 'include: "../workflow.smk"\n\n\nrule all:\n    input:\n        everything,\n\n\n'
+
+
+@pytest.fixture
+def reproduce(tmp_path):
+    """Reproduce by a workflow with these lines, in a clone of its own; return the exit code and what is reported."""
     folder = tmp_path / "analysis" / "yuan_2019"
     folder.mkdir(parents=True)
     for name in ("workflow.smk", "agreement.py", "yuan_2019/scales.toml", "yuan_2019/paper.csv"):
         (tmp_path / "analysis" / name).write_bytes((ANALYSIS / name).read_bytes())
-    (folder / "fig02_shapes.py").write_text(
-        "import sys\nopen(sys.argv[2], 'w').write('a picture')\nprint('{}')\n"
-    )
-    (folder / "fig99_none.py").write_text("import sys\nsys.exit('fig99_none.py: there is none')\n")
-    (folder / "reproduce.smk").write_text(
-        'include: "../workflow.smk"\n\n\nrule all:\n    input:\n        "agreement.md",\n\n\n'
-        'figure("fig02", "yuan_2019/fig02_shapes.py", (), ())\n'
-        'figure("fig99", "yuan_2019/fig99_none.py", (), ())\n'
-    )
     runner = (
         "import sys; from jamshape.commands import main, reproduce\n"
         f"reproduce.workflow_of = lambda paper: reproduce.Path({str(folder / 'reproduce.smk')!r})\n"
         "main(sys.argv[1:])"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", runner, "reproduce", "yuan-2019", "--out", "made"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
+
+    def reproduced(lines):
+        (folder / "reproduce.smk").write_text(HEAD + lines)
+        done = subprocess.run(
+            [sys.executable, "-c", runner, "reproduce", "yuan-2019", "--out", "made"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.stdout, done.stderr
+        return done.returncode, json.loads(done.stdout.splitlines()[-1])
+
+    return reproduced
+
+
+def picture(name):
+    """A figure that needs no script."""
+    return f"draws=\"echo '{{}}' && echo drawn >figures/{name}.png\""
+
+
+def test_a_job_that_fails_is_told_and_the_others_go_on(reproduce, tmp_path):
+    code, said = reproduce(
+        f'figure("fig02", "", (), (), {picture("fig02")})\n'
+        'figure("fig99", "", (), (), draws="echo \'fig99: there is none\' >&2; false")\n'
     )
-    assert done.returncode == 1, done.stderr
-    said = json.loads(done.stdout.splitlines()[-1])
-    assert said["failed"] == ["fig99: fig99_none.py: there is none"]
+    assert code == 1
+    assert said["failed"] == ["fig99: fig99: there is none"]
     assert said["figures"] == 1
     assert said["numbers"].keys() == {"not measured at this scale"}
     assert "![fig02.png](figures/fig02.png)" in (tmp_path / "made" / "agreement.md").read_text()
+
+
+def test_what_is_there_is_not_made_again_and_what_was_removed_is(reproduce, tmp_path):
+    lines = (
+        'add_sweep("rods", "--alpha 1 --samples 2 --n 16 --phi-start 0.55 --u0 1e-6", 1)\n'
+        f'figure("fig02", "", (), ["rods"], {picture("fig02")})\n'
+    )
+    assert reproduce(lines)[0] == 0
+    packings = [tmp_path / "made" / "packings" / "rods" / f"alpha1_seed{k}.h5" for k in (1, 2)]
+    before = [path.stat().st_mtime_ns for path in packings]
+    drawn = (tmp_path / "made" / "figures" / "fig02.png").stat().st_mtime_ns
+    assert reproduce(lines)[0] == 0
+    assert (tmp_path / "made" / "figures" / "fig02.png").stat().st_mtime_ns == drawn
+    packings[1].unlink()
+    assert reproduce(lines)[0] == 0
+    after = [path.stat().st_mtime_ns for path in packings]
+    assert after[0] == before[0]
+    assert after[1] > before[1]
+
+
+def test_a_sample_that_cannot_be_made_is_listed_and_stops_nothing(reproduce, tmp_path):
+    # A file of other particles is in its place, which is refused.
+    lines = (
+        'add_sweep("rods", "--alpha {} --samples 1 --n 16 --phi-start 0.55 --u0 1e-6", 1)\n'
+        f'figure("fig02", "", (), ["rods"], {picture("fig02")})\n'
+    )
+    assert reproduce(lines.replace("{}", "1"))[0] == 0
+    folder = tmp_path / "made" / "packings" / "rods"
+    (folder / "alpha2_seed1.h5").write_bytes((folder / "alpha1_seed1.h5").read_bytes())
+    code, said = reproduce(lines.replace("{}", "2"))
+    assert (code, said["failed"]) == (0, [])
+    assert "Not made: alpha2_seed1.h5: " in (tmp_path / "made" / "agreement.md").read_text()
