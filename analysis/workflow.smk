@@ -99,10 +99,9 @@ def forget_if_gone(name, packings):
     Samples that could not be made count as told of: jobs on a cluster, which read this file as well, would else
     remove reports that others wait for.
     """
-    said = report_of(name)
-    if said.exists():
-        if json.loads(said.read_text())["made"] > sum(path.exists() for path in packings):
-            said.unlink()
+    said, there = report_of(name), sum(path.exists() for path in packings)
+    if said.exists() and json.loads(said.read_text())["made"] > there:
+        said.unlink()
 
 
 def add_modes(group, of, files):
@@ -139,8 +138,10 @@ RUN = (
     "printf '%s\\n' {params.command:q} >commands/{wildcards.name}.sh;"
     " bash -euo pipefail commands/{wildcards.name}.sh >logs/{wildcards.name}.out 2>logs/{wildcards.name}.err"
     " || {{ tail -n 1 logs/{wildcards.name}.err >&2; exit 1; }};"
-    " tail -n 1 logs/{wildcards.name}.out >{output.said:q};"
-    " test -s {output.said:q} || {{ tail -n 1 logs/{wildcards.name}.err >&2; exit 1; }}"
+    " tail -n 1 logs/{wildcards.name}.out >logs/{wildcards.name}.last;"
+    " test -s logs/{wildcards.name}.last || {{ tail -n 1 logs/{wildcards.name}.err >&2; exit 1; }};"
+    # In one go: a report that a kill left half written would pass for one.
+    " mv logs/{wildcards.name}.last {output.said:q}"
 )
 for folder in ("commands", "logs", "runs", "packings", "figures"):
     Path(folder).mkdir(exist_ok=True)
