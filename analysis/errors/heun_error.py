@@ -138,11 +138,11 @@ def draw(rows: list[Row], n: int, path: Path) -> None:
     for (sides, word), axis in zip(SIDES.items(), axes, strict=True):
         of = [r for r in rows if r.sides == sides]
         wall = [r.wall_seconds for r in of]
+        axis.margins(x=0.15, y=0.1)  # room for the words at points
         axis.loglog(wall, [r.median for r in of], "o-", label="pressure, median")
         axis.loglog(wall, [r.largest for r in of], "s--", label="pressure, largest")
         for r in of:
             if r.dt in NAMED:
-                axis.margins(x=0.15, y=0.1)  # room for these words
                 axis.annotate(f"dt = {r.dt:g}", (r.wall_seconds, r.median), fontsize=7,
                               textcoords="offset points", xytext=(-4, -14), ha="right")  # fmt: skip
         axis.set(xlabel="run time (s)", title=f"sides {word}")

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import discs_at, error_bars, label_alpha_axis
+from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import PAPER_STYLE, color
 from jamshape.drawing.text import conditions_text, system_labels
@@ -74,7 +74,8 @@ def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> N
         error_bars(axes, PHI_J, discs, **PAPER_STYLE)
     label_alpha_axis(axes, discs)
     axes.set_ylabel(r"jamming density $\langle\phi_J\rangle$")
-    axes.legend(fontsize=8, frameon=False, title=conditions_text(groups), title_fontsize=8)
+    place: dict[str, Any] = {"loc": "outside upper center", "ncols": 2, "frameon": False}
+    figure.legend(title=conditions_text(groups), **SMALL_TEXT, **place)
     save_figure(figure, options.out)
 
 

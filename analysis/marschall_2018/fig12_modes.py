@@ -153,14 +153,15 @@ def draw(file: PackingFile, table: ModeTable, modes: list[int], options: Namespa
 def add_key(axes: Axes, *, with_rattlers: bool) -> None:
     """Say what arrows, thick outlines and grey are, below a panel."""
     arrow = {"arrowstyle": "-|>", "lw": 1.2, "color": "k", "shrinkA": 0, "shrinkB": 0}
-    ends = ((1.0, -0.035), (1.0 - LONGEST, -0.035))
+    below = -0.021  # of the panel; the layout cuts what is lower
+    ends = ((1.0, below), (1.0 - LONGEST, below))
     axes.annotate("", *ends, xycoords="axes fraction", arrowprops=arrow)
-    label: dict[str, Any] = {"ha": "right", "va": "center", "fontsize": 8}
+    label: dict[str, Any] = {"ha": "right", "va": "center", "fontsize": 7}
     text = "displacement: largest motion"
-    axes.text(1.0 - LONGEST - 0.02, -0.035, text, transform=axes.transAxes, **label)
+    axes.text(1.0 - LONGEST - 0.02, below, text, transform=axes.transAxes, **label)
     others = "thick outline: moves most" + ", grey: rattlers" * with_rattlers
     label |= {"ha": "left", "transform": axes.transAxes}
-    axes.text(0.0, -0.035, others, **label)
+    axes.text(0.0, below, others, **label)
 
 
 def add_color_bar(bar: Any) -> None:

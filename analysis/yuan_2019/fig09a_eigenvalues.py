@@ -66,7 +66,7 @@ def draw(tables: Tables, title: str, options: Namespace) -> None:
     top.set(yscale="log", ylabel=rf"$\lambda_i\;[k_e/{unit}^2]$")
     bottom.set(xlabel="mode $i$", ylabel="share of rotation", ylim=(-0.03, 1.03))
     figure.suptitle(title, fontsize=8)
-    figure.legend(loc="outside right upper", frameon=False, **SMALL_TEXT)
+    figure.legend(loc="outside right center", frameon=False, **SMALL_TEXT)
     save_figure(figure, options.out)
 
 

@@ -27,6 +27,7 @@ COMMANDS = {
     "shear": "shear at a constant rate; record stress, order and snapshots",
     "aqs": "shear by small steps with a minimisation after each; record stress and its drops",
     "sweep": "make many packings on all cores",
+    "reproduce": "make all data and every figure of a paper, its numbers beside ours",
     "modes": "find the modes of vibration of a packing, and its moduli",
     "draw": "draw packings",
     "info": "tell what a file is, what is in it and how to go on with it",

@@ -101,12 +101,12 @@ def options_of() -> ArgumentParser:
         )
     parser.add_argument("--samples", type=int, default=6, help="of each, one for a seed (6)")
     parser.add_argument("--first-seed", type=int, default=1, help="the next has one more (1)")
-    parser.add_argument("--jobs", type=int, default=_cores(), help="processes (all cores)")
+    parser.add_argument("--jobs", type=int, default=cores(), help="processes (all cores)")
     parser.add_argument("--out", type=Path, required=True, help="folder")
     return parser
 
 
-def _cores() -> int:
+def cores() -> int:
     """Count the cores that this process may use, which in a job of a cluster are not all of the machine."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -202,7 +202,7 @@ def make(particle: Particle, seed: int, options: Namespace, leash: Leash) -> str
             stdin=leash.read,
             stdout=subprocess.PIPE,
             stderr=errors,
-            env=os.environ | _ONE_THREAD | {"PYTHONPATH": _python_path()},
+            env=os.environ | _ONE_THREAD | {"PYTHONPATH": python_path()},
         )
     if done.stdout.strip():  # a finished packing, which says itself whether it is in equilibrium
         return None
@@ -226,7 +226,7 @@ def _is_ours(log: IO[str]) -> bool:
             return True
 
 
-def _python_path() -> str:
+def python_path() -> str:
     """Folders in which a process finds this jamshape before any other."""
     before = os.environ.get("PYTHONPATH")
     return os.pathsep.join([str(Path(__file__).parents[2]), *([before] if before else [])])
