@@ -77,7 +77,18 @@ def test_packings_are_timed_beside_those_of_a_peer(here, capsys, tmp_path, monke
     (tmp_path / "sitecustomize.py").write_text(PEER)
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{':'.join(sys.path)}")
     out = tmp_path / "out"
-    some = ("--cases", "discs", "--n", 16, "--seeds", 1, "--spheropack", sys.executable, "--out", out)
+    some = (
+        "--cases",
+        "discs",
+        "--n",
+        16,
+        "--seeds",
+        1,
+        "--spheropack",
+        sys.executable,
+        "--out",
+        out,
+    )
     here("benchmarks/peer_packings.py", *some)
     ours, peer = rows_of(capsys)["rows"]
     assert (ours["maker"], peer["maker"]) == ("jamshape", "spheropack")
