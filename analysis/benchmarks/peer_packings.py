@@ -10,12 +10,13 @@ whose forces balance. spheropack's are of hard ones by the event-driven algorith
 slow steps with which its documentation has 98 % of the isostatic contacts, Jammed(step=0.1). JaxDEM's are of soft ones as its
 example jam_spheres makes them (its `bisection_jam` with FIRE, to an energy of 1e-16 a particle, compilation included), with its
 neighbour list. Discs are of two sizes, 1 and 1.4, as many of each. Contacts are told over those of an isostatic packing of what is
-no rattler; JaxDEM's are not counted. What is finished is kept. The last line of standard output is one JSON object.
+no rattler; JaxDEM's are not counted. One that takes longer than --seconds by the clock is given up. What is finished is kept. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -107,6 +108,7 @@ def parser() -> ArgumentParser:
     add("--cases", nargs="*", default=list(CASES), choices=list(CASES), help="(all)")
     add("--n", type=int, nargs="*", help="particles (those of each case)")
     add("--seeds", type=int, default=3, help="packings of each (3)")
+    add("--seconds", type=float, default=600.0, help="after which one is given up (600)")
     return found
 
 
@@ -149,13 +151,18 @@ def made(task: Task, options: Namespace) -> dict[str, Any]:
     python = str(peers_of(options).get(task.maker, sys.executable))
     threads = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
     threads["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false"
-    done = subprocess.run(
-        [python, "-c", task.code],
-        capture_output=True,
-        text=True,
-        env=os.environ | threads,
-        check=False,
-    )
+    try:
+        done = subprocess.run(
+            [python, "-c", task.code],
+            capture_output=True,
+            text=True,
+            env=os.environ | threads,
+            check=False,
+            timeout=options.seconds,
+        )
+    except subprocess.TimeoutExpired:
+        nothing = {"seconds": options.seconds, "phi": math.nan, "contacts": None}
+        return task._asdict() | nothing | {"outcome": "given up"}
     if done.returncode:
         msg = f"{task.maker} made no packing of {task.n} {task.case}: {done.stderr.strip()[-300:]}"
         raise RuntimeError(msg)

@@ -98,7 +98,7 @@ def run(parser: ArgumentParser, main: Callable[[Namespace], int | None]) -> NoRe
 
 @contextmanager
 def sentences(name: str, go_on: str = "it may be started again") -> Iterator[None]:
-    """End the program with one sentence after its name where its body raises what users may meet.
+    """End the program with one sentence after its name where its body raises what users may meet; warn in one, too.
 
     The exit code is 1 after one of `PROBLEMS` or where a module is missing, and 130 after Ctrl-C.
 
@@ -109,9 +109,12 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
     go_on : str
         How to go on after Ctrl-C.
     """
-    warnings.showwarning = lambda said, *_: print(f"{name}: warning: {said}", file=sys.stderr)
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.showwarning = lambda said, *_: print(
+                f"{name}: warning: {said}", file=sys.stderr
+            )
+            yield
     except PROBLEMS as error:
         sys.exit(f"{name}: {error}")
     except ImportError as error:

@@ -1,12 +1,11 @@
 """pyscripts/sweep.smk on this machine; tests/cluster runs it on Slurm."""
 
 import json
-import subprocess
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from snakemake_runs import run_snakemake
 
 pytestmark = [
     pytest.mark.lammps,
@@ -23,15 +22,7 @@ def run(folder, options, *more, settings=("chunk=2",)):
     """Run the workflow in a folder; the packings go to a folder in it."""
     config = [f"sweep={options}", "out=of rods", *settings]
     words = ["--cores", "2", "--keep-going", "--rerun-incomplete", *more, "--config", *config]
-    return subprocess.run(
-        [sys.executable, "-m", "snakemake", "-s", str(WORKFLOW), *words],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-        timeout=300,
-    )
+    return run_snakemake(WORKFLOW, folder, *words)
 
 
 def packings(folder):

@@ -2,6 +2,7 @@ import json
 import signal
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -94,3 +95,14 @@ def test_a_second_ctrl_c_does_not_cut_the_end_off():
 def test_help_is_the_docstring(monkeypatch, capsys):
     assert ended(monkeypatch, lambda _: None, "--help") == 0
     assert "What it does.\n" in capsys.readouterr().out
+
+
+def test_a_warning_is_one_sentence_after_the_name(monkeypatch, capsys):
+    def warned(_):
+        warnings.simplefilter("always")
+        warnings.warn("the rate is high", stacklevel=1)
+
+    shown = warnings.showwarning
+    assert ended(monkeypatch, warned) is None
+    assert capsys.readouterr().err.endswith(": warning: the rate is high\n")
+    assert warnings.showwarning is shown

@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from snakemake_runs import run_snakemake
 
 from jamshape.commands.reproduce import PAPERS, SCALES
 
@@ -22,16 +23,8 @@ NO_FIGURES = {"beside_paper.py"}
 
 def planned(folder, scale, tmp_path):
     """Plan the workflow; return the names of its figures and all that Snakemake says."""
-    words = ["-s", str(ANALYSIS / folder / "reproduce.smk"), "--config", f"scale={scale}"]
-    done = subprocess.run(
-        [sys.executable, "-m", "snakemake", *words, "--cores", "1", "-n", "-p"],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-        timeout=300,
-    )
+    words = ["--config", f"scale={scale}", "--cores", "1", "-n", "-p"]
+    done = run_snakemake(ANALYSIS / folder / "reproduce.smk", tmp_path, *words)
     assert done.returncode == 0, done.stdout
     return set(re.findall(r"output: figures/(\w+)\.json", done.stdout)), done.stdout
 
@@ -104,32 +97,28 @@ def test_all_scales_have_the_same_keys(folder):
     ],
 )
 def test_nonsense_is_refused_before_any_job(folder, setting, words, tmp_path):
-    workflow = str(ANALYSIS / folder / "reproduce.smk")
-    command = ["-s", workflow, "--cores", "1", "-n", "--config", setting]
-    done = subprocess.run(
-        [sys.executable, "-m", "snakemake", *command],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
+    asked = ["--cores", "1", "-n", "--config", setting]
+    done = run_snakemake(ANALYSIS / folder / "reproduce.smk", tmp_path, *asked)
     assert done.returncode != 0
     assert words in done.stdout
 
 
 def test_a_job_leaves_what_was_typed_what_it_said_and_how_long_it_took(tmp_path):
-    words = ["-s", str(ANALYSIS / "yuan_2019" / "reproduce.smk"), "--cores", "1"]
-    command = [sys.executable, "-m", "snakemake", *words, "figures/fig02.json"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    asked = (
+        ANALYSIS / "yuan_2019" / "reproduce.smk",
+        tmp_path,
+        "--cores",
+        "1",
+        "figures/fig02.json",
+    )
+    done = run_snakemake(*asked)
+    assert done.returncode == 0, done.stdout
     assert len(json.loads((tmp_path / "figures" / "fig02.json").read_text())["shapes"]) == 9
     assert (tmp_path / "figures" / "fig02.png").read_bytes().startswith(b"\x89PNG")
     typed = (tmp_path / "commands" / "fig02.sh").read_text()
     assert typed.startswith('python "$analysis/yuan_2019/fig02_shapes.py"')
     assert (tmp_path / "seconds" / "fig02.tsv").exists()
-    again = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert "Nothing to be done" in again.stdout + again.stderr
+    assert "Nothing to be done" in run_snakemake(*asked).stdout
 
 
 def test_the_command_lists_its_jobs(tmp_path):

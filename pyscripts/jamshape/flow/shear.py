@@ -94,7 +94,7 @@ class Shear(Motion):
         stiffness over the distance of first touch.
         """
         pull = self.k_d * packing.measures * self.gdot * packing.outer_radius
-        return float((pull * packing.diameters.min(axis=1)).max() / self.k_e)
+        return float((2 * pull * packing.inner_radius).max() / self.k_e)
 
     def warning(self, packing: Packing) -> str:
         """Say that the rate may drive particles through each other; nothing where contacts bear it."""

@@ -191,6 +191,11 @@ class Packing:
         return np.asarray(self._bodies.outer_radius)
 
     @property
+    def inner_radius(self) -> FloatArray:
+        """(N,) radii of the spheres in the particles, [length]: R of rods, the shortest semi-axis."""
+        return np.asarray(self._bodies.inner_radius)
+
+    @property
     def measures(self) -> FloatArray:
         """(N,) areas (volumes) of the particles, [length^D]."""
         return np.asarray(self._bodies.measure)

@@ -134,8 +134,6 @@ class DynamicalMatrix:
         S, symmetric to the last bit.
     prestress_sizes : (n, n) scipy.sparse CSR matrix
         Sums of the magnitudes of what was added to each entry of S.
-    prestress_rounding : (n, n) scipy.sparse CSR matrix
-        How far each entry of S may be off because overlaps are differences of lengths in long double.
     coordinates : Coordinates
     bonds : Bonds
     curvature : (C, v, v) array of float64
@@ -156,7 +154,6 @@ class DynamicalMatrix:
     compatibility: Any
     prestress: Any
     prestress_sizes: Any
-    prestress_rounding: Any
     coordinates: Coordinates
     bonds: Bonds
     curvature: FloatArray
@@ -196,6 +193,18 @@ class DynamicalMatrix:
     def matrix(self) -> Any:
         """(n, n) scipy.sparse CSR matrix M = H - S, as far as doubles hold it."""
         return (self.stiffness - self.prestress).tocsr()
+
+    @cached_property
+    def prestress_rounding(self) -> Any:
+        """(n, n) scipy.sparse CSR matrix: how far entries of S may be off, as overlaps are small differences of lengths.
+
+        A force is the stiffness times the overlap, and lengths are of the size of the separation, in long double.
+        """
+        distance = np.linalg.norm(self.contacts["separation"], axis=1)
+        lost = _ROUNDINGS * EPS * self.contacts["stiffness"].sum(axis=1) * distance
+        part = lost / self.contacts["bond_force"].sum(axis=1)
+        scatter = _Scatter(self.contacts["particles"], self.coordinates)
+        return scatter.sizes(part[:, None, None] * self.curvature)
 
     @cached_property
     def translations(self) -> FloatArray:
@@ -332,7 +341,7 @@ def lengths_of_bonds(contacts: dict[str, NDArray[Any]], coordinates: Coordinates
 def _matrix(
     landscape: Landscape, state: State, evaluation: Evaluation, parts: dict[str, Any]
 ) -> DynamicalMatrix:
-    gradient = _gradient(landscape, evaluation.gradient, parts["coordinates"])
+    gradient = gradient_in(parts["coordinates"], landscape, evaluation)
     return DynamicalMatrix(
         **parts, gradient=gradient, bond_force=evaluation.bond_force, volume=state.volume
     )
@@ -372,10 +381,12 @@ def _coordinates(
     return Coordinates(particle, kind, direction[used], n, D)
 
 
-def _gradient(landscape: Landscape, gradient: FloatArray, coordinates: Coordinates) -> FloatArray:
-    """Express the gradient of a landscape in other coordinates."""
+def gradient_in(
+    coordinates: Coordinates, landscape: Landscape, evaluation: Evaluation
+) -> FloatArray:
+    """Express the gradient of a landscape, (n,), in coordinates of modes, [energy / length]."""
     D = coordinates.dimension
-    components = landscape.components(gradient)
+    components = landscape.components(evaluation.gradient)
     components[:, D:] *= landscape.rotation_length[:, None]  # per radian
     return np.asarray(coordinates.embedding.T @ components.ravel())
 
@@ -392,33 +403,19 @@ def _parts(
     contacts = {name: values[held & strong] for name, values in every.items()}
     bonds = _bonds(contacts)
     scatter = _Scatter(contacts["particles"], coordinates)
-    prestress, sizes = scatter.blocks(-contacts["curvature"])
-    _, rounding = scatter.blocks(
-        _rounding_of_forces(contacts)[:, None, None] * contacts["curvature"]
-    )
+    prestress = scatter.blocks(-contacts["curvature"])
     return {
         "compatibility": scatter.rows(
             np.sqrt(bonds.stiffness)[:, None] * bonds.gradient, bonds.contact
         ),
         "prestress": prestress,
-        "prestress_sizes": sizes,
-        "prestress_rounding": rounding,
+        "prestress_sizes": scatter.sizes(contacts["curvature"]),
         "coordinates": coordinates,
         "bonds": bonds,
         "curvature": contacts["curvature"],
         "contacts": contacts,
         "n_left_out": int((held & ~strong).sum()),
     }
-
-
-def _rounding_of_forces(contacts: dict[str, NDArray[Any]]) -> FloatArray:
-    """(C,) How far the forces of contacts may be off, over these forces.
-
-    A force is the stiffness times the overlap, a small difference of lengths of the size of the separation.
-    """
-    distance = np.linalg.norm(contacts["separation"], axis=1)
-    lost = _ROUNDINGS * EPS * contacts["stiffness"].sum(axis=1) * distance
-    return np.asarray(lost / contacts["bond_force"].sum(axis=1))
 
 
 def _bonds(contacts: dict[str, NDArray[Any]]) -> Bonds:
@@ -475,20 +472,23 @@ class _Scatter:
         np.add.at(full, self._place, vectors[:, self._variable] * self._sign)
         return np.asarray(self._embedding.T @ full)
 
-    def blocks(self, blocks: FloatArray) -> tuple[Any, Any]:
-        """(n, n) CSR matrix of (C, v, v) blocks, and that of the magnitudes."""
-        entries = blocks[:, self._variable[:, None], self._variable]
-        entries = entries * self._sign[:, None] * self._sign
+    def blocks(self, blocks: FloatArray) -> Any:
+        """(n, n) CSR matrix of (C, v, v) blocks, symmetric to the last bit."""
+        sign = self._sign[:, None] * self._sign
+        matrix = self._assembled(blocks, sign, self._embedding)
+        return _tidy(0.5 * (matrix + matrix.T))
+
+    def sizes(self, blocks: FloatArray) -> Any:
+        """(n, n) CSR matrix of the magnitudes of what such blocks add."""
+        return self._assembled(np.abs(blocks), 1.0, abs(self._embedding))
+
+    def _assembled(self, blocks: FloatArray, sign: FloatArray | float, embedding: Any) -> Any:
+        entries = blocks[:, self._variable[:, None], self._variable] * sign
         row = np.broadcast_to(self._place[:, :, None], entries.shape).ravel()
         column = np.broadcast_to(self._place[:, None, :], entries.shape).ravel()
-        E, shape = self._embedding, (self._embedding.shape[0],) * 2
-
-        def assembled(values: FloatArray, embedding: Any) -> Any:
-            full = scipy.sparse.csr_matrix((values.ravel(), (row, column)), shape=shape)
-            return _tidy(embedding.T @ full @ embedding)
-
-        matrix = assembled(entries, E)
-        return _tidy(0.5 * (matrix + matrix.T)), assembled(np.abs(entries), abs(E))
+        shape = (self._embedding.shape[0],) * 2
+        full = scipy.sparse.csr_matrix((entries.ravel(), (row, column)), shape=shape)
+        return _tidy(embedding.T @ full @ embedding)
 
 
 def _tidy(matrix: Any) -> Any:

@@ -16,7 +16,7 @@ import scipy.sparse
 from jamshape.arrays import FloatArray
 from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.minima import rounding_floor
-from jamshape.vibration.hessian import DynamicalMatrix, matrix_at
+from jamshape.vibration.hessian import DynamicalMatrix, gradient_in
 
 # How far from a state the energy is to rise, over the smallest radius; the kink is nearer than the first.
 _DISTANCES = (1e-8, 1e-7, 1e-6)
@@ -63,23 +63,28 @@ def _normal(
     landscape: Landscape, state: State, matrix: DynamicalMatrix, mode: FloatArray
 ) -> FloatArray | None:
     """Find the unit normal of the kink that a mode crosses, the way forces jump; None where there is none."""
-    radius = float(landscape.inner_radius.min())
+    here = landscape.evaluate(state)
+    clear = rounding_floor(here, landscape) * matrix.bond_force
     shift, turn = matrix.coordinates.motion(mode / np.abs(mode).max())
-    clear = rounding_floor(landscape.evaluate(state), landscape) * matrix.bond_force
-    jumps = []
-    for way in (radius * distance for distance in _DISTANCES):
-        ways = (way, -way)
-        try:
-            sides = [
-                matrix_at(landscape, state.displaced(x * shift, x * turn), matrix) for x in ways
-            ]
-        except CrossingError:
-            return None
-        jumps.append(sides[0].gradient - sides[1].gradient)
-        rises = min(mode @ sides[0].gradient, -(mode @ sides[1].gradient)) > clear
+
+    def jump_at(distance: float, n_bonds: int | None = None) -> FloatArray | None:
+        """How forces change from one side to the other; None where the energy does not rise to both."""
+        sides = []
+        for x in (distance, -distance):
+            there = landscape.evaluate(state.displaced(x * shift, x * turn))
+            if n_bonds not in (None, there.n_bonds):
+                return None
+            sides.append(gradient_in(matrix.coordinates, landscape, there))
+        rises = min(mode @ sides[0], -(mode @ sides[1])) > clear
+        return sides[0] - sides[1] if rises else None
+
+    nearest, *others = float(landscape.inner_radius.min()) * np.array(_DISTANCES)
+    try:
         # A bond more or less so near is a wall, which can be closed; further away it has nothing to do with the kink.
-        is_wall = len(jumps) == 1 and any(side.n_bonds != matrix.n_bonds for side in sides)
-        if is_wall or not rises:
+        jump = jump_at(nearest, here.n_bonds)
+        if jump is None or any(jump_at(distance) is None for distance in others):
             return None
-    jump = jumps[0] - matrix.translations @ (matrix.translations.T @ jumps[0])
+    except CrossingError:
+        return None
+    jump = jump - matrix.translations @ (matrix.translations.T @ jump)
     return np.asarray(jump / np.linalg.norm(jump))

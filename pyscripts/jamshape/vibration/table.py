@@ -204,10 +204,11 @@ def holds_modes(path: PathLike) -> bool:
 
 def _read(file: h5py.File) -> ModeTable:
     group, of = file["modes"], file["coordinates"]
-    since = {
-        "overlap_error": np.zeros(len(group["eigenvalues"]))
-    }  # files of earlier versions are without
-    columns = {name: group[name][()] if name in group else since[name] for name in _COLUMNS}
+    stored_of = {name: group[name][()] for name in _COLUMNS if name in group}
+    # Files of earlier versions do not tell what the rounding of overlaps changes.
+    columns = {"overlap_error": np.zeros(len(stored_of["eigenvalues"]))} | stored_of
+    if missing := set(_COLUMNS) - columns.keys():
+        raise KeyError(*missing)
     particle, kind, direction = (of[name][()] for name in ("particle", "kind", "direction"))
     n_all, dimension = int(of.attrs["n_all"]), int(of.attrs["dimension"])
     coordinates = Coordinates(particle, kind, direction, n_all, dimension)
