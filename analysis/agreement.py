@@ -6,8 +6,8 @@ FOLDER is what `jamshape reproduce` makes: figures/ has what the scripts of the 
 each job took and commands/ what it was. The paper's numbers stand in analysis/PAPER/paper.csv: a quantity, where the
 paper has it, its value and error (half of the last digit where the paper tells none), where it is among the results
 here, and a remark. `fig05/phi_J[alpha=4]/phi_J` is in fig05.json, under phi_J the row with alpha = 4, of that phi_J; [-1]
-is the last row. It is divided by what `per` names. Writes a page, and beside it the same as a table (.csv) and the jobs
-(jobs.csv). The last line of standard output is one JSON object.
+is the last row. It is divided by what `per` names. Writes a page, and beside it the same as a table (.csv), the jobs
+(jobs.csv) and with what they ran (versions.csv). The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -372,21 +372,30 @@ def page(title: str, rows: Sequence[Row], options: Namespace, at: Mapping[str, A
 
 
 def write_tables(out: Path, rows: Sequence[Row], folder: Path) -> None:
-    """Write the table of numbers and that of jobs."""
-    with out.with_suffix(".csv").open("w", newline="", encoding="utf-8") as file:
+    """Write the tables of numbers, of jobs and of versions."""
+    ours = ("ours", "our_error", "samples", "difference", "verdict")
+    header = ("quantity", "where", "paper", "paper_error", *ours, "remark")
+    write_table(out.with_suffix(".csv"), header, [plain(row) for row in rows])
+    jobs = [(job.name, job.seconds, job.command) for job in read_jobs(folder)]
+    write_table(out.with_name("jobs.csv"), ("job", "seconds", "command"), jobs)
+    write_table(out.with_name("versions.csv"), ("on", "version"), versions())
+
+
+def plain(row: Row) -> tuple[Any, ...]:
+    """Write a line of the table for programs; None is an empty cell."""
+    p, here, off, verdict = row
+    measured = here or Ours(math.nan)
+    told = [*(None if math.isnan(x) else x for x in measured[:2]), measured.samples or None]
+    difference = None if math.isnan(off) else f"{off:.3g}"
+    return (p.quantity, p.where, p.value, p.error, *told, difference, verdict, p.remark)
+
+
+def write_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    """Write a table (CSV)."""
+    with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        ours = ("ours", "our_error", "samples", "difference", "verdict")
-        writer.writerow(("quantity", "where", "paper", "paper_error", *ours, "remark"))
-        for p, here, off, verdict in rows:
-            measured = here or Ours(math.nan)
-            told = [*(None if math.isnan(x) else x for x in measured[:2]), measured.samples or None]
-            difference = None if math.isnan(off) else f"{off:.3g}"
-            paper = (p.quantity, p.where, p.value, p.error)
-            writer.writerow((*paper, *told, difference, verdict, p.remark))
-    with out.with_name("jobs.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("job", "seconds", "command"))
-        writer.writerows((job.name, job.seconds, job.command) for job in read_jobs(folder))
+        writer.writerow(header)
+        writer.writerows(rows)
 
 
 TITLES = {

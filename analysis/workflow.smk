@@ -158,11 +158,14 @@ rule page:
         "agreement.md",
         "agreement.csv",
         "jobs.csv",
+        "versions.csv",
+        "samples/packings.csv",
     params:
         scale=SCALE,
         paper=PAPER,
     shell:
-        'python "$analysis/agreement.py" . --paper {params.paper} --scale {params.scale} --out agreement.md'
+        'python "$analysis/sample_tables.py" . --out samples;'
+        ' python "$analysis/agreement.py" . --paper {params.paper} --scale {params.scale} --out agreement.md'
 
 
 rule job:

@@ -21,7 +21,7 @@ from jamshape.drawing.axes import SMALL_TEXT
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import counted, ensemble_labels, ensembles_title
 from jamshape.files.sets import PackingFile
-from jamshape.measures.averages import standard_error
+from jamshape.measures.averages import Mean, mean, standard_error
 from jamshape.measures.runs import Ensemble, ensemble_of, observables_of
 
 ORDERS = {"S_2": "nematic", "S_4": "tetratic"}
@@ -40,6 +40,8 @@ class Curve(NamedTuple):
     """(2, POINTS), of the `ORDERS`."""
     error: FloatArray
     """(2, POINTS), 0 for one sample."""
+    over_phi: tuple[Mean, Mean]
+    """Averages over phi, whose errors are those over samples."""
     samples: int
 
 
@@ -61,7 +63,9 @@ def average(n: int, runs: Samples) -> Curve:
     phi = np.linspace(start, end, POINTS)
     S = np.array([[np.interp(phi, run["phi"], run[name]) for name in ORDERS] for run in runs])
     scaled = np.sqrt(n) * S
-    return Curve(phi, scaled.mean(axis=0), standard_error(scaled), len(runs))
+    nematic, tetratic = scaled.mean(axis=2).T
+    over_phi = (mean(nematic), mean(tetratic))
+    return Curve(phi, scaled.mean(axis=0), standard_error(scaled), over_phi, len(runs))
 
 
 def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
@@ -75,8 +79,9 @@ def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
             bars = curve.error[order] if curve.error[order].any() else None
             label = f"{labels[ensemble]} ({counted(curve.samples, 'sample')})"
             style = {"marker": "osDv^"[k % 5], "ms": 3.5, "lw": 0.8, "elinewidth": 0.8}
-            mean = curve.mean[order]
-            axes.errorbar(curve.phi, mean, bars, capsize=1.5, mfc="none", label=label, **style)
+            axes.errorbar(
+                curve.phi, curve.mean[order], bars, capsize=1.5, mfc="none", label=label, **style
+            )
         if any(ensemble.system.dimension == 2 for ensemble in curves):
             line = {"color": "0.3", "ls": "--", "lw": 1, "zorder": 0}
             axes.axhline(RANDOM, label=r"random, $\sqrt{\pi}/2$", **line)
@@ -99,9 +104,9 @@ def main(options: Namespace) -> None:
     draw(curves, options)
     rows = []
     for ensemble, curve in curves.items():
-        means = {f"sqrtN_{n}": of.mean() for n, of in zip(ORDERS, curve.mean, strict=True)}
-        row = ensemble.report() | {"samples": curve.samples}
-        rows.append(row | {"phi_start": curve.phi[0], "phi_end": curve.phi[-1]} | means)
+        means = {f"sqrtN_{n}": of._asdict() for n, of in zip(ORDERS, curve.over_phi, strict=True)}
+        row = ensemble.report() | {"phi_start": curve.phi[0], "phi_end": curve.phi[-1]}
+        rows.append(row | means)
     report({"out": options.out, "random": RANDOM, "ensembles": rows})
 
 

@@ -47,7 +47,7 @@ for alpha in OF_MODES[1:]:
 
 # Compressions at finite rates, Figs. 3 and 4.
 SLOW = {}
-for alpha, (start, end) in AT["slow_phi"].items():
+for alpha, (start, slow, end) in AT["slow_phi"].items():
     for kappa in AT["slow_kappas"]:
         for seed in range(1, AT["slow_samples"] + 1):
             name = f"slow_alpha{alpha}_kappa{kappa}_seed{seed}"
@@ -56,7 +56,7 @@ for alpha, (start, end) in AT["slow_phi"].items():
                 "slow",
                 name,
                 f"jamshape slow --alpha {alpha} --n {AT['slow_n']} --seed {seed} --kappa {kappa}"
-                f" --phi-start {start} --phi-end {end} --out runs/{name}.h5",
+                f" --phi-start {start} --phi-slow {slow} --phi-end {end} --out runs/{name}.h5",
             )
 SLOWEST = [path for (alpha, kappa, _), path in SLOW.items() if (alpha, kappa) == ("4", AT["slow_kappas"][-1])]
 

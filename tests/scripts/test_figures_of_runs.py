@@ -124,19 +124,21 @@ def test_order_of_samples(report, tmp_path):
     runs = [compression(tmp_path / f"{n}-{k}.h5", k, n=n) for n in (100, 400) for k in range(3)]
     found = report(ORDER, *runs, "--out", tmp_path / "order.png")
     assert found["random"] == pytest.approx(np.sqrt(np.pi) / 2)
-    assert [(e["n"], e["samples"]) for e in found["ensembles"]] == [(100, 3), (400, 3)]
+    means = {e["n"]: e["sqrtN_S_2"] for e in found["ensembles"]}
+    assert {n: mean["samples"] for n, mean in means.items()} == {100: 3, 400: 3}
     rng = [np.random.default_rng(k) for k in range(3)]
     for r in rng:
         r.uniform(0, 7, 3)
     S_2 = [orientational_order(r.uniform(0, 7, 400), 2).S_n for r in rng]
-    assert found["ensembles"][1]["sqrtN_S_2"] == pytest.approx(20 * np.mean(S_2))
+    assert means[400]["value"] == pytest.approx(20 * np.mean(S_2))
+    assert means[400]["error"] == pytest.approx(20 * np.std(S_2, ddof=1) / np.sqrt(3))
     image(tmp_path / "order.png")
 
 
 def test_order_of_one_run_and_of_runs_that_do_not_overlap(report, problem, tmp_path):
     one = compression(tmp_path / "one.h5")
     (found,) = report(ORDER, one, "--out", tmp_path / "order.png")["ensembles"]
-    assert (found["samples"], found["alpha"], found["kappa"]) == (1, 4.0, 1e-6)
+    assert (found["sqrtN_S_4"]["samples"], found["alpha"], found["kappa"]) == (1, 4.0, 1e-6)
     low = compression(tmp_path / "low.h5", ends=(0.7, 0.8))
     assert "share no range of phi" in problem(ORDER, one, low, "--out", tmp_path / "o.png")
 

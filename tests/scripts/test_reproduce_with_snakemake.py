@@ -139,7 +139,8 @@ def reproduce(tmp_path):
     """Reproduce by a workflow with these lines, in a clone of its own; return the exit code and what is reported."""
     folder = tmp_path / "analysis" / "yuan_2019"
     folder.mkdir(parents=True)
-    for name in ("workflow.smk", "agreement.py", "yuan_2019/scales.toml", "yuan_2019/paper.csv"):
+    scripts = ("workflow.smk", "agreement.py", "sample_tables.py")
+    for name in (*scripts, "yuan_2019/scales.toml", "yuan_2019/paper.csv"):
         (tmp_path / "analysis" / name).write_bytes((ANALYSIS / name).read_bytes())
     runner = (
         "import sys; from jamshape.commands import main, reproduce\n"

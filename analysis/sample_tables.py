@@ -1,0 +1,104 @@
+"""Write what packings, modes and runs of a reproduced paper are as tables, a line for each of their files.
+
+    python analysis/sample_tables.py FOLDER --out FOLDER/samples
+
+FOLDER is what `jamshape reproduce` makes. Writes packings.csv, modes.csv and runs.csv to the folder --out. They are what
+averages in figures are of, without the coordinates: seeds, sizes, how each one ended, and what was measured. A cell is
+empty where a file has no such number. Units are those of the files: the diameter and the stiffness k of the smaller
+particles (docs/explanation/files.md). The commands that made the files are in jobs.csv, and the versions in
+agreement.md, beside these. The last line of standard output is one JSON object.
+"""
+
+from __future__ import annotations
+
+import csv
+from argparse import Namespace
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from jamshape.command import parser_of, report, run
+from jamshape.files.h5md import read_attributes
+from jamshape.vibration.table import read_modes
+
+SHAPE = ("alpha", "exponent", "w1", "w2", "size_ratio", "n", "seed")
+PACKING = (
+    *SHAPE, "way", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
+    "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "outcome", "wall_seconds",
+)  # fmt: skip
+RUN = (
+    *SHAPE, "kappa", "phi_start", "phi_end", "method", "phi_unjams", "phi_jams", "frames_minimised",
+    "flow_steps", "flow_evaluations", "flow_wall_seconds",
+)  # fmt: skip
+BANDS = ("low", "middle", "high")
+MODES = (
+    *SHAPE, "u0", "n_backbone", "n_modes", "n_bonds", "z", "rank", "n_self_stress", "n_grazing",
+    *BANDS, "negative", "bulk_modulus", "pure_shear_modulus", "wall_seconds",
+)  # fmt: skip
+
+
+def told(path: Path) -> dict[str, Any]:
+    """Read what a packing or a run is."""
+    return read_attributes(path)
+
+
+def told_modes(path: Path) -> dict[str, Any]:
+    """Read what modes are: numbers of their own before those of the packing, and how many are in each band."""
+    table = read_modes(path)
+    own = table.attributes
+    packing = {name.removeprefix("packing_"): value for name, value in own.items()}
+    counts = {band: len(table.in_band(band)) for band in BANDS}
+    return packing | own | counts | {"negative": int((table["sign"] < 0).sum())}
+
+
+def rows_of(paths: Iterable[Path], read: Callable[[Path], dict[str, Any]]) -> list[dict[str, Any]]:
+    """Read files; those that hold something else, as a run that was not finished, are left out."""
+    found = []
+    for path in sorted(paths):
+        row = read(path)
+        if row.get("finished", True):
+            found.append(row | {"path": path})
+    return found
+
+
+def write(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]], folder: Path) -> None:
+    """Write a table; columns that no line has are left out."""
+    known = [name for name in columns if any(name in row for row in rows)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("file", *known))
+        for row in rows:
+            name = row["path"].relative_to(folder).as_posix()
+            writer.writerow((name, *(short(row.get(name)) for name in known)))
+
+
+def short(value: Any) -> str:
+    """Write a number to ten digits, and nothing for what is not known."""
+    if value is None or value != value:  # noqa: PLR0124 - not a number
+        return ""
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def main(options: Namespace) -> None:
+    """Read, write, report."""
+    folder = options.folder
+    if not (folder / "packings").is_dir():
+        msg = f"{folder} has no folder packings, expected one that jamshape reproduce made"
+        raise ValueError(msg)
+    options.out.mkdir(parents=True, exist_ok=True)
+    # .h5 alone: a search that was not finished has two endings.
+    packings = [p for part in ("packings", "ladder") for p in folder.glob(f"{part}/*/*.h5")]
+    tables = {
+        "packings": (PACKING, rows_of((p for p in packings if p.suffixes[-2:] != [".search", ".h5"]), told)),
+        "modes": (MODES, rows_of(folder.glob("modes/*/*.modes.h5"), told_modes)),
+        "runs": (RUN, rows_of(folder.glob("runs/*.h5"), told)),
+    }  # fmt: skip
+    for name, (columns, rows) in tables.items():
+        write(options.out / f"{name}.csv", columns, rows, folder)
+    report({"out": options.out, **{name: len(rows) for name, (_, rows) in tables.items()}})
+
+
+if __name__ == "__main__":
+    parser = parser_of(__doc__, "samples")
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="of jamshape reproduce")
+    run(parser, main)

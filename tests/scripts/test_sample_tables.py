@@ -1,0 +1,57 @@
+"""Tables of the packings, modes and runs of a reproduced paper."""
+
+import csv
+
+import pytest
+
+import jamshape as js
+from jamshape.files.h5md import read_attributes
+
+SCRIPT = "sample_tables.py"
+
+
+def table(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A packing, its modes and a search that was not finished, as the workflow leaves them."""
+    root = tmp_path_factory.mktemp("reproduced")
+    for name in ("packings/rods", "modes/modes"):
+        (root / name).mkdir(parents=True)
+    packing = root / "packings" / "rods" / "alpha4_seed1.h5"
+    js.make_packing(
+        js.Spherocylinders(alpha=4), n=16, seed=1, u0=1e-12, file=packing, progress=False
+    )
+    js.modes(packing).save(root / "modes" / "modes" / "alpha4_seed1.modes.h5")
+    (packing.parent / "alpha4_seed2.h5.search.h5").write_bytes(b"half of a search")
+    return root
+
+
+def test_each_file_is_a_line(folder, report):
+    out = folder / "samples"
+    said = report(SCRIPT, folder, "--out", out)
+    assert (said["packings"], said["modes"], said["runs"]) == (1, 1, 0)
+    [packing] = table(out / "packings.csv")
+    told = read_attributes(folder / packing["file"])
+    for name in ("alpha", "n", "seed", "u0", "phi_J", "z", "n_rattlers", "residual_force"):
+        assert float(packing[name]) == pytest.approx(float(told[name]), rel=1e-9)
+    assert packing["outcome"] == told["outcome"]
+    assert "w1" not in packing  # no file has one
+    assert table(out / "runs.csv") == []
+
+
+def test_modes_are_counted_by_band_beside_their_packing(folder, report):
+    report(SCRIPT, folder, "--out", folder / "samples")
+    [modes] = table(folder / "samples" / "modes.csv")
+    whole = sum(int(modes[band]) for band in ("low", "middle", "high"))
+    assert whole == int(modes["n_modes"]) - 2  # but for translations
+    assert (float(modes["alpha"]), int(modes["seed"])) == (4.0, 1)
+    assert int(modes["n"]) == 16
+
+
+def test_what_is_no_folder_of_a_reproduction_is_refused(tmp_path, problem):
+    said = problem(SCRIPT, tmp_path, "--out", tmp_path / "samples")
+    assert "has no folder packings, expected one that jamshape reproduce made" in said
