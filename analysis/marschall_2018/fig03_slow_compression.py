@@ -6,7 +6,8 @@ Runs are of pyscripts/slow_compress.py or compress.py; there is a column for eac
 linear axis above and on a logarithmic one below, and a line for each rate: the mean over samples (seeds),
 which are drawn thin. Vertical lines mark phi_J(kappa) of the slowest rate, from the lines through the pressures
 just above the onsets (Fig. 4), and phi_J of packings at an energy. Prints a table (Markdown) of what runs cost (medians;
-beside Heun's method with dt = 0.01), of phi_J(kappa), of how far it lies from that of the slowest rate, and of
+beside Heun's method with dt = 0.01), of phi_J(kappa), of phi_J by the frames (in the middle between the last frame
+that unjams when it is minimised and the first that stays jammed), of how far it lies from that of the slowest rate, and of
 the pressure above it over that of the slowest rate, sample by sample, with standard errors. The last line of
 standard output is one JSON object.
 """
@@ -35,6 +36,7 @@ from jamshape.drawing.text import (
 from jamshape.files.h5md import read_attributes
 from jamshape.files.sets import PackingFile, System
 from jamshape.measures.averages import Mean, mean
+from jamshape.measures.jamming import Jamming
 from jamshape.measures.runs import Run, read_run
 
 if TYPE_CHECKING:
@@ -59,6 +61,7 @@ TABLE = (
         "Heun's over these",
         "seconds",
         "phi_J(kappa)",
+        "phi_J by frames",
     ),
     *("phi_J(kappa) less that of the slowest", "p above phi_J over that of the slowest, less 1"),
 )
@@ -98,6 +101,11 @@ class Rate(NamedTuple):
         if len(fits) == 1:
             return Mean(fits[0].phi_J, fits[0].phi_J_error, 1)
         return mean([fit.phi_J for fit in fits])
+
+    def jamming(self) -> Mean:
+        """Mean phi_J by the frames of runs that were minimised, which no drag holds up."""
+        told = (Jamming.stored(read_attributes(one.path)) for one in self.runs)
+        return mean([(one.unjams + one.jams) / 2 for one in told if one])
 
     def pressure(self) -> tuple[FloatArray, FloatArray]:
         """Mean p(phi) where all samples have one."""
@@ -164,6 +172,10 @@ def draw_onsets(axis: Axes, own: list[Rate], packings: list[float]) -> None:
         onset = fitted[-1].onset()
         label = rf"${onset_symbol(fitted[-1].kappa)}={onset.tex}$"
         axis.axvline(onset.value, color="k", ls="--", lw=0.8, label=label)
+    jamming = own[-1].jamming()
+    if jamming.samples:
+        label = rf"$\phi_J={jamming.tex}$, by frames"
+        axis.axvline(jamming.value, color="k", ls="-.", lw=0.8, label=label)
     if packings:
         found = mean(packings)
         label = rf"$\phi_J={found.tex}$, from $u_0$ to 0"
@@ -207,6 +219,7 @@ def row(of: Rate, rates: list[Rate]) -> dict[str, Any]:
     medians = np.median(costs, axis=0).tolist() if costs else [None] * len(Cost._fields)
     found |= dict(zip(Cost._fields, medians, strict=True))
     found |= {"runs": [one.path for one in of.runs], "phi_J(kappa)": of.onset()}
+    found |= {"phi_J(frames)": of.jamming()}
     if of is slowest:
         return found | {"shift": None, "excess": None}
     pairs = [(one, twins[one.seed]) for one in of.runs if one.seed in twins]
@@ -219,7 +232,8 @@ def table(rates: list[Rate], rows: list[dict[str, Any]]) -> str:
     lines = ["| " + " | ".join(TABLE) + " |", "| --- " * len(TABLE) + "|"]
     for of, r in zip(rates, rows, strict=True):
         cost = ["" if r[name] is None else f"{r[name]:.3g}" for name in Cost._fields]
-        means = [m.text() if m else "" for m in (r["phi_J(kappa)"], r["shift"], r["excess"])]
+        names = ("phi_J(kappa)", "phi_J(frames)", "shift", "excess")
+        means = [r[name].text() if r[name] else "" for name in names]
         system = system_text(of.place.system).replace("$", "").replace("\\", "")
         cells = (system, r["n"], f"{r['kappa']:g}", len(r["runs"]), *cost, *means)
         lines.append("| " + " | ".join(map(str, cells)) + " |")

@@ -186,5 +186,17 @@ def test_one_sample_has_the_error_of_its_fit_and_packings_are_marked(here, capsy
     assert row["phi_J(kappa)"]["samples"] == 1
     assert 0 < row["phi_J(kappa)"]["error"] < 1e-9
     table = lines[:3]
-    assert {line.count("|") for line in table} == {11}
+    assert {line.count("|") for line in table} == {12}
     image(tmp_path / "slow.png")
+
+
+def test_phi_j_by_frames_is_between_the_last_that_unjams_and_the_first_that_stays(report, tmp_path):
+    jams = ((0.860, 0.862), (0.864, 0.868))
+    runs = [
+        compression(tmp_path / f"{k}.h5", k, phi_unjams=low, phi_jams=high, frames_minimised=3)
+        for k, (low, high) in enumerate(jams)
+    ]
+    [row] = report(SLOW, *runs, "--out", tmp_path / "slow.png")["rows"]
+    found = row["phi_J(frames)"]
+    assert (found["value"], found["samples"]) == (pytest.approx(0.8635), 2)
+    assert found["error"] == pytest.approx(0.0025)
