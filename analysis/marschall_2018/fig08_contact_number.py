@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
 from jamshape.drawing.saving import save_figure
@@ -71,13 +72,23 @@ def fit(known: Averages, limit: int, largest: float) -> Fitted:
         found = f"{len(small)} alpha from 0 to {largest:g}"
         return Fitted(None, small, f"{found}, expected {FITTED} for a fit")
     means = [known[alpha] for alpha in small]
-    errors = np.array([m.error for m in means])
     above = np.array([m.value for m in means]) - limit
     try:
-        law = fit_offset_power_law(small, above, errors if (errors > 0).all() else None)
+        law = fit_offset_power_law(small, above, errors_of(means))
     except ValueError as error:
         return Fitted(None, small, str(error))
     return Fitted(law, small)
+
+
+def errors_of(means: list[Mean]) -> FloatArray | None:
+    """Errors of averages; that of a single sample is the usual deviation of samples of the others. None if nobody knows."""
+    errors, samples = np.array([m.error for m in means]), np.array([m.samples for m in means])
+    is_known = np.isfinite(errors)
+    if not is_known.any():
+        return None
+    usual = np.median((errors * np.sqrt(samples))[is_known])
+    errors = np.where(is_known, errors, usual)
+    return errors if (errors > 0).all() else None
 
 
 def above(known: Averages, limit: int) -> Averages:
