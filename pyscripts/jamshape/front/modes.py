@@ -88,7 +88,7 @@ class Modes:
 
     @property
     def participation(self) -> FloatArray:
-        """(k,) participation ratios: 1 where all particles move alike, 1/N where one does."""
+        """(k,) participation ratios: 3 where all of x, y and turns take part alike (2D), 1/N where one coordinate does."""
         return self.table["participation"]
 
     @property

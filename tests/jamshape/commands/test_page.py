@@ -14,7 +14,8 @@ from jamshape.commands import COMMANDS, sweep
 
 pytestmark = pytest.mark.lammps
 
-PAGES = Path(__file__).parents[3] / "docs" / "how-to"
+ROOT = Path(__file__).parents[3]
+PAGES = ROOT / "docs" / "how-to"
 PAGE = (PAGES / "command.md").read_text(encoding="utf-8")
 OF_COMMAND = re.compile(r"^    jamshape (.*)$", re.MULTILINE)
 LINES = OF_COMMAND.findall(PAGE)
@@ -77,6 +78,20 @@ def test_the_commands_of_protocols_run_in_their_order(jamshape, tmp_path, monkey
         assert not ended.code or (may_fail and ended.code == 1), f"{line}: {ended}"
 
 
+def run_python(page, **shorter):
+    """Run the blocks of Python of a page, each as a script of its own, with some of its words replaced."""
+    for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        for words, quick in shorter.items():
+            code = re.sub(rf"\b{words}=[\d.]+", f"{words}={quick}", code)
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-c", f"import jamshape as js\n{code}"],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+
+
 SHEAR = (PAGES / "shear.md").read_text(encoding="utf-8")
 
 
@@ -85,19 +100,35 @@ def test_the_commands_and_lines_of_python_about_shear_run(jamshape, tmp_path, mo
     monkeypatch.setenv("MPLBACKEND", "agg")
     first, steps = OF_COMMAND.findall(SHEAR)
     assert not jamshape(*shlex.split(first), *QUICK["shear"].split()).code
-    for code in re.findall(r"```python\n(.*?)```", SHEAR, re.DOTALL):
-        script = "import jamshape as js\n" + code.replace("n=64", "n=16").replace(
-            "strain=4", "strain=1"
-        )
-        done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", script],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
+    run_python(SHEAR, n=16, strain=1)
     # From the packing that the lines have made.
     assert not jamshape(*shlex.split(steps), "--step", 1e-2).code
+
+
+def test_the_commands_and_lines_of_python_about_modes_run(jamshape, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    page = (PAGES / "energies-and-modes.md").read_text(encoding="utf-8")
+    for line in OF_COMMAND.findall(page):
+        name, *options = shlex.split(line)
+        assert not jamshape(name, *options, *({"pack": ["--n", "32"]}.get(name, []))).code
+    [ladder] = re.findall(r"^    python (analysis/\S+) (.*)$", page, re.MULTILINE)
+    script = [sys.executable, str(ROOT / ladder[0]), *shlex.split(ladder[1])]
+    done = subprocess.run(script, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert len(list(Path("ladder").glob("*.h5"))) == 2
+    run_python(page)
+    assert Path("spectrum.png").exists()
+
+
+def test_the_commands_of_another_shape_run(jamshape, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = (PAGES / "another-shape.md").read_text(encoding="utf-8")
+    lines = [shlex.split(line) for line in OF_COMMAND.findall(page)]
+    assert [line[0] for line in lines] == ["pack", "modes", "draw"]
+    for name, *options in lines:
+        quick = {"pack": ["--n", "16", "--u0", "1e-6"], "draw": ["--dpi", "50"]}.get(name, [])
+        assert not jamshape(name, *options, *quick).code
 
 
 CLUSTER = (PAGES / "cluster.md").read_text(encoding="utf-8")
