@@ -81,10 +81,11 @@ def test_the_commands_of_protocols_run_in_their_order(jamshape, tmp_path, monkey
 def run_python(page, **shorter):
     """Run the blocks of Python of a page, each as a script of its own, with some of its words replaced."""
     for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        script = f"import jamshape as js\n{code}"
         for words, quick in shorter.items():
-            code = re.sub(rf"\b{words}=[\d.]+", f"{words}={quick}", code)
+            script = re.sub(rf"\b{words}=[\d.]+", f"{words}={quick}", script)
         done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", f"import jamshape as js\n{code}"],
+            [sys.executable, "-W", "error", "-c", script],
             capture_output=True,
             text=True,
             check=False,
