@@ -12,6 +12,7 @@ agreement.md, beside these. The last line of standard output is one JSON object.
 from __future__ import annotations
 
 import csv
+import math
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -37,9 +38,10 @@ MODES = (
 )  # fmt: skip
 
 
-def told(path: Path) -> dict[str, Any]:
-    """Read what a packing or a run is."""
-    return read_attributes(path)
+def told_run(path: Path) -> dict[str, Any] | None:
+    """Read what a run is; None of one that was not finished."""
+    found = read_attributes(path)
+    return found if found.get("finished") else None
 
 
 def told_modes(path: Path) -> dict[str, Any]:
@@ -51,14 +53,12 @@ def told_modes(path: Path) -> dict[str, Any]:
     return packing | own | counts | {"negative": int((table["sign"] < 0).sum())}
 
 
-def rows_of(paths: Iterable[Path], read: Callable[[Path], dict[str, Any]]) -> list[dict[str, Any]]:
-    """Read files; those that hold something else, as a run that was not finished, are left out."""
-    found = []
-    for path in sorted(paths):
-        row = read(path)
-        if row.get("finished", True):
-            found.append(row | {"path": path})
-    return found
+def rows_of(
+    paths: Iterable[Path], read: Callable[[Path], dict[str, Any] | None]
+) -> list[dict[str, Any]]:
+    """Read files, but those of which nothing can be told yet."""
+    rows = ((path, read(path)) for path in sorted(paths))
+    return [row | {"path": path} for path, row in rows if row]
 
 
 def write(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]], folder: Path) -> None:
@@ -74,9 +74,9 @@ def write(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]], fo
 
 def short(value: Any) -> str:
     """Write a number to ten digits, and nothing for what is not known."""
-    if value is None or value != value:  # noqa: PLR0124 - not a number
+    if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
-    return f"{value:.10g}" if isinstance(value, float) else str(value)
+    return f"{value:.10g}" if isinstance(value, float) else " ".join(str(value).split())
 
 
 def main(options: Namespace) -> None:
@@ -89,9 +89,9 @@ def main(options: Namespace) -> None:
     # .h5 alone: a search that was not finished has two endings.
     packings = [p for part in ("packings", "ladder") for p in folder.glob(f"{part}/*/*.h5")]
     tables = {
-        "packings": (PACKING, rows_of((p for p in packings if p.suffixes[-2:] != [".search", ".h5"]), told)),
+        "packings": (PACKING, rows_of((p for p in packings if p.suffixes[-2:] != [".search", ".h5"]), read_attributes)),
         "modes": (MODES, rows_of(folder.glob("modes/*/*.modes.h5"), told_modes)),
-        "runs": (RUN, rows_of(folder.glob("runs/*.h5"), told)),
+        "runs": (RUN, rows_of(folder.glob("runs/*.h5"), told_run)),
     }  # fmt: skip
     for name, (columns, rows) in tables.items():
         write(options.out / f"{name}.csv", columns, rows, folder)

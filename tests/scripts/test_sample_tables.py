@@ -6,6 +6,7 @@ import pytest
 
 import jamshape as js
 from jamshape.files.h5md import read_attributes
+from jamshape.files.run_writer import RunWriter
 
 SCRIPT = "sample_tables.py"
 
@@ -27,20 +28,29 @@ def folder(tmp_path_factory):
     )
     js.modes(packing).save(root / "modes" / "modes" / "alpha4_seed1.modes.h5")
     (packing.parent / "alpha4_seed2.h5.search.h5").write_bytes(b"half of a search")
+    (root / "runs").mkdir()
+    for name, finished in (("slow1", True), ("slow2", False)):
+        known = {"alpha": 4.0, "kappa": 1e-8, "phi_jams": 0.86, "finished": finished}
+        RunWriter.create(root / "runs" / f"{name}.h5", js.load(packing), known).close()
     return root
 
 
 def test_each_file_is_a_line(folder, report):
     out = folder / "samples"
     said = report(SCRIPT, folder, "--out", out)
-    assert (said["packings"], said["modes"], said["runs"]) == (1, 1, 0)
+    assert (said["packings"], said["modes"], said["runs"]) == (1, 1, 1)
     [packing] = table(out / "packings.csv")
     told = read_attributes(folder / packing["file"])
     for name in ("alpha", "n", "seed", "u0", "phi_J", "z", "n_rattlers", "residual_force"):
         assert float(packing[name]) == pytest.approx(float(told[name]), rel=1e-9)
     assert packing["outcome"] == told["outcome"]
     assert "w1" not in packing  # no file has one
-    assert table(out / "runs.csv") == []
+
+
+def test_runs_that_were_not_finished_are_left_out(folder, report):
+    report(SCRIPT, folder, "--out", folder / "samples")
+    [run] = table(folder / "samples" / "runs.csv")
+    assert (run["file"], run["kappa"], run["phi_jams"]) == ("runs/slow1.h5", "1e-08", "0.86")
 
 
 def test_modes_are_counted_by_band_beside_their_packing(folder, report):
