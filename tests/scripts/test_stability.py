@@ -29,7 +29,7 @@ _ROUNDING = (
 )
 _FREE_MOTION = (
     "a single contact below jamming may open and close by more than its overlap at a kappa of 1e-14: "
-    "free motion is resolved to sqrt(overlap size) only, as ARCHITECTURE says"
+    "free motion is resolved to sqrt(overlap size) only, as docs/explanation/slow-compressions.md says"
 )
 _DEEP_KINK = (
     "overlaps of a third of rods: two bonds as a norm have a kink where the far end goes from one rod's "
