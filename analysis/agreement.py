@@ -32,6 +32,7 @@ from typing import Any, NamedTuple
 import jamshape
 from jamshape.checks import require_one_of
 from jamshape.command import parser_of, report, run
+from jamshape.commands.reproduce import with_samples
 from jamshape.lammps.plugin import PluginError, built_for, plugin_path
 
 HERE = Path(__file__).parent
@@ -415,7 +416,8 @@ def main(options: Namespace) -> None:
         raise ValueError(msg)
     results = read_results(figures)
     rows = [judged(p, ours_of(results, p)) for p in read_paper(HERE / options.paper / "paper.csv")]
-    text = page(TITLES[options.paper], rows, options, scales[options.scale])
+    at = with_samples(scales[options.scale], options.samples)
+    text = page(TITLES[options.paper], rows, options, at)
     options.out.write_text(text, encoding="utf-8")
     write_tables(options.out, rows, options.folder)
     counts = Counter(row.verdict for row in rows)
@@ -428,4 +430,5 @@ if __name__ == "__main__":
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="of jamshape reproduce")
     parser.add_argument("--paper", required=True, help=" or ".join(TITLES))
     parser.add_argument("--scale", default="demo", help="of scales.toml (%(default)s)")
+    parser.add_argument("--samples", type=int, help="at most so many of each sort were asked for")
     run(parser, main)

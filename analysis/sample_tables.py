@@ -6,7 +6,7 @@ FOLDER is what `jamshape reproduce` makes. Writes packings.csv, modes.csv and ru
 averages in figures are of, without the coordinates: seeds, sizes, how each one ended, and what was measured. A cell is
 empty where a file has no such number. Units are those of the files: the diameter and the stiffness k of the smaller
 particles (docs/explanation/files.md). The commands that made the files are in jobs.csv, and the versions in
-agreement.md, beside these. The last line of standard output is one JSON object.
+versions.csv, which agreement.py writes. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from typing import Any
 
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes
+from jamshape.files.sets import OTHERS
+from jamshape.measures.runs import rate_of
+from jamshape.vibration.sets import TOLD, of_packing
 from jamshape.vibration.table import read_modes
 
 SHAPE = ("alpha", "exponent", "w1", "w2", "size_ratio", "n", "seed")
@@ -31,26 +34,24 @@ RUN = (
     *SHAPE, "kappa", "phi_start", "phi_end", "method", "phi_unjams", "phi_jams", "frames_minimised",
     "flow_steps", "flow_evaluations", "flow_wall_seconds",
 )  # fmt: skip
-BANDS = ("low", "middle", "high")
 MODES = (
     *SHAPE, "u0", "n_backbone", "n_modes", "n_bonds", "z", "rank", "n_self_stress", "n_grazing",
-    *BANDS, "negative", "bulk_modulus", "pure_shear_modulus", "wall_seconds",
+    *TOLD, "negative", "bulk_modulus", "pure_shear_modulus", "wall_seconds",
 )  # fmt: skip
 
 
 def told_run(path: Path) -> dict[str, Any] | None:
-    """Read what a run is; None of one that was not finished."""
+    """Read what a run is, and its rate at the end; None of one that was not finished."""
     found = read_attributes(path)
-    return found if found.get("finished") else None
+    return found | {"kappa": rate_of(found)} if found.get("finished") else None
 
 
 def told_modes(path: Path) -> dict[str, Any]:
     """Read what modes are: numbers of their own before those of the packing, and how many are in each band."""
     table = read_modes(path)
-    own = table.attributes
-    packing = {name.removeprefix("packing_"): value for name, value in own.items()}
-    counts = {band: len(table.in_band(band)) for band in BANDS}
-    return packing | own | counts | {"negative": int((table["sign"] < 0).sum())}
+    counts = {band: len(table.in_band(band)) for band in TOLD}
+    counts["negative"] = int((table["sign"] < 0).sum())
+    return of_packing(table) | table.attributes | counts
 
 
 def rows_of(
@@ -76,7 +77,7 @@ def short(value: Any) -> str:
     """Write a number to ten digits, and nothing for what is not known."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
-    return f"{value:.10g}" if isinstance(value, float) else " ".join(str(value).split())
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def main(options: Namespace) -> None:
@@ -86,10 +87,10 @@ def main(options: Namespace) -> None:
         msg = f"{folder} has no folder packings, expected one that jamshape reproduce made"
         raise ValueError(msg)
     options.out.mkdir(parents=True, exist_ok=True)
-    # .h5 alone: a search that was not finished has two endings.
-    packings = [p for part in ("packings", "ladder") for p in folder.glob(f"{part}/*/*.h5")]
+    places = [p for part in ("packings", "ladder") for p in folder.glob(f"{part}/*/*.h5")]
+    packings = [place for place in places if not place.name.endswith(OTHERS)]
     tables = {
-        "packings": (PACKING, rows_of((p for p in packings if p.suffixes[-2:] != [".search", ".h5"]), read_attributes)),
+        "packings": (PACKING, rows_of(packings, read_attributes)),
         "modes": (MODES, rows_of(folder.glob("modes/*/*.modes.h5"), told_modes)),
         "runs": (RUN, rows_of(folder.glob("runs/*.h5"), told_run)),
     }  # fmt: skip

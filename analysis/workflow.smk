@@ -15,17 +15,19 @@ from pathlib import Path
 from typing import NamedTuple
 
 from jamshape.commands import sweep
+from jamshape.commands.reproduce import with_samples
 
 ANALYSIS = Path(workflow.basedir).parent
 PAPER = Path(workflow.basedir).name
 SCALES = tomllib.loads((Path(workflow.basedir) / "scales.toml").read_text())
 SCALE = config.get("scale", "demo")
 for name in config:
-    if name != "scale":
-        sys.exit(f"{PAPER}/reproduce.smk: the setting {name} is not known, expected scale")
+    if name not in ("scale", "samples", "figures"):
+        sys.exit(f"{PAPER}/reproduce.smk: the setting {name} is not known, expected scale, samples or figures")
 if SCALE not in SCALES:
     sys.exit(f"{PAPER}/reproduce.smk: scale is {SCALE}, expected one of {', '.join(SCALES)}")
-AT = SCALES[SCALE]
+SAMPLES = config.get("samples")  # at most so many of each sort
+AT = with_samples(SCALES[SCALE], SAMPLES)
 
 # Commands are written as one types them; these words stand for this Python and for the folder of the scripts.
 shell.executable("bash")
@@ -79,6 +81,7 @@ def add_sweep(group, options, chunk):
             asked = ["--first-seed", own.start, "--samples", len(own), *parsed.extra]
             line = f"jamshape sweep {shlex.join(particle.asked)} {shlex.join(map(str, asked))}"
             add(group, name, f"{line} --jobs 1 --out {out} || true")
+            GROUPS.setdefault(f"{group}_{particle.name}", []).append(name)
             made = [sweep.file_of(particle, seed, parsed) for seed in own]
             files[name] = [str(path) for path in made]
             forget_if_gone(name, made)
@@ -121,9 +124,26 @@ def report_of(name):
     return Path("reports") / f"{name}.json"
 
 
+def chosen_figures():
+    """Name the figures that are asked for."""
+    asked = [name for name in str(config.get("figures", "")).split(",") if name] or list(FIGURES)
+    for name in asked:
+        if name not in FIGURES:
+            sys.exit(f"{PAPER}/reproduce.smk: {name} is no figure, expected some of {', '.join(FIGURES)}")
+    return asked
+
+
 def everything(_):
     """List the page and the reports of all jobs: of these, too, since Snakemake makes what lies between again only if asked."""
-    return ["agreement.md", *(str(report_of(name)) for name in JOBS)]
+    needed = [name for figure in chosen_figures() for name in before(FIGURES[figure])]
+    names = dict.fromkeys(needed) if config.get("figures") else JOBS
+    return ["agreement.md", *(str(report_of(name)) for name in names)]
+
+
+def before(job):
+    """List the jobs before a job, and those before these."""
+    direct = [name for group in job.after for name in GROUPS[group]]
+    return [earlier for name in direct for earlier in (*before(JOBS[name]), name)]
 
 
 def needs(jobs):
@@ -153,19 +173,22 @@ wildcard_constraints:
 
 rule page:
     input:
-        lambda _: [f"figures/{name}.json" for name in FIGURES],
+        lambda _: [f"figures/{name}.json" for name in chosen_figures()],
     output:
         "agreement.md",
         "agreement.csv",
         "jobs.csv",
         "versions.csv",
         "samples/packings.csv",
+        "samples/modes.csv",
+        "samples/runs.csv",
     params:
         scale=SCALE,
         paper=PAPER,
+        samples=f"--samples {SAMPLES}" if SAMPLES else "",
     shell:
-        'python "$analysis/sample_tables.py" . --out samples;'
-        ' python "$analysis/agreement.py" . --paper {params.paper} --scale {params.scale} --out agreement.md'
+        'python "$analysis/sample_tables.py" . --out samples'
+        ' && python "$analysis/agreement.py" . --paper {params.paper} --scale {params.scale} {params.samples} --out agreement.md'
 
 
 rule job:

@@ -7,7 +7,7 @@ linear axis above and on a logarithmic one below, and a line for each rate: the 
 which are drawn thin. Vertical lines mark phi_J(kappa) of the slowest rate, from the lines through the pressures
 just above the onsets (Fig. 4), and phi_J of packings at an energy. Prints a table (Markdown) of what runs cost (medians;
 beside Heun's method with dt = 0.01), of phi_J(kappa), of phi_J by the frames (in the middle between the last frame
-that unjams when it is minimised and the first that stays jammed), of how far it lies from that of the slowest rate, and of
+that unjams when it is minimised and the first that stays jammed; the error holds how far these lie apart), of how far it lies from that of the slowest rate, and of
 the pressure above it over that of the slowest rate, sample by sample, with standard errors. The last line of
 standard output is one JSON object.
 """
@@ -36,7 +36,6 @@ from jamshape.drawing.text import (
 from jamshape.files.h5md import read_attributes
 from jamshape.files.sets import PackingFile, System
 from jamshape.measures.averages import Mean, mean
-from jamshape.measures.jamming import Jamming
 from jamshape.measures.runs import Run, read_run
 
 if TYPE_CHECKING:
@@ -103,9 +102,16 @@ class Rate(NamedTuple):
         return mean([fit.phi_J for fit in fits])
 
     def jamming(self) -> Mean:
-        """Mean phi_J by the frames of runs that were minimised, which no drag holds up."""
-        told = (Jamming.stored(read_attributes(one.path)) for one in self.runs)
-        return mean([(one.unjams + one.jams) / 2 for one in told if one])
+        """Mean phi_J by the frames of runs that were minimised, which no drag holds up.
+
+        Frames of all samples lie at like packing fractions, so that averages do not make their brackets narrower.
+        """
+        known = [one.jamming for one in self.runs if one.jamming and one.jamming.phi_J > 0]
+        found = mean([one.phi_J for one in known])
+        widths = np.array([one.phi_J_error for one in known])
+        scatter = found.error if len(known) > 1 else 0.0
+        error = np.hypot(scatter, np.sqrt(np.mean(widths**2))) if known else math.nan
+        return found._replace(error=float(error))
 
     def pressure(self) -> tuple[FloatArray, FloatArray]:
         """Mean p(phi) where all samples have one."""

@@ -42,7 +42,7 @@ for alpha in OF_MODES[1:]:
         f"ladder_alpha{alpha:g}",
         f'python "$analysis/energy_ladder.py" {words(packings(alpha, AT["ladder_samples"]))}'
         f' --u0 {words(AT["ladder_u0"])} --out {ladder} || true; {modes_of(f"{ladder}/*.h5", "ladder")}',
-        after=["rods"],
+        after=[f"rods_alpha{alpha:g}"],
     )
 
 # Compressions at finite rates, Figs. 3 and 4.

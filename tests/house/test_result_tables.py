@@ -1,6 +1,7 @@
-"""Tables of the pages about the papers are those of docs/results/tables, number by number."""
+"""Tables of the pages about the papers are lines of agreement.md, and those are in docs/results/tables."""
 
 import csv
+import math
 import runpy
 from pathlib import Path
 
@@ -9,7 +10,11 @@ import pytest
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "docs" / "results"
 PAPERS = ("marschall-2018", "yuan-2019")
-UNMEASURED = "not measured at this scale"
+
+
+@pytest.fixture(scope="module")
+def script():
+    return runpy.run_path(str(ROOT / "analysis" / "agreement.py"))
 
 
 def rows(paper):
@@ -17,29 +22,28 @@ def rows(paper):
         return list(csv.DictReader(file))
 
 
-def line_of(row):
-    """Write a row as it stands on the page."""
-    number = runpy.run_path(str(ROOT / "analysis" / "agreement.py"))["number"]
-
-    def written(value, error):
-        return number(float(row[value]), float(row[error] or "nan"))
-
-    off = f"{float(row['difference']):+.1f}" if row["difference"] else ""
-    cells = (row["quantity"], row["where"], written("paper", "paper_error"), written("ours", "our_error"))  # fmt: skip
-    return f"| {' | '.join((*cells, row['samples'], off, row['verdict']))} |"
+def line_of(script, row):
+    """Write a row as agreement.py does."""
+    number = {k: float(row[k] or "nan") for k in ("paper", "paper_error", "ours", "our_error", "difference")}  # fmt: skip
+    published = script["Published"](
+        row["quantity"], row["where"], number["paper"], number["paper_error"], "", "", row["remark"]
+    )
+    ours = script["Ours"](number["ours"], number["our_error"], int(row["samples"] or 0))
+    ours = None if math.isnan(ours.value) else ours
+    told = script["Row"](published, ours, number["difference"], row["verdict"])
+    return f"| {' | '.join(script['cells'](told))} |"
 
 
 @pytest.mark.parametrize("paper", PAPERS)
-def test_every_number_that_was_measured_stands_on_the_page(paper):
-    page = (RESULTS / f"{paper}.md").read_text(encoding="utf-8")
-    measured = [line_of(row) for row in rows(paper) if row["verdict"] != UNMEASURED]
+def test_every_number_that_was_measured_stands_on_the_page(script, paper):
+    page = (RESULTS / f"{paper}.md").read_text(encoding="utf-8").splitlines()
+    measured = [row for row in rows(paper) if row["verdict"] != script["UNMEASURED"]]
     assert len(measured) > 10
-    assert [line for line in measured if line not in page] == []
+    assert [line for row in measured if (line := line_of(script, row)) not in page] == []
 
 
 @pytest.mark.parametrize("paper", PAPERS)
-def test_every_number_of_the_paper_is_in_the_table(paper):
-    name = paper.replace("-", "_")
-    with (ROOT / "analysis" / name / "paper.csv").open(newline="") as file:
-        asked = [row["quantity"] for row in csv.DictReader(file)]
-    assert [row["quantity"] for row in rows(paper)] == asked
+def test_every_number_of_the_paper_is_in_the_table(script, paper):
+    asked = script["read_paper"](ROOT / "analysis" / paper.replace("-", "_") / "paper.csv")
+    told = [(row["quantity"], float(row["paper"]), row["remark"]) for row in rows(paper)]
+    assert told == [(one.quantity, one.value, one.remark) for one in asked]

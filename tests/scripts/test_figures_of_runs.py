@@ -199,4 +199,12 @@ def test_phi_j_by_frames_is_between_the_last_that_unjams_and_the_first_that_stay
     [row] = report(SLOW, *runs, "--out", tmp_path / "slow.png")["rows"]
     found = row["phi_J(frames)"]
     assert (found["value"], found["samples"]) == (pytest.approx(0.8635), 2)
-    assert found["error"] == pytest.approx(0.0025)
+    # Of samples, whose standard error is 0.0025, and of brackets 0.002 and 0.004 wide.
+    assert found["error"] == pytest.approx(np.sqrt(0.0025**2 + (0.002**2 + 0.004**2) / 2 / 12))
+
+
+def test_runs_without_a_bracket_tell_no_phi_j_by_frames(report, tmp_path):
+    one_end = {"phi_unjams": 0.86, "phi_jams": np.nan, "frames_minimised": 3}
+    runs = [compression(tmp_path / "0.h5", 0, **one_end), compression(tmp_path / "1.h5", 1)]
+    [row] = report(SLOW, *runs, "--out", tmp_path / "slow.png")["rows"]
+    assert (row["phi_J(frames)"]["value"], row["phi_J(frames)"]["samples"]) == (None, 0)

@@ -93,7 +93,8 @@ def test_all_scales_have_the_same_keys(folder):
     ("setting", "words"),
     [
         ("scale=huge", "reproduce.smk: scale is huge, expected one of demo, small, full"),
-        ("size=3", "reproduce.smk: the setting size is not known, expected scale"),
+        ("size=3", "reproduce.smk: the setting size is not known, expected scale, samples or figures"),
+        ("figures=fig02,fig99", "reproduce.smk: fig99 is no figure, expected some of fig02, fig03"),
     ],
 )
 def test_nonsense_is_refused_before_any_job(folder, setting, words, tmp_path):
@@ -121,14 +122,25 @@ def test_a_job_leaves_what_was_typed_what_it_said_and_how_long_it_took(tmp_path)
     assert "Nothing to be done" in run_snakemake(*asked).stdout
 
 
-def test_the_command_lists_its_jobs(tmp_path):
-    words = ["reproduce", "yuan-2019", "--dry-run", "--out", str(tmp_path / "of yuan")]
-    done = subprocess.run(
-        [sys.executable, "-m", "jamshape", *words], capture_output=True, text=True, check=False
-    )
+def listed_jobs(tmp_path, *words):
+    """Jobs that the command would run."""
+    asked = [sys.executable, "-m", "jamshape", "reproduce", *words, "--dry-run"]
+    asked += ["--out", str(tmp_path / "of a paper")]
+    done = subprocess.run(asked, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout.splitlines()[-1])["planned"]
-    assert {"fig02", "fig14", "ladder1"} <= set(found)
+    return set(json.loads(done.stdout.splitlines()[-1])["planned"])
+
+
+def test_the_command_lists_its_jobs(tmp_path):
+    assert {"fig02", "fig14", "ladder1"} <= listed_jobs(tmp_path, "yuan-2019")
+
+
+def test_figures_that_are_chosen_come_with_what_they_need_and_with_no_more(tmp_path):
+    asked = ("marschall-2018", "--scale", "full", "--samples", "1", "--figures", "fig14b", "fig18b")
+    alphas = ("0.01", "1", "4")  # those of the ladders, which both figures read
+    packings = {f"rods_alpha{alpha}_seeds1to1" for alpha in alphas}
+    ladders = {f"ladder_alpha{alpha}" for alpha in alphas}
+    assert listed_jobs(tmp_path, *asked) == packings | ladders | {"fig14b", "fig18b"}
 
 
 HEAD = 'include: "../workflow.smk"\n\n\nrule all:\n    input:\n        everything,\n\n\n'

@@ -27,10 +27,12 @@ def folder(tmp_path_factory):
         js.Spherocylinders(alpha=4), n=16, seed=1, u0=1e-12, file=packing, progress=False
     )
     js.modes(packing).save(root / "modes" / "modes" / "alpha4_seed1.modes.h5")
-    (packing.parent / "alpha4_seed2.h5.search.h5").write_bytes(b"half of a search")
+    for others in ("search", "path", "run"):
+        (packing.parent / f"alpha4_seed2.h5.{others}.h5").write_bytes(b"half of a packing")
     (root / "runs").mkdir()
     for name, finished in (("slow1", True), ("slow2", False)):
-        known = {"alpha": 4.0, "kappa": 1e-8, "phi_jams": 0.86, "finished": finished}
+        rates = [[0.8, 1e-6], [0.85, 1e-8]]  # from these packing fractions on
+        known = {"alpha": 4.0, "kappa": rates, "phi_jams": 0.86, "finished": finished}
         RunWriter.create(root / "runs" / f"{name}.h5", js.load(packing), known).close()
     return root
 

@@ -2,6 +2,7 @@
 
     jamshape reproduce marschall-2018
     jamshape reproduce yuan-2019 --scale small --jobs 2 --out runs/yuan
+    jamshape reproduce yuan-2019 --scale full --samples 2 --figures fig03 fig05
 
 At the scale `demo` it takes minutes on two cores, `small` an hour, and `full`, of the papers' sizes, weeks of one core.
 The last that is made is agreement.md, a page with every number beside the paper's, the figures, and what was run where.
@@ -24,10 +25,10 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO, Any, NamedTuple
 
 from jamshape.command import parser_of, report
 from jamshape.commands.sweep import cores, python_path
@@ -58,6 +59,10 @@ def options_of() -> ArgumentParser:
     parser = parser_of(__doc__)
     parser.add_argument("paper", choices=PAPERS)
     parser.add_argument("--scale", choices=SCALES, default="demo", help="how large (%(default)s)")
+    more = "at most so many packings or runs of each sort; more of them later go on from these"
+    parser.add_argument("--samples", type=int, metavar="N", help=f"{more} (those of the scale)")
+    chosen = "only these figures, with what they need (all)"
+    parser.add_argument("--figures", nargs="+", default=[], metavar="NAME", help=chosen)
     parser.add_argument("--jobs", type=int, default=cores(), help="processes (all cores)")
     parser.add_argument("--out", type=Path, help="folder (runs/PAPER_SCALE)")
     parser.add_argument("--dry-run", action="store_true", help="list the jobs, and run none")
@@ -84,6 +89,18 @@ def workflow_of(paper: str) -> Path:
     raise ValueError(msg)
 
 
+def with_samples(settings: Mapping[str, Any], samples: int | None) -> dict[str, Any]:
+    """Take at most so many samples of each sort in the settings of a scale; None takes those of the scale.
+
+    Examples
+    --------
+    >>> with_samples({"n": 1024, "samples": 6, "order_samples": 1}, 2)
+    {'n': 1024, 'samples': 2, 'order_samples': 1}
+    """
+    counts = [name for name in settings if samples and name.endswith("samples")]
+    return {**settings, **{name: min(settings[name], samples or 0) for name in counts}}
+
+
 def require_snakemake() -> None:
     """Refuse a Python without Snakemake."""
     if not importlib.util.find_spec("snakemake"):
@@ -100,13 +117,10 @@ def command_of(workflow: Path, options: Namespace) -> list[str]:
     It does not lock the folder, which would stay locked after a kill: `held` does.
     """
     words = ["-s", str(workflow), "--directory", str(options.out), "--cores", str(options.jobs)]
-    words += [
-        "--config",
-        f"scale={options.scale}",
-        "--keep-going",
-        "--rerun-incomplete",
-        "--nolock",
-    ]
+    words += ["--config", f"scale={options.scale}"]
+    words += [f"samples={options.samples}"] if options.samples else []
+    words += [f"figures={','.join(options.figures)}"] if options.figures else []
+    words += ["--keep-going", "--rerun-incomplete", "--nolock"]
     words += ["--dry-run"] if options.dry_run else []
     # -P: what lies in the working directory is no module.
     return [sys.executable, "-P", "-m", "snakemake", *words]
@@ -222,6 +236,7 @@ def page_of_what_is_there(workflow: Path, options: Namespace) -> None:
     """Write the page although figures are missing."""
     script = workflow.parents[1] / "agreement.py"
     words = [str(options.out), "--paper", workflow.parent.name, "--scale", options.scale]
+    words += ["--samples", str(options.samples)] if options.samples else []
     subprocess.run(
         [sys.executable, str(script), *words, "--out", str(options.out / _PAGE)],
         check=False,
@@ -242,6 +257,9 @@ def main(options: Namespace) -> int:
     """Make what is not there yet; return the exit code."""
     if options.jobs < 1:
         msg = f"--jobs is {options.jobs}, expected at least 1"
+        raise ValueError(msg)
+    if options.samples is not None and options.samples < 1:
+        msg = f"--samples is {options.samples}, expected at least 1"
         raise ValueError(msg)
     workflow = workflow_of(options.paper)
     require_snakemake()

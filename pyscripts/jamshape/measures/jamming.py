@@ -78,6 +78,22 @@ class Jamming(NamedTuple):
         unjams, jams, tried = (attributes[name] for name in _NAMES.values())
         return cls(float(unjams), float(jams), int(tried))
 
+    @property
+    def phi_J(self) -> float:  # noqa: N802 - the paper's symbol
+        """The middle of the bracket; NaN if one of its ends is not known."""
+        return (self.unjams + self.jams) / 2
+
+    @property
+    def phi_J_error(self) -> float:  # noqa: N802
+        """Standard deviation of a number that may be anywhere in the bracket: its width over the root of 12.
+
+        Examples
+        --------
+        >>> round(Jamming(0.85, 0.86).phi_J_error, 4)
+        0.0029
+        """
+        return (self.jams - self.unjams) / math.sqrt(12)
+
     def attributes(self) -> dict[str, Any]:
         """Name its numbers as they are stored."""
         return {name: getattr(self, own) for own, name in _NAMES.items()}

@@ -50,6 +50,12 @@ def test_less_than_one_job_is_refused(jamshape, tmp_path):
     assert said == "jamshape reproduce: --jobs is 0, expected at least 1"
 
 
+def test_less_than_one_sample_is_refused(jamshape, tmp_path):
+    said = jamshape("reproduce", PAPER, "--samples", 0, "--out", tmp_path / "new").code
+    assert said == "jamshape reproduce: --samples is 0, expected at least 1"
+    assert not (tmp_path / "new").exists()
+
+
 def test_a_folder_of_something_else_is_refused(jamshape, tmp_path):
     (tmp_path / "reproduced.json").write_text(json.dumps({"paper": PAPER, "scale": "small"}))
     said = jamshape("reproduce", PAPER, "--out", tmp_path).code
