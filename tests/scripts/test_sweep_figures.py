@@ -1,5 +1,8 @@
 """The figures of a sweep, as their users run them, on a folder of small packings made here."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 from mixtures import bidisperse
@@ -8,10 +11,12 @@ from pictures import image, is_color
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import read_packing, write_packing
 from jamshape.files.run_writer import RunWriter
+from jamshape.measures.averages import Mean
 from jamshape.measures.contact_statistics import class_fractions, contact_angles, flat_fraction
 from jamshape.packing import Box
 from jamshape.protocols.random_start import random_packing
 
+ANALYSIS = Path(__file__).parents[2] / "analysis"
 FOLDER = "marschall_2018"
 PHI_J, SNAPSHOTS, NUMBER, CLASSES, ANGLES, RESIDUALS = SCRIPTS = [
     f"{FOLDER}/{name}.py"
@@ -139,6 +144,15 @@ def test_contact_number_of_a_sweep_and_its_fit(report, sweep, tmp_path):
     (fits,) = few["fits"]
     assert fits["z"]["fit"] is None
     assert "expected 4" in fits["z"]["why_not"]
+
+
+def test_a_single_sample_has_the_error_of_one_in_a_fit():
+    errors_of = runpy.run_path(str(ANALYSIS / NUMBER))["errors_of"]
+    nan = float("nan")
+    many, one = Mean(4.4, 0.01, 9), Mean(4.5, nan, 1)  # samples deviate by 0.03
+    assert errors_of([many, one, many]) == pytest.approx([0.01, 0.03, 0.01])
+    assert errors_of([one, one]) is None
+    assert errors_of([many, Mean(4.4, 0.0, 2)]) is None  # nobody knows how those deviate
 
 
 def test_contact_classes_of_a_sweep(report, sweep, tmp_path):
