@@ -4,7 +4,7 @@
     jamshape reproduce yuan-2019 --scale small --jobs 2 --out runs/yuan
     jamshape reproduce yuan-2019 --scale full --samples 2 --figures fig03 fig05
 
-At the scale `demo` it takes minutes on two cores, `small` an hour, and `full`, of the papers' sizes, weeks of one core.
+At the scale `demo` it takes minutes on two cores, `small` an hour, and `full`, of the papers' sizes, several hours.
 The last that is made is agreement.md, a page with every number beside the paper's, the figures, and what was run where.
 Needs Snakemake and a clone of the repository, whose folder analysis/ has the workflows. Run again after a kill, it makes
 what is not there yet. The last line of standard output is one JSON object; the exit code is 0 only if every figure
