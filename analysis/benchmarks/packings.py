@@ -40,7 +40,7 @@ CASES: dict[str, tuple[str, tuple[int, ...]]] = {
     "rods-4": ("js.Spherocylinders(alpha=4)", (256, 1024)),
     "spheres": ("js.Superellipsoids(p=1, w1=1, w2=1)", (400, 1000)),
     "spheroids": ("js.Superellipsoids(p=1, w1=0.6, w2=1)", (400,)),
-    "superballs": ("js.Superellipsoids(p=1.5, w1=1, w2=1), protocol='yuan-2019-1'", (400,)),
+    "superballs": ("js.Superellipsoids(p=1.5, w1=1, w2=1)", (400,)),
 }
 ROUND = ("discs", "spheres")
 
