@@ -78,6 +78,18 @@ def test_the_commands_of_protocols_run_in_their_order(jamshape, tmp_path, monkey
         assert not ended.code or (may_fail and ended.code == 1), f"{line}: {ended}"
 
 
+def test_the_commands_about_particles_run(jamshape, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = (PAGES / "particles.md").read_text(encoding="utf-8")
+    lines = OF_COMMAND.findall(page)
+    assert len(lines) == 5
+    for line in lines:
+        words = OF_PROTOCOLS["yuan-2019-1"] if "--protocol" in line else "--n 16 --u0 1e-6"
+        ended = jamshape(*shlex.split(line), *words.split())
+        assert not ended.code, f"{line}: {ended}"
+    run_python(page)
+
+
 def run_python(page, **shorter):
     """Run the blocks of Python of a page, each as a script of its own, with some of its words replaced."""
     for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
