@@ -4,8 +4,8 @@
 
 Left phi_J against the reduced aspect ratio beta, in bands of asphericity A = 0.1, 0.15, 0.2, 0.25 (+- 0.025),
 without boxes (p > 1), as in the paper, and what is below; right phi_J as color against A and beta, with contours
-where there are enough shapes (10). One protocol is drawn (--protocol). The last line of standard output is one
-JSON object.
+where there are enough shapes (10). Packings of protocol 2, which are ordered, are left out unless --protocol asks for
+them. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import numpy as np
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.axes import beta_axis
-from jamshape.drawing.families import NEEDS, beta, shape_of
+from jamshape.drawing.families import NEEDS, beta, is_thermal, shape_of
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLACK, COLORS, PAPER_LINE
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Groups, System, conditions, only, read_groups
-from jamshape.files.vocabulary import ATHERMAL, NUMBERED, read_protocol
+from jamshape.files.vocabulary import NUMBERED, read_protocol
 from jamshape.measures.averages import Mean, averages, exactly, rows
 
 if TYPE_CHECKING:
@@ -104,9 +104,11 @@ def draw(groups: Groups, options: Namespace) -> bool:
 def main(options: Namespace) -> None:
     """Read, average, draw, report."""
     every = read_groups(options.files, needs=(*NEEDS, "asphericity", "phi_J"))
-    groups = only(every, lambda system: system.protocol == options.protocol)
+    asked = options.protocol
+    groups = only(every, lambda s: s.protocol == asked if asked else not is_thermal(s))
     if not groups:
-        msg = f"no packing is of the protocol {options.protocol}, expected one"
+        of = f"of the protocol {asked}" if asked else "made without Monte Carlo"
+        msg = f"no packing is {of}, expected one"
         raise ValueError(msg)
     contours = draw(groups, options)
     columns = {name: averages(groups, name) for name in ("phi_J", "asphericity")}
@@ -118,7 +120,7 @@ def main(options: Namespace) -> None:
 if __name__ == "__main__":
     parser = parser_of(__doc__, "shape_map.png", "SWEEP")
     parser.add_argument(
-        "--protocol", type=read_protocol, choices=tuple(NUMBERED.values()), default=ATHERMAL,
-        help="or its number (%(default)s)",
+        "--protocol", type=read_protocol, choices=tuple(NUMBERED.values()),
+        help="or its number (all without Monte Carlo)",
     )  # fmt: skip
     run(parser, main)

@@ -166,7 +166,9 @@ def test_asphericity(drawn, sweep, quantity):
 def test_shape_map_and_plane(drawn, wrong, sweep, thermal):
     found = drawn(MAP, sweep)
     assert (found["contours"], len(found["shapes"])) == (False, 5)
+    assert found["shapes"] == drawn(MAP, sweep, thermal)["shapes"]  # without those of Monte Carlo
     assert "no packing is of the protocol yuan-2019-2" in wrong(MAP, sweep, "--protocol", 2)
+    assert "no packing is made without Monte Carlo" in wrong(MAP, thermal)
     assert len(drawn(MAP, sweep, thermal, "--protocol", 2)["shapes"]) == 1
     rows = rows_by_shape(drawn(PLANE, sweep)["shapes"])
     assert rows[1.0, 0.8, 1.25, ATHERMAL]["beta"]["value"] == pytest.approx(1)
