@@ -1,0 +1,91 @@
+"""What bonds that only graze do to contact numbers and bands: beside Secs. III C and III D of Marschall & Teitel, PRE 97, 012905.
+
+    python analysis/marschall_2018/grazing_bonds.py samples/modes.csv
+
+The table is that of sample_tables.py. A bond grazes if it bears less than 1e-4 of the mean force of a bond, as where a
+rod slid until it met another one. Each takes one mode out of the low band into the high one and adds 2/N' to z, with
+N' particles that are no rattlers; here both are undone. Prints a row for each aspect ratio and energy density, with
+standard errors. The last line of standard output is one JSON object.
+"""
+
+from __future__ import annotations
+
+import csv
+from argparse import Namespace
+from pathlib import Path
+from typing import NamedTuple
+
+from jamshape.command import parser_of, report, run
+from jamshape.measures.averages import Mean, mean
+
+NEEDED = ("alpha", "u0", "z", "n_backbone", "n_modes", "n_grazing", "low", "high")
+
+
+class Counts(NamedTuple):
+    """Contacts and bands of one packing, as they are and without bonds that graze."""
+
+    z: float
+    z_without: float
+    low: float
+    low_without: float
+    high: float
+    high_without: float
+
+
+def counts_of(row: dict[str, str]) -> Counts:
+    """Count with and without bonds that graze; bands are fractions of all modes."""
+    z, backbone, modes, grazing, low, high = (float(row[name]) for name in NEEDED[2:])
+    return Counts(
+        *(z, z - 2 * grazing / backbone),
+        *(low / modes, (low + grazing) / modes),
+        *(high / modes, (high - grazing) / modes),
+    )
+
+
+def read(path: Path) -> dict[tuple[float, float], list[Counts]]:
+    """Read a table, by aspect ratio and energy density.
+
+    Raises
+    ------
+    ValueError
+        If it is not a table of modes, or empty.
+    """
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    if not rows or (missing := [name for name in NEEDED if name not in rows[0]]):
+        found = f"no {missing[0]}" if rows else "no row"
+        msg = f"{path} has {found}, expected modes.csv of sample_tables.py with packings that have an alpha"
+        raise ValueError(msg)
+    found_of: dict[tuple[float, float], list[Counts]] = {}
+    for row in rows:
+        found_of.setdefault((float(row["alpha"]), float(row["u0"])), []).append(counts_of(row))
+    return dict(sorted(found_of.items()))
+
+
+def text(one: Mean) -> str:
+    """Write a mean with its error, if there is one."""
+    return f"{one.value:.5f}" + (f" +- {one.error:.5f}" if one.samples > 1 else "")
+
+
+def main(options: Namespace) -> None:
+    """Read, average, print, report."""
+    averages = {
+        key: {name: mean([getattr(one, name) for one in every]) for name in Counts._fields}
+        for key, every in read(options.table).items()
+    }
+    print(f"| alpha | u0 | samples | {' | '.join(Counts._fields)} |")
+    print(f"|{' --- |' * (3 + len(Counts._fields))}")
+    for (alpha, u0), means in averages.items():
+        cells = " | ".join(text(one) for one in means.values())
+        print(f"| {alpha:g} | {u0:g} | {means['z'].samples} | {cells} |")
+    told = [
+        {"alpha": alpha, "u0": u0} | {name: one._asdict() for name, one in means.items()}
+        for (alpha, u0), means in averages.items()
+    ]
+    report({"rows": told})
+
+
+if __name__ == "__main__":
+    parser = parser_of(__doc__)
+    parser.add_argument("table", type=Path, metavar="TABLE", help="modes.csv")
+    run(parser, main)
