@@ -93,7 +93,10 @@ def test_all_scales_have_the_same_keys(folder):
     ("setting", "words"),
     [
         ("scale=huge", "reproduce.smk: scale is huge, expected one of demo, small, full"),
-        ("size=3", "reproduce.smk: the setting size is not known, expected scale, samples or figures"),
+        (
+            "size=3",
+            "reproduce.smk: the setting size is not known, expected scale, samples or figures",
+        ),
         ("figures=fig02,fig99", "reproduce.smk: fig99 is no figure, expected some of fig02, fig03"),
     ],
 )

@@ -79,12 +79,12 @@ class Jamming(NamedTuple):
         return cls(float(unjams), float(jams), int(tried))
 
     @property
-    def phi_J(self) -> float:  # noqa: N802 - the paper's symbol
+    def phi_J(self) -> float:
         """The middle of the bracket; NaN if one of its ends is not known."""
         return (self.unjams + self.jams) / 2
 
     @property
-    def phi_J_error(self) -> float:  # noqa: N802
+    def phi_J_error(self) -> float:
         """Standard deviation of a number that may be anywhere in the bracket: its width over the root of 12.
 
         Examples
