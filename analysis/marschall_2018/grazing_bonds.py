@@ -4,8 +4,8 @@
 
 The table is that of sample_tables.py. A bond grazes if it bears less than 1e-4 of the mean force of a bond, as where a
 rod slid until it met another one. Each takes one mode out of the low band into the high one and adds 2/N' to z, with
-N' particles that are no rattlers; here both are undone. Prints a row for each aspect ratio and energy density, with
-standard errors. The last line of standard output is one JSON object.
+N' particles that are no rattlers; here both are undone. Prints a row for each folder of modes, aspect ratio and energy
+density, with standard errors. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import NamedTuple
 from jamshape.command import parser_of, report, run
 from jamshape.measures.averages import Mean, mean
 
-NEEDED = ("alpha", "u0", "z", "n_backbone", "n_modes", "n_grazing", "low", "high")
+NEEDED = ("file", "alpha", "u0", "z", "n_backbone", "n_modes", "n_grazing", "low", "high")
 
 
 class Counts(NamedTuple):
@@ -34,7 +34,7 @@ class Counts(NamedTuple):
 
 def counts_of(row: dict[str, str]) -> Counts:
     """Count with and without bonds that graze; bands are fractions of all modes."""
-    z, backbone, modes, grazing, low, high = (float(row[name]) for name in NEEDED[2:])
+    z, backbone, modes, grazing, low, high = (float(row[name]) for name in NEEDED[3:])
     return Counts(
         *(z, z - 2 * grazing / backbone),
         *(low / modes, (low + grazing) / modes),
@@ -42,8 +42,12 @@ def counts_of(row: dict[str, str]) -> Counts:
     )
 
 
-def read(path: Path) -> dict[tuple[float, float], list[Counts]]:
-    """Read a table, by aspect ratio and energy density.
+Key = tuple[str, float, float]
+"""The folder of the modes, since packings led to other energies come back to their own; alpha and u0."""
+
+
+def read(path: Path) -> dict[Key, list[Counts]]:
+    """Read a table, by folder, aspect ratio and energy density.
 
     Raises
     ------
@@ -56,9 +60,10 @@ def read(path: Path) -> dict[tuple[float, float], list[Counts]]:
         found = f"no {missing[0]}" if rows else "no row"
         msg = f"{path} has {found}, expected modes.csv of sample_tables.py with packings that have an alpha"
         raise ValueError(msg)
-    found_of: dict[tuple[float, float], list[Counts]] = {}
+    found_of: dict[Key, list[Counts]] = {}
     for row in rows:
-        found_of.setdefault((float(row["alpha"]), float(row["u0"])), []).append(counts_of(row))
+        key = (Path(row["file"]).parent.name, float(row["alpha"]), float(row["u0"]))
+        found_of.setdefault(key, []).append(counts_of(row))
     return dict(sorted(found_of.items()))
 
 
@@ -73,14 +78,15 @@ def main(options: Namespace) -> None:
         key: {name: mean([getattr(one, name) for one in every]) for name in Counts._fields}
         for key, every in read(options.table).items()
     }
-    print(f"| alpha | u0 | samples | {' | '.join(Counts._fields)} |")
-    print(f"|{' --- |' * (3 + len(Counts._fields))}")
-    for (alpha, u0), means in averages.items():
+    print(f"| folder | alpha | u0 | samples | {' | '.join(Counts._fields)} |")
+    print(f"|{' --- |' * (4 + len(Counts._fields))}")
+    for (folder, alpha, u0), means in averages.items():
         cells = " | ".join(text(one) for one in means.values())
-        print(f"| {alpha:g} | {u0:g} | {means['z'].samples} | {cells} |")
+        print(f"| {folder} | {alpha:g} | {u0:g} | {means['z'].samples} | {cells} |")
     told = [
-        {"alpha": alpha, "u0": u0} | {name: one._asdict() for name, one in means.items()}
-        for (alpha, u0), means in averages.items()
+        {"folder": folder, "alpha": alpha, "u0": u0}
+        | {name: one._asdict() for name, one in means.items()}
+        for (folder, alpha, u0), means in averages.items()
     ]
     report({"rows": told})
 
