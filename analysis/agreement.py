@@ -7,7 +7,9 @@ each job took and commands/ what it was. The paper's numbers stand in analysis/P
 paper has it, its value and error (half of the last digit where the paper tells none), where it is among the results
 here, and a remark. `fig05/phi_J[alpha=4]/phi_J` is in fig05.json, under phi_J the row with alpha = 4, of that phi_J; [-1]
 is the last row. It is divided by what `per` names. Writes a page, and beside it the same as a table (.csv), the jobs
-(jobs.csv) and with what they ran (versions.csv). The last line of standard output is one JSON object.
+(jobs.csv) and with what they ran (versions.csv). --known names a folder with earlier tables, of another day or machine:
+numbers that are not among the results here, and jobs that did not run here, are taken from them. The last line of
+standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -52,6 +54,7 @@ Errors know nothing of what another number of particles, rate or protocol change
 `{DIFFERS}` may mean no more than that, and `{AGREES}` no more than that the errors are large. Errors of a few samples are
 uncertain themselves. With {WITHIN:g} joint errors as the bound, about one of twenty numbers differs by chance."""
 
+JOB = ("job", "seconds", "command")
 HEADER = ("quantity", "where", "paper", "ours", "difference in joint errors", "verdict", "remark")
 
 
@@ -87,6 +90,8 @@ class Row(NamedTuple):
     difference: float
     """Ours minus the paper's in joint errors; NaN where that is not known."""
     verdict: str
+    commit: str = ""
+    """Of the code that found ours."""
 
 
 class Took(NamedTuple):
@@ -212,6 +217,37 @@ def ours_of(results: Mapping[str, Any], published: Published) -> Ours | None:
     error = found.get("error")
     error = math.nan if error is None else error / unit
     return Ours(found["value"] / unit, error, int(found.get("samples") or 0))
+
+
+def earlier(table: Path) -> dict[str, tuple[Ours, str]]:
+    """Read what an earlier table has measured, and by which commit, by the names of quantities."""
+    with table.open(newline="", encoding="utf-8") as file:
+        return {
+            row["quantity"]: (
+                Ours(
+                    float(row["ours"]),
+                    float(row["our_error"] or math.nan),
+                    int(row["samples"] or 0),
+                ),
+                row["commit"],
+            )
+            for row in csv.DictReader(file)
+            if row["ours"]
+        }
+
+
+def rows_of(
+    results: Mapping[str, Any], paper: Sequence[Published], known: Mapping[str, tuple[Ours, str]]
+) -> list[Row]:
+    """Compare all numbers of a paper with those that were found here, or else earlier."""
+    here = commit()
+    found = []
+    for published in paper:
+        ours, made_by = ours_of(results, published), here
+        if ours is None:
+            ours, made_by = known.get(published.quantity, (None, ""))
+        found.append(judged(published, ours)._replace(commit=made_by))
+    return found
 
 
 def judged(published: Published, ours: Ours | None) -> Row:
@@ -372,23 +408,32 @@ def page(title: str, rows: Sequence[Row], options: Namespace, at: Mapping[str, A
     ) + "\n"  # fmt: skip
 
 
-def write_tables(out: Path, rows: Sequence[Row], folder: Path) -> None:
+def write_tables(out: Path, rows: Sequence[Row], jobs: Sequence[tuple[Any, ...]]) -> None:
     """Write the tables of numbers, of jobs and of versions."""
     ours = ("ours", "our_error", "samples", "difference", "verdict")
-    header = ("quantity", "where", "paper", "paper_error", *ours, "remark")
+    header = ("quantity", "where", "paper", "paper_error", *ours, "remark", "commit")
     write_table(out.with_suffix(".csv"), header, [plain(row) for row in rows])
-    jobs = [(job.name, job.seconds, job.command) for job in read_jobs(folder)]
-    write_table(out.with_name("jobs.csv"), ("job", "seconds", "command"), jobs)
+    write_table(out.with_name("jobs.csv"), JOB, jobs)
     write_table(out.with_name("versions.csv"), ("on", "version"), versions())
 
 
 def plain(row: Row) -> tuple[Any, ...]:
     """Write a line of the table for programs; None is an empty cell."""
-    p, here, off, verdict = row
+    p, here, off, verdict, made_by = row
     measured = here or Ours(math.nan)
     told = [*(None if math.isnan(x) else x for x in measured[:2]), measured.samples or None]
     difference = None if math.isnan(off) else f"{off:.3g}"
-    return (p.quantity, p.where, p.value, p.error, *told, difference, verdict, p.remark)
+    return (p.quantity, p.where, p.value, p.error, *told, difference, verdict, p.remark, made_by)
+
+
+def jobs_of(folder: Path, known: Path | None) -> list[tuple[Any, ...]]:
+    """List the jobs that ran here, and those that ran earlier and not here, by their names."""
+    found: dict[str, tuple[Any, ...]] = {}
+    if known:
+        with (known / "jobs.csv").open(newline="", encoding="utf-8") as file:
+            found = {row[JOB[0]]: tuple(row[name] for name in JOB) for row in csv.DictReader(file)}
+    found |= {job.name: (job.name, job.seconds, job.command) for job in read_jobs(folder)}
+    return [found[name] for name in sorted(found)]
 
 
 def write_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
@@ -415,11 +460,12 @@ def main(options: Namespace) -> None:
         msg = f"{options.folder} has no folder figures, expected one that jamshape reproduce made"
         raise ValueError(msg)
     results = read_results(figures)
-    rows = [judged(p, ours_of(results, p)) for p in read_paper(HERE / options.paper / "paper.csv")]
+    known = earlier(options.known / "agreement.csv") if options.known else {}
+    rows = rows_of(results, read_paper(HERE / options.paper / "paper.csv"), known)
     at = with_samples(scales[options.scale], options.samples)
     text = page(TITLES[options.paper], rows, options, at)
     options.out.write_text(text, encoding="utf-8")
-    write_tables(options.out, rows, options.folder)
+    write_tables(options.out, rows, jobs_of(options.folder, options.known))
     counts = Counter(row.verdict for row in rows)
     verdicts = {name: counts[name] for name in (AGREES, DIFFERS, UNJUDGED, UNMEASURED)}
     report({"out": options.out, "figures": len(results), **verdicts})
@@ -431,4 +477,5 @@ if __name__ == "__main__":
     parser.add_argument("--paper", required=True, help=" or ".join(TITLES))
     parser.add_argument("--scale", default="demo", help="of scales.toml (%(default)s)")
     parser.add_argument("--samples", type=int, help="at most so many of each sort were asked for")
+    parser.add_argument("--known", type=Path, metavar="TABLES", help="folder of earlier tables")
     run(parser, main)

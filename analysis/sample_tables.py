@@ -1,10 +1,14 @@
 """Write what packings, modes and runs of a reproduced paper are as tables, a line for each of their files.
 
     python analysis/sample_tables.py FOLDER --out FOLDER/samples
+    python analysis/sample_tables.py FOLDER --known TABLES --out FOLDER/samples
 
-FOLDER is what `jamshape reproduce` makes. Writes packings.csv, modes.csv and runs.csv to the folder --out. They are what
-averages in figures are of, without the coordinates: seeds, sizes, how each one ended, and what was measured. A cell is
-empty where a file has no such number. Units are those of the files: the diameter and the stiffness k of the smaller
+FOLDER is what `jamshape reproduce` makes. Writes to the folder --out a table for each folder of packings (rods.csv of
+packings/rods, ordered.csv of packings/ordered1, packings/ordered2 and so on), ladder.csv of those that were led to
+other energies, modes.csv and runs.csv. They are what averages in figures are of, without the coordinates: seeds, sizes,
+how each one ended, and what was measured. Figures that need no coordinates are drawn from a table of packings as from
+their folder. A cell is empty where a file has no such number, and nan where there is none of such particles. --known names earlier tables, of another day or machine: their lines are kept, but for those of files
+that are in FOLDER again. Units are those of the files: the diameter and the stiffness k of the smaller
 particles (docs/explanation/files.md). The commands that made the files are in jobs.csv, and the versions in
 versions.csv, which agreement.py writes. The last line of standard output is one JSON object.
 """
@@ -12,22 +16,22 @@ versions.csv, which agreement.py writes. The last line of standard output is one
 from __future__ import annotations
 
 import csv
-import math
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from jamshape.command import parser_of, report, run
-from jamshape.files.h5md import read_attributes
+from jamshape.files.h5md import read_attributes, read_style
 from jamshape.files.sets import OTHERS
 from jamshape.measures.runs import rate_of
 from jamshape.vibration.sets import TOLD, of_packing
 from jamshape.vibration.table import read_modes
 
 SHAPE = ("alpha", "exponent", "w1", "w2", "size_ratio", "n", "seed")
+STYLE = ("shape", "dimension")
 PACKING = (
-    *SHAPE, "way", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
+    *STYLE, *SHAPE, "asphericity", "beta", "z_iso", "way", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
     "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "outcome", "wall_seconds",
 )  # fmt: skip
 RUN = (
@@ -38,6 +42,11 @@ MODES = (
     *SHAPE, "u0", "n_backbone", "n_modes", "n_bonds", "z", "rank", "n_self_stress", "n_grazing",
     *TOLD, "negative", "bulk_modulus", "pure_shear_modulus", "wall_seconds",
 )  # fmt: skip
+
+
+def told_packing(path: Path) -> dict[str, Any]:
+    """Read what a packing is."""
+    return dict(zip(STYLE, read_style(path), strict=True)) | read_attributes(path)
 
 
 def told_run(path: Path) -> dict[str, Any] | None:
@@ -54,6 +63,12 @@ def told_modes(path: Path) -> dict[str, Any]:
     return of_packing(table) | table.attributes | counts
 
 
+def table_of(packing: Path, folder: Path) -> str:
+    """Name the table that a packing is in."""
+    part, group = packing.relative_to(folder).parts[:2]
+    return group.rstrip("0123456789") if part == "packings" else part
+
+
 def rows_of(
     paths: Iterable[Path], read: Callable[[Path], dict[str, Any] | None]
 ) -> list[dict[str, Any]]:
@@ -62,20 +77,35 @@ def rows_of(
     return [row | {"path": path} for path, row in rows if row]
 
 
-def write(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]], folder: Path) -> None:
-    """Write a table; columns that no line has are left out."""
-    known = [name for name in columns if any(name in row for row in rows)]
+def cells(row: dict[str, Any], columns: Sequence[str], folder: Path) -> dict[str, str]:
+    """Write a line."""
+    told = {name: short(row.get(name)) for name in columns}
+    return {"file": row["path"].relative_to(folder).as_posix()} | told
+
+
+def earlier(path: Path) -> list[dict[str, str]]:
+    """Read an earlier table; one that is not there has no lines."""
+    if not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def write(path: Path, columns: Sequence[str], lines: Sequence[dict[str, str]]) -> None:
+    """Write a table, by the names of files, of each the last line; columns that are empty are left out."""
+    kept = {line["file"]: line for line in lines}
+    told = [name for name in columns if any(line.get(name) for line in kept.values())]
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("file", *known))
-        for row in rows:
-            name = row["path"].relative_to(folder).as_posix()
-            writer.writerow((name, *(short(row.get(name)) for name in known)))
+        writer = csv.DictWriter(
+            file, ("file", *told), restval="", extrasaction="ignore", lineterminator="\n"
+        )
+        writer.writeheader()
+        writer.writerows(kept[name] for name in sorted(kept))
 
 
 def short(value: Any) -> str:
     """Write a number to ten digits, and nothing for what is not known."""
-    if value is None or (isinstance(value, float) and math.isnan(value)):
+    if value is None:
         return ""
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
@@ -87,19 +117,23 @@ def main(options: Namespace) -> None:
         msg = f"{folder} has no folder packings, expected one that jamshape reproduce made"
         raise ValueError(msg)
     options.out.mkdir(parents=True, exist_ok=True)
-    places = [p for part in ("packings", "ladder") for p in folder.glob(f"{part}/*/*.h5")]
+    places = [*folder.glob("packings/*/*.h5"), *folder.glob("ladder/*/*.h5")]
     packings = [place for place in places if not place.name.endswith(OTHERS)]
     tables = {
-        "packings": (PACKING, rows_of(packings, read_attributes)),
-        "modes": (MODES, rows_of(folder.glob("modes/*/*.modes.h5"), told_modes)),
-        "runs": (RUN, rows_of(folder.glob("runs/*.h5"), told_run)),
-    }  # fmt: skip
+        name: (PACKING, rows_of((p for p in packings if table_of(p, folder) == name), told_packing))
+        for name in sorted({table_of(place, folder) for place in packings})
+    }
+    tables["modes"] = MODES, rows_of(folder.glob("modes/*/*.modes.h5"), told_modes)
+    tables["runs"] = RUN, rows_of(folder.glob("runs/*.h5"), told_run)
     for name, (columns, rows) in tables.items():
-        write(options.out / f"{name}.csv", columns, rows, folder)
+        known = earlier(options.known / f"{name}.csv") if options.known else []
+        lines = [*known, *(cells(row, columns, folder) for row in rows)]
+        write(options.out / f"{name}.csv", columns, lines)
     report({"out": options.out, **{name: len(rows) for name, (_, rows) in tables.items()}})
 
 
 if __name__ == "__main__":
     parser = parser_of(__doc__, "samples")
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="of jamshape reproduce")
+    parser.add_argument("--known", type=Path, metavar="TABLES", help="folder of earlier tables")
     run(parser, main)

@@ -179,9 +179,7 @@ rule page:
         "agreement.csv",
         "jobs.csv",
         "versions.csv",
-        "samples/packings.csv",
-        "samples/modes.csv",
-        "samples/runs.csv",
+        directory("samples"),
     params:
         scale=SCALE,
         paper=PAPER,

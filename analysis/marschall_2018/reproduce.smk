@@ -19,6 +19,15 @@ SWEEP = add_sweep(
 )
 RODS = ["packings/rods"]
 
+# Some of them by the protocol of the paper, which compresses at a rate, beyond jamming, and then opens the box.
+add_sweep(
+    "published",
+    f"--alpha {words(AT['published_alphas'])} --samples {AT['published_samples']} --n {AT['n']}"
+    f" --protocol marschall-2018 {AT['published_way']}",
+    AT["chunk"],
+)
+BOTH = [*RODS, "packings/published"]
+
 
 def packings(alpha, samples=1):
     """Name the first packings of an aspect ratio."""
@@ -83,9 +92,9 @@ def draw(name, script, *inputs, after):
 draw("fig02", "fig02_order", ORDER, after=["order"])
 draw("fig03", "fig03_slow_compression", list(SLOW.values()), after=["slow"])
 draw("fig04", "fig04_pressure", SLOWEST, after=["slow"])
-draw("fig05", "fig05_phi_j", RODS, after=["rods"])
+draw("fig05", "fig05_phi_j", BOTH, after=["rods", "published"])
 draw("fig07", "fig07_snapshots", RODS, "--alpha 0.01 4", after=["rods"])
-draw("fig08", "fig08_contact_number", RODS, after=["rods"])
+draw("fig08", "fig08_contact_number", BOTH, after=["rods", "published"])
 draw("fig09", "fig09_contact_classes", RODS, after=["rods"])
 draw("fig10", "fig10_contact_angles", RODS, "--alpha 0.01 0.12 1", after=["rods"])
 draw("fig21", "fig21_residuals", RODS, "--alpha 0.01 4", after=["rods"])

@@ -18,12 +18,15 @@ def mean(value, error=0.001, samples=6):
     return {"value": value, "error": error, "samples": samples}
 
 
+USUAL = {"protocol": "quasistatic"}
+
+
 RESULTS = {
     "fig05": {
         "phi_J": [
-            {"alpha": 0, "phi_J": mean(0.8410)},
-            {"alpha": 1, "phi_J": mean(0.8930)},
-            {"alpha": 4.0, "phi_J": mean(0.8661, None, 1)},
+            USUAL | {"alpha": 0, "phi_J": mean(0.8410)},
+            USUAL | {"alpha": 1, "phi_J": mean(0.8930)},
+            USUAL | {"alpha": 4.0, "phi_J": mean(0.8661, None, 1)},
         ]
     },
     "fig03": {
@@ -35,10 +38,10 @@ RESULTS = {
     "fig08": {
         "conditions": {"n": 200},
         "contact_numbers": [
-            {"alpha": 1, "z": mean(5.9), "rattlers": mean(0.0, 0.0)},
-            {"alpha": 0.01, "z": mean(None), "rattlers": mean(8.0, 2.0)},
+            USUAL | {"alpha": 1, "z": mean(5.9), "rattlers": mean(0.0, 0.0)},
+            USUAL | {"alpha": 0.01, "z": mean(None), "rattlers": mean(8.0, 2.0)},
         ],
-        "fits": [{"z": {"fit": {"a": 0.30, "a_error": 0.1, "x": 2.0, "x_error": 0.1}}}],
+        "fits": [USUAL | {"z": {"fit": {"a": 0.30, "a_error": 0.1, "x": 2.0, "x_error": 0.1}}}],
     },
 }
 
@@ -88,7 +91,7 @@ def test_verdicts(made):
 def test_what_is_rare_and_what_is_exact(folder, report):
     counts = {
         "conditions": {"n": 64},
-        "contact_numbers": [{"alpha": 4, "rattlers": mean(0.0, 0.0)}],
+        "contact_numbers": [USUAL | {"alpha": 4, "rattlers": mean(0.0, 0.0)}],
     }
     (folder / "figures" / "fig08.json").write_text(json.dumps(counts))
     assert report(SCRIPT, folder, "--paper", PAPER, "--out", folder / "a.md")["not judged"] == 2
@@ -134,7 +137,7 @@ def test_a_row_that_is_not_one_is_refused(folder, problem):
     twice = {"phi_J": [rows[0], rows[0]]}
     (folder / "figures" / "fig05.json").write_text(json.dumps(twice))
     said = problem(SCRIPT, folder, "--paper", PAPER, "--out", folder / "a.md")
-    assert "2 rows fit [alpha=0], expected one" in said
+    assert "2 rows fit [alpha=0][protocol=quasistatic], expected one" in said
 
 
 @pytest.mark.parametrize(
@@ -179,10 +182,11 @@ def test_numbers_are_those_that_figures_draw():
     """What jamshape.measures.published knows stands in the table with the same values."""
     script = runpy.run_path(str(ANALYSIS / SCRIPT))
     rows = {p.result: p for p in script["read_paper"](ANALYSIS / PAPER / "paper.csv")}
+    usual = "[protocol=quasistatic]"
     for alpha, known in published.PHI_J.items():
-        assert rows[f"fig05/phi_J[alpha={alpha:g}]/phi_J"].value == known.value
+        assert rows[f"fig05/phi_J[alpha={alpha:g}]{usual}/phi_J"].value == known.value
     for alpha, known in published.Z.items():
-        assert rows[f"fig08/contact_numbers[alpha={alpha:g}]/z"].value == known.value
+        assert rows[f"fig08/contact_numbers[alpha={alpha:g}]{usual}/z"].value == known.value
     for alpha, distances in published.DISTANCE.items():
         for u, value in distances.items():
             path = f"fig14_jamming_distance/jamming_distance[alpha={alpha:g}]/distance/{u:g}"
@@ -191,5 +195,25 @@ def test_numbers_are_those_that_figures_draw():
         for band, part in published.BANDS[alpha].items():
             assert rows[f"{figure}/bands[alpha={alpha:g}]/{band}/fraction"].value == part
     for alpha, few in published.RATTLERS.items():
-        path = f"fig08/contact_numbers[alpha={alpha:g}]/rattlers"
+        path = f"fig08/contact_numbers[alpha={alpha:g}]{usual}/rattlers"
         assert rows[path].value == pytest.approx(few / published.N, abs=5e-5)
+
+
+def test_what_was_not_measured_here_is_taken_from_an_earlier_table(folder, report, tmp_path):
+    known = tmp_path / "known"
+    known.mkdir()
+    header = "quantity,ours,our_error,samples,commit\n"
+    rows = '"z, alpha = 0.01",4.43,0.03,6,abc\n"phi_J, alpha = 0",0.5,0.1,2,abc\n'
+    (known / "agreement.csv").write_text(header + rows)
+    (known / "jobs.csv").write_text("job,seconds,command\nfig05,1.0,old\nfig02,3.0,older\n")
+    out = folder / "agreement.md"
+    report(SCRIPT, folder, "--paper", PAPER, "--known", known, "--out", out)
+    with out.with_suffix(".csv").open(newline="") as file:
+        found = {row["quantity"]: row for row in csv.DictReader(file)}
+    earlier, here = found["z, alpha = 0.01"], found["phi_J, alpha = 0"]
+    assert (earlier["ours"], earlier["verdict"], earlier["commit"]) == ("4.43", "agrees", "abc")
+    assert float(here["ours"]) == 0.8410
+    assert here["commit"] not in ("", "abc")
+    with out.with_name("jobs.csv").open(newline="") as file:
+        jobs = {row["job"]: row["seconds"] for row in csv.DictReader(file)}
+    assert jobs == {"fig02": "3.0", "fig05": "2.5", "rods_alpha4": "60.0"}

@@ -17,8 +17,8 @@ pytest.importorskip("snakemake")
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 FOLDERS = [paper.replace("-", "_") for paper in PAPERS]
 
-# Puts numbers beside the paper's, as agreement.py does, and draws nothing.
-NO_FIGURES = {"beside_paper.py"}
+# These put numbers beside the paper's and draw nothing.
+NO_FIGURES = {"beside_paper.py", "grazing_bonds.py"}
 
 
 def planned(folder, scale, tmp_path):

@@ -7,6 +7,7 @@ import pytest
 import jamshape as js
 from jamshape.files.h5md import read_attributes
 from jamshape.files.run_writer import RunWriter
+from jamshape.files.sets import read_groups
 
 SCRIPT = "sample_tables.py"
 
@@ -40,8 +41,8 @@ def folder(tmp_path_factory):
 def test_each_file_is_a_line(folder, report):
     out = folder / "samples"
     said = report(SCRIPT, folder, "--out", out)
-    assert (said["packings"], said["modes"], said["runs"]) == (1, 1, 1)
-    [packing] = table(out / "packings.csv")
+    assert (said["rods"], said["modes"], said["runs"]) == (1, 1, 1)
+    [packing] = table(out / "rods.csv")
     told = read_attributes(folder / packing["file"])
     for name in ("alpha", "n", "seed", "u0", "phi_J", "z", "n_rattlers", "residual_force"):
         assert float(packing[name]) == pytest.approx(float(told[name]), rel=1e-9)
@@ -67,3 +68,61 @@ def test_modes_are_counted_by_band_beside_their_packing(folder, report):
 def test_what_is_no_folder_of_a_reproduction_is_refused(tmp_path, problem):
     said = problem(SCRIPT, tmp_path, "--out", tmp_path / "samples")
     assert "has no folder packings, expected one that jamshape reproduce made" in said
+
+
+def test_groups_of_a_table_are_those_of_its_files(folder, report):
+    report(SCRIPT, folder, "--out", folder / "samples")
+    [(of_table, [row])] = read_groups([folder / "samples" / "rods.csv"]).items()
+    [(of_file, [file])] = read_groups([folder / "packings" / "rods"]).items()
+    assert of_table == of_file
+    for name in ("alpha", "n", "seed", "phi_J", "z"):
+        assert row.number(name) == pytest.approx(file.number(name), rel=1e-9)
+    assert row.path.name == file.path.name
+
+
+def test_a_figure_of_a_table_has_the_numbers_of_the_packings(folder, report, tmp_path):
+    report(SCRIPT, folder, "--out", folder / "samples")
+    places = {"table": folder / "samples" / "rods.csv", "files": folder / "packings" / "rods"}
+    said = {
+        name: report("marschall_2018/fig05_phi_j.py", place, "--out", tmp_path / f"{name}.png")
+        for name, place in places.items()
+    }
+    [of_table], [of_files] = (said[name]["phi_J"] for name in places)
+    assert of_table["phi_J"]["value"] == pytest.approx(of_files["phi_J"]["value"], rel=1e-9)
+    assert of_table["alpha"] == of_files["alpha"]
+
+
+def test_particles_of_a_table_are_in_its_files_only(folder, report, problem, tmp_path):
+    report(SCRIPT, folder, "--out", tmp_path / "elsewhere")
+    table_alone = tmp_path / "elsewhere" / "rods.csv"
+    said = problem(
+        "marschall_2018/fig09_contact_classes.py", table_alone, "--out", tmp_path / "a.png"
+    )
+    assert "alpha4_seed1.h5" in said
+
+
+@pytest.mark.parametrize("column", ["file", "shape", "dimension", "outcome"])
+def test_a_table_that_lacks_a_column_is_refused(folder, report, problem, tmp_path, column):
+    report(SCRIPT, folder, "--out", folder / "samples")
+    lines = table(folder / "samples" / "rods.csv")
+    with (tmp_path / "short.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, [n for n in lines[0] if n != column], extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(lines)
+    said = problem(
+        "marschall_2018/fig05_phi_j.py", tmp_path / "short.csv", "--out", tmp_path / "a.png"
+    )
+    assert f"line 2: has no {column}, expected a table of sample_tables.py" in said
+
+
+def test_lines_of_earlier_tables_are_kept_but_for_files_that_are_here(folder, report, tmp_path):
+    report(SCRIPT, folder, "--out", tmp_path / "earlier")
+    [line] = table(tmp_path / "earlier" / "rods.csv")
+    others = [line | {"z": "0"}, line | {"file": "packings/rods/alpha4_seed9.h5", "seed": "9"}]
+    with (tmp_path / "earlier" / "rods.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, line)
+        writer.writeheader()
+        writer.writerows(others)
+    report(SCRIPT, folder, "--known", tmp_path / "earlier", "--out", tmp_path / "both")
+    assert table(tmp_path / "both" / "rods.csv") == [line, others[1]]
+    assert len(table(tmp_path / "both" / "modes.csv")) == 1

@@ -1,12 +1,14 @@
 """Sets of finished packings in folders and files, grouped by the systems that they are samples of.
 
 A sweep is a folder of files that `make_packing.py` or `sweep.py` wrote; several may be given together. Packings
-are of one system where shape, dimension, the shape's parameters, mixture, protocol and its sweeps agree.
+are of one system where shape, dimension, the shape's parameters, mixture, protocol and its sweeps agree. Instead of
+files a table may be given, of what files say without their particles, a line for each (`analysis/sample_tables.py`).
 """
 
 from __future__ import annotations
 
 import contextlib
+import csv
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,8 +18,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.contacts import Contacts, find_contacts, find_rattlers
-from jamshape.files import layout
-from jamshape.files.h5md import FileFormatError, read_attributes, read_observables, read_packing
+from jamshape.files.h5md import (
+    FileFormatError,
+    read_attributes,
+    read_observables,
+    read_packing,
+    read_style,
+)
 from jamshape.files.vocabulary import protocol_named
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT, shape_named
@@ -26,6 +33,10 @@ REACHED = ("converged", "sliding")  # outcomes with mechanical equilibrium; othe
 
 # Ends of the names of files that may lie beside a packing and are none.
 OTHERS = (".run.h5", ".search.h5", ".path.h5", ".strict.h5", ".modes.h5")
+
+# End of the name of a table of packings, and its columns that are no attributes.
+TABLE = ".csv"
+_STYLE = ("shape", "dimension")
 
 CONDITIONS = ("n", "size_ratio", "u0", "kappa")
 
@@ -68,11 +79,13 @@ class PackingFile:
 
     path: Path
     attributes: dict[str, Any]
+    style: tuple[str, int]
+    """Name of the shape, and dimension."""
 
     @classmethod
     def read(cls, path: Path) -> PackingFile:
         """Read what a file says; errors as `read_attributes`."""
-        return cls(path, read_attributes(path))
+        return cls(path, read_attributes(path), read_style(path))
 
     @property
     def reached(self) -> bool:
@@ -95,10 +108,7 @@ class PackingFile:
 
     def system(self) -> System:
         """Tell what it is a sample of."""
-        with layout.opened(self.path) as file:
-            shape = layout.require_item(file, "particles/all").attrs["shape_style"]
-            dimension = int(layout.require_item(file, "particles/all/box").attrs["dimension"])
-        return system_of(self.attributes, shape, dimension)
+        return system_of(self.attributes, *self.style)
 
     def contacts(self) -> Contacts:
         """Read the packing and find its contacts, with two bonds side to side, and its rattlers."""
@@ -201,7 +211,9 @@ def finished(paths: list[Path], *, with_stalled: bool = False) -> list[PackingFi
 
 
 def _files(path: Path) -> list[PackingFile]:
-    """Read one file, or those of a folder that are packings."""
+    """Read one file, the lines of a table, or the files of a folder that are packings."""
+    if path.suffix == TABLE:
+        return read_table(path)
     if not path.is_dir():
         file = PackingFile.read(path)
         if "outcome" not in file.attributes:
@@ -215,6 +227,39 @@ def _files(path: Path) -> list[PackingFile]:
         with contextlib.suppress(FileFormatError):  # files of other kinds
             found.append(PackingFile.read(place))
     return [file for file in found if "outcome" in file.attributes]
+
+
+def read_table(path: Path) -> list[PackingFile]:
+    """Read a table of packings, as `analysis/sample_tables.py` writes it.
+
+    The file of a line is named beside the table, and need not be there: only who asks for its particles misses it.
+
+    Raises
+    ------
+    ValueError
+        If the table lacks a column, or its dimension is no number.
+    OSError
+        If it cannot be read.
+    """
+    with path.open(newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    found = []
+    for number_of, line in enumerate(lines, 2):
+        if missing := [name for name in (*_STYLE, "file", "outcome") if not line.get(name)]:
+            msg = f"{path}, line {number_of}: has no {missing[0]}, expected a table of sample_tables.py"
+            raise ValueError(msg)
+        known = {name: _read(text) for name, text in line.items() if text}
+        shape, dimension = (known.pop(name) for name in _STYLE)
+        found.append(PackingFile(path.parent / known.pop("file"), known, (shape, int(dimension))))
+    return found
+
+
+def _read(text: str) -> Any:
+    """Read a cell: a number if it is one."""
+    for kind in (int, float):
+        with contextlib.suppress(ValueError):
+            return kind(text)
+    return text
 
 
 def require_one_ensemble(attributes: Sequence[Mapping[str, Any]], same: Sequence[str]) -> None:
