@@ -27,7 +27,7 @@ from jamshape.measures.averages import averages, exactly, mean, rows
 from jamshape.measures.order3d import cubatic_order, nematic_order
 from jamshape.packing import body_axes
 
-DRAWS = 200
+DRAWS = 40
 
 
 def random_order(n: int) -> dict[str, float]:
