@@ -45,7 +45,8 @@ AGREES, DIFFERS, UNJUDGED, UNMEASURED = (
 
 RULE = f"""\
 The joint error is the root of the sum of the squares of both errors; ours is the standard error of the mean over
-samples, or that of a fit. A number of ours *{AGREES}* if it differs from the paper's by at most {WITHIN:g} joint errors,
+samples, or that of a fit. Errors stand in brackets, in units of the last digit. The column of joint errors has the
+difference of both numbers. A number of ours *{AGREES}* if it differs from the paper's by at most {WITHIN:g} joint errors,
 and *{DIFFERS}* if by more. What the paper states exactly, with an error of 0, must be the same. A number is *{UNJUDGED}*
 where there is no error of ours, as of a single sample, or where what the paper counts was found in no sample. It is
 *{UNMEASURED}* where there is no such number.
@@ -55,7 +56,7 @@ Errors know nothing of what another number of particles, rate or protocol change
 uncertain themselves. With {WITHIN:g} joint errors as the bound, about one of twenty numbers differs by chance."""
 
 JOB = ("job", "seconds", "command")
-HEADER = ("quantity", "where", "paper", "ours", "difference in joint errors", "verdict", "remark")
+HEADER = ("quantity", "where", "paper", "ours", "samples", "joint errors", "verdict", "remark")
 
 
 class Published(NamedTuple):
@@ -266,30 +267,42 @@ def judged(published: Published, ours: Ours | None) -> Row:
 
 
 def number(value: float, error: float = math.nan) -> str:
-    """Write a number with its error, to two digits of the error.
+    """Write a number with two digits of its error in brackets, in units of the last digit.
 
     Examples
     --------
-    >>> number(0.841234, 0.0005), number(7.41e-8, 5e-10), number(4)
-    ('0.84123 +- 0.00050', '7.410e-08 +- 5.0e-10', '4')
+    >>> number(0.841234, 0.0005), number(7.41e-8, 5e-10), number(4), number(10.0, 2.0)
+    ('0.84123(50)', '7.410(50)e-08', '4', '10.0(2.0)')
     """
     if not math.isfinite(error) or error == 0:
-        return f"{value:.5g}" + (" +- 0" if error == 0 else "")
+        return f"{value:.5g}" + (" exactly" if error == 0 else "")
+    scale, end = 1.0, ""
     if 0 < abs(value) < 1e-3:
-        scale = math.floor(math.log10(max(abs(value), error)))
-        digits = max(scale - math.floor(math.log10(error)) + 1, 0)
-        return f"{value:.{digits}e} +- {error:.1e}"
-    digits = max(1 - math.floor(math.log10(error)), 0)
-    return f"{value:.{digits}f} +- {error:.{digits}f}"
+        power = math.floor(math.log10(max(abs(value), error)))
+        scale, end = 10.0**power, f"e{power:03d}"
+    digits = max(1 - math.floor(math.log10(error / scale)), 0)
+    # An error above 1 keeps its point, as 10.0(2.0); others are in units of the last digit.
+    told = f"{error / scale:.{digits}f}"
+    in_brackets = told if error >= scale else told.replace(".", "").lstrip("0")
+    return f"{value / scale:.{digits}f}({in_brackets}){end}"
 
 
 def cells(row: Row) -> tuple[str, ...]:
     """Write a line of the table."""
     p, ours = row.published, row.ours
     here = number(ours.value, ours.error) if ours else ""
-    here += f" ({ours.samples} samples)" if ours and ours.samples else ""
+    samples = str(ours.samples) if ours and ours.samples else ""
     off = f"{row.difference:+.1f}" if not math.isnan(row.difference) else ""
-    return (p.quantity, p.where, number(p.value, p.error), here, off, row.verdict, p.remark)
+    return (
+        p.quantity,
+        p.where,
+        number(p.value, p.error),
+        here,
+        samples,
+        off,
+        row.verdict,
+        p.remark,
+    )
 
 
 def read_jobs(folder: Path) -> list[Took]:
