@@ -119,7 +119,7 @@ def main(options: Namespace) -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     places = [*folder.glob("packings/*/*.h5"), *folder.glob("ladder/*/*.h5")]
     packings = [place for place in places if not place.name.endswith(OTHERS)]
-    tables = {
+    tables: dict[str, tuple[Sequence[str], list[dict[str, Any]]]] = {
         name: (PACKING, rows_of((p for p in packings if table_of(p, folder) == name), told_packing))
         for name in sorted({table_of(place, folder) for place in packings})
     }

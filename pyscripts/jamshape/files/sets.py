@@ -29,7 +29,7 @@ from jamshape.files.vocabulary import protocol_named
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT, shape_named
 
-REACHED = ("converged", "sliding")  # outcomes with mechanical equilibrium; others stalled
+REACHED = ("converged", "sliding", "corner")  # outcomes with mechanical equilibrium; others stalled
 
 # Ends of the names of files that may lie beside a packing and are none.
 OTHERS = (".run.h5", ".search.h5", ".path.h5", ".strict.h5", ".modes.h5")

@@ -28,6 +28,7 @@ _VERDICTS = {
     Outcome.UNJAMMED: False,
     Outcome.CONVERGED: True,
     Outcome.SLIDING: True,
+    Outcome.CORNER: True,
 }
 
 _NAMES = {"unjams": "phi_unjams", "jams": "phi_jams", "tried": "frames_minimised"}

@@ -22,7 +22,7 @@ from jamshape.packing import Packing, body_axes
 # Rows of the convergence history that are kept in a packing's file.
 _REPORT_ROWS = 2000
 
-_REACHED = (Outcome.CONVERGED, Outcome.SLIDING)
+_REACHED = (Outcome.CONVERGED, Outcome.SLIDING, Outcome.CORNER)
 
 _SUMMARY = (
     *("alpha", "exponent", "w1", "w2", "kinds", "n", "protocol", "seed", "outcome", "phi", "phi_J"),

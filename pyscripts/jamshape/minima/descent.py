@@ -25,12 +25,14 @@ class Outcome(Enum):
 
     SLIDING: what is left of the forces lies along modes softer than the prestress, rods that slide
     along flat sides, and does not fall any more; all the rest is below the tolerance.
-    STALLED: no progress, such as a cycle about a kink of the energy.
+    CORNER: at rest where the slope of the energy jumps; a mixture of the forces around is below the tolerance.
+    STALLED: no progress.
     """
 
     CONVERGED = "converged"
     UNJAMMED = "unjammed"
     SLIDING = "sliding"
+    CORNER = "corner"
     STALLED = "stalled"
     EXHAUSTED = "exhausted"
 
@@ -101,6 +103,7 @@ class Minimum:
 
     state: State
     evaluation: Evaluation
+    """On a corner its gradient is the mixture of those around that balances."""
     outcome: Outcome
     residual: Residual
     history: History
@@ -109,6 +112,11 @@ class Minimum:
     def energy_density(self) -> float:
         """U / L^D."""
         return self.evaluation.energy / self.state.volume
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether forces balance, be it on a corner of the energy."""
+        return self.outcome in (Outcome.CONVERGED, Outcome.CORNER)
 
 
 def residual_of(landscape: Landscape, evaluation: Evaluation) -> Residual:

@@ -6,6 +6,7 @@ import math
 
 from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, least_shift
 from jamshape.landscape.vicinity import DescentStop, Vicinity
+from jamshape.minima.corners import at_rest
 from jamshape.minima.descent import Descent, Outcome, rounding_of_a_bond
 
 # L-BFGS, cheap while contacts come and go, gives way to Newton's method below this residual.
@@ -45,4 +46,15 @@ def _descend(descent: Descent, newton_below: float, *, is_near: bool = False) ->
     vicinity = Vicinity(landscape, descent.state)
     end = vicinity.descend(about, least_shift(landscape, descent.evaluation))
     descent.take(vicinity.base, end)
-    return Outcome(end.outcome)
+    return _on_a_corner(descent) or Outcome(end.outcome)
+
+
+def _on_a_corner(descent: Descent) -> Outcome | None:
+    """Lead a state beside a corner, from whose sides steps turn round for ever, to rest on it; None if it is none."""
+    if descent.outcome() is not None:
+        return None
+    found = at_rest(descent.landscape, descent.state, descent.stop.tolerance)
+    if found is None:
+        return None
+    descent.move_to(found.state, found.evaluation)
+    return Outcome.CORNER if found.n_sides > 1 else Outcome.CONVERGED

@@ -200,7 +200,7 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
     while search.minimum is None:
         stop = Stop(tolerance=_GOOD, lowest=search.lowest(landscape, target))
         found = minimise(landscape, search.state, "auto", stop, search.history)
-        if found.outcome is Outcome.CONVERGED:
+        if found.is_at_rest:
             jammed = found
             found = yield from _lead_to(landscape, search, jammed, target)
             if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):

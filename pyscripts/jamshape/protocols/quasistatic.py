@@ -188,7 +188,7 @@ def compress(
                 f" expected at most {protocol.energy:g}; start at a smaller phi"
             )
             raise ValueError(msg)
-        elif compression.openings > 0 and found.outcome is not Outcome.CONVERGED:
+        elif compression.openings > 0 and not found.is_at_rest:
             compression.jammed_phi, compression.halves = compression.phi, True
             compression.halve()
         elif per_particle <= protocol.closeness * protocol.energy or _is_narrow(compression):

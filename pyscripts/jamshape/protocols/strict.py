@@ -172,7 +172,7 @@ def _take(
         return
     energy = search.minimum.evaluation.energy
     change = (there.evaluation.energy - energy) / energy
-    settled = there.outcome is Outcome.CONVERGED
+    settled = there.is_at_rest
     fell = change < -_SLIDE or there.outcome is Outcome.UNJAMMED
     if settled and -_SLIDE < change < 0:
         search.farthest = _next_farthest(search, step.moved, _LONGEST * radius)

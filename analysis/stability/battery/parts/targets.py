@@ -17,7 +17,7 @@ from jamshape.minima.target import Target, find
 
 PART = "energy target"
 
-ENDED = (Outcome.CONVERGED, Outcome.SLIDING, Outcome.UNJAMMED)
+ENDED = (Outcome.CONVERGED, Outcome.SLIDING, Outcome.CORNER, Outcome.UNJAMMED)
 STARTS = {name: scene for shape in SHAPES for name, scene in shape.solvers.jammed.items()}
 
 
