@@ -62,7 +62,9 @@ def test_bonds_make_up_their_contacts(packing):
         np.testing.assert_allclose(np.linalg.norm(bonds.normal, axis=1), 1, rtol=8 * EPS)
         along = (bonds.force * bonds.normal).sum(axis=1)
         assert (along >= 0).all()
-        if sides != laws(packing)[0]:  # bonds that fade turn particles by more than their forces do, and end at none
+        if (
+            sides != laws(packing)[0]
+        ):  # bonds that fade turn particles by more than their forces do, and end at none
             continue
         assert (along > 0).all()
         overlap = 1 - bonds.distance / bonds.reach
