@@ -142,9 +142,9 @@ def test_a_step_past_the_stability_limit_fails_with_a_sentence_and_a_readable_fi
         (("--n", "0"), "0"),
     ],
 )
-def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path):
+def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path, run_here):
     out = tmp_path / "none.h5"
-    failed = run(out, *options)
+    failed = run_here(DRIVER, *SMALL, "--out", out, *options)
     assert failed.returncode == 1
     assert failed.stderr.startswith("compress.py: ")
     assert len(failed.stderr.strip().splitlines()) == 1

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.lammps
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_packing.py"
 USUAL = ("--n", "16", "--alpha", "1", "--phi-start", "0.6", "--u0", "1e-9")
-SMALL = (*USUAL, "--way", "dynamics", "--kappa", "1e-5")
+SMALL = (*USUAL, "--way", "dynamics", "--kappa", "1e-5", "--p-end", "3e-3")
 
 
 def run(*options):
@@ -143,8 +143,9 @@ def assert_one_sentence(failed, words):
         ),
     ],
 )
-def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path):
-    assert_one_sentence(run(*SMALL, *options, "--out", tmp_path / "none.h5"), words)
+def test_bad_input_is_one_sentence_and_leaves_no_file(options, words, tmp_path, run_here):
+    failed = run_here(DRIVER, *SMALL, *options, "--out", tmp_path / "none.h5")
+    assert_one_sentence(failed, words)
     assert not list(tmp_path.iterdir())
 
 
@@ -184,11 +185,13 @@ def forget_the_outcome(path):
         (Path.unlink, ("--alpha", "4"), "holds the compression of a packing with alpha = 1.0"),
     ],
 )
-def test_a_file_that_is_not_the_packing_is_told_and_kept(made, tmp_path, damage, options, words):
+def test_a_file_that_is_not_the_packing_is_told_and_kept(
+    made, tmp_path, damage, options, words, run_here
+):
     out = tmp_path / made[0].name
     for path in made[0].parent.iterdir():
         shutil.copy(path, tmp_path)
     damage(out)
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    assert_one_sentence(run(*SMALL, *options, "--out", out), words)
+    assert_one_sentence(run_here(DRIVER, *SMALL, *options, "--out", out), words)
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before

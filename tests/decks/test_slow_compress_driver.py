@@ -71,10 +71,10 @@ def test_a_finished_run_is_left_alone(made):
         (("--tolerance", "1e-2"), "tolerance = 0.001, expected 0.01"),
     ],
 )
-def test_a_file_with_another_protocol_is_refused(made, options, sentence):
+def test_a_file_with_another_protocol_is_refused(made, options, sentence, run_here):
     out, before_options, _ = made
     before = out.read_bytes()
-    found = run(*before_options, *options)
+    found = run_here(DRIVER, *before_options, *options)
     assert found.returncode == 1
     assert found.stderr.startswith("slow_compress.py: ")
     assert sentence in found.stderr

@@ -15,6 +15,7 @@ from lammps_scenes import (
     bindings_forces,
     dense,
     dense_mixture,
+    difference_from,
     difference_from_bindings,
     dump,
     fix_vector,
@@ -297,9 +298,9 @@ def test_no_contact_is_missed_however_rods_move(motion, skin, dimension, tmp_pat
         session.commands("run 0")
         for step in range(150):
             state = state_of(session)
-            largest = max(largest, difference_from_bindings(state))
-            pairs = contacts.find_contacts(state.packing).pairs
-            seen |= set(map(tuple, pairs))
+            network = contacts.find_contacts(state.exact)
+            largest = max(largest, difference_from(network, state))
+            seen |= set(map(tuple, network.pairs))
             flight.go_on([0.004, 0.012, 0.04][step % 3])
             set_poses(session, flight.packing)
             session.commands("run 1 pre no post no")

@@ -25,7 +25,7 @@ from jamshape.shapes.shape import Interaction
 
 SKIN = 0.3
 
-_MPIRUN = ("mpirun", "--mca", "mpi_yield_when_idle", "1", "--oversubscribe", "-np")
+_MPIRUN = ("mpirun", "--oversubscribe", "-np")
 _MPI_AS_ROOT = ("OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM")
 
 # What `compute packing` gives, from 0.

@@ -56,7 +56,7 @@ def test_the_commands_of_the_page_run_in_their_order(jamshape, tmp_path, monkeyp
 
 RODS, BALLS = "--n 16 --alpha 1", "--n 16 --delta-phi 0.02 --tolerance 1e-1"
 OF_PROTOCOLS = {
-    "--search halving": "--u0 1e-6 --accuracy 0.1 --tolerance 1e-2",
+    "--search halving": "--u0 1.3e-6 --accuracy 0.1 --tolerance 1e-2",
     "--start": "--u0 1e-6",
     "marschall-2018": f"{RODS} --phi-start 0.55 --kappa 1e-4 --u0 1e-6",
     "yuan-2019-1": f"{BALLS} --phi-start 0.3",
@@ -113,7 +113,7 @@ def test_the_commands_and_lines_of_python_about_shear_run(jamshape, tmp_path, mo
     monkeypatch.setenv("MPLBACKEND", "agg")
     first, steps = OF_COMMAND.findall(SHEAR)
     assert not jamshape(*shlex.split(first), *QUICK["shear"].split()).code
-    run_python(SHEAR, n=16, strain=1)
+    run_python(SHEAR, n=16, strain=0.5)
     # From the packing that the lines have made.
     assert not jamshape(*shlex.split(steps), "--step", 1e-2).code
 

@@ -22,7 +22,7 @@ from jamshape.protocols.random_start import InsertionError
 
 U0 = 1e-12
 RECIPE = Recipe(bidisperse(1.0), n=16, phi_start=0.5, target=Target(U0))
-FAST = Dynamics(Approach(kappa=1e-5, p_end=3e-4))
+FAST = Dynamics(Approach(kappa=1e-5, p_end=3e-3))
 
 
 def run_of(out):
