@@ -39,6 +39,8 @@ autodoc_member_order = "bysource"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 
+highlight_language = "none"  # of commands and decks; Python says that it is Python
+
 html_theme = "furo"
 html_title = "jamshape"
 html_show_sourcelink = False

@@ -58,6 +58,13 @@ def test_examples_run(name, text, tmp_path):
     )
 
 
+@pytest.mark.lammps
+def test_examples_of_the_command_run_one_after_the_other(tmp_path):
+    example = part_of("command_jamshape", "Examples").split("```")[1]
+    run_lmp_well(f"variable out index new\n{load_plugin()}\n{example}", tmp_path)
+    assert (tmp_path / "new" / "initial.data").exists()
+
+
 @pytest.mark.parametrize(
     ("name", "members"),
     [
