@@ -297,8 +297,8 @@ def dynamical_matrix(
     if residual.largest > LARGEST_RESIDUAL and not scope.force:
         msg = (
             f"the state is not at a minimum: its largest net force is {residual.largest:.2g} of the"
-            f" mean bond force, expected at most {LARGEST_RESIDUAL:g}; minimise it first,"
-            " or force it (--force)"
+            f" mean bond force, expected at most {LARGEST_RESIDUAL:g}; minimise it first (what is at rest on a"
+            " corner of the energy has no modes), or force it (--force)"
         )
         raise NotAtMinimumError(msg)
     coordinates = _coordinates(landscape, state, taken, _lengths(landscape, scope.rotation))
