@@ -39,6 +39,8 @@ WAYS = {
     "phi_J_opening": ("^", r"$\phi_J(\kappa)$ from $p$ to 0, opening again"),
 }
 
+ENOUGH = 5  # points for a line through them
+
 Averages = dict[str, dict[float, Mean]]
 
 
@@ -68,7 +70,8 @@ def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> N
                 # One curve alone has two colours, of packings and of runs.
                 tint = color(2 * k + (way > 0) * (len(known) == 1))
                 label = ", ".join(filter(None, [labels[system], text]))
-                style: dict[str, Any] = {"fmt": marker, "color": tint, "label": label}
+                shown = marker if len(found) >= ENOUGH else marker.rstrip("-")
+                style: dict[str, Any] = {"fmt": shown, "color": tint, "label": label}
                 error_bars(axes, found, discs, mfc=tint if way == 0 else "none", **style)
     if any(of_paper(system) for system in known):
         error_bars(axes, PHI_J, discs, **PAPER_STYLE)

@@ -142,7 +142,11 @@ class Corner:
         """Find the weights of the gradients at the minimum of the largest parabola, their mixture, and the step there."""
         first, gradients = self.pieces[0], self.gradients()
         steps = np.array([p.relaxed + first.x - p.x for p in self.pieces])
-        weights = weights_of(gradients @ steps.T, self.below())
+        products = gradients @ steps.T
+        if not np.isfinite(products).all():
+            msg = "second derivatives without an inverse"  # such as of flat faces, where they jump
+            raise RuntimeError(msg)
+        weights = weights_of(products, self.below())
         return weights, weights @ gradients, -(weights @ steps)
 
     def draw_near(self, weights: FloatArray) -> None:

@@ -60,7 +60,7 @@ def in_units(method: str, length: float, k_e: float) -> float:
         packing = scaled(jammed(0.0), unit)
         landscape = Landscape(packing, energy)
         found = minimise(landscape, State.of(packing), method, STOPS[method])
-        if found.outcome is not Outcome.CONVERGED:
+        if not found.is_at_rest:
             return np.inf
         energies.append(_relative(landscape, found))
         counts.append(landscape.evaluations)
@@ -74,7 +74,7 @@ def faint_in_units(length: float, k_e: float) -> float:
     landscape, faint = led("discs", 1e-18)
     there = scaled(faint.state.packing(landscape.particles), length)
     found = minimise(Landscape(there, k_e), State.of(there), "newton", Stop(tolerance=1e-3))
-    return found.residual.largest if found.outcome is Outcome.CONVERGED else np.inf
+    return found.residual.largest if found.is_at_rest else np.inf
 
 
 def unjams(method: str, length: float, k_e: float) -> float:
