@@ -42,6 +42,7 @@ NOT_RUN = [
     Told("docs/how-to/install.md", "tests/debian", "makes a Debian as root"),
     Told("docs/how-to/install.md", "pip", "downloads and compiles; ./run wheel does it"),
     Told("docs/how-to/reproduce.md", "pip install", "downloads packages"),
+    Told("docs/how-to/reproduce.md", "--known", "needs packings of a paper; tests/scripts/test_sample_tables.py"),
     Told("docs/how-to/reproduce.md", "snakemake -s", "needs Slurm; tests/scripts/test_reproduce_with_snakemake.py"),
     Told("docs/reference/*.md", "Syntax\n", "has names in the place of values"),
     Told("docs/results/*.md", "", "takes minutes to hours: the calculations behind the numbers of the page"),
