@@ -24,8 +24,8 @@ from jamshape.landscape.newton import least_shift
 from jamshape.landscape.vicinity import Vicinity
 from jamshape.minima.descent import residual_of
 
-# Steps to a corner; few are needed, or it is none.
-_STEPS = 30
+# Steps to a corner: a handful near jamming, some forty where overlaps are a third of a particle.
+_STEPS = 100
 
 # Parabolas that are kept: one more than corners that are met at once.
 _MOST = 7
