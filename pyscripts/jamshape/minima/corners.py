@@ -27,6 +27,9 @@ from jamshape.minima.descent import residual_of
 # Steps to a corner: a handful near jamming, some forty where overlaps are a third of a particle.
 _STEPS = 100
 
+# It is none if the residual has not halved in so many steps, as where rods slide.
+_PATIENCE = 15
+
 # Parabolas that are kept: one more than corners that are met at once.
 _MOST = 7
 
@@ -255,7 +258,8 @@ def at_rest(landscape: Landscape, state: State, tolerance: float) -> Rest | None
     """
     try:
         corner = Corner(landscape, state, tolerance)
-        for _ in range(_STEPS):
+        least, last_gain = math.inf, 0
+        for k in range(_STEPS):
             first = corner.pieces[0]
             if first.evaluation.bond_force == 0.0:
                 return None
@@ -263,8 +267,13 @@ def at_rest(landscape: Landscape, state: State, tolerance: float) -> Rest | None
                 return corner.rest(first.evaluation, 1)
             weights, mixture, step = corner.mixed()
             mixed = first.evaluation._replace(gradient=mixture)
-            if residual_of(landscape, mixed).largest <= tolerance and corner.is_near(weights):
+            residual = residual_of(landscape, mixed).largest
+            if residual <= tolerance and corner.is_near(weights):
                 return corner.rest(mixed, int(np.count_nonzero(weights)))
+            if residual <= max(least / 2, tolerance):
+                least, last_gain = residual, k
+            if k - last_gain > _PATIENCE:
+                return None
             corner.draw_near(weights)
             corner.forget(weights)
             corner.add(first.x + step)
