@@ -3,7 +3,8 @@
     python analysis/marschall_2018/fig14_jamming_distance.py LADDER [MORE.h5 ...] --out jamming_distance.png
 
 LADDER is a folder of energy_ladder.py, or of packings at several u0. phi_J of a sample is where sqrt(u), linear
-in phi, vanishes below its lowest energy. Means over samples with standard errors, on the right without the trend
+in phi, vanishes below its lowest energy; where a packing has rearranged on its way to another energy, so that this
+phi_J is no longer its own, it is left out. Means over samples with standard errors, on the right without the trend
 u^(1/2); power laws of u are fitted to each sample. The last line of standard output is one JSON object with
 these numbers beside the paper's.
 """
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 EXPONENT = 0.5
 MISPRINT = 4.3e-4  # does not fit the others
 FEWEST = 3  # energies of a fit
+SAME = 0.1  # of phi - phi_J, by which phi_J of a packing that is still the same may differ
 STAR: dict[str, Any] = {"ms": PAPER_STYLE["ms"], "lw": 0, "zorder": 1.5, "mec": "k", "mew": 0.7}
 
 Samples = dict[int, dict[float, float]]
@@ -54,7 +56,11 @@ def read_ladder(files: list[PackingFile]) -> Ladder:
     for (system, seed), points in sorted(rows.items()):
         if len(points) > 1:
             _, phi_J = points[min(points)]
-            above = {u: phi - phi_J for u, (phi, _) in sorted(points.items())}
+            above = {
+                u: phi - phi_J
+                for u, (phi, own) in sorted(points.items())
+                if abs(own - phi_J) <= SAME * abs(phi - phi_J)
+            }
             ladder.setdefault(system, {})[seed] = above
     if not ladder:
         places = ", ".join(dict.fromkeys(str(file.path) for file in files))

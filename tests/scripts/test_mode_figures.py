@@ -202,6 +202,13 @@ def test_jamming_distance(report, problem, tmp_path):
     assert_allclose(row["exponent"]["value"], 0.5, rtol=1e-6)
     assert_allclose(row["distance"]["1e-15"]["value"], 2.9e-15**0.5, rtol=0.8)
     assert row["paper"]["1e-15"] == 9.1e-8
+    # One that rearranged on the way, to another phi_J, is left out.
+    elsewhere = {"alpha": 4.0, "seed": 1, "u0": 1e-11, "outcome": "converged"}
+    elsewhere |= {"phi": 0.861, "phi_J": 0.861 - 2.9 * 1e-11**0.5}
+    write_packing(tmp_path / "1_1e-11.h5", packing, elsewhere)
+    (again,) = report(DISTANCE, tmp_path, "--out", out)["jamming_distance"]
+    assert again["distance"] == row["distance"]
+    (tmp_path / "1_1e-11.h5").unlink()
     one = tmp_path / "1_1e-17.h5"
     assert "no sample at two energies" in problem(DISTANCE, one, "--out", out)
 
