@@ -62,11 +62,12 @@ def test_every_mode_is_a_constraint_or_floppy(packings, alpha):
 
 @pytest.mark.parametrize("alpha", PAPER)
 def test_bounds_leave_the_digits_of_every_mode(packings, alpha):
+    """Four digits, down to what the rounding of overlaps leaves: positions times that of a long double, stiffness 1."""
     for seed in SEEDS:
-        _, found = analysed(packings[alpha, seed])
-        real = ~found.is_translation & (np.abs(found.eigenvalues) > 1e-21)
-        assert (found.bound < 1e-4 * np.abs(found.eigenvalues))[real].all()
-        assert (found.bound < 1e-18)[~real].all()
+        packing = packings[alpha, seed]
+        rounding = 2 * float(packing.box.edges.max()) * float(np.finfo(np.longdouble).eps)
+        _, found = analysed(packing)
+        assert (found.bound < 1e-4 * np.abs(found.eigenvalues) + rounding).all()
 
 
 @pytest.mark.parametrize("alpha", PAPER)
