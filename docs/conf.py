@@ -51,7 +51,6 @@ BESIDE_CODE = {
     "development/changelog": "CHANGELOG.md",
     "development/contributing": "CONTRIBUTING.md",
     "reference/analysis-scripts": "analysis/README.md",
-    "reference/decks": "inputs/README.md",
 }
 _LINK = re.compile(r"\[([^\]]*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
 

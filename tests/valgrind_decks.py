@@ -20,13 +20,13 @@ from jamshape.lammps.plugin import PLUGIN_NAME, decks_path, plugin_path
 
 RODS = {"n": 16, "alpha": 1, "kappa": 1e-2, "dt": 0.1, "phi_end": 0.9, "rows": 20, "frames": 4}
 BODIES = {"n": 12, "p": 1.5, "w2": 1.5, "kappa": 1e-2, "phi_end": 0.9, "rows": 20, "frames": 4}
-# Decks by the folders that they write: a minimisation begins with what a compression has left.
+# Decks by the names of the files that they write: a minimisation begins with what a compression has left.
 RUNS = {
     "rods": ("compress_spherocylinder", RODS | {"sides": "two"}),
-    "rods, rkc2": ("compress_spherocylinder", RODS | {"integrator": "rkc2 tolerance 1e-3"}),
-    "rods, minimum": ("minimize_spherocylinder", {"restart": "rods", "maxiter": 20}),
+    "rkc2": ("compress_spherocylinder", RODS | {"integrator": "rkc2 tolerance 1e-3"}),
+    "minimum": ("minimize_spherocylinder", {"restart": "rods", "maxiter": 20}),
     "bodies": ("compress_superellipsoid", BODIES),
-    "bodies, minimum": ("minimize_superellipsoid", {"restart": "bodies", "maxiter": 20}),
+    "minimum_of_bodies": ("minimize_superellipsoid", {"restart": "bodies", "maxiter": 20}),
 }
 SUPPRESSED = Path("/usr/share/openmpi/openmpi-valgrind.supp")
 VALGRIND = (
@@ -56,11 +56,13 @@ def run_under_valgrind(folder: Path, name: str) -> Path:
     """Run a deck in a folder, and return valgrind's report; the program ends where the deck does not."""
     deck, settings = RUNS[name]
     given = {
-        key: folder / value / "final.restart" if key == "restart" else value
+        key: folder / f"{value}.restart" if key == "restart" else value
         for key, value in settings.items()
     }
     words = [
-        str(word) for pair in (given | {"out": folder / name}).items() for word in ("-var", *pair)
+        str(word)
+        for pair in (given | {"out": folder / name, "jamshape": decks_path().parent}).items()
+        for word in ("-var", *pair)
     ]
     report = folder / f"{name}.xml"
     silent = [f"--suppressions={SUPPRESSED}"] if SUPPRESSED.is_file() else []

@@ -1,7 +1,7 @@
 #include "contact/pair_derivatives.hpp"
 
 #include "bindings/shape.hpp"
-#include "bindings/shapes.hpp"
+#include "contact/shapes.hpp"
 
 #include <vector>
 

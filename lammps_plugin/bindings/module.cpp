@@ -19,6 +19,7 @@ nb::list instruction_sets()
 void export_shapes(nanobind::module_ &m);
 void export_sums();
 void export_derivatives();
+void export_starts();
 void export_sweeps();
 void export_vicinity(nanobind::module_ &m);
 void export_stages(nanobind::module_ &m);
@@ -33,6 +34,7 @@ NB_MODULE(_contact, m)
   jamshape::export_shapes(m);
   jamshape::export_sums();
   jamshape::export_derivatives();
+  jamshape::export_starts();
   jamshape::export_sweeps();
   jamshape::export_vicinity(m);
   jamshape::export_stages(m);

@@ -1,4 +1,4 @@
-#include "bindings/shapes.hpp"
+#include "contact/shapes.hpp"
 
 #include "contact/host_spin.hpp"
 

@@ -1,5 +1,5 @@
 #include "bindings/shape.hpp"
-#include "bindings/shapes.hpp"
+#include "contact/shapes.hpp"
 
 namespace jamshape {
 

@@ -1,6 +1,7 @@
 #include "bindings/shape.hpp"
-#include "bindings/shapes.hpp"
+#include "contact/shapes.hpp"
 #include "packing/hard_particles.hpp"
+#include "packing/orientation.hpp"
 
 #include <utility>
 
@@ -24,13 +25,6 @@ struct HardPoses {
     require_orientations(orientation.data(), N, D);
     require_edges(edges.data(), D);
   }
-
-  template <int D> Quaternion orientation_of(std::size_t i) const
-  {
-    const double *q = orientation.data() + i * orientation.shape(1);
-    if (D == 2) return {std::cos(0.5 * q[0]), 0.0, 0.0, std::sin(0.5 * q[0])};
-    return normalized(Quaternion{q[0], q[1], q[2], q[3]});
-  }
 };
 
 template <class Model, int D>
@@ -41,7 +35,8 @@ HardParticles<Model, D> placed(const ShapeOf<Model> &of, const HardPoses &poses,
   std::vector<Quaternion> orientations;
   for (std::size_t i = 0; i < of.n(); ++i) {
     centres.push_back(read_vec<D>(poses.position.data() + D * i));
-    orientations.push_back(poses.orientation_of<D>(i));
+    const double *const at = poses.orientation.data() + i * poses.orientation.shape(1);
+    orientations.push_back(orientation_from<D>(at));
   }
   HardParticles<Model, D> particles(of.shapes(), centres, std::move(orientations),
                                     read_vec<D>(poses.edges.data()), seed);

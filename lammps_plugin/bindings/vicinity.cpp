@@ -1,7 +1,7 @@
 #include "bindings/vicinity.hpp"
 
 #include "bindings/shape.hpp"
-#include "bindings/shapes.hpp"
+#include "contact/shapes.hpp"
 
 #include <memory>
 #include <nanobind/stl/shared_ptr.h>

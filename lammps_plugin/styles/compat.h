@@ -37,6 +37,8 @@ class AtomVecEllipsoid {
   void unpack_comm_bonus(int n, int first, double *buf);
   /// An atom with an ellipsoid: 1, three semi-axes, quaternion; without one: 0.
   int pack_border_bonus(int n, int *list, double *buf);
+  /// Three semi-axes, of an atom with an ellipsoid or without.
+  void set_shape(int i, double a, double b, double c);
 };
 
 class Min {

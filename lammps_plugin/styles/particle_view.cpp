@@ -4,6 +4,8 @@
 #include "error.h"
 #include "refusal.h"
 
+#include <cmath>
+
 namespace jamshape {
 
 void ParticleView::require_ellipsoids(const std::string &style) const
@@ -46,6 +48,13 @@ void ParticleView::set_orientation(int i, const Quaternion &q) const
 {
   double packed[PER_ORIENTATION] = {q.w, q.i, q.j, q.k};
   ellipsoids()->unpack_comm_bonus(1, i, packed);
+}
+
+void ParticleView::set_diameters(int i, const Vec<3> &diameters) const
+{
+  const Vec<3> a = 0.5 * diameters;
+  ellipsoids()->set_shape(i, a[0], a[1], a[2]);
+  atom->rmass[i] = 4.0 / 3.0 * M_PI * a[0] * a[1] * a[2];
 }
 
 }  // namespace jamshape

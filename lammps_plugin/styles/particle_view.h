@@ -33,6 +33,8 @@ class ParticleView : protected LAMMPS_NS::Pointers {
   Vec<3> semi_axes(int i) const;
   Quaternion orientation(int i) const;
   void set_orientation(int i, const Quaternion &q) const;
+  /// Makes an atom an ellipsoid of density 1.
+  void set_diameters(int i, const Vec<3> &diameters) const;
 
   /// Shows atoms 0 to n - 1 as `visit(begin, end)`, at most BLOCK of them at a time: so few that
   /// what one pass over them reads is in the cache for the next.

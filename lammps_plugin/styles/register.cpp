@@ -4,7 +4,7 @@
 #include "compat.h"
 #include "compute_contact_local.h"
 #include "compute_packing.h"
-#include "deck_command.h"
+#include "create_random.h"
 #include "error.h"
 #include "fix_overdamped_affine.h"
 #include "force.h"
@@ -13,7 +13,10 @@
 #include "pair_dimer_harmonic.h"
 #include "pair_spherocylinder_harmonic.h"
 #include "pair_superellipsoid_harmonic.h"
+#include "variable.h"
 
+#include <dlfcn.h>
+#include <filesystem>
 #include <mpi.h>
 #include <string>
 
@@ -43,7 +46,7 @@ template <class T> LAMMPS_NS::Compute *compute(LAMMPS *lmp, int narg, char **arg
   return new T(lmp, narg, arg);
 }
 
-LAMMPS_NS::Command *command(LAMMPS *lmp) { return new jamshape::DeckCommand(lmp); }
+LAMMPS_NS::Command *command(LAMMPS *lmp) { return new jamshape::CreateRandom(lmp); }
 
 /// Gives each style to `add`, which knows pairs, fixes, computes and commands apart.
 template <class Add> void for_all_styles(Add &&add)
@@ -55,7 +58,7 @@ template <class Add> void for_all_styles(Add &&add)
   add("overdamped/affine", fix<FixOverdampedAffine>);
   add("contact/local", compute<ComputeContactLocal>);
   add("packing", compute<ComputePacking>);
-  add("jamshape", command);
+  add("create_random", command);
 }
 
 /// Into the tables of LAMMPS.
@@ -163,6 +166,22 @@ std::string what_differs(void *handle)
   return "";
 }
 
+/// Names the file of this plugin to decks: the variable `jamshape_plugin`, which there is only where
+/// the styles are. Not by a command, in which LAMMPS would read quotes and dollars of the path.
+void tell_plugin_file(LAMMPS *lmp)
+{
+  Dl_info found;
+  std::error_code none;
+  if (!dladdr(&jamshape_built_for, &found)) return;
+  std::string path = std::filesystem::absolute(found.dli_fname, none).string();
+  std::string name = "jamshape_plugin", style = "index", away = "delete";
+  char *removal[] = {name.data(), away.data()};
+  char *definition[] = {name.data(), style.data(), path.data()};
+  LAMMPS_NS::Variable *const variables = lmp->input->variable;
+  if (variables->find(name.data()) >= 0) variables->set(2, removal);
+  variables->set(3, definition);
+}
+
 }  // namespace
 
 #pragma GCC visibility push(default)
@@ -185,7 +204,7 @@ void jamshape_register(void *handle)
   const std::string wrong = what_differs(handle);
   if (!wrong.empty()) lmp->error->all(FLERR, wrong);
   for_all_styles(AddToMaps{lmp});
-  jamshape::tell_plugin_file(lmp);
+  tell_plugin_file(lmp);
 }
 
 /// What `plugin load` and LAMMPS_PLUGIN_PATH call. With another LAMMPS it only says so: one that
@@ -199,7 +218,7 @@ void lammpsplugin_init(void *handle, void *library, void *add)
     return;
   }
   for_all_styles(AddAsPlugins{lmp, library, reinterpret_cast<lammpsplugin_regfunc>(add)});
-  jamshape::tell_plugin_file(lmp);
+  tell_plugin_file(lmp);
 }
 
 /// What the scene at hand is spared, as in the log; empty before the first evaluation. Valid until

@@ -81,6 +81,13 @@ class _Shape:
         shift: NDArray[np.int64],
         extended: bool = False,
     ) -> dict[str, NDArray[Any]]: ...
+    def insert(
+        self,
+        edges: NDArray[np.float64],
+        positions: Callable[[int], NDArray[np.float64]],
+        orientations: Callable[[int], NDArray[np.float64]],
+        most_attempts: int,
+    ) -> dict[str, Any]: ...
     def sweeps(
         self,
         position: NDArray[np.float64],

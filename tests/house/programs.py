@@ -20,7 +20,6 @@ from lammps_scenes import MPIRUN, environment
 from sessions import make_clone, make_programs
 
 from jamshape.commands import COMMANDS, main, options_of
-from jamshape.lammps.deck.settings import known_settings
 
 OURS = ("analysis/", "docs/", "inputs/", "pyscripts/", "tests/")
 """Folders of the clone: what a command line names in them is there."""
@@ -155,8 +154,11 @@ def check_git(place, words):
 def check_lmp(place, words):
     deck = place / words[words.index("-in") + 1]
     if deck.is_file():  # else a reader's own
-        known = known_settings(deck.read_text(encoding="utf-8"))
-        assert {words[k + 1] for k, word in enumerate(words) if word == "-var"} <= set(known)
+        text = deck.read_text(encoding="utf-8") + (deck.parent / "run.lmp").read_text(
+            encoding="utf-8"
+        )
+        known = {"data", "restart", *re.findall(r"^variable +(\w+) +index", text, re.MULTILINE)}
+        assert {words[k + 1] for k, word in enumerate(words) if word == "-var"} <= known
 
 
 def check_snakemake(_, words):

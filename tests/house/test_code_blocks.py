@@ -38,7 +38,7 @@ NOT_RUN = [
     Told("docs/how-to/cluster.md", "git clone", "downloads packages"),
     Told("docs/how-to/cluster.md", "snakemake -s", "needs Snakemake, and Slurm; tests/decks/test_sweep_with_snakemake.py"),
     Told("docs/how-to/cluster.md", "sbatch", "needs Slurm; tests/cluster/slurm_on_one_node.py"),
-    Told("docs/how-to/decks.md", "-var restart", "needs a run that was killed; tests/kills/test_kills.py"),
+    Told("docs/how-to/decks.md", "-var jamshape", "needs a clone at a reader's path; tests/decks/test_decks.py"),
     Told("docs/how-to/install.md", "tests/debian", "makes a Debian as root"),
     Told("docs/how-to/install.md", "pip", "downloads and compiles; ./run wheel does it"),
     Told("docs/how-to/reproduce.md", "pip install", "downloads packages"),
@@ -55,8 +55,8 @@ RUN_BY = [
 ]
 
 FILES = [
-    Told("README.md", "read_data", "rods.in"),
-    Told("docs/how-to/decks.md", "read_data", "rods.in"),
+    Told("README.md", "create_random", "rods.in"),
+    Told("docs/how-to/decks.md", "create_random spherocylinder", "rods.in"),
 ]
 """Blocks that the page tells its reader to keep in a file."""
 
@@ -67,8 +67,6 @@ SMALL = "--n 16 --phi-start 0.55 --u0 1e-6"
 # Few steps: each waits for the other rank, which takes long where all cores are busy.
 DECK = "-var n 16 -var kappa 1e-2 -var dt 0.1 -var phi_end 0.42 -var rows 4 -var frames 2"
 QUICK = [
-    Told("docs/how-to/decks.md", "initial --alpha 4", ""),
-    Told("README.md", "initial --alpha 4", ""),
     Told("*", "--search halving", "--u0 1e-5 --accuracy 0.2 --tolerance 1e-2"),
     Told("*/protocols.md", "--start", "--u0 1e-6"),
     Told("*", "--protocol marschall-2018", "--n 16 --alpha 1 --phi-start 0.55 --kappa 1e-4 --u0 1e-6"),
@@ -235,7 +233,7 @@ class Reader:
     def begin(self, place, block):
         self.block = block
         for file in told(FILES, block):
-            # tests/decks/test_decks_from_anywhere.py runs all of its steps.
+            # tests/decks/test_decks.py runs all of its steps.
             (place / file.what).write_text(re.sub(r"(?m)^run .*", "run 40", self.here(block)))
         if block.language == "python" and not told(RUN_BY, block):
             code = block.text

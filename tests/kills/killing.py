@@ -6,20 +6,16 @@ nearly all of them fall into the work itself.
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import multiprocessing
 import os
 import random
 import signal
-import subprocess
 import sys
 import time
-from pathlib import Path
 
 import h5py
 import numpy as np
-from lammps_scenes import REPOSITORY, command_line, environment
 from matplotlib.image import imread
 
 from jamshape.exchange.gsd import read_gsd
@@ -76,30 +72,6 @@ def _command(words, log, patches):
         module, constant = name.rsplit(".", 1)
         setattr(importlib.import_module(module), constant, value)
     main(words)
-
-
-class _Deck:
-    """The stock lmp with a deck, in the manners of a process of multiprocessing."""
-
-    def __init__(self, words, log):
-        with Path(log).open("ab") as file:
-            self._process = subprocess.Popen(
-                command_line(*words), cwd=REPOSITORY, env=environment(), stdout=file, stderr=file
-            )
-        self.pid = self._process.pid
-
-    def join(self, seconds):
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(seconds)
-
-    @property
-    def exitcode(self):
-        return self._process.poll()
-
-
-def deck(words, log):
-    """Run a deck in LAMMPS."""
-    return _Deck(words, log)
 
 
 def ended(process, after=_SECONDS):

@@ -1,4 +1,4 @@
-"""Every command that writes and every deck, killed at random moments: what they leave and where they get to."""
+"""Every command that writes, killed at random moments: what they leave and where they get to."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from killing import GIVEN, deck, differences, forked, killed, require_whole, uninterrupted
-from lammps_scenes import REPOSITORY, nearest_image
+from killing import GIVEN, differences, forked, killed, require_whole, uninterrupted
 from lattices import discs
 from scenes import pressed
 from superellipsoid_packings import pressed_superellipsoids
 
 from jamshape.files.h5md import write_frames, write_packing
-from jamshape.files.lammps_text import read_dump, write_data
 from jamshape.protocols.random_start import random_packing
 
 pytestmark = pytest.mark.lammps
@@ -61,14 +59,6 @@ def one_of_bodies(path):
 def many_frames(path):
     start = random_packing(100, 0.3, 1)
     write_frames(path, [start.with_(position=start.position + k / 300) for k in range(300)])
-
-
-def data_of_rods(path):
-    write_data(path, rods())
-
-
-def data_of_bodies(path):
-    write_data(path, bodies())
 
 
 # --- commands -------------------------------------------------------------------------------------
@@ -158,67 +148,6 @@ CASES = {
     "export": Case(("export", "--again"), ("again.h5",), given={"run.h5": many_frames}),
     "export for MDAnalysis": Case(("export",), ("run.h5md",), given={"run.h5": many_frames}),
     "export for HOOMD": Case(("export",), ("run.gsd",), given={"run.h5": many_frames}),
-}
-
-
-# --- decks ----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Deck:
-    """A deck of LAMMPS that is killed."""
-
-    name: str
-    settings: tuple
-    given: Given = field(default_factory=dict)
-
-    def start(self, folder):
-        out = folder / "out"
-        variables = [
-            ("out", out),
-            *self.settings,
-            *(("data", folder / GIVEN / x) for x in self.given),
-        ]
-        if any(out.glob("restart.[ab]")):
-            variables.append(("restart", out))
-        words = [word for name, value in variables for word in ("-var", name, value)]
-        path = REPOSITORY / "inputs" / f"{self.name}.in"
-        return deck(["-in", path, *words], folder / "said.log")
-
-    def require_same(self, expected, found):
-        self.require_same_result(expected / "out", found / "out")
-        left = [{path.name for path in (f / "out").iterdir()} for f in (expected, found)]
-        assert left[0] == left[1]
-
-    def require_same_result(self, expected, found):
-        """Frames are the same to a bound: after a restart LAMMPS sums in another order."""
-        one, other = (read_dump(folder / "particles.dump") for folder in (expected, found))
-        assert [frame.step for frame in other] == [frame.step for frame in one]
-        for a, b in zip(one, other, strict=True):
-            np.testing.assert_array_equal(a.box.edges, b.box.edges)
-            assert np.abs(nearest_image(b.position - a.position, a.box)).max() < 1e-10
-            assert np.abs(np.sin((b.orientation - a.orientation) / 2)).max() < 1e-10
-
-
-class Minimisation(Deck):
-    """A deck that begins anew."""
-
-    def require_same_result(self, expected, found):
-        assert not differences(expected / "final.data", found / "final.data")
-
-
-CASES |= {
-    "deck": Deck(
-        "compress_spherocylinder",
-        (("n", 24), ("alpha", 1), ("kappa", 2e-4), ("phi_end", 0.86), ("dt", 0.1)),
-    ),
-    "deck of superellipsoids": Deck(
-        "compress_superellipsoid", (("n", 24), ("kappa", 2e-4), ("phi_end", 0.7), ("dt", 0.5))
-    ),
-    "minimising deck": Minimisation("minimize_spherocylinder", (), {"start.data": data_of_rods}),
-    "minimising deck of superellipsoids": Minimisation(
-        "minimize_superellipsoid", (("maxiter", 300),), {"start.data": data_of_bodies}
-    ),
 }
 
 

@@ -15,9 +15,8 @@ from every_shape import (
 from jamshape.contacts import (
     PairArrays,
     forces,
-    near_pairs,
 )
-from jamshape.contacts.near import NearPairs, Spheres, each_once, near_particles
+from jamshape.contacts.near import NearPairs, Spheres, each_once, near_pairs, near_particles
 from jamshape.packing import State
 from jamshape.shapes.shape import Interaction
 

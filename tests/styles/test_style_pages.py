@@ -29,7 +29,7 @@ def examples():
             yield pytest.param(name, text, id=f"{name}-{text.splitlines()[0]}")
 
 
-@pytest.mark.parametrize("name", [*STYLES, "command_jamshape"])
+@pytest.mark.parametrize("name", [*STYLES, "create_random"])
 def test_a_page_has_the_sections_of_lammps(name):
     titles = re.findall(r"^## (.*)", text_of(name), re.MULTILINE)
     assert [title for title in titles if title in SECTIONS] == SECTIONS
@@ -39,7 +39,7 @@ def test_every_style_that_is_registered_has_a_page():
     register = (REPOSITORY / "lammps_plugin" / "styles" / "register.cpp").read_text()
     registered = re.findall(r'add\("([\w/]+)"', register)
     pages = {re.sub(r"^(pair|fix|compute)_", "", name).replace("_", "/") for name in STYLES}
-    assert set(registered) - {"jamshape"} == pages
+    assert set(registered) - {"create_random"} == pages
 
 
 @pytest.mark.lammps
@@ -59,10 +59,11 @@ def test_examples_run(name, text, tmp_path):
 
 
 @pytest.mark.lammps
-def test_examples_of_the_command_run_one_after_the_other(tmp_path):
-    example = part_of("command_jamshape", "Examples").split("```")[1]
-    run_lmp_well(f"variable out index new\n{load_plugin()}\n{example}", tmp_path)
-    assert (tmp_path / "new" / "initial.data").exists()
+@pytest.mark.parametrize("text", part_of("create_random", "Examples").split("```")[1].strip().splitlines())
+def test_examples_of_the_command_run(text, tmp_path):
+    dimension = 2 if "spherocylinder" in text else 3
+    said = run_lmp_well(f"{before_box(dimension)}\n{load_plugin()}\n{text}", tmp_path)
+    assert "Created 64 particles at random" in said
 
 
 @pytest.mark.parametrize(

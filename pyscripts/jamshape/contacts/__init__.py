@@ -1,14 +1,7 @@
 """Near pairs, contacts, forces and rattlers of a packing."""
 
 from jamshape.contacts.found import Contacts
-from jamshape.contacts.near import (
-    NearPairs,
-    PairArrays,
-    Spheres,
-    Surroundings,
-    each_once,
-    near_pairs,
-)
+from jamshape.contacts.near import NearPairs, PairArrays
 from jamshape.contacts.network import (
     Bonds,
     ContactKind,
@@ -33,13 +26,9 @@ __all__ = [
     "NearPairs",
     "PairArrays",
     "Pairs",
-    "Spheres",
-    "Surroundings",
     "coordination",
-    "each_once",
     "find_contacts",
     "find_rattlers",
     "forces",
-    "near_pairs",
     "sum_forces",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,10 +13,6 @@ from jamshape.packing import Box, Packing, State
 
 # Bounding spheres are larger by this fraction, so that rounding never drops a contact.
 _BOUNDING_MARGIN = 1e-9
-
-# Among so many times more spheres each one is sought by itself: to go through two trees at once pays where both
-# are as dense.
-_MANY_MORE = 8
 
 
 class Spheres(NamedTuple):
@@ -76,62 +71,19 @@ def near_pairs(first: Spheres, second: Spheres, box: Box) -> NearPairs:
     NearPairs
         In no particular order; a row of `first` that also stands in `second` meets itself.
     """
-    reach = sum(_bound(spheres).max(initial=0) for spheres in (first, second))
-    return Surroundings(second, box, reach).near(first)
-
-
-class Surroundings:
-    """Spheres with all their periodic images within reach of the box, in a tree that is made once.
-
-    Parameters
-    ----------
-    spheres : Spheres
-    box : Box
-    reach : float, [length]
-        At least the largest sum of two radii that will be asked for.
-    """
-
-    def __init__(self, spheres: Spheres, box: Box, reach: float) -> None:
-        self.box, self._bound = box, _bound(spheres)
-        inside, self._turn = box.wrapped(spheres.centre)
-        self._owner, self._shift = _images_near_box(inside, box, reach)
-        self._tree = cKDTree(inside[self._owner] + box.vectors(self._shift))
-
-    def near(self, first: Spheres) -> NearPairs:
-        """Find all pairs of other spheres and these that overlap; as `near_pairs`."""
-        inside, turn = self.box.wrapped(first.centre)
-        bound = _bound(first)
-        reach = bound.max(initial=0) + self._bound.max(initial=0)
-        if _MANY_MORE * len(inside) < self._tree.n:
-            found = self._tree.query_ball_point(inside, reach, return_sorted=False)
-            count = np.fromiter(map(len, found), np.int64, len(found))
-            i = np.repeat(np.arange(len(inside)), count)
-            image = np.fromiter(itertools.chain.from_iterable(found), np.int64, len(i))
-            apart = np.linalg.norm(inside[i] - self._tree.data[image], axis=1)
-            return self._kept(i, image, apart, (bound, turn))
-        near = cKDTree(inside).sparse_distance_matrix(self._tree, reach, output_type="ndarray")
-        return self._kept(near["i"], near["j"], near["v"], (bound, turn))
-
-    def nearest(self, first: Spheres, most: int) -> NearPairs:
-        """Find of these pairs those with the centres nearest to each other sphere's, at most so many of each."""
-        inside, turn = self.box.wrapped(first.centre)
-        apart, image = self._tree.query(inside, np.arange(1, 1 + most))
-        i, k = np.nonzero(np.isfinite(apart))
-        return self._kept(i, image[i, k], apart[i, k], (_bound(first), turn))
-
-    def _kept(
-        self, i: IntArray, image: IntArray, apart: FloatArray, first: tuple[FloatArray, IntArray]
-    ) -> NearPairs:
-        """Keep pairs of spheres, of bounds and turns `first`, and images that overlap."""
-        bound, turn = first
-        keep = apart < bound[i] + self._bound[self._owner[image]]
-        i, image = i[keep], image[keep]
-        j = self._owner[image]
-        return NearPairs(i, j, self._shift[image] + turn[i] - self._turn[j])
-
-
-def _bound(spheres: Spheres) -> FloatArray:
-    return (1 + _BOUNDING_MARGIN) * spheres.radius
+    bound_first, bound_second = (
+        (1 + _BOUNDING_MARGIN) * spheres.radius for spheres in (first, second)
+    )
+    reach = bound_first.max(initial=0) + bound_second.max(initial=0)
+    inside, turn = box.wrapped(first.centre)
+    others, other_turn = box.wrapped(second.centre)
+    owner, shift = _images_near_box(others, box, reach)
+    images = cKDTree(others[owner] + box.vectors(shift))
+    near = cKDTree(inside).sparse_distance_matrix(images, reach, output_type="ndarray")
+    keep = near["v"] < bound_first[near["i"]] + bound_second[owner[near["j"]]]
+    i, image = near["i"][keep], near["j"][keep]
+    j = owner[image]
+    return NearPairs(i, j, shift[image] + turn[i] - other_turn[j])
 
 
 def each_once(near: NearPairs) -> NearPairs:

@@ -111,39 +111,41 @@ def load_script_path() -> Path:
     return decks_path() / LOADER_NAME
 
 
-def include_line(script: Path | None = None, version: int | None = None) -> str:
-    """Line of a deck that includes `load_plugin.lmp`.
+def loader_lines(folder: Path | None = None, version: int | None = None) -> tuple[str, str]:
+    """Two lines of a deck that load the plugin.
 
     Parameters
     ----------
-    script
-        The file; that of this installation when left out.
+    folder
+        The folder that holds ``inputs/load_plugin.lmp``; that of this installation when left out.
     version
         Of the LAMMPS that reads the deck; that of the plugin when left out.
 
     Raises
     ------
     PluginError
-        When there is none, or LAMMPS could not read its path in a deck: in quotes LAMMPS changes letters that are not
-        ASCII, and there is no way to write both kinds of quotes. LAMMPS later than 29Sep2021 takes the path without
+        When there is none, or LAMMPS cannot read its path in a deck: in quotes LAMMPS changes letters that are not
+        ASCII, and there is no way to write both kinds of quotes. LAMMPS later than 29Sep2021 takes a path without
         its quotes for input once more, so that dollars and a single quote mean something there.
 
     Examples
     --------
-    >>> include_line(Path("/home/you/jamshape/inputs/load_plugin.lmp"), 20250204)
-    'include "/home/you/jamshape/inputs/load_plugin.lmp"'
+    >>> loader_lines(Path("/home/you/jamshape"))
+    ('variable jamshape index /home/you/jamshape', 'include ${jamshape}/inputs/load_plugin.lmp')
     """
-    path = str(script or load_script_path())
+    path = str(folder or decks_path().parent)
     is_plain = path.isascii() and path.isprintable()
     if (version or built_for()) > _READS_ONCE:
         is_plain &= "$" not in path and all(path.count(quote) % 2 == 0 for quote in _QUOTES)
+    if is_plain and not set(path) & set(" $#&*%\"'"):
+        return f"variable jamshape index {path}", f"include ${{jamshape}}/inputs/{LOADER_NAME}"
     for quote in _QUOTES:
-        if is_plain and quote not in path:
-            return f"include {quote}{path}{quote}"
+        if is_plain and quote not in path:  # a variable is not put in between quotes
+            include = f"include {quote}{path}/inputs/{LOADER_NAME}{quote}"
+            return f"variable jamshape index {quote}{path}{quote}", include
     msg = (
         f"Found {path}, which LAMMPS cannot read in a deck, expected a path of ASCII letters with at most one kind of "
-        f"quotes, in pairs, and no $: copy the file beside your deck, write 'include {LOADER_NAME}', and set "
-        "JAMSHAPE_PLUGIN to the plugin."
+        "quotes, in pairs, and no $: move it to another folder."
     )
     raise PluginError(msg)
 

@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from jamshape.contacts import near_pairs
-from jamshape.contacts.near import Spheres, each_once
+from jamshape.contacts.near import Spheres, each_once, near_pairs
 from jamshape.packing import Box, affine_change
 
 PLANE = Box([0.5, -1], [4, 5], [1])

@@ -14,7 +14,6 @@ from jamshape import _contact
 from jamshape.files.h5md import read_packing
 from jamshape.files.lammps_text import read_data
 from jamshape.measures.order import orientational_order
-from jamshape.protocols import random_start
 from jamshape.protocols.random_start import InsertionError, random_packing
 from jamshape.shapes.particles import Particles, Sizes
 from jamshape.shapes.table import shape_named
@@ -262,18 +261,3 @@ def test_packings_of_a_seed_stay_what_they_are(n, phi, mixture, dimension, diges
     """Recipes tell a seed and no start: a faster search for places must find the same ones."""
     packing = random_packing(n, phi, 1, mixture, dimension)
     assert hashlib.sha256(packing.position.tobytes()).hexdigest()[:16] == digest
-
-
-def test_particles_go_into_trees_a_few_times_each_however_many_there_are(monkeypatch):
-    counts = []
-
-    class Counting(random_start.Surroundings):
-        def __init__(self, spheres, *others):
-            counts.append(len(spheres.radius))
-            super().__init__(spheres, *others)
-
-    monkeypatch.setattr(random_start, "Surroundings", Counting)
-    n = 6000
-    random_packing(n, 0.3, 1)
-    assert len(counts) > 20
-    assert sum(counts) < 2 * np.log2(n) * n

@@ -11,7 +11,7 @@ template <class... Models> struct ShapeList {
   template <class Visit> static void each(const Visit &visit) { (visit(Models{}), ...); }
 };
 
-/// Every shape that Python knows.
+/// Every shape that Python and the command `create_random` know.
 using Shapes = ShapeList<SpherocylinderModel, SuperellipsoidModel, DimerModel>;
 
 }  // namespace jamshape

@@ -1,0 +1,186 @@
+#pragma once
+
+#include "contact/math/rotation.hpp"
+#include "contact/math/vec.hpp"
+
+#include "packing/image_cells.hpp"
+#include "packing/orientation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+#include <vector>
+
+namespace jamshape {
+
+/// How an insertion ended.
+enum class Inserted {
+  ALL,
+  TOO_SHORT,  // the longest particle meets its own periodic images in every direction tried
+  STALLED     // no room found after the attempts allowed
+};
+
+/// Particles placed at random in a periodic box, one after another, wherever they overlap none that
+/// is there: random sequential insertion of hard particles, the longest first, since early there is
+/// room for them and short ones fit into gaps. Orientations are drawn before a place is looked for,
+/// and anew only where none is found: drawing both together would favour particles aligned with
+/// those around them.
+///
+/// `Model` as for pair styles, with `are_overlapping` for its bodies. `Draw` gives random numbers:
+/// `positions(n, out)`, n D numbers uniform in [0, 1), and `orientations(n, out)`, n angles in 2D or
+/// n quaternions in 3D. The order in which they are drawn is part of what a seed stands for.
+template <class Model, int D> class RandomInsertion {
+ public:
+  using Shape = typename Model::Shape;
+  static constexpr int PER_ORIENTATION = D == 2 ? 1 : 4;
+
+  RandomInsertion(const std::vector<Shape> &longest_first, const Vec<D> &box_edges) :
+      shapes(longest_first), edges(box_edges), n(shapes.size()),
+      reach(2.0 * Model::template outer_radius<D>(shapes.front())), placed(edges, reach, n),
+      centre(n), orientation(PER_ORIENTATION * n), waiting(n)
+  {
+    for (const Shape &shape : shapes) {
+      bodies.push_back(Model::template body<D>(shape));
+      radius.push_back(Model::template outer_radius<D>(shape));
+    }
+    std::iota(waiting.begin(), waiting.end(), std::size_t{0});
+  }
+
+  template <class Draw> Inserted run(Draw &draw, std::size_t most_attempts)
+  {
+    double pairs_per_trial = static_cast<double>(n);
+    for (int k = 0; k < D; ++k) pairs_per_trial *= 2.0 * reach / edges[k];
+    if (pairs_per_trial > MOST_PAIRS) return Inserted::TOO_SHORT;
+    const auto most_trials =
+        std::min(static_cast<std::size_t>(MOST_PAIRS / pairs_per_trial), MOST_TRIALS);
+    if (!turn(draw, without_place())) return Inserted::TOO_SHORT;
+    const std::size_t competing = std::max<std::size_t>(1, n / COMPETING);
+    std::size_t n_trials = std::min(competing, most_trials);
+    while (n_done < n) {
+      if (attempts >= most_attempts)
+        return n_done == 0 ? Inserted::TOO_SHORT : Inserted::STALLED;
+      attempts += n_trials;
+      const std::size_t n_placed = place(draw, std::min(competing, n - n_done), n_trials);
+      // No room for them as they are.
+      if (n_placed == 0 && n_trials == most_trials && !turn(draw, without_place()))
+        return Inserted::TOO_SHORT;
+      if (2 * n_placed < std::min(competing, n_trials))
+        n_trials = std::min(2 * n_trials, most_trials);
+    }
+    return Inserted::ALL;
+  }
+
+  std::size_t n_attempts() const { return attempts; }
+  /// Particles without a place, ascending.
+  std::vector<std::size_t> without_place() const { return {waiting.begin() + n_done, waiting.end()}; }
+  const Vec<D> &position(std::size_t i) const { return centre[i]; }
+  const double *orientation_of(std::size_t i) const { return &orientation[PER_ORIENTATION * i]; }
+
+ private:
+  using Body = typename Model::template Body<D>;
+
+  /// Trials tested in one batch, at most, and those in a batch times the particles near one.
+  static constexpr std::size_t MOST_TRIALS = 4096;
+  static constexpr double MOST_PAIRS = 524288.0;
+  /// One particle in so many competes for places in one batch: few, so that the longest stay ahead.
+  static constexpr std::size_t COMPETING = 16;
+  /// Directions in which a particle is tried in a box shorter than it.
+  static constexpr int DIRECTIONS = 4096;
+
+  const std::vector<Shape> &shapes;
+  Vec<D> edges;
+  std::size_t n, attempts = 0, n_done = 0;
+  double reach;
+  ImageCells<D> placed;
+  std::vector<Vec<D>> centre;
+  std::vector<double> orientation;
+  std::vector<std::size_t> waiting;  // from n_done on, ascending
+  std::vector<Body> bodies;  // turned; their centres are set where they are compared
+  std::vector<double> radius;
+
+  /// Draws orientations of these particles that keep them off their own images; false if there are
+  /// none.
+  template <class Draw> bool turn(Draw &draw, std::vector<std::size_t> which)
+  {
+    std::vector<double> drawn, ignored;
+    for (int attempt = 0; attempt < DIRECTIONS && !which.empty(); ++attempt) {
+      drawn.resize(PER_ORIENTATION * which.size());
+      draw.orientations(which.size(), drawn.data());
+      ignored.resize(D * which.size());
+      draw.positions(which.size(), ignored.data());  // seeds have always stood for these as well
+      for (std::size_t k = 0; k < which.size(); ++k) {
+        const double *const from = &drawn[PER_ORIENTATION * k];
+        std::copy_n(from, PER_ORIENTATION, &orientation[PER_ORIENTATION * which[k]]);
+        if (Model::template turns<D>(shapes[which[k]]))
+          Model::template turn_to<D>(bodies[which[k]], orientation_from<D>(from));
+      }
+      which.erase(std::remove_if(which.begin(), which.end(),
+                                 [&](std::size_t i) { return !meets_own_images(i); }),
+                  which.end());
+    }
+    return which.empty();
+  }
+
+  bool meets_own_images(std::size_t i) const
+  {
+    return placed.any_shift(2.0 * radius[i], [&](const Vec<D> &apart) {
+      return overlap(i, i, apart);
+    });
+  }
+
+  /// Tries the first of those that wait, each as often as `n_trials` in all allow, anywhere; returns
+  /// how many have found a place.
+  template <class Draw> std::size_t place(Draw &draw, std::size_t competing, std::size_t n_trials)
+  {
+    std::vector<double> at(D * n_trials);
+    draw.positions(n_trials, at.data());
+    std::vector<char> found(competing, 0);
+    for (std::size_t t = 0; t < n_trials; ++t) {
+      const std::size_t rank = t % competing, i = waiting[n_done + rank];
+      if (found[rank]) continue;
+      Vec<D> x;
+      for (int k = 0; k < D; ++k) x[k] = edges[k] * at[D * t + k];
+      if (meets(i, x, 0)) continue;
+      centre[i] = x;
+      found[rank] = 1;
+    }
+    return keep(found);
+  }
+
+  /// Keeps the places found in one batch but those that overlap an earlier one of it.
+  std::size_t keep(std::vector<char> &found)
+  {
+    const std::size_t first_new = placed.size();
+    for (std::size_t rank = 0; rank < found.size(); ++rank) {
+      const std::size_t i = waiting[n_done + rank];
+      found[rank] = found[rank] && !meets(i, centre[i], first_new);
+      if (found[rank]) placed.add(i, centre[i]);
+    }
+    std::size_t to = n_done + found.size();  // the others of the batch move up to those behind it
+    for (std::size_t rank = found.size(); rank-- > 0;) {
+      if (!found[rank]) waiting[--to] = waiting[n_done + rank];
+    }
+    n_done = to;
+    return placed.size() - first_new;
+  }
+
+  /// Whether particle i, at x, overlaps any of those placed, but for the first so many.
+  bool meets(std::size_t i, const Vec<D> &x, std::size_t but) const
+  {
+    return placed.any_near(x, but, [&](std::size_t j, const Vec<D> &apart) {
+      const double bounding = radius[i] + radius[j];
+      return norm_sq(apart) < bounding * bounding && overlap(i, j, apart);
+    });
+  }
+
+  bool overlap(std::size_t i, std::size_t j, const Vec<D> &apart) const
+  {
+    Body first = bodies[i], second = bodies[j];
+    first.centre = apart;
+    second.centre = Vec<D>{};
+    return are_overlapping(first, second);
+  }
+};
+
+}  // namespace jamshape

@@ -1,0 +1,52 @@
+#pragma once
+
+#include "contact/math/vec.hpp"
+
+#include "compat.h"
+#include "particle_view.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace jamshape {
+
+/// The command `create_random SHAPE N PHI SEED type SHARE DX DY DZ [exponent P] ...`: a periodic box
+/// with particles at random places and in random directions that do not overlap. Every rank finds
+/// all places and keeps its own, so that a seed stands for one state on any number of ranks.
+class CreateRandom : public LAMMPS_NS::Command {
+ public:
+  explicit CreateRandom(LAMMPS_NS::LAMMPS *lmp) : Command(lmp), view(lmp) {}
+  void command(int narg, char **arg) override;
+
+  /// A type of particles: diameters, exponent, and how many there are beside the other types.
+  struct Kind {
+    double share;
+    Vec<3> diameters;
+    double exponent = 1.0;
+  };
+  /// Places of all particles by ascending ID, as doubles in a row.
+  struct Start {
+    double edge = 0.0;
+    std::vector<int> type;
+    std::vector<double> position;     // (N, 3)
+    std::vector<double> orientation;  // (N, 4) quaternions w i j k
+  };
+
+ private:
+  ParticleView view;
+  std::string words;
+  int n = 0;
+  double phi = 0.0;
+  std::uint64_t seed = 0;
+  std::vector<Kind> kinds;
+
+  void read(int narg, char **arg);
+  void require(bool holds, const std::string &expected);
+  double number(const char *word, const char *name);
+  template <class Model, int D> Start start();
+  template <class Model, int D> std::vector<typename Model::Shape> shapes_of_kinds();
+  void create(const Start &start);
+};
+
+}  // namespace jamshape
