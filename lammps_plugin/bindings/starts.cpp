@@ -1,5 +1,6 @@
-#include "bindings/shape.hpp"
 #include "contact/shapes.hpp"
+
+#include "bindings/shape.hpp"
 #include "packing/random_insertion.hpp"
 
 #include <algorithm>
@@ -80,14 +81,16 @@ void export_starts()
         [](const ShapeOf<Model> &of, const Array1<double> &edges, const nb::callable &positions,
            const nb::callable &orientations, std::size_t most_attempts) {
           return of.in_space([&](auto D) {
-            require(of.n() > 0 && edges.shape(0) == D, "edges have no shape (D,), or no particles.");
+            require(of.n() > 0 && edges.shape(0) == D,
+                    "edges have no shape (D,), or no particles.");
             require_edges(edges.data(), D);
             return inserted<Model, D>(of, read_vec<D>(edges.data()), {positions, orientations},
                                       most_attempts);
           });
         },
         "edges"_a, "positions"_a, "orientations"_a, "most_attempts"_a,
-        "Random insertion of the particles, the longest first, into a periodic box: `positions(n)`\n"
+        "Random insertion of the particles, the longest first, into a periodic box: "
+        "`positions(n)`\n"
         "draws (n, D) numbers in [0, 1), `orientations(n)` (n, 1) angles or (n, 4) quaternions.\n"
         "Returns a dict: outcome (all, stalled, too short), position, orientation, waiting (those\n"
         "without a place) and attempts.");

@@ -1,5 +1,6 @@
-#include "bindings/shape.hpp"
 #include "contact/shapes.hpp"
+
+#include "bindings/shape.hpp"
 #include "packing/hard_particles.hpp"
 #include "packing/orientation.hpp"
 

@@ -10,8 +10,8 @@
 
 namespace jamshape {
 
-/// Points in a periodic box, sorted into cells, with all their images: the box may be shorter than
-/// the distance that is asked for.
+/// Points with spheres in a periodic box, sorted into cells, with all their images: the box may be
+/// shorter than the distance that is asked for.
 template <int D> class ImageCells {
  public:
   /// For neighbours closer than `distance` among about n points.
@@ -24,25 +24,40 @@ template <int D> class ImageCells {
       around[k] = static_cast<long>(std::ceil(distance * count[k] / edges[k]));
       n_cells *= static_cast<std::size_t>(count[k]);
     }
-    newest.assign(n_cells, NONE);
-    points.reserve(n);
+    parts.resize(n_cells);
   }
 
-  std::size_t size() const { return points.size(); }
+  std::size_t size() const { return n_points; }
 
-  void add(std::size_t label, const Vec<D> &x)
+  void add(std::size_t label, const Vec<D> &x, double radius)
   {
-    std::size_t cell = 0;
-    for (int k = 0; k < D; ++k) cell = cell * count[k] + cell_along(k, x[k]);
-    points.push_back({x, label, newest[cell]});
-    newest[cell] = points.size() - 1;
+    std::size_t at = cell_of(x);
+    while (parts[at].n == PER_PART) {
+      if (parts[at].more == NONE) {
+        parts[at].more = parts.size();
+        parts.push_back({});
+      }
+      at = parts[at].more;
+    }
+    parts[at].points[parts[at].n++] = {x, radius, label, n_points++};
   }
 
-  /// Whether `test(label, x - y)` holds for any image y of a point that may be near x, of the points
-  /// added after the first `but`.
-  template <class Test> bool any_near(const Vec<D> &x, std::size_t but, const Test &test) const
+  /// Whether `test(label, x - y)` holds for any image y of a point whose sphere meets one of this
+  /// radius about x, of the points added after the first `but`. The cell of x comes first: there
+  /// most is found.
+  template <class Test>
+  bool any_near(const Vec<D> &x, double radius, std::size_t but, const Test &test) const
   {
-    return any_in(0, 0, Vec<D>{}, x, but, test);
+    const Sphere about{x, radius, but};
+    return any_of_cell(cell_of(x), Vec<D>{}, about, test) ||
+           any_in(0, 0, Vec<D>{}, false, about, test);
+  }
+
+  /// Begins to fetch what `any_near` will ask for first.
+  void fetch(const Vec<D> &x) const
+  {
+    const char *const from = reinterpret_cast<const char *>(&parts[cell_of(x)]);
+    for (std::size_t byte = 0; byte < sizeof(Part); byte += 64) __builtin_prefetch(from + byte);
   }
 
   /// Whether `test(shift)` holds for any sum of edges shorter than a length, each and its opposite
@@ -54,15 +69,27 @@ template <int D> class ImageCells {
 
  private:
   static constexpr std::size_t NONE = static_cast<std::size_t>(-1);
+  static constexpr std::size_t PER_PART = 4;
   struct Point {
     Vec<D> x;
-    std::size_t label, before;  // the one added to its cell before it
+    double radius;
+    std::size_t label, number;  // in the order in which they were added
+  };
+  struct Sphere {
+    const Vec<D> &x;
+    double radius;
+    std::size_t but;
+  };
+  /// Points of a cell, side by side in memory: to fetch them is what takes long in a large box.
+  struct Part {
+    std::array<Point, PER_PART> points;
+    std::size_t n = 0, more = NONE;
   };
 
   Vec<D> edges;
   std::array<long, D> count, around;
-  std::vector<std::size_t> newest;
-  std::vector<Point> points;
+  std::vector<Part> parts;  // the first of each cell, then those of full cells
+  std::size_t n_points = 0;
 
   std::size_t cell_along(int k, double x) const
   {
@@ -70,34 +97,48 @@ template <int D> class ImageCells {
     return static_cast<std::size_t>(std::clamp(at, 0.0, static_cast<double>(count[k] - 1)));
   }
 
+  std::size_t cell_of(const Vec<D> &x) const
+  {
+    std::size_t cell = 0;
+    for (int k = 0; k < D; ++k) cell = cell * count[k] + cell_along(k, x[k]);
+    return cell;
+  }
+
+  /// In the cells around that of x, but not in that.
   template <class Test>
-  bool any_in(int k, std::size_t cell, Vec<D> image, const Vec<D> &x, std::size_t but,
+  bool any_in(int k, std::size_t cell, Vec<D> image, bool is_other, const Sphere &about,
               const Test &test) const
   {
-    if (k == D) return any_of_cell(cell, image, x, but, test);
-    const long centre = static_cast<long>(cell_along(k, x[k]));
+    if (k == D) return is_other && any_of_cell(cell, image, about, test);
+    const long centre = static_cast<long>(cell_along(k, about.x[k]));
     for (long c = centre - around[k]; c <= centre + around[k]; ++c) {
       const long turns = c >= 0 ? c / count[k] : -((count[k] - 1 - c) / count[k]);
       image[k] = static_cast<double>(turns);
       const auto own = static_cast<std::size_t>(c - turns * count[k]);
-      if (any_in(k + 1, cell * count[k] + own, image, x, but, test)) return true;
+      if (any_in(k + 1, cell * count[k] + own, image, is_other || c != centre, about, test))
+        return true;
     }
     return false;
   }
 
   template <class Test>
-  bool any_of_cell(std::size_t cell, const Vec<D> &image, const Vec<D> &x, std::size_t but,
+  bool any_of_cell(std::size_t cell, const Vec<D> &image, const Sphere &about,
                    const Test &test) const
   {
-    for (std::size_t p = newest[cell]; p != NONE && p >= but; p = points[p].before) {
-      Vec<D> apart;
-      for (int k = 0; k < D; ++k) {
-        // Across the box the difference is large and then loses an edge: not in doubles.
-        apart[k] = image[k] == 0.0 ? x[k] - points[p].x[k]
-                                   : static_cast<double>(static_cast<long double>(x[k]) -
-                                                         points[p].x[k] - image[k] * edges[k]);
+    for (std::size_t at = cell; at != NONE; at = parts[at].more) {
+      for (std::size_t p = 0; p < parts[at].n; ++p) {
+        const Point &point = parts[at].points[p];
+        if (point.number < about.but) continue;
+        Vec<D> apart;
+        for (int k = 0; k < D; ++k) {
+          // Across the box the difference is large and then loses an edge: not in doubles.
+          apart[k] = image[k] == 0.0 ? about.x[k] - point.x[k]
+                                     : static_cast<double>(static_cast<long double>(about.x[k]) -
+                                                           point.x[k] - image[k] * edges[k]);
+        }
+        const double reach = about.radius + point.radius;
+        if (norm_sq(apart) < reach * reach && test(point.label, apart)) return true;
       }
-      if (test(points[p].label, apart)) return true;
     }
     return false;
   }

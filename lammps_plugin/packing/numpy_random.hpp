@@ -10,8 +10,9 @@
 
 namespace jamshape {
 
-/// Random numbers as `numpy.random.default_rng(seed)` draws them, so that a seed stands for the same
-/// start in a deck and in Python: PCG64 (O'Neill, HMC-CS-2014-0905), seeded by NumPy's SeedSequence.
+/// Random numbers as `numpy.random.default_rng(seed)` draws them, so that a seed stands for the
+/// same start in a deck and in Python: PCG64 (O'Neill, HMC-CS-2014-0905), seeded by NumPy's
+/// SeedSequence.
 class NumpyRandom {
  public:
   explicit NumpyRandom(std::uint64_t seed)
@@ -31,7 +32,8 @@ class NumpyRandom {
   {
     std::vector<std::size_t> order(n);
     std::iota(order.begin(), order.end(), std::size_t{0});
-    for (std::size_t i = n; i-- > 1;) std::swap(order[i], order[up_to(static_cast<std::uint32_t>(i))]);
+    for (std::size_t i = n; i-- > 1;)
+      std::swap(order[i], order[up_to(static_cast<std::uint32_t>(i))]);
     return order;
   }
 
@@ -52,7 +54,8 @@ class NumpyRandom {
   std::uint64_t next()
   {
     advance();
-    const auto folded = static_cast<std::uint64_t>(state >> 64U) ^ static_cast<std::uint64_t>(state);
+    const auto folded =
+        static_cast<std::uint64_t>(state >> 64U) ^ static_cast<std::uint64_t>(state);
     const auto turn = static_cast<unsigned>(state >> 122U);
     return (folded >> turn) | (folded << ((64U - turn) % 64U));
   }
@@ -120,8 +123,8 @@ inline double numpy_sum(const double *values, std::size_t n)
   }
   std::array<double, 8> part{};
   for (std::size_t k = 0; k < n - n % 8; ++k) part[k % 8] += values[k];
-  double sum = ((part[0] + part[1]) + (part[2] + part[3])) +
-               ((part[4] + part[5]) + (part[6] + part[7]));
+  double sum =
+      ((part[0] + part[1]) + (part[2] + part[3])) + ((part[4] + part[5]) + (part[6] + part[7]));
   for (std::size_t k = n - n % 8; k < n; ++k) sum += values[k];
   return sum;
 }

@@ -28,8 +28,8 @@ enum class Inserted {
 /// those around them.
 ///
 /// `Model` as for pair styles, with `are_overlapping` for its bodies. `Draw` gives random numbers:
-/// `positions(n, out)`, n D numbers uniform in [0, 1), and `orientations(n, out)`, n angles in 2D or
-/// n quaternions in 3D. The order in which they are drawn is part of what a seed stands for.
+/// `positions(n, out)`, n D numbers uniform in [0, 1), and `orientations(n, out)`, n angles in 2D
+/// or n quaternions in 3D. The order in which they are drawn is part of what a seed stands for.
 template <class Model, int D> class RandomInsertion {
  public:
   using Shape = typename Model::Shape;
@@ -58,8 +58,7 @@ template <class Model, int D> class RandomInsertion {
     const std::size_t competing = std::max<std::size_t>(1, n / COMPETING);
     std::size_t n_trials = std::min(competing, most_trials);
     while (n_done < n) {
-      if (attempts >= most_attempts)
-        return n_done == 0 ? Inserted::TOO_SHORT : Inserted::STALLED;
+      if (attempts >= most_attempts) return n_done == 0 ? Inserted::TOO_SHORT : Inserted::STALLED;
       attempts += n_trials;
       const std::size_t n_placed = place(draw, std::min(competing, n - n_done), n_trials);
       // No room for them as they are.
@@ -73,7 +72,10 @@ template <class Model, int D> class RandomInsertion {
 
   std::size_t n_attempts() const { return attempts; }
   /// Particles without a place, ascending.
-  std::vector<std::size_t> without_place() const { return {waiting.begin() + n_done, waiting.end()}; }
+  std::vector<std::size_t> without_place() const
+  {
+    return {waiting.begin() + n_done, waiting.end()};
+  }
   const Vec<D> &position(std::size_t i) const { return centre[i]; }
   const double *orientation_of(std::size_t i) const { return &orientation[PER_ORIENTATION * i]; }
 
@@ -85,6 +87,8 @@ template <class Model, int D> class RandomInsertion {
   static constexpr double MOST_PAIRS = 524288.0;
   /// One particle in so many competes for places in one batch: few, so that the longest stay ahead.
   static constexpr std::size_t COMPETING = 16;
+  /// Trials for which memory is fetched ahead.
+  static constexpr std::size_t AHEAD = 8;
   /// Directions in which a particle is tried in a box shorter than it.
   static constexpr int DIRECTIONS = 4096;
 
@@ -96,7 +100,7 @@ template <class Model, int D> class RandomInsertion {
   std::vector<Vec<D>> centre;
   std::vector<double> orientation;
   std::vector<std::size_t> waiting;  // from n_done on, ascending
-  std::vector<Body> bodies;  // turned; their centres are set where they are compared
+  std::vector<Body> bodies;          // turned; their centres are set where they are compared
   std::vector<double> radius;
 
   /// Draws orientations of these particles that keep them off their own images; false if there are
@@ -124,23 +128,27 @@ template <class Model, int D> class RandomInsertion {
 
   bool meets_own_images(std::size_t i) const
   {
-    return placed.any_shift(2.0 * radius[i], [&](const Vec<D> &apart) {
-      return overlap(i, i, apart);
-    });
+    return placed.any_shift(2.0 * radius[i],
+                            [&](const Vec<D> &apart) { return overlap(i, i, apart); });
   }
 
-  /// Tries the first of those that wait, each as often as `n_trials` in all allow, anywhere; returns
-  /// how many have found a place.
+  /// Tries the first of those that wait, each as often as `n_trials` in all allow, anywhere;
+  /// returns how many have found a place.
   template <class Draw> std::size_t place(Draw &draw, std::size_t competing, std::size_t n_trials)
   {
     std::vector<double> at(D * n_trials);
     draw.positions(n_trials, at.data());
     std::vector<char> found(competing, 0);
-    for (std::size_t t = 0; t < n_trials; ++t) {
-      const std::size_t rank = t % competing, i = waiting[n_done + rank];
-      if (found[rank]) continue;
+    const auto trial = [&](std::size_t t) {
       Vec<D> x;
       for (int k = 0; k < D; ++k) x[k] = edges[k] * at[D * t + k];
+      return x;
+    };
+    for (std::size_t t = 0; t < n_trials; ++t) {
+      placed.fetch(trial(std::min(t + AHEAD, n_trials - 1)));
+      const std::size_t rank = t % competing, i = waiting[n_done + rank];
+      if (found[rank]) continue;
+      const Vec<D> x = trial(t);
       if (meets(i, x, 0)) continue;
       centre[i] = x;
       found[rank] = 1;
@@ -155,7 +163,7 @@ template <class Model, int D> class RandomInsertion {
     for (std::size_t rank = 0; rank < found.size(); ++rank) {
       const std::size_t i = waiting[n_done + rank];
       found[rank] = found[rank] && !meets(i, centre[i], first_new);
-      if (found[rank]) placed.add(i, centre[i]);
+      if (found[rank]) placed.add(i, centre[i], radius[i]);
     }
     std::size_t to = n_done + found.size();  // the others of the batch move up to those behind it
     for (std::size_t rank = found.size(); rank-- > 0;) {
@@ -168,9 +176,8 @@ template <class Model, int D> class RandomInsertion {
   /// Whether particle i, at x, overlaps any of those placed, but for the first so many.
   bool meets(std::size_t i, const Vec<D> &x, std::size_t but) const
   {
-    return placed.any_near(x, but, [&](std::size_t j, const Vec<D> &apart) {
-      const double bounding = radius[i] + radius[j];
-      return norm_sq(apart) < bounding * bounding && overlap(i, j, apart);
+    return placed.any_near(x, radius[i], but, [&](std::size_t j, const Vec<D> &apart) {
+      return overlap(i, j, apart);
     });
   }
 

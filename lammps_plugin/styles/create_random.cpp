@@ -169,7 +169,8 @@ template <class Model, int D> CreateRandom::Start CreateRandom::start()
   std::vector<std::size_t> longest(kinds.size());
   std::iota(longest.begin(), longest.end(), std::size_t{0});
   std::stable_sort(longest.begin(), longest.end(), [&](std::size_t a, std::size_t b) {
-    return Model::template outer_radius<D>(of_kind[a]) > Model::template outer_radius<D>(of_kind[b]);
+    return Model::template outer_radius<D>(of_kind[a]) >
+           Model::template outer_radius<D>(of_kind[b]);
   });
   std::vector<typename Model::Shape> shapes;
   std::vector<double> measures;
@@ -228,8 +229,8 @@ void CreateRandom::create(const Start &start)
     return Quaternion{q[0], q[1], q[2], q[3]};
   });
   if (comm->me == 0)
-    LAMMPS_NS::utils::logmesg(lmp, "Created " + std::to_string(n) + " particles at random, phi = " +
-                            shown(phi) + "\n");
+    LAMMPS_NS::utils::logmesg(lmp, "Created " + std::to_string(n) +
+                                       " particles at random, phi = " + shown(phi) + "\n");
 }
 
 }  // namespace jamshape

@@ -11,9 +11,9 @@
 
 namespace jamshape {
 
-/// The command `create_random SHAPE N PHI SEED type SHARE DX DY DZ [exponent P] ...`: a periodic box
-/// with particles at random places and in random directions that do not overlap. Every rank finds
-/// all places and keeps its own, so that a seed stands for one state on any number of ranks.
+/// The command `create_random SHAPE N PHI SEED type SHARE DX DY DZ [exponent P] ...`: a periodic
+/// box with particles at random places and in random directions that do not overlap. Every rank
+/// finds all places and keeps its own, so that a seed stands for one state on any number of ranks.
 class CreateRandom : public LAMMPS_NS::Command {
  public:
   explicit CreateRandom(LAMMPS_NS::LAMMPS *lmp) : Command(lmp), view(lmp) {}

@@ -166,8 +166,9 @@ std::string what_differs(void *handle)
   return "";
 }
 
-/// Names the file of this plugin to decks: the variable `jamshape_plugin`, which there is only where
-/// the styles are. Not by a command, in which LAMMPS would read quotes and dollars of the path.
+/// Names the file of this plugin to decks: the variable `jamshape_plugin`, which there is only
+/// where the styles are. Not by a command, in which LAMMPS would read quotes and dollars of the
+/// path.
 void tell_plugin_file(LAMMPS *lmp)
 {
   Dl_info found;
