@@ -22,5 +22,6 @@ from .shapes.named import Spherocylinders as Spherocylinders
 from .shapes.named import Superellipsoids as Superellipsoids
 from .shapes.particles import Kind as Kind
 from .shapes.particles import Particles as Particles
+from .shapes.shape import Interaction as Interaction
 
 __version__: str

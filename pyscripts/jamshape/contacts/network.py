@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.contacts.near import NearPairs, PairArrays, near_particles
 from jamshape.packing import Packing, State
-from jamshape.shapes.shape import Interaction
 
 _CROSSING, _UNCONVERGED = 2, 3  # ContactStatus of contact/contact.hpp
 
@@ -129,17 +128,19 @@ class Forces:
     pressure: float
 
 
-def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> ContactNetwork:
+def find_contacts(
+    packing: Packing, k_e: float | None = None, sides: int | None = None
+) -> ContactNetwork:
     """Find all contacts, with all periodic images in reach.
 
     Parameters
     ----------
     packing : Packing
         Positions need not lie in the box.
-    k_e : float, [energy]
-    sides : {1, 2}
-        Bonds of a side-to-side contact, of shapes that have both laws: one in the dynamics, two for
-        minima and modes.
+    k_e : float, [energy], optional
+    sides : {1, 2}, optional
+        Bonds of a side-to-side contact, of shapes that have both laws: one in the dynamics of Marschall
+        & Teitel, two for minima and modes. Both are those of the packing's law when left out.
 
     Returns
     -------
@@ -159,7 +160,7 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
     >>> len(find_contacts(random_packing(n=10, phi=0.3, seed=1)).pairs)
     0
     """
-    bodies, state = packing.compiled(Interaction(k_e, sides)), State.of(packing)
+    bodies, state = packing.compiled(packing.law.but(k_e, sides)), State.of(packing)
     near = near_particles(packing, bodies)
     found = bodies.contacts(*PairArrays.of(state, near), packing.has_rests)
     near = near.take(found["pair"])
@@ -180,7 +181,7 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
     )
 
 
-def forces(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Forces:
+def forces(packing: Packing, k_e: float | None = None, sides: int | None = None) -> Forces:
     """Sum energy, forces, torques and pressure; arguments and errors as `find_contacts`."""
     return sum_forces(packing, find_contacts(packing, k_e, sides))
 

@@ -55,7 +55,7 @@ def read_picture(path: Path, frame: int = -1, sides: int | None = None, color: s
     frame : int
         From 0; negative ones count from the end.
     sides : int, optional
-        Bonds of a side-to-side contact; None for what the file says, or else 2.
+        Bonds of a side-to-side contact; None for those of the packing's law.
     color : str
         What it will be coloured by; kinds of order are told with the numbers.
 
@@ -65,10 +65,10 @@ def read_picture(path: Path, frame: int = -1, sides: int | None = None, color: s
         As `read_any`.
     """
     packing = read_any(path, frame)
-    known: dict[str, Any] = {"sides": 2, "k_e": 1.0}
+    known: dict[str, Any] = {}
     with contextlib.suppress(FileFormatError):  # dumps and data files have no attributes
         known |= read_attributes(path)
-    found = Contacts.of(packing, known["k_e"], sides or known["sides"])
+    found = Contacts.of(packing, sides=sides)
     counts = found.counts
     told = {"packing": path, "shape": packing.shape_style, "dimension": packing.dimension}
     told |= {"n": packing.n, "rattlers": counts.n_rattlers, "contacts": len(found)}

@@ -21,6 +21,7 @@ from jamshape.files.rows import Columns, Stored, as_column, gathered, table
 from jamshape.files.signature import HDF5, format_of
 from jamshape.files.vocabulary import FORMAT_VERSION, RENAMED, former
 from jamshape.packing import Box, Packing
+from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
     import h5py
@@ -273,6 +274,7 @@ def create_file(
 def create_particles(group: h5py.Group, packing: Packing) -> None:
     """Create the elements of particles, still without frames."""
     group.attrs["shape_style"] = packing.shape_style
+    group.attrs.update(packing.law._asdict())
     for name in ("species", "id", "diameters"):
         group[name] = getattr(packing, name)
     if packing.shape.has_exponent:
@@ -435,6 +437,17 @@ def set_attributes(group: h5py.Group, attributes: Mapping[str, Any]) -> None:
     group.attrs.update(attributes)
 
 
+def _read_law(file: h5py.File) -> Interaction:
+    """Read the law of the particles; files of 0.1.0 have it among the attributes of runs only."""
+    known = dict(file["parameters"].attrs) if "parameters" in file else {}
+    known |= dict(require_item(file, "particles/all").attrs)
+    try:
+        return Interaction.told(known)
+    except (TypeError, ValueError) as error:
+        msg = f"{file.filename}: k_e and sides are no numbers ({error}), expected those of the contacts"
+        raise FileFormatError(msg) from error
+
+
 def read_frame(file: h5py.File, frame: int) -> Packing:
     """Read a frame as a packing."""
 
@@ -453,6 +466,7 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
         if f"particles/all/{element}" in file:
             fields[name] = row(f"{element}/value")
     fields["shape_style"] = require_item(file, "particles/all").attrs.get("shape_style")
+    fields["law"] = _read_law(file)
     fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
     lo, edges = row("box/lo/value"), row(f"{EDGES}/value")
     try:

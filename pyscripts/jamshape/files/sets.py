@@ -111,9 +111,9 @@ class PackingFile:
         return system_of(self.attributes, *self.style)
 
     def contacts(self) -> Contacts:
-        """Read the packing and find its contacts, with two bonds side to side, and its rattlers."""
+        """Read the packing and find its contacts, by its own law, and its rattlers."""
         packing = self.packing()
-        network = find_contacts(packing, sides=2)
+        network = find_contacts(packing)
         observables = read_observables(self.path)
         if "rattler_ids" not in observables:
             return Contacts(packing, network, find_rattlers(packing, network))

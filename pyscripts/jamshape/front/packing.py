@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class MeasuredPacking(Packing):
     """A `Packing` with what is known of it and what can be asked of it.
 
-    Its contacts have the law with two bonds side to side and k_e = 1, unless its file says otherwise.
+    Its contacts have the law that it carries, ``packing.law``, as its copies and files do.
 
     Parameters
     ----------
@@ -69,8 +69,7 @@ class MeasuredPacking(Packing):
 
     @cached_property
     def _contacts(self) -> Contacts:
-        k_e, sides = self.results.get("k_e", 1.0), self.results.get("sides", 2)
-        return Contacts.of(self, float(k_e), int(sides))
+        return Contacts.of(self)
 
     def contacts(self) -> Contacts:
         """Find its contacts.

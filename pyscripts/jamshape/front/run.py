@@ -169,8 +169,7 @@ class RunFile(Recorded):
             tried.append(one)
             return Told("minimising frames", str(one))
 
-        k_e = float(self.about.get("k_e", 1.0))
-        frames = minimised_frames(len(self), lambda frame: read_packing(self.file, frame), k_e)
+        frames = minimised_frames(len(self), lambda frame: read_packing(self.file, frame))
         follow(frames, told, shown=progress)
         found = Jamming.of(tried)
         if self.about.get("finished"):

@@ -28,6 +28,7 @@ from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.quasistatic import compressed_to
 from jamshape.protocols.random_start import start_below
 from jamshape.shapes.particles import Particles
+from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
     from jamshape.front.packing import MeasuredPacking
@@ -137,7 +138,7 @@ def shear(
     if tolerance is not None:
         require_stated(tolerance=tolerance)
     at = place(file, "shear.h5")
-    of = _Start.of(particles, _Numbers(n, phi, seed, dimension), start)
+    of = _Start.of(particles, _Numbers(n, phi, seed, dimension), start, sides)
     integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
     if integrator in METHODS:
         longest = min(SlowShear.largest_strain, strain / rows)
@@ -148,7 +149,7 @@ def shear(
         return ShearFile(*at)
     settings = Shear(
         gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
-        sides=sides, integrator=integrator, tolerance=tolerance or _ERROR,
+        sides=sides, k_e=of.k_e, integrator=integrator, tolerance=tolerance or _ERROR,
     )  # fmt: skip
     if settings.chooses_steps:
         settings = settings.in_steps(rows)
@@ -262,10 +263,11 @@ class _Start(NamedTuple):
 
     @classmethod
     def of(
-        cls, particles: Particles | None, numbers: _Numbers, start: Packing | str | Path | None
-    ) -> _Start:
+        cls, particles: Particles | None, numbers: _Numbers, start: Packing | str | Path | None,
+        sides: int = 2,
+    ) -> _Start:  # fmt: skip
         if start is not None:
-            return cls(start_of(start), None, numbers)
+            return cls(start_of(start, sides), None, numbers)
         if particles is None:
             msg = "there are neither particles nor a start, expected one of them"
             raise ValueError(msg)
@@ -274,6 +276,11 @@ class _Start(NamedTuple):
     @property
     def dimension(self) -> int:
         return self.known.dimension if self.known else self.numbers.dimension
+
+    @property
+    def k_e(self) -> float:
+        """Stiffness of the contacts, [energy]."""
+        return self.known.law.k_e if self.known else Interaction().k_e
 
     @property
     def made_from(self) -> dict[str, Any]:

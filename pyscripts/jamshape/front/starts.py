@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,24 @@ from jamshape.front.packing import MeasuredPacking
 from jamshape.packing import Packing
 
 
-def start_of(start: Packing | str | Path) -> MeasuredPacking:
-    """Take the packing to begin with, of a path its last frame."""
+def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
+    """Take the packing to begin with, of a path its last frame, under the law that the run has.
+
+    Warns where the bonds of side-to-side contacts are not those that the start has.
+    """
     if isinstance(start, str | Path):
-        return MeasuredPacking.read(Path(start))
-    return start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
+        start = MeasuredPacking.read(Path(start))
+    known = start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
+    if known.law.sides == sides:
+        return known
+    if known.compiled().has_sides and not known.is_round.all():
+        said = (
+            f"the start has sides={known.law.sides}, bonds of a side-to-side contact, and the run has"
+            f" sides={sides}: energy and forces of the start change"
+        )
+        warnings.warn(said, stacklevel=4)
+    of_run = known.with_(law=known.law.but(sides=sides), results=known.results, file=known.file)
+    return of_run
 
 
 def told_of(start: MeasuredPacking) -> dict[str, Any]:

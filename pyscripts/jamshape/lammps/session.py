@@ -81,6 +81,7 @@ class Session:
     ) -> None:
         lammps_class()  # says what is missing before anything is started
         self._like: Packing | None = None
+        self._law: Interaction | None = None
         plugin = plugin_path()
         options = ["-nocite", "-log", str(log) if log else "none"]
         self._complaints: subprocess.Popen[bytes] | None = None
@@ -195,7 +196,8 @@ class Session:
             store(path, file.read(), wait=False)
 
     def interact(self, law: Interaction) -> None:
-        """Set the pair style of the particles that were loaded."""
+        """Set the pair style of the particles that were loaded; packings carry this law from then on."""
+        self._law = law
         self.commands(self._loaded.shape.style(self._loaded, law).commands)
 
     @property
@@ -242,7 +244,7 @@ class Session:
             return known | {"id": np.arange(1, len(types) + 1)}
         like = self._like.sorted_by_id()
         names = ("shape_style", "exponent", "species", "id")
-        return {name: getattr(like, name) for name in names}
+        return {name: getattr(like, name) for name in names} | {"law": self._law or like.law}
 
     def neighbours(self) -> str:
         """Input that sets the neighbour list up in the unit of length of the particles."""

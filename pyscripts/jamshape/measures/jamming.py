@@ -134,13 +134,15 @@ class Jamming(NamedTuple):
         return f"{onset} is the onset of flow and not of jamming: {told}"
 
 
-def stays_jammed(packing: Packing, k_e: float = 1.0) -> bool | None:
+def stays_jammed(packing: Packing, k_e: float | None = None) -> bool | None:
     """Tell whether a state keeps energy in balanced contacts when it is minimised at fixed box.
 
     Parameters
     ----------
     packing : Packing
-    k_e : float, [energy]
+        Minimised with two bonds side to side, whatever its law: with one there are no minima.
+    k_e : float, [energy], optional
+        That of the packing's law when left out.
 
     Returns
     -------
@@ -155,8 +157,8 @@ def stays_jammed(packing: Packing, k_e: float = 1.0) -> bool | None:
     >>> stays_jammed(packing)
     True
     """
-    landscape, state = Landscape(packing, k_e), State.of(packing)
-    lowest = _LOWEST * k_e / landscape.length**packing.dimension
+    landscape, state = Landscape(packing, k_e, sides=2), State.of(packing)
+    lowest = _LOWEST * landscape.k_e / landscape.length**packing.dimension
     stop = Stop(tolerance=_TOLERANCE, lowest=lowest, evaluations=_EVALUATIONS)
     try:
         found = minimise(landscape, state, "auto", stop)
@@ -168,7 +170,7 @@ def stays_jammed(packing: Packing, k_e: float = 1.0) -> bool | None:
 
 
 def minimised_frames(
-    count: int, read: Callable[[int], Packing], k_e: float = 1.0
+    count: int, read: Callable[[int], Packing], k_e: float | None = None
 ) -> Iterator[Tried]:
     """Minimise frames of a compression from the densest on, until one unjams.
 
@@ -181,7 +183,8 @@ def minimised_frames(
         How many frames there are.
     read : callable
         Reads one by its number, from 0.
-    k_e : float, [energy]
+    k_e : float, [energy], optional
+        That of the law of each frame when left out.
 
     Yields
     ------

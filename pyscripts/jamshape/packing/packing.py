@@ -49,6 +49,9 @@ class Packing:
         A name of `jamshape.shapes.table.SHAPES`.
     exponent : (N,) array of float64, optional
         p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones when left out.
+    law : Interaction
+        Constants of the contacts, which energy and forces depend on; k_e = 1 and two bonds side to side
+        when left out.
     step : int
     time : float, [time]
     position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional
@@ -59,7 +62,8 @@ class Packing:
     ------
     ValueError
         If shapes disagree, a number is not finite, a diameter is not positive, an exponent is not
-        above 1/2, an ID is there twice, or the diameters are not those of the shape style.
+        above 1/2, an ID is there twice, the diameters are not those of the shape style, or the law
+        is none.
 
     Examples
     --------
@@ -81,6 +85,7 @@ class Packing:
     image: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
     shape_style: str = DEFAULT
     exponent: FloatArray = field(default_factory=lambda: np.empty(0))
+    law: Interaction = Interaction()
     step: int = 0
     time: float = 0.0
     position_rest: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
@@ -112,6 +117,7 @@ class Packing:
             object.__setattr__(self, name, as_integers(name, getattr(self, name), shape))
         _check_labels(self)
         _check_shapes(self)
+        object.__setattr__(self, "law", _checked_law(self.law))
 
     @property
     def n(self) -> int:
@@ -129,14 +135,14 @@ class Packing:
         return shape_named(self.shape_style)
 
     def compiled(self, law: Interaction | None = None) -> Any:
-        """Make the compiled object that knows these particles' contacts; see `Shape.compiled`."""
+        """Make the compiled object that knows these particles' contacts; of their own law if none is given."""
         sizes = (self.diameters, self.exponent)
-        return self.shape.compiled(sizes, self.dimension, law or Interaction())
+        return self.shape.compiled(sizes, self.dimension, law or self.law)
 
     @cached_property
     def _bodies(self) -> Any:
         """The particles, whatever their interaction."""
-        return self.compiled()
+        return self.compiled(Interaction())
 
     @property
     def half_length(self) -> FloatArray:
@@ -299,6 +305,19 @@ def _check_labels(packing: Packing) -> None:
     if not np.isfinite(packing.time):
         msg = f"time is {packing.time}, expected a finite number"
         raise ValueError(msg)
+
+
+def _checked_law(law: Interaction) -> Interaction:
+    """Take the constants of the contacts, or raise a ValueError."""
+    try:
+        k_e, sides = float(law[0]), int(law[1])
+        is_law = 0 < k_e < np.inf and sides in {1, 2} and sides == law[1] and len(law) == len(Interaction._fields)
+    except (TypeError, ValueError, LookupError):
+        is_law = False
+    if not is_law:
+        msg = f"law is {law!r}, expected Interaction(k_e, sides) with a positive k_e and sides 1 or 2"
+        raise ValueError(msg)
+    return Interaction(k_e, sides)
 
 
 def _check_shapes(packing: Packing) -> None:

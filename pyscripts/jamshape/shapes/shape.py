@@ -61,12 +61,44 @@ class Style(NamedTuple):
 
 
 class Interaction(NamedTuple):
-    """The constants of the contacts."""
+    """The constants of the contacts: what energy and forces of a packing depend on beside its particles.
+
+    Parameters
+    ----------
+    k_e : float, [energy]
+        Stiffness of a contact.
+    sides : {1, 2}
+        Bonds of a side-to-side contact, of shapes that have both laws.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> discs = js.Packing(
+    ...     position=[[2, 5], [2.9, 5]], orientation=[0, 0], diameters=[[1, 1, 1]] * 2,
+    ...     species=[1, 1], id=[1, 2], box=js.Box(lo=[0, 0], edges=[10, 10]),
+    ... )
+    >>> stiff = discs.with_(law=js.Interaction(k_e=2.0))
+    >>> round(float(js.MeasuredPacking.of(stiff).u / js.MeasuredPacking.of(discs).u), 12)
+    2.0
+    """
 
     k_e: float = 1.0
     """[energy]"""
     sides: int = 2
     """Bonds of a side-to-side contact, 1 or 2, of shapes that have both laws."""
+
+    @classmethod
+    def told(cls, known: Mapping[str, Any]) -> Interaction:
+        """Take the constants that a mapping holds under their names; the usual ones where it holds none."""
+        usual = cls()
+        k_e, sides = (known.get(name, getattr(usual, name)) for name in cls._fields)
+        return cls(float(k_e), int(sides))
+
+    def but(self, k_e: float | None = None, sides: int | None = None) -> Interaction:
+        """Replace constants; those that are None stay."""
+        return Interaction(
+            self.k_e if k_e is None else k_e, self.sides if sides is None else sides
+        )
 
 
 class Shape(ABC):
