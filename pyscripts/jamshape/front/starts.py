@@ -26,8 +26,8 @@ def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
             f" sides={sides}: energy and forces of the start change"
         )
         warnings.warn(said, stacklevel=4)
-    of_run = known.with_(law=known.law.but(sides=sides), results=known.results, file=known.file)
-    return of_run
+    law = known.law.but(sides=sides)
+    return known.with_(law=law, results=known.results, file=known.file)
 
 
 def told_of(start: MeasuredPacking) -> dict[str, Any]:
