@@ -12,6 +12,7 @@ import numpy as np
 from jamshape.drawing.kinds import kinds_of
 from jamshape.exchange.gsd import read_gsd
 from jamshape.files.h5md import (
+    FileFormatError,
     count_frames,
     read_attributes,
     read_creator,
@@ -21,8 +22,9 @@ from jamshape.files.h5md import (
     read_report,
 )
 from jamshape.files.lammps_text import iter_dump, read_data
+from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.files.sets import REACHED
-from jamshape.files.signature import DATA, DUMP, GSD, HDF5, RESTART, SIGNATURES, format_of
+from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
 from jamshape.front.packing import MeasuredPacking
 from jamshape.packing import Packing
 from jamshape.vibration.sets import TOLD, of_packing
@@ -63,12 +65,14 @@ _STORED = (
 _ENDS = (".search.h5", ".path.h5", ".run.h5")
 
 
-def contents_of(path: Path) -> dict[str, Any]:
+def contents_of(path: Path, wanted: Wanted = NOTHING) -> dict[str, Any]:
     """Tell what is in a file.
 
     Parameters
     ----------
     path : Path
+    wanted : Wanted
+        Dimension and shape of a data or dump file that does not say them.
 
     Returns
     -------
@@ -85,8 +89,16 @@ def contents_of(path: Path) -> dict[str, Any]:
     OSError
         If it cannot be read.
     """
-    if tell := _READERS.get(format_of(path)):
-        return {"file": path, **tell(path)}
+    found = format_of(path)
+    if found in _TEXTS:
+        return {"file": path, **_TEXTS[found](path, wanted)}
+    if found in _READERS:
+        told = {"file": path, **_READERS[found](path)}
+        _require_told(told, wanted)
+        return told
+    if found in REFUSED:
+        msg = f"{path} {REFUSED[found]}"
+        raise FileFormatError(msg)
     msg = (
         f"{path} is no file that jamshape knows, expected a packing, a run or modes in HDF5, a data, dump"
         " or restart file of LAMMPS, or a GSD file"
@@ -186,14 +198,22 @@ def _modes(table: ModeTable) -> dict[str, Any]:
     return found | {"bands": {name: len(table.in_band(name)) for name in TOLD}, "finished": True}
 
 
-def _dump(path: Path) -> dict[str, Any]:
-    for frames, packing in enumerate(iter_dump(path), 1):
+def _require_told(told: Mapping[str, Any], wanted: Wanted) -> None:
+    """Refuse a dimension or shape that is not that of a file that says it."""
+    for name, asked in wanted._asdict().items():
+        if asked and told.get(name, asked) != asked:
+            msg = f"{told['file']} says {name} {told[name]}, expected --{name} to be the same; leave it out"
+            raise ValueError(msg)
+
+
+def _dump(path: Path, wanted: Wanted) -> dict[str, Any]:
+    for frames, packing in enumerate(iter_dump(path, *wanted), 1):
         last, count = packing, frames
     return _text("LAMMPS dump", last) | {"frames": count}
 
 
-def _data(path: Path) -> dict[str, Any]:
-    return _text("LAMMPS data file", read_data(path)) | {"frames": 1}
+def _data(path: Path, wanted: Wanted) -> dict[str, Any]:
+    return _text("LAMMPS data file", read_data(path, *wanted)) | {"frames": 1}
 
 
 def _gsd(path: Path) -> dict[str, Any]:
@@ -232,8 +252,7 @@ def _picked(known: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
 
 _READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
     HDF5: _hdf5,
-    DUMP: _dump,
     RESTART: _restart,
     GSD: _gsd,
-    DATA: _data,
 }
+_TEXTS: dict[str, Callable[[Path, Wanted], dict[str, Any]]] = {DUMP: _dump, DATA: _data}

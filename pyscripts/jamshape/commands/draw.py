@@ -23,6 +23,8 @@ from jamshape.command import parser_of, report
 from jamshape.drawing.colors import CHOICES
 from jamshape.drawing.packing import Look
 from jamshape.drawing.pictures import draw_pictures, read_picture, save_pictures
+from jamshape.files.meaning import Wanted
+from jamshape.shapes.command_line import add_meaning_options
 
 _ANGLE = Range(-360.0, 360.0, "degrees")
 
@@ -43,6 +45,7 @@ def options_of() -> ArgumentParser:
     finer = "of meshes in space, 1 to 4; each makes four triangles of one (3, or 2 for many)"
     parser.add_argument("--level", type=int, choices=range(1, 5), help=finer)
     parser.add_argument("--dpi", type=int, default=200, help="dots per inch (%(default)s)")
+    add_meaning_options(parser)
     return parser
 
 
@@ -54,7 +57,8 @@ def main(options: Namespace) -> None:
         require_in(f"--{name}", getattr(options, name), _ANGLE)
     sides = None if options.sides == "auto" else int(options.sides)
     how = options.frame, sides, options.color
-    pictures = [read_picture(path, *how) for path in options.files]
+    wanted = Wanted(options.dimension, options.shape)
+    pictures = [read_picture(path, *how, wanted) for path in options.files]
     look = Look(options.color, options.height, options.turn, options.level or 0)
     figure, colored = draw_pictures(pictures, look)
     save_pictures(figure, pictures, options.out, options.dpi)

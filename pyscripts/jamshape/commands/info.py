@@ -15,6 +15,8 @@ from typing import Any
 
 from jamshape.command import parser_of, report
 from jamshape.commands.contents import contents_of
+from jamshape.files.meaning import Wanted
+from jamshape.shapes.command_line import add_meaning_options
 
 # Lines of what is known; each part is said where its number is there.
 _LINES = {
@@ -59,12 +61,13 @@ def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_of(__doc__)
     parser.add_argument("file", type=Path, metavar="FILE", help="any file of jamshape or LAMMPS")
+    add_meaning_options(parser)
     return parser
 
 
 def main(options: Namespace) -> None:
     """Read, tell, report."""
-    found = contents_of(options.file)
+    found = contents_of(options.file, Wanted(options.dimension, options.shape))
     print(f"{options.file}: {_title(found)}")
     for line in lines_of(found):
         print(f"  {line}")

@@ -28,9 +28,7 @@ class Contacts:
     rattlers: BoolArray
 
     @classmethod
-    def of(
-        cls, packing: Packing, k_e: float | None = None, sides: int | None = None
-    ) -> Contacts:
+    def of(cls, packing: Packing, k_e: float | None = None, sides: int | None = None) -> Contacts:
         """Find them; arguments and errors as `find_contacts`."""
         network = find_contacts(packing, k_e, sides)
         return cls(packing, network, find_rattlers(packing, network))

@@ -100,7 +100,9 @@ def _moved(packing: Packing, ours: Any, frame: Any, box: Box) -> dict[str, Any]:
     turns = np.rint(box.fractions(found - before))
     left = found - before - box.vectors(turns)
     scale = float(box.edges.max()) / 2
-    is_moved = (np.abs(left) > _ROUNDING * scale).any(axis=1) | (box is not packing.box)
+    is_moved: BoolArray = np.array(box is not packing.box) | (np.abs(left) > _ROUNDING * scale).any(
+        axis=1
+    )
     changes: dict[str, Any] = {}
     if is_moved.any():
         changes["position"] = np.where(is_moved[:, None], found + box.center, packing.position)

@@ -46,9 +46,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jamshape.checks import require_other_file
 from jamshape.files import layout
 from jamshape.files.disk import PathLike, replacing
 from jamshape.files.frames import Form
+from jamshape.files.journal import read_journal
 from jamshape.files.layout import (
     FileFormatError,
     Report,
@@ -64,6 +66,7 @@ __all__ = [
     "PathLike",
     "Report",
     "Series",
+    "copy_run",
     "count_frames",
     "read_attributes",
     "read_creator",
@@ -162,6 +165,25 @@ def write_run(
             form = Form.found(file).joined(Form.of(frame))
             layout.append_table(file, layout.FRAMES, layout.frames_table(frame, form))
             last = frame.step
+
+
+def copy_run(path: PathLike, out: PathLike) -> None:
+    """Write a copy of a run, with the rows that are in its journal still, to another file.
+
+    Raises
+    ------
+    FileFormatError
+        As `read_packing`.
+    ValueError
+        If both are the same file.
+    OSError
+        If one cannot be read or the other written.
+    """
+    require_other_file(Path(out), [Path(path)])
+    pending = read_journal(path)
+    with layout.changed(path, out) as file:
+        layout.fold(file, pending)
+        layout.set_token(file, None)
 
 
 def read_packing(path: PathLike, frame: int = -1) -> Packing:

@@ -110,8 +110,15 @@ def written(path: PathLike) -> Iterator[h5py.File]:
 @contextmanager
 def rewritten(path: PathLike) -> Iterator[h5py.File]:
     """Give a copy of an HDF5 file to change, which replaces it if the body succeeds; errors as `opened`."""
+    with changed(path, path) as file:
+        yield file
+
+
+@contextmanager
+def changed(path: PathLike, out: PathLike) -> Iterator[h5py.File]:
+    """Give a copy of an HDF5 file to change, which is written to `out` if the body succeeds; errors as `opened`."""
     with readable(path):
-        image = Image(path, Path(path).read_bytes())
+        image = Image(out, Path(path).read_bytes())
         with hdf5().File(image, "r+") as file:
             check_h5md(file)
             yield file

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.arrays import FloatArray
 from jamshape.checks import Range, require_in, require_one_of, require_other_file
+from jamshape.files.disk import require_hdf5_name, settled
 from jamshape.front.packing import MeasuredPacking
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
@@ -64,6 +65,9 @@ class Modes:
     packing: MeasuredPacking | None = None
     file: Path | None = None
     matrix: DynamicalMatrix | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "file", settled(self.file))
 
     @classmethod
     def read(cls, path: Path) -> Modes:
@@ -121,6 +125,7 @@ class Modes:
             If the file is there and holds anything else, such as the packing.
         """
         read = [self.packing.file] if self.packing and self.packing.file else []
+        require_hdf5_name(Path(path))
         require_modes_file(Path(path), read)
         write_modes(path, self.table, self.about, vectors=vectors)
 

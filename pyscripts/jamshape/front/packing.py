@@ -13,7 +13,8 @@ import numpy as np
 from jamshape.arrays import BoolArray
 from jamshape.contacts import Contacts
 from jamshape.contacts.network import sum_forces
-from jamshape.files.h5md import read_attributes, read_packing, write_packing
+from jamshape.files.disk import named, settled
+from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.files.sets import REACHED
 from jamshape.packing import Packing
 
@@ -49,6 +50,10 @@ class MeasuredPacking(Packing):
 
     results: Mapping[str, Any] = field(default_factory=dict)
     file: Path | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "file", settled(self.file))
 
     @classmethod
     def of(
@@ -119,8 +124,10 @@ class MeasuredPacking(Packing):
         return plot(self, axes, **look)
 
     def save(self, path: str | Path) -> None:
-        """Write it with its results to an H5MD file, replacing what is there."""
-        write_packing(path, self, self.to_store)
+        """Write it, as `jamshape.save`: how says the end of the name."""
+        from jamshape.front.files import save  # noqa: PLC0415 - which knows packings
+
+        save(path, self)
 
     @property
     def to_store(self) -> dict[str, Any]:
@@ -160,7 +167,7 @@ class MeasuredPacking(Packing):
         said += [f"{k} = {v:.4g}" for k, v in numbers.items() if _is_number(v)]
         outcome = self.results.get("outcome", REACHED[0])
         said += [f"{outcome}: forces do not balance"] * (outcome not in REACHED)
-        said += [f"in {self.file}"] * (self.file is not None)
+        said += [f"in {named(self.file)}"] if self.file else []
         what = f"{self.n} {self.shape.name}s in {self.dimension}D"
         return f"<Packing of {what}: {', '.join(said)}>"
 

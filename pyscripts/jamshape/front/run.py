@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jamshape.arrays import FloatArray
+from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
     count_frames,
     read_attributes,
@@ -44,6 +45,15 @@ class Recorded:
 
     file: Path
     folder: Any = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "file", settled(self.file))
+
+    def save(self, path: str | Path) -> None:
+        """Write a copy, as `jamshape.save`."""
+        from jamshape.front.files import save  # noqa: PLC0415 - which knows runs
+
+        save(path, self)
 
     @cached_property
     def about(self) -> dict[str, Any]:
@@ -99,7 +109,7 @@ class Recorded:
 
     def _where(self) -> str:
         state = "" if self.about.get("finished") else ", not finished"
-        return f"{state}, in {self.file}"
+        return f"{state}, in {named(self.file)}"
 
 
 class RunFile(Recorded):

@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from jamshape.files.disk import named
 from jamshape.front.packing import MeasuredPacking
 from jamshape.packing import Packing
 
@@ -35,4 +36,4 @@ def told_of(start: MeasuredPacking) -> dict[str, Any]:
     own = [parameter.name for parameter in start.shape.parameters]
     names, results = (*own, "size_ratio", "kinds", "seed"), start.results
     found = {name: results[name] for name in names if name in results}
-    return found | {"n": start.n, "start": str(start.file or "")}
+    return found | {"n": start.n, "start": "" if start.file is None else named(start.file)}

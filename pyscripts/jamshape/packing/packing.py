@@ -85,7 +85,7 @@ class Packing:
     image: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
     shape_style: str = DEFAULT
     exponent: FloatArray = field(default_factory=lambda: np.empty(0))
-    law: Interaction = Interaction()
+    law: Interaction = field(default_factory=Interaction)
     step: int = 0
     time: float = 0.0
     position_rest: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
@@ -311,11 +311,18 @@ def _checked_law(law: Interaction) -> Interaction:
     """Take the constants of the contacts, or raise a ValueError."""
     try:
         k_e, sides = float(law[0]), int(law[1])
-        is_law = 0 < k_e < np.inf and sides in {1, 2} and sides == law[1] and len(law) == len(Interaction._fields)
+        is_law = (
+            0 < k_e < np.inf
+            and sides in {1, 2}
+            and sides == law[1]
+            and len(law) == len(Interaction._fields)
+        )
     except (TypeError, ValueError, LookupError):
         is_law = False
     if not is_law:
-        msg = f"law is {law!r}, expected Interaction(k_e, sides) with a positive k_e and sides 1 or 2"
+        msg = (
+            f"law is {law!r}, expected Interaction(k_e, sides) with a positive k_e and sides 1 or 2"
+        )
         raise ValueError(msg)
     return Interaction(k_e, sides)
 

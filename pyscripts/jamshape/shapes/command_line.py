@@ -31,6 +31,15 @@ def add_particle_options(parser: ArgumentParser) -> None:
     )
 
 
+def add_meaning_options(parser: ArgumentParser) -> None:
+    """Add --dimension and --shape, of files that do not say them."""
+    group = parser.add_argument_group(
+        "LAMMPS's data files and dumps that do not say what they hold"
+    )
+    group.add_argument("--dimension", type=int, choices=(2, 3), help="of the file's state")
+    group.add_argument("--shape", choices=SHAPES, help="of the file's particles")
+
+
 def particles_of(options: Namespace) -> Particles:
     """Read the particles from the options.
 

@@ -96,9 +96,7 @@ class Interaction(NamedTuple):
 
     def but(self, k_e: float | None = None, sides: int | None = None) -> Interaction:
         """Replace constants; those that are None stay."""
-        return Interaction(
-            self.k_e if k_e is None else k_e, self.sides if sides is None else sides
-        )
+        return Interaction(self.k_e if k_e is None else k_e, self.sides if sides is None else sides)
 
 
 class Shape(ABC):
@@ -143,6 +141,23 @@ class Shape(ABC):
     @abstractmethod
     def fits(self, diameters: FloatArray) -> bool:
         """Whether (N, 3) diameters can be those of this shape."""
+
+    def placed(self, diameters: FloatArray, dimension: int) -> tuple[FloatArray, IntArray]:
+        """Name the axes of bodies as this shape names them, where other programs have another order.
+
+        Parameters
+        ----------
+        diameters : (N, 3) array of float64, [length]
+        dimension : {2, 3}
+
+        Returns
+        -------
+        (N, 3) array of float64, (N,) array of int64
+            Diameters of the same bodies, and which of the axes that were given is now the first one, after a
+            rotation about one axis.
+        """
+        del dimension
+        return diameters, np.zeros(len(diameters), np.int64)
 
     @abstractmethod
     def rule(self) -> str:
@@ -204,6 +219,10 @@ class Shape(ABC):
         return "_".join([self.name, *numbers])
 
 
+# Diameters that differ by less are alike, but for rounding.
+_ROUNDING = 1e-12
+
+
 class ElongatedShape(Shape):
     """A shape of half length A along the body's x and radius R: diameters (2(A+R), 2R, 2R)."""
 
@@ -220,6 +239,21 @@ class ElongatedShape(Shape):
         """As `Shape.fits`."""
         long, short, other = diameters.T
         return bool(((short == other) & (long >= short)).all())
+
+    def placed(self, diameters: FloatArray, dimension: int) -> tuple[FloatArray, IntArray]:
+        """As `Shape.placed`: the long axis comes first, and diameters that differ by rounding are alike."""
+        low, middle, high = np.sort(diameters).T
+        first = diameters.argmax(axis=1)
+        first[high - low <= _ROUNDING * high] = 0
+        is_body = (middle - low <= _ROUNDING * high) | (high - low <= _ROUNDING * high)
+        # In the plane bodies turn about z only.
+        is_body &= (first < 2) | (dimension == 3)
+        fits = (diameters[:, 1] == diameters[:, 2]) & (diameters[:, 0] >= diameters[:, 1])
+        is_other = is_body & ~fits
+        short = np.where(high - low <= _ROUNDING * high, high, middle)
+        as_named = np.column_stack([high, short, short])
+        found = np.where(is_other[:, None], as_named, diameters)
+        return found, np.where(is_other, first, 0)
 
     def rule(self) -> str:
         """As `Shape.rule`."""
