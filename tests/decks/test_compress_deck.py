@@ -100,9 +100,9 @@ def test_deck_runs_bare_to_the_end(whole):
 
 
 def test_dumps_hold_the_states_that_the_log_tells_of(whole):
-    rows, frames = thermo_rows(whole), read_dump(whole / "particles.dump")
+    rows, frames = thermo_rows(whole), read_dump(whole / "particles.dump", shape="spherocylinder")
     assert 15 < len(frames) < 25
-    assert read_any(whole / "particles.dump").step == frames[-1].step
+    assert read_any(whole / "particles.dump", shape="spherocylinder").step == frames[-1].step
     last_tables = (whole / "contacts.dump").read_text().split("ITEM: TIMESTEP\n")[1:]
     assert len(last_tables) == len(frames)
     for frame, text in zip(frames, last_tables, strict=True):
@@ -186,8 +186,10 @@ def test_run_goes_on_after_a_kill(ranks_after, tmp_path):
     for name in ("particles.dump", "contacts.dump"):
         steps = [dump_steps(folder / name) for folder in (killed, whole)]
         assert steps[0] == steps[1]
-    expected = {frame.step: frame for frame in read_dump(whole / "particles.dump")}
-    frames = read_dump(killed / "particles.dump")
+    expected = {
+        frame.step: frame for frame in read_dump(whole / "particles.dump", shape="spherocylinder")
+    }
+    frames = read_dump(killed / "particles.dump", shape="spherocylinder")
     assert {frame.step for frame in frames} == expected.keys()
     assert halfway.step < max(expected)
     for frame in frames:
@@ -208,5 +210,5 @@ def test_run_goes_on_after_a_kill(ranks_after, tmp_path):
 def test_deck_takes_data_of_your_own(whole, tmp_path):
     packing = read_data(whole / "initial.data")
     run_deck(tmp_path, data=whole / "initial.data", kappa=1e-2, phi_end=0.5)
-    first = read_dump(tmp_path / "particles.dump")[0]
+    first = read_dump(tmp_path / "particles.dump", shape="spherocylinder")[0]
     np.testing.assert_array_equal(first.position, packing.sorted_by_id().position)

@@ -110,7 +110,8 @@ def test_pressure_ends_the_run(whole, tmp_path):
     assert rows["p"][:-2].max() <= 2e-3
     assert rows["phi"][-1] < 0.69
     assert (tmp_path / "final.restart").is_file()
-    jammed = read_data(tmp_path / "final.data").with_(shape_style="superellipsoid")
+    with pytest.warns(UserWarning, match="does not say the exponents"):
+        jammed = read_data(tmp_path / "final.data", shape="superellipsoid")
     phi = jammed.with_(exponent=np.full(jammed.n, SETTINGS["p"])).phi
     np.testing.assert_allclose(phi, rows["phi"][-1], rtol=1e-7)
 
@@ -161,6 +162,7 @@ def test_minimising_its_end_balances_forces(source, jammed, tmp_path):
     np.testing.assert_allclose(phi, thermo_rows(jammed)["phi"][-1], rtol=1e-7)
     assert u[-1] < u[0]
     assert max(fmax[-1], tmax[-1]) < 1e-3
-    end = read_data(tmp_path / "final.data").with_(shape_style="superellipsoid")
+    with pytest.warns(UserWarning, match="does not say the exponents"):
+        end = read_data(tmp_path / "final.data", shape="superellipsoid")
     end = end.with_(exponent=np.full(end.n, SETTINGS["p"]))
     np.testing.assert_allclose(u[-1], sums(end, 1.0)["energy"] / end.box.volume, rtol=1e-6)

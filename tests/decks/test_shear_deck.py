@@ -79,7 +79,7 @@ def test_deck_shears_at_constant_density_to_its_strain(whole):
 
 
 def test_frames_have_the_tilt_and_the_energy_of_their_row(whole):
-    found, frames = rows(whole), read_dump(whole / "particles.dump")
+    found, frames = rows(whole), read_dump(whole / "particles.dump", shape="spherocylinder")
     assert len(frames) == 8
     for frame in frames:
         row = found[frame.step]
@@ -109,7 +109,9 @@ def test_a_killed_run_goes_on_with_its_strain(whole, tmp_path):
     assert done.returncode == 0, done.stdout[-3000:]
     assert rows(out).keys() == rows(whole).keys()
     for frame, expected in zip(
-        read_dump(out / "particles.dump"), read_dump(whole / "particles.dump"), strict=True
+        read_dump(out / "particles.dump", shape="spherocylinder"),
+        read_dump(whole / "particles.dump", shape="spherocylinder"),
+        strict=True,
     ):
         assert frame.step == expected.step
         np.testing.assert_array_equal(frame.box.matrix, expected.box.matrix)

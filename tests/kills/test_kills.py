@@ -192,7 +192,8 @@ class Deck:
 
     def require_same_result(self, expected, found):
         """Frames are the same to a bound: after a restart LAMMPS sums in another order."""
-        one, other = (read_dump(folder / "particles.dump") for folder in (expected, found))
+        dumps = [folder / "particles.dump" for folder in (expected, found)]
+        one, other = (read_dump(dump, shape=self.name.split("_")[1]) for dump in dumps)
         assert [frame.step for frame in other] == [frame.step for frame in one]
         for a, b in zip(one, other, strict=True):
             np.testing.assert_array_equal(a.box.edges, b.box.edges)

@@ -25,7 +25,7 @@ from jamshape.files.lammps_text import iter_dump, read_data
 from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.files.sets import REACHED
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
-from jamshape.front.packing import MeasuredPacking
+from jamshape.front.packing import MeasuredPacking, results_of
 from jamshape.packing import Packing
 from jamshape.vibration.sets import TOLD, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
@@ -115,7 +115,8 @@ def _particles(path: Path) -> dict[str, Any]:
     known, packing = read_attributes(path), read_packing(path)
     stored = next(one for one in _STORED if not one.mark or one.mark in known)
     found: dict[str, Any] = {"kind": stored.kind, **_of_packing(packing)}
-    found |= _state(packing, _measured(path, known), known)
+    is_changed = bool(known) and not results_of(path, packing)
+    found |= _state(packing, {} if is_changed else _measured(path, known))
     found |= _picked(known, _MADE) | {"finished": bool(known.get("finished", not stored.mark))}
     if "kappa" in found:
         found["kappa"] = np.ravel(found["kappa"])[-1].item()
@@ -156,13 +157,11 @@ def _rattlers(found: Mapping[str, Any], known: Mapping[str, Any]) -> int | None:
     return None if number is None else int(number)
 
 
-def _state(
-    packing: Packing, measured: Mapping[str, Any], known: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
+def _state(packing: Packing, measured: Mapping[str, Any]) -> dict[str, Any]:
     """Give the numbers of a state, those that are not stored from its contacts."""
     if all(name in measured for name in _STATE):
         return dict(measured)
-    of = MeasuredPacking.of(packing, known)
+    of = MeasuredPacking.of(packing)
     found = {"phi": of.phi, "pressure": of.pressure, "u": of.u, "z": of.z}
     return found | {"rattlers": int(of.rattlers.sum())} | dict(measured)
 

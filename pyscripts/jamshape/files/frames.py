@@ -67,3 +67,8 @@ def frame_values(packing: Packing, form: Form) -> dict[str, NDArray[Any]]:
 def lengths_of(edges: FloatArray) -> Lengths:
     """Take a box as H5MD has it: edges (D,), or (D, D) edge vectors as rows."""
     return Lengths.of(edges.T) if edges.ndim > 1 else Lengths(edges, np.empty(0))
+
+
+def as_rest(rest: NDArray[Any], whole: NDArray[Any]) -> NDArray[Any]:
+    """Take what doubles leave out; 0 where it is more than that, after another program has changed the doubles."""
+    return np.where(np.abs(rest) <= np.spacing(np.abs(whole)), rest, 0.0)

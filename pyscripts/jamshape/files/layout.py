@@ -15,7 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.disk import PathLike, store
-from jamshape.files.frames import EDGES, EDGES_REST, RESTS, Form, frame_values, lengths_of
+from jamshape.files.frames import (
+    EDGES,
+    EDGES_REST,
+    RESTS,
+    Form,
+    as_rest,
+    frame_values,
+    lengths_of,
+)
 from jamshape.files.journal import Pending, Table, read_journal
 from jamshape.files.rows import Columns, Stored, as_column, gathered, table
 from jamshape.files.signature import HDF5, format_of
@@ -31,6 +39,7 @@ if TYPE_CHECKING:
 _CHUNK_BYTES = 1024
 _ATTRIBUTE_BYTES = 60_000  # HDF5 refuses attributes of 64 kB and more
 REPORT = {"step": np.int64, "wall_seconds": np.float64, "error": np.float64}
+_SAME_SIZE = 1e-12  # of a diameter: what rounding leaves between two copies of a size
 # Tables of a journal.
 FRAMES, OBSERVABLES, REPORT_TABLE = "frames", "observables", "report"
 _TOKEN = "journal"  # the attribute of a file that has one
@@ -444,6 +453,21 @@ def set_attributes(group: h5py.Group, attributes: Mapping[str, Any]) -> None:
     group.attrs.update(attributes)
 
 
+def _require_one_size(file: h5py.File, diameters: FloatArray) -> None:
+    """Refuse a file in which another program has changed one of two copies of sizes."""
+    group = file["particles/all"]
+    if "half_length" not in group or "radius" not in group:
+        return
+    own = np.column_stack([(diameters[:, 0] - diameters[:, 1]) / 2, diameters[:, 1] / 2])
+    stored = np.column_stack([group["half_length"][()], group["radius"][()]])
+    if not (np.abs(own - stored) <= _SAME_SIZE * diameters[:, :1]).all():
+        msg = (
+            f"{file.filename}: half_length and radius are not those of diameters, (2(A+R), 2R, 2R), expected both to"
+            " say the same; change all three"
+        )
+        raise FileFormatError(msg)
+
+
 def _read_law(file: h5py.File) -> Interaction:
     """Read the law of the particles; files of 0.1.0 have it among the attributes of runs only."""
     known = dict(file["parameters"].attrs) if "parameters" in file else {}
@@ -471,14 +495,16 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
     fields |= {name: row(f"{name}/value") for name in ("position", "orientation", "image")}
     for name, element in RESTS.items():
         if f"particles/all/{element}" in file:
-            fields[name] = row(f"{element}/value")
+            whole = fields[name.removesuffix("_rest")]
+            fields[name] = as_rest(row(f"{element}/value"), whole)
+    _require_one_size(file, fields["diameters"])
     fields["shape_style"] = require_item(file, "particles/all").attrs.get("shape_style")
     fields["law"] = _read_law(file)
     fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
     lo, edges = row("box/lo/value"), row(f"{EDGES}/value")
     try:
         if f"particles/all/{EDGES_REST}" in file:
-            rest = lengths_of(row(f"{EDGES_REST}/value"))
+            rest = lengths_of(as_rest(row(f"{EDGES_REST}/value"), edges))
             fields |= {"edges_rest": rest.edges, "tilt_rest": rest.tilt}
         return Packing(box=Box(lo, *lengths_of(edges)), **fields)
     except ValueError as error:

@@ -153,6 +153,12 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
     elif why:
         say = "say dimension= or --dimension if it is another"
         warnings.warn(f"{path} {why}: it is read as {dimension}D; {say}", stacklevel=2)
+    if shape_named(found.name).has_exponent and not said.has_exponent:
+        warnings.warn(
+            f"{path} does not say the exponents of its particles: they are read as p = 1, ellipsoids; use"
+            " packing.with_(exponent=...) for others",
+            stacklevel=2,
+        )
     if _FEW < said.digits < _EXACT:
         warnings.warn(_of_digits(path, there, said.digits), stacklevel=2)
     return Meaning(dimension, found, law)

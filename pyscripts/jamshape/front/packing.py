@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,6 +18,8 @@ from jamshape.files.disk import named, settled
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.files.sets import REACHED
 from jamshape.packing import Packing
+
+_SAME_PHI = 1e-6  # relative; more than any rounding, and than that of boxes in single precision
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +69,8 @@ class MeasuredPacking(Packing):
     @classmethod
     def read(cls, path: Path, frame: int = -1) -> Self:
         """Read one frame of an H5MD file; errors as `jamshape.files.h5md.read_packing`."""
-        return cls.of(read_packing(path, frame), read_attributes(path), path)
+        packing = read_packing(path, frame)
+        return cls.of(packing, results_of(path, packing), path)
 
     def with_(self, **changes: Any) -> Self:
         """Return a packing with the named fields replaced, of which its file says nothing any more."""
@@ -175,6 +179,25 @@ class MeasuredPacking(Packing):
         from jamshape.front.pictures import html  # noqa: PLC0415 - only notebooks ask
 
         return html(self)
+
+
+def results_of(path: Path, packing: Packing) -> dict[str, Any]:
+    """Read what a file says of a packing in it; nothing, with a warning, if its particles were changed since.
+
+    Errors are those of `read_packing`.
+    """
+    known = read_attributes(path)
+    if "outcome" not in known or not _is_number(known.get("phi")):
+        return known
+    phi = float(known["phi"])
+    if abs(phi - packing.phi) <= _SAME_PHI * packing.phi:
+        return known
+    said = (
+        f"{path}: its attributes say phi = {phi:.8g} and its particles have phi = {packing.phi:.8g}: another program has"
+        " changed them, and what the file says of its packing is left out"
+    )
+    warnings.warn(said, stacklevel=3)
+    return {}
 
 
 def _is_number(value: Any) -> bool:
