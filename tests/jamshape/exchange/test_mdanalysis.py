@@ -32,6 +32,24 @@ def run_file(tmp_path, request):
     return tmp_path / "run.h5", frames
 
 
+@pytest.mark.parametrize(
+    ("run_file", "how", "opens"),
+    [(2, {}, False), (2, {"convert_units": False}, False), (3, {}, False), (3, {"convert_units": False}, True)],
+    indirect=["run_file"],
+)  # fmt: skip
+def test_which_of_our_own_files_it_opens(run_file, how, opens):
+    """As the page on files says: of runs in space, without units."""
+    path, frames = run_file
+    universe = MDAnalysis.Universe.empty(frames[0].n)
+    if opens:
+        universe.load_new(str(path), format="H5MD", **how)
+        assert [ts.time for ts in universe.trajectory] == TIMES
+        np.testing.assert_allclose(universe.atoms.positions, frames[-1].position, rtol=1e-6)
+    else:
+        with pytest.raises(ValueError, match="3-dimensional simulation boxes|readable units"):
+            universe.load_new(str(path), format="H5MD", **how)
+
+
 def assert_is_the_run(universe, frames):
     assert universe.trajectory.n_frames == len(frames)
     for packing, ts in zip(frames, universe.trajectory, strict=True):
