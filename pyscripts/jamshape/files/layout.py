@@ -453,19 +453,18 @@ def set_attributes(group: h5py.Group, attributes: Mapping[str, Any]) -> None:
     group.attrs.update(attributes)
 
 
-def _require_one_size(file: h5py.File, diameters: FloatArray) -> None:
+def _require_one_size(file: h5py.File, packing: Packing) -> None:
     """Refuse a file in which another program has changed one of two copies of sizes."""
-    group = file["particles/all"]
-    if "half_length" not in group or "radius" not in group:
-        return
-    own = np.column_stack([(diameters[:, 0] - diameters[:, 1]) / 2, diameters[:, 1] / 2])
-    stored = np.column_stack([group["half_length"][()], group["radius"][()]])
-    if not (np.abs(own - stored) <= _SAME_SIZE * diameters[:, :1]).all():
-        msg = (
-            f"{file.filename}: half_length and radius are not those of diameters, (2(A+R), 2R, 2R), expected both to"
-            " say the same; change all three"
-        )
-        raise FileFormatError(msg)
+    for name in ("half_length", "radius"):
+        element, own = f"particles/all/{name}", getattr(packing, name)
+        stored = require_dataset(file, element)[()] if element in file else own
+        bound = _SAME_SIZE * packing.diameters[:, 0]
+        if np.shape(stored) != own.shape or not (np.abs(stored - own) <= bound).all():
+            msg = (
+                f"{file.filename}: {name} is not that of diameters, which are (2(A+R), 2R, 2R), expected both to"
+                " say the same; change both"
+            )
+            raise FileFormatError(msg)
 
 
 def _read_law(file: h5py.File) -> Interaction:
@@ -497,7 +496,6 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
         if f"particles/all/{element}" in file:
             whole = fields[name.removesuffix("_rest")]
             fields[name] = as_rest(row(f"{element}/value"), whole)
-    _require_one_size(file, fields["diameters"])
     fields["shape_style"] = require_item(file, "particles/all").attrs.get("shape_style")
     fields["law"] = _read_law(file)
     fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
@@ -506,7 +504,9 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
         if f"particles/all/{EDGES_REST}" in file:
             rest = lengths_of(as_rest(row(f"{EDGES_REST}/value"), edges))
             fields |= {"edges_rest": rest.edges, "tilt_rest": rest.tilt}
-        return Packing(box=Box(lo, *lengths_of(edges)), **fields)
+        packing = Packing(box=Box(lo, *lengths_of(edges)), **fields)
     except ValueError as error:
         msg = f"{file.filename}: {error}; write it again"
         raise FileFormatError(msg) from error
+    _require_one_size(file, packing)
+    return packing

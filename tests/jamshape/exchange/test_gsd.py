@@ -173,7 +173,7 @@ def test_bad_files_and_packings_are_told_in_a_sentence(path, tmp_path):
 def edited(path, change):
     """Read a file of ours as another program does, change its frame, and write all of it."""
     out = path.with_name("edited.gsd")
-    with gsd.hoomd.open(path) as old, gsd.hoomd.open(out, "w") as new:
+    with hoomd.open(path) as old, hoomd.open(out, "w") as new:
         frame = old[0]
         change(frame)
         new.append(frame)

@@ -40,7 +40,7 @@ def run_file(tmp_path, request):
 def test_which_of_our_own_files_it_opens(run_file, how, opens):
     """As the page on files says: of runs in space, without units."""
     path, frames = run_file
-    universe = MDAnalysis.Universe.empty(frames[0].n)
+    universe = MDAnalysis.Universe.empty(frames[0].n, trajectory=True)
     if opens:
         universe.load_new(str(path), format="H5MD", **how)
         assert [ts.time for ts in universe.trajectory] == TIMES

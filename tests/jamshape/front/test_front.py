@@ -275,7 +275,7 @@ def test_all_entrances_save_alike(run, tmp_path):
     assert (type(copy), len(copy)) == (type(run), len(run))
     assert (copy.pressure == run.pressure).all()
     assert (copy.packing().position == packing.position).all()
-    with pytest.raises(ValueError, match="a RunFile was given, expected a packing in a file .data"):
+    with pytest.raises(ValueError, match="a RunFile was given, expected a packing in a file"):
         js.save(tmp_path / "run.data", run)
     modes = js.modes(packing, force=True)
     js.save(tmp_path / "modes.h5", modes)
