@@ -28,13 +28,20 @@ import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.h5md import FileFormatError, PathLike, read_packing, replacing
-from jamshape.files.meaning import Geometry, Said, Wanted, meaning_of, most_digits, require_told
+from jamshape.files.meaning import (
+    PLANE,
+    Geometry,
+    Said,
+    Wanted,
+    meaning_of,
+    most_digits,
+    require_told,
+)
 from jamshape.files.signature import DUMP, HDF5, REFUSED, format_of
 from jamshape.packing import Box, Lengths, Packing, angle_from_quaternion, cuboid_around
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import SHAPES
 
-_PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional file of ours
 _TITLE = "LAMMPS data file by jamshape"
 _EXPONENT_COMMENT = "exponent="
 _POSITION = ("x", "y", "z")
@@ -243,7 +250,7 @@ def _padded(vectors: FloatArray | IntArray) -> FloatArray:
 
 def _header_text(packing: Packing) -> str:
     lo, hi = packing.box.lo, packing.box.lo + packing.box.edges
-    bounds = [*zip(lo, hi, strict=True), _PLANE][:3]
+    bounds = [*zip(lo, hi, strict=True), PLANE][:3]
     sides = [f"{a:.17g} {b:.17g} {x}lo {x}hi" for x, (a, b) in zip("xyz", bounds, strict=True)]
     counts = [
         f"{packing.n} atoms",
@@ -441,7 +448,7 @@ def _said(text: str, sections: Mapping[str, _Section], columns: dict[str, FloatA
         words = dict(word.split("=", 1) for word in first.split("#")[1].split() if "=" in word)
         law = {name: float(words[name]) for name in Interaction._fields if name in words}
         dimension = int(words["dimension"]) if "dimension" in words else None
-        return Said(dimension, words.get("shape", ""), law)
+        return Said(dimension, words.get("shape", ""), law, is_ours=True)
     for name, n_types in _PAIRS.items():
         shape = sections[name].title.partition("/")[0] if name in sections else ""
         if shape in SHAPES:
@@ -520,7 +527,7 @@ def _dump_frame(title: str, lines: TextIO, *, is_first: bool) -> _Frame:
     rows = _take(lines, int(items["NUMBER OF ATOMS"][1]))
     names = [_plain_name(name) for name in title.split()[2:]]
     columns = _dump_columns(names, rows)
-    said = Said(digits=_digits(rows, names) if is_first else 0)
+    said = Said(digits=_digits(rows, names)) if is_first else Said(is_later=True)
     step, time = int(items["TIMESTEP"][1]), float(items.get("TIME", ["", "0"])[1])
     return _Frame(columns, *_dump_bounds(items["BOX BOUNDS"]), said, step, time)
 

@@ -22,7 +22,7 @@ from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import SHAPES, Fitted, fitted, shape_named
 
 _ROUNDING = 1e-9  # of a length over a diameter, of a quaternion over its length
-_PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional system, as LAMMPS has it when nobody says
+PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional system, as LAMMPS has it when nobody says
 # Rotations that bring the body's x to its axis k, w i j k.
 _FROM_X = np.array([[1, 0, 0, 0], [0.5**0.5, 0, 0, 0.5**0.5], [0.5**0.5, 0, -(0.5**0.5), 0]])
 _EXACT, _FEW = 15, 5  # digits: of numbers as good as doubles; most that a person writes
@@ -50,6 +50,10 @@ class Said:
     """Whether exponents are told."""
     digits: int = 0
     """The largest number of significant digits of a coordinate; 0 if nobody counted."""
+    is_ours: bool = False
+    """Whether sizes are those that we wrote, to the last bit."""
+    is_later: bool = False
+    """Whether it is a frame after the first one, of which all is said already."""
 
 
 class Geometry(NamedTuple):
@@ -90,7 +94,7 @@ class Geometry(NamedTuple):
     @property
     def is_usual_plane(self) -> bool:
         """Whether the box is as high as that of two-dimensional systems is where nobody says otherwise."""
-        return bool((np.abs(self.bounds[2] - _PLANE) <= _ROUNDING).all())
+        return bool((np.abs(self.bounds[2] - PLANE) <= _ROUNDING).all())
 
     @property
     def is_thin(self) -> bool:
@@ -146,8 +150,13 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
     if name and shape_named(name).name not in able:
         msg = f"there are exponents, which no {name} has, expected one of {', '.join(able)}"
         raise ValueError(msg)
-    found = fitted([name] if name else able, there.diameters, dimension)
+    if name and said.is_ours:
+        found = Fitted(name, there.diameters, np.zeros(len(there.diameters), np.int64))
+    else:
+        found = fitted([name] if name else able, there.diameters, dimension)
     law = Interaction.told(said.law)
+    if said.is_later:
+        return Meaning(dimension, found, law)
     if not name and len(able) > 1:
         warnings.warn(_of_shape(path, found.name, dimension, law, able), stacklevel=2)
     elif why:

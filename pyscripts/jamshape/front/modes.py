@@ -177,7 +177,7 @@ def modes(
     Parameters
     ----------
     packing : Packing or path
-        At a minimum of its energy, as `make_packing` leaves it.
+        At a minimum of its energy, as `make_packing` leaves it; the energy is that of its law, ``packing.law``.
     lowest : int, optional
         Only so many of the softest modes, by a sparse method; all when left out.
     near : float, [sqrt(energy) / length], optional

@@ -17,6 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing.given import as_floats
 
+# Of the largest entry of a matrix: entries that are left where a program turns a box and back.
+_ROUNDING = 1e-13
+
 
 @dataclass(frozen=True, eq=False)
 class Box:
@@ -78,7 +81,7 @@ class Box:
         Raises
         ------
         ValueError
-            As `Box`, or if the matrix is not upper triangular.
+            As `Box`, or if the matrix is not upper triangular, but for rounding.
         """
         return cls(np.asarray(lo), *Lengths.of(np.asarray(matrix, np.float64)))
 
@@ -178,9 +181,12 @@ class Lengths(NamedTuple):
         Raises
         ------
         ValueError
-            If it is no upper triangular matrix.
+            If it is no upper triangular matrix, but for rounding.
         """
-        if matrix.shape not in {(2, 2), (3, 3)} or np.tril(matrix, -1).any():
+        below = np.abs(np.tril(matrix, -1)).max(initial=0)
+        if matrix.shape not in {(2, 2), (3, 3)} or below > _ROUNDING * np.abs(matrix).max(
+            initial=0
+        ):
             msg = (
                 f"the cell vectors are the columns of {matrix.tolist()}, expected the first one along x"
                 " and the second one in the x-y plane; turn box and particles"

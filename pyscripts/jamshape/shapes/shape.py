@@ -243,14 +243,14 @@ class ElongatedShape(Shape):
     def placed(self, diameters: FloatArray, dimension: int) -> tuple[FloatArray, IntArray]:
         """As `Shape.placed`: the long axis comes first, and diameters that differ by rounding are alike."""
         low, middle, high = np.sort(diameters).T
-        first = diameters.argmax(axis=1)
-        first[high - low <= _ROUNDING * high] = 0
-        is_body = (middle - low <= _ROUNDING * high) | (high - low <= _ROUNDING * high)
+        is_round = high - low <= _ROUNDING * high
+        first = np.where(is_round, 0, diameters.argmax(axis=1))
+        is_body = (middle - low <= _ROUNDING * high) | is_round
         # In the plane bodies turn about z only.
         is_body &= (first < 2) | (dimension == 3)
         fits = (diameters[:, 1] == diameters[:, 2]) & (diameters[:, 0] >= diameters[:, 1])
-        is_other = is_body & ~fits
-        short = np.where(high - low <= _ROUNDING * high, high, middle)
+        is_other = is_body & (~fits | (is_round & (high > low)))
+        short = np.where(is_round, high, middle)
         as_named = np.column_stack([high, short, short])
         found = np.where(is_other[:, None], as_named, diameters)
         return found, np.where(is_other, first, 0)

@@ -94,8 +94,8 @@ def of_packing(table: ModeTable) -> dict[str, Any]:
 
 
 def to_store(attributes: Mapping[str, Any], packing: Packing) -> dict[str, Any]:
-    """Return what a file of modes keeps of its packing: what that file said, and the shape."""
-    known = dict(attributes) | {"shape": packing.shape_style}
+    """Return what a file of modes keeps of its packing: what that file said, the shape and the law."""
+    known = dict(attributes) | {"shape": packing.shape_style, **packing.law._asdict()}
     return {f"{_PREFIX}{name}": value for name, value in known.items()}
 
 

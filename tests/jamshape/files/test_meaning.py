@@ -217,6 +217,11 @@ def test_a_plane_is_one_to_within_rounding(path):
         js.load(path, shape=RODS, dimension=2)
 
 
+def test_discs_are_round_to_within_rounding(path):
+    path.write_text(changed(("1 5 1 1", "1 1.0000000000000002 1 1"), ("2 5 1 1", "2 1 1 1")))
+    assert js.load(path, shape=RODS).is_round.all()
+
+
 @pytest.mark.parametrize("sizes", ["3 1 1", "1 3 1", "1 1 3"])
 def test_rods_along_another_axis_are_the_same_rods(path, sizes):
     axis = sizes.split().index("3")
