@@ -11,7 +11,7 @@ from jamshape.checks import (
     Range,
     require_in,
     require_one_of,
-    require_path_for_lammps,
+    require_path,
     require_rising,
     require_stated,
 )
@@ -118,7 +118,7 @@ def compress(
         settings = settings.in_steps(phi[0], rows, dimension)
     settings.steps(phi[0], dimension)  # refuses what does not end
     at = place(file, "run.h5")
-    require_path_for_lammps(at.path)  # restart files lie beside it
+    require_path(at.path)
     made_from = dict(particles.told) | {"n": n, "seed": seed}
     to = Recording(at.path, rows, frames, made_from)
     if again or not at.path.exists():

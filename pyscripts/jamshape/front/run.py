@@ -21,7 +21,7 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.run_writer import RunWriter
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.progress import Told, follow
+from jamshape.front.progress import Told, follow, place
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
@@ -44,6 +44,11 @@ class Recorded:
 
     file: Path
     folder: Any = None
+
+    def __reduce__(self) -> Any:
+        if self.folder is None:
+            return type(self), (self.file,)
+        return _brought_along, (type(self), self.file.name, self.file.read_bytes())
 
     @cached_property
     def about(self) -> dict[str, Any]:
@@ -284,6 +289,13 @@ class QuasistaticShearFile(Recorded):
         end = f"strain = {self.strain[-1]:.5g}, phi = {self.phi[-1]:.5g}, stress = {self.stress[-1]:.3g}"
         steps = len(self.strain) - 1
         return f"<Quasistatic shear of {self._who()}: {steps} steps to {end}{self._where()}>"
+
+
+def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:
+    """Make a run of what a pickle holds of one without a file of its own."""
+    at = place(None, name)
+    at.path.write_bytes(content)
+    return kind(*at)
 
 
 def run_file(path: Path, folder: Any = None) -> Recorded:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from jamshape.checks import (
     require_one_of,
     require_path,
-    require_path_for_lammps,
     require_stated,
 )
 from jamshape.flow import quasistatic_recording, recording, slow_recording
@@ -314,7 +313,7 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
 
 
 def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> None:
-    require_path_for_lammps(to.path)  # restart files lie beside it
+    require_path(to.path)
     if how.again or not to.path.exists():
         first = of.flowing()
         settings.all_steps(first)  # refuses what does not end

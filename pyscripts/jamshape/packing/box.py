@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing.given import as_floats
+from jamshape.records import Record
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class Box(Record):
     """Periodic box, orthogonal unless it has a tilt.
 
     Parameters

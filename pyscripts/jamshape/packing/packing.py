@@ -13,6 +13,7 @@ from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray
 from jamshape.packing.box import Box, Lengths, number_of_tilts
 from jamshape.packing.given import as_floats, as_integers
 from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
+from jamshape.records import Record
 from jamshape.shapes.shape import Interaction, Shape
 from jamshape.shapes.table import DEFAULT, shape_named
 
@@ -25,7 +26,7 @@ _REST_OF = {
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Packing:
+class Packing(Record):
     """Particles in a periodic box.
 
     Arrays are copied and made read-only; use `with_` to change one.

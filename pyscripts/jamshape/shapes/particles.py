@@ -118,7 +118,7 @@ class Particles:
         sizes = [1.0] if ratio == 1 else [1.0, ratio]
         is_plain = its.size_ratio == 1 == ratio
         told = chosen | ({} if is_plain else {"size_ratio": ratio})
-        return cls(its, _draw_of(its, [Kind(chosen, size) for size in sizes]), told)
+        return cls(its, _Mixture(its, [Kind(chosen, size) for size in sizes]), told)
 
     @classmethod
     def mixture(cls, shape: str | Shape, kinds: Sequence[Kind]) -> Particles:
@@ -137,7 +137,7 @@ class Particles:
         require_in("the largest size over the smallest", big / small, RANGES["size_ratio"])
         full = [Kind(_with_defaults(its, k.parameters), k.size, k.share, k.spread) for k in kinds]
         told = {"kinds": "; ".join(map(_text, full))}
-        return cls(its, _draw_of(its, full), told)
+        return cls(its, _Mixture(its, full), told)
 
     @classmethod
     def given(
@@ -152,7 +152,7 @@ class Particles:
         d = np.atleast_2d(np.asarray(diameters, np.float64))
         p = np.ones(len(d)) if exponent is None else np.asarray(exponent, np.float64)
         kinds = np.ones(len(d), np.int64) if species is None else np.asarray(species, np.int64)
-        return cls(its, lambda _n, _rng: Sizes(d, p, kinds), {"kinds": "given one by one"})
+        return cls(its, _Given(Sizes(d, p, kinds)), {"kinds": "given one by one"})
 
     def sample(self, n: int, rng: np.random.Generator) -> Sizes:
         """Draw n particles.
@@ -214,8 +214,15 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, f
     return chosen
 
 
-def _draw_of(shape: Shape, kinds: Sequence[Kind]) -> Callable[[int, np.random.Generator], Sizes]:
-    def draw(n: int, rng: np.random.Generator) -> Sizes:
+@dataclass(frozen=True)
+class _Mixture:
+    """Draws particles of kinds by their shares. A class, as pickles do not take functions within functions."""
+
+    shape: Shape
+    kinds: Sequence[Kind]
+
+    def __call__(self, n: int, rng: np.random.Generator) -> Sizes:
+        kinds = self.kinds
         species = np.repeat(np.arange(1, len(kinds) + 1), _numbers(n, [k.share for k in kinds]))
         diameters, exponent = np.empty((n, 3)), np.empty(n)
         for number, kind in enumerate(kinds, 1):
@@ -223,10 +230,19 @@ def _draw_of(shape: Shape, kinds: Sequence[Kind]) -> Callable[[int, np.random.Ge
             size = np.full(int(own.sum()), kind.size)
             if kind.spread:
                 size *= np.exp(kind.spread * rng.standard_normal(len(size)))
-            diameters[own], exponent[own] = shape.sizes(kind.parameters, size)
+            diameters[own], exponent[own] = self.shape.sizes(kind.parameters, size)
         return Sizes(diameters, exponent, species)
 
-    return draw
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """Gives particles that are known one by one."""
+
+    sizes: Sizes
+
+    def __call__(self, n: int, rng: np.random.Generator) -> Sizes:
+        del n, rng
+        return self.sizes
 
 
 def _numbers(n: int, shares: Sequence[float]) -> IntArray:
