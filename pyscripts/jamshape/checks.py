@@ -82,7 +82,7 @@ def require_number(name: str, value: Any) -> float:
     ValueError: dt is '4; ls', expected a finite number
     """
     if not (_is_a(numbers.Real, value) and math.isfinite(value)):
-        msg = f"{name} is {_said(value)}, expected a finite number"
+        msg = f"{name} is {said(value)}, expected a finite number"
         raise ValueError(msg)
     return float(value)
 
@@ -98,7 +98,7 @@ def require_positive(**values: Any) -> None:
     """
     for name, value in values.items():
         if not (_is_a(numbers.Real, value) and math.isfinite(value) and value > 0):
-            msg = f"{name} is {_said(value)}, expected a positive number"
+            msg = f"{name} is {said(value)}, expected a positive number"
             raise ValueError(msg)
 
 
@@ -153,7 +153,7 @@ def require_in(name: str, value: Any, allowed: Range) -> None:
     kind = numbers.Integral if allowed.whole else numbers.Real
     if _is_a(kind, value) and (allowed.low <= value <= allowed.high or value in allowed.also):
         return
-    msg = f"{name} is {_said(value)}, expected {_described(allowed)}"
+    msg = f"{name} is {said(value)}, expected {described(allowed)}"
     raise ValueError(msg)
 
 
@@ -185,7 +185,7 @@ def require_one_of(name: str, value: Any, table: Iterable[Any]) -> None:
     if not ((isinstance(value, str) or _is_a(numbers.Real, value)) and value in names):
         texts = [name for name in names if isinstance(name, str)]
         known = f"one of {', '.join(texts)}" if texts else " or ".join(map(str, names))
-        msg = f"{name} is {_said(value)}, expected {known}"
+        msg = f"{name} is {said(value)}, expected {known}"
         raise ValueError(msg)
 
 
@@ -250,18 +250,18 @@ def _is_a(kind: type, value: Any) -> bool:
     return isinstance(value, kind) and type(value) is not bool
 
 
-def _described(allowed: Range) -> str:
+def described(allowed: Range) -> str:
+    """Say which numbers are in a range."""
     words = [f"{value:g} or" for value in allowed.also]
     low, high = (f"{v}" if allowed.whole else f"{v:g}" for v in (allowed.low, allowed.high))
     whole = "a whole number of " if allowed.whole and not allowed.meaning.startswith("a ") else ""
     return " ".join([*words, f"{whole}{allowed.meaning} from {low} to {high}"])
 
 
-def _said(value: Any) -> str:
+def said(value: Any) -> str:
     """Show a value in one line."""
-    text = value if isinstance(value, numbers.Real) else repr(value)
-    said = str(text)
-    return said if len(said) <= 80 else f"{said[:77]}..."
+    text = " ".join(str(value if isinstance(value, numbers.Real) else repr(value)).split("\n"))
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 RANKS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")

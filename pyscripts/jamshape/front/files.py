@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from jamshape.arguments import checked
 from jamshape.files.h5md import read_attributes
 from jamshape.files.lammps_text import read_any, write_data
 from jamshape.files.signature import GSD, HDF5, format_of
@@ -15,6 +16,7 @@ from jamshape.packing import Packing
 from jamshape.vibration.table import holds_modes
 
 
+@checked
 def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | Recorded | Modes:
     """Load what is in a file.
 
@@ -61,6 +63,7 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | Record
     return MeasuredPacking.read(path, -1 if frame is None else frame)
 
 
+@checked
 def save(path: str | Path, packing: Packing) -> None:
     """Write a packing, replacing the file that is there only when all is written.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from jamshape.arguments import checked
 from jamshape.checks import require_path, require_stated
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow, place
@@ -13,6 +14,7 @@ from jamshape.protocols.make import Progress, is_done, make, require_same, tidy
 from jamshape.shapes.particles import Particles
 
 
+@checked
 def make_packing(
     particles: Particles | None = None,
     *,

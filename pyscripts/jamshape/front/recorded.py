@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from jamshape.arguments import checked
 from jamshape.checks import require_path
 from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
 from jamshape.flow import quasistatic, quasistatic_recording, recording, slow_recording
@@ -19,6 +20,7 @@ from jamshape.front.run import Recorded, run_file
 from jamshape.lammps.session import Session
 
 
+@checked
 def resume(file: str | Path, *, progress: bool = True) -> Recorded:
     """Go on with a run that was cut off, as it was set; a finished one is loaded.
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jamshape.arguments import checked
 from jamshape.arrays import FloatArray
 from jamshape.files.h5md import (
     count_frames,
@@ -78,6 +79,7 @@ class Recorded:
         """Count the frames."""
         return count_frames(self.file)
 
+    @checked
     def packing(self, frame: int = -1) -> MeasuredPacking:
         """Read a frame, counted from 0, or with negative numbers from the end."""
         return MeasuredPacking.read(self.file, frame)
@@ -142,6 +144,7 @@ class RunFile(Recorded):
         except ValueError:  # it ends below jamming
             return None
 
+    @checked
     def jamming(self, *, progress: bool = True) -> Jamming:
         """Minimise frames, from the densest on, to see which stay jammed when nothing drives them.
 
@@ -214,6 +217,7 @@ class ShearFile(Recorded):
         """Rate, [1/time]."""
         return float(self.about["gdot"])
 
+    @checked
     def steady(self, after: float | None = None) -> SteadyState:
         """Average over the steady state, apart from the start-up.
 
@@ -267,6 +271,7 @@ class QuasistaticShearFile(Recorded):
         """(T,) dU/d(strain) over the volume, [energy / length^D]: the shear stress of simple shear."""
         return self["stress"]
 
+    @checked
     def events(self, least: float = 1e-2) -> list[Event]:
         """List the drops of the stress.
 
@@ -281,6 +286,7 @@ class QuasistaticShearFile(Recorded):
         """Slope of the stress in the first step, [energy / length^D]; that of the Hessian where the step is small."""
         return float((self.stress[1] - self.stress[0]) / (self.strain[1] - self.strain[0]))
 
+    @checked
     def steady(self, after: float | None = None) -> SteadyState:
         """Average over the steady state, as `ShearFile.steady`."""
         return steady_state(self.observables, self.strain, after)

@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from jamshape.arguments import checked
 from jamshape.checks import (
     require_one_of,
     require_path,
@@ -40,6 +41,7 @@ _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
 _ROUNDING = 1e-9
 
 
+@checked
 def shear(
     particles: Particles | None = None,
     *,
@@ -156,6 +158,7 @@ def shear(
     return ShearFile(*at)
 
 
+@checked
 def quasistatic_shear(
     particles: Particles | None = None,
     *,

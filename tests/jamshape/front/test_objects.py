@@ -26,7 +26,7 @@ from jamshape.vibration.elasticity import moduli
 pytestmark = pytest.mark.lammps  # which one of the runs is made by
 
 RODS = {"alpha": 1}
-QUICK = {"n": 16, "progress": False}
+QUICK = {"n": 12, "progress": False}
 
 
 def packed(**how):
@@ -35,18 +35,16 @@ def packed(**how):
 
 def compressed(**how):
     rods = js.Spherocylinders(alpha=4)
-    return js.compress(rods, phi=(0.4, 0.95), kappa=1e-2, rows=50, frames=4, **QUICK, **how)
+    return js.compress(rods, phi=(0.5, 0.95), kappa=2e-2, rows=20, frames=2, **QUICK, **how)
 
 
 def sheared(**how):
     discs = js.Spherocylinders(alpha=0)
-    return js.shear(discs, phi=0.8, gdot=1e-2, strain=1, rows=50, frames=2, **QUICK, **how)
+    return js.shear(discs, phi=0.8, gdot=2e-2, strain=0.2, rows=5, frames=2, **QUICK, **how)
 
 
 def quasistatic(**how):
-    return js.quasistatic_shear(
-        js.Spherocylinders(**RODS), phi=0.95, step=2e-3, strain=0.02, **QUICK, **how
-    )
+    return js.quasistatic_shear(start=packed(**how), step=2e-3, strain=4e-3, progress=False)
 
 
 def made(folder):
@@ -183,7 +181,8 @@ def numbers(seed):
     """Call every function that makes something; the bits of what it made."""
     rods = js.Spherocylinders(**RODS)
     packing = packed(seed=seed)
-    slow = js.slow_compress(start=packing, phi=(0.9, 0.9), kappa=1e-4, p_end=1e-4, progress=False)
+    to = {"phi": (0.8, packing.phi + 1e-5), "kappa": 1e-3}
+    slow = js.slow_compress(start=packing, **to, progress=False)
     return [
         packing.position.tobytes(),
         js.modes(packing).eigenvalues.tobytes(),
@@ -197,9 +196,9 @@ def numbers(seed):
 
 def test_functions_give_the_same_in_threads_and_processes():
     """LAMMPS, HDF5 and bars run beside each other, in threads and in processes forked after LAMMPS began."""
-    seeds = [1, 2, 3]
-    expected = [numbers(seed) for seed in seeds]
-    with ThreadPoolExecutor(len(seeds)) as pool:
+    seeds = [1, 1]
+    expected = [numbers(1)] * 2
+    with ThreadPoolExecutor(2) as pool:
         assert list(pool.map(numbers, seeds)) == expected
     with ProcessPoolExecutor(2, multiprocessing.get_context("fork")) as pool:
         assert list(pool.map(numbers, seeds)) == expected
