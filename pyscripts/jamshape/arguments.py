@@ -188,5 +188,6 @@ def _name(kind: Any) -> str:
 
 _NAMES = {
     bool: "True or False", int: "a whole number", float: "a number", str: "text", Path: "a path",
-    "Particles": "particles such as Spherocylinders(alpha=4)",
+    "Particles": "particles such as Spherocylinders(alpha=4)", "Packing": "a packing",
+    "Recorded": "a run", "Modes": "modes",
 }  # fmt: skip

@@ -269,8 +269,13 @@ RANKS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
 what a job was given, in which one process may run.)"""
 
 
-def require_one_process() -> None:
+def require_one_process(why: str = "", instead: str = "") -> None:
     """Refuse to be one of several ranks, which were all told to write the same file.
+
+    Parameters
+    ----------
+    why, instead : str
+        In place of these words, why not, and what to do.
 
     Raises
     ------
@@ -284,9 +289,11 @@ def require_one_process() -> None:
     for name in RANKS:
         ranks = os.environ.get(name, "1")
         if ranks.isdecimal() and int(ranks) > 1:
+            why = why or "each would write the same file"
+            unset = f"or unset {name} where each writes a file of its own"
+            instead = instead or f" (jamshape sweep makes packings on all cores), {unset}"
             msg = (
-                f"found {ranks} MPI ranks ({name}), expected one process, since each would write the same file;"
-                " start it without mpirun or srun (jamshape sweep makes packings on all cores), or unset"
-                f" {name} where each writes a file of its own"
+                f"found {ranks} MPI ranks ({name}), expected one process, since {why};"
+                f" start it without mpirun or srun{instead}"
             )
             raise RuntimeError(msg)

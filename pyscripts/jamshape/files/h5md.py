@@ -67,6 +67,7 @@ __all__ = [
     "count_frames",
     "read_attributes",
     "read_creator",
+    "read_origin",
     "read_format_version",
     "read_observables",
     "read_packing",
@@ -239,9 +240,18 @@ def read_format_version(path: PathLike) -> int:
 
 def read_creator(path: PathLike) -> str:
     """Read which version of jamshape wrote a file; errors as `read_packing`."""
+    return _of_creator(path, "version")
+
+
+def read_origin(path: PathLike) -> str:
+    """Read what the bits of a file depend on, as `jamshape.files.origin.origin` names it; errors as `read_packing`."""
+    return _of_creator(path, "origin")
+
+
+def _of_creator(path: PathLike, name: str) -> str:
     with layout.opened(path) as file:
-        version = layout.require_item(file, "h5md/creator").attrs.get("version", b"unknown")
-        return version.decode() if isinstance(version, bytes) else str(version)
+        text = layout.require_item(file, "h5md/creator").attrs.get(name, b"unknown")
+        return text.decode() if isinstance(text, bytes) else str(text)
 
 
 def read_observables(path: PathLike) -> dict[str, NDArray[Any]]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from jamshape.checks import require_one_process
 from jamshape.files.disk import store
 from jamshape.files.lammps_text import write_data
 from jamshape.lammps.module import lammps_class, one_at_a_time, run_command, start_lammps
@@ -87,6 +88,10 @@ class Session:
         self, log: str | Path | None = None, *, screen: bool = False, arguments: Sequence[str] = ()
     ) -> None:
         lammps_class()  # says what is missing before anything is started
+        require_one_process(
+            "they would share each run, and each make its own copy of the result",
+            ", or give mpirun the command lmp and a deck",
+        )
         self._like: Packing | None = None
         plugin = plugin_path()
         options = ["-nocite", "-log", str(log) if log else "none"]
@@ -139,7 +144,7 @@ class Session:
 
     def _checked(self, plugin: Path) -> ctypes.CDLL:
         again = "install jamshape again beside this LAMMPS"
-        found, expected = int(self.lmp.version()), built_for(plugin)
+        found, expected = self.version, built_for(plugin)
         if found != expected:
             msg = f"Found LAMMPS version {found}, expected {expected} for which {plugin} was built: {again}."
             raise PluginError(msg)
@@ -277,6 +282,11 @@ class Session:
     def is_tilted(self) -> bool:
         """Whether the box may tilt (LAMMPS: is triclinic)."""
         return bool(self.lmp.extract_setting("triclinic"))
+
+    @property
+    def version(self) -> int:
+        """Version of LAMMPS, such as 20210929."""
+        return int(self.lmp.version())
 
     @property
     def step(self) -> int:

@@ -81,7 +81,7 @@ def test_what_is_of_no_known_type_is_refused_by_name(function, name, wrong, tmp_
         (lambda: js.compress(RODS, kappa=1e-3 + 0j), "kappa is .*j.*, expected a rate"),
         (lambda: js.compress(RODS, kappa=np.nan), "kappa is nan, expected a rate"),
         (lambda: js.save(scene(), "x.h5"), "path is .*Packing.*, expected a path"),
-        (lambda: js.modes(RODS), "packing is Particles.*, expected a Packing or a path"),
+        (lambda: js.modes(RODS), "packing is Particles.*, expected a packing or a path"),
         (lambda: js.plot(scene(), "axes"), "axes is 'axes', expected matplotlib axes without"),
         (lambda: js.Spherocylinders(None), "alpha has dtype object, expected real numbers"),
         (lambda: js.Spherocylinders([1, [2, 3]]), "alpha has rows of different lengths"),
