@@ -28,11 +28,21 @@ constexpr char ALL[] =
 constexpr char ONE[] =
     "_ZN9LAMMPS_NS5Error3oneERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEEiS8_";
 
+/// A function of LAMMPS's library, which is found by the table of virtual functions of one of its
+/// objects.
+void *of_lammps(const LAMMPS_NS::Error *object, const char *name)
+{
+  Dl_info found;
+  if (!dladdr(*reinterpret_cast<void *const *>(object), &found)) return nullptr;
+  void *const library = dlopen(found.dli_fname, RTLD_NOLOAD | RTLD_LAZY);
+  return library ? dlsym(library, name) : nullptr;
+}
+
 [[noreturn]] void leave_to_lammps(const char *name, LAMMPS_NS::Error *error,
                                   const std::string &file, int line, const std::string &sentence)
 {
   using Stop = void (*)(LAMMPS_NS::Error *, const std::string &, int, const std::string &);
-  if (const auto stop = reinterpret_cast<Stop>(dlsym(RTLD_NEXT, name)))
+  if (const auto stop = reinterpret_cast<Stop>(of_lammps(error, name)))
     stop(error, file, line, sentence);
   std::fprintf(stderr, "ERROR: %s\n", sentence.c_str());
   std::abort();

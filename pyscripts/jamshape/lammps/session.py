@@ -68,6 +68,13 @@ def _as_one_process() -> Iterator[None]:
 class Session:
     """One LAMMPS instance that knows our styles; a context manager.
 
+    Raises
+    ------
+    PluginError
+        If there is no LAMMPS, or no plugin for it.
+    RuntimeError
+        If mpirun or srun started several processes.
+
     Parameters
     ----------
     log
@@ -79,9 +86,8 @@ class Session:
 
     Notes
     -----
-    Debian 12's LAMMPS has no C++ exceptions: an error in a command prints its sentence and ends the
-    process. Close what must survive before each call. That of the wheel raises `LammpsError`. Without
-    `screen`, errors and warnings still reach standard error, through a filter that outlives the process.
+    An error in a command raises `LammpsError`, also where LAMMPS itself would end the process. Without `screen`, warnings
+    still reach standard error, through a filter that outlives the process. Threads take turns, command by command.
     """
 
     def __init__(
