@@ -1,8 +1,8 @@
 // Errors of a LAMMPS that was compiled without exceptions, as of Debian 12, which ends its process
 // where it meets one. Python loads this library before LAMMPS's, so that calls of `Error::all` and
-// `Error::one`, in LAMMPS as in the plugin, come here: within a command that Python gave they throw,
-// and `jamshape_command` returns their sentence. Everywhere else, as in decks and on several ranks,
-// LAMMPS's own functions do what they do.
+// `Error::one`, in LAMMPS as in the plugin, come here: within a command that Python gave they
+// throw, and `jamshape_command` returns their sentence. Everywhere else, as in decks and on several
+// ranks, LAMMPS's own functions do what they do.
 
 #include "comm.h"
 #include "error.h"

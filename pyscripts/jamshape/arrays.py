@@ -29,7 +29,7 @@ def real_numbers(name: str, values: ArrayLike) -> NDArray[np.generic]:
     """
     if isinstance(values, np.ma.MaskedArray):
         msg = f"{name} is a masked array, expected plain numbers: fill what is masked, or leave it out"
-        raise ValueError(msg)
+        raise ValueError(msg)  # noqa: TRY004 - as for what is wrong with other arrays
     try:
         array = np.asarray(values)
     except ValueError:

@@ -21,7 +21,11 @@ LEAST, MOST = np.iinfo(np.int64).min, np.iinfo(np.int64).max
 NUMBERS = (np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1e-320, 1e-30, 1e30, 1e300)
 WHOLE = (0, 1, -1, 2, 3, 7, 2**31 - 1, -(2**31), 2**31, 2**40, 2**63 - 1, -(2**63), 2**64 - 1)
 OBJECTS = (None, "", "abc", [], {}, (), b"x", 1 + 2j, object())
-WORK = {"rounds", "n_sweeps", "evaluations"}  # how much is asked for, which takes as long as it takes
+WORK = {
+    "rounds",
+    "n_sweeps",
+    "evaluations",
+}  # how much is asked for, which takes as long as it takes
 MOST_WORK = 7
 MOST_BYTES = 3 * 2**30  # what asks for more is refused, as on a machine that has no more
 
@@ -46,7 +50,9 @@ class Fuzz:
         if kind == 3:
             return np.asfortranarray(array[..., None])
         if kind == 4:
-            return np.zeros(self.one_of(((), (0,), (0, 0), (0, 3), (3, 0), (0, 0, 0), (2, 0, 2))), array.dtype)
+            return np.zeros(
+                self.one_of(((), (0,), (0, 0), (0, 3), (3, 0), (0, 0, 0), (2, 0, 2))), array.dtype
+            )
         if array.size:
             values = (LEAST, MOST, -1, 0, 1, 2, 3, 10**6) if array.dtype.kind == "i" else NUMBERS
             array.flat[self.random.integers(array.size)] = self.one_of(values)
@@ -97,13 +103,24 @@ def of_shapes(fuzz):
     )
     of = particles(shape, dimension) if made is None else made
     with contextlib.suppress(ValueError, RuntimeError):
-        for name in ("measure", "moment", "outer_radius", "turning_radius", "symmetry_axis", "director"):
+        for name in (
+            "measure",
+            "moment",
+            "outer_radius",
+            "turning_radius",
+            "symmetry_axis",
+            "director",
+        ):
             getattr(of, name)
     given = hard_poses(dimension)
     turns = given["orientation"]
-    fuzz.call("host_spin", of.host_spin, orientation=turns, gradient=np.zeros((dimension, dimension)))
+    fuzz.call(
+        "host_spin", of.host_spin, orientation=turns, gradient=np.zeros((dimension, dimension))
+    )
     fuzz.call("sweeps", of.sweeps, **given, shift=0.1, turn=0.1, n_sweeps=1, seed=1)
-    poses = split({k: v for k, v in given.items() if k != "edges"} | {"cell": 30.0 * np.eye(dimension)})
+    poses = split(
+        {k: v for k, v in given.items() if k != "edges"} | {"cell": 30.0 * np.eye(dimension)}
+    )
     pairs = {"pairs": np.array([[0, 1], [1, 2]]), "shift": np.zeros((2, dimension), np.int64)}
     over_pairs(fuzz, of, poses | pairs)
     return of, dimension, poses, pairs
@@ -115,14 +132,19 @@ def probes(fuzz, dimension):
     turn = [0.3] if dimension == 2 else [1.0, 0.0, 0.0, 0.0]
     boxes = np.tile([0.0] * dimension + turn + [1.0] * dimension + [2.0], (2, 1))
     boxes[1, 0] = 1.5
-    i, j = {"bodies_i": rods[:1], "bodies_j": rods[1:]}, {"bodies_i": boxes[:1], "bodies_j": boxes[1:]}
+    i, j = (
+        {"bodies_i": rods[:1], "bodies_j": rods[1:]},
+        {"bodies_i": boxes[:1], "bodies_j": boxes[1:]},
+    )
     fuzz.call("spherocylinder_contacts", _contact.spherocylinder_contacts, **i, k_e=1.0, sides=2)
     fuzz.call("spine_distances", _contact.spine_distances, **i)
     fuzz.call("superellipsoid_contacts", _contact.superellipsoid_contacts, **j, epsilon=1.0)
     normals = np.ones((1, dimension))
     fuzz.call("superellipsoid_scales", _contact.superellipsoid_scales, **j, normals=normals)
     fuzz.call("superellipsoid_near", _contact.superellipsoid_near, **j, margin=0.1)
-    fuzz.call("superellipsoid_motion_sq", _contact.superellipsoid_motion_sq, then=boxes[:1], now=boxes[1:])
+    fuzz.call(
+        "superellipsoid_motion_sq", _contact.superellipsoid_motion_sq, then=boxes[:1], now=boxes[1:]
+    )
     fuzz.call("superellipsoid_overlap", _contact.superellipsoid_overlap, **j)
     fuzz.call("counts_of_team", _contact.counts_of_team, threads=2, first_that_fails=1, rounds=2)
     flat = np.zeros((2, 2), bool)
@@ -152,7 +174,9 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
         fuzz.call("deform", about.deform, matrix=matrix, turns=np.zeros((3, n_turns)))
 
     def factorise():
-        found = fuzz.call("factorise", about.factorise, x=np.zeros(n), strain=0.0, diagonal=np.ones(n))
+        found = fuzz.call(
+            "factorise", about.factorise, x=np.zeros(n), strain=0.0, diagonal=np.ones(n)
+        )
         if found is not None:
             held["factors"] = found
             fuzz.call("Factors.solve", found.solve, right=np.ones((1, n)))
@@ -162,7 +186,9 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
         if system is not None:
             for name in fuzz.random.permutation(["prepare", "solve", "learn", "coupling"]):
                 if name == "solve":
-                    fuzz.call("NewtonSystem.solve", system.solve, right=np.ones((1, n)), accuracy=1e-3)
+                    fuzz.call(
+                        "NewtonSystem.solve", system.solve, right=np.ones((1, n)), accuracy=1e-3
+                    )
                 elif name == "learn":
                     fuzz.call("NewtonSystem.learn", system.learn, tries=2)
                 elif name == "prepare":
@@ -171,18 +197,29 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
                     fuzz.call("NewtonSystem.coupling", lambda: system.coupling)
 
     def solve_stage():
-        units = fuzz.call("StageUnits", _contact.StageUnits, force=1.0, energy=1.0, length=1.0, n_particles=3.0)
-        limits = fuzz.call("StageLimits", _contact.StageLimits, accuracy=1e-6, longest_step=0.1, widest_turn=0.1)
+        units = fuzz.call(
+            "StageUnits", _contact.StageUnits, force=1.0, energy=1.0, length=1.0, n_particles=3.0
+        )
+        limits = fuzz.call(
+            "StageLimits", _contact.StageLimits, accuracy=1e-6, longest_step=0.1, widest_turn=0.1
+        )
         if units is None or limits is None:
             return
-        fuzz.call("StageUnits.size", units.size, shift=np.ones(3), force=np.ones(3), drag=np.ones(3))
+        fuzz.call(
+            "StageUnits.size", units.size, shift=np.ones(3), force=np.ones(3), drag=np.ones(3)
+        )
         stage = fuzz.call(
             "Stage", _contact.Stage, drag=np.ones(n), centre=np.zeros(n), extended=False,
             units=units, limits=limits, guess=np.zeros(n), other=np.zeros(n),
         )  # fmt: skip
         if stage is not None:
             fuzz.call(
-                "solve_stage", about.solve_stage, stage=stage, factors=held["factors"], bonds_of_factors=1, renew=renew
+                "solve_stage",
+                about.solve_stage,
+                stage=stage,
+                factors=held["factors"],
+                bonds_of_factors=1,
+                renew=renew,
             )
 
     def descend():
@@ -191,7 +228,9 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
             rounding=1e-16, newton_below=1e-2, is_near=False, longest_step=0.1, widest_turn=0.1,
         )  # fmt: skip
         if stop is not None:
-            end = fuzz.call("descend", about.descend, stop=stop, shift=1.0, renew=renew, tell=lambda _: None)
+            end = fuzz.call(
+                "descend", about.descend, stop=stop, shift=1.0, renew=renew, tell=lambda _: None
+            )
             if end is not None:
                 repr((end.outcome, end.sums, end.rows))
 
@@ -202,7 +241,9 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
         "deform": deform,
         "poses": lambda: fuzz.call("poses", lambda: about.poses),
         "share": lambda: fuzz.call("share", about.share, threads=2),
-        "evaluate": lambda: fuzz.call("evaluate", about.evaluate, x=np.zeros(n), strain=0.0, extended=False),
+        "evaluate": lambda: fuzz.call(
+            "evaluate", about.evaluate, x=np.zeros(n), strain=0.0, extended=False
+        ),
         "factorise": factorise,
         "take_pairs": lambda: renew(None, None),
         "newton": newton,

@@ -25,7 +25,14 @@ def fuzzed(seed, rounds):
 
 def test_bindings_survive_what_they_do_not_expect():
     calls = fuzzed(1, ROUNDS)
-    assert calls.keys() >= {"deform", "counts_of_team", "sums", "solve_stage", "descend", "find_rattlers"}
+    assert calls.keys() >= {
+        "deform",
+        "counts_of_team",
+        "sums",
+        "solve_stage",
+        "descend",
+        "find_rattlers",
+    }
     assert all(returned for returned, _ in calls.values())
     assert sum(refused for _, refused in calls.values()) > 5 * ROUNDS
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jamshape.arrays import FloatArray
 from jamshape.arguments import checked
+from jamshape.arrays import FloatArray
 from jamshape.checks import Range, require_in, require_one_of, require_other_file
 from jamshape.front.packing import MeasuredPacking
 from jamshape.landscape import Landscape, State
@@ -18,7 +18,14 @@ from jamshape.vibration.sets import TOLD, to_store
 from jamshape.vibration.sparse_modes import lowest as lowest_modes
 from jamshape.vibration.sparse_modes import near as modes_near
 from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
-from jamshape.vibration.table import BANDS, ModeTable, holds_modes, read_modes, tabulate, write_modes
+from jamshape.vibration.table import (
+    BANDS,
+    ModeTable,
+    holds_modes,
+    read_modes,
+    tabulate,
+    write_modes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -150,7 +150,9 @@ def _particles(
         msg = "size_ratio and kinds were given, expected the size of each kind in size alone"
         raise ValueError(msg)
     try:
-        columns = np.broadcast_arrays(*(np.atleast_1d(v).astype(np.float64) for v in values.values()))
+        columns = np.broadcast_arrays(
+            *(np.atleast_1d(v).astype(np.float64) for v in values.values())
+        )
     except ValueError:
         lengths = {name: np.size(value) for name, value in values.items()}
         msg = f"arrays of kinds have lengths {lengths}, expected one entry for each kind"

@@ -156,7 +156,11 @@ class Particles:
         """Particles one by one: (n, 3) diameters, (n,) exponents and species from 1."""
         its = shape_named(shape) if isinstance(shape, str) else shape
         d = np.atleast_2d(real_numbers("diameters", diameters).astype(np.float64))
-        p = np.ones(len(d)) if exponent is None else real_numbers("exponent", exponent).astype(np.float64)
+        p = (
+            np.ones(len(d))
+            if exponent is None
+            else real_numbers("exponent", exponent).astype(np.float64)
+        )
         kinds = np.ones(len(d)) if species is None else whole_numbers("species", species)
         sizes = Sizes(d, p, kinds.astype(np.int64))
         return cls(its, _Given(sizes), {"kinds": "given one by one"})

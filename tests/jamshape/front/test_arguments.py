@@ -10,6 +10,7 @@ import pytest
 
 import jamshape as js
 from jamshape.arguments import ArgumentError, checked
+from jamshape.front.pictures import _DRAWN
 from jamshape.front.run import QuasistaticShearFile, RunFile, ShearFile
 
 RODS = js.Spherocylinders(alpha=1)
@@ -70,13 +71,22 @@ def test_what_is_of_no_known_type_is_refused_by_name(function, name, wrong, tmp_
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
-        (lambda: js.quasistatic_shear("x.h5"), "particles is 'x.h5', expected particles such as Spher"),
-        (lambda: js.make_packing(js.Spherocylinders), "particles is the function Spherocylinders, exp"),
+        (
+            lambda: js.quasistatic_shear("x.h5"),
+            "particles is 'x.h5', expected particles such as Spher",
+        ),
+        (
+            lambda: js.make_packing(js.Spherocylinders),
+            "particles is the function Spherocylinders, exp",
+        ),
         (lambda: js.compress(scene()), "particles is .*expected particles such as"),
         (lambda: js.compress(RODS, phi=0.9), "phi is 0.9, expected a tuple of 2 numbers"),
         (lambda: js.compress(RODS, n=True), "n is True, expected a whole number of particles"),
         (lambda: js.compress(RODS, dt=np.ma.masked), "dt is masked, expected a time step from"),
-        (lambda: js.compress(RODS, dt=np.array([0.1])), r"dt is array\(\[0.1\]\), expected a time step"),
+        (
+            lambda: js.compress(RODS, dt=np.array([0.1])),
+            r"dt is array\(\[0.1\]\), expected a time step",
+        ),
         (lambda: js.slow_compress(RODS, kappa=[1, 2]), r"kappa is \[1, 2\], expected a rate from"),
         (lambda: js.compress(RODS, kappa=1e-3 + 0j), "kappa is .*j.*, expected a rate"),
         (lambda: js.compress(RODS, kappa=np.nan), "kappa is nan, expected a rate"),
@@ -103,7 +113,7 @@ WRONG_ARRAYS = {
     "dtype object": lambda x: np.asarray(x).astype(object),
     "dtype datetime64": lambda x: np.asarray(x).astype("datetime64[s]"),
     "dtype bool": lambda x: np.asarray(x).astype(bool),
-    "rows of different lengths": lambda x: [[1], [1, 2]],
+    "rows of different lengths": lambda x: [[*np.ravel(x)[:1]], [1, 2]],
 }
 ARRAYS = ("position", "orientation", "diameters", "species", "id", "image", "exponent")
 
@@ -112,15 +122,15 @@ ARRAYS = ("position", "orientation", "diameters", "species", "id", "image", "exp
 @pytest.mark.parametrize("name", [*ARRAYS, "lo", "edges", "tilt", "alpha", "given"])
 def test_arrays_of_anything_but_numbers_are_refused(name, found):
     wrong, here = WRONG_ARRAYS[found], scene()
+    calls = {
+        "alpha": lambda: js.Spherocylinders(alpha=wrong([1, 2])),
+        "given": lambda: js.Particles.given("dimer", wrong([[2, 1, 1]])),
+        "lo": lambda: js.Box(lo=wrong([0, 0]), edges=[9, 9]),
+        "edges": lambda: js.Box(lo=[0, 0], edges=wrong([9, 9])),
+        "tilt": lambda: js.Box(lo=[0, 0], edges=[9, 9], tilt=wrong([1])),
+    }
     with pytest.raises(ValueError, match="expected") as refused:
-        if name in ARRAYS:
-            here.with_(**{name: wrong(getattr(here, name))})
-        elif name == "alpha":
-            js.Spherocylinders(alpha=wrong([1, 2]))
-        elif name == "given":
-            js.Particles.given("dimer", wrong([[2, 1, 1]]))
-        else:
-            js.Box(**{"lo": [0, 0], "edges": [9, 9]} | {name: wrong(getattr(here.box, name))})
+        calls.get(name, lambda: here.with_(**{name: wrong(getattr(here, name))}))()
     sentence = str(refused.value)
     assert {"given": "diameters"}.get(name, name) in sentence
     assert found in sentence
@@ -194,8 +204,6 @@ def test_a_quasistatic_shear_shows_itself(quasistatic):
 
 
 def test_every_run_is_drawn():
-    from jamshape.front.pictures import _DRAWN
-
     assert {RunFile, ShearFile, QuasistaticShearFile} <= set(_DRAWN)
 
 

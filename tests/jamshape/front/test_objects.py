@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import inspect
+import math
 import multiprocessing
 import os
 import pickle
@@ -120,7 +121,8 @@ def same(one, other):
         return len(one) == len(other) and all(map(same, one, other))
     if isinstance(one, Landscape):
         return same(vars(one)["particles"], vars(other)["particles"])
-    return one == other or (one != one and other != other)
+    is_nan = isinstance(one, float) and math.isnan(one)
+    return math.isnan(other) if is_nan else one == other
 
 
 def same_run(one, other):
