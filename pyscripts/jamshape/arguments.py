@@ -53,38 +53,43 @@ def checked_fields(record: type[_T]) -> type[_T]:
 
 def _checked(function: Callable[_P, _R], names: dict[str, Any]) -> Callable[_P, _R]:
     """Check arguments, whose annotations hold names."""
-    signature = inspect.signature(function)
+    parameters = inspect.signature(function).parameters
+    positions = list(parameters)
+    rest = next((p.name for p in parameters.values() if p.kind is p.VAR_KEYWORD), "")
 
     @functools.cache
     def kinds_of(name: str) -> tuple[Any, ...]:
-        return _kinds_of(signature.parameters[name].annotation, names)
+        known = parameters.get(name) or parameters.get(rest)
+        return _kinds_of(known.annotation, names) if known else ()
 
     @functools.wraps(function)
     def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        try:
-            bound = signature.bind(*args, **kwargs)
-        except TypeError:
-            return function(*args, **kwargs)  # says it as Python does
-        given = bound.arguments
-        for name, value in given.items():
-            if signature.parameters[name].kind is inspect.Parameter.VAR_KEYWORD:
-                given[name] = {one: _taken(one, v, kinds_of(name)) for one, v in value.items()}
-            else:
-                given[name] = _taken(name, value, kinds_of(name))
-        return function(*bound.args, **bound.kwargs)
+        # What is missing or too much the function says as Python does.
+        first = [_taken(name, value, kinds_of(name)) for name, value in zip(positions, args, strict=False)]
+        named = {name: _taken(name, value, kinds_of(name)) for name, value in kwargs.items()}
+        return function(*first, *args[len(first) :], **named)  # type: ignore[arg-type]
 
     return call
 
 
 def _kinds_of(annotation: Any, names: dict[str, Any]) -> tuple[Any, ...]:
-    """Types that an annotation names; none where it is of a module that only checkers of types import."""
+    """Types that an annotation names; none where one is of a module that only checkers of types import, or is unknown."""
     if not isinstance(annotation, str):
         return ()
     try:
         kind = eval(annotation, names)
     except NameError:
         return ()
-    return typing.get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
+    kinds = typing.get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
+    return kinds if all(map(_is_known, kinds)) else ()
+
+
+def _is_known(kind: Any) -> bool:
+    """Tell whether a type is one that is looked at here."""
+    return kind is None or isinstance(kind, type) or typing.get_origin(kind) in _SEVERAL
+
+
+_SEVERAL = (Mapping, Sequence, tuple)
 
 
 class _UnfitError(Exception):
@@ -93,13 +98,13 @@ class _UnfitError(Exception):
 
 def _taken(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
     """Give a value as the first of some types that it fits, or refuse it."""
+    if not kinds or type(value) in kinds:
+        return value
     for kind in kinds:
         try:
             return _fitted(value, kind)
         except _UnfitError:
             continue
-    if not kinds:
-        return value
     msg = f"{name} is {_shown(value)}, expected {_named(name, kinds)}"
     raise ArgumentError(msg)
 
@@ -114,12 +119,8 @@ def _fitted(value: Any, kind: Any) -> Any:
         fits = isinstance(value, os.PathLike)
     elif isinstance(kind, type):
         fits = isinstance(value, kind)
-    elif typing.get_origin(kind) is Mapping:
-        return _mapping(value, kind)
-    elif typing.get_origin(kind) in (tuple, Sequence):
-        return _sequence(value, kind)
     else:
-        fits = True
+        return (_mapping if typing.get_origin(kind) is Mapping else _sequence)(value, kind)
     if not fits:
         raise _UnfitError
     return value
