@@ -65,7 +65,10 @@ def _checked(function: Callable[_P, _R], names: dict[str, Any]) -> Callable[_P, 
     @functools.wraps(function)
     def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         # What is missing or too much the function says as Python does.
-        first = [_taken(name, value, kinds_of(name)) for name, value in zip(positions, args, strict=False)]
+        first = [
+            _taken(name, value, kinds_of(name))
+            for name, value in zip(positions, args, strict=False)
+        ]
         named = {name: _taken(name, value, kinds_of(name)) for name, value in kwargs.items()}
         return function(*first, *args[len(first) :], **named)  # type: ignore[arg-type]
 

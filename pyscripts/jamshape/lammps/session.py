@@ -74,6 +74,8 @@ class Session:
         If there is no LAMMPS, or no plugin for it.
     RuntimeError
         If mpirun or srun started several processes.
+    OSError
+        If the log cannot be written.
 
     Parameters
     ----------
@@ -98,6 +100,8 @@ class Session:
             "they would share each run, and each make its own copy of the result",
             ", or give mpirun the command lmp and a deck",
         )
+        if log:
+            Path(log).open("a").close()  # where LAMMPS cannot, it ends the process
         self._like: Packing | None = None
         plugin = plugin_path()
         options = ["-nocite", "-log", str(log) if log else "none"]

@@ -103,3 +103,11 @@ def test_one_of_several_ranks_runs_nothing(monkeypatch):
         Session()
     with pytest.raises(RuntimeError, match=sentence):
         js.compress(js.Spherocylinders(alpha=1), n=8, progress=False)
+
+
+def test_a_log_that_cannot_be_written_ends_no_program(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no/such"):
+        Session(log=tmp_path / "no" / "such.log")
+    with Session(log=tmp_path / "a.log") as session:
+        session.commands("units lj")
+    assert "units lj" in (tmp_path / "a.log").read_text()
