@@ -218,8 +218,10 @@ nb::object superellipsoid_overlap(const Bodies &bodies_i, const Bodies &bodies_j
 }
 
 /// Lets a team count its parts again and again, each time but the last with some that fail.
-nb::object counts_of_team(std::size_t threads, std::size_t first_that_fails, int rounds)
+nb::object counts_of_team(std::int64_t asked, std::size_t first_that_fails, int rounds)
 {
+  require_threads(asked);
+  const auto threads = static_cast<std::size_t>(asked);
   Team team(threads);
   NewArray<std::int64_t> counts({threads});
   std::fill_n(&counts[0], threads, 0);

@@ -82,7 +82,7 @@ def require_number(name: str, value: Any) -> float:
     ValueError: dt is '4; ls', expected a finite number
     """
     if not (_is_a(numbers.Real, value) and math.isfinite(value)):
-        msg = f"{name} is {_said(value)}, expected a finite number"
+        msg = f"{name} is {said(value)}, expected a finite number"
         raise ValueError(msg)
     return float(value)
 
@@ -98,7 +98,7 @@ def require_positive(**values: Any) -> None:
     """
     for name, value in values.items():
         if not (_is_a(numbers.Real, value) and math.isfinite(value) and value > 0):
-            msg = f"{name} is {_said(value)}, expected a positive number"
+            msg = f"{name} is {said(value)}, expected a positive number"
             raise ValueError(msg)
 
 
@@ -153,7 +153,7 @@ def require_in(name: str, value: Any, allowed: Range) -> None:
     kind = numbers.Integral if allowed.whole else numbers.Real
     if _is_a(kind, value) and (allowed.low <= value <= allowed.high or value in allowed.also):
         return
-    msg = f"{name} is {_said(value)}, expected {_described(allowed)}"
+    msg = f"{name} is {said(value)}, expected {described(allowed)}"
     raise ValueError(msg)
 
 
@@ -185,32 +185,8 @@ def require_one_of(name: str, value: Any, table: Iterable[Any]) -> None:
     if not ((isinstance(value, str) or _is_a(numbers.Real, value)) and value in names):
         texts = [name for name in names if isinstance(name, str)]
         known = f"one of {', '.join(texts)}" if texts else " or ".join(map(str, names))
-        msg = f"{name} is {_said(value)}, expected {known}"
+        msg = f"{name} is {said(value)}, expected {known}"
         raise ValueError(msg)
-
-
-# LAMMPS reads the names of files as words of its input: these would end a word or stand for something.
-_TAKEN = {'"': "a double quote", "$": "a dollar", "*": "an asterisk", "%": "a percent sign"}
-
-
-def require_path_for_lammps(path: Path) -> None:
-    """Refuse a path that LAMMPS cannot be told.
-
-    Examples
-    --------
-    >>> require_path_for_lammps(Path("runs/my run.h5"))
-    >>> require_path_for_lammps(Path("runs/$HOME.h5"))
-    Traceback (most recent call last):
-    ValueError: the path 'runs/$HOME.h5' holds a dollar, which LAMMPS cannot take, expected another name
-    """
-    require_path(path)
-    text = str(path)
-    for sign, called in _TAKEN.items():
-        if sign in text:
-            msg = (
-                f"the path {text!r} holds {called}, which LAMMPS cannot take, expected another name"
-            )
-            raise ValueError(msg)
 
 
 def require_path(path: Path) -> None:
@@ -222,7 +198,8 @@ def require_path(path: Path) -> None:
     Traceback (most recent call last):
     ValueError: the path 'a\nb' holds a control character, expected letters and signs; choose another name
     """
-    if any(unicodedata.category(sign) in {"Cc", "Cs"} for sign in str(path)):
+    # Bytes of a name that the locale cannot read are no control characters, and files may have them.
+    if any(unicodedata.category(sign) == "Cc" for sign in str(path)):
         msg = (
             f"the path {str(path)!r} holds a control character, expected letters and signs;"
             " choose another name"
@@ -273,18 +250,18 @@ def _is_a(kind: type, value: Any) -> bool:
     return isinstance(value, kind) and type(value) is not bool
 
 
-def _described(allowed: Range) -> str:
+def described(allowed: Range) -> str:
+    """Say which numbers are in a range."""
     words = [f"{value:g} or" for value in allowed.also]
     low, high = (f"{v}" if allowed.whole else f"{v:g}" for v in (allowed.low, allowed.high))
     whole = "a whole number of " if allowed.whole and not allowed.meaning.startswith("a ") else ""
     return " ".join([*words, f"{whole}{allowed.meaning} from {low} to {high}"])
 
 
-def _said(value: Any) -> str:
+def said(value: Any) -> str:
     """Show a value in one line."""
-    text = value if isinstance(value, numbers.Real) else repr(value)
-    said = str(text)
-    return said if len(said) <= 80 else f"{said[:77]}..."
+    text = " ".join(str(value if isinstance(value, numbers.Real) else repr(value)).split("\n"))
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 RANKS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
@@ -292,8 +269,13 @@ RANKS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
 what a job was given, in which one process may run.)"""
 
 
-def require_one_process() -> None:
+def require_one_process(why: str = "", instead: str = "") -> None:
     """Refuse to be one of several ranks, which were all told to write the same file.
+
+    Parameters
+    ----------
+    why, instead : str
+        In place of these words, why not, and what to do.
 
     Raises
     ------
@@ -307,9 +289,11 @@ def require_one_process() -> None:
     for name in RANKS:
         ranks = os.environ.get(name, "1")
         if ranks.isdecimal() and int(ranks) > 1:
+            why = why or "each would write the same file"
+            unset = f"or unset {name} where each writes a file of its own"
+            instead = instead or f" (jamshape sweep makes packings on all cores), {unset}"
             msg = (
-                f"found {ranks} MPI ranks ({name}), expected one process, since each would write the same file;"
-                " start it without mpirun or srun (jamshape sweep makes packings on all cores), or unset"
-                f" {name} where each writes a file of its own"
+                f"found {ranks} MPI ranks ({name}), expected one process, since {why};"
+                f" start it without mpirun or srun{instead}"
             )
             raise RuntimeError(msg)

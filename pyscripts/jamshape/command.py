@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import signal
 import sys
 import warnings
@@ -32,6 +33,7 @@ SET_UP = "run ./run setup in the repository, then use .venv/bin/python"
 """What to do where something that jamshape needs is not there."""
 
 _INTERRUPTED = 130  # as shells tell that a program was ended by Ctrl-C
+_BROKEN_PIPE = 141  # and that nobody reads what it writes
 
 
 def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser:
@@ -114,7 +116,13 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
             warnings.showwarning = lambda said, *_: print(
                 f"{name}: warning: {said}", file=sys.stderr
             )
-            yield
+            try:
+                yield
+            finally:
+                sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads has seen enough, as `head` has
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(_BROKEN_PIPE)
     except PROBLEMS as error:
         sys.exit(f"{name}: {error}")
     except ImportError as error:

@@ -18,6 +18,7 @@ from jamshape.files.h5md import (
     read_creator,
     read_format_version,
     read_observables,
+    read_origin,
     read_packing,
     read_report,
 )
@@ -124,6 +125,7 @@ def _particles(path: Path) -> dict[str, Any]:
         found["reached"] = known["outcome"] in REACHED
     found |= {"frames": count_frames(path), **_cost(path, known)}
     found |= {"format_version": read_format_version(path), "jamshape_version": read_creator(path)}
+    found |= {"origin": origin} if (origin := read_origin(path)) else {}
     if not found["finished"]:
         found["go_on"] = stored.go_on.format(path=path, result=_result_of(path))
     return found

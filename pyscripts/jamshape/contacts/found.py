@@ -9,10 +9,11 @@ from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.contacts.network import ContactNetwork, find_contacts
 from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers
 from jamshape.packing import Packing
+from jamshape.records import Record
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class Contacts(Record):
     """A packing with its M contacts, and which of its N particles are rattlers.
 
     Parameters

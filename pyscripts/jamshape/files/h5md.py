@@ -3,7 +3,7 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
 ::
 
     /h5md               +version [1, 1]   author/+name   creator/+name, version, format_version (2; 1 where
-                        it is not there)
+                        it is not there), origin (what the last bits depend on: `jamshape.files.origin`)
     /particles/all      +shape_style
         box             +dimension D   +boundary D times "periodic"
             edges       {step, time, value (T, D), or (T, D, D) with the edge vectors as rows: of all
@@ -72,6 +72,7 @@ __all__ = [
     "read_creator",
     "read_format_version",
     "read_observables",
+    "read_origin",
     "read_packing",
     "read_report",
     "read_series",
@@ -261,9 +262,18 @@ def read_format_version(path: PathLike) -> int:
 
 def read_creator(path: PathLike) -> str:
     """Read which version of jamshape wrote a file; errors as `read_packing`."""
+    return _of_creator(path, "version", "unknown")
+
+
+def read_origin(path: PathLike) -> str:
+    """Read what the bits of a file depend on, as `jamshape.files.origin.origin` names it, "" where it is not told; errors as `read_packing`."""
+    return _of_creator(path, "origin", "")
+
+
+def _of_creator(path: PathLike, name: str, otherwise: str) -> str:
     with layout.opened(path) as file:
-        version = layout.require_item(file, "h5md/creator").attrs.get("version", b"unknown")
-        return version.decode() if isinstance(version, bytes) else str(version)
+        text = layout.require_item(file, "h5md/creator").attrs.get(name, otherwise)
+        return text.decode() if isinstance(text, bytes) else str(text)
 
 
 def read_observables(path: PathLike) -> dict[str, NDArray[Any]]:

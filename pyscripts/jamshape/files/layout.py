@@ -25,6 +25,7 @@ from jamshape.files.frames import (
     lengths_of,
 )
 from jamshape.files.journal import Pending, Table, read_journal
+from jamshape.files.origin import origin
 from jamshape.files.rows import Columns, Stored, as_column, gathered, table
 from jamshape.files.signature import HDF5, format_of
 from jamshape.files.vocabulary import FORMAT_VERSION, RENAMED, former
@@ -266,6 +267,7 @@ def write_metadata(file: h5py.File) -> None:
     creator.attrs["name"] = np.bytes_("jamshape")
     creator.attrs["version"] = np.bytes_(version)
     creator.attrs["format_version"] = FORMAT_VERSION
+    creator.attrs["origin"] = np.bytes_(origin())
 
 
 def create_file(

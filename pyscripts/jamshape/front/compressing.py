@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from jamshape.arguments import checked
 from jamshape.checks import (
     Range,
     require_in,
     require_one_of,
-    require_path_for_lammps,
+    require_path,
     require_rising,
     require_stated,
 )
@@ -32,6 +33,7 @@ _PHI_RANDOM = 0.4  # of the random start of a slow compression
 _PHI_SLOW = Range(0.41, 2.0, "a packing fraction above that of the random start, which is 0.4,")
 
 
+@checked
 def compress(
     particles: Particles,
     *,
@@ -118,7 +120,7 @@ def compress(
         settings = settings.in_steps(phi[0], rows, dimension)
     settings.steps(phi[0], dimension)  # refuses what does not end
     at = place(file, "run.h5")
-    require_path_for_lammps(at.path)  # restart files lie beside it
+    require_path(at.path)
     made_from = dict(particles.told) | {"n": n, "seed": seed}
     to = Recording(at.path, rows, frames, made_from)
     if again or not at.path.exists():
@@ -130,6 +132,7 @@ def compress(
     return RunFile(*at)
 
 
+@checked
 def slow_compress(
     particles: Particles | None = None,
     *,
@@ -197,7 +200,7 @@ def slow_compress(
     require_stated(n=n, seed=seed, phi_end=phi[1], tolerance=tolerance, largest_drop=largest_drop)
     if p_end != math.inf:
         require_stated(p_end=p_end)
-    rates = kappa if isinstance(kappa, int | float) else tuple(kappa)
+    rates = kappa if isinstance(kappa, float | int) else tuple(kappa)
     protocol = Protocol(rates, phi[1], p_end, tolerance, largest_drop=largest_drop, method=method)
     for _, rate in protocol.rates:
         require_stated(kappa=rate)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from jamshape.arguments import checked
 from jamshape.files.h5md import copy_run, read_attributes, write_packing
 from jamshape.files.lammps_text import read_any, write_data
 from jamshape.files.meaning import Wanted, require_told
@@ -17,6 +18,7 @@ from jamshape.packing import Packing
 from jamshape.vibration.table import holds_modes
 
 
+@checked
 def load(
     path: str | Path,
     frame: int | None = None,
@@ -82,6 +84,7 @@ def load(
     return measured
 
 
+@checked
 def save(path: str | Path, thing: Packing | Recorded | Modes) -> None:
     """Write a packing, a run or modes, replacing the file that is there only when all is written.
 

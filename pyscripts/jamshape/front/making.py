@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jamshape.checks import require_path, require_path_for_lammps, require_stated
+from jamshape.arguments import checked
+from jamshape.checks import require_path, require_stated
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow, place
 from jamshape.landscape.threads import sharing
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Progress, is_done, make, require_same, tidy
-from jamshape.protocols.recipe import Compressed, Dynamics
 from jamshape.shapes.particles import Particles
 
 
+@checked
 def make_packing(
     particles: Particles | None = None,
     *,
@@ -137,9 +138,7 @@ def make_packing(
     )  # fmt: skip
     require_stated(threads=threads)
     at = place(file, "packing.h5")
-    (require_path_for_lammps if isinstance(recipe.way, Dynamics | Compressed) else require_path)(
-        at.path
-    )
+    require_path(at.path)
     if again or not is_done(at.path):
         steps = make(recipe, at.path, again=again)
         with sharing(threads):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jamshape.arguments import checked
 from jamshape.arrays import FloatArray
 from jamshape.checks import Range, require_in, require_one_of, require_other_file
 from jamshape.files.disk import require_hdf5_name, settled
@@ -18,7 +19,14 @@ from jamshape.vibration.sets import TOLD, to_store
 from jamshape.vibration.sparse_modes import lowest as lowest_modes
 from jamshape.vibration.sparse_modes import near as modes_near
 from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
-from jamshape.vibration.table import ModeTable, holds_modes, read_modes, tabulate, write_modes
+from jamshape.vibration.table import (
+    BANDS,
+    ModeTable,
+    holds_modes,
+    read_modes,
+    tabulate,
+    write_modes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -108,6 +116,7 @@ class Modes:
 
     def in_band(self, name: str) -> Any:
         """Rows of the modes of a band: translation, low, middle or high."""
+        require_one_of("band", name, BANDS.values())
         return self.table.in_band(name)
 
     def plot(self, axes: Axes | None = None, **look: Any) -> Axes:
@@ -116,6 +125,7 @@ class Modes:
 
         return plot(self, axes, **look)
 
+    @checked
     def save(self, path: str | Path, *, vectors: bool = True) -> None:
         """Write them to an HDF5 file, with or without their vectors, replacing modes that are there.
 
@@ -162,6 +172,7 @@ def require_modes_file(out: Path, read: Sequence[Path] = ()) -> None:
         raise ValueError(msg)
 
 
+@checked
 def modes(
     packing: Packing | str | Path,
     *,

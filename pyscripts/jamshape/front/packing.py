@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from jamshape.arguments import checked, checked_fields
 from jamshape.arrays import BoolArray
 from jamshape.contacts import Contacts
 from jamshape.contacts.network import sum_forces
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from jamshape.front.modes import Modes
 
 
+@checked_fields
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuredPacking(Packing):
     """A `Packing` with what is known of it and what can be asked of it.
@@ -127,6 +129,7 @@ class MeasuredPacking(Packing):
 
         return plot(self, axes, **look)
 
+    @checked
     def save(self, path: str | Path) -> None:
         """Write it, as `jamshape.save`: how says the end of the name."""
         from jamshape.front.files import save  # noqa: PLC0415 - which knows packings
@@ -138,6 +141,7 @@ class MeasuredPacking(Packing):
         """Give the results without what tells of a run: a frame is not that run, which could be gone on with."""
         return {k: v for k, v in self.results.items() if k != "finished"}
 
+    @checked
     def to_gsd(self, path: str | Path) -> None:
         """Write it for HOOMD-blue, OVITO and freud; needs the package gsd."""
         from jamshape.exchange.gsd import write_gsd  # noqa: PLC0415 - gsd may be missing

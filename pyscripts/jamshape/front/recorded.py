@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from jamshape.checks import require_path_for_lammps
+from jamshape.arguments import checked
+from jamshape.checks import require_path
 from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
 from jamshape.flow import quasistatic, quasistatic_recording, recording, slow_recording
 from jamshape.flow.implicit import Step
@@ -19,6 +20,7 @@ from jamshape.front.run import Recorded, run_file
 from jamshape.lammps.session import Session
 
 
+@checked
 def resume(file: str | Path, *, progress: bool = True) -> Recorded:
     """Go on with a run that was cut off, as it was set; a finished one is loaded.
 
@@ -56,7 +58,7 @@ def resume(file: str | Path, *, progress: bool = True) -> Recorded:
         if record:
             record(path, progress)
         else:
-            require_path_for_lammps(path)
+            require_path(path)
             to = Recording(path, stored["rows"], stored["frames"])
             record_flow(lambda session: recording.resume(session, path)[0], to, progress)
     recording.tidy(path)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jamshape.arguments import checked
 from jamshape.arrays import FloatArray
 from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
@@ -22,7 +23,7 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.run_writer import RunWriter
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.progress import Told, follow
+from jamshape.front.progress import Told, follow, place
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
@@ -55,6 +56,11 @@ class Recorded:
 
         save(path, self)
 
+    def __reduce__(self) -> Any:
+        if self.folder is None:
+            return type(self), (self.file,)
+        return _brought_along, (type(self), self.file.name, self.file.read_bytes())
+
     @cached_property
     def about(self) -> dict[str, Any]:
         """What it is of and how it was set: attributes of its file."""
@@ -83,6 +89,7 @@ class Recorded:
         """Count the frames."""
         return count_frames(self.file)
 
+    @checked
     def packing(self, frame: int = -1) -> MeasuredPacking:
         """Read a frame, counted from 0, or with negative numbers from the end."""
         return MeasuredPacking.read(self.file, frame)
@@ -147,6 +154,7 @@ class RunFile(Recorded):
         except ValueError:  # it ends below jamming
             return None
 
+    @checked
     def jamming(self, *, progress: bool = True) -> Jamming:
         """Minimise frames, from the densest on, to see which stay jammed when nothing drives them.
 
@@ -218,6 +226,7 @@ class ShearFile(Recorded):
         """Rate, [1/time]."""
         return float(self.about["gdot"])
 
+    @checked
     def steady(self, after: float | None = None) -> SteadyState:
         """Average over the steady state, apart from the start-up.
 
@@ -271,6 +280,7 @@ class QuasistaticShearFile(Recorded):
         """(T,) dU/d(strain) over the volume, [energy / length^D]: the shear stress of simple shear."""
         return self["stress"]
 
+    @checked
     def events(self, least: float = 1e-2) -> list[Event]:
         """List the drops of the stress.
 
@@ -285,6 +295,7 @@ class QuasistaticShearFile(Recorded):
         """Slope of the stress in the first step, [energy / length^D]; that of the Hessian where the step is small."""
         return float((self.stress[1] - self.stress[0]) / (self.strain[1] - self.strain[0]))
 
+    @checked
     def steady(self, after: float | None = None) -> SteadyState:
         """Average over the steady state, as `ShearFile.steady`."""
         return steady_state(self.observables, self.strain, after)
@@ -293,6 +304,13 @@ class QuasistaticShearFile(Recorded):
         end = f"strain = {self.strain[-1]:.5g}, phi = {self.phi[-1]:.5g}, stress = {self.stress[-1]:.3g}"
         steps = len(self.strain) - 1
         return f"<Quasistatic shear of {self._who()}: {steps} steps to {end}{self._where()}>"
+
+
+def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:
+    """Make a run of what a pickle holds of one without a file of its own."""
+    at = place(None, name)
+    at.path.write_bytes(content)
+    return kind(*at)
 
 
 def run_file(path: Path, folder: Any = None) -> Recorded:

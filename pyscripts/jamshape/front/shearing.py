@@ -6,10 +6,10 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from jamshape.arguments import checked
 from jamshape.checks import (
     require_one_of,
     require_path,
-    require_path_for_lammps,
     require_stated,
 )
 from jamshape.flow import quasistatic_recording, recording, slow_recording
@@ -42,6 +42,7 @@ _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
 _ROUNDING = 1e-9
 
 
+@checked
 def shear(
     particles: Particles | None = None,
     *,
@@ -158,6 +159,7 @@ def shear(
     return ShearFile(*at)
 
 
+@checked
 def quasistatic_shear(
     particles: Particles | None = None,
     *,
@@ -321,7 +323,7 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
 
 
 def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> None:
-    require_path_for_lammps(to.path)  # restart files lie beside it
+    require_path(to.path)
     if how.again or not to.path.exists():
         first = of.flowing()
         settings.all_steps(first)  # refuses what does not end

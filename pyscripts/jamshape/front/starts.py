@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from pathlib import Path
 from typing import Any
@@ -36,4 +37,6 @@ def told_of(start: MeasuredPacking) -> dict[str, Any]:
     own = [parameter.name for parameter in start.shape.parameters]
     names, results = (*own, "size_ratio", "kinds", "seed"), start.results
     found = {name: results[name] for name in names if name in results}
-    return found | {"n": start.n, "start": "" if start.file is None else named(start.file)}
+    # As UTF-8, whatever the locale: names may hold bytes that it cannot read.
+    name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else ""
+    return found | {"n": start.n, "start": name}

@@ -76,6 +76,9 @@ class Landscape:
         self._pairs: Pairs | None = None
         self._wide: Pairs | None = None
 
+    def __reduce__(self) -> tuple[type[Landscape], tuple[Packing, float, int]]:
+        return type(self), (self.particles, self.k_e, self.sides)
+
     @cached_property
     def rotation_length(self) -> FloatArray:
         """(N,) lengths that a radian counts for: A, or a; 0 where nothing can turn."""

@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray
+from jamshape.arguments import checked_fields
+from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray, real_numbers
 from jamshape.packing.box import Box, Lengths, number_of_tilts
 from jamshape.packing.given import as_floats, as_integers
 from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
+from jamshape.records import Record
 from jamshape.shapes.shape import Interaction, Shape
 from jamshape.shapes.table import DEFAULT, shape_named
 
@@ -24,8 +26,9 @@ _REST_OF = {
 }
 
 
+@checked_fields
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Packing:
+class Packing(Record):
     """Particles in a periodic box.
 
     Arrays are copied and made read-only; use `with_` to change one.
@@ -94,20 +97,21 @@ class Packing:
     tilt_rest: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        n, dimension = len(self.position), self.box.dimension
+        n = len(np.atleast_1d(real_numbers("position", self.position)))
+        dimension = self.box.dimension
         if n == 0:
             msg = "packing has no particles, expected at least one"
             raise ValueError(msg)
-        if np.size(self.image) == 0:
+        if real_numbers("image", self.image).size == 0:
             object.__setattr__(self, "image", np.zeros((n, dimension), dtype=np.int64))
-        if np.size(self.exponent) == 0:
+        if real_numbers("exponent", self.exponent).size == 0:
             object.__setattr__(self, "exponent", np.ones(n))
         vector = (n, dimension)
         rotation = (n,) if dimension == 2 else (n, 4)
         rests = {"position_rest": vector, "orientation_rest": rotation, "edges_rest": (dimension,)}
         rests["tilt_rest"] = (number_of_tilts(dimension),)
         for name, shape in rests.items():
-            if np.size(getattr(self, name)) == 0:
+            if real_numbers(name, getattr(self, name)).size == 0:
                 object.__setattr__(self, name, np.zeros(shape))
         floats = {"position": vector, "orientation": rotation, "diameters": (n, 3), **rests}
         floats["exponent"] = (n,)

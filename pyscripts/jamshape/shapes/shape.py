@@ -117,6 +117,13 @@ class Shape(ABC):
     """Of mixtures, when nobody says; 1 for equal particles."""
     has_exponent: ClassVar[bool] = False
 
+    def __eq__(self, other: object) -> bool:
+        """Tell whether it is the same shape; copies and pickles of a shape are."""
+        return type(self) is type(other) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
+
     def compiled(
         self, particles: tuple[FloatArray, FloatArray], dimension: int, law: Interaction
     ) -> Any:

@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.landscape import Evaluation, Landscape, State
 from jamshape.minima import Residual, residual_of
+from jamshape.records import Record
 from jamshape.vibration.extended import EPS
 
 # Lengths are off by so many roundings of long doubles at most: sums of squares, roots, and where feet lie.
@@ -34,7 +35,7 @@ class NotAtMinimumError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Coordinates:
+class Coordinates(Record):
     """What the components of a mode are.
 
     Parameters
@@ -121,7 +122,7 @@ class Strains(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class DynamicalMatrix:
+class DynamicalMatrix(Record):
     """M = C^T C - S of n coordinates and m bonds (Marschall & Teitel 2018, Eqs. 38-40).
 
     Every entry is a double that is off by a few roundings of the sizes that it was summed of.
