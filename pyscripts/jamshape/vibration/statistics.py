@@ -17,10 +17,13 @@ from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum
 from jamshape.vibration.two_levels import rank_of
 
-# The gap below the high band is the widest within this fraction of all modes (or so many modes) of
+# The gap below the high band is the widest within this fraction of all modes, or this number of modes, of
 # where the rank of H says that it is.
-_NEAR_RANK = 0.02
+_NEAR_RANK = 0.002
 _NEAR_RANK_MODES = 3
+
+# Where the rank is that of all modes, bonds in excess of this fraction of them leave no band.
+_EXCESS = 0.02
 
 # Bands are apart if eigenvalues on both sides of the gap between them differ by this factor, as much as
 # `jamshape.vibration.two_levels` asks of modes that only the stiffness holds.
@@ -267,7 +270,7 @@ def _split(matrix: DynamicalMatrix, found: Spectrum) -> _Split:
     reach = max(_NEAR_RANK_MODES, int(_NEAR_RANK * n))
     n_low = int((size < _cut(matrix)).sum())
     n_below = _gap_near(size, n_low, n - rank, reach)
-    if rank >= n and matrix.n_bonds - n > reach:
+    if rank >= n and matrix.n_bonds - n > max(_NEAR_RANK_MODES, _EXCESS * n):
         held = f"{matrix.n_bonds} bonds, more than the {n} modes of vibration, hold all of them"
         return _Split([], f"no bands: {held}, as far above jamming")
     gap = _ratio(size, n_below)
