@@ -302,7 +302,9 @@ def summary(found: list[dict[str, Any]]) -> dict[str, Any]:
 
 def parser() -> ArgumentParser:
     """Make the parser of the command line."""
-    return parser_of(__doc__, "runs/moduli_error")
+    found = parser_of(__doc__, "runs/moduli_error")
+    found.add_argument("--only", type=int, nargs="*", metavar="K", help="numbers of packings, from 0")
+    return found
 
 
 def main(options: Namespace) -> None:
@@ -310,6 +312,8 @@ def main(options: Namespace) -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     found = []
     for number, case in enumerate(cases()):
+        if options.only is not None and number not in options.only:
+            continue
         path = options.out / f"{number:02}.h5"
         found.append(kept(path.with_suffix(".json"), measure, case, path))
         print(table_of(found[-1:]).splitlines()[-1], flush=True)

@@ -82,6 +82,8 @@ def show(table: ModeTable, bands: dict[str, Any]) -> None:
     )
     if "rank" in a:
         show_bands(table, bands)
+    if "why_no_bands" in a:
+        print(a["why_no_bands"])
     print("lambda          sign  bound     of state  P       par.   perp.  rot.   band")
     for k in np.flatnonzero(~table["is_translation"])[:SHOWN]:
         kinds = " ".join(f"{table[n][k]:6.3f}" for n in ("parallel", "perpendicular", "rotation"))
@@ -96,10 +98,14 @@ def show_moduli(table: ModeTable) -> None:
     found = table.moduli
     if found.n_floppy:
         print(f"floppy modes, left out of moduli: {found.n_floppy}")
+    if found.n_negative:
+        print(f"a saddle, with {found.n_negative} negative eigenvalues: moduli hold as long as it stays")
     for name in MODULI:
         modulus = getattr(found, name)
-        value = f"{modulus.relaxed:.8g} +- {modulus.bound:.2g}"
-        print(f"{name.replace('_', ' ')} modulus {modulus.reason or value}")
+        defined = math.isfinite(modulus.relaxed)
+        value = f"{modulus.relaxed:.8g} +- {modulus.bound:.2g}" if defined else "not defined"
+        why = f": {modulus.reason}" if modulus.reason else ""
+        print(f"{name.replace('_', ' ')} modulus {value}{why}")
     print(f"pressure {found.pressure:.8g}")
 
 
@@ -116,8 +122,6 @@ def show_bands(table: ModeTable, bands: dict[str, Any]) -> None:
         omega = math.nan if b["mean_omega"] is None else b["mean_omega"]
         row = f"{name:8} {b['modes']:6} {b['fraction']:9.5f} {b['negative']:9} {b['unsure']:7}"
         print(f"{row} {omega:11.4g}")
-    if "why_no_bands" in a:
-        print(a["why_no_bands"])
 
 
 def tell_redundant(sets: list[Redundancy], ids: Any) -> list[list[int]]:

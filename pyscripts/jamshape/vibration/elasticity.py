@@ -68,6 +68,8 @@ class Moduli(NamedTuple):
     """[energy / length^D], of the same state."""
     n_floppy: int = 0
     """Number of floppy modes: eigenvalues below their bounds. A modulus is that of all other modes."""
+    n_negative: int = 0
+    """Number of negative eigenvalues, as far as modes are known: at a saddle, moduli are not what shear measures."""
 
 
 def moduli(
@@ -112,8 +114,9 @@ def moduli(
         Modulus(np.nan if why else value, *rest, why)
         for why, value, *rest in zip(reasons, *(c.tolist() for c in columns), strict=True)
     ]
-    n_floppy = int(response.soft.is_floppy.sum())
-    return Moduli(*found, pressure=here.pressure, n_floppy=n_floppy)
+    soft = response.soft
+    n_floppy, n_negative = int(soft.is_floppy.sum()), int((soft.is_firm & (soft.sign < 0)).sum())
+    return Moduli(*found, here.pressure, n_floppy, n_negative)
 
 
 class _Combined(NamedTuple):
@@ -235,10 +238,11 @@ class Response:
         Z = self.soft.vectors[:, self.soft.is_floppy]
         coupling = np.abs(Z.T @ self.here.left.astype(np.float64))
         error = np.abs(Z).T @ self._left_error()
-        if drift is not None:
-            error += _SAFETY * np.abs(Z.T @ drift)
+        if drift is None:  # what net forces can do to a stress directly
+            net = self.matrix.compatibility.T @ self.matrix.bonds.pull
+            error += _SAFETY * np.linalg.norm(net)
         else:
-            error += np.linalg.norm(self.matrix.gradient)
+            error += _SAFETY * np.abs(Z.T @ drift)
         return [
             _reason(coupling[:, k], error[:, k], largest) for k in range(len(self.strains))
         ]

@@ -114,7 +114,8 @@ class ModeTable:
         return Moduli(
             *(_stored_modulus(a, f"{name}_modulus") for name in MODULI),
             pressure=a["pressure"],
-            n_floppy=a.get("n_floppy_left_out", 0),
+            n_floppy=int(a.get("n_floppy_left_out", 0)),
+            n_negative=int(a.get("n_negative_modes", 0)),
         )
 
 
@@ -163,7 +164,7 @@ def tabulate(
     if whole and len(found.singular_values):
         attributes |= count(matrix, found)._asdict()
     at = None if matrix.n_left_out else (landscape, state)
-    attributes |= _to_store(moduli(matrix, found, at))
+    attributes |= _to_store(_moduli(matrix, found, at))
     kinds = components(coordinates, state.packing(landscape.particles), found.vectors)
     error = state_error(*at, matrix, found) if whole and at else np.full(k, np.nan)
     columns = {
@@ -176,9 +177,22 @@ def tabulate(
     return ModeTable(columns, found.vectors, coordinates, found.singular_values, attributes)
 
 
+def _moduli(
+    matrix: DynamicalMatrix, found: Spectrum, at: tuple[Landscape, State] | None
+) -> Moduli:
+    """Compute moduli; where contacts were left out, say that their bounds are not known."""
+    elastic = moduli(matrix, found, at)
+    if at is not None:
+        return elastic
+    why = f"the bound is not known, as {matrix.n_left_out} contacts were left out"
+    given = {name: getattr(elastic, name) for name in MODULI}
+    return elastic._replace(**{name: m._replace(reason=m.reason or why) for name, m in given.items()})
+
+
 def _to_store(elastic: Moduli) -> dict[str, Any]:
     """Spread moduli over attributes."""
-    found: dict[str, Any] = {"n_floppy_left_out": elastic.n_floppy, "pressure": elastic.pressure}
+    found: dict[str, Any] = {"pressure": elastic.pressure}
+    found |= {"n_floppy_left_out": elastic.n_floppy, "n_negative_modes": elastic.n_negative}
     for name in MODULI:
         modulus: Modulus = getattr(elastic, name)
         key = f"{name}_modulus"
