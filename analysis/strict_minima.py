@@ -64,7 +64,10 @@ def parser() -> ArgumentParser:
 
 def parts_of(matrix: DynamicalMatrix, found: Spectrum) -> dict[str, float]:
     """Give the fraction of all modes but translations that is in each band; NaN where bands are not apart."""
-    n, nothing = int((~found.is_translation).sum()), math.nan if why_no_bands(matrix, found) else 0.0
+    n, nothing = (
+        int((~found.is_translation).sum()),
+        math.nan if why_no_bands(matrix, found) else 0.0,
+    )
     return dict.fromkeys(TOLD, nothing) | {b.name: b.n_modes / n for b in bands(matrix, found)}
 
 

@@ -38,7 +38,10 @@ from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix, gradie
 from jamshape.vibration.table import MODULI
 
 STRAIN = 1e-4  # of shear, over the relative overlap
-STEP, OF_WEAKEST = 1e-5, 0.1  # of differences, over the mean overlap and at most over the smallest one
+STEP, OF_WEAKEST = (
+    1e-5,
+    0.1,
+)  # of differences, over the mean overlap and at most over the smallest one
 TOLERANCE = 1e-13
 NOISE = 3.0  # errors are largely rounding, of which other steps show the size
 EPS = float(np.finfo(float).eps)
@@ -108,7 +111,7 @@ def map_of(name: str, dimension: int, strain: float) -> LongArray:
 
 
 def slope(name: str, landscape: Landscape, state: State) -> float:
-    """Derivative of the energy by a strain; of the pressure over D for the bulk modulus."""
+    """Differentiate the energy by a strain, or take the pressure for the bulk modulus."""
     contacts = landscape.derivatives(state, extended=True)
     virial = contacts["separation"].T @ contacts["force"]
     if name == "bulk":
@@ -158,7 +161,10 @@ def differences(landscape: Landscape, state: State, matrix: DynamicalMatrix, h: 
     matrix_ = np.array([(along(k, h) - along(k, -h)) / (2 * h) for k in range(at.size)])
     up, down = ([deformed(state, map_of(name, D, e)) for name in MODULI] for e in (h, -h))
     pushed = [(gradient(a) - gradient(b)) / (2 * h) for a, b in zip(up, down, strict=True)]
-    slopes = [[slope(name, landscape, there) for name, there in zip(MODULI, of, strict=True)] for of in (up, down)]
+    slopes = [
+        [slope(name, landscape, there) for name, there in zip(MODULI, of, strict=True)]
+        for of in (up, down)
+    ]
     affine = (np.array(slopes[0]) - slopes[1]) / (2 * h)
     return Dense(0.5 * (matrix_ + matrix_.T), np.array(pushed).T, affine)
 
@@ -174,7 +180,8 @@ def by_elimination(matrix: DynamicalMatrix, held: FloatArray, state: State) -> F
         for a in (matrix.compatibility.toarray(), matrix.prestress.toarray(), held)
     )
     pushed = C.T @ given.stretched + given.pushed
-    x = eliminated(C.T @ C - S + Z @ Z.T, -(pushed - Z @ (Z.T @ pushed)))
+    right: LongArray = np.asarray(-(pushed - Z @ (Z.T @ pushed)), np.longdouble)
+    x = eliminated(C.T @ C - S + Z @ Z.T, right)
     rise = (np.asarray(given.stretched, np.longdouble) ** 2).sum(axis=0) + given.affine
     rise += (x * pushed).sum(axis=0)
     virial = (matrix.contacts["separation"] * matrix.contacts["force"]).sum(axis=0) / state.volume
@@ -242,8 +249,13 @@ def measure(case: Case, path: Path) -> dict[str, Any]:
             "dense": dense[k],
         }
     return {
-        **{"packing": case.name, "dimension": case.dimension, "n": case.n, "u0": case.u0},
-        **{"residual": matrix.residual.largest, "n_floppy": modes.moduli.n_floppy, "moduli": rows},
+        "packing": case.name,
+        "dimension": case.dimension,
+        "n": case.n,
+        "u0": case.u0,
+        "residual": matrix.residual.largest,
+        "n_floppy": modes.moduli.n_floppy,
+        "moduli": rows,
     }
 
 
@@ -256,14 +268,25 @@ def is_within(row: dict[str, Any]) -> bool:
         row["rounding"] + EPS * abs(row["modulus"]),
     )
     return all(
-        abs(row["modulus"] - row[other]) <= error for other, error in zip(others, errors, strict=True)
+        abs(row["modulus"] - row[other]) <= error
+        for other, error in zip(others, errors, strict=True)
     )
 
 
 def table_of(found: list[dict[str, Any]]) -> str:
     """Write a line for each packing with its largest numbers over three moduli, relative to these."""
     heads = (
-        *("packing", "D", "N", "u0", "floppy", "simple shear", "bound", "beside shear", "its error"),
+        *(
+            "packing",
+            "D",
+            "N",
+            "u0",
+            "floppy",
+            "simple shear",
+            "bound",
+            "beside shear",
+            "its error",
+        ),
         *("beside differences", "their error", "beside dense", "within"),
     )
 
@@ -274,7 +297,13 @@ def table_of(found: list[dict[str, Any]]) -> str:
             return f"{max(value(row) / abs(row['modulus']) for row in rows):.1e}"
 
         return [
-            *(of["packing"], str(of["dimension"]), str(of["n"]), f"{of['u0']:.0e}", str(of["n_floppy"])),
+            *(
+                of["packing"],
+                str(of["dimension"]),
+                str(of["n"]),
+                f"{of['u0']:.0e}",
+                str(of["n_floppy"]),
+            ),
             f"{of['moduli']['simple_shear']['modulus']:.6e}",
             largest(lambda row: row["bound"]),
             largest(lambda row: abs(row["modulus"] - row["shear"])),
@@ -303,7 +332,9 @@ def summary(found: list[dict[str, Any]]) -> dict[str, Any]:
 def parser() -> ArgumentParser:
     """Make the parser of the command line."""
     found = parser_of(__doc__, "runs/moduli_error")
-    found.add_argument("--only", type=int, nargs="*", metavar="K", help="numbers of packings, from 0")
+    found.add_argument(
+        "--only", type=int, nargs="*", metavar="K", help="numbers of packings, from 0"
+    )
     return found
 
 

@@ -27,7 +27,9 @@ def test_all_moduli_are_within_their_bounds(report, tmp_path, measured):
     )
     require_within(found, 60)
     assert sum(row["n_floppy"] > 0 for row in found["packings"]) >= 5
-    rods = [row for row in found["packings"] if (row["packing"], row["u0"]) == ("rods, alpha = 4", 1e-6)]
+    rods = [
+        row for row in found["packings"] if (row["packing"], row["u0"]) == ("rods, alpha = 4", 1e-6)
+    ]
     for row in rods:
         shear = row["moduli"]["simple_shear"]
         assert abs(shear["shear"] / shear["modulus"] - 1) < 1e-4

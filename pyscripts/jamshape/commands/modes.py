@@ -99,7 +99,9 @@ def show_moduli(table: ModeTable) -> None:
     if found.n_floppy:
         print(f"floppy modes, left out of moduli: {found.n_floppy}")
     if found.n_negative:
-        print(f"a saddle, with {found.n_negative} negative eigenvalues: moduli hold as long as it stays")
+        print(
+            f"a saddle, with {found.n_negative} negative eigenvalues: moduli hold as long as it stays"
+        )
     for name in MODULI:
         modulus = getattr(found, name)
         defined = math.isfinite(modulus.relaxed)

@@ -92,31 +92,41 @@ def moduli(
     -------
     Moduli
     """
-    D = matrix.coordinates.dimension
-    stretch, shear, tilt = np.eye(D), np.zeros((D, D)), np.zeros((D, D))
-    shear[0, 0], shear[1, 1], tilt[0, 1] = 0.5, -0.5, 1.0
-    strains = np.stack([stretch, shear, tilt])
-    response = Response.of(matrix, strains, softest(matrix, soft))
+    response = Response.of(matrix, _strains(matrix), softest(matrix, soft))
     here = _Combined.of(matrix, response.here.value)
-    affine = _Combined.of(matrix, _point(matrix, strains, 0 * response.motion).value)
+    affine = _Combined.of(matrix, _point(matrix, response.strains, 0 * response.motion).value)
     rounding = response.rounding() / matrix.volume * here.scale + here.rounding
     drift, of_state = None, np.full(3, np.nan)
     if at is not None:
         near = nearer_minimum(*at, matrix, response.solved(-matrix.gradient))
-        there = _point(near.matrix, strains, response.motion)
+        there = _point(near.matrix, response.strains, response.motion)
         drift = (there.left - response.here.left).astype(np.float64) / near.part
         change = np.abs(_Combined.of(near.matrix, there.value).value - here.value) / near.part
         further = response.squared(response.along(drift)) / matrix.volume * here.scale
         of_state = _SAFETY * (change + further)
-    reasons = response.reasons(drift)
-    columns = (here.value, affine.value, rounding, of_state)
-    found = [
-        Modulus(np.nan if why else value, *rest, why)
-        for why, value, *rest in zip(reasons, *(c.tolist() for c in columns), strict=True)
-    ]
-    soft = response.soft
-    n_floppy, n_negative = int(soft.is_floppy.sum()), int((soft.is_firm & (soft.sign < 0)).sum())
-    return Moduli(*found, here.pressure, n_floppy, n_negative)
+    reasons, value = response.reasons(drift), here.value
+    bulk, pure_shear, simple_shear = (
+        Modulus(
+            relaxed=np.nan if reasons[k] else float(value[k]),
+            affine=float(affine.value[k]),
+            rounding=float(rounding[k]),
+            of_state=float(of_state[k]),
+            reason=reasons[k],
+        )
+        for k in range(3)
+    )
+    known = response.soft
+    n_floppy, n_negative = int(known.is_floppy.sum()), int((known.sign[known.is_firm] < 0).sum())
+    return Moduli(bulk, pure_shear, simple_shear, here.pressure, n_floppy, n_negative)
+
+
+def _strains(matrix: DynamicalMatrix) -> FloatArray:
+    """(3, D, D) strains of `Moduli`: dilation, pure shear and simple shear."""
+    D = matrix.coordinates.dimension
+    strains = np.zeros((3, D, D))
+    strains[0] = np.eye(D)
+    strains[1, 0, 0], strains[1, 1, 1], strains[2, 0, 1] = 0.5, -0.5, 1.0
+    return strains
 
 
 class _Combined(NamedTuple):
@@ -197,18 +207,21 @@ class Response:
     def solved(self, push: FloatArray) -> FloatArray:
         """(n,) motion under forces, those on translations and floppy modes left out."""
         found = self.inverse.solve(push - _onto(self.inverse.held, push)).v
-        return found - _onto(self.inverse.held, found)
+        return np.asarray(found - _onto(self.inverse.held, found))
 
     def along(self, left: FloatArray) -> FloatArray:
         """(l + 1, k) magnitudes of (n, k) columns along l modes that are not floppy, and of what is left."""
         modes = self.soft.vectors[:, self.soft.is_firm]
         parts = modes.T @ left
         beside = left - modes @ parts - _onto(self.inverse.held, left)
-        return np.abs(np.vstack([parts, np.linalg.norm(beside, axis=0)]))
+        return np.asarray(np.abs(np.vstack([parts, np.linalg.norm(beside, axis=0)])))
 
     def squared(self, along: FloatArray) -> FloatArray:
         """(k,) bound of what such a slope that is left can change E by."""
-        values, bound = np.abs(self.soft.eigenvalues[self.soft.is_firm]), self.soft.bound[self.soft.is_firm]
+        values, bound = (
+            np.abs(self.soft.eigenvalues[self.soft.is_firm]),
+            self.soft.bound[self.soft.is_firm],
+        )
         # All modes that are not known are stiffer than those that are; of a whole spectrum there is none.
         beside = 0.5 * values.max(initial=0.0) if values.size else np.inf
         stiffness = np.append(values - bound, beside)
@@ -243,9 +256,7 @@ class Response:
             error += _SAFETY * np.linalg.norm(net)
         else:
             error += _SAFETY * np.abs(Z.T @ drift)
-        return [
-            _reason(coupling[:, k], error[:, k], largest) for k in range(len(self.strains))
-        ]
+        return [_reason(coupling[:, k], error[:, k], largest) for k in range(len(self.strains))]
 
     def _changes(self) -> tuple[FloatArray, FloatArray]:
         """(m, k) and (n, k) bounds of what rounding changes C x + s and S x by."""
@@ -266,7 +277,9 @@ def _reason(coupling: FloatArray, error: FloatArray, residual: float) -> str:
     if not len(couples):
         return ""
     worst = couples[np.argmax(coupling[couples])]
-    motions = "a floppy motion couples" if len(couples) == 1 else f"{len(couples)} floppy motions couple"
+    motions = (
+        "a floppy motion couples" if len(couples) == 1 else f"{len(couples)} floppy motions couple"
+    )
     return (
         f"{motions} to this strain (by {coupling[worst]:.2g}, known to {error[worst]:.1g}), so that nothing"
         f" holds the packing against it; the residual is {residual:.2g}"
@@ -285,10 +298,14 @@ def _point(matrix: DynamicalMatrix, strains: FloatArray, x: FloatArray) -> _Poin
     value = (stretched**2).sum(axis=0) - (long * pushed).sum(axis=0)
     value += 2 * (long * given.pushed).sum(axis=0) + given.affine
     left = SparseRows(matrix.compatibility.T) @ stretched - pushed + given.pushed
-    return _Point(value, left, stretched)
+    return _Point(value, np.asarray(left, np.longdouble), stretched)
 
 
 def _errors_of(matrix: DynamicalMatrix, strains: FloatArray) -> Strains:
     """Bound what rounding changes in what strains do."""
     sizes, lost = matrix.strained_sizes(strains)
-    return Strains(*(ROUNDINGS * EPS * a + b for a, b in zip(sizes, lost, strict=True)))
+    return Strains(
+        stretched=ROUNDINGS * EPS * sizes.stretched + lost.stretched,
+        pushed=ROUNDINGS * EPS * sizes.pushed + lost.pushed,
+        affine=ROUNDINGS * EPS * sizes.affine + lost.affine,
+    )

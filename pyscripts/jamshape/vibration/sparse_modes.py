@@ -101,7 +101,7 @@ def _supports(translations: FloatArray, floppy: FloatArray) -> IntArray:
     """Choose as many coordinates as there are modes, such that no mode moves without them."""
     first = np.abs(translations).argmax(axis=0)
     if not floppy.shape[1]:
-        return first
+        return np.asarray(first)
     both = np.column_stack([translations, floppy]).T
     order = scipy.linalg.qr(both, mode="r", pivoting=True)[1]
     return np.asarray(order[: len(both)])
@@ -195,12 +195,18 @@ def _is_most(matrix: DynamicalMatrix, k: int) -> bool:
     """Whether k is all modes but a few, which Lanczos iteration leaves to dense methods."""
     n = matrix.size - matrix.translations.shape[1]
     if n == 0:
-        msg = f"the packing has no modes of vibration, as all its {matrix.size} modes are translations"
-        raise ValueError(f"{msg}; ask for the whole spectrum to see them")
+        msg = (
+            f"the packing has no modes of vibration, as all its {matrix.size} modes are translations;"
+            " ask for the whole spectrum to see them"
+        )
+        raise ValueError(msg)
     if not 1 <= k <= n:
-        msg = f"{k} modes were asked for, expected from 1 to {n}, the number of modes of vibration"
-        raise ValueError(f"{msg}; leave the number out for the whole spectrum")
-    return k > n - _BEYOND
+        msg = (
+            f"{k} modes were asked for, expected from 1 to {n}, the number of modes of vibration;"
+            " leave the number out for the whole spectrum"
+        )
+        raise ValueError(msg)
+    return bool(k > n - _BEYOND)
 
 
 def _nearest(matrix: DynamicalMatrix, k: int, shift: float) -> Spectrum:

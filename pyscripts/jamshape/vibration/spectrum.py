@@ -86,12 +86,12 @@ class Spectrum:
     @property
     def is_floppy(self) -> NDArray[np.bool_]:
         """(k,) modes but translations of which not even the sign is known: eigenvalues below their bounds."""
-        return (self.sign == 0) & ~self.is_translation
+        return np.asarray((self.sign == 0) & ~self.is_translation)
 
     @property
     def is_firm(self) -> NDArray[np.bool_]:
         """(k,) modes that are neither floppy nor translations."""
-        return (self.sign != 0) & ~self.is_translation
+        return np.asarray((self.sign != 0) & ~self.is_translation)
 
     def picked(self, rows: NDArray[Any]) -> Spectrum:
         """Choose modes, by rows or by a mask."""

@@ -284,19 +284,19 @@ def _split(matrix: DynamicalMatrix, found: Spectrum) -> _Split:
         reason = f"{where}: no gap of a factor of {_GAP:g} between first and second order in the prestress"
         return _Split(high, reason)
     limits = {"low": (0, n_low), "middle": (n_low, n_below)}
-    below = [
+    soft = [
         _band(found, name, order[first:last], _ratio(size, first))
         for name, (first, last) in limits.items()
         if last > first
     ]
-    return _Split(below + high, "")
+    return _Split(soft + high, "")
 
 
 def _cut(matrix: DynamicalMatrix) -> float:
     """Eigenvalue between those of first and of second order in the prestress."""
     stiffness = float(matrix.bonds.stiffness.mean())
     distance = float(matrix.contacts["distance"][matrix.contacts["distance"] > 0].mean())
-    return stiffness * float(matrix.bond_force / (stiffness * distance)) ** 1.5
+    return float(stiffness * (matrix.bond_force / (stiffness * distance)) ** 1.5)
 
 
 def _ratio(size: FloatArray, first: int) -> float:

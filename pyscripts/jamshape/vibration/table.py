@@ -111,12 +111,11 @@ class ModeTable:
     def moduli(self) -> Moduli:
         """Elastic moduli; bounds are NaN in files of versions that did not have them."""
         a = self.attributes
-        return Moduli(
-            *(_stored_modulus(a, f"{name}_modulus") for name in MODULI),
-            pressure=a["pressure"],
-            n_floppy=int(a.get("n_floppy_left_out", 0)),
-            n_negative=int(a.get("n_negative_modes", 0)),
+        bulk, pure_shear, simple_shear = (_stored_modulus(a, f"{name}_modulus") for name in MODULI)
+        n_floppy, n_negative = (
+            int(a.get(name, 0)) for name in ("n_floppy_left_out", "n_negative_modes")
         )
+        return Moduli(bulk, pure_shear, simple_shear, a["pressure"], n_floppy, n_negative)
 
 
 def tabulate(
@@ -177,16 +176,16 @@ def tabulate(
     return ModeTable(columns, found.vectors, coordinates, found.singular_values, attributes)
 
 
-def _moduli(
-    matrix: DynamicalMatrix, found: Spectrum, at: tuple[Landscape, State] | None
-) -> Moduli:
+def _moduli(matrix: DynamicalMatrix, found: Spectrum, at: tuple[Landscape, State] | None) -> Moduli:
     """Compute moduli; where contacts were left out, say that their bounds are not known."""
     elastic = moduli(matrix, found, at)
     if at is not None:
         return elastic
     why = f"the bound is not known, as {matrix.n_left_out} contacts were left out"
     given = {name: getattr(elastic, name) for name in MODULI}
-    return elastic._replace(**{name: m._replace(reason=m.reason or why) for name, m in given.items()})
+    return elastic._replace(
+        **{name: m._replace(reason=m.reason or why) for name, m in given.items()}
+    )
 
 
 def _to_store(elastic: Moduli) -> dict[str, Any]:
@@ -203,8 +202,9 @@ def _to_store(elastic: Moduli) -> dict[str, Any]:
 
 
 def _stored_modulus(attributes: Mapping[str, Any], key: str) -> Modulus:
-    parts = (float(attributes.get(f"{key}_{part}", np.nan)) for part in _PARTS)
-    return Modulus(float(attributes[key]), *parts, str(attributes.get(f"{key}_reason", "")))
+    affine, rounding, of_state = (float(attributes.get(f"{key}_{p}", np.nan)) for p in _PARTS)
+    reason = str(attributes.get(f"{key}_reason", ""))
+    return Modulus(float(attributes[key]), affine, rounding, of_state, reason)
 
 
 def write_modes(

@@ -57,9 +57,7 @@ def test_few_modes_are_told_like_all(packing, whole, k):
 
 @pytest.mark.parametrize("n", [1, 2])
 def test_one_or_two_discs(n):
-    discs = js.make_packing(
-        js.Spherocylinders(alpha=0), n=n, seed=1, u0=1e-8, progress=False
-    )
+    discs = js.make_packing(js.Spherocylinders(alpha=0), n=n, seed=1, u0=1e-8, progress=False)
     found = js.modes(discs)
     assert len(found) == 2 * n
     assert len(found.vibrational) == density_of_states(found.omega).n_modes.sum() == 2 * n - 2

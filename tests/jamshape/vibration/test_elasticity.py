@@ -133,7 +133,7 @@ def test_floppy_modes_are_left_out():
 
 
 def test_a_floppy_mode_that_couples_leaves_no_modulus():
-    landscape, state, matrix, whole = floppy()
+    _, _, matrix, whole = floppy()
     pushed, _ = strains_of(matrix)
     firm = np.flatnonzero(whole.is_firm)
     k = firm[np.abs(whole.vectors[:, firm].T @ pushed).argmax()]  # made floppy
@@ -162,9 +162,7 @@ def test_rounding_is_bounded(name):
             mpmath.matrix(part.toarray().tolist())
             for part in (matrix.compatibility, matrix.prestress)
         )
-        s, f, Z = (
-            mpmath.matrix(part.tolist()) for part in (given.stretched, given.pushed, held)
-        )
+        s, f, Z = (mpmath.matrix(part.tolist()) for part in (given.stretched, given.pushed, held))
         push = C.T * s + f
         beside = C.T * C - S + Z * Z.T  # which does not move what is held
         x = mpmath.lu_solve(beside, -push + Z * (Z.T * push))

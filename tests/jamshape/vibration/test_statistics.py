@@ -129,9 +129,7 @@ def test_there_are_no_bands_without_a_gap_where_the_rank_says_so():
 
 
 def test_low_and_middle_modes_that_run_into_each_other_are_in_no_band():
-    matrix, made = with_values(
-        [0, 0, *np.geomspace(1e-14, 1e-10, 12)], np.linspace(0.01, 1, 40)
-    )
+    matrix, made = with_values([0, 0, *np.geomspace(1e-14, 1e-10, 12)], np.linspace(0.01, 1, 40))
     (high,) = bands(matrix, made)
     assert (high.name, high.n_modes) == ("high", matrix.size - 14)
     assert "the softest 12 modes are no low and middle bands" in why_no_bands(matrix, made)
