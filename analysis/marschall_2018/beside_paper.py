@@ -20,7 +20,7 @@ from jamshape.files.sets import System, n_of, of_paper, read_groups
 from jamshape.measures import published
 from jamshape.measures.averages import Mean, mean
 from jamshape.measures.runs import read_run
-from jamshape.vibration.sets import TOLD, read_tables
+from jamshape.vibration.sets import TOLD, fraction_of, read_tables
 
 NONE = Mean(math.nan)
 
@@ -80,7 +80,7 @@ def rows_of_modes(paths: list[Path]) -> tuple[int, list[Row]]:
     known = published.BANDS.get(alpha_of(key.system), {})
     rows = []
     for band in TOLD:
-        share = mean([len(t.in_band(band)) / int(t.attributes["n_modes"]) for t in tables])
+        share = mean([fraction_of(t, band) for t in tables])
         paper = f"{known[band]:.4f}" if known else ""
         rows.append(Row(f"modes in the {band} band", len(tables), share.text(), paper))
     return int(tables[0].attributes["n"]), rows

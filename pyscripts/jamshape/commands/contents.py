@@ -28,7 +28,7 @@ from jamshape.files.sets import REACHED
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
 from jamshape.front.packing import MeasuredPacking, results_of
 from jamshape.packing import Packing
-from jamshape.vibration.sets import TOLD, of_packing
+from jamshape.vibration.sets import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
 _STATE = ("phi", "pressure", "u", "z", "rattlers")
@@ -197,7 +197,7 @@ def _modes(table: ModeTable) -> dict[str, Any]:
     found |= _picked(own, ("n", "n_modes", "z", "pressure", "method", "wall_seconds"))
     found |= {"modes": len(table["eigenvalues"]), "rattlers": own["n"] - own["n_backbone"]}
     found |= {"error": own["residual"], "vectors": table.vectors.shape[1] > 0}
-    return found | {"bands": {name: len(table.in_band(name)) for name in TOLD}, "finished": True}
+    return found | {"bands": {name: count_of(table, name) for name in TOLD}, "finished": True}
 
 
 def _require_told(told: Mapping[str, Any], wanted: Wanted) -> None:

@@ -87,7 +87,9 @@ def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
     if found.get("kinds"):
         known["kinds_text"] = "; ".join(_kind(kind, found["unit"]) for kind in found["kinds"])
     if "bands" in found:
-        known["bands_text"] = ", ".join(f"{count} {name}" for name, count in found["bands"].items())
+        counts = {name: count for name, count in found["bands"].items() if count is not None}
+        told = ", ".join(f"{count} {name}" for name, count in counts.items())
+        known["bands_text"] = told or "no bands"
     for subject, parts in _LINES.items():
         said = [text for text in (_filled(part, known) for part in parts) if text]
         if said:

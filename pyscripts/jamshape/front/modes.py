@@ -8,16 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jamshape.arguments import checked
-from jamshape.arrays import FloatArray
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.checks import Range, require_in, require_one_of, require_other_file
 from jamshape.files.disk import require_hdf5_name, settled
 from jamshape.front.packing import MeasuredPacking
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
+from jamshape.vibration.elasticity import Moduli
 from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
 from jamshape.vibration.sets import TOLD, to_store
 from jamshape.vibration.sparse_modes import lowest as lowest_modes
 from jamshape.vibration.sparse_modes import near as modes_near
+from jamshape.vibration.sparse_modes import with_translations
 from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
 from jamshape.vibration.table import (
     BANDS,
@@ -114,10 +116,33 @@ class Modes:
     def __len__(self) -> int:
         return len(self.table["eigenvalues"])
 
-    def in_band(self, name: str) -> Any:
-        """Rows of the modes of a band: translation, low, middle or high."""
+    def in_band(self, name: str) -> IntArray:
+        """Rows of the modes of a band: translation, low, middle or high.
+
+        There are none where bands are not apart, as far above jamming; ``repr(modes)`` says why.
+        """
         require_one_of("band", name, BANDS.values())
         return self.table.in_band(name)
+
+    @property
+    def vibrational(self) -> IntArray:
+        """Rows of all modes but translations, which are flagged by ``modes["is_translation"]`` and have omega = 0."""
+        return self.table.vibrational
+
+    @property
+    def moduli(self) -> Moduli:
+        """Elastic moduli ``bulk``, ``pure_shear`` and ``simple_shear``, each with its ``bound``.
+
+        Examples
+        --------
+        >>> import jamshape as js
+        >>> discs = js.Spherocylinders(alpha=0)
+        >>> packing = js.make_packing(discs, n=16, u0=1e-8, file="discs.h5", progress=False)
+        >>> bulk = js.modes(packing).moduli.bulk
+        >>> bulk.bound < 1e-6 * bulk.relaxed
+        True
+        """
+        return self.table.moduli
 
     def plot(self, axes: Axes | None = None, **look: Any) -> Axes:
         """Draw the density of their frequencies; arguments as `jamshape.plot`."""
@@ -140,11 +165,14 @@ class Modes:
         write_modes(path, self.table, self.about, vectors=vectors)
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{len(self.in_band(name))} {name}" for name in TOLD)
+        known = [name for name in TOLD if self.table.has_band(name)]
+        counts = ", ".join(f"{len(self.in_band(name))} {name}" for name in known)
         a = self.table.attributes
         of = f"{a['n_backbone']} of {a['n']} particles held by {a['n_bonds']} bonds"
-        bands = f" ({counts})" if len(self) == a["n_modes"] else f" of {a['n_modes']}"
-        return f"<{len(self)} modes{bands} of {of}: z = {a['z']:.4g}>"
+        is_whole = len(self) == a["n_modes"]
+        bands = f" ({counts or 'no bands'})" if is_whole else f" of {a['n_modes']}"
+        why = f"; {a['why_no_bands']}" if is_whole and "why_no_bands" in a else ""
+        return f"<{len(self)} modes{bands} of {of}: z = {a['z']:.4g}{why}>"
 
     def _repr_html_(self) -> str:
         from jamshape.front.pictures import html  # noqa: PLC0415 - only notebooks ask
@@ -190,7 +218,8 @@ def modes(
     packing : Packing or path
         At a minimum of its energy, as `make_packing` leaves it; the energy is that of its law, ``packing.law``.
     lowest : int, optional
-        Only so many of the softest modes, by a sparse method; all when left out.
+        Only this number of softest modes, by a sparse method; all when left out. Translations do not count
+        and come in addition, flagged, as in the whole spectrum.
     near : float, [sqrt(energy) / length], optional
         As many modes as `lowest` says, or 20, whose frequencies are nearest to this one.
     method : {"projected", "refined", "plain", "first_order", "sparse"}
@@ -206,7 +235,8 @@ def modes(
     Returns
     -------
     Modes
-        Each eigenvalue with its sign, the bound of its error, participation, kind of motion and band.
+        Each eigenvalue with its sign, the bound of its error, participation, kind of motion and band;
+        translations have the eigenvalue 0.
 
     Raises
     ------
@@ -221,8 +251,10 @@ def modes(
     >>> rods = js.Spherocylinders(alpha=1)
     >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> softest = js.modes(packing, lowest=4)
-    >>> softest.omega.shape
+    >>> softest.omega[softest.vibrational].shape
     (4,)
+    >>> len(softest), len(softest.in_band("translation"))
+    (6, 2)
     """
     require_one_of("the method", method, (*METHODS, _SPARSE))
     require_one_of("rotation", rotation, ("half_length", "radius"))
@@ -247,9 +279,10 @@ def modes(
 def _found(
     matrix: DynamicalMatrix, method: str, lowest: int | None, near: float | None
 ) -> Spectrum:
-    """Find the modes that were asked for, by the method that was."""
+    """Find the modes that were asked for, by the method that was, and translations."""
+    few = lowest or min(FEW, max(1, matrix.size - matrix.translations.shape[1]))
     if near is not None:
-        return modes_near(matrix, lowest or FEW, near**2)
+        return with_translations(matrix, modes_near(matrix, few, near**2))
     if method == _SPARSE or lowest:
-        return lowest_modes(matrix, lowest or FEW)
+        return with_translations(matrix, lowest_modes(matrix, few))
     return spectrum(matrix, method)
