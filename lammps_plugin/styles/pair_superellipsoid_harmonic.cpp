@@ -3,6 +3,7 @@
 #include "atom.h"
 #include "comm.h"
 #include "error.h"
+#include "text.hpp"
 #include "utils.h"
 
 #include <algorithm>
@@ -23,6 +24,11 @@ constexpr double ELLIPSOID = 1.0;  // the exponent of types that were given none
 double PairSuperellipsoidHarmonic::exponent(int type) const
 {
   return exponent_of.empty() ? ELLIPSOID : exponent_of[type];
+}
+
+std::string PairSuperellipsoidHarmonic::more_coefficients(int type) const
+{
+  return " " + exactly(exponent(type));
 }
 
 void PairSuperellipsoidHarmonic::coeff(int narg, char **arg)

@@ -30,6 +30,7 @@ class PairSuperellipsoidHarmonic : public PairContactOf<SuperellipsoidModel> {
   }
   std::string energy_name() const override { return "epsilon"; }
   std::string coeff_rule() const override { return "'I J epsilon' or 'I I epsilon p'"; }
+  std::string more_coefficients(int type) const override;
   std::string without_force() const override { return "coinciding centres"; }
   double exponent(int type) const override;
 
