@@ -254,8 +254,11 @@ void PairContact::require_only_one_turns() const
 {
   if (force->pair == this) return;
   int n_ours = 0;
+  LAMMPS_NS::Pair *last = nullptr;  // the only one that matches has every number
   for (int n = 1; auto *const style = force->pair_match("/harmonic", 0, n); ++n) {
+    if (style == last) break;
     n_ours += dynamic_cast<PairContact *>(style) != nullptr;
+    last = style;
   }
   if (n_ours < 2) return;
   error->all(

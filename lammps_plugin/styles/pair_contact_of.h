@@ -17,7 +17,7 @@
 #include "neigh_list.h"
 #include "neighbor.h"
 #include "pair_contact.h"
-#include "update.h"
+#include "timer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -176,9 +176,9 @@ template <class Model> class PairContactOf : public PairContact {
   Bodies<2> in_2d;
   Bodies<3> in_3d;
   double margin = 0.0, n_listed = 0.0;
-  LAMMPS_NS::bigint chosen_at = -1;    // step of the list that pairs were chosen from
-  LAMMPS_NS::bigint shapes_read = -1;  // first step of the run in which shapes were read last
-  std::uint64_t shapes = 0;            // a checksum of them
+  LAMMPS_NS::bigint chosen_at = -1;  // step of the list that pairs were chosen from
+  double shapes_read = -1.0;         // when the run began in which shapes were read last
+  std::uint64_t shapes = 0;          // a checksum of them
   bool packs_take_all = false;
   std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
   std::vector<float> last_normal;   // D a close pair, if contacts start from it; zeros at first
@@ -396,13 +396,16 @@ template <class Model> class PairContactOf : public PairContact {
       read_poses<D>();
       choose_pairs<D>();
     } else {
-      const bool have_shapes_changed = update->firststep != shapes_read && read_shapes<D>();
+      const bool have_shapes_changed = run_began() != shapes_read && read_shapes<D>();
       read_poses<D>();
       if (have_shapes_changed || have_outrun_margin<D>()) choose_pairs<D>();
     }
   }
 
   int n_all() const { return atom->nlocal + atom->nghost; }
+
+  /// Another number in each run, also where 'pre no' leaves out the set-up.
+  double run_began() const { return timer->get_wall(LAMMPS_NS::Timer::TOTAL); }
 
   /// What stands for an atom of other styles in a hybrid one, of which no pair is listed here.
   static typename Model::Shape ball() { return *Model::shape_from({{1.0, 1.0, 1.0}}, 1.0); }
@@ -433,7 +436,7 @@ template <class Model> class PairContactOf : public PairContact {
         packs_take_all = packs_take_all && PacksOf<Model, D>::take(shape, *of_first);
       }
     }
-    shapes_read = update->firststep;
+    shapes_read = run_began();
     return std::exchange(shapes, checksum) != checksum;
   }
 

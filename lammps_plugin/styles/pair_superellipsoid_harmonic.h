@@ -19,6 +19,7 @@ class PairSuperellipsoidHarmonic : public PairContactOf<SuperellipsoidModel> {
   bool has_three_axes() const override { return true; }
 
   void coeff(int narg, char **arg) override;
+  void init_style() override;
   void write_restart(FILE *fp) override;
   void read_restart(FILE *fp) override;
 
