@@ -222,12 +222,14 @@ void PairContact::choose_instructions()
   }
 }
 
-/// LAMMPS reads positions alone from a dump. Of all commands that evaluate forces `rerun` alone has
-/// a last step that no number of steps leads to.
+/// LAMMPS reads positions alone from a dump. Of all commands that evaluate forces `rerun` alone
+/// begins at another step than the present one or has a last step that no number of steps leads to.
 void PairContact::require_orientations_of_rerun() const
 {
-  const bigint span = update->laststep - update->firststep;
-  if (!any_turns || update->whichflag != 1 || span <= 0 || span == update->nsteps) return;
+  const bigint first = update->firststep, last = update->laststep;
+  const bool is_run = first == update->ntimestep && last == first + update->nsteps;
+  const bool is_unset = first == 0 && last == 0;
+  if (!any_turns || update->whichflag != 1 || is_run || is_unset) return;
   error->all(
       FLERR,
       std::string("rerun reads no orientations from a dump, expected particles that cannot turn: "
