@@ -4,7 +4,8 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
 
     /h5md               +version [1, 1]   author/+name   creator/+name, version, format_version (2; 1 where
                         it is not there), origin (what the last bits depend on: `jamshape.files.origin`)
-    /particles/all      +shape_style
+    /particles/all      +shape_style   +k_e, sides: the law of the contacts (where they are not there, those
+                        of /parameters, or else 1 and 2)
         box             +dimension D   +boundary D times "periodic"
             edges       {step, time, value (T, D), or (T, D, D) with the edge vectors as rows: of all
                         frames of a file that has a tilted box, the transposes of `Box.matrix`}

@@ -37,7 +37,7 @@ from jamshape.files.meaning import (
     most_digits,
     require_told,
 )
-from jamshape.files.signature import DUMP, HDF5, REFUSED, format_of
+from jamshape.files.signature import DUMP, GSD, HDF5, REFUSED, format_of
 from jamshape.packing import Box, Lengths, Packing, angle_from_quaternion, cuboid_around
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import SHAPES
@@ -224,6 +224,9 @@ def read_any(
     found_format = format_of(path)
     if found_format in REFUSED:
         msg = f"{path} {REFUSED[found_format]}"
+        raise FileFormatError(msg)
+    if found_format == GSD:
+        msg = f"{path} is a GSD file, expected H5MD, a dump or a data file; make one with jamshape export"
         raise FileFormatError(msg)
     if found_format == HDF5:
         packing = read_packing(path, frame)

@@ -158,7 +158,9 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
     if said.is_later:
         return Meaning(dimension, found, law)
     if not name and len(able) > 1:
-        warnings.warn(_of_shape(path, found.name, dimension, law, able), stacklevel=2)
+        doubt = "shape= and dimension= (--shape, --dimension)" if why else "shape= (--shape)"
+        said_so = _of_shape(path, found.name, dimension, law)
+        warnings.warn(f"{said_so}; say {doubt}, a shape of {', '.join(able)}", stacklevel=2)
     elif why:
         say = "say dimension= or --dimension if it is another"
         warnings.warn(f"{path} {why}: it is read as {dimension}D; {say}", stacklevel=2)
@@ -204,13 +206,11 @@ def _dimension(there: Geometry, told: int | None) -> tuple[int, str]:
     return (2 if is_plane else 3), why
 
 
-def _of_shape(
-    path: PathLike, name: str, dimension: int, law: Interaction, able: Sequence[str]
-) -> str:
+def _of_shape(path: PathLike, name: str, dimension: int, law: Interaction) -> str:
     bonds = {1: "one bond", 2: "two bonds"}[law.sides]
     return (
         f"{path} does not say which shape its particles have: they are read as {name}s in {dimension}D with"
-        f" k_e = {law.k_e:g} and {bonds} side to side; say shape= or --shape, one of {', '.join(able)}"
+        f" k_e = {law.k_e:g} and {bonds} side to side"
     )
 
 
