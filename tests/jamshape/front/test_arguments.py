@@ -203,6 +203,15 @@ def test_a_quasistatic_shear_shows_itself(quasistatic):
     matplotlib.pyplot.close("all")
 
 
+def test_what_is_not_in_a_run_is_named(quasistatic):
+    with pytest.raises(KeyError, match="nix is no observable of .*expected one of .*stress"):
+        quasistatic["nix"]
+    with pytest.raises(ValueError, match="^least is nan, expected a finite number"):
+        quasistatic.events(np.nan)
+    with pytest.raises(ValueError, match="expected frame 99 to be one of them"):
+        quasistatic.packing(99)
+
+
 def test_every_run_is_drawn():
     assert {RunFile, ShearFile, QuasistaticShearFile} <= set(_DRAWN)
 
