@@ -163,9 +163,9 @@ def _sequence(value: Any, kind: Any) -> Any:
 
 def _shown(value: Any) -> str:
     if isinstance(value, type):
-        return f"the class {value.__name__}"
+        return f"the class {value.__name__} itself"
     if inspect.isroutine(value):
-        return f"the function {value.__name__}"
+        return f"the function {value.__name__} itself"
     return said(value)
 
 
@@ -192,6 +192,6 @@ def _name(kind: Any) -> str:
 
 _NAMES = {
     bool: "True or False", int: "a whole number", float: "a number", str: "text", Path: "a path",
-    "Particles": "particles such as Spherocylinders(alpha=4)", "Packing": "a packing",
+    "Particles": "particles such as Particles.of(alpha=4)", "Packing": "a packing",
     "Recorded": "a run", "Modes": "modes",
 }  # fmt: skip

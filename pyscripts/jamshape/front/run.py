@@ -13,6 +13,7 @@ import numpy as np
 
 from jamshape.arguments import checked
 from jamshape.arrays import FloatArray
+from jamshape.checks import require_number
 from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
     count_frames,
@@ -73,6 +74,9 @@ class Recorded:
 
     def __getitem__(self, name: str) -> FloatArray:
         """Look up an observable by its name."""
+        if name not in self.observables:
+            msg = f"{name} is no observable of {self.file}, expected one of {', '.join(self.observables)}"
+            raise KeyError(msg)
         return self.observables[name]
 
     @property
@@ -289,6 +293,7 @@ class QuasistaticShearFile(Recorded):
         least : float
             Drops below this part of the largest stress are left out.
         """
+        require_number("least", least)
         return stress_drops(self.observables, least)
 
     def modulus(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import os
 import threading
 import warnings
@@ -111,6 +112,7 @@ _LOADED_BEFORE = (
 )
 
 
+@functools.cache
 def load_errors() -> Any:
     """Library that turns errors of LAMMPS into exceptions, loaded; None of a LAMMPS that raises them by itself."""
     path = errors_path()

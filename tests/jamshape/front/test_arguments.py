@@ -73,11 +73,11 @@ def test_what_is_of_no_known_type_is_refused_by_name(function, name, wrong, tmp_
     [
         (
             lambda: js.quasistatic_shear("x.h5"),
-            "particles is 'x.h5', expected particles such as Spher",
+            "particles is 'x.h5', expected particles such as Part",
         ),
         (
             lambda: js.make_packing(js.Spherocylinders),
-            "particles is the function Spherocylinders, exp",
+            "particles is the function Spherocylinders itself, exp",
         ),
         (lambda: js.compress(scene()), "particles is .*expected particles such as"),
         (lambda: js.compress(RODS, phi=0.9), "phi is 0.9, expected a tuple of 2 numbers"),
@@ -201,6 +201,15 @@ def test_a_quasistatic_shear_shows_itself(quasistatic):
     assert "quasistatic shear" in axes.get_title()
     assert "data:image/png;base64," in quasistatic._repr_html_()
     matplotlib.pyplot.close("all")
+
+
+def test_what_is_not_in_a_run_is_named(quasistatic):
+    with pytest.raises(KeyError, match=r"nix is no observable of .*expected one of .*stress"):
+        quasistatic["nix"]
+    with pytest.raises(ValueError, match=r"^least is nan, expected a finite number"):
+        quasistatic.events(np.nan)
+    with pytest.raises(ValueError, match="expected frame 99 to be one of them"):
+        quasistatic.packing(99)
 
 
 def test_every_run_is_drawn():

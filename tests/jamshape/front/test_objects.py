@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import dataclasses
+import importlib
 import inspect
 import math
 import multiprocessing
 import os
 import pickle
+import pkgutil
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import cached_property
 from pathlib import Path
@@ -17,10 +20,12 @@ import numpy as np
 import pytest
 import scipy.sparse
 
+import jamshape
 import jamshape as js
 from jamshape.contacts import Contacts
 from jamshape.landscape import Landscape, State
 from jamshape.protocols.defaults import recipe_for
+from jamshape.records import Record
 from jamshape.shapes.table import SHAPES
 from jamshape.vibration.elasticity import moduli
 
@@ -174,6 +179,28 @@ def test_objects_go_to_other_processes_and_come_back(objects, method):
     for name, thing in objects.items():
         assert alike(thing, back[name]), name
         assert not hasattr(thing, "folder") or thing.file.exists(), name
+
+
+def modules():
+    for found in pkgutil.walk_packages(jamshape.__path__, "jamshape."):
+        if not found.name.startswith(
+            ("jamshape.commands", "jamshape.__main__", "jamshape.lammps.deck.__main__")
+        ):
+            with contextlib.suppress(ImportError):
+                yield importlib.import_module(found.name)
+
+
+def test_what_keeps_what_it_has_computed_is_a_record():
+    """Others would take compiled objects and arrays along in their pickles."""
+    classes = {
+        c
+        for m in modules()
+        for c in vars(m).values()
+        if dataclasses.is_dataclass(c) and inspect.isclass(c)
+    }
+    keeping = {c for c in classes if any(isinstance(v, cached_property) for v in vars(c).values())}
+    assert len(keeping) > 5
+    assert all(issubclass(c, Record) or "__reduce__" in vars(c) for c in keeping), keeping
 
 
 # --- where functions are called -------------------------------------------------------------------
