@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -53,8 +54,13 @@ class ParticleView : protected LAMMPS_NS::Pointers {
     in_blocks(end - begin, [&](int first, int last) {
       int index[BLOCK], size = 0;
       double packed[PER_ORIENTATION * BLOCK];
-      for (int i = begin + first; i < begin + last; ++i) {
-        if (has_shape(i)) index[size++] = i;
+      if (all_have_shapes(begin + first, begin + last)) {
+        size = last - first;
+        std::iota(index, index + size, begin + first);
+      } else {
+        for (int i = begin + first; i < begin + last; ++i) {
+          if (has_shape(i)) index[size++] = i;
+        }
       }
       ellipsoids->pack_comm_bonus(size, index, packed);
       for (int k = 0; k < size; ++k) visit(index[k], quaternion(packed + PER_ORIENTATION * k));
@@ -71,8 +77,9 @@ class ParticleView : protected LAMMPS_NS::Pointers {
   {
     in_blocks(end - begin, [&](int first, int last) {
       double packed[PER_ORIENTATION * BLOCK], *to = packed;
+      const bool all = all_have_shapes(begin + first, begin + last);
       for (int i = begin + first; i < begin + last; ++i) {
-        if (!has_shape(i)) continue;
+        if (!all && !has_shape(i)) continue;
         const Quaternion q = orientation_of(i);
         to[0] = q.w;
         to[1] = q.i;
@@ -89,6 +96,14 @@ class ParticleView : protected LAMMPS_NS::Pointers {
   static constexpr int MOST_PER_SHAPE = 64;  // room for what versions keep beside a shape
 
   LAMMPS_NS::AtomVecEllipsoid *ellipsoids = nullptr;
+
+  bool all_have_shapes(int begin, int end) const
+  {
+    const int *const index = atom->ellipsoid;  // below zero without a shape
+    int signs = 0;
+    for (int i = begin; i < end; ++i) signs |= index[i];
+    return signs >= 0;
+  }
 
   static Quaternion quaternion(const double *q) { return {q[0], q[1], q[2], q[3]}; }
 };

@@ -59,7 +59,7 @@ def marked(feature):
     return pytest.param(feature, marks=marks, id=feature.name)
 
 
-@pytest.mark.parametrize("feature", map(marked, CONTACTS))
+@pytest.mark.parametrize("feature", [marked(feature) for feature in CONTACTS])
 def test_a_feature_works_or_is_refused(feature):
     """Each row of the table of docs/results/stability.md."""
     outcome = judge(feature)
