@@ -29,6 +29,7 @@ void write_rate(double *to, const Rate &rate, int dimension)
 void Mobilities::measure(const PairContact &of)
 {
   pair = &of;
+  pair->particle_view().require_ellipsoids("fix overdamped/affine");
   std::map<std::tuple<int, double, double, double>, std::size_t> number_of;
   kinds.clear();
   resize_closely(kind, static_cast<std::size_t>(atom->nlocal));

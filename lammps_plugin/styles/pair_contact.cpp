@@ -47,9 +47,14 @@ PairContact::~PairContact()
   memory->destroy(k_e);
 }
 
+PairContact *PairContact::find(LAMMPS_NS::LAMMPS *lmp)
+{
+  return dynamic_cast<PairContact *>(lmp->force->pair);
+}
+
 PairContact &PairContact::of(LAMMPS_NS::LAMMPS *lmp, const std::string &who)
 {
-  auto *const pair = dynamic_cast<PairContact *>(lmp->force->pair);
+  auto *const pair = find(lmp);
   if (!pair) {
     const char *const style = lmp->force->pair_style;
     lmp->error->all(FLERR, who + " found pair_style " + (style ? style : "none") +
