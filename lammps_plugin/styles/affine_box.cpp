@@ -48,9 +48,8 @@ void AffineBox::restore(const State &from, double time_until_base)
   now.rate = gradient;
 }
 
-bool AffineBox::begin_run()
+bool AffineBox::begin_run(bigint step)
 {
-  const bigint step = update->ntimestep;
   now.step_base += step - reached_step;
   reached_step = step;
   const bool was_started = started, continues = started && is_in_box(bounds(deformation(step)));

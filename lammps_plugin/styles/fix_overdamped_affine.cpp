@@ -327,15 +327,15 @@ void FixOverdampedAffine::require_cell(const Upper &gradient) const
 
 void FixOverdampedAffine::setup_post_neighbor()
 {
-  begin_run();
+  begin_run(update->ntimestep);
   tell_what_is_left_out();
   running = true;
 }
 
 /// Looks at all that may have changed since the last run.
-void FixOverdampedAffine::begin_run()
+void FixOverdampedAffine::begin_run(bigint step)
 {
-  if (!box->begin_run()) {
+  if (!box->begin_run(step)) {
     flow->set_mean_turn(0.0);
     if (comm->me == 0) {
       error->warning(FLERR, std::string("fix overdamped/affine found another box than it left, so "
@@ -357,7 +357,7 @@ void FixOverdampedAffine::begin_run()
 /// At the start of a step: what neither LAMMPS nor another fix has told.
 void FixOverdampedAffine::take_up(bigint from)
 {
-  if (from == update->firststep && !has_begun) begin_run();  // 'run N pre no'
+  if (from == update->firststep && !has_begun) begin_run(from);  // 'run N pre no'
   has_begun = false;
   if (!box->is_as_left()) {
     flow->stop("found that something else changed the box in the last step, expected no other fix "
@@ -390,11 +390,9 @@ void FixOverdampedAffine::require_strain(double strain) const
 {
   const double radii = 0.5 * strain / flow->largest_strain();
   if (radii <= 0.5) return;  // false for NaN
-  char found[128];
-  std::snprintf(found, sizeof(found),
-                "a strain of %g in one step, which pushes a particle %g radii", strain, radii);
-  flow->stop("found " + std::string(found) +
-             " into its neighbour, expected at most half its radius: use a smaller timestep.");
+  flow->stop("found a strain of " + shown(strain) + " in one step, which pushes a particle " +
+             shown(radii) +
+             " radii into its neighbour, expected at most half its radius: use a smaller timestep.");
 }
 
 /// The numbers are the pair style's to say; see PairContact::report_left_out.

@@ -77,7 +77,7 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   void require_no_trace(const Upper &gradient) const;
   void tell_what_this_is();
   [[noreturn]] void fail(const std::string &found_and_expected) const;
-  void begin_run();
+  void begin_run(LAMMPS_NS::bigint step);
   void require_alone() const;
   void take_up(LAMMPS_NS::bigint from);
   void require_timestep() const;

@@ -2,6 +2,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "decimal_point.h"
 #include "domain.h"
 #include "error.h"
 #include "force.h"
@@ -142,6 +143,7 @@ void PairContact::measure_particles()
 
 void PairContact::init_style()
 {
+  require_decimal_point(lmp, "pair_style " + style_name());
   particles.require_ellipsoids("pair_style " + style_name());
   choose_instructions();
   measure_particles();

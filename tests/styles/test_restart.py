@@ -206,7 +206,7 @@ def test_state_that_something_else_changed_is_taken_as_it_is(change, packings, t
 
 
 def test_a_restart_file_of_another_version_is_refused(packings, tmp_path):
-    path, mark = tmp_path / "half.restart", (0x6A616D7368617002).to_bytes(8, "little")
+    path, mark = tmp_path / "half.restart", (0x6A616D7368617003).to_bytes(8, "little")
     with loaded(packings["rods"], tmp_path) as session:
         session.commands(f"{fix()}\nrun 1\nwrite_restart {path}")
     content = path.read_bytes()

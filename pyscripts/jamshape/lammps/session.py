@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import locale
 import os
 import subprocess
 import tempfile
@@ -57,6 +58,26 @@ def _as_one_process() -> Iterator[None]:
         os.environ.update(hidden)
 
 
+@contextmanager
+def _decimal_point() -> Iterator[None]:
+    """Let C code of this thread read and write numbers with a point, whatever LC_NUMERIC the host program has set.
+
+    LAMMPS reads "0.5" as 0 under a decimal comma.
+    """
+    c = ctypes.CDLL(None)
+    c.uselocale.argtypes = c.duplocale.argtypes = c.freelocale.argtypes = [ctypes.c_void_p]
+    c.newlocale.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_void_p]
+    c.uselocale.restype = c.duplocale.restype = c.newlocale.restype = ctypes.c_void_p
+    before = c.uselocale(None)
+    point = c.newlocale(1 << locale.LC_NUMERIC, b"C", c.duplocale(before))
+    c.uselocale(point)
+    try:
+        yield
+    finally:
+        c.uselocale(before)
+        c.freelocale(point)
+
+
 class Session:
     """One LAMMPS instance that knows our styles; a context manager.
 
@@ -90,9 +111,9 @@ class Session:
             )
             assert self._complaints.stdin is not None
             options += ["-screen", f"/dev/fd/{self._complaints.stdin.fileno()}"]
-        with _as_one_process():
+        with _as_one_process(), _decimal_point():
             self.lmp: Any = start_lammps([*options, *arguments])
-        self._library = self._load(plugin)
+            self._library = self._load(plugin)
 
     def __enter__(self) -> Self:
         return self
@@ -148,11 +169,12 @@ class Session:
         LammpsError
             Where LAMMPS refuses one and was built with exceptions; Debian 12's ends the process.
         """
-        for line in text.strip().splitlines():
-            try:
-                self.lmp.command(line.strip())
-            except Exception as error:  # LAMMPS raises plain ones
-                raise LammpsError(sentence_of(error)) from error
+        with _decimal_point():
+            for line in text.strip().splitlines():
+                try:
+                    self.lmp.command(line.strip())
+                except Exception as error:  # LAMMPS raises plain ones
+                    raise LammpsError(sentence_of(error)) from error
 
     def left_out(self) -> str:
         """Say what the last run spared this scene, as the log does."""
