@@ -42,8 +42,8 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   double saved_time() const { return time_base; }
   void restore(const State &from, double time_until_base);
 
-  /// At the start of a run from this step: takes the present box as strain 0 unless it is the one that this left.
-  /// False where that ends a strain that was reached.
+  /// At the start of a run from this step: takes the present box as strain 0 unless it is the one
+  /// that this left. False where that ends a strain that was reached.
   bool begin_run(LAMMPS_NS::bigint step);
   /// Goes on from the present strain with another `timestep`; true where there is one.
   bool follow_timestep();

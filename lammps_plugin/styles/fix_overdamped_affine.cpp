@@ -54,11 +54,11 @@ struct Saved {
   double time;  // not in files of the format WITHOUT_TIME
 };
 
-/// Styles of LAMMPS, and what their names begin with, that act on velocities or take their effect
-/// from them.
-constexpr const char *OF_VELOCITIES[] = {"langevin", "viscous",  "viscosity", "temp/",  "heat",
-                                         "ehex",     "momentum", "thermal/",  "ffl",    "gle",
-                                         "gld",      "ttm",      "srd",       "nvk"};
+/// What names of fixes begin with that act on velocities or by them; the last are those of
+/// accelerated dynamics at a temperature, `tad` and others.
+constexpr const char *OF_VELOCITIES[] = {
+    "langevin", "viscous", "viscosity", "temp/", "heat", "ehex", "momentum", "thermal/",
+    "ffl",      "gle",     "gld",       "ttm",   "srd",  "nvk",  "pimd",     "EVENT/"};
 
 bool begins_with(const std::string &text, const std::string &with)
 {
@@ -258,7 +258,8 @@ FixOverdampedAffine::~FixOverdampedAffine()
 int FixOverdampedAffine::setmask()
 {
   using namespace LAMMPS_NS::FixConst;
-  return INITIAL_INTEGRATE | POST_NEIGHBOR | POST_RUN | (domain->triclinic ? PRE_EXCHANGE : 0);
+  return INITIAL_INTEGRATE | POST_NEIGHBOR | MIN_POST_NEIGHBOR | POST_RUN |
+         (domain->triclinic ? PRE_EXCHANGE : 0);
 }
 
 /// Of those that LAMMPS would let integrate the same particles, or would let act on nothing.
@@ -266,12 +267,14 @@ void FixOverdampedAffine::require_alone() const
 {
   const std::string integrate = update->integrate_style ? update->integrate_style : "verlet";
   if (integrate != "verlet") {
-    fail("run_style " + integrate + ", expected verlet: use 'run_style verlet', and an integrator "
+    fail("run_style " + integrate +
+         ", expected verlet: use 'run_style verlet', and an integrator "
          "of the fix that chooses its own steps for short ones.");
   }
   if (force->kspace || force->bond || force->angle || force->dihedral || force->improper) {
-    fail("bonds, angles, dihedrals, impropers or a kspace_style, expected forces of contacts and of "
-         "fixes alone: set these styles to none.");
+    fail(
+        "bonds, angles, dihedrals, impropers or a kspace_style, expected forces of contacts and of "
+        "fixes alone: set these styles to none.");
   }
   for (int k = 0; k < modify->nfix; ++k) {
     const Fix &other = *modify->fix[k];
@@ -283,8 +286,10 @@ void FixOverdampedAffine::require_alone() const
     }
     for (const char *const style : OF_VELOCITIES) {
       if (!begins_with(other.style, style)) continue;
-      fail(named + ", which acts on velocities, expected none: the motion has no inertia and no "
-           "temperature" + cure);
+      fail(named +
+           ", which acts on velocities, expected none: the motion has no inertia and no "
+           "temperature" +
+           cure);
     }
   }
 }
@@ -329,7 +334,7 @@ void FixOverdampedAffine::setup_post_neighbor()
 {
   begin_run(update->ntimestep);
   tell_what_is_left_out();
-  running = true;
+  running = update->whichflag == 1;
 }
 
 /// Looks at all that may have changed since the last run.
@@ -390,9 +395,10 @@ void FixOverdampedAffine::require_strain(double strain) const
 {
   const double radii = 0.5 * strain / flow->largest_strain();
   if (radii <= 0.5) return;  // false for NaN
-  flow->stop("found a strain of " + shown(strain) + " in one step, which pushes a particle " +
-             shown(radii) +
-             " radii into its neighbour, expected at most half its radius: use a smaller timestep.");
+  flow->stop(
+      "found a strain of " + shown(strain) + " in one step, which pushes a particle " +
+      shown(radii) +
+      " radii into its neighbour, expected at most half its radius: use a smaller timestep.");
 }
 
 /// The numbers are the pair style's to say; see PairContact::report_left_out.
@@ -413,7 +419,13 @@ void FixOverdampedAffine::post_neighbor()
   if (!inside_step) flow->require_untouched();
 }
 
-void FixOverdampedAffine::post_run() { flow->require_untouched(); }
+void FixOverdampedAffine::min_post_neighbor() { flow->measure_particles(); }
+
+/// LAMMPS calls it after minimisations, too.
+void FixOverdampedAffine::post_run()
+{
+  if (running) flow->require_untouched();
+}
 
 void FixOverdampedAffine::setup(int)
 {

@@ -36,6 +36,7 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   void setup(int vflag) override;
   void setup_post_neighbor() override;
   void post_neighbor() override;
+  void min_post_neighbor() override;
   void pre_exchange() override;
   void post_run() override;
   void initial_integrate(int vflag) override;
@@ -64,8 +65,8 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   LAMMPS_NS::bigint check_every, next_check;
   double largest_rate, largest_tilt;
   bool warned, was_told, running, inside_step;
-  bool has_begun;                      // the present run
-  LAMMPS_NS::bigint next_look;         // at what other fixes did
+  bool has_begun;               // the present run
+  LAMMPS_NS::bigint next_look;  // at what other fixes did
 
   struct Command;
   Command read(int narg, char **arg);

@@ -59,8 +59,8 @@ class Mobilities : protected LAMMPS_NS::Pointers {
     double gyration;    // length that a radian stands for
   };
 
-  /// Reads sizes of own atoms; after every exchange of atoms. Stops with one sentence at one without
-  /// a shape, which may have come in between.
+  /// Reads sizes of own atoms; after every exchange of atoms. Stops with one sentence at one
+  /// without a shape, which may have come in between.
   void measure(const PairContact &of);
   const Mobility &operator[](int i) const { return kinds[kind[i]]; }
   const std::vector<Mobility> &all_kinds() const { return kinds; }

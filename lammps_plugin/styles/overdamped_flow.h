@@ -154,8 +154,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   double *row(int i) const { return values + static_cast<std::size_t>(width()) * i; }
 
   template <int D> struct Row;
-  template <int D>
-  bool is_at(int i, const AffineBox::Deformed<D> &present, double tolerance) const;
+  template <int D> bool is_at(int i, const AffineBox::Deformed<D> &present, double tolerance) const;
   bool is_moving(int i) const;
   template <int D> void hold(int begin, int end, const Upper &inverse);
   template <int D> struct Spins;

@@ -15,6 +15,17 @@ LOAD = f'include "{load_script_path()}"'
 
 HEAD = "dimension 2\natom_style ellipsoid\natom_modify map array"
 
+# Two rods of length 5 and width 1 that overlap, in a box of edge 20.
+BOX = f"""{LOAD}
+region box block 0 20 0 20 -0.5 0.5
+create_box 2 box"""
+RODS = """create_atoms 1 single 10 10 0
+create_atoms 2 single 11.5 10.8 0
+set group all shape 5 1 1
+set group all density 1"""
+LAW = """pair_style spherocylinder/harmonic sides two
+pair_coeff * * 1.0
+thermo_modify norm no"""
 # What may be asked for after a run: a sum that sees every position and direction among it.
 OUTPUT = """compute quaternions all property/atom quatw quatk
 variable pose atom id*(x+2*y+c_quaternions[1]+2*c_quaternions[2])
@@ -22,30 +33,16 @@ compute poses all reduce sum v_pose
 compute turned all reduce max c_quaternions[2]
 thermo_style custom step lx pe press c_poses c_turned
 thermo_modify norm no"""
-LAW = f"""pair_style spherocylinder/harmonic sides two
-pair_coeff * * 1.0
-{OUTPUT}"""
-
-# Two rods of length 5 and width 1 that overlap, in a box of edge 20.
-TWO_RODS = f"""{HEAD}
-{LOAD}
-region box block 0 20 0 20 -0.5 0.5
-create_box 2 box
-create_atoms 1 single 10 10 0
-create_atoms 2 single 11.5 10.8 0
-set group all shape 5 1 1
-set group all density 1
-{LAW}"""
+TWO_RODS = f"{HEAD}\n{BOX}\n{RODS}\n{LAW}\n{OUTPUT}"
 
 # A disc of diameter 1 alone, off the centre of that box.
 DISC = f"""{HEAD}
-{LOAD}
-region box block 0 20 0 20 -0.5 0.5
-create_box 2 box
+{BOX}
 create_atoms 1 single 5 10 0
 set group all shape 1 1 1
 set group all density 1
-{LAW}"""
+{LAW}
+{OUTPUT}"""
 
 # 64 short rods that all touch neighbours and cannot cross.
 CROWD = f"""{HEAD}
@@ -59,7 +56,8 @@ set group all shape 1.4 0.8 0.8
 set group all density 1
 set group all quat/random 11
 displace_atoms all random 0.1 0.1 0 13
-{LAW}"""
+{LAW}
+{OUTPUT}"""
 
 
 class Feature(NamedTuple):
@@ -111,7 +109,7 @@ _ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 
 def run_deck(text: str, folder: Path, ranks: int = 1) -> tuple[int, str]:
-    """Run `lmp` on a deck in a process of its own, within a folder; return exit code and output."""
+    """Run `lmp` on a deck in processes of its own, within a folder; return exit code and output."""
     deck = folder / "deck.in"
     deck.write_text(text + "\n")
     command = ["lmp", "-nocite", "-log", "none", "-in", deck.name]
@@ -128,12 +126,15 @@ def run_deck(text: str, folder: Path, ranks: int = 1) -> tuple[int, str]:
         timeout=120,
         check=False,
     )
-    return done.returncode, done.stdout
+    of_partitions = [path.read_text() for path in sorted(folder.glob("screen.*"))]
+    return done.returncode, "".join([done.stdout, *of_partitions])
 
 
 def sentence_of(output: str) -> str:
     """Return the sentence with which LAMMPS ended, or what else is known of its end."""
-    found = re.findall(r"^(?:.*\bERROR|ERROR on proc \d+): (.*?)(?: \(\S+:\d+\))?$", output, re.MULTILINE)
+    found = re.findall(
+        r"^(?:.*\bERROR|ERROR on proc \d+): (.*?)(?: \(\S+:\d+\))?$", output, re.MULTILINE
+    )
     if found:
         return str(found[0])
     lines = output.strip().splitlines()

@@ -10,6 +10,7 @@ REST = "fix f all overdamped/affine drag 1.0\ntimestep 0.1"
 EDGE = 20 * exp(-0.05)  # after 50 steps of FLOW
 PLAIN = f"{FLOW}\nrun 50"
 AREA = pi / 4
+_DISCS = "set group all shape 1.1 1.1 1.1"
 
 
 def _beside(name: str, command: str, sentence: str) -> Feature:
@@ -78,8 +79,8 @@ _TIME = (
             refused="Cannot use PRD with a changing box"),
     Feature("`temper`", f"{FLOW}\nvariable t world 1 2\ntemper 10 5 $t f 3 5",
             refused="Tempering temperature fix is not supported", ranks=2),
-    Feature("`tad`", f"{FLOW}\ncompute e all event/displace 0.5\nfix n all neb 1\ntad 10 1 1 2 1 1 e",
-            refused="Cannot use TAD with a changing box", ranks=2),
+    Feature("`tad`", f"{FLOW}\natom_modify sort 0 0\ncompute e all event/displace 0.5\nfix n all neb 1\ntad 10 1 1 2 0.5 1 e",
+            refused=r"fix overdamped/affine found fix EVENT/TAD \(tad_event\), which acts on velocities, .*", ranks=2),
     Feature("`neb`", f"{FLOW}\nfix n all neb 1\nmin_style quickmin\nneb 0 0.1 10 10 1 none",
             refused="min_style quickmin cannot turn particles: .*", ranks=2),
 )  # fmt: skip
@@ -173,9 +174,11 @@ _STATES = (
             f"read_restart r.rst remap\npair_style spherocylinder/harmonic sides two\n{FIX}\nrun 25",
             "f_f[2]", 0.05),
     Feature("`f_f[5]` before a run", FLOW, "f_f[5] != f_f[5]", 1),
-    Feature("`rerun`",
-            f"{FLOW}\ndump d all custom 25 d.dump id type x y z\nrun 50\nrerun d.dump dump x y",
-            "lx", EDGE),
+    Feature("`rerun` beside the fix", f"{FLOW}\ndump d all custom 25 d.dump id type x y\nrun 50\n"
+            "rerun d.dump dump x y", refused="Cannot reset timestep with a time-dependent fix defined"),
+    Feature("`rerun` of discs", f"{_DISCS}\ndump d all custom 25 d.dump id type x y\ndump_modify d format float "
+            "%.17g\nrun 0\ndisplace_atoms all random 0.1 0.1 0 5\nrerun d.dump dump x y", "pe",
+            f"{_DISCS}\nrun 0", scene=CROWD),
     _unchanged("`balance`", "balance 1.0 shift x 5 1.05"),
     _unchanged("`atom_modify sort`", "atom_modify sort 1 1.0"),
     _unchanged("`neighbor multi`, `comm_modify mode multi`", "neighbor 0.3 multi\ncomm_modify mode multi"),
