@@ -76,7 +76,7 @@ _TIME = (
     Feature("`fix halt`", f"{FLOW}\nvariable k equal step\nfix h all halt 1 v_k >= 20 error continue\nrun 50",
             "lx", 20 * exp(-0.02)),
     Feature("`prd`", f"{FLOW}\ncompute e all event/displace 0.5\nprd 10 1 1 1 1 e 3",
-            refused="Cannot use PRD with a changing box"),
+            refused=r"fix overdamped/affine found fix EVENT/PRD \(prd_event\), which acts on velocities, .*"),
     Feature("`temper`", f"{FLOW}\nvariable t world 1 2\ntemper 10 5 $t f 3 5",
             refused="Tempering temperature fix is not supported", ranks=2),
     Feature("`tad`", f"{FLOW}\natom_modify sort 0 0\ncompute e all event/displace 0.5\nfix n all neb 1\ntad 10 1 1 2 0.5 1 e",
