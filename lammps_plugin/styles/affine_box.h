@@ -37,7 +37,7 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   AffineBox(LAMMPS_NS::LAMMPS *lmp, const Upper &gradient, Reference fixed_point);
 
   const State &state() const { return now; }
-  /// As of LAMMPS's present step, and the time since strain 0 until the state's `step_base`.
+  /// State as of LAMMPS's present step, and the time from strain 0 to its `step_base`.
   State saved_state() const;
   double saved_time() const { return time_base; }
   void restore(const State &from, double time_until_base);
@@ -45,7 +45,7 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   /// At the start of a run from this step: takes the present box as strain 0 unless it is the one
   /// that this left. False where that ends a strain that was reached.
   bool begin_run(LAMMPS_NS::bigint step);
-  /// Goes on from the present strain with another `timestep`; true where there is one.
+  /// Continues from the present strain if `timestep` has changed; true where it has.
   bool follow_timestep();
   /// Last step that the flow has done: LAMMPS counts those of minimisers, too, in which it rests.
   LAMMPS_NS::bigint reached() const { return reached_step; }

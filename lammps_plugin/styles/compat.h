@@ -87,7 +87,7 @@ auto has_post_force(const Modify *modify) -> decltype(modify->n_post_force != 0)
   return modify->n_post_force != 0;
 }
 
-/// How many regions a deck has defined: counted in public until 2022.
+/// Number of regions that a deck has defined: counted in public until 2022.
 template <class Domain> auto n_regions(Domain *domain) -> decltype(int(domain->nregion))
 {
   return domain->nregion;

@@ -54,8 +54,8 @@ struct Saved {
   double time;  // not in files of the format WITHOUT_TIME
 };
 
-/// What names of fixes begin with that act on velocities or by them; the last are those of
-/// accelerated dynamics at a temperature, `tad` and others.
+/// Beginnings of the names of fixes that act on velocities or by them; EVENT/ is of accelerated
+/// dynamics at a temperature, as by `tad`.
 constexpr const char *OF_VELOCITIES[] = {
     "langevin", "viscous", "viscosity", "temp/", "heat", "ehex", "momentum", "thermal/",
     "ffl",      "gle",     "gld",       "ttm",   "srd",  "nvk",  "pimd",     "EVENT/"};
@@ -262,14 +262,14 @@ int FixOverdampedAffine::setmask()
          (domain->triclinic ? PRE_EXCHANGE : 0);
 }
 
-/// Of those that LAMMPS would let integrate the same particles, or would let act on nothing.
+/// Refuses what LAMMPS would let move the same particles, and what would act on nothing.
 void FixOverdampedAffine::require_alone() const
 {
   const std::string integrate = update->integrate_style ? update->integrate_style : "verlet";
   if (integrate != "verlet") {
     fail("run_style " + integrate +
-         ", expected verlet: use 'run_style verlet', and an integrator "
-         "of the fix that chooses its own steps for short ones.");
+         ", expected verlet: use 'run_style verlet'; integrators rkc2 and heun/adaptive choose "
+         "substeps by themselves.");
   }
   if (force->kspace || force->bond || force->angle || force->dihedral || force->improper) {
     fail(
@@ -337,7 +337,7 @@ void FixOverdampedAffine::setup_post_neighbor()
   running = update->whichflag == 1;
 }
 
-/// Looks at all that may have changed since the last run.
+/// Takes up all that may have changed since the last run.
 void FixOverdampedAffine::begin_run(bigint step)
 {
   if (!box->begin_run(step)) {
@@ -359,11 +359,10 @@ void FixOverdampedAffine::begin_run(bigint step)
   }
 }
 
-/// At the start of a step: what neither LAMMPS nor another fix has told.
+/// Follows, or refuses, what has changed at the start of a step without a call to this fix.
 void FixOverdampedAffine::take_up(bigint from)
 {
-  if (from == update->firststep && !has_begun) begin_run(from);  // 'run N pre no'
-  has_begun = false;
+  if (!has_begun) begin_run(from);  // 'run N pre no'
   if (!box->is_as_left()) {
     flow->stop("found that something else changed the box in the last step, expected no other fix "
                "that does: use 'unfix', or run that fix before or after the flow.");
@@ -425,6 +424,7 @@ void FixOverdampedAffine::min_post_neighbor() { flow->measure_particles(); }
 void FixOverdampedAffine::post_run()
 {
   if (running) flow->require_untouched();
+  has_begun = false;
 }
 
 void FixOverdampedAffine::setup(int)

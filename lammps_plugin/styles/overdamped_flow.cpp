@@ -41,7 +41,7 @@ constexpr double LARGEST_TRIAL = 0.5;
 /// Coordinates that agree with the atom's position to this fraction of the box are its own.
 constexpr double SAME_POSITION = 1e-13;
 
-/// What rounding and counts of images may take from the same within a run.
+/// The same within a run, in which rounding and counts of images grow.
 constexpr double UNTOUCHED = 1e-10;
 
 }  // namespace
@@ -130,7 +130,7 @@ bool OverdampedFlow::begin_run()
   return sum(moved) == 0.0;
 }
 
-/// Where its coordinates say, to this part of the box.
+/// Whether atom i is where its coordinates put it, to this fraction of the box.
 template <int D>
 bool OverdampedFlow::is_at(int i, const AffineBox::Deformed<D> &present, double tolerance) const
 {
@@ -162,7 +162,8 @@ bool OverdampedFlow::stop_particles()
 
 bool OverdampedFlow::knows_particles() const
 {
-  return pair && pair == PairContact::find(lmp) && mobilities.n_measured() == atom->nlocal;
+  const bool is_known = pair && pair == PairContact::find(lmp);
+  return sum(is_known && mobilities.n_measured() == atom->nlocal ? 0.0 : 1.0) == 0.0;
 }
 
 void OverdampedFlow::require_untouched() const

@@ -26,7 +26,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
 
   /// False when particles are not where the last run left them.
   bool begin_run();
-  /// Takes velocities away, which this motion has none of; true if there were any.
+  /// Sets velocities to 0, since this motion has none; true if there were any.
   bool stop_particles();
   /// Whether the last `begin_run` was for the present particles and pair style.
   bool knows_particles() const;

@@ -156,7 +156,7 @@ _STATES = (
     Feature("`displace_atoms` between runs", f"{FLOW}\nrun 25\ndisplace_atoms all move 1 0 0\nrun 25", "x[1]",
             10 + (-5 * exp(-0.025) + 1) * exp(-0.025), scene=DISC),
     Feature("`displace_atoms`, then `run pre no`",
-            f"{FLOW}\nrun 25\ndisplace_atoms all move 1 0 0\nrun 25 pre no", "x[1]",
+            f"{FLOW}\nrun 25\nrun 0\ndisplace_atoms all move 1 0 0\nrun 25 pre no", "x[1]",
             10 + (-5 * exp(-0.025) + 1) * exp(-0.025), scene=DISC),
     Feature("`create_atoms` between runs",
             f"{FLOW}\nrun 25\ncreate_atoms 1 single 3 3 0\nset atom 3 shape 1 1 1\nrun 25", "x[3]",
