@@ -93,6 +93,17 @@ auto has_post_force(const Modify *modify) -> decltype(modify->n_post_force != 0)
   return modify->n_post_force != 0;
 }
 
+/// Number of regions that a deck has defined: counted in public until 2022.
+template <class Domain> auto n_regions(Domain *domain) -> decltype(int(domain->nregion))
+{
+  return domain->nregion;
+}
+template <class Domain>
+auto n_regions(Domain *domain) -> decltype(int(domain->get_region_list().size()))
+{
+  return static_cast<int>(domain->get_region_list().size());
+}
+
 }  // namespace jamshape::compat
 
 /// What the PLUGIN package's header, which is not installed, says of plugins for its `plugin load`.

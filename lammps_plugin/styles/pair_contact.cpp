@@ -2,6 +2,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "decimal_point.h"
 #include "domain.h"
 #include "error.h"
 #include "fix.h"
@@ -60,9 +61,14 @@ PairContact::~PairContact()
   memory->destroy(k_e);
 }
 
+PairContact *PairContact::find(LAMMPS_NS::LAMMPS *lmp)
+{
+  return dynamic_cast<PairContact *>(lmp->force->pair);
+}
+
 PairContact &PairContact::of(LAMMPS_NS::LAMMPS *lmp, const std::string &who)
 {
-  auto *const pair = dynamic_cast<PairContact *>(lmp->force->pair);
+  auto *const pair = find(lmp);
   if (!pair) {
     const char *const style = lmp->force->pair_style;
     lmp->error->all(FLERR, who + " found pair_style " + (style ? style : "none") +
@@ -198,6 +204,7 @@ void PairContact::measure_particles()
 
 void PairContact::init_style()
 {
+  require_decimal_point(lmp, "pair_style " + style_name());
   if (mix_flag == SIXTHPOWER) {
     error->all(FLERR, "pair_style " + style_name() +
                           " found 'pair_modify mix sixthpower', expected geometric or arithmetic, "

@@ -41,7 +41,9 @@ class PairContact : public LAMMPS_NS::Pair {
   explicit PairContact(LAMMPS_NS::LAMMPS *lmp);
   ~PairContact() override;
 
-  /// The pair style in use; ends the run with a sentence about `who` asks if it is none of ours.
+  /// The pair style in use, null if it is none of ours.
+  static PairContact *find(LAMMPS_NS::LAMMPS *lmp);
+  /// The same; ends the run with a sentence about `who` asks if it is none of ours.
   static PairContact &of(LAMMPS_NS::LAMMPS *lmp, const std::string &who);
   /// The same, and with one if its contacts are not those of the present atoms.
   static PairContact &evaluated(LAMMPS_NS::LAMMPS *lmp, const std::string &who);

@@ -4,6 +4,7 @@
 #include "compat.h"
 #include "compute_contact_local.h"
 #include "compute_packing.h"
+#include "decimal_point.h"
 #include "deck_command.h"
 #include "error.h"
 #include "fix_overdamped_affine.h"
@@ -184,6 +185,7 @@ void jamshape_register(void *handle)
   auto *lmp = static_cast<LAMMPS *>(handle);
   const std::string wrong = what_differs(handle);
   if (!wrong.empty()) lmp->error->all(FLERR, wrong);
+  jamshape::give_decimal_point(lmp);
   for_all_styles(AddToMaps{lmp});
   jamshape::tell_plugin_file(lmp);
 }
@@ -198,6 +200,7 @@ void lammpsplugin_init(void *handle, void *library, void *add)
     if (lmp->comm->me == 0) lmp->error->warning(FLERR, wrong);
     return;
   }
+  jamshape::give_decimal_point(lmp);
   for_all_styles(AddAsPlugins{lmp, library, reinterpret_cast<lammpsplugin_regfunc>(add)});
   jamshape::tell_plugin_file(lmp);
 }

@@ -153,11 +153,19 @@ def test_wrong_fix_commands(command, sentence, sentence_of):
     assert re.fullmatch(f"fix overdamped/affine found {sentence}", sentence_of(command))
 
 
-@pytest.mark.parametrize(("dt", "strain"), [("-0.5", "-0.0005"), ("2000", "2")])
-def test_steps_that_cannot_be_divided(dt, strain, sentence_of):
-    assert sentence_of(f"{FIX} integrator rkc2\ntimestep {dt}\nrun 1") == (
-        f"fix overdamped/affine found timestep {dt}, a strain of {strain}, expected a "
-        "step from 0 to a strain of 1: the integrator divides it."
+@pytest.mark.parametrize("integrator", ["heun", "heun/adaptive", "rkc2"])
+@pytest.mark.parametrize("dt", ["0", "-0.5"])
+def test_time_passes_forwards(dt, integrator, sentence_of):
+    assert sentence_of(f"{FIX} integrator {integrator}\ntimestep {dt}\nrun 1") == (
+        f"fix overdamped/affine found timestep {dt}, expected a positive one: to open the box, give "
+        "'compress' a negative rate."
+    )
+
+
+def test_steps_that_cannot_be_divided(sentence_of):
+    assert sentence_of(f"{FIX} integrator rkc2\ntimestep 2000\nrun 1") == (
+        "fix overdamped/affine found timestep 2000, a strain of 2, expected a step from 0 to a strain "
+        "of 1: the integrator divides it."
     )
 
 

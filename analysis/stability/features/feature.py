@@ -13,7 +13,9 @@ from jamshape.lammps.plugin import load_script_path, plugin_path
 
 LOAD = f'include "{load_script_path()}"'
 
-# Two rods of length 5 and width 1 that overlap, in a box of edge 20; as of /shape and /pair in LAMMPS's words.
+HEAD = "dimension 2\natom_style ellipsoid\natom_modify map array"
+
+# Two rods of length 5 and width 1 that overlap, in a box of edge 20.
 BOX = f"""{LOAD}
 region box block 0 20 0 20 -0.5 0.5
 create_box 2 box"""
@@ -24,8 +26,23 @@ set group all density 1"""
 LAW = """pair_style spherocylinder/harmonic sides two
 pair_coeff * * 1.0
 thermo_modify norm no"""
-HEAD = "dimension 2\natom_style ellipsoid\natom_modify map array"
-TWO_RODS = f"{HEAD}\n{BOX}\n{RODS}\n{LAW}"
+# What may be asked for after a run: a sum that sees every position and direction among it.
+OUTPUT = """compute quaternions all property/atom quatw quatk
+variable pose atom id*(x+2*y+c_quaternions[1]+2*c_quaternions[2])
+compute poses all reduce sum v_pose
+compute turned all reduce max c_quaternions[2]
+thermo_style custom step lx pe press c_poses c_turned
+thermo_modify norm no"""
+TWO_RODS = f"{HEAD}\n{BOX}\n{RODS}\n{LAW}\n{OUTPUT}"
+
+# A disc of diameter 1 alone, off the centre of that box.
+DISC = f"""{HEAD}
+{BOX}
+create_atoms 1 single 5 10 0
+set group all shape 1 1 1
+set group all density 1
+{LAW}
+{OUTPUT}"""
 
 # 64 short rods that all touch neighbours and cannot cross.
 CROWD = f"""{HEAD}
@@ -39,12 +56,8 @@ set group all shape 1.4 0.8 0.8
 set group all density 1
 set group all quat/random 11
 displace_atoms all random 0.1 0.1 0 13
-{LAW}"""
-
-# Sums that see every particle: positions and angles weighted with IDs.
-SUM_OF_POSES = """compute quaternions all property/atom quatw quatk
-variable pose atom id*(x+2*y)+id*(c_quaternions[1]+2*c_quaternions[2])
-compute poses all reduce sum v_pose"""
+{LAW}
+{OUTPUT}"""
 
 
 class Feature(NamedTuple):
@@ -67,9 +80,9 @@ class Feature(NamedTuple):
     warned : str
         Regular expression of a warning that must be in the log.
     scene : str
-        Deck that comes before, `TWO_RODS` or `CROWD` or another.
-    arguments : tuple of str
-        More words of the command line of `lmp`.
+        Deck that comes before, `TWO_RODS`, `DISC`, `CROWD` or another.
+    ranks : int
+        How many, each a partition of its own if more than one.
     """
 
     name: str
@@ -80,7 +93,7 @@ class Feature(NamedTuple):
     refused: str = ""
     warned: str = ""
     scene: str = TWO_RODS
-    arguments: tuple[str, ...] = ()
+    ranks: int = 1
 
 
 class Outcome(NamedTuple):
@@ -95,12 +108,16 @@ class Outcome(NamedTuple):
 _ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 
-def run_deck(text: str, folder: Path, arguments: tuple[str, ...] = ()) -> tuple[int, str]:
-    """Run `lmp` on a deck in a process of its own, within a folder; return exit code and output."""
+def run_deck(text: str, folder: Path, ranks: int = 1) -> tuple[int, str]:
+    """Run `lmp` on a deck in processes of its own, within a folder; return exit code and output."""
     deck = folder / "deck.in"
     deck.write_text(text + "\n")
+    command = ["lmp", "-nocite", "-log", "none", "-in", deck.name]
+    if ranks > 1:
+        mpirun = ["mpirun", "--oversubscribe", "-np", str(ranks)]
+        command = [*mpirun, *command, "-partition", f"{ranks}x1"]
     done = subprocess.run(
-        ["lmp", "-nocite", "-log", "none", *arguments, "-in", deck.name],
+        command,
         env={**os.environ, **_ROOT, "OMP_NUM_THREADS": "1", "JAMSHAPE_PLUGIN": str(plugin_path())},
         cwd=folder,
         text=True,
@@ -109,12 +126,15 @@ def run_deck(text: str, folder: Path, arguments: tuple[str, ...] = ()) -> tuple[
         timeout=120,
         check=False,
     )
-    return done.returncode, done.stdout
+    of_partitions = [path.read_text() for path in sorted(folder.glob("screen.*"))]
+    return done.returncode, "".join([done.stdout, *of_partitions])
 
 
 def sentence_of(output: str) -> str:
     """Return the sentence with which LAMMPS ended, or what else is known of its end."""
-    found = re.findall(r"^ERROR(?: on proc \d+)?: (.*?)(?: \(\S+:\d+\))?$", output, re.MULTILINE)
+    found = re.findall(
+        r"^(?:.*\bERROR|ERROR on proc \d+): (.*?)(?: \(\S+:\d+\))?$", output, re.MULTILINE
+    )
     if found:
         return str(found[0])
     lines = output.strip().splitlines()
@@ -125,7 +145,7 @@ def _measured(deck: str, feature: Feature) -> tuple[float | None, str]:
     """Return the number that a deck gives (None where LAMMPS ended), and all that it printed."""
     with tempfile.TemporaryDirectory() as folder:
         asked = f'{feature.scene}\n{deck}\nprint "measured $({feature.measure or "step"}:%.17g)"'
-        code, output = run_deck(asked, Path(folder), feature.arguments)
+        code, output = run_deck(asked, Path(folder), feature.ranks)
     numbers = re.findall(r"^measured (\S+)$", output, re.MULTILINE)
     return (float(numbers[-1]) if code == 0 and numbers else None), output
 
@@ -141,7 +161,7 @@ def judge(feature: Feature) -> Outcome:
         return Outcome(True, f"{number:.12g}, expected a refusal", False)
     right = feature.right
     if isinstance(right, str):
-        right_number, said = _measured(right, feature._replace(arguments=()))
+        right_number, said = _measured(right, feature)
         assert right_number is not None, said[-2000:]
         right = right_number
     holds = abs(number - right) <= feature.within * abs(right)

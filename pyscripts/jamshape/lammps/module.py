@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import locale
 import os
 import threading
 import warnings
@@ -91,9 +92,29 @@ _one_at_a_time = threading.RLock()
 
 
 @contextmanager
+def _decimal_point() -> Iterator[None]:
+    """Let C code of this thread read and write numbers with a point, whatever LC_NUMERIC the host program has set.
+
+    LAMMPS reads "0.5" as 0 under a decimal comma.
+    """
+    c = ctypes.CDLL(None)
+    c.uselocale.argtypes = c.duplocale.argtypes = c.freelocale.argtypes = [ctypes.c_void_p]
+    c.newlocale.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_void_p]
+    c.uselocale.restype = c.duplocale.restype = c.newlocale.restype = ctypes.c_void_p
+    before = c.uselocale(None)
+    point = c.newlocale(1 << locale.LC_NUMERIC, b"C", c.duplocale(before))
+    c.uselocale(point)
+    try:
+        yield
+    finally:
+        c.uselocale(before)
+        c.freelocale(point)
+
+
+@contextmanager
 def one_at_a_time() -> Iterator[None]:
-    """Let no other thread of this process call LAMMPS meanwhile: its MPI library is not made for that."""
-    with _one_at_a_time:
+    """Let no other thread of this process call LAMMPS meanwhile, whose MPI library is not made for that, under a decimal point."""
+    with _one_at_a_time, _decimal_point():
         yield
 
 
