@@ -23,7 +23,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from jamshape.checks import require_options
+from jamshape.checks import NotReachedWarning, Sentence, require_options
 
 # What wrong input, missing files and searches without an end raise, each with one sentence.
 PROBLEMS = (OSError, ValueError, RuntimeError)
@@ -100,7 +100,8 @@ def run(parser: ArgumentParser, main: Callable[[Namespace], int | None]) -> NoRe
 def sentences(name: str, go_on: str = "it may be started again") -> Iterator[None]:
     """End the program with one sentence after its name where its body raises what users may meet; warn in one, too.
 
-    The exit code is 1 after one of `PROBLEMS` or where a module is missing, and 130 after Ctrl-C.
+    The exit code is 1 after one of `PROBLEMS`, where a module is missing, and where a result did not reach its goal
+    (`checks.NotReachedWarning`), and 130 after Ctrl-C.
 
     Parameters
     ----------
@@ -109,14 +110,23 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
     go_on : str
         How to go on after Ctrl-C.
     """
+    short: list[Warning | str] = []
+
+    def show(said: Warning | str, *_: Any, **__: Any) -> None:
+        print(f"{name}: warning: {_typed(said)}", file=sys.stderr)
+        short.extend([said] * isinstance(said, NotReachedWarning))
+
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = lambda said, *_: print(
-                f"{name}: warning: {said}", file=sys.stderr
-            )
+            warnings.simplefilter("always", NotReachedWarning)
+            warnings.showwarning = show  # type: ignore[assignment]
             yield
+    except SystemExit as end:
+        if short and not end.code:
+            sys.exit(1)
+        raise
     except PROBLEMS as error:
-        sys.exit(f"{name}: {error}")
+        sys.exit(f"{name}: {_typed(error)}")
     except ImportError as error:
         sys.exit(f"{name}: {what_is_missing(error)}")
     except KeyboardInterrupt:
@@ -125,6 +135,11 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
         # Below a bar of progress.
         print(f"\n{name}: interrupted; {go_on}", file=sys.stderr)
         sys.exit(_INTERRUPTED)
+
+
+def _typed(said: BaseException | str) -> str:
+    """Write a sentence with the options of a command in place of the arguments of a function."""
+    return said.with_options if isinstance(said, Sentence) else str(said)
 
 
 def what_is_missing(error: ImportError) -> str:

@@ -21,7 +21,7 @@ from jamshape.files.h5md import (
     read_report,
 )
 from jamshape.files.lammps_text import iter_dump, read_data
-from jamshape.files.sets import REACHED
+from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, RESTART, SIGNATURES, format_of
 from jamshape.front.packing import MeasuredPacking
 from jamshape.packing import Packing
@@ -108,7 +108,7 @@ def _particles(path: Path) -> dict[str, Any]:
     if "kappa" in found:
         found["kappa"] = np.ravel(found["kappa"])[-1].item()
     if "outcome" in known:
-        found["reached"] = known["outcome"] in REACHED
+        found |= {"reached": is_reached(known), "shortfall": shortfall(known) or None}
     found |= {"frames": count_frames(path), **_cost(path, known)}
     found |= {"format_version": read_format_version(path), "jamshape_version": read_creator(path)}
     if not found["finished"]:

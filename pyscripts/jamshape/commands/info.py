@@ -48,6 +48,7 @@ _LINES = {
         "jamshape {jamshape_version}",
         "format {format_version}",
     ),
+    "not reached": ("{shortfall}",),
     "go on with": ("{go_on}",),
 }
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.arrays import FloatArray
 from jamshape.checks import Range, require_in, require_one_of, require_other_file
+from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
@@ -199,6 +200,11 @@ def modes(
     NotAtMinimumError
         If forces do not balance, unless `force` is given.
 
+    Warns
+    -----
+    NotReachedWarning
+        If forces balance well enough for modes, but not to the tolerance of the packing, unless `force` is given.
+
     Examples
     --------
     >>> import jamshape as js
@@ -218,6 +224,8 @@ def modes(
     if not isinstance(packing, Packing):
         packing = MeasuredPacking.read(Path(packing))
     measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
+    if not force and not measured.reached:
+        warn_unless_reached(measured.results)
     landscape, state = Landscape(measured), State.of(measured)
     scope = Scope(rotation, least_force, force=force)
     matrix = dynamical_matrix(landscape, state, scope)

@@ -214,6 +214,11 @@ def quasistatic_shear(
     PressureError
         If the pressure cannot be held.
 
+    Warns
+    -----
+    NotReachedWarning
+        If forces do not balance to the tolerance after some of the steps; ``run.at_rest`` says after which they do.
+
     Examples
     --------
     >>> import jamshape as js

@@ -23,6 +23,7 @@ from jamshape.minima import Outcome, Stop, minimise
 from jamshape.minima.target import Search, Target, TargetError, direct
 from jamshape.packing import Packing
 from jamshape.protocols.make import is_done
+from jamshape.protocols.retry import retried
 from jamshape.shapes.shape import in_name
 
 # What must agree in the packing and in a rung that is there already.
@@ -112,14 +113,17 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
     except TargetError as error:
         return Rung(out, goal.u0, made=False, failure=str(error))
     assert search.minimum is not None
-    shared = _shared(read_packing(source), search.minimum.state.packing(start))
+    minimum = search.minimum
+    if not minimum.is_at_rest:
+        minimum = retried(landscape, minimum, goal, landscape.evaluations)
+    shared = _shared(read_packing(source), minimum.state.packing(start))
     attributes = stored | {name: getattr(goal, name) for name in ("u0", "accuracy", "tolerance")}
     attributes |= {"ladder_source": source.name, "contacts_shared": shared}
     attributes |= {
         "evaluations": landscape.evaluations,
         "wall_seconds": time.perf_counter() - began,
     }
-    write_minimum(out, landscape, search.minimum, attributes)
+    write_minimum(out, landscape, minimum, attributes)
     return Rung(out, goal.u0, made=True, failure="")
 
 
