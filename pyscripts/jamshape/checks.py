@@ -245,6 +245,11 @@ def require_stated(**values: Any) -> None:
         require_in(name, value, RANGES[name])
 
 
+def require_given(**values: Any) -> None:
+    """Refuse numbers as `require_stated` does, those that are None left out."""
+    require_stated(**{name: value for name, value in values.items() if value is not None})
+
+
 def require_options(given: Mapping[str, Any]) -> None:
     """Refuse options that are out of the range of their name, and numbers that are none whatever their name.
 

@@ -55,11 +55,19 @@ def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser
 
 
 def add_numbers(parser: ArgumentParser, *rows: tuple[str, int | float, str]) -> None:
-    """Add options that are numbers, each with its name, what it is where it is left out, and what it means."""
+    """Add options that are numbers, each with its name, what it is where it is left out, and what it means.
+
+    What is left out is None: the function that the command calls knows what is usual, and what was not typed cannot
+    contradict anything.
+    """
     for name, default, meaning in rows:
-        parser.add_argument(
-            name, type=type(default), default=default, help=f"{meaning} ({default})"
-        )
+        parser.add_argument(name, type=type(default), help=f"{meaning} ({default})")
+
+
+def typed(options: Namespace, *names: str) -> dict[str, Any]:
+    """Pick the options of these names that were typed."""
+    found = {name: getattr(options, name) for name in names}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def report(found: Mapping[str, Any]) -> None:

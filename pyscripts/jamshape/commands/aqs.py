@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.checks import RANGES, require_in
-from jamshape.command import add_numbers, parser_of, report
+from jamshape.command import add_numbers, parser_of, report, typed
 from jamshape.flow.shear import FLOWS
 from jamshape.front.run import QuasistaticShearFile
 from jamshape.front.shearing import quasistatic_shear
-from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
+from jamshape.shapes.command_line import add_particle_options, particles_beside
 
 GO_ON = "the same command goes on from the last frame"
 
@@ -57,9 +57,8 @@ def main(options: Namespace) -> None:
     )
     names = ("n", "dimension", "phi", "step", "strain", "flow", "pressure", "tolerance", "seed",
              "start", "frames", "again")  # fmt: skip
-    given = {name: getattr(options, name) for name in names}
-    particles = particles_of(options) if are_particles_given(options) or not options.start else None
-    run = quasistatic_shear(particles, **given, file=options.out)
+    given = typed(options, *names)
+    run = quasistatic_shear(particles_beside(options), **given, file=options.out)
     at_end = ("strain", "phi", "stress", "pressure", "sigma", "mu", "z")
     found = {name: float(run[name][-1]) for name in at_end}
     events = run.events(options.least_drop)

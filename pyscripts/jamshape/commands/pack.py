@@ -23,8 +23,9 @@ from pathlib import Path
 
 from jamshape.command import parser_of, report
 from jamshape.front.making import make_packing
-from jamshape.protocols.command_line import add_recipe_options, asked_particles, settings_of
+from jamshape.protocols.command_line import add_recipe_options, settings_of
 from jamshape.protocols.make import summary_of
+from jamshape.shapes.command_line import particles_beside
 
 GO_ON = "the same command goes on from the files beside the result"
 
@@ -45,7 +46,7 @@ def main(options: Namespace) -> int:
     """Make the packing unless it is there; return the exit code."""
     settings = settings_of(options)
     make_packing(
-        asked_particles(options), **settings, threads=options.threads, file=options.out,
+        particles_beside(options), **settings, threads=options.threads, file=options.out,
         again=options.again,
     )  # fmt: skip
     found = summary_of(options.out)

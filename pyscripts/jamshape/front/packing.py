@@ -14,7 +14,7 @@ from jamshape.arrays import BoolArray
 from jamshape.contacts import Contacts
 from jamshape.contacts.network import sum_forces
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
-from jamshape.files.outcomes import is_reached, shortfall
+from jamshape.files.outcomes import AT_REST, is_reached, shortfall
 from jamshape.packing import Packing
 
 if TYPE_CHECKING:
@@ -165,7 +165,9 @@ class MeasuredPacking(Packing):
         numbers = {name: self.results.get(key) for key, name in known}
         said += [f"{k} = {v:.4g}" for k, v in numbers.items() if _is_number(v)]
         if not self.reached:
-            said.append(f"not at rest: {shortfall(self.results)}")
+            outcome = self.results["outcome"]
+            unbalanced = f"{outcome}: forces do not balance"
+            said.append(shortfall(self.results) if outcome in AT_REST else unbalanced)
         said += [f"in {self.file}"] * (self.file is not None)
         what = f"{self.n} {self.shape.name}s in {self.dimension}D"
         return f"<Packing of {what}: {', '.join(said)}>"

@@ -31,6 +31,9 @@ _IDENTITY = (
     *("alpha", "exponent", "w1", "w2", "kinds", "n", "seed", "size_ratio", "protocol", "n_sweeps"),
 )
 
+# What a packing's file says of how its own minimum was found, which is not that of a rung.
+_OF_SOURCE = ("strict", "retry_", "n_negative", "n_kinked", "lowest_eigenvalue")
+
 # A box that was opened has been opened too far below this fraction of u0; how long to look.
 _FALLEN = 1e-2
 _EVALUATIONS = 2000
@@ -117,7 +120,8 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
     if not minimum.is_at_rest:
         minimum = retried(landscape, minimum, goal, landscape.evaluations)
     shared = _shared(read_packing(source), minimum.state.packing(start))
-    attributes = stored | {name: getattr(goal, name) for name in ("u0", "accuracy", "tolerance")}
+    known = {name: value for name, value in stored.items() if not name.startswith(_OF_SOURCE)}
+    attributes = known | {name: getattr(goal, name) for name in ("u0", "accuracy", "tolerance")}
     attributes |= {"ladder_source": source.name, "contacts_shared": shared}
     attributes |= {
         "evaluations": landscape.evaluations,
