@@ -57,6 +57,10 @@ class _Parser(ArgumentParser):
                 self.error(f"--{name.replace('_', '-')} is {value}, expected at least {least}")
         if not particles(options):
             self.error("no particles were given, expected --alpha, --kind or the name of a shape")
+        if options.shape and not (options.alpha or options.kind):
+            self.error(
+                f"--shape {options.shape} has no effect without --alpha or --kind, expected one of them"
+            )
         self._require_options_of_a_packing(options)
         return options, []
 
@@ -88,7 +92,7 @@ def options_of() -> ArgumentParser:
     parser.add_argument(
         "--alpha", type=float, nargs="+", action="extend", default=[], help="aspect ratios A/R"
     )
-    parser.add_argument("--shape", choices=SHAPES, default=DEFAULT, help="of --alpha and --kind")
+    parser.add_argument("--shape", choices=SHAPES, help=f"of --alpha and --kind ({DEFAULT})")
     parser.add_argument("--kind", action="append", default=[], help="one mixture, of these kinds")
     for shape in SHAPES.values():
         parser.add_argument(
@@ -124,7 +128,7 @@ class Particle(NamedTuple):
 
 def particles(options: Namespace) -> list[Particle]:
     """List the particles that are asked for, each once."""
-    shape = shape_named(options.shape)
+    shape = shape_named(options.shape or DEFAULT)
     found = [particle_of(shape, {"alpha": alpha}) for alpha in options.alpha]
     for other in SHAPES.values():
         names = [p.name for p in other.parameters]

@@ -228,7 +228,8 @@ def modes(
     if near is not None:
         require_in("near", near, _NEAR)
     if method != _SPARSE:
-        require_no_effect("method", method, lowest=lowest, near=near)
+        require_no_effect("lowest", lowest, method=method)
+        require_no_effect("near", near, method=method)
     if not isinstance(packing, Packing):
         packing = MeasuredPacking.read(Path(packing))
     measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)

@@ -7,6 +7,7 @@ import html as markup
 import io
 from typing import TYPE_CHECKING, Any
 
+from jamshape.checks import ArgumentError
 from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
@@ -29,7 +30,7 @@ _DPI = 100
 
 
 def plot(
-    thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str = "kind"
+    thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str | None = None
 ) -> Axes:
     """Draw a packing, the pressure of a compression, the stress of a shear, or the density of modes.
 
@@ -38,8 +39,8 @@ def plot(
     thing : Packing, RunFile, ShearFile or Modes
     axes : matplotlib Axes, optional
         Where to draw; a new figure of `matplotlib.pyplot` when left out.
-    color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}
-        What the colours of a packing's particles tell.
+    color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}, optional
+        What the colours of a packing's particles tell; "kind" when left out.
 
     Returns
     -------
@@ -50,7 +51,7 @@ def plot(
     TypeError
         If it is none of these.
     ValueError
-        If the packing's dimension knows no such order.
+        If the packing's dimension knows no such order, or there is a colour for what is no packing.
 
     Examples
     --------
@@ -63,11 +64,16 @@ def plot(
     >>> "N=16" in axes.get_title()
     True
     """
+    if color is not None and not isinstance(thing, Packing):
+        said = (
+            f"{{color}} has no effect on a {type(thing).__name__}, expected a packing; leave it out"
+        )
+        raise ArgumentError(said, {"color": color})
     if axes is None:
         import matplotlib.pyplot as plt  # noqa: PLC0415 - not needed where axes are given
 
         axes = plt.figure(figsize=_size(thing), layout="constrained").add_subplot()
-    _draw(thing, axes, color)
+    _draw(thing, axes, color or "kind")
     return axes
 
 
