@@ -24,9 +24,10 @@ from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_packing
+from jamshape.files.outcomes import is_reached
 from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape, State
-from jamshape.measures.averages import mean_over
+from jamshape.measures.averages import Mean, mean_over
 from jamshape.minima.target import TargetError
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import make
@@ -90,9 +91,15 @@ def row_of(made: list[Sample]) -> dict[str, Any]:
     files = [PackingFile.read(one.file) for one in made if not one.failure]
     seconds = [one.seconds for one in made]
     means = {n: mean_over(files, [f.number(n) for f in files]) for n in ("z", "phi_J")}
-    counts = {"samples": len(made), "reached": sum(file.reached for file in files)}
+    counts: dict[str, Any] = {"samples": len(made), "reached": sum(file.reached for file in files)}
     counts |= {"not_made": len(made) - len(files)}
+    found = [file.attributes for file in files]
+    counts |= {"steps_of_cured": sorted(a["retry_steps"] for a in found if _is_cured(a))}
     return counts | means | {"median_seconds": statistics.median(seconds), "seconds": sum(seconds)}
+
+
+def _is_cured(known: dict[str, Any]) -> bool:
+    return "retry_of" in known and is_reached(known)
 
 
 def price(file: Path) -> float:
@@ -126,7 +133,7 @@ def main(options: Namespace) -> None:
         rows += [{"alpha": alpha, "sort": sort, **row_of(made)} for sort, made in found.items()]
         steps.append(price(next(one.file for one in found["now"] if not one.failure)))
     for row in rows:
-        z = row["z"]
+        z: Mean = row["z"]
         reached = f", {z.reached.text()} of those that did" if z.reached else ""
         print(
             f"alpha {row['alpha']:g} {row['sort']:6}: {row['reached']} of {row['samples']} reached,"

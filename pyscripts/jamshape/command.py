@@ -78,10 +78,13 @@ def report(found: Mapping[str, Any]) -> None:
 def plain(value: Any) -> Any:
     """Turn a value into what JSON knows.
 
-    NaN and infinity become null, named tuples objects, arrays and other tuples lists, paths text.
+    NaN and infinity become null, what has a method ``as_json`` what that returns, named tuples objects, arrays and other
+    tuples lists, paths text.
     """
     if hasattr(value, "tolist"):  # arrays and numbers of numpy
         return plain(value.tolist())
+    if hasattr(value, "as_json"):
+        return plain(value.as_json())
     if hasattr(value, "_asdict"):
         return plain(value._asdict())
     if isinstance(value, Mapping):

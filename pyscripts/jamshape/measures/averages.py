@@ -50,6 +50,11 @@ class Mean(NamedTuple):
     reached: Mean | None = None
     """The same without samples that did not reach their goal, where there are some."""
 
+    def as_json(self) -> dict[str, Any]:
+        """Name its numbers for JSON; `reached` only where there are two averages."""
+        found = self._asdict()
+        return found if self.reached else {k: v for k, v in found.items() if k != "reached"}
+
     @property
     def tex(self) -> str:
         """Write it in TeX, without dollars."""
