@@ -49,6 +49,8 @@ _OTHER_COMMAND = "start the command that makes {result} again, which goes on fro
 # The first that fits.
 _STORED = (
     _Stored("search for an energy", "search_step", _OTHER_COMMAND),
+    _Stored("search for a strict minimum", "strict_search", _OTHER_COMMAND),
+    _Stored("second try of a packing", "retry_budget", _OTHER_COMMAND),
     _Stored("steps on the way to a packing", "loose_phi", _OTHER_COMMAND),
     _Stored("slow run", "flow_steps", _SAME_COMMAND),
     _Stored("compression on the way to a packing", "restart_step", _OTHER_COMMAND),
@@ -60,7 +62,7 @@ _STORED = (
 )
 
 # Of files beside a packing that is not made yet.
-_ENDS = (".search.h5", ".path.h5", ".run.h5")
+_ENDS = (".search.h5", ".path.h5", ".run.h5", ".strict.h5")
 
 
 def contents_of(path: Path) -> dict[str, Any]:

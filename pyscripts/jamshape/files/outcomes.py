@@ -20,6 +20,7 @@ _SLIDING = "sliding"  # forces that are left lie along what slides: they may be 
 
 _ADVICE = "{strict}, another {u0:name} or another {seed:name}"
 _ADVICE_OF_STRICT = "another {u0:name} or another {seed:name}"
+_ADVICE_OF_DIGITS = "a larger {u0:name} or {tolerance:name}, since rounding leaves more"
 
 
 def is_reached(known: Mapping[str, Any]) -> bool:
@@ -74,7 +75,9 @@ def warn_unless_reached(known: Mapping[str, Any], stacklevel: int = 2) -> None:
     """
     if found := shortfall(known):
         advice = _ADVICE_OF_STRICT if known.get("strict") else _ADVICE
-        given = {"strict": True, "u0": None, "seed": None}
+        if known.get("rounding_floor", 0.0) > _tolerance(known):
+            advice = _ADVICE_OF_DIGITS
+        given = {"strict": True, "u0": None, "seed": None, "tolerance": None}
         said = NotReachedWarning(f"the packing is not at rest: {found}; try {advice}", given)
         warnings.warn(said, stacklevel=stacklevel + 1)
 

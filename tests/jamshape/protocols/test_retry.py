@@ -7,6 +7,7 @@ import pytest
 from mixtures import bidisperse
 
 import jamshape as js
+from jamshape.commands.contents import contents_of
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima import residual_of
@@ -64,7 +65,11 @@ def test_after_a_kill_it_ends_in_the_same_packing(cured, tmp_path, monkeypatch):
     for _ in itertools.islice((at for at in steps if at.stage == "retry"), 2):
         pass
     steps.close()
-    assert read_attributes(tmp_path / "packing.h5.strict.h5")["retry_n_steps"] == 1
+    file = tmp_path / "packing.h5.strict.h5"
+    assert read_attributes(file)["retry_n_steps"] == 1
+    told = contents_of(file)
+    assert (told["kind"], told["finished"]) == ("second try of a packing", False)
+    assert told["go_on"].startswith(f"start the command that makes {out} again")
     again = made(out)
     assert [path.name for path in tmp_path.iterdir()] == ["packing.h5"]
     whole, known = cured
