@@ -83,8 +83,9 @@ class Ours(NamedTuple):
     samples: int = 0
     """0 where nobody knows."""
     reached: float = math.nan
-    """The same without the packings that did not reach their goal; NaN where all did."""
-    reached_samples: int = 0
+    """The same without the packings that did not reach their goal; NaN where all or none did."""
+    reached_samples: int | None = None
+    """How many did; None where all."""
 
 
 class Row(NamedTuple):
@@ -238,7 +239,7 @@ def earlier(table: Path) -> dict[str, tuple[Ours, str]]:
                     float(row["our_error"] or math.nan),
                     int(row["samples"] or 0),
                     float(row.get("ours_reached") or math.nan),
-                    int(row.get("reached_samples") or 0),
+                    int(at_rest) if (at_rest := row.get("reached_samples")) else None,
                 ),
                 row["commit"],
             )
@@ -301,8 +302,11 @@ def cells(row: Row) -> tuple[str, ...]:
     """Write a line of the table."""
     p, ours = row.published, row.ours
     here = number(ours.value, ours.error) if ours else ""
-    if ours and math.isfinite(ours.reached):
-        here += f"; {ours.reached:.6g} of {ours.reached_samples} at rest"
+    if ours and ours.reached_samples is not None:
+        at_rest = (
+            f"{ours.reached:.5g} of {ours.reached_samples}" if ours.reached_samples else "none"
+        )
+        here += f"; {at_rest} at rest"
     samples = str(ours.samples) if ours and ours.samples else ""
     off = f"{row.difference:+.1f}" if not math.isnan(row.difference) else ""
     return (
@@ -331,7 +335,7 @@ def read_jobs(folder: Path) -> list[Took]:
 
 
 # What jobs say of packings that could not be made, led to an energy, or have no modes; the others of a job go on.
-COMPLAINT = re.compile(r"^(?:jamshape modes: .+|\S+\.h5: .+)$", re.MULTILINE)
+COMPLAINT = re.compile(r"^(?:jamshape modes: (?!warning: ).+|\S+\.h5: .+)$", re.MULTILINE)
 
 
 def failures(folder: Path) -> list[str]:
@@ -409,7 +413,9 @@ def where_it_ran(folder: Path, at: Mapping[str, Any]) -> str:
     parts.append(markdown(("job", "how many", "seconds"), rows))
     failed = failures(folder)
     parts.append(
-        "Not made: " + ("; ".join(failed) if failed else "nothing that was asked for") + "."
+        "Not made, or not at rest: "
+        + ("; ".join(failed) if failed else "nothing of what was asked for")
+        + "."
     )
     return "\n\n".join(parts)
 
@@ -461,7 +467,7 @@ def plain(row: Row) -> tuple[Any, ...]:
         made_by,
     )
     without = None if math.isnan(measured.reached) else measured.reached
-    return (*cells_of_row, without, measured.reached_samples or None)
+    return (*cells_of_row, without, measured.reached_samples)
 
 
 def jobs_of(folder: Path, known: Path | None) -> list[tuple[Any, ...]]:
