@@ -24,6 +24,7 @@ from typing import Any
 
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes, read_style
+from jamshape.files.outcomes import is_reached
 from jamshape.files.sets import OTHERS
 from jamshape.measures.runs import rate_of
 from jamshape.vibration.sets import TOLD, count_of, of_packing
@@ -33,11 +34,11 @@ SHAPE = ("alpha", "exponent", "w1", "w2", "size_ratio", "n", "seed")
 STYLE = ("shape", "dimension")
 PACKING = (
     *STYLE, *SHAPE, "asphericity", "beta", "z_iso", "way", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
-    "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "outcome", "wall_seconds",
+    "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "tolerance", "outcome", "retry_of", "wall_seconds",
 )  # fmt: skip
 RUN = (
     *SHAPE, "kappa", "phi_start", "phi_end", "method", "phi_unjams", "phi_jams", "frames_minimised",
-    "flow_steps", "flow_evaluations", "flow_wall_seconds",
+    "frames_undecided", "flow_steps", "flow_evaluations", "flow_wall_seconds",
 )  # fmt: skip
 MODES = (
     *SHAPE, "u0", "n_backbone", "n_modes", "n_bonds", "z", "rank", "n_self_stress", "n_grazing",
@@ -131,7 +132,9 @@ def main(options: Namespace) -> None:
         known = earlier(options.known / f"{name}.csv") if options.known else []
         lines = [*known, *(cells(row, columns, folder) for row in rows)]
         write(options.out / f"{name}.csv", columns, lines)
-    report({"out": options.out, **{name: len(rows) for name, (_, rows) in tables.items()}})
+    counts = {name: len(rows) for name, (_, rows) in tables.items()}
+    made = [row for _, rows in tables.values() for row in rows if "outcome" in row]
+    report({"out": options.out, **counts, "not_reached": sum(not is_reached(row) for row in made)})
 
 
 if __name__ == "__main__":

@@ -136,7 +136,7 @@ def pairs_of(files: list[PackingFile]) -> dict[tuple[Any, ...], Pair]:
 
 def main(options: Namespace) -> int:
     """Compare; return the exit code."""
-    pairs = pairs_of(finished(options.packings, with_stalled=True))
+    pairs = pairs_of(finished(options.packings))
     for (_, n, u0, seed), pair in sorted(pairs.items(), key=lambda item: item[0][1:]):
         for sort, numbers in pair._asdict().items():
             told = ", ".join(f"{name} {numbers[name]:.6g}" for name in NUMBERS)

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from jamshape.command import parser_of, report, run
 from jamshape.files.sets import System, n_of, of_paper, read_groups
 from jamshape.measures import published
-from jamshape.measures.averages import Mean, mean
+from jamshape.measures.averages import Mean, mean, mean_over
 from jamshape.measures.runs import read_run
 from jamshape.vibration.sets import TOLD, fraction_of, read_tables
 
@@ -60,7 +60,8 @@ def rows_of_packings(paths: list[Path]) -> tuple[int, list[Row]]:
         raise ValueError(msg)
     alpha, u0, n = alpha_of(system), files[0].number("u0"), n_of(groups)
     phi_J, z, rattlers = (
-        mean([file.number(name) for file in files]) for name in ("phi_J", "z", "n_rattlers")
+        mean_over(files, [file.number(name) for file in files])
+        for name in ("phi_J", "z", "n_rattlers")
     )
     beyond = mean([file.number("phi") - file.number("phi_J") for file in files]).value
     distance = published.DISTANCE.get(alpha, {}).get(u0)

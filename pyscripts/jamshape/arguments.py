@@ -20,7 +20,7 @@ _R = TypeVar("_R")
 _T = TypeVar("_T")
 
 
-class ArgumentError(TypeError, ValueError):
+class ArgumentTypeError(TypeError, ValueError):
     """An argument is not of a type that the function takes; the text is one sentence."""
 
 
@@ -37,7 +37,7 @@ def checked(function: Callable[_P, _R]) -> Callable[_P, _R]:
     ...     return 2 * number
     >>> double("1")
     Traceback (most recent call last):
-    jamshape.arguments.ArgumentError: number is '1', expected a number
+    jamshape.arguments.ArgumentTypeError: number is '1', expected a number
     """
     return _checked(function, function.__globals__)
 
@@ -109,7 +109,7 @@ def _taken(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
         except _UnfitError:
             continue
     msg = f"{name} is {_shown(value)}, expected {_named(name, kinds)}"
-    raise ArgumentError(msg)
+    raise ArgumentTypeError(msg)
 
 
 def _fitted(value: Any, kind: Any) -> Any:

@@ -26,6 +26,131 @@ class Range(NamedTuple):
     """Whether it counts something."""
 
 
+class _Typed(NamedTuple):
+    """An argument in a sentence."""
+
+    name: str
+    value: Any
+    is_option: bool
+
+    def __format__(self, spec: str) -> str:
+        """Write it with its value, or with the spec ``name`` without; options that are true need no value."""
+        if self.is_option:
+            option = f"--{_OPTIONS.get(self.name, self.name).replace('_', '-')}"
+            return option if spec == "name" or self.value is True else f"{option} {self.value}"
+        value = str(self.value) if isinstance(self.value, Path) else self.value
+        return self.name if spec == "name" else f"{self.name}={_shown(value)}"
+
+
+# Arguments whose options are called otherwise.
+_OPTIONS = {"file": "out"}
+
+
+class Sentence(Exception):  # noqa: N818 - warnings are of this kind as well
+    """A sentence of an exception or a warning that names arguments as they were typed.
+
+    Parameters
+    ----------
+    template : str
+        With ``{name}`` for an argument with its value and ``{name:name}`` for its name.
+    given : mapping of str to Any
+        The values of the arguments.
+    """
+
+    def __init__(self, template: str, given: Mapping[str, Any]) -> None:
+        super().__init__(template, given)
+        self.template, self.given = template, dict(given)
+
+    def __str__(self) -> str:
+        return self._written(is_option=False)
+
+    @property
+    def with_options(self) -> str:
+        """The sentence for a command line."""
+        return self._written(is_option=True)
+
+    def _written(self, *, is_option: bool) -> str:
+        typed = {name: _Typed(name, value, is_option) for name, value in self.given.items()}
+        return self.template.format_map(typed)
+
+
+class ArgumentError(Sentence, ValueError):
+    """Arguments that contradict each other, or have no effect; parameters as of `Sentence`.
+
+    Examples
+    --------
+    >>> error = ArgumentError("{phi} has no effect with {start}", {"phi": 0.7, "start": "run.h5"})
+    >>> print(error)
+    phi=0.7 has no effect with start='run.h5'
+    >>> print(error.with_options)
+    --phi 0.7 has no effect with --start run.h5
+    """
+
+
+class NotReachedWarning(Sentence, UserWarning):
+    """A result that did not reach its goal: what was reached, and what to try; parameters as of `Sentence`.
+
+    A command that has said so ends with the exit code 1.
+
+    Examples
+    --------
+    >>> said = NotReachedWarning("forces do not balance; try {strict} or another {u0:name}", {"strict": True, "u0": None})
+    >>> print(said)
+    forces do not balance; try strict=True or another u0
+    >>> print(said.with_options)
+    forces do not balance; try --strict or another --u0
+    """
+
+
+def require_no_effect(beside: str, value: Any, **given: Any) -> None:
+    """Refuse arguments that have no effect beside another one.
+
+    Parameters
+    ----------
+    beside : str
+        Name of the other one.
+    value : Any
+        That was given for it; nothing is refused where it is None.
+    **given
+        The arguments, None where they were left out.
+
+    Raises
+    ------
+    ArgumentError
+
+    Examples
+    --------
+    >>> require_no_effect("start", "run.h5", n=None, phi=0.7)
+    Traceback (most recent call last):
+    jamshape.checks.ArgumentError: phi=0.7 has no effect with start='run.h5', expected one of them; leave the other out
+    """
+    for name, other in given.items():
+        if value is not None and other is not None:
+            template = f"{{{name}}} has no effect with {{{beside}}}, expected one of them; leave the other out"
+            raise ArgumentError(template, {name: other, beside: value})
+
+
+def require_with(needed: str, value: Any, **given: Any) -> None:
+    """Refuse arguments that have no effect without another one; parameters as of `require_no_effect`.
+
+    Raises
+    ------
+    ArgumentError
+
+    Examples
+    --------
+    >>> require_with("u0", None, accuracy=1e-9)
+    Traceback (most recent call last):
+    jamshape.checks.ArgumentError: accuracy=1e-09 has no effect without u0, expected both or neither
+    """
+    for name, other in given.items():
+        if value is None and other is not None:
+            template = (
+                f"{{{name}}} has no effect without {{{needed}:name}}, expected both or neither"
+            )
+            raise ArgumentError(template, {name: other, needed: value})
+
+
 _COUNT = 1_000_000
 
 RANGES = {
@@ -118,6 +243,11 @@ def require_stated(**values: Any) -> None:
     """
     for name, value in values.items():
         require_in(name, value, RANGES[name])
+
+
+def require_given(**values: Any) -> None:
+    """Refuse numbers as `require_stated` does, those that are None left out."""
+    require_stated(**{name: value for name, value in values.items() if value is not None})
 
 
 def require_options(given: Mapping[str, Any]) -> None:
@@ -256,6 +386,11 @@ def described(allowed: Range) -> str:
     low, high = (f"{v}" if allowed.whole else f"{v:g}" for v in (allowed.low, allowed.high))
     whole = "a whole number of " if allowed.whole and not allowed.meaning.startswith("a ") else ""
     return " ".join([*words, f"{whole}{allowed.meaning} from {low} to {high}"])
+
+
+def _shown(value: Any) -> str:
+    """Show the value of an argument in one line, numbers of NumPy as those of Python."""
+    return said(value.item() if hasattr(value, "item") else value)
 
 
 def said(value: Any) -> str:

@@ -24,7 +24,7 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.lammps_text import iter_dump, read_data
 from jamshape.files.meaning import NOTHING, Wanted
-from jamshape.files.sets import REACHED
+from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
 from jamshape.front.packing import MeasuredPacking, results_of
 from jamshape.packing import Packing
@@ -52,6 +52,8 @@ _OTHER_COMMAND = "start the command that makes {result} again, which goes on fro
 # The first that fits.
 _STORED = (
     _Stored("search for an energy", "search_step", _OTHER_COMMAND),
+    _Stored("search for a strict minimum", "strict_search", _OTHER_COMMAND),
+    _Stored("second try of a packing", "retry_budget", _OTHER_COMMAND),
     _Stored("steps on the way to a packing", "loose_phi", _OTHER_COMMAND),
     _Stored("slow run", "flow_steps", _SAME_COMMAND),
     _Stored("compression on the way to a packing", "restart_step", _OTHER_COMMAND),
@@ -63,7 +65,7 @@ _STORED = (
 )
 
 # Of files beside a packing that is not made yet.
-_ENDS = (".search.h5", ".path.h5", ".run.h5")
+_ENDS = (".search.h5", ".path.h5", ".run.h5", ".strict.h5")
 
 
 def contents_of(path: Path, wanted: Wanted = NOTHING) -> dict[str, Any]:
@@ -122,7 +124,7 @@ def _particles(path: Path) -> dict[str, Any]:
     if "kappa" in found:
         found["kappa"] = np.ravel(found["kappa"])[-1].item()
     if "outcome" in known:
-        found["reached"] = known["outcome"] in REACHED
+        found |= {"reached": is_reached(known), "shortfall": shortfall(known) or None}
     found |= {"frames": count_frames(path), **_cost(path, known)}
     found |= {"format_version": read_format_version(path), "jamshape_version": read_creator(path)}
     found |= {"origin": origin} if (origin := read_origin(path)) else {}

@@ -50,6 +50,7 @@ _LINES = {
         "jamshape {jamshape_version}",
         "format {format_version}",
     ),
+    "not reached": ("{shortfall}",),
     "made on": ("{origin}",),
     "go on with": ("{go_on}",),
 }

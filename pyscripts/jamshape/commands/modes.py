@@ -37,7 +37,8 @@ def options_of() -> ArgumentParser:
     parser = parser_of(__doc__, "modes.h5")
     parser.add_argument("packing", type=Path, metavar="PACKING.h5")
     parser.add_argument("--plot", type=Path, help="D(omega), participation and kinds of motion")
-    parser.add_argument("--method", choices=[*METHODS, "sparse"], default="projected")
+    usual = "(projected; sparse with --lowest and --near)"
+    parser.add_argument("--method", choices=[*METHODS, "sparse"], help=usual)
     parser.add_argument("--lowest", type=int, metavar="K", help="only the K softest, sparse")
     parser.add_argument("--near", type=float, metavar="OMEGA", help="K modes near it instead")
     counts = "what a radian counts for (%(default)s)"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from jamshape.arguments import checked
 from jamshape.checks import require_path, require_stated
+from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow, place
 from jamshape.landscape.threads import sharing
@@ -111,7 +112,7 @@ def make_packing(
     Returns
     -------
     MeasuredPacking
-        Its ``results["outcome"]`` says whether forces balance to the tolerance.
+        Its ``reached`` says whether forces balance to the tolerance, and ``results["outcome"]`` how it ended.
 
     Raises
     ------
@@ -121,6 +122,11 @@ def make_packing(
         If the energy is not reached.
     PluginError
         If the way by dynamics finds no LAMMPS or no plugin for it.
+
+    Warns
+    -----
+    NotReachedWarning
+        If forces do not balance to the tolerance, after a second try as long as the first one.
 
     Examples
     --------
@@ -147,6 +153,7 @@ def make_packing(
         require_same(at.path, recipe)
         tidy(recipe, at.path)
     packing = MeasuredPacking.read(at.path)
+    warn_unless_reached(packing.results)
     # A file that goes with its folder is nothing to name.
     return packing if at.folder is None else MeasuredPacking.of(packing, packing.results)
 

@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.arguments import checked
 from jamshape.arrays import FloatArray, IntArray
-from jamshape.checks import Range, require_in, require_one_of, require_other_file
+from jamshape.checks import (
+    Range,
+    require_in,
+    require_no_effect,
+    require_one_of,
+    require_other_file,
+)
 from jamshape.files.disk import require_hdf5_name, settled
+from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
@@ -206,7 +213,7 @@ def modes(
     *,
     lowest: int | None = None,
     near: float | None = None,
-    method: str = "projected",
+    method: str | None = None,
     rotation: str = "half_length",
     least_force: float = 0.0,
     force: bool = False,
@@ -222,9 +229,9 @@ def modes(
         and come in addition, flagged, as in the whole spectrum.
     near : float, [sqrt(energy) / length], optional
         As many modes as `lowest` says, or 20, whose frequencies are nearest to this one.
-    method : {"projected", "refined", "plain", "first_order", "sparse"}
+    method : {"projected", "refined", "plain", "first_order", "sparse"}, optional
         Of the whole spectrum; see `jamshape.vibration.spectrum.spectrum`. ``sparse`` finds 20 modes
-        where nobody says how many.
+        where nobody says how many. When left out ``sparse`` where only some modes are asked for, and else ``projected``.
     rotation : {"half_length", "radius"}
         What a radian counts for as a length.
     least_force : float
@@ -245,6 +252,11 @@ def modes(
     NotAtMinimumError
         If forces do not balance, unless `force` is given.
 
+    Warns
+    -----
+    NotReachedWarning
+        If forces balance well enough for modes, but not to the tolerance of the packing, unless `force` is given.
+
     Examples
     --------
     >>> import jamshape as js
@@ -256,20 +268,25 @@ def modes(
     >>> len(softest), len(softest.in_band("translation"))
     (6, 2)
     """
-    require_one_of("the method", method, (*METHODS, _SPARSE))
+    require_one_of("the method", method or _SPARSE, (*METHODS, _SPARSE))
     require_one_of("rotation", rotation, ("half_length", "radius"))
     require_in("least_force", least_force, _LEAST_FORCE)
     if lowest is not None:
         require_in("lowest", lowest, _LOWEST)
     if near is not None:
         require_in("near", near, _NEAR)
+    if method != _SPARSE:
+        require_no_effect("lowest", lowest, method=method)
+        require_no_effect("near", near, method=method)
     if not isinstance(packing, Packing):
         packing = MeasuredPacking.read(Path(packing))
     measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
+    if not force and not measured.reached:
+        warn_unless_reached(measured.results)
     landscape, state = Landscape(measured), State.of(measured)
     scope = Scope(rotation, least_force, force=force)
     matrix = dynamical_matrix(landscape, state, scope)
-    found = _found(matrix, method, lowest, near)
+    found = _found(matrix, method or next(iter(METHODS)), lowest, near)
     table = tabulate(landscape, state, matrix, found)
     asked = {"rotation": rotation, "least_force": least_force}
     about = to_store(measured.results, measured) | asked

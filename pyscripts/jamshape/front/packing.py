@@ -17,7 +17,7 @@ from jamshape.contacts import Contacts
 from jamshape.contacts.network import sum_forces
 from jamshape.files.disk import named, settled
 from jamshape.files.h5md import read_attributes, read_packing
-from jamshape.files.sets import REACHED
+from jamshape.files.outcomes import AT_REST, is_reached, shortfall
 from jamshape.packing import Packing
 
 _SAME_PHI = 1e-6  # relative; more than any rounding, and than that of boxes in single precision
@@ -98,6 +98,11 @@ class MeasuredPacking(Packing):
         return self._contacts
 
     @property
+    def reached(self) -> bool:
+        """Whether it reached its goal, forces that balance; True where its file says nothing of that."""
+        return "outcome" not in self.results or is_reached(self.results)
+
+    @property
     def z(self) -> float:
         """Bonds per particle that is no rattler (Marschall & Teitel 2018, Sec. III C)."""
         return self._contacts.z
@@ -173,8 +178,10 @@ class MeasuredPacking(Packing):
         known = (("pressure", "pressure"), ("u", "u"), ("z", "z"), ("n_rattlers", "rattlers"))
         numbers = {name: self.results.get(key) for key, name in known}
         said += [f"{k} = {v:.4g}" for k, v in numbers.items() if _is_number(v)]
-        outcome = self.results.get("outcome", REACHED[0])
-        said += [f"{outcome}: forces do not balance"] * (outcome not in REACHED)
+        if not self.reached:
+            outcome = self.results["outcome"]
+            unbalanced = f"{outcome}: forces do not balance"
+            said.append(shortfall(self.results) if outcome in AT_REST else unbalanced)
         said += [f"in {named(self.file)}"] if self.file else []
         what = f"{self.n} {self.shape.name}s in {self.dimension}D"
         return f"<Packing of {what}: {', '.join(said)}>"

@@ -7,8 +7,8 @@ import html as markup
 import io
 from typing import TYPE_CHECKING, Any
 
-from jamshape.arguments import ArgumentError, checked
-from jamshape.checks import said
+from jamshape.arguments import ArgumentTypeError, checked
+from jamshape.checks import ArgumentError, said
 from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
@@ -33,7 +33,7 @@ _DPI = 100
 
 @checked
 def plot(
-    thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str = "kind"
+    thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str | None = None
 ) -> Axes:
     """Draw a packing, the pressure of a compression, the stress of a shear, or the density of modes.
 
@@ -43,8 +43,8 @@ def plot(
     axes : matplotlib Axes, optional
         Where to draw, without a projection, also packings in space, whose picture is computed; a new figure of
         `matplotlib.pyplot` when left out.
-    color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}
-        What the colours of a packing's particles tell.
+    color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}, optional
+        What the colours of a packing's particles tell; "kind" when left out.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def plot(
     TypeError
         If it is none of these, or axes are no such axes.
     ValueError
-        If the packing's dimension knows no such order.
+        If the packing's dimension knows no such order, or there is a colour for what is no packing.
 
     Examples
     --------
@@ -68,12 +68,17 @@ def plot(
     >>> "N=16" in axes.get_title()
     True
     """
+    if color is not None and not isinstance(thing, Packing):
+        msg = (
+            f"{{color}} has no effect on a {type(thing).__name__}, expected a packing; leave it out"
+        )
+        raise ArgumentError(msg, {"color": color})
     if axes is None:
         import matplotlib.pyplot as plt  # noqa: PLC0415 - not needed where axes are given
 
         axes = plt.figure(figsize=_size(thing), layout="constrained").add_subplot()
     _require_plane(axes)
-    _draw(thing, axes, color)
+    _draw(thing, axes, color or "kind")
     return axes
 
 
@@ -97,7 +102,7 @@ def _require_plane(axes: Any) -> None:
         return
     found = f"axes with projection={axes.name!r}" if isinstance(axes, Axes) else said(axes)
     msg = f"axes is {found}, expected matplotlib axes without a projection, as figure.add_subplot() makes them"
-    raise ArgumentError(msg)
+    raise ArgumentTypeError(msg)
 
 
 def _size(thing: Any) -> tuple[float, float]:

@@ -40,6 +40,12 @@ def resume(file: str | Path, *, progress: bool = True) -> Recorded:
     FileFormatError, OSError
         If it is no such file, or not to be read.
 
+    Warns
+    -----
+    NotReachedWarning
+        If the run did not reach its goal: forces that balance after each step of a quasistatic shear, or the pressure
+        ``p_end`` of a slow compression.
+
     Examples
     --------
     >>> import jamshape as js
@@ -62,7 +68,9 @@ def resume(file: str | Path, *, progress: bool = True) -> Recorded:
             to = Recording(path, stored["rows"], stored["frames"])
             record_flow(lambda session: recording.resume(session, path)[0], to, progress)
     recording.tidy(path)
-    return run_file(path)
+    run = run_file(path)
+    run.warn_unless_reached()
+    return run
 
 
 def record_flow(start: Callable[[Session], FlowRun[Motion]], to: Recording, progress: bool) -> None:

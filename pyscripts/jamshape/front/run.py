@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,14 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jamshape.arguments import checked
-from jamshape.arrays import FloatArray
-from jamshape.checks import require_number
+from jamshape.arrays import BoolArray, FloatArray
+from jamshape.checks import RANGES, NotReachedWarning, require_number
 from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
     count_frames,
     read_attributes,
     read_observables,
     read_packing,
+    read_report,
     read_style,
 )
 from jamshape.files.run_writer import RunWriter
@@ -32,6 +35,10 @@ from jamshape.measures.steady import SteadyState, steady_state
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+# Below, forces have nothing to balance.
+_NO_ENERGY = RANGES["u0"].low
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +96,9 @@ class Recorded:
         """(T,) pressures, [energy / length^D]."""
         return self["pressure"]
 
+    def warn_unless_reached(self) -> None:
+        """Warn where a finished run did not reach its goal."""
+
     def __len__(self) -> int:
         """Count the frames."""
         return count_frames(self.file)
@@ -142,6 +152,16 @@ class RunFile(Recorded):
         """Compression rate at the end, [1/time]."""
         return float(np.ravel(self.about["kappa"])[-1])
 
+    def warn_unless_reached(self) -> None:
+        """Warn where the pressure that was to be reached is not."""
+        aim = float(self.about.get("p_end", math.inf))
+        if self.about.get("finished") and math.isfinite(aim) and self.pressure[-1] < aim:
+            said = (
+                f"the pressure is {self.pressure[-1]:.3g} at the end, phi = {self.phi[-1]:.6g}, expected"
+                " {p_end}; take a larger {phi_end:name}"
+            )
+            warnings.warn(NotReachedWarning(said, {"p_end": aim, "phi_end": None}), stacklevel=3)
+
     def onset(self) -> OnsetFit | None:
         """Fit phi_J(kappa), where the pressure begins at this rate; None where it does not rise.
 
@@ -173,6 +193,11 @@ class RunFile(Recorded):
             The packing fractions ``unjams`` and ``jams`` of the densest frame that unjams and of the next one
             that stays jammed. The file of a finished run keeps them, and figures of it show them.
 
+        Warns
+        -----
+        NotReachedWarning
+            If minimisations of some frames came to no end.
+
         Examples
         --------
         >>> import jamshape as js
@@ -182,9 +207,12 @@ class RunFile(Recorded):
         >>> run.onset().phi_J < found.unjams < found.jams
         True
         """
-        known = Jamming.stored(self.about)
-        if known is not None:
-            return known
+        found = Jamming.stored(self.about) or self._minimised(progress=progress)
+        found.warn_if_undecided()
+        return found
+
+    def _minimised(self, *, progress: bool) -> Jamming:
+        """Minimise frames, and keep what it finds in the file of a finished run."""
         tried: list[Tried] = []
 
         def told(one: Tried) -> Told:
@@ -295,6 +323,25 @@ class QuasistaticShearFile(Recorded):
         """
         require_number("least", least)
         return stress_drops(self.observables, least)
+
+    @property
+    def at_rest(self) -> BoolArray:
+        """(T,) in which rows forces balance to the tolerance, or there are none; of a running run those that are stored."""
+        residual, u = read_report(self.file).error, self["u"]
+        n = min(len(residual), len(u))
+        return np.asarray((residual[:n] <= self.about["tolerance"]) | (u[:n] <= _NO_ENERGY))
+
+    def warn_unless_reached(self) -> None:
+        """Warn where a minimisation after a step did not bring forces to balance."""
+        wrong = ~self.at_rest
+        if wrong.any():
+            largest = read_report(self.file).error[: len(wrong)][wrong].max()
+            said = (
+                f"forces do not balance in {wrong.sum()} of {len(wrong)} rows: net forces there are up to"
+                f" {largest:.2g} of the mean force of a bond, expected at most {self.about['tolerance']:g};"
+                " try a smaller {step:name} or another {seed:name}"
+            )
+            warnings.warn(NotReachedWarning(said, {"step": None, "seed": None}), stacklevel=3)
 
     def modulus(self) -> float:
         """Slope of the stress in the first step, [energy / length^D]; that of the Hessian where the step is small."""

@@ -286,6 +286,11 @@ class Recipe:
         """Make the random start; errors as `random_start.random_packing`."""
         return self.way.start(self)
 
+    @property
+    def is_searched(self) -> bool:
+        """Whether the energy is looked for by our own search, not by one as published."""
+        return self.target is not None and self.way.search == "direct"
+
     def attributes(self) -> dict[str, Any]:
         """Return what identifies it, to be stored."""
         strict = {"strict": True} if self.strict else {}

@@ -63,6 +63,11 @@ def are_particles_given(options: Namespace) -> bool:
     return bool(options.kind or _given(options)) or any(value is not None for value in others)
 
 
+def particles_beside(options: Namespace) -> Particles | None:
+    """Read the particles; None where there is a start, which has its own, and none were asked for."""
+    return None if options.start and not are_particles_given(options) else particles_of(options)
+
+
 def _shape(options: Namespace) -> Shape:
     return shape_named(options.shape or DEFAULT)
 

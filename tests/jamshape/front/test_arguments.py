@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jamshape as js
-from jamshape.arguments import ArgumentError, checked
+from jamshape.arguments import ArgumentTypeError, checked
 from jamshape.front.pictures import _DRAWN
 from jamshape.front.run import QuasistaticShearFile, RunFile, ShearFile
 
@@ -101,7 +101,7 @@ def test_what_is_of_no_known_type_is_refused_by_name(function, name, wrong, tmp_
     ],
 )
 def test_wrong_types_are_one_sentence(call, sentence):
-    with pytest.raises((ArgumentError, ValueError), match=f"^{sentence}"):
+    with pytest.raises((ArgumentTypeError, ValueError), match=f"^{sentence}"):
         call()
 
 
@@ -221,6 +221,6 @@ def test_axes_with_a_projection_are_refused(projection):
     figure = pytest.importorskip("matplotlib.figure").Figure()
     axes = figure.add_subplot(projection=projection)
     sentence = f"axes is axes with projection='{projection}', expected matplotlib axes without"
-    with pytest.raises(ArgumentError, match=f"^{sentence}"):
+    with pytest.raises(ArgumentTypeError, match=f"^{sentence}"):
         js.plot(scene(), axes)
     figure.savefig("/dev/null", format="png")

@@ -214,7 +214,7 @@ def test_what_cannot_be_drawn_is_named():
 @pytest.mark.lammps
 def test_a_slow_run_begins_with_any_packing_and_goes_on_by_its_file(run, tmp_path):
     start = run.packing(0)
-    slow = {"phi": (0.3, 0.31), "kappa": 1e-4, "progress": False, "file": tmp_path / "slow.h5"}
+    slow = {"phi": (None, 0.31), "kappa": 1e-4, "progress": False, "file": tmp_path / "slow.h5"}
     first = js.slow_compress(start=start, **slow)
     assert first.phi[-1] == pytest.approx(0.31)
     assert first.about["start"] == str(run.file)
@@ -236,7 +236,11 @@ def test_a_packing_whose_forces_do_not_balance_says_so(run):
     packing = run.packing()
     stalled = js.MeasuredPacking.of(packing, {"outcome": "stalled"})
     assert "stalled: forces do not balance" in repr(stalled)
-    assert "balance" not in repr(js.MeasuredPacking.of(packing, {"outcome": "sliding"}))
+    assert not stalled.reached
+    assert "balance" not in repr(js.MeasuredPacking.of(packing, {"outcome": "corner"}))
+    saddle = {"outcome": "converged", "strict": True, "n_negative": 2}
+    said = "2 of its modes have a negative eigenvalue, expected none"
+    assert said in repr(js.MeasuredPacking.of(packing, saddle))
 
 
 @pytest.mark.lammps
