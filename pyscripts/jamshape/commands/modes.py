@@ -99,6 +99,8 @@ def show_moduli(table: ModeTable) -> None:
     found = table.moduli
     if found.n_floppy:
         print(f"floppy modes, left out of moduli: {found.n_floppy}")
+    if found.n_unsettled:
+        print(f"modes along which the packing has not settled, left out too: {found.n_unsettled}")
     if found.n_negative:
         print(
             f"a saddle, with {found.n_negative} negative eigenvalues: moduli hold as long as it stays"
@@ -106,7 +108,8 @@ def show_moduli(table: ModeTable) -> None:
     for name in MODULI:
         modulus = getattr(found, name)
         defined = math.isfinite(modulus.relaxed)
-        value = f"{modulus.relaxed:.8g} +- {modulus.bound:.2g}" if defined else "not defined"
+        bound = f" +- {modulus.bound:.2g}" if math.isfinite(modulus.bound) else ""
+        value = f"{modulus.relaxed:.8g}{bound}" if defined else "not defined"
         why = f": {modulus.reason}" if modulus.reason else ""
         print(f"{name.replace('_', ' ')} modulus {value}{why}")
     print(f"pressure {found.pressure:.8g}")

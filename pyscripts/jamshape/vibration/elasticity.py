@@ -10,7 +10,8 @@ for a motion x of the particles, and the modulus is the stationary value of E ov
 error of x enters squared, over the eigenvalues.
 
 A floppy mode, of which the eigenvalue is below its bound, is left out where it does not couple to the
-strain. Where one couples, E has no stationary value: the modulus is not defined.
+strain. Where one couples, E has no stationary value: the modulus is not defined. Modes along which the state has
+not settled are left out as well; where one couples, the bound is not known.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import FloatArray, LongArray
+from jamshape.arrays import BoolArray, FloatArray, LongArray
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.extended import SparseRows
 from jamshape.vibration.hessian import LARGEST_RESIDUAL, DynamicalMatrix, Strains
 from jamshape.vibration.quotients import EPS, ROUNDINGS
 from jamshape.vibration.sparse_modes import ShiftedInverse, softest
-from jamshape.vibration.spectrum import Spectrum, nearer_minimum
+from jamshape.vibration.spectrum import Spectrum, is_unsettled, nearer_minimum
 
 # Corrections of a solution by what it leaves of its equation.
 _REFINEMENTS = 3
@@ -45,13 +46,13 @@ class Modulus(NamedTuple):
     rounding: float
     """Bound of the numerical error, for the state as it is."""
     of_state: float
-    """Bound of the change up to the minimum, as far as it can be estimated; NaN where it is not known."""
+    """Bound of the change up to the minimum, as far as it can be estimated; inf where it is not known."""
     reason: str = ""
     """One sentence that says why the modulus is not defined, or its bound not known."""
 
     @property
     def bound(self) -> float:
-        """Bound of the error; NaN where it is not known."""
+        """Bound of the error; inf where it is not known."""
         return self.rounding + self.of_state
 
 
@@ -67,7 +68,9 @@ class Moduli(NamedTuple):
     pressure: float
     """[energy / length^D], of the same state."""
     n_floppy: int = 0
-    """Number of floppy modes: eigenvalues below their bounds. A modulus is that of all other modes."""
+    """Number of floppy modes: eigenvalues below their bounds. Moduli are those of all other modes."""
+    n_unsettled: int = 0
+    """Number of further modes left out: along these the minimum is further away than the mean overlap."""
     n_negative: int = 0
     """Number of negative eigenvalues, as far as modes are known: at a saddle, moduli are not what shear measures."""
 
@@ -96,28 +99,33 @@ def moduli(
     here = _Combined.of(matrix, response.here.value)
     affine = _Combined.of(matrix, _point(matrix, response.strains, 0 * response.motion).value)
     rounding = response.rounding() / matrix.volume * here.scale + here.rounding
-    drift, of_state = None, np.full(3, np.nan)
+    drift, of_state, unknown = None, np.full(3, np.inf), ""
     if at is not None:
         near = nearer_minimum(*at, matrix, response.solved(-matrix.gradient))
+        unknown = _changed(matrix, near.matrix)
+    if at is not None and not unknown:
         there = _point(near.matrix, response.strains, response.motion)
-        drift = (there.left - response.here.left).astype(np.float64) / near.part
         change = np.abs(_Combined.of(near.matrix, there.value).value - here.value) / near.part
+        drift = (there.left - response.here.left).astype(np.float64) / near.part
         further = response.squared(response.along(drift)) / matrix.volume * here.scale
         of_state = _SAFETY * (change + further)
-    reasons, value = response.reasons(drift), here.value
+    verdicts, value = response.verdicts(drift), here.value
     bulk, pure_shear, simple_shear = (
         Modulus(
-            relaxed=np.nan if reasons[k] else float(value[k]),
+            relaxed=float(value[k]) if verdicts[k].is_defined else np.nan,
             affine=float(affine.value[k]),
             rounding=float(rounding[k]),
-            of_state=float(of_state[k]),
-            reason=reasons[k],
+            of_state=np.inf if verdicts[k].reason else float(of_state[k]),
+            reason=verdicts[k].reason or unknown,
         )
         for k in range(3)
     )
     known = response.soft
-    n_floppy, n_negative = int(known.is_floppy.sum()), int((known.sign[known.is_firm] < 0).sum())
-    return Moduli(bulk, pure_shear, simple_shear, here.pressure, n_floppy, n_negative)
+    n_floppy, n_unsettled = (
+        int(part.sum()) for part in (known.is_floppy, response.is_unsettled & ~known.is_floppy)
+    )
+    n_negative = int((known.sign[known.is_firm] < 0).sum())
+    return Moduli(bulk, pure_shear, simple_shear, here.pressure, n_floppy, n_unsettled, n_negative)
 
 
 def _strains(matrix: DynamicalMatrix) -> FloatArray:
@@ -127,6 +135,17 @@ def _strains(matrix: DynamicalMatrix) -> FloatArray:
     strains[0] = np.eye(D)
     strains[1, 0, 0], strains[1, 1, 1], strains[2, 0, 1] = 0.5, -0.5, 1.0
     return strains
+
+
+def _changed(matrix: DynamicalMatrix, nearer: DynamicalMatrix) -> str:
+    """Say whether other bonds hold the packing nearer to the minimum; an empty text if it is the same ones."""
+    here, there = (np.column_stack([m.bonds.particles, m.bonds.slot]) for m in (matrix, nearer))
+    if sorted(here.tolist()) == sorted(there.tolist()):
+        return ""
+    return (
+        "the bound is not known, as contacts open or close on the way to the minimum; the residual is"
+        f" {matrix.residual.largest:.2g}, minimise further or choose another u0"
+    )
 
 
 class _Combined(NamedTuple):
@@ -171,10 +190,12 @@ class Response:
     matrix : DynamicalMatrix
     strains : (k, D, D) array of float64
     soft : Spectrum
-        All floppy modes, and others.
+        All floppy modes and those along which the state has not settled, and others.
+    is_unsettled : (l,) array of bool
+        Which of them these are.
     inverse : ShiftedInverse
     motion : (n, k) array of float64
-        Without translations and floppy modes.
+        Without translations and modes that are left out.
     here : _Point
     errors : Strains
         Bounds of what rounding changes.
@@ -183,6 +204,7 @@ class Response:
     matrix: DynamicalMatrix
     strains: FloatArray
     soft: Spectrum
+    is_unsettled: BoolArray
     inverse: ShiftedInverse
     motion: FloatArray
     here: _Point
@@ -191,7 +213,8 @@ class Response:
     @classmethod
     def of(cls, matrix: DynamicalMatrix, strains: FloatArray, soft: Spectrum) -> Response:
         """Relax a packing from strains."""
-        inverse = ShiftedInverse(matrix, 0.0, soft.vectors[:, soft.is_floppy])
+        unsettled = is_unsettled(matrix, soft)
+        inverse = ShiftedInverse(matrix, 0.0, soft.vectors[:, soft.is_floppy | unsettled])
         given = matrix.strained(strains)
         s, f = given.stretched, given.pushed
         held = _onto(inverse.held, matrix.compatibility.T @ s + f)
@@ -202,16 +225,25 @@ class Response:
             x = x - inverse.solve(left - _onto(inverse.held, left)).v
         x = np.asarray(x - _onto(inverse.held, x))
         here = _point(matrix, strains, x)
-        return cls(matrix, strains, soft, inverse, x, here, _errors_of(matrix, strains))
+        errors = _errors_of(matrix, strains)
+        return cls(matrix, strains, soft, unsettled, inverse, x, here, errors)
+
+    @property
+    def _is_left_out(self) -> BoolArray:
+        return self.soft.is_floppy | self.is_unsettled
+
+    @property
+    def _is_in(self) -> BoolArray:
+        return self.soft.is_firm & ~self.is_unsettled
 
     def solved(self, push: FloatArray) -> FloatArray:
-        """(n,) motion under forces, those on translations and floppy modes left out."""
+        """(n,) motion under forces, those on translations and modes that are left out not among them."""
         found = self.inverse.solve(push - _onto(self.inverse.held, push)).v
         return np.asarray(found - _onto(self.inverse.held, found))
 
     def along(self, left: FloatArray) -> FloatArray:
-        """(l + 1, k) magnitudes of (n, k) columns along l modes that are not floppy, and of what is left."""
-        modes = self.soft.vectors[:, self.soft.is_firm]
+        """(l + 1, k) magnitudes of (n, k) columns along l modes that are taken in, and of what is left."""
+        modes = self.soft.vectors[:, self._is_in]
         parts = modes.T @ left
         beside = left - modes @ parts - _onto(self.inverse.held, left)
         return np.asarray(np.abs(np.vstack([parts, np.linalg.norm(beside, axis=0)])))
@@ -219,8 +251,8 @@ class Response:
     def squared(self, along: FloatArray) -> FloatArray:
         """(k,) bound of what such a slope that is left can change E by."""
         values, bound = (
-            np.abs(self.soft.eigenvalues[self.soft.is_firm]),
-            self.soft.bound[self.soft.is_firm],
+            np.abs(self.soft.eigenvalues[self._is_in]),
+            self.soft.bound[self._is_in],
         )
         # All modes that are not known are stiffer than those that are; of a whole spectrum there is none.
         beside = 0.5 * values.max(initial=0.0) if values.size else np.inf
@@ -235,28 +267,32 @@ class Response:
         first += 2 * (x * self.errors.pushed).sum(axis=0) + self.errors.affine
         left = self.here.left.astype(np.float64)
         along = self.along(left)
-        along[:-1] += np.abs(self.soft.vectors[:, self.soft.is_firm]).T @ self._left_error()
+        along[:-1] += np.abs(self.soft.vectors[:, self._is_in]).T @ self._left_error()
         along[-1] += np.linalg.norm(self._left_error(), axis=0)
         return np.asarray(first + (by_C**2).sum(axis=0) + self.squared(along))
 
-    def reasons(self, drift: FloatArray | None) -> list[str]:
-        """Say of each strain why there is no modulus; an empty text where there is one."""
+    def verdicts(self, drift: FloatArray | None) -> list[_Verdict]:
+        """Say of each strain whether there is a modulus, and why it is not known."""
         largest = self.matrix.residual.largest
         if largest > LARGEST_RESIDUAL:
             why = (
                 f"the state is not at a minimum: its largest net force is {largest:.2g} of the mean"
                 f" bond force, expected at most {LARGEST_RESIDUAL:g}"
             )
-            return [why] * len(self.strains)
-        Z = self.soft.vectors[:, self.soft.is_floppy]
+            return [_Verdict(False, why)] * len(self.strains)
+        out = self._is_left_out
+        Z, unsettled = self.soft.vectors[:, out], (self.is_unsettled & ~self.soft.is_floppy)[out]
         coupling = np.abs(Z.T @ self.here.left.astype(np.float64))
         error = np.abs(Z).T @ self._left_error()
-        if drift is None:  # what net forces can do to a stress directly
-            net = self.matrix.compatibility.T @ self.matrix.bonds.pull
-            error += _SAFETY * np.linalg.norm(net)
-        else:
+        if drift is not None:
             error += _SAFETY * np.abs(Z.T @ drift)
-        return [_reason(coupling[:, k], error[:, k], largest) for k in range(len(self.strains))]
+        if drift is None or unsettled.any():  # what net forces can do to a stress directly
+            net = self.matrix.compatibility.T @ self.matrix.bonds.pull
+            error[~unsettled] += _SAFETY * np.linalg.norm(net)
+        return [
+            _verdict(coupling[:, k], error[:, k], unsettled, largest)
+            for k in range(len(self.strains))
+        ]
 
     def _changes(self) -> tuple[FloatArray, FloatArray]:
         """(m, k) and (n, k) bounds of what rounding changes C x + s and S x by."""
@@ -272,18 +308,32 @@ class Response:
         return np.asarray(C.T @ (by_C + ROUNDINGS * EPS * y) + by_S + self.errors.pushed)
 
 
-def _reason(coupling: FloatArray, error: FloatArray, residual: float) -> str:
-    couples = np.flatnonzero(coupling > error)
-    if not len(couples):
-        return ""
-    worst = couples[np.argmax(coupling[couples])]
-    motions = (
-        "a floppy motion couples" if len(couples) == 1 else f"{len(couples)} floppy motions couple"
-    )
-    return (
-        f"{motions} to this strain (by {coupling[worst]:.2g}, known to {error[worst]:.1g}), so that nothing"
-        f" holds the packing against it; the residual is {residual:.2g}"
-    )
+class _Verdict(NamedTuple):
+    is_defined: bool
+    reason: str
+    """Why there is no modulus, or no bound; an empty text where there are both."""
+
+
+def _verdict(
+    coupling: FloatArray, error: FloatArray, is_unsettled: BoolArray, residual: float
+) -> _Verdict:
+    """Judge by the couplings of the modes that are left out."""
+    couples = coupling > error
+
+    def by(which: BoolArray) -> str:
+        worst = int(np.argmax(np.where(which, coupling, 0.0)))
+        return f"to this strain (by {coupling[worst]:.2g}, known to {error[worst]:.1g})"
+
+    if (floppy := couples & ~is_unsettled).any():
+        why = f"a floppy motion couples {by(floppy)}, so that nothing holds the packing against it"
+        return _Verdict(False, why)
+    if couples.any():
+        why = (
+            f"the bound is not known, as the packing has not settled along a motion that couples {by(couples)};"
+            f" the residual is {residual:.2g}, minimise further or choose another u0"
+        )
+        return _Verdict(True, why)
+    return _Verdict(True, "")
 
 
 def _onto(held: FloatArray, columns: FloatArray) -> FloatArray:

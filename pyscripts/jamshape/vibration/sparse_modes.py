@@ -24,7 +24,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.vibration.hessian import DynamicalMatrix
 from jamshape.vibration.quotients import Products, isolated_error, norms
-from jamshape.vibration.spectrum import COLUMNS, Spectrum, spectrum
+from jamshape.vibration.spectrum import COLUMNS, Spectrum, is_unsettled, spectrum
 
 # The shift for the lowest modes, over the square of the prestress that sliding modes come from.
 _BELOW = -4.0
@@ -169,10 +169,10 @@ def near(matrix: DynamicalMatrix, k: int, shift: float) -> Spectrum:
 
 
 def softest(matrix: DynamicalMatrix, known: Spectrum | None = None) -> Spectrum:
-    """Find the softest modes, up to some that are not floppy, unless those that are known hold them."""
+    """Find the softest modes, up to some that are neither floppy nor unsettled, unless those known hold them."""
     most, k = matrix.size - matrix.translations.shape[1], _SOME
     found = known if known is not None and known.has_softest else None
-    while found is None or not found.is_firm.any():
+    while found is None or not (found.is_firm & ~is_unsettled(matrix, found)).any():
         if k >= most:
             return spectrum(matrix)
         found = lowest(matrix, k)

@@ -167,6 +167,20 @@ def spectrum(matrix: DynamicalMatrix, method: str = "projected") -> Spectrum:
     )
 
 
+def is_unsettled(matrix: DynamicalMatrix, found: Spectrum) -> NDArray[np.bool_]:
+    """Select modes but translations along which the minimum is further away than the mean overlap.
+
+    So far off no eigenvalue tells what is there: often other contacts.
+
+    Returns
+    -------
+    (k,) array of bool
+    """
+    overlap = matrix.bond_force / float(matrix.bonds.stiffness.mean())
+    slope = np.abs(found.vectors.T @ matrix.gradient)
+    return np.asarray((slope > overlap * np.abs(found.eigenvalues)) & ~found.is_translation)
+
+
 class Nearer(NamedTuple):
     """The dynamical matrix on the way to the minimum."""
 

@@ -37,6 +37,7 @@ BANDS = {-1: "translation", 0: "low", 1: "middle", 2: "high", 3: "none"}
 _TRANSLATION, _HIGH, _NONE = -1, 2, 3
 
 MODULI = ("bulk", "pure_shear", "simple_shear")
+_COUNTS = ("n_floppy_left_out", "n_unsettled_left_out", "n_negative_modes")
 _PARTS = ("affine", "rounding", "of_state")
 
 # Of each eigenvalue, which together bound it.
@@ -109,13 +110,11 @@ class ModeTable:
 
     @property
     def moduli(self) -> Moduli:
-        """Elastic moduli; bounds are NaN in files of versions that did not have them."""
+        """Elastic moduli; bounds are inf in files of versions that did not have them."""
         a = self.attributes
         bulk, pure_shear, simple_shear = (_stored_modulus(a, f"{name}_modulus") for name in MODULI)
-        n_floppy, n_negative = (
-            int(a.get(name, 0)) for name in ("n_floppy_left_out", "n_negative_modes")
-        )
-        return Moduli(bulk, pure_shear, simple_shear, a["pressure"], n_floppy, n_negative)
+        counts = (int(a.get(name, 0)) for name in _COUNTS)
+        return Moduli(bulk, pure_shear, simple_shear, a["pressure"], *counts)
 
 
 def tabulate(
@@ -191,7 +190,8 @@ def _moduli(matrix: DynamicalMatrix, found: Spectrum, at: tuple[Landscape, State
 def _to_store(elastic: Moduli) -> dict[str, Any]:
     """Spread moduli over attributes."""
     found: dict[str, Any] = {"pressure": elastic.pressure}
-    found |= {"n_floppy_left_out": elastic.n_floppy, "n_negative_modes": elastic.n_negative}
+    counts = (elastic.n_floppy, elastic.n_unsettled, elastic.n_negative)
+    found |= dict(zip(_COUNTS, counts, strict=True))
     for name in MODULI:
         modulus: Modulus = getattr(elastic, name)
         key = f"{name}_modulus"
@@ -202,7 +202,7 @@ def _to_store(elastic: Moduli) -> dict[str, Any]:
 
 
 def _stored_modulus(attributes: Mapping[str, Any], key: str) -> Modulus:
-    affine, rounding, of_state = (float(attributes.get(f"{key}_{p}", np.nan)) for p in _PARTS)
+    affine, rounding, of_state = (float(attributes.get(f"{key}_{p}", np.inf)) for p in _PARTS)
     reason = str(attributes.get(f"{key}_reason", ""))
     return Modulus(float(attributes[key]), affine, rounding, of_state, reason)
 
@@ -270,6 +270,12 @@ def _read(file: h5py.File) -> ModeTable:
     columns = {"overlap_error": np.zeros(len(stored_of["eigenvalues"]))} | stored_of
     if missing := set(_COLUMNS) - columns.keys():
         raise KeyError(*missing)
+    for name in (
+        "eigenvalues",
+        "omega",
+        *_ERRORS,
+    ):  # files of earlier versions have what rounding left
+        columns[name] = np.where(columns["is_translation"], 0.0, columns[name])
     particle, kind, direction = (of[name][()] for name in ("particle", "kind", "direction"))
     n_all, dimension = int(of.attrs["n_all"]), int(of.attrs["dimension"])
     coordinates = Coordinates(particle, kind, direction, n_all, dimension)
