@@ -138,7 +138,7 @@ def shear(
     if tolerance is not None:
         require_stated(tolerance=tolerance)
     at = place(file, "shear.h5")
-    of = _Start.of(particles, _Numbers(n, phi, seed, dimension), start, sides)
+    of = _Start.of(particles, _Numbers(n, phi, seed, dimension), start, sides=sides)
     integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
     if integrator in METHODS:
         longest = min(SlowShear.largest_strain, strain / rows)
@@ -264,6 +264,7 @@ class _Start(NamedTuple):
     @classmethod
     def of(
         cls, particles: Particles | None, numbers: _Numbers, start: Packing | str | Path | None,
+        *,
         sides: int = 2,
     ) -> _Start:  # fmt: skip
         if start is not None:
