@@ -71,6 +71,8 @@ def lengths_of(edges: FloatArray) -> Lengths:
 
 def as_rest(rest: NDArray[Any], whole: NDArray[Any]) -> NDArray[Any]:
     """Take what doubles leave out; 0 where it is more than that, after another program has changed the doubles."""
+    if rest.shape != whole.shape or {rest.dtype.kind, whole.dtype.kind} != {"f"}:
+        return rest  # which a packing refuses
     with np.errstate(over="ignore"):
         is_more = np.abs(rest) > np.spacing(np.abs(whole))
     return np.where(is_more & np.isfinite(rest), 0.0, rest)

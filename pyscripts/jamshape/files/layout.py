@@ -459,9 +459,10 @@ def _require_one_size(file: h5py.File, packing: Packing) -> None:
     """Refuse a file in which another program has changed one of two copies of sizes."""
     for name in ("half_length", "radius"):
         element, own = f"particles/all/{name}", getattr(packing, name)
-        stored = require_dataset(file, element)[()] if element in file else own
+        stored = np.asarray(require_dataset(file, element)[()] if element in file else own)
         bound = _SAME_SIZE * packing.diameters[:, 0]
-        if np.shape(stored) != own.shape or not (np.abs(stored - own) <= bound).all():
+        is_size = stored.shape == own.shape and stored.dtype.kind in "fiu"
+        if not is_size or not (np.abs(stored - own) <= bound).all():
             msg = (
                 f"{file.filename}: {name} is not that of diameters, which are (2(A+R), 2R, 2R), expected both to"
                 " say the same; change both"

@@ -10,19 +10,22 @@ from typing import Any
 from jamshape.files.disk import named
 from jamshape.front.packing import MeasuredPacking
 from jamshape.packing import Packing
+from jamshape.shapes.shape import Interaction
 
 
 def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
     """Take the packing to begin with, of a path its last frame, under the law that the run has.
 
-    Warns where the bonds of side-to-side contacts are not those that the start has.
+    Warns where the usual bonds of side-to-side contacts are not those that the start has.
     """
     if isinstance(start, str | Path):
         start = MeasuredPacking.read(Path(start))
     known = start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
     if known.law.sides == sides:
         return known
-    if known.compiled().has_sides and not known.is_round.all():
+    # Other ones than the usual were asked for.
+    is_asked = sides != Interaction().sides
+    if not is_asked and known.compiled().has_sides and not known.is_round.all():
         said = (
             f"the start has sides={known.law.sides}, bonds of a side-to-side contact, and the run has"
             f" sides={sides}: energy and forces of the start change"
