@@ -631,18 +631,18 @@ void PairContact::find_held()
   is_held.assign(nlocal, false);
   for (int i = 0; i < nlocal; ++i) is_held[i] = !handles(i);
   std::vector<double> kept;
-  double **const f = atom->f;
+  double **const f = atom->f, *const all = nlocal > 0 ? f[0] : nullptr;
   for (int k = 0; k < modify->nfix; ++k) {
     LAMMPS_NS::Fix &fix = *modify->fix[k];
     const bool acts = modify->fmask[k] & LAMMPS_NS::FixConst::MIN_POST_FORCE;
-    if (!acts || !begins_with(fix.style, "setforce") || nlocal == 0) continue;
-    kept.assign(f[0], f[0] + 3 * nlocal);
-    std::fill_n(f[0], 3 * nlocal, 1.0);
-    fix.min_post_force(0);
+    if (!acts || !begins_with(fix.style, "setforce")) continue;
+    kept.assign(all, all + 3 * nlocal);
+    std::fill_n(all, 3 * nlocal, 1.0);
+    fix.min_post_force(0);  // by all ranks: it may evaluate variables
     for (int i = 0; i < nlocal; ++i) {
       is_held[i] |= std::all_of(f[i], f[i] + d, [](double component) { return component == 0.0; });
     }
-    std::copy(kept.begin(), kept.end(), f[0]);
+    std::copy(kept.begin(), kept.end(), all);
   }
 }
 

@@ -54,13 +54,15 @@ class ParticleView : protected LAMMPS_NS::Pointers {
     in_blocks(end - begin, [&](int first, int last) {
       int index[BLOCK], size = 0;
       double packed[PER_ORIENTATION * BLOCK];
-      if (all_have_shapes(begin + first, begin + last)) {
-        size = last - first;
-        std::iota(index, index + size, begin + first);
-      } else {
-        for (int i = begin + first; i < begin + last; ++i) {
-          if (has_shape(i)) index[size++] = i;
-        }
+      const int from = begin + first, to = begin + last;
+      if (all_have_shapes(from, to)) {  // as ever but in hybrid pair styles
+        std::iota(index, index + (to - from), from);
+        ellipsoids->pack_comm_bonus(to - from, index, packed);
+        for (int i = from; i < to; ++i) visit(i, quaternion(packed + PER_ORIENTATION * (i - from)));
+        return;
+      }
+      for (int i = from; i < to; ++i) {
+        if (has_shape(i)) index[size++] = i;
       }
       ellipsoids->pack_comm_bonus(size, index, packed);
       for (int k = 0; k < size; ++k) visit(index[k], quaternion(packed + PER_ORIENTATION * k));
@@ -76,16 +78,17 @@ class ParticleView : protected LAMMPS_NS::Pointers {
   template <class Of> void set_orientations(int begin, int end, const Of &orientation_of) const
   {
     in_blocks(end - begin, [&](int first, int last) {
-      double packed[PER_ORIENTATION * BLOCK], *to = packed;
-      const bool all = all_have_shapes(begin + first, begin + last);
-      for (int i = begin + first; i < begin + last; ++i) {
+      double packed[PER_ORIENTATION * BLOCK];
+      const int from = begin + first, to = begin + last;
+      const bool all = all_have_shapes(from, to);
+      for (int i = from, n = 0; i < to; ++i) {
         if (!all && !has_shape(i)) continue;
         const Quaternion q = orientation_of(i);
-        to[0] = q.w;
-        to[1] = q.i;
-        to[2] = q.j;
-        to[3] = q.k;
-        to += PER_ORIENTATION;
+        double *const numbers = packed + PER_ORIENTATION * n++;
+        numbers[0] = q.w;
+        numbers[1] = q.i;
+        numbers[2] = q.j;
+        numbers[3] = q.k;
       }
       ellipsoids->unpack_comm_bonus(last - first, begin + first, packed);
     });

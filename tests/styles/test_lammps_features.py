@@ -14,6 +14,7 @@ from lammps_scenes import (
     Session,
     before_box,
     dense,
+    dense_mixture,
     environment,
     global_vector,
     load_plugin,
@@ -25,6 +26,8 @@ from lammps_scenes import (
 sys.path.insert(0, str(REPOSITORY / "analysis" / "stability"))
 from features.contacts import CONTACTS
 from features.feature import judge
+
+from jamshape import contacts
 
 pytestmark = pytest.mark.lammps
 
@@ -64,6 +67,27 @@ def test_a_feature_works_or_is_refused(feature):
     """Each row of the table of docs/results/stability.md."""
     outcome = judge(feature)
     assert outcome.holds, outcome.found
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_hybrid_pair_style_has_the_forces_of_the_types_that_are_ours(dimension, tmp_path):
+    """Those of a crowd from which all other particles are taken."""
+    with loaded(dense_mixture(dimension, n=32), tmp_path, sides="two") as session:
+        session.commands("""
+            pair_style hybrid spherocylinder/harmonic sides two zero 1.0
+            pair_coeff * * zero
+            pair_coeff 1 1 spherocylinder/harmonic 1.0
+            run 0""")
+        state, energy = state_of(session), session.lmp.get_thermo("pe")
+    ours = state.packing.species == 1
+    arrays = {k: v for k, v in vars(state.exact).items() if np.shape(v)[:1] == ours.shape}
+    alone = state.exact.with_(**{name: values[ours] for name, values in arrays.items()})
+    expected = contacts.forces(alone, 1.0, 2)
+    assert energy == pytest.approx(expected.energy, rel=1e-12)
+    scale = np.abs(expected.force).max()
+    np.testing.assert_allclose(state.force[ours], expected.force, rtol=0, atol=1e-13 * scale)
+    np.testing.assert_allclose(state.torque[ours], expected.torque, rtol=0, atol=1e-13 * scale)
+    assert not state.force[~ours].any()
 
 
 @pytest.mark.parametrize("angle", [20, 70])
