@@ -230,7 +230,7 @@ def slow_compress(
     if start is not None:
         of: _Known | _Random = _Known.of(start, phi_start)
     else:
-        of = _Random.of(particles, n, phi_start, seed)
+        of = _Random.of(particles, n=n, phi=phi_start, seed=seed)
         require_rising(of.phi, phi_end)
     if at.path.exists() and not again:
         slow_recording.require_same(at.path, protocol, of.made_from)
@@ -284,19 +284,13 @@ class _Random(NamedTuple):
     seed: int
 
     @classmethod
-    def of(
-        cls, particles: Particles | None, n: int | None, phi: float | None, seed: int | None
-    ) -> _Random:
-        """Take what was given, and what is usual for the rest."""
+    def of(cls, particles: Particles | None, **asked: Any) -> _Random:
+        """Take what was asked for, n, phi and seed, and what is usual for those that are None."""
         if particles is None:
             msg = "there are neither particles nor a start, expected one of them"
             raise ValueError(msg)
-        found = cls(
-            particles,
-            _N if n is None else n,
-            _PHI_SLOW_USUAL[0] if phi is None else phi,
-            _SEED if seed is None else seed,
-        )
+        given = {name: value for name, value in asked.items() if value is not None}
+        found = cls(particles, **{"n": _N, "phi": _PHI_SLOW_USUAL[0], "seed": _SEED} | given)
         require_stated(n=found.n, seed=found.seed)
         require_in("phi_start", found.phi, _PHI_SLOW)
         return found
