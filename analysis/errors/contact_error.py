@@ -167,7 +167,9 @@ def main(options: Namespace) -> None:
     (options.out / "contact_error.json").write_text(json.dumps(rows, indent=1))
     draw(rows, options.out / "contact_error.png")
     print(text)
-    totals = {key: sum(r[key] for r in rows) for key in ("pairs", "uncertain", "fallbacks", "extended")}
+    totals = {
+        key: sum(r[key] for r in rows) for key in ("pairs", "uncertain", "fallbacks", "extended")
+    }
     points = [
         Point(
             f"w = {r['axis_ratio']:g}, p = {r['exponent']}",

@@ -7,7 +7,6 @@ part.
 from __future__ import annotations
 
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +75,9 @@ def test_pairs_that_were_wrong_without_a_word(evaluate):
     i, j = known()
     found, back = evaluate(i, j), evaluate(j, i)
     np.testing.assert_allclose(found["energy"], ENERGY, rtol=1e-10)
-    np.testing.assert_allclose(found["force"], FORCE, rtol=0, atol=1e-9 * np.abs(FORCE).max(1)[:, None])
+    np.testing.assert_allclose(
+        found["force"], FORCE, rtol=0, atol=1e-9 * np.abs(FORCE).max(1)[:, None]
+    )
     np.testing.assert_allclose(back["force"], -found["force"], rtol=1e-9)
     np.testing.assert_allclose(back["torque_j"], found["torque_i"], rtol=1e-8)
     assert np.all(found["energy_error"] < 1e-9 * ENERGY)

@@ -11,9 +11,11 @@ from typing import Any
 
 import mpmath
 import numpy as np
+
 from studies.touching import Couples
 
 DIGITS = 60
+STEPS = 30
 
 
 class _Body:
@@ -55,7 +57,10 @@ def _dot(a: list[Any], b: list[Any]) -> Any:
 
 class _Pair:
     def __init__(self, couples: Couples, m: int, normal: list[Any]) -> None:
-        self.i, self.j = _Body(couples.i[m], couples.dimension), _Body(couples.j[m], couples.dimension)
+        self.i, self.j = (
+            _Body(couples.i[m], couples.dimension),
+            _Body(couples.j[m], couples.dimension),
+        )
         self.r = [a - b for a, b in zip(self.i.centre, self.j.centre, strict=True)]
         self.begin = normal
         if len(normal) == 2:
@@ -86,18 +91,48 @@ class _Pair:
         apart = [eta * (a + b) - r for a, b, r in zip(x_i, x_j, self.r, strict=True)]
         return [_dot(u, apart) for u in self.across]
 
-    def solved(self) -> tuple[Any, list[Any], list[Any]] | None:
-        """Energy, force and point of i, or None where Newton's method does not converge."""
+    def _step(self, t: list[Any], at: list[Any]) -> list[Any] | None:
+        """Newton's step, or None where the matrix of slopes is singular."""
+        small = mpmath.mpf(10) ** (-DIGITS // 2)
+        rows = mpmath.matrix(len(t))
+        for col in range(len(t)):
+            beside = [x + (small if k == col else 0) for k, x in enumerate(t)]
+            for row, (x, y) in enumerate(zip(self.slopes(*beside), at, strict=True)):
+                rows[row, col] = (x - y) / small
         try:
-            t = mpmath.findroot(self.slopes, [mpmath.mpf(0)] * len(self.across), solver="mdnewton",
-                                tol=mpmath.mpf(10) ** (-80), maxsteps=60)  # fmt: skip
-        except (ValueError, ZeroDivisionError):
+            return list(mpmath.lu_solve(rows, mpmath.matrix(at)))
+        except ZeroDivisionError:
+            return None
+
+    def _root(self) -> list[Any] | None:
+        t = [mpmath.mpf(0)] * len(self.across)
+        at = self.slopes(*t)
+        for _ in range(STEPS):
+            step = self._step(t, at)
+            if step is None:
+                return None
+            for cut in range(STEPS):
+                beside = [x - y / 2**cut for x, y in zip(t, step, strict=True)]
+                there = self.slopes(*beside)
+                if _dot(there, there) < _dot(at, at):
+                    break
+            else:
+                return None
+            t, at = beside, there
+            if _dot(step, step) < mpmath.mpf(10) ** (-DIGITS):
+                return t
+        return None
+
+    def solved(self) -> tuple[Any, list[Any]] | None:
+        """Energy and force, or None where Newton's method does not converge."""
+        t = self._root()
+        if t is None:
             return None
         n = self.normal(list(t))
-        (h_i, x_i), (h_j, _) = self.i.width(n), self.j.width(n)
-        eta, along = _dot(self.r, n) / (h_i + h_j), _dot(self.r, n)
+        along = _dot(self.r, n)
+        eta = along / (self.i.width(n)[0] + self.j.width(n)[0])
         overlap = 1 - eta**2
-        return overlap**2 / 2, [2 * overlap * eta**2 * x / along for x in n], [eta * x for x in x_i]
+        return overlap**2 / 2, [2 * overlap * eta**2 * x / along for x in n]
 
 
 def judged(couples: Couples, exact: Any) -> dict[str, float]:
@@ -112,7 +147,7 @@ def judged(couples: Couples, exact: Any) -> dict[str, float]:
             if found is None:
                 worst["not_solved"] += 1
                 continue
-            energy, by, _ = found
+            energy, by = found
             off = [abs(_long(exact.energy[m]) - energy) / energy,
                    mpmath.sqrt(sum((_long(a) - b) ** 2 for a, b in zip(exact.force[m], by, strict=True))) / size]  # fmt: skip
             doubt = exact.errors[m] / np.array([float(energy), float(size), 1.0])

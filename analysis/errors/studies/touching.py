@@ -70,9 +70,7 @@ def _log_uniform(rng: Generator, least: float, most: float, n: int) -> FloatArra
 
 
 def _exponents(rng: Generator, n: int) -> FloatArray:
-    return np.where(
-        rng.random(n) < 0.5, _log_uniform(rng, 0.55, 10.0, n), rng.choice(EXPONENTS, n)
-    )
+    return np.where(rng.random(n) < 0.5, _log_uniform(rng, 0.55, 10.0, n), rng.choice(EXPONENTS, n))
 
 
 def _bodies(axes: FloatArray, p: FloatArray, signs: FloatArray) -> Bodies:
@@ -149,4 +147,6 @@ def targeted_pairs(rng: Generator, n: int, D: int) -> Couples:
     eta = superellipsoid_scales(a, b)["eta"]
     a[:, :D] *= (np.sqrt(1 - _log_uniform(rng, *OVERLAPS, n)) / eta)[:, None]
     swapped = (rng.random(n) < 0.5)[:, None]
-    return Couples(*(np.ascontiguousarray(x) for x in (np.where(swapped, b, a), np.where(swapped, a, b))))
+    return Couples(
+        *(np.ascontiguousarray(x) for x in (np.where(swapped, b, a), np.where(swapped, a, b)))
+    )
