@@ -17,6 +17,7 @@ from jamshape import _contact
 
 ERRORS = Path(__file__).parents[2] / "analysis" / "errors"
 NAMES = ("energy", "force", "torque")
+EPS = np.finfo(float).eps
 
 # i, j: centre, quaternion, semi-axes, p. Energies and forces below are those of 33 digits.
 KNOWN = {
@@ -74,14 +75,20 @@ def test_pairs_that_were_wrong_without_a_word(evaluate):
     """Energies were 35 % and forces 38 % off, or 7 % on exchange of i and j; stated were 3e-9 and 0."""
     i, j = known()
     found, back = evaluate(i, j), evaluate(j, i)
-    np.testing.assert_allclose(found["energy"], ENERGY, rtol=1e-10)
-    np.testing.assert_allclose(
-        found["force"], FORCE, rtol=0, atol=1e-9 * np.abs(FORCE).max(1)[:, None]
-    )
-    np.testing.assert_allclose(back["force"], -found["force"], rtol=1e-9)
-    np.testing.assert_allclose(back["torque_j"], found["torque_i"], rtol=1e-8)
-    assert np.all(found["energy_error"] < 1e-9 * ENERGY)
-    assert np.all(found["force_error"] < 1e-5 * np.linalg.norm(FORCE, axis=1))
+    size = np.linalg.norm(FORCE, axis=1)
+    rounding = 4 * EPS / np.sqrt(2 * ENERGY)  # of the scale, over the overlap
+    for of, sign in ((found, 1), (back, -1)):
+        energy = np.abs(of["energy"] - ENERGY)
+        force = np.linalg.norm(sign * of["force"] - FORCE, axis=1)
+        assert np.all(energy < (rounding + 1e-10) * ENERGY)
+        assert np.all(force < (rounding + 1e-9) * size)
+        assert np.all(energy <= of["energy_error"])
+        assert np.all(force <= of["force_error"])
+        assert np.all(of["energy_error"] < 1e-7 * ENERGY)
+        assert np.all(of["force_error"] < 1e-5 * size)
+    torque = np.linalg.norm(found["torque_i"] - back["torque_j"], axis=1)
+    assert np.all(torque <= found["torque_error"] + back["torque_error"])
+    assert np.all(torque < 1e-7 * np.linalg.norm(found["torque_i"], axis=1))
 
 
 def test_sums_and_second_derivatives_have_these_digits():
@@ -89,7 +96,7 @@ def test_sums_and_second_derivatives_have_these_digits():
     i, j = (bodies(rows) for rows in known())
     shapes, at = shapes_of(i, j), packed(i, j)
     sums = shapes.sums(*at)
-    np.testing.assert_allclose(sums["force"][::2], FORCE, rtol=0, atol=1e-9 * np.abs(FORCE).max())
+    np.testing.assert_allclose(sums["force"][::2], FORCE, rtol=1e-7)
     assert sums["energy"] == pytest.approx(ENERGY.sum(), rel=1e-10)
     short, long = shapes.derivatives(*at), shapes.derivatives(*at, True)
     for name in ("gradient", "curvature"):
@@ -118,9 +125,9 @@ def test_energy_force_and_torque_are_within_their_errors(study, dimension, measu
         assert not of.beyond.any()
         assert not of.unsaid.any()
         assert np.isfinite(of.stated).all()
-        # Nor are the errors that are stated useless.
-        assert np.all(np.median(of.stated / np.maximum(of.error, 1e-17), axis=0) < 20.0)
-    assert np.mean(found["double"].stated[:, 0] < 1e-5) > 0.99
+    of = found["double"]  # whose bounds are not useless
+    assert np.all(np.median(of.stated / np.maximum(of.error, 1e-17), axis=0) < 2.0)
+    assert np.mean(of.stated[:, 0] < 1e-5) > 0.99
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -140,7 +147,7 @@ def test_hard_bodies_overlap_as_long_doubles_say(study):
     """Aligned faces and tips whose scale is 1 - 1e-13 or 1 + 1e-13, which bounds in doubles cannot tell."""
     script, _ = study
     for dimension in (2, 3):
-        i, j = script.targeted_pairs(np.random.default_rng(6), 300, dimension)
+        i, j = script.targeted_pairs(np.random.default_rng(6), 100, dimension)
         for times in (1 - 1e-13, 1 + 1e-13):
             beside = i.copy(), j.copy()
             wide = script.superellipsoid_contacts(i, j, 1.0, True)
