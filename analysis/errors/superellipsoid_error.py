@@ -102,9 +102,11 @@ def contacts_of(couples: Couples, *, extended: bool) -> tuple[Contacts, FloatArr
         raise ValueError(msg)
     torque = np.stack([found["torque_i"], found["torque_j"]], 1)
     errors = np.stack([found[f"{name}_error"] for name in NAMES], 1)
-    arrays = (np.asarray(x, np.longdouble) for x in (found["energy"], found["force"], torque))
+    energy, force, torques = (
+        np.asarray(x, np.longdouble) for x in (found["energy"], found["force"], torque)
+    )
     begin = np.hstack([found["bond_normal"][:, 0], found["bond_arm_i"][:, 0]])
-    return Contacts(*arrays, errors), begin
+    return Contacts(energy, force, torques, errors), begin
 
 
 def reference(program: Path, couples: Couples, begin: FloatArray) -> Contacts:

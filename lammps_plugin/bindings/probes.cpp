@@ -329,14 +329,14 @@ void export_probes(nb::module_ &m)
         "in 3D: centre, quaternion w i j k, three semi-axes, p. Returns the arrays of\n"
         "Superellipsoids.contacts, of all M pairs (status 0: apart). Of a bond 1 -\n"
         "distance/reach is 1 - eta^2.");
-  m.def(
-      "superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
-      "normals"_a.none() = nb::none(),
-      "The scale at which both bodies of M pairs touch, whether above 1 or below, begun at\n"
-      "`normals` (M, D) where given. Returns a dict: eta, gap (relative bound of its error),\n"
-      "iterations, fallback (the first attempt failed), extended (in long doubles, as doubles were\n"
-      "too short), normal (into i, unit), point_i (from the\n"
-      "centre of i to the tangency of the scaled bodies).");
+  m.def("superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
+        "normals"_a.none() = nb::none(),
+        "The scale at which both bodies of M pairs touch, whether above 1 or below, begun at\n"
+        "`normals` (M, D) where given. Returns a dict: eta, gap (relative bound of its error),\n"
+        "iterations, fallback (the first attempt failed), extended (in long doubles, as doubles "
+        "were\n"
+        "too short), normal (into i, unit), point_i (from the\n"
+        "centre of i to the tangency of the scaled bodies).");
   m.def("superellipsoid_near", &superellipsoid_near, "bodies_i"_a, "bodies_j"_a, "margin"_a,
         "Whether surfaces may be closer than `margin` (M,): false only where they are not.");
   m.def("superellipsoid_motion_sq", &superellipsoid_motion_sq, "then"_a, "now"_a,

@@ -32,10 +32,6 @@ class Couples(NamedTuple):
         D = self.dimension
         return np.asarray(np.maximum(*(b[:, -1 - D : -1].max(axis=1) for b in self)))
 
-    def __getitem__(self, which: object) -> Couples:  # type: ignore[override]
-        """Give some of them."""
-        return Couples(*(np.ascontiguousarray(b[which]) for b in tuple(self)))  # type: ignore[index]
-
 
 class Bodies(NamedTuple):
     """What is drawn of one particle each: semi-axes (M, D), exponents (M,), a point and a normal there (M, 3)."""
