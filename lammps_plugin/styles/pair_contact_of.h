@@ -2,12 +2,12 @@
 
 #include "contact/contact.hpp"
 #include "contact/contact_block.hpp"
+#include "contact/extended.hpp"
 #include "contact/math/dimension.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/upper.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/packs.hpp"
-#include "contact/pair_derivatives.hpp"
 
 #include "atom.h"
 #include "bodies.h"
@@ -20,6 +20,7 @@
 #include "timer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -305,7 +306,7 @@ template <class Model> class PairContactOf : public PairContact {
   {
     const BodiesOf<Model, D> &bodies = all<D>().now;
     const Body<D> &body = bodies[i], &other = bodies[j];
-    const Touch<D> contact = contact_of_pair<D>(pair, body, other, law_of(i, j));
+    const Touch<D> contact = contact_of_pair<D>(pair, {i, j}, body, other);
     if (contact.status == ContactStatus::APART) return;
     if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
     if (contact.status == ContactStatus::UNCONVERGED) stop_at_unconverged(i, j);
@@ -326,7 +327,7 @@ template <class Model> class PairContactOf : public PairContact {
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
         const Body<D> &other = bodies[j];
-        const Touch<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
+        const Touch<D> contact = contact_of_pair<D>(k, {i, j}, body, other);
         if (contact.status == ContactStatus::APART) continue;
         if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
         if (contact.status == ContactStatus::UNCONVERGED) stop_at_unconverged(i, j);
@@ -344,10 +345,18 @@ template <class Model> class PairContactOf : public PairContact {
     }
   }
 
-  /// Contact of the k-th close pair. Where it starts from is worth time only, so floats do.
+  /// Contact of the k-th close pair, of these particles and their bodies.
   template <int D>
-  Touch<D> contact_of_pair(int k, const Body<D> &i, const Body<D> &j,
-                           const typename Model::Law &law)
+  Touch<D> contact_of_pair(int k, const std::array<int, 2> &pair, const Body<D> &i,
+                           const Body<D> &j)
+  {
+    return to_its_digits<Model, D>(contact_begun<D>(k, i, j, law_of(pair[0], pair[1])),
+                                   [&] { return pair_in_long<D>(pair[0], pair[1]); });
+  }
+
+  /// Where it starts from is worth time only, so floats do.
+  template <int D>
+  Touch<D> contact_begun(int k, const Body<D> &i, const Body<D> &j, const typename Model::Law &law)
   {
     if constexpr (StartsFromNormal<D>::value) {
       float *const last = any_turns ? &last_normal[static_cast<std::size_t>(D) * k] : nullptr;
@@ -529,7 +538,7 @@ template <class Model> class PairContactOf : public PairContact {
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
         const Body<D> &other = bodies[j];
-        const Touch<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
+        const Touch<D> contact = contact_of_pair<D>(k, {i, j}, body, other);
         if (contact.status != ContactStatus::TOUCHING) continue;
         const Vec<D> r = body.centre - other.centre;
         for (int b = 0; b < contact.n_bonds; ++b) {
@@ -551,7 +560,7 @@ template <class Model> class PairContactOf : public PairContact {
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
         const ContactDerivatives<Model, D, double> found =
-            derivatives_at<Model, D, double>(posed_pair<D>(i, j));
+            derivatives_at<Model, D>(posed_pair<D>(i, j));
         if (found.contact.status != ContactStatus::TOUCHING) continue;
         fill_triangle<D>(found, triangle);
         visit({i, j, triangle});
@@ -569,6 +578,15 @@ template <class Model> class PairContactOf : public PairContact {
             particles.orientation(i),
             particles.orientation(j),
             law_of(i, j)};
+  }
+
+  template <int D> PosedPair<Model, D, long double> pair_in_long(int i, int j) const
+  {
+    auto pair = in_long(posed_pair<D>(i, j));
+    for (int k = 0; k < D; ++k) {
+      pair.r[k] = static_cast<long double>(atom->x[i][k]) - atom->x[j][k];
+    }
+    return pair;
   }
 
   template <int D>

@@ -11,6 +11,7 @@ from jamshape.contacts.near import (
 )
 from jamshape.contacts.network import (
     Bonds,
+    ContactErrors,
     ContactKind,
     ContactNetwork,
     CrossingError,
@@ -24,6 +25,7 @@ from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers
 
 __all__ = [
     "Bonds",
+    "ContactErrors",
     "ContactKind",
     "ContactNetwork",
     "Contacts",

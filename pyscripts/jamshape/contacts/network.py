@@ -67,6 +67,25 @@ class Bonds:
 
 
 @dataclass(frozen=True, eq=False)
+class ContactErrors:
+    """Bounds of how far M contacts are from those of exactly these particles.
+
+    Parameters
+    ----------
+    energy : (M,) array of float64, [energy]
+        By the error of the overlap.
+    force : (M,) array of float64, [energy / length]
+        Length of the difference, by the errors of the overlap and of the normal.
+    torque : (M,) array of float64, [energy]
+        Of the larger of both, by these and by the error of the point of contact.
+    """
+
+    energy: FloatArray
+    force: FloatArray
+    torque: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class ContactNetwork:
     """The M contacts of a packing, each pair of touching images once, in ascending order.
 
@@ -90,6 +109,8 @@ class ContactNetwork:
     bonds_are_contacts : bool
         Whether each bond holds a particle by itself, as a contact of its own: where particles are made of
         several round parts.
+    errors : ContactErrors or None
+        If they were asked for.
     """
 
     pairs: IntArray
@@ -103,6 +124,7 @@ class ContactNetwork:
     torque_j: FloatArray
     bonds: Bonds
     bonds_are_contacts: bool = False
+    errors: ContactErrors | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +151,7 @@ class Forces:
 
 
 def find_contacts(
-    packing: Packing, k_e: float | None = None, sides: int | None = None
+    packing: Packing, k_e: float | None = None, sides: int | None = None, *, errors: bool = False
 ) -> ContactNetwork:
     """Find all contacts, with all periodic images in reach.
 
@@ -141,6 +163,8 @@ def find_contacts(
     sides : {1, 2}, optional
         Bonds of a side-to-side contact, of shapes that have both laws: one in the dynamics of Marschall
         & Teitel, two for minima and modes. Both are those of the packing's law when left out.
+    errors : bool
+        Bound the error of each contact as well, which takes many times as long as the contacts.
 
     Returns
     -------
@@ -162,7 +186,7 @@ def find_contacts(
     """
     bodies, state = packing.compiled(packing.law.but(k_e, sides)), State.of(packing)
     near = near_particles(packing, bodies)
-    found = bodies.contacts(*PairArrays.of(state, near), packing.has_rests)
+    found = bodies.contacts(*PairArrays.of(state, near), packing.has_rests, errors)
     near = near.take(found["pair"])
     refuse_crossing(packing, bodies.core, near.take(found["status"] == _CROSSING))
     refuse_unconverged(packing, near.take(found["status"] == _UNCONVERGED))
@@ -178,6 +202,7 @@ def find_contacts(
         torque_j=_rotation(found["torque_j"]),
         bonds=_bonds(found, packing.position[near.first]),
         bonds_are_contacts=bodies.bonds_are_contacts,
+        errors=_errors(found) if errors else None,
     )
 
 
@@ -247,6 +272,10 @@ def _separation(state: State, near: NearPairs) -> FloatArray:
 def _rotation(torque: FloatArray) -> FloatArray:
     """(M,) about z in 2D, (M, 3) in 3D."""
     return torque[:, 0] if torque.shape[1] == 1 else torque
+
+
+def _errors(found: dict[str, NDArray[Any]]) -> ContactErrors:
+    return ContactErrors(*(found[f"{name}_error"] for name in ("energy", "force", "torque")))
 
 
 def _bonds(found: dict[str, NDArray[Any]], position: FloatArray) -> Bonds:
