@@ -78,17 +78,20 @@ class ParticleView : protected LAMMPS_NS::Pointers {
   template <class Of> void set_orientations(int begin, int end, const Of &orientation_of) const
   {
     in_blocks(end - begin, [&](int first, int last) {
+      if (!all_have_shapes(begin + first, begin + last)) {
+        for (int i = begin + first; i < begin + last; ++i) {
+          if (has_shape(i)) set_orientation(i, orientation_of(i));
+        }
+        return;
+      }
       double packed[PER_ORIENTATION * BLOCK];
-      const int from = begin + first, to = begin + last;
-      const bool all = all_have_shapes(from, to);
-      for (int i = from, n = 0; i < to; ++i) {
-        if (!all && !has_shape(i)) continue;
-        const Quaternion q = orientation_of(i);
-        double *const numbers = packed + PER_ORIENTATION * n++;
-        numbers[0] = q.w;
-        numbers[1] = q.i;
-        numbers[2] = q.j;
-        numbers[3] = q.k;
+      for (int k = 0; k < last - first; ++k) {
+        const Quaternion q = orientation_of(begin + first + k);
+        double *const to = packed + PER_ORIENTATION * k;
+        to[0] = q.w;
+        to[1] = q.i;
+        to[2] = q.j;
+        to[3] = q.k;
       }
       ellipsoids->unpack_comm_bonus(last - first, begin + first, packed);
     });
