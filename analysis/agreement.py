@@ -49,7 +49,8 @@ samples, or that of a fit. Errors stand in brackets, in units of the last digit.
 difference of both numbers. A number of ours *{AGREES}* if it differs from the paper's by at most {WITHIN:g} joint errors,
 and *{DIFFERS}* if by more. What the paper states exactly, with an error of 0, must be the same. A number is *{UNJUDGED}*
 where there is no error of ours, as of a single sample, or where what the paper counts was found in no sample. It is
-*{UNMEASURED}* where there is no such number.
+*{UNMEASURED}* where there is no such number. Averages are over all packings; where forces do not balance in some, the
+average over the others stands beside it.
 
 Errors know nothing of what another number of particles, rate or protocol changes: at a smaller size than the paper's,
 `{DIFFERS}` may mean no more than that, and `{AGREES}` no more than that the errors are large. Errors of a few samples are
@@ -81,6 +82,10 @@ class Ours(NamedTuple):
     """NaN where nobody knows."""
     samples: int = 0
     """0 where nobody knows."""
+    reached: float = math.nan
+    """The same without the packings that did not reach their goal; NaN where all or none did."""
+    reached_samples: int | None = None
+    """How many did; None where all."""
 
 
 class Row(NamedTuple):
@@ -217,7 +222,11 @@ def ours_of(results: Mapping[str, Any], published: Published) -> Ours | None:
     unit = find(results, published.per)["value"] if published.per else 1.0
     error = found.get("error")
     error = math.nan if error is None else error / unit
-    return Ours(found["value"] / unit, error, int(found.get("samples") or 0))
+    ours = Ours(found["value"] / unit, error, int(found.get("samples") or 0))
+    if isinstance(reached := found.get("reached"), Mapping):
+        value = math.nan if reached["value"] is None else reached["value"] / unit
+        return ours._replace(reached=value, reached_samples=int(reached["samples"]))
+    return ours
 
 
 def earlier(table: Path) -> dict[str, tuple[Ours, str]]:
@@ -229,6 +238,8 @@ def earlier(table: Path) -> dict[str, tuple[Ours, str]]:
                     float(row["ours"]),
                     float(row["our_error"] or math.nan),
                     int(row["samples"] or 0),
+                    float(row.get("ours_reached") or math.nan),
+                    int(at_rest) if (at_rest := row.get("reached_samples")) else None,
                 ),
                 row["commit"],
             )
@@ -291,6 +302,11 @@ def cells(row: Row) -> tuple[str, ...]:
     """Write a line of the table."""
     p, ours = row.published, row.ours
     here = number(ours.value, ours.error) if ours else ""
+    if ours and ours.reached_samples is not None:
+        at_rest = (
+            f"{ours.reached:.5g} of {ours.reached_samples}" if ours.reached_samples else "none"
+        )
+        here += f"; {at_rest} at rest"
     samples = str(ours.samples) if ours and ours.samples else ""
     off = f"{row.difference:+.1f}" if not math.isnan(row.difference) else ""
     return (
@@ -319,7 +335,7 @@ def read_jobs(folder: Path) -> list[Took]:
 
 
 # What jobs say of packings that could not be made, led to an energy, or have no modes; the others of a job go on.
-COMPLAINT = re.compile(r"^(?:jamshape modes: .+|\S+\.h5: .+)$", re.MULTILINE)
+COMPLAINT = re.compile(r"^(?:jamshape modes: (?!warning: ).+|\S+\.h5: .+)$", re.MULTILINE)
 
 
 def failures(folder: Path) -> list[str]:
@@ -397,7 +413,9 @@ def where_it_ran(folder: Path, at: Mapping[str, Any]) -> str:
     parts.append(markdown(("job", "how many", "seconds"), rows))
     failed = failures(folder)
     parts.append(
-        "Not made: " + ("; ".join(failed) if failed else "nothing that was asked for") + "."
+        "Not made, or not at rest: "
+        + ("; ".join(failed) if failed else "nothing of what was asked for")
+        + "."
     )
     return "\n\n".join(parts)
 
@@ -424,7 +442,8 @@ def page(title: str, rows: Sequence[Row], options: Namespace, at: Mapping[str, A
 def write_tables(out: Path, rows: Sequence[Row], jobs: Sequence[tuple[Any, ...]]) -> None:
     """Write the tables of numbers, of jobs and of versions."""
     ours = ("ours", "our_error", "samples", "difference", "verdict")
-    header = ("quantity", "where", "paper", "paper_error", *ours, "remark", "commit")
+    without = ("ours_reached", "reached_samples")
+    header = ("quantity", "where", "paper", "paper_error", *ours, "remark", "commit", *without)
     write_table(out.with_suffix(".csv"), header, [plain(row) for row in rows])
     write_table(out.with_name("jobs.csv"), JOB, jobs)
     write_table(out.with_name("versions.csv"), ("on", "version"), versions())
@@ -436,7 +455,19 @@ def plain(row: Row) -> tuple[Any, ...]:
     measured = here or Ours(math.nan)
     told = [*(None if math.isnan(x) else x for x in measured[:2]), measured.samples or None]
     difference = None if math.isnan(off) else f"{off:.3g}"
-    return (p.quantity, p.where, p.value, p.error, *told, difference, verdict, p.remark, made_by)
+    cells_of_row = (
+        p.quantity,
+        p.where,
+        p.value,
+        p.error,
+        *told,
+        difference,
+        verdict,
+        p.remark,
+        made_by,
+    )
+    without = None if math.isnan(measured.reached) else measured.reached
+    return (*cells_of_row, without, measured.reached_samples)
 
 
 def jobs_of(folder: Path, known: Path | None) -> list[tuple[Any, ...]]:

@@ -4,7 +4,7 @@
 
 Every packing is led from its own energy up and down to each u0 and written to LADDER. Started again
 after a kill it goes on: files that are there are not made again. The last line of standard output is
-one JSON object; the exit code is 0 only if every file is there and each is in equilibrium.
+one JSON object; the exit code is 0 only if every file is there and forces balance in each.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ from typing import Any
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
-from jamshape.files.sets import REACHED, PackingFile
+from jamshape.files.h5md import read_attributes
+from jamshape.files.outcomes import shortfall
+from jamshape.files.sets import PackingFile
 from jamshape.minima.target import Target
 from jamshape.protocols.ladder import Rung, climb
 
@@ -49,7 +51,8 @@ def row_of(rung: Rung) -> dict[str, Any]:
         return {"out": rung.path, "u0": rung.u0, "failure": rung.failure}
     file = PackingFile.read(rung.path)
     stored = {name: file.attributes[name] for name in SUMMARY if name in file.attributes}
-    return {"out": rung.path, "made": rung.made, **file.system().report(), **stored}
+    told = {"out": rung.path, "made": rung.made, "reached": file.reached}
+    return told | file.system().report() | stored
 
 
 def main(options: Namespace) -> int:
@@ -68,10 +71,10 @@ def main(options: Namespace) -> int:
                 rows.append(row_of(rung))
                 bar.set_postfix_str(rung.path.name, refresh=False)
                 bar.update()
-                if rung.failure:
-                    tqdm.write(f"{rung.path.name}: {rung.failure}", file=sys.stderr)
+                if said := rung.failure or shortfall(read_attributes(rung.path)):
+                    tqdm.write(f"{rung.path.name}: {said}", file=sys.stderr)
     failed = sum("failure" in found for found in rows)
-    reached = sum(found.get("outcome") in REACHED for found in rows)
+    reached = sum(found.get("reached", False) for found in rows)
     made = sum(found.get("made", False) for found in rows)
     report({"made": made, "reached": reached, "failed": failed, "ladder": rows})
     return 0 if reached == len(rows) else 1

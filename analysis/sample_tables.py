@@ -16,6 +16,7 @@ versions.csv, which agreement.py writes. The last line of standard output is one
 from __future__ import annotations
 
 import csv
+import math
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -23,24 +24,26 @@ from typing import Any
 
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes, read_style
+from jamshape.files.outcomes import is_reached
 from jamshape.files.sets import OTHERS
 from jamshape.measures.runs import rate_of
-from jamshape.vibration.sets import TOLD, of_packing
+from jamshape.vibration.sets import TOLD, count_of, of_packing
 from jamshape.vibration.table import read_modes
 
 SHAPE = ("alpha", "exponent", "w1", "w2", "size_ratio", "n", "seed")
 STYLE = ("shape", "dimension")
 PACKING = (
     *STYLE, *SHAPE, "asphericity", "beta", "z_iso", "way", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
-    "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "outcome", "wall_seconds",
+    "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "tolerance", "outcome", "retry_of", "wall_seconds",
 )  # fmt: skip
 RUN = (
     *SHAPE, "kappa", "phi_start", "phi_end", "method", "phi_unjams", "phi_jams", "frames_minimised",
-    "flow_steps", "flow_evaluations", "flow_wall_seconds",
+    "frames_undecided", "flow_steps", "flow_evaluations", "flow_wall_seconds",
 )  # fmt: skip
 MODES = (
     *SHAPE, "u0", "n_backbone", "n_modes", "n_bonds", "z", "rank", "n_self_stress", "n_grazing",
-    *TOLD, "negative", "bulk_modulus", "pure_shear_modulus", "wall_seconds",
+    *TOLD, "negative", "bulk_modulus", "bulk_modulus_bound", "pure_shear_modulus", "pure_shear_modulus_bound",
+    "wall_seconds",
 )  # fmt: skip
 
 
@@ -58,7 +61,7 @@ def told_run(path: Path) -> dict[str, Any] | None:
 def told_modes(path: Path) -> dict[str, Any]:
     """Read what modes are: numbers of their own before those of the packing, and how many are in each band."""
     table = read_modes(path)
-    counts = {band: len(table.in_band(band)) for band in TOLD}
+    counts: dict[str, Any] = {band: count_of(table, band) for band in TOLD}
     counts["negative"] = int((table["sign"] < 0).sum())
     return of_packing(table) | table.attributes | counts
 
@@ -105,7 +108,7 @@ def write(path: Path, columns: Sequence[str], lines: Sequence[dict[str, str]]) -
 
 def short(value: Any) -> str:
     """Write a number to ten digits, and nothing for what is not known."""
-    if value is None:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
@@ -129,7 +132,9 @@ def main(options: Namespace) -> None:
         known = earlier(options.known / f"{name}.csv") if options.known else []
         lines = [*known, *(cells(row, columns, folder) for row in rows)]
         write(options.out / f"{name}.csv", columns, lines)
-    report({"out": options.out, **{name: len(rows) for name, (_, rows) in tables.items()}})
+    counts = {name: len(rows) for name, (_, rows) in tables.items()}
+    made = [row for _, rows in tables.values() for row in rows if "outcome" in row]
+    report({"out": options.out, **counts, "not_reached": sum(not is_reached(row) for row in made)})
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ changes from one to the other.
 
 from __future__ import annotations
 
+import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,8 +24,9 @@ from jamshape.landscape import Landscape, State
 from jamshape.measures.averages import mean
 from jamshape.minima import Stop, minimise
 from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
+from jamshape.vibration.sets import TOLD
 from jamshape.vibration.spectrum import Spectrum, spectrum
-from jamshape.vibration.statistics import bands
+from jamshape.vibration.statistics import bands, why_no_bands
 
 # Forces below this part of the mean stop what slides; they are of second order in the overlap.
 WEAK = 1e-4
@@ -61,8 +63,12 @@ def parser() -> ArgumentParser:
 
 
 def parts_of(matrix: DynamicalMatrix, found: Spectrum) -> dict[str, float]:
-    """Tell which fraction of all modes is in which band."""
-    return {band.name: band.n_modes / matrix.size for band in bands(matrix, found)}
+    """Give the fraction of all modes but translations that is in each band; NaN where bands are not apart."""
+    n, nothing = (
+        int((~found.is_translation).sum()),
+        math.nan if why_no_bands(matrix, found) else 0.0,
+    )
+    return dict.fromkeys(TOLD, nothing) | {b.name: b.n_modes / n for b in bands(matrix, found)}
 
 
 def n_falling(landscape: Landscape, state: State, matrix: DynamicalMatrix, found: Spectrum) -> int:
@@ -83,7 +89,7 @@ def n_falling(landscape: Landscape, state: State, matrix: DynamicalMatrix, found
 
 
 def numbers_of(file: PackingFile) -> dict[str, float]:
-    """Measure one packing; fractions are of all modes, and of all bonds."""
+    """Measure one packing; fractions are of all modes but translations, and of all bonds."""
     packing = file.packing()
     landscape, state = Landscape(packing), State.of(packing)
     matrix = dynamical_matrix(landscape, state, Scope(force=True))
@@ -99,8 +105,8 @@ def numbers_of(file: PackingFile) -> dict[str, float]:
         "z_without_weak": 2 * float((~weak).sum()) / matrix.n_particles,
         "phi_J": file.number("phi_J"),
         "n_negative": float((found.sign[own] < 0).sum()),
-        **{name: part.get(name, 0.0) for name in ("low", "middle", "high")},
-        "low_without_weak": parts_of(strong, spectrum(strong)).get("low", 0.0),
+        **part,
+        "low_without_weak": parts_of(strong, spectrum(strong))["low"],
         "n_falling": float(n_falling(landscape, state, matrix, found)),
         "weak_forces": float(weak.mean()),
         "median_weak": float(np.median(force[weak])) if weak.any() else 0.0,
@@ -130,7 +136,7 @@ def pairs_of(files: list[PackingFile]) -> dict[tuple[Any, ...], Pair]:
 
 def main(options: Namespace) -> int:
     """Compare; return the exit code."""
-    pairs = pairs_of(finished(options.packings, with_stalled=True))
+    pairs = pairs_of(finished(options.packings))
     for (_, n, u0, seed), pair in sorted(pairs.items(), key=lambda item: item[0][1:]):
         for sort, numbers in pair._asdict().items():
             told = ", ".join(f"{name} {numbers[name]:.6g}" for name in NUMBERS)

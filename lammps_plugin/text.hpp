@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdio>
+#include <cstdlib>
 #include <sstream>
 #include <string>
 
@@ -12,6 +14,17 @@ inline std::string shown(double number)
   std::ostringstream text;
   text << number;
   return text.str();
+}
+
+/// The shortest text that reads back as the same number.
+inline std::string exactly(double number)
+{
+  char text[32];
+  for (int digits = 6; digits <= 17; ++digits) {
+    std::snprintf(text, sizeof text, "%.*g", digits, number);
+    if (std::strtod(text, nullptr) == number) break;
+  }
+  return text;
 }
 
 /// The words of a command, as they were given.

@@ -87,5 +87,7 @@ rule packings:
         out=shlex.quote(OUT),
     shell:
         # The report is there only when its packings are: other jobs, which read this file as well, remove it else.
-        "said=$({sys.executable} -m jamshape sweep {params.asked} --jobs {threads} --out {params.out});"
+        # A packing that did not reach its goal is there, and would not be another one if the job ran again.
+        "said=$({sys.executable} -m jamshape sweep {params.asked} --jobs {threads} --out {params.out})"
+        """ || [[ "$said" == *'"not_made": 0,'* ]];"""
         ' echo "$said" > {output:q}'

@@ -5,7 +5,7 @@
 Random pairs of random orientation, semi-axes within a factor w of each other, sizes within ten, are
 moved to just below contact. Of each exponent p (the same for both, and one row of random unequal
 ones) and each w: the largest relative bound of the error of the scale, pairs whose bound is above
-2e-14, pairs whose first attempt failed, iterations from no start and from the normal of a
+2e-14, pairs whose first attempt failed, pairs for which doubles are too short, iterations from no start and from the normal of a
 moment before (centres moved by 1e-4 of a semi-axis), and the time of a contact with and without force
 to be found. Writes a table (Markdown), a picture and the numbers (JSON). The last line of standard
 output is one JSON object.
@@ -39,7 +39,8 @@ SCALE = 0.98  # of the pairs that are timed: a small overlap
 APART = 1.1
 CERTAIN = 2e-14
 
-HEADS = ("p", "w", "largest gap", "uncertain", "fallbacks, of", "iterations, most", "warm",
+HEADS = ("p", "w", "largest gap", "uncertain", "fallbacks, of", "in long doubles",
+         "iterations, most", "warm",
          "us contact", "us warm", "us apart", "us overlap")  # fmt: skip
 
 
@@ -92,6 +93,7 @@ def measure(rng: np.random.Generator, p: float | None, axis_ratio: float, n: int
         "scale_error": float(np.abs(cold["eta"] / SCALE - 1.0).max()),
         "uncertain": int(sum(np.sum(~(s["gap"] < CERTAIN)) for s in found)),
         "fallbacks": int(sum(s["fallback"].sum() for s in found)),
+        "extended": int(sum(s["extended"].sum() for s in found)),
         "iterations": float(cold["iterations"].mean()),
         "iterations_most": int(cold["iterations"].max()),
         "iterations_warm": float(warm["iterations"].mean()),
@@ -114,7 +116,7 @@ def table(rows: list[dict[str, Any]]) -> str:
     """Write the rows as Markdown."""
     cells = [
         (str(r["exponent"] or "any"), f"{r['axis_ratio']:g}", f"{r['largest_gap']:.1e}",
-         str(r["uncertain"]), f"{r['fallbacks']}, {r['pairs']}",
+         str(r["uncertain"]), f"{r['fallbacks']}, {r['pairs']}", str(r["extended"]),
          f"{r['iterations']:.1f}, {r['iterations_most']}", f"{r['iterations_warm']:.1f}",
          f"{r['microseconds']:.2f}", f"{r['microseconds_warm']:.2f}",
          f"{r['microseconds_apart']:.2f}", f"{r['microseconds_overlap']:.2f}")
@@ -165,7 +167,9 @@ def main(options: Namespace) -> None:
     (options.out / "contact_error.json").write_text(json.dumps(rows, indent=1))
     draw(rows, options.out / "contact_error.png")
     print(text)
-    totals = {key: sum(r[key] for r in rows) for key in ("pairs", "uncertain", "fallbacks")}
+    totals = {
+        key: sum(r[key] for r in rows) for key in ("pairs", "uncertain", "fallbacks", "extended")
+    }
     points = [
         Point(
             f"w = {r['axis_ratio']:g}, p = {r['exponent']}",

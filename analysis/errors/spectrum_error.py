@@ -80,7 +80,7 @@ def measure(path: Path) -> dict[str, Any]:
     runs = {m: timed(partial(spectrum, matrix, m)) for m in METHODS if m != "sparse"}
     reference = runs["refined"].found
     parts = bands(matrix, reference)
-    n_below = sum(band.n_modes for band in parts if band.name != "high")
+    n_below = sum(band.n_modes for band in parts if band.name != "high") if parts else 0
     runs["sparse"] = timed(lambda: lowest(matrix, n_below + BEYOND))
     rows: dict[str, Any] = {}
     for method, done in runs.items():

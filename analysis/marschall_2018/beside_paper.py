@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 from jamshape.command import parser_of, report, run
 from jamshape.files.sets import System, n_of, of_paper, read_groups
 from jamshape.measures import published
-from jamshape.measures.averages import Mean, mean
+from jamshape.measures.averages import Mean, mean, mean_over
 from jamshape.measures.runs import read_run
-from jamshape.vibration.sets import TOLD, read_tables
+from jamshape.vibration.sets import TOLD, fraction_of, read_tables
 
 NONE = Mean(math.nan)
 
@@ -60,7 +60,8 @@ def rows_of_packings(paths: list[Path]) -> tuple[int, list[Row]]:
         raise ValueError(msg)
     alpha, u0, n = alpha_of(system), files[0].number("u0"), n_of(groups)
     phi_J, z, rattlers = (
-        mean([file.number(name) for file in files]) for name in ("phi_J", "z", "n_rattlers")
+        mean_over(files, [file.number(name) for file in files])
+        for name in ("phi_J", "z", "n_rattlers")
     )
     beyond = mean([file.number("phi") - file.number("phi_J") for file in files]).value
     distance = published.DISTANCE.get(alpha, {}).get(u0)
@@ -80,7 +81,7 @@ def rows_of_modes(paths: list[Path]) -> tuple[int, list[Row]]:
     known = published.BANDS.get(alpha_of(key.system), {})
     rows = []
     for band in TOLD:
-        share = mean([len(t.in_band(band)) / int(t.attributes["n_modes"]) for t in tables])
+        share = mean([fraction_of(t, band) for t in tables])
         paper = f"{known[band]:.4f}" if known else ""
         rows.append(Row(f"modes in the {band} band", len(tables), share.text(), paper))
     return int(tables[0].attributes["n"]), rows

@@ -109,7 +109,7 @@ def main(options: Namespace) -> None:
     runs = [read_run(path) for path in options.files]
     average = mean_phi_J(runs)
     draw(runs, average, options)
-    phi_J, error, _ = average or (None, None, 0)
+    phi_J, error = average[:2] if average else (None, None)
     rows = [row_of(one) for one in runs]
     report({"out": options.out, "runs": rows, "mean": phi_J, "error": error})
     if problems := [one.problem for one in runs if one.problem]:

@@ -12,6 +12,7 @@ the averages over samples.
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,13 +25,14 @@ from jamshape.drawing.text import conditions_text, system_labels
 from jamshape.files.sets import (
     Curve,
     Groups,
+    PackingFile,
     System,
     conditions,
     curves_over,
     of_paper,
     read_groups,
 )
-from jamshape.measures.averages import Mean, mean
+from jamshape.measures.averages import Mean, mean_over
 from jamshape.measures.published import PHI_J
 
 WAYS = {
@@ -46,13 +48,13 @@ Averages = dict[str, dict[float, Mean]]
 
 def averages(curve: Curve) -> Averages:
     """Average over the samples of each alpha, those left out that do not know."""
-    return {
-        name: {
-            alpha: mean([s.number(name) for s in samples if name in s.attributes])
-            for alpha, samples in curve.items()
-        }
-        for name in WAYS
-    }
+    return {name: {alpha: average(of, name) for alpha, of in curve.items()} for name in WAYS}
+
+
+def average(samples: Sequence[PackingFile], name: str) -> Mean:
+    """Average over samples that know a number."""
+    known = [s for s in samples if name in s.attributes]
+    return mean_over(known, [s.number(name) for s in known])
 
 
 def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> None:

@@ -21,7 +21,7 @@ from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLUE, GREEN, ORANGE, PAPER_STYLE, RED
 from jamshape.drawing.text import conditions_text
 from jamshape.files.sets import Curve, System, conditions, of_paper, one_curve, read_groups
-from jamshape.measures.averages import Mean, mean
+from jamshape.measures.averages import Mean, mean_over
 from jamshape.measures.touching import NAMES, class_numbers
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def averages(curve: Curve) -> Averages:
     known: Averages = {}
     for alpha, files in curve.items():
         found = [class_numbers(file.contacts()) for file in files]
-        known[alpha] = {name: mean([numbers[name] for numbers in found]) for name in NAMES}
+        known[alpha] = {name: mean_over(files, [of[name] for of in found]) for name in NAMES}
     return known
 
 

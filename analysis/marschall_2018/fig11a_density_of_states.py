@@ -4,7 +4,7 @@
 
 MODES are files of analysis/modes.py, or folders of them. One curve for each system and u0, averaged over
 samples with standard errors; --alpha and --u0 select. The integral is 1; the rotations of discs, at
-omega = 0, count in it and are not drawn. Modes of negative eigenvalue are drawn apart, on the left. Stars are
+omega = 0, count in it and are not drawn, translations are left out. Modes of negative eigenvalue are drawn apart, on the left. Stars are
 the frequencies of bands that the paper names. The last line of standard output is one JSON object with
 the fractions of modes in each band, beside the paper's.
 """
@@ -55,9 +55,10 @@ def of_figure(key: Key) -> bool:
 
 
 def total(table: ModeTable) -> int:
-    """Count all modes, rotations of discs included."""
+    """Count all modes but translations, rotations of discs included."""
     freedoms = {2: 3, 3: 6}[table.coordinates.dimension]
-    return freedoms * int(table.attributes["n_backbone"])
+    n_translations = int(table.attributes["n_modes"]) - table.n_vibrational
+    return freedoms * int(table.attributes["n_backbone"]) - n_translations
 
 
 def densities(samples: list[ModeTable], edges: FloatArray, *, below: bool) -> FloatArray:
@@ -126,7 +127,7 @@ def mark_bands(row: Sides, key: Key, samples: list[ModeTable]) -> None:
     for band, shade in SHADES.items():
         part = found[band]["fraction"].value
         style: dict[str, Any] = {"color": shade, "alpha": 0.2, "lw": 0, "zorder": 0}
-        if part:
+        if part > 0:
             style["label"] = band_text(band, samples, part, found[band]["paper"])
         for axes, selected in ((row.stable, stable), (row.unstable, unstable)):
             omega = np.concatenate(
@@ -150,9 +151,11 @@ def row_of(key: Key, samples: list[ModeTable]) -> dict[str, Any]:
     found: dict[str, Any] = key.report() | {"samples": len(samples)}
     paper = BANDS.get(key.number("alpha"), {}) if of_figure(key) else {}
     for band in TOLD:
-        fraction = mean([len(t.in_band(band)) / total(t) for t in samples])
-        counts = [int(unstable(t)[t.in_band(band)].sum()) for t in samples]
+        known = [t for t in samples if t.has_band(band)]
+        fraction = mean([len(t.in_band(band)) / total(t) for t in known])
+        counts = [int(unstable(t)[t.in_band(band)].sum()) for t in known]
         found[band] = {"fraction": fraction, "unstable": counts, "paper": paper.get(band)}
+    found["without_bands"] = sum("why_no_bands" in t.attributes for t in samples)
     found["unsure"] = sum(int((t["sign"][~t["is_translation"]] == 0).sum()) for t in samples)
     found["z"] = float(np.mean([t.attributes["z"] for t in samples]))
     return found

@@ -128,7 +128,7 @@ def is_apart(table: ModeTable, band: str) -> bool:
 
 def draw_points(axes: Axes, points: Curve, **style: Any) -> None:
     """Draw means with standard errors."""
-    value, error, _ = np.array(list(points.values()), np.float64).T
+    value, error = np.array([mean[:2] for mean in points.values()], np.float64).T
     bars = log_bars(value, error)
     axes.errorbar(list(points), value, bars, capsize=2, lw=0.8, **style)
 

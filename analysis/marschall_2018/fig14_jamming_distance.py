@@ -40,13 +40,22 @@ Ladder = dict[System, Samples]
 
 
 def read_ladder(files: list[PackingFile]) -> Ladder:
-    """Read phi - phi_J of packings in equilibrium.
+    """Read phi - phi_J of packings.
 
     Raises
     ------
     ValueError
         If there is no sample at two energies.
     """
+    ladder = _ladder_of(files)
+    if not ladder:
+        places = ", ".join(dict.fromkeys(str(file.path) for file in files))
+        msg = f"{places}: no sample at two energies, expected energy_ladder.py's"
+        raise ValueError(msg)
+    return ladder
+
+
+def _ladder_of(files: list[PackingFile]) -> Ladder:
     rows: dict[tuple[System, int], dict[float, tuple[float, float]]] = {}
     for file in files:
         of = file.system(), int(file.number("seed"))
@@ -62,10 +71,6 @@ def read_ladder(files: list[PackingFile]) -> Ladder:
                 if abs(own - phi_J) <= SAME * abs(phi - phi_J)
             }
             ladder.setdefault(system, {})[seed] = above
-    if not ladder:
-        places = ", ".join(dict.fromkeys(str(file.path) for file in files))
-        msg = f"{places}: no sample at two energies, expected energy_ladder.py's"
-        raise ValueError(msg)
     return ladder
 
 
@@ -94,7 +99,7 @@ def draw_system(panels: list[Axes], samples: Samples, **style: Any) -> None:
     """Draw means of one system, as they are and without their trend."""
     points, law = averages(samples), exponent(samples)
     u = np.array(list(points))
-    value, error, _ = np.array(list(points.values())).T
+    value, error = np.array([mean[:2] for mean in points.values()]).T
     style["label"] += f", {counted(len(samples), 'sample')}"
     if law.samples:
         style["label"] += rf": $u^{{{law.tex}}}$"
@@ -151,9 +156,15 @@ def main(options: Namespace) -> None:
     """Read, average, fit, draw, report."""
     files = finished(options.files)
     ladder, sizes = read_ladder(files), sorted({file.packing().n for file in files})
+    reached = [file for file in files if file.reached]
     draw(ladder, f"$N={' and '.join(map(str, sizes))}$", options)
     rows = [row_of(system, samples) for system, samples in ladder.items()]
-    report({"out": options.out, "jamming_distance": rows})
+    found = {"out": options.out, "not_reached": len(files) - len(reached), "jamming_distance": rows}
+    if len(reached) < len(files):
+        found["jamming_distance_reached"] = [
+            row_of(system, samples) for system, samples in _ladder_of(reached).items()
+        ]
+    report(found)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
 
 Distributions over the particles that are no rattlers, of the net force over the mean bond force
 (Eq. 36) and of the net torque over the mean contact torque (Eq. 37), as each packing's file gives
-them. Packings that stalled are included. The last line of standard output is one JSON object with
+them. Packings whose forces do not balance are included. The last line of standard output is one JSON object with
 quantiles.
 """
 
@@ -110,7 +110,7 @@ def quantiles(samples: list[FloatArray]) -> dict[str, float | None]:
 def main(options: Namespace) -> None:
     """Read, count, draw, report."""
     same = ("n", "size_ratio", "u0")
-    every = read_groups(options.files, needs=["alpha"], same=same, with_stalled=True)
+    every = read_groups(options.files, needs=["alpha"], same=same)
     groups = choose(every, "alpha", Choice(options.alpha, PAPER_ALPHAS, MOST))
     residuals = {
         name: {system: [values_of(file, name) for file in of] for system, of in groups.items()}
@@ -119,8 +119,8 @@ def main(options: Namespace) -> None:
     draw(residuals, conditions_alone(groups), options)
     rows: list[dict[str, Any]] = []
     for system, files in groups.items():
-        stalled = sum(not file.reached for file in files)
-        rows.append(system.report() | {"samples": len(files), "stalled": stalled})
+        not_reached = sum(not file.reached for file in files)
+        rows.append(system.report() | {"samples": len(files), "not_reached": not_reached})
         rows[-1] |= {name: quantiles(residuals[name][system]) for name in NAMES}
     report({"out": options.out, "conditions": conditions(groups), "residuals": rows})
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 from jamshape.command import parser_of, report, run
 from jamshape.measures.averages import Mean, mean
 
-NEEDED = ("file", "alpha", "u0", "z", "n_backbone", "n_modes", "n_grazing", "low", "high")
+NEEDED = ("file", "alpha", "u0", "z", "n_backbone", "n_grazing", "low", "middle", "high")
 
 
 class Counts(NamedTuple):
@@ -33,8 +33,12 @@ class Counts(NamedTuple):
 
 
 def counts_of(row: dict[str, str]) -> Counts:
-    """Count with and without bonds that graze; bands are fractions of all modes."""
-    z, backbone, modes, grazing, low, high = (float(row[name]) for name in NEEDED[3:])
+    """Count with and without bonds that graze; bands are fractions of all modes but translations.
+
+    They are NaN of a packing whose bands are not apart.
+    """
+    z, backbone, grazing, low, middle, high = (float(row[name] or "nan") for name in NEEDED[3:])
+    modes = low + middle + high
     return Counts(
         *(z, z - 2 * grazing / backbone),
         *(low / modes, (low + grazing) / modes),

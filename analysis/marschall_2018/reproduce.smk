@@ -65,7 +65,8 @@ for alpha, (start, slow, end) in AT["slow_phi"].items():
                 "slow",
                 name,
                 f"jamshape slow --alpha {alpha} --n {AT['slow_n']} --seed {seed} --kappa {kappa}"
-                f" --phi-start {start} --phi-slow {slow} --phi-end {end} --out runs/{name}.h5",
+                # The exit code is 1 where minimisations of frames came to no end, too, which the report counts.
+                f" --phi-start {start} --phi-slow {slow} --phi-end {end} --out runs/{name}.h5 || true",
             )
 SLOWEST = [path for (alpha, kappa, _), path in SLOW.items() if (alpha, kappa) == ("4", AT["slow_kappas"][-1])]
 

@@ -29,9 +29,10 @@ from jamshape.drawing.contact_angles import contact_angle_figure
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import conditions_alone
 from jamshape.files.h5md import require_attributes
+from jamshape.files.outcomes import shortfall
 from jamshape.files.sets import Curve, PackingFile, is_among, one_curve, read_groups
 from jamshape.landscape import Landscape, State
-from jamshape.measures.averages import mean
+from jamshape.measures.averages import mean_over
 from jamshape.measures.minimum import write_minimum
 from jamshape.measures.touching import angle_curve, angles_of, class_numbers
 from jamshape.minima.target import Target, TargetError, find
@@ -131,7 +132,7 @@ def lead_all(discs: list[PackingFile], options: Namespace) -> tuple[list[Packing
             done.append(lead(file, options))
         except TargetError as error:
             failed.append(f"{file.path.name}: {error}")
-    failed += [f"{file.path.name}: stalled" for file in done if not file.reached]
+    failed += [f"{f.path.name}: {shortfall(f.attributes)}" for f in done if not f.reached]
     return done, failed
 
 
@@ -147,12 +148,13 @@ def row_of(files: list[PackingFile], alpha: float) -> Row:
     """Average what is compared over samples."""
     flat = [class_numbers(file.contacts()) for file in files]
     found = angle_curve(alpha, files)
-    means = {name: mean([f.number(name) for f in files]) for name in ("phi_J", "z", "z_single")}
-    means["rattlers"] = mean([f.number("n_rattlers") / f.number("n") for f in files])
-    for name in ("flat_of_backbone", "flat_of_all", "side_to_side"):
-        means[name] = mean([numbers[name] for numbers in flat])
+    parts = [file.number("n_rattlers") / file.number("n") for file in files]
+    numbers = {n: [f.number(n) for f in files] for n in ("phi_J", "z", "z_single")}
+    numbers |= {"rattlers": parts, "overlap_over_limit": [overlap_over_limit(f) for f in files]}
+    names = ("flat_of_backbone", "flat_of_all", "side_to_side")
+    numbers |= {name: [of[name] for of in flat] for name in names}
+    means = {name: mean_over(files, values) for name, values in numbers.items()}
     means["angles_on_flat"] = found.on_flat
-    means["overlap_over_limit"] = mean([overlap_over_limit(file) for file in files])
     counts = {"samples": len(files), "contacts": found.n_contacts, "peak": found.density.max()}
     return counts | means
 
@@ -171,7 +173,7 @@ def main(options: Namespace) -> int:
         sweep = read([*options.sweep, *make_discs(options)])
     done, failed = lead_all(sweep[0.0], options)
     compressed = [of for alpha, of in sweep.items() if is_among(alpha, [options.alpha])]
-    groups = {"from_discs": [file for file in done if file.reached]}
+    groups = {"from_discs": done}
     groups["compressed"] = [file for of in compressed for file in of]
     groups = {name: files for name, files in groups.items() if files}
     found: Row = {"alpha": options.alpha, "paper": PAPER, "failed": failed}

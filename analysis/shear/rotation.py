@@ -26,7 +26,6 @@ from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.flow.host import Host
 from jamshape.flow.rotation import rotation_rates
 from jamshape.measures.shears import ShearOf, read_shear
-from jamshape.shapes.shape import Interaction
 
 # Colours end here, as rates over that of the shear.
 END = 2.0
@@ -44,11 +43,9 @@ def frame_of(path: Path, frame: int) -> Frame:
     """Read a frame."""
     of, known = read_shear(path), read_attributes(path)
     packing = read_packing(path, frame)
-    law = Interaction(float(known.get("k_e", 1.0)), int(known.get("sides", 2)))
     host = Host.shearing(of.ensemble.gdot, of.ensemble.flow)
-    rates = rotation_rates(packing, host, law, float(known.get("k_d", 1.0)))
-    contacts = Contacts.of(packing, law.k_e, law.sides)
-    return Frame(of, contacts, -rates / of.ensemble.gdot)
+    rates = rotation_rates(packing, host, k_d=float(known.get("k_d", 1.0)))
+    return Frame(of, Contacts.of(packing), -rates / of.ensemble.gdot)
 
 
 def main(options: Namespace) -> None:

@@ -82,6 +82,11 @@ class Followed(NamedTuple):
 def follow(file: PackingFile, n_quartic: int) -> Followed:
     """Find the energy along modes of one packing."""
     table = found_modes(file)
+    if not table.has_band("high"):
+        msg = (
+            f"{file.path}: {table.attributes['why_no_bands']}; expected a packing closer to jamming"
+        )
+        raise ValueError(msg)
     below = n_quartic if quartic_count(table).n_quartic else 0
     band = "middle" if len(table.in_band("middle")) else "low"
     per_band = {"low": 0, "middle": 0, "high": OTHERS} | {band: below}

@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <initializer_list>
 #include <memory>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -34,7 +36,7 @@ template <typename T> class NewArray {
   {
   }
 
-  T *row(std::size_t n) { return values.get() + n * (size() / *shape.begin()); }
+  T *row(std::size_t n) { return values.get() + n * product(shape.begin() + 1); }
   T &operator[](std::size_t n) { return values[n]; }
 
   nb::object release()
@@ -48,11 +50,12 @@ template <typename T> class NewArray {
   std::vector<std::size_t> shape;
   std::unique_ptr<T[]> values;
 
-  std::size_t size() const
+  std::size_t size() const { return product(shape.begin()); }
+
+  /// Of the extents from one on.
+  std::size_t product(std::vector<std::size_t>::const_iterator from) const
   {
-    std::size_t n = 1;
-    for (const std::size_t extent : shape) n *= extent;
-    return n;
+    return std::accumulate(from, shape.end(), std::size_t{1}, std::multiplies<>());
   }
 };
 
@@ -106,6 +109,13 @@ inline void require_finite(double number, const char *name)
   require(std::isfinite(number), name + (" is " + shown(number)) + ", expected a finite number.");
 }
 
+/// Throws unless so many threads may be made.
+inline void require_threads(std::int64_t threads)
+{
+  require(threads >= 1 && threads <= 1024,
+          "threads is " + std::to_string(threads) + ", expected from 1 to 1024.");
+}
+
 /// Throws unless all of D edges of a box are lengths.
 inline void require_edges(const double *edges, std::size_t D)
 {
@@ -114,22 +124,28 @@ inline void require_edges(const double *edges, std::size_t D)
           "edges hold what is no length, expected positive ones.");
 }
 
-/// Throws unless (2, D, D) are the cell vectors of a box, columns that are upper triangular, as
-/// doubles and their small rests.
-inline void require_cell(const Array3<double> &cell, std::size_t D)
+/// Throws unless (2, D, D) are an upper triangular matrix with a positive diagonal, as doubles and
+/// their small rests.
+inline void require_upper(const Array3<double> &of, std::size_t D, const std::string &name)
 {
-  require(cell.shape(0) == 2 && cell.shape(1) == D && cell.shape(2) == D,
-          "cell has no shape (2, D, D).");
-  require_finite(cell, "cell");
+  require(of.shape(0) == 2 && of.shape(1) == D && of.shape(2) == D,
+          name + " has no shape (2, D, D).");
+  require_finite(of, name.c_str());
   for (std::size_t part = 0; part < 2; ++part) {
     for (std::size_t k = 0; k < D; ++k) {
-      const double *const row = cell.data() + (part * D + k) * D;
+      const double *const row = of.data() + (part * D + k) * D;
       require(std::all_of(row, row + k, [](double x) { return x == 0.0; }),
-              "cell is not upper triangular, expected cell vectors as columns, the first along x.");
+              name + " is not upper triangular, expected vectors as columns, the first along x.");
       require(part == 1 || row[k] > 0.0,
-              "cell holds an edge that is no length, expected positive ones.");
+              name + " holds an edge that is no length, expected positive ones.");
     }
   }
+}
+
+/// Throws unless (2, D, D) are the cell vectors of a box, as columns.
+inline void require_cell(const Array3<double> &cell, std::size_t D)
+{
+  require_upper(cell, D, "cell");
 }
 
 /// Throws unless n orientations, angles or quaternions, turn a particle somewhere.

@@ -1,8 +1,11 @@
 #pragma once
 
 #include "contact/contact.hpp"
+#include "contact/errors.hpp"
 
 #include "bindings/arrays.hpp"
+
+#include <optional>
 
 namespace jamshape {
 
@@ -10,11 +13,11 @@ namespace jamshape {
 template <class Model, int D> class ContactArrays {
  public:
   explicit ContactArrays(std::size_t n) :
-      status({n}), kind({n}), n_bonds({n}), error({n}), energy({n}), force({n, D}),
-      torque_i({n, ROTATIONS<D>}), torque_j({n, ROTATIONS<D>}), bond_normal({n, BONDS, D}),
-      bond_force({n, BONDS, D}), bond_arm_i({n, BONDS, D}), bond_distance({n, BONDS}),
-      bond_reach({n, BONDS}), bond_energy({n, BONDS}), bond_stiffness({n, BONDS}),
-      bond_on_side({n, BONDS, 2}), bond_on_face({n, BONDS, 2})
+      status({n}), kind({n}), n_bonds({n}), energy({n}), force({n, D}), torque_i({n, ROTATIONS<D>}),
+      torque_j({n, ROTATIONS<D>}), bond_normal({n, BONDS, D}), bond_force({n, BONDS, D}),
+      bond_arm_i({n, BONDS, D}), bond_distance({n, BONDS}), bond_reach({n, BONDS}),
+      bond_energy({n, BONDS}), bond_stiffness({n, BONDS}), bond_on_side({n, BONDS, 2}),
+      bond_on_face({n, BONDS, 2})
   {
   }
 
@@ -26,7 +29,6 @@ template <class Model, int D> class ContactArrays {
     status[n] = static_cast<int>(contact.status);
     kind[n] = static_cast<int>(contact.kind);
     n_bonds[n] = contact.n_bonds;
-    error[n] = contact.error;
     energy[n] = static_cast<double>(contact.energy);
     write_vec(contact.force, force.row(n));
     write_vec(contact.torque_i, torque_i.row(n));
@@ -44,7 +46,6 @@ template <class Model, int D> class ContactArrays {
     result["status"] = status.release();
     result["kind"] = kind.release();
     result["n_bonds"] = n_bonds.release();
-    result["error"] = error.release();
     result["energy"] = energy.release();
     result["force"] = force.release();
     result["torque_i"] = torque_i.release();
@@ -64,7 +65,7 @@ template <class Model, int D> class ContactArrays {
   static constexpr int BONDS = Model::MOST_BONDS;
 
   NewArray<int> status, kind, n_bonds;
-  NewArray<double> error, energy, force, torque_i, torque_j, bond_normal, bond_force, bond_arm_i;
+  NewArray<double> energy, force, torque_i, torque_j, bond_normal, bond_force, bond_arm_i;
   NewArray<double> bond_distance, bond_reach, bond_energy, bond_stiffness;
   NewArray<bool> bond_on_side, bond_on_face;
 
@@ -80,6 +81,42 @@ template <class Model, int D> class ContactArrays {
     bond_on_side.row(n)[2 * b] = bond.on_side_i;
     bond_on_side.row(n)[2 * b + 1] = bond.on_side_j;
   }
+};
+
+/// Bounds of the errors of n contacts, where they are asked for: they take longer than the
+/// contacts.
+class ErrorArrays {
+ public:
+  ErrorArrays(std::size_t n, bool wanted)
+  {
+    if (wanted) arrays.emplace(n);
+  }
+
+  template <class Errors> void set(std::size_t n, const Errors &errors)
+  {
+    if (arrays.has_value()) arrays->set(n, errors());
+  }
+
+  void release_to(nb::dict &result)
+  {
+    if (!arrays.has_value()) return;
+    result["energy_error"] = arrays->energy.release();
+    result["force_error"] = arrays->force.release();
+    result["torque_error"] = arrays->torque.release();
+  }
+
+ private:
+  struct Arrays {
+    NewArray<double> energy, force, torque;
+    explicit Arrays(std::size_t n) : energy({n}), force({n}), torque({n}) {}
+    void set(std::size_t n, const ContactErrors &errors)
+    {
+      energy[n] = errors.energy;
+      force[n] = errors.force;
+      torque[n] = errors.torque;
+    }
+  };
+  std::optional<Arrays> arrays;
 };
 
 }  // namespace jamshape

@@ -1,5 +1,6 @@
 // Contact geometry of single pairs, row by row: what only tests and measurements of errors call.
 
+#include "contact/extended.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
 #include "contact/superellipsoid/superellipsoid.hpp"
 
@@ -48,11 +49,25 @@ struct SuperellipsoidRows {
   static constexpr const char *RULE =
       "6 (2D: centre, angle, semi-axes, p) or 11 (3D: centre, quaternion, semi-axes, p).";
 
+  /// The two of a pair to all digits of their numbers.
+  template <int D>
+  static PosedPair<Model, D, long double> in_long(const double *row_i, const double *row_j,
+                                                  const Model::Law &law)
+  {
+    Vec<D, long double> r;
+    for (int k = 0; k < D; ++k) r[k] = static_cast<long double>(row_i[k]) - row_j[k];
+    return {*shape<D>(row_i),
+            *shape<D>(row_j),
+            r,
+            orientation<D, long double>(row_i + D),
+            orientation<D, long double>(row_j + D),
+            law};
+  }
+
   template <int D> static SuperellipsoidBody<D> read(const double *row, std::size_t n)
   {
-    const double *turn = row + D, *axes = turn + (D == 2 ? 1 : 4);
-    const Vec<3> semi_axes{{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}};
-    const auto shape = Model::shape_from(semi_axes, axes[D]);
+    const double *turn = row + D;
+    const auto shape = SuperellipsoidRows::shape<D>(row);
     require_body(
         shape.has_value(), n,
         "is no such shape: a superellipsoid has positive semi-axes and an exponent p above "
@@ -66,10 +81,17 @@ struct SuperellipsoidRows {
   }
 
  private:
-  template <int D> static Quaternion orientation(const double *turn)
+  template <int D> static std::optional<Superellipsoid> shape(const double *row)
   {
-    if (D == 2) return {std::cos(0.5 * turn[0]), 0.0, 0.0, std::sin(0.5 * turn[0])};
-    return normalized(Quaternion{turn[0], turn[1], turn[2], turn[3]});
+    const double *axes = row + D + (D == 2 ? 1 : 4);
+    return Model::shape_from({{axes[0], axes[1], D == 2 ? axes[1] : axes[D - 1]}}, axes[D]);
+  }
+
+  template <int D, class S = double> static QuaternionOf<S> orientation(const double *turn)
+  {
+    const S half = S(0.5) * turn[0];
+    if (D == 2) return {std::cos(half), 0.0, 0.0, std::sin(half)};
+    return normalized(QuaternionOf<S>{turn[0], turn[1], turn[2], turn[3]});
   }
 };
 
@@ -85,6 +107,8 @@ template <class Rows> class BodyPairs {
             "bodies have " + std::to_string(columns) + " columns, expected " + Rows::RULE);
   }
 
+  const double *row_i(std::size_t n) const { return i.data() + n * i.shape(1); }
+  const double *row_j(std::size_t n) const { return j.data() + n * j.shape(1); }
   int dimension() const { return i.shape(1) == Rows::COLUMNS_2D ? 2 : 3; }
   std::size_t size() const { return i.shape(0); }
   template <int D> auto first(std::size_t n) const { return at<D>(i, n); }
@@ -141,10 +165,55 @@ nb::object spine_distances(const Bodies &bodies_i, const Bodies &bodies_j)
       [](const auto &i, const auto &j) { return std::sqrt(spine_distance_sq(spine_pair(i, j))); });
 }
 
-nb::dict superellipsoid_contacts(const Bodies &bodies_i, const Bodies &bodies_j, double epsilon)
+template <int D>
+nb::dict superellipsoid_contacts_in(const BodyPairs<SuperellipsoidRows> &pairs,
+                                    const SuperellipsoidLaw &law, bool extended, bool with_errors)
 {
-  return contacts(BodyPairs<SuperellipsoidRows>(bodies_i, bodies_j),
-                  law_of<SuperellipsoidModel>(epsilon, 1));
+  using Model = SuperellipsoidModel;
+  ContactArrays<Model, D> found(pairs.size());
+  ErrorArrays errors(pairs.size(), with_errors);
+  for (std::size_t n = 0; n < pairs.size(); ++n) {
+    const auto i = pairs.first<D>(n), j = pairs.second<D>(n);
+    const auto longer = [&] {
+      return SuperellipsoidRows::in_long<D>(pairs.row_i(n), pairs.row_j(n), law);
+    };
+    const auto contact = extended ? rounded(contact_at<Model, D, long double>(longer()))
+                                  : to_its_digits<Model, D>(contact_of(i, j, law), longer);
+    found.set(n, contact, i, j);
+    errors.set(n, [&] { return errors_at<Model, D>(contact, longer()); });
+  }
+  nb::dict result;
+  found.release_to(result);
+  errors.release_to(result);
+  return result;
+}
+
+nb::dict superellipsoid_contacts(const Bodies &bodies_i, const Bodies &bodies_j, double epsilon,
+                                 bool extended, bool errors)
+{
+  const BodyPairs<SuperellipsoidRows> pairs(bodies_i, bodies_j);
+  const auto law = law_of<SuperellipsoidModel>(epsilon, 1);
+  return in_dimension(pairs.dimension(), [&](auto D) {
+    return superellipsoid_contacts_in<D>(pairs, law, extended, errors);
+  });
+}
+
+/// The tangency of pair n in long doubles.
+template <int D>
+FoundTangency<D, double> tangency_in_long(const BodyPairs<SuperellipsoidRows> &pairs, std::size_t n)
+{
+  using Long = long double;
+  const auto pair = SuperellipsoidRows::in_long<D>(pairs.row_i(n), pairs.row_j(n),
+                                                   law_of<SuperellipsoidModel>(1.0, 1));
+  const PosedBodies<SuperellipsoidModel, D, Long> bodies(pair);
+  const auto longer =
+      tangency_of(bodies.i, bodies.j, TangencyWish<D, Long>{pair.r, false, nullptr});
+  return {plain<double>(longer.at),
+          static_cast<double>(longer.gap),
+          longer.iterations,
+          longer.is_fallback,
+          false,
+          longer.is_settled};
 }
 
 template <int D>
@@ -154,7 +223,7 @@ nb::dict scales(const BodyPairs<SuperellipsoidRows> &pairs,
   NewArray<double> eta({pairs.size()}), gap({pairs.size()});
   NewArray<double> normal({pairs.size(), D}), point_i({pairs.size(), D});
   NewArray<int> iterations({pairs.size()});
-  NewArray<bool> fallback({pairs.size()});
+  NewArray<bool> fallback({pairs.size()}), extended({pairs.size()});
   for (std::size_t n = 0; n < pairs.size(); ++n) {
     const auto i = pairs.first<D>(n), j = pairs.second<D>(n);
     TangencyWish<D, double> wish{i.centre - j.centre, false, nullptr};
@@ -165,7 +234,9 @@ nb::dict scales(const BodyPairs<SuperellipsoidRows> &pairs,
       last = read_vec<D>(normals->data() + D * n);
       wish.last = &last;
     }
-    const FoundTangency<D, double> found = tangency_of(i, j, wish);
+    FoundTangency<D, double> found = tangency_of(i, j, wish);
+    extended[n] = !found.is_settled;
+    if (extended[n]) found = tangency_in_long<D>(pairs, n);
     eta[n] = found.at.scale;
     gap[n] = found.gap;
     iterations[n] = found.iterations;
@@ -178,6 +249,7 @@ nb::dict scales(const BodyPairs<SuperellipsoidRows> &pairs,
   result["gap"] = gap.release();
   result["iterations"] = iterations.release();
   result["fallback"] = fallback.release();
+  result["extended"] = extended.release();
   result["normal"] = normal.release();
   result["point_i"] = point_i.release();
   return result;
@@ -218,8 +290,10 @@ nb::object superellipsoid_overlap(const Bodies &bodies_i, const Bodies &bodies_j
 }
 
 /// Lets a team count its parts again and again, each time but the last with some that fail.
-nb::object counts_of_team(std::size_t threads, std::size_t first_that_fails, int rounds)
+nb::object counts_of_team(std::int64_t asked, std::size_t first_that_fails, int rounds)
 {
+  require_threads(asked);
+  const auto threads = static_cast<std::size_t>(asked);
   Team team(threads);
   NewArray<std::int64_t> counts({threads});
   std::fill_n(&counts[0], threads, 0);
@@ -252,18 +326,19 @@ void export_probes(nb::module_ &m)
   m.def("spine_distances", &spine_distances, "bodies_i"_a, "bodies_j"_a,
         "Shortest distances (M,) of the spines of M pairs, 0 where they cross.");
   m.def("superellipsoid_contacts", &superellipsoid_contacts, "bodies_i"_a, "bodies_j"_a,
-        "epsilon"_a,
+        "epsilon"_a, "extended"_a = false, "errors"_a = false,
         "Contacts of M pairs. Bodies are (M, 6) in 2D: centre, angle, two semi-axes, p; (M, 11)\n"
         "in 3D: centre, quaternion w i j k, three semi-axes, p. Returns the arrays of\n"
         "Superellipsoids.contacts, of all M pairs (status 0: apart). Of a bond 1 -\n"
         "distance/reach is 1 - eta^2.");
-  m.def(
-      "superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
-      "normals"_a.none() = nb::none(),
-      "The scale at which both bodies of M pairs touch, whether above 1 or below, begun at\n"
-      "`normals` (M, D) where given. Returns a dict: eta, gap (relative bound of its error),\n"
-      "iterations, fallback (the first attempt failed), normal (into i, unit), point_i (from the\n"
-      "centre of i to the tangency of the scaled bodies).");
+  m.def("superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
+        "normals"_a.none() = nb::none(),
+        "The scale at which both bodies of M pairs touch, whether above 1 or below, begun at\n"
+        "`normals` (M, D) where given. Returns a dict: eta, gap (relative bound of its error),\n"
+        "iterations, fallback (the first attempt failed), extended (in long doubles, as doubles "
+        "were\n"
+        "too short), normal (into i, unit), point_i (from the\n"
+        "centre of i to the tangency of the scaled bodies).");
   m.def("superellipsoid_near", &superellipsoid_near, "bodies_i"_a, "bodies_j"_a, "margin"_a,
         "Whether surfaces may be closer than `margin` (M,): false only where they are not.");
   m.def("superellipsoid_motion_sq", &superellipsoid_motion_sq, "then"_a, "now"_a,

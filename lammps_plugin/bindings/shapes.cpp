@@ -1,5 +1,6 @@
 #include "contact/shapes.hpp"
 
+#include "contact/extended.hpp"
 #include "contact/host_spin.hpp"
 
 #include "bindings/contact_arrays.hpp"
@@ -116,8 +117,20 @@ nb::object each_pair(const ShapeOf<Model> &of, const PairArrays &arrays, const A
   return answer.release();
 }
 
+/// A contact as Python sees it.
+template <int D, int BONDS>
+const Contact<D, double, BONDS> &in_doubles(const Contact<D, double, BONDS> &contact)
+{
+  return contact;
+}
+template <int D, int BONDS>
+Contact<D, double, BONDS> in_doubles(const Contact<D, long double, BONDS> &contact)
+{
+  return rounded(contact);
+}
+
 template <class Model, int D, class S>
-nb::dict contacts_in(const ShapeOf<Model> &of, const PairArrays &arrays)
+nb::dict contacts_in(const ShapeOf<Model> &of, const PairArrays &arrays, bool with_errors)
 {
   const PosedPairs<Model, D, S> pairs = of.template posed<D, S>(arrays);
   std::vector<std::size_t> at;
@@ -131,16 +144,20 @@ nb::dict contacts_in(const ShapeOf<Model> &of, const PairArrays &arrays)
   NewArray<std::int64_t> pair({at.size()});
   NewArray<double> separation({at.size(), D});
   ContactArrays<Model, D> contacts(at.size());
+  ErrorArrays errors(at.size(), with_errors);
   for (std::size_t c = 0; c < at.size(); ++c) {
     pair[c] = static_cast<std::int64_t>(at[c]);
     const Vec<D, S> r = pairs.separation(at[c]);
     write_vec(r, separation.row(c));
     contacts.set(c, found[c], pairs.first_body(at[c], r), pairs.second_body(at[c]));
+    errors.set(
+        c, [&] { return errors_at<Model, D>(in_doubles(found[c]), pairs.pair_in_long(at[c])); });
   }
   nb::dict result;
   result["pair"] = pair.release();
   result["separation"] = separation.release();
   contacts.release_to(result);
+  errors.release_to(result);
   return result;
 }
 
@@ -164,18 +181,24 @@ template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
         return each_pair(self, arrays, [](const auto &of, std::size_t p) { return of.overlap(p); });
       },
       "Whether the particles of M pairs share more than a point (M,).");
-  def_in_precision(
+  def_over_pairs<bool, bool>(
       of, "contacts",
-      [](auto D, auto s, Self self, const PairArrays &arrays) {
-        return contacts_in<Model, D, decltype(s)>(self, arrays);
+      [](Self self, const PairArrays &arrays, bool extended, bool errors) {
+        return self.in_space([&](auto D) {
+          return extended ? contacts_in<Model, D, long double>(self, arrays, errors)
+                          : contacts_in<Model, D, double>(self, arrays, errors);
+        });
       },
-      "The C of M pairs that are not apart, found in long double if extended. Returns a dict: "
-      "pair\n"
-      "(C,) rows of pairs; status (1 touching, 2 crossing, 3 unconverged), kind, n_bonds, error\n"
-      "(relative, of an iteration), energy (C,); separation, force (on i) (C, D); torque_i,\n"
-      "torque_j (C, 1 or 3) and, of up to most_bonds bonds B, bond_normal (into i), bond_force,\n"
-      "bond_arm_i (C, B, D), bond_distance, bond_reach, bond_energy, bond_stiffness (C, B),\n"
-      "bond_on_side and bond_on_face (flat in all D - 1 directions) of i and j (C, B, 2).");
+      "extended"_a = false, "errors"_a = false,
+      "The C of M pairs that are not apart, found in long double if extended. Returns a dict:\n"
+      "pair (C,) rows of pairs; status (1 touching, 2 crossing, 3 unconverged), kind, n_bonds,\n"
+      "energy (C,); separation, force (on i) (C, D); torque_i, torque_j (C, 1 or 3) and, of up to\n"
+      "most_bonds bonds B, bond_normal (into i), bond_force, bond_arm_i (C, B, D),\n"
+      "bond_distance, bond_reach, bond_energy, bond_stiffness (C, B), bond_on_side and\n"
+      "bond_on_face (flat in all D - 1 directions) of i and j (C, B, 2). With errors, which takes\n"
+      "longer, also bounds (C,) of how far energy, force and torques are from those of exactly\n"
+      "these particles, in their units: energy_error, by the overlap; force_error, by overlap and\n"
+      "normal; torque_error, by these and the point of contact; NaN where nothing touches.");
 }
 
 template <class Model> void export_shape(nb::module_ &m)

@@ -24,7 +24,6 @@ template <class Model, int D, class S>
   result["virial"] = virial.release();
   result["bond_force"] = static_cast<double>(sums.bond_force);
   result["n_bonds"] = sums.n_bonds;
-  result["error"] = sums.error;
   result["crossing"] = sums.crossing;
   result["unconverged"] = sums.unconverged;
   return result;
@@ -45,9 +44,9 @@ void export_sums()
         "quaternions and cell (2, D, D), the box's cell vectors as columns, as doubles and their\n"
         "small rests; pairs (M, 2), shift (M, D) cell vectors to add to the second; extended: in\n"
         "long double. Returns a dict: energy, force (N, D), torque (N, 1 or 3), virial (D, D),\n"
-        "bond_force (sum of magnitudes), n_bonds,\n"
-        "error (the largest of a contact), crossing and unconverged (a pair of this status, or\n"
-        "-1).");
+        "bond_force (sum of magnitudes), n_bonds, crossing and unconverged (a pair of this "
+        "status,\n"
+        "or -1).");
   });
 }
 

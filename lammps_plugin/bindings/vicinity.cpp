@@ -136,12 +136,20 @@ void move_to(Vicinity &of, const Array3<double> &position, const Array3<double> 
   of.move_to(poses.read());
 }
 
+void hold(Vicinity &of)
+{
+  require_base(of);
+  of.hold();
+}
+
 void deform(Vicinity &of, const Array3<double> &matrix, const Array2<double> &turns)
 {
   const std::size_t D = of.dimension();
-  require(matrix.shape(0) == 2 && matrix.shape(1) == D && matrix.shape(2) == D &&
-              turns.shape(0) == of.n_particles() && turns.shape(1) == (D == 2 ? 1 : 3),
-          "matrix and turns have no shapes (2, D, D) and (N, 1 or 3).");
+  require_upper(matrix, D, "matrix");
+  require(turns.shape(0) == of.n_particles() && turns.shape(1) == (D == 2 ? 1 : 3),
+          "turns have no shape (N, 1) in 2D or (N, 3) in 3D.");
+  require_finite(turns, "turns");
+  require(of.has_held(), "no base is held, expected move_to and hold before.");
   std::vector<long double> rows(D * D);
   for (std::size_t k = 0; k < D * D; ++k) {
     rows[k] = static_cast<long double>(matrix.data()[k]) + matrix.data()[D * D + k];
@@ -197,7 +205,7 @@ void export_vicinity(nb::module_ &m)
            "Count coordinates from these poses, doubles and their small rests.")
       .def("move", &move, "x"_a, "strain"_a,
            "Count coordinates from a point near the base; gives its poses as move_to takes them.")
-      .def("hold", &Vicinity::hold, "Keep the base, from which deform begins.")
+      .def("hold", &hold, "Keep the base, from which deform begins.")
       .def("deform", &deform, "matrix"_a, "turns"_a,
            "Count coordinates from where an upper triangular matrix (2, D, D), doubles and their\n"
            "small rests, takes the base that was kept, and rotation vectors (N, 1 or 3) its\n"
@@ -208,8 +216,7 @@ void export_vicinity(nb::module_ &m)
       .def(
           "share",
           [](Vicinity &of, std::int64_t threads) {
-            require(threads >= 1,
-                    "threads is " + std::to_string(threads) + ", expected at least 1.");
+            require_threads(threads);
             of.share(static_cast<std::size_t>(threads));
           },
           "threads"_a, "By how many threads sums over contacts are taken; 1 if nobody says so.")

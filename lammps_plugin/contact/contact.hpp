@@ -2,6 +2,8 @@
 
 #include "contact/math/vec.hpp"
 
+#include <type_traits>
+
 namespace jamshape {
 
 /// What a pair of particles is to each other. Two have no contact: CROSSING, where spines (or
@@ -55,7 +57,8 @@ template <int D, class S, int BONDS> struct Contact {
   ContactStatus status;
   ContactKind kind;
   int n_bonds;
-  double error;  // relative, of the overlap's distance where that comes from an iteration; else 0
+  double gap;  // relative, between bounds of the distance that an iteration ended with; else 0
+  bool needs_digits;  // doubles are too short for it: see to_its_digits
   Bond<D, S> bond[BONDS];
   S energy;
   Vec<D, S> force;
@@ -70,7 +73,8 @@ template <int D, class S, int BONDS> Contact<D, S, BONDS> without_bonds(ContactS
   contact.status = status;
   contact.kind = ContactKind::TIP_TO_TIP;
   contact.n_bonds = 0;
-  contact.error = 0.0;
+  contact.gap = 0.0;
+  contact.needs_digits = false;
   contact.energy = 0.0;
   contact.force = {};
   contact.torque_i = contact.torque_j = {};
@@ -89,13 +93,16 @@ template <int D, class S> struct ContactLanes {
   Vec<D, S> force{};
   Torque<D, S> torque_i{}, torque_j{};
   S bond_force{0.0};  // sum of the magnitudes
-  S error{0.0};
   Truth<S> touching, alone{}, shared{}, two_bonds{};
 };
 
 /// What a pair remembers of one contact to begin the search for the next one at, a moment later: a
 /// model's Start<D>. Shapes whose contacts need no search remember nothing.
 struct NoStart {};
+
+/// Whether a model's contacts need a search, which doubles may be too short for.
+template <class Model, int D>
+inline constexpr bool IS_SEARCHED = !std::is_same_v<typename Model::template Start<D>, NoStart>;
 
 /// What the drag on the substrate needs of a particle (Marschall & Teitel 2018, Eqs. 8-12): its
 /// area (volume in 3D) and, per body axis, the integral of the squared distance from that axis over

@@ -24,7 +24,6 @@ template <int D> struct ContactBlock {
   alignas(64) double torque_i[ROTATIONS<D>][MOST];
   alignas(64) double torque_j[ROTATIONS<D>][MOST];
   alignas(64) double bond_force[MOST];  // sum of the magnitudes
-  alignas(64) double error[MOST];
 
   /// Of shapes whose contacts are searched: where the searches of all pairs begin, if they are to
   /// begin anywhere, and where they ended.
@@ -113,7 +112,6 @@ template <int D> struct ContactBlock {
     two_bonds |= std::uint64_t{bits_of(found.two_bonds)} << first;
     found.energy.store(energy + first);
     found.bond_force.store(bond_force + first);
-    found.error.store(error + first);
     for (int a = 0; a < D; ++a) found.force[a].store(force[a] + first);
     for (int a = 0; a < ROTATIONS<D>; ++a) {
       found.torque_i[a].store(torque_i[a] + first);
@@ -133,7 +131,6 @@ template <int D> struct ContactBlock {
     take(two_bonds, other.two_bonds);
     energy[k] = other.energy[from];
     bond_force[k] = other.bond_force[from];
-    error[k] = other.error[from];
     for (int a = 0; a < D; ++a) force[a][k] = other.force[a][from];
     for (int a = 0; a < ROTATIONS<D>; ++a) {
       torque_i[a][k] = other.torque_i[a][from];

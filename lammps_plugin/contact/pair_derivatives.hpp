@@ -69,18 +69,32 @@ template <int D> Torque<D, int> variables_from(int first)
 
 }  // namespace detail
 
+/// The bodies of a pair, the second at the origin.
+template <class Model, int D, class S> struct PosedBodies {
+  typename Model::template Body<D, S> i, j;
+
+  explicit PosedBodies(const PosedPair<Model, D, S> &pair) :
+      i(posed(pair.shape_i, pair.orientation_i)), j(posed(pair.shape_j, pair.orientation_j))
+  {
+    i.centre = pair.r;
+  }
+
+ private:
+  static typename Model::template Body<D, S> posed(const typename Model::Shape &shape,
+                                                   const QuaternionOf<S> &orientation)
+  {
+    auto body = Model::template body<D, S>(shape);
+    if (Model::template turns<D>(shape)) Model::template turn_to<D, S>(body, orientation);
+    return body;
+  }
+};
+
 /// The contact of a pair as its energy and forces alone.
 template <class Model, int D, class S>
 ContactOf<Model, D, S> contact_at(const PosedPair<Model, D, S> &pair)
 {
-  auto body_i = Model::template body<D, S>(pair.shape_i);
-  auto body_j = Model::template body<D, S>(pair.shape_j);
-  body_i.centre = pair.r;
-  if (Model::template turns<D>(pair.shape_i))
-    Model::template turn_to<D, S>(body_i, pair.orientation_i);
-  if (Model::template turns<D>(pair.shape_j))
-    Model::template turn_to<D, S>(body_j, pair.orientation_j);
-  return contact_of(body_i, body_j, pair.law);
+  const PosedBodies<Model, D, S> bodies(pair);
+  return contact_of(bodies.i, bodies.j, pair.law);
 }
 
 /// A body that its own rotation variables, from `first` on, turn: for the code of the forces to run
@@ -162,20 +176,15 @@ void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
 /// integrator, which jumps over it, not a spring.
 inline constexpr double STIFFEST_COUPLING = 4.0;
 
-/// Adds the second derivatives, by running the code of the forces on dual numbers; of what couples
-/// bonds as much as counts in rates.
+/// The contact in dual numbers: the code of the forces, run on these, gives second derivatives.
 template <class Model, int D, class S>
-ContactDerivatives<Model, D, S> derivatives_at(const PosedPair<Model, D, S> &pair)
+ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>>
+turned_contact_at(const PosedPair<Model, D, S> &pair)
 {
   auto body_i = turned_body<Model, D, S>(pair.shape_i, pair.orientation_i, FIRST_OF_I<D>);
   const auto body_j = turned_body<Model, D, S>(pair.shape_j, pair.orientation_j, FIRST_OF_J<D>);
   body_i.centre = as_variables<D, S>(pair.r);
-  const auto dual = contact_of(body_i, body_j, pair.law);
-  ContactDerivatives<Model, D, S> result{};
-  result.contact = contact_at(pair);
-  if (dual.status == ContactStatus::TOUCHING)
-    read_derivatives<D, S, Model::MOST_BONDS>(dual, result, STIFFEST_COUPLING);
-  return result;
+  return contact_of(body_i, body_j, pair.law);
 }
 
 }  // namespace jamshape

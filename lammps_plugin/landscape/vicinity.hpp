@@ -99,6 +99,7 @@ class Vicinity {
   virtual void move(const Displacement &at) = 0;
   /// Keeps the base, from which `deform` begins.
   virtual void hold() = 0;
+  virtual bool has_held() const = 0;
   /// To where an upper triangular matrix, rows (D, D), takes positions and cell vectors of the base
   /// that was kept, and rotation vectors (N, 1 or 3) the particles that can turn.
   virtual void deform(const std::vector<long double> &matrix, const double *turns) = 0;
@@ -190,6 +191,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   }
 
   void hold() override { held = base; }
+  bool has_held() const override { return !held.position[0].empty(); }
 
   void deform(const std::vector<long double> &matrix, const double *by) override
   {

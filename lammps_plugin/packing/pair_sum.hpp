@@ -2,6 +2,7 @@
 
 #include "contact/contact.hpp"
 #include "contact/contact_block.hpp"
+#include "contact/extended.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/packs.hpp"
@@ -69,6 +70,8 @@ using StartIn =
 /// whatever S is.
 template <class Model, int D, class S> class PosedPairs {
  public:
+  using Long = long double;
+
   PosedPairs(const std::vector<typename Model::Shape> &particle_shapes, const SplitPoses &at,
              const PairList &list, const typename Model::Law &contact_law) :
       shapes(particle_shapes), poses(at), pairs(list), law(contact_law)
@@ -90,7 +93,9 @@ template <class Model, int D, class S> class PosedPairs {
   std::size_t second(std::size_t p) const { return pairs.particles[2 * p + 1]; }
 
   /// x_i - x_j.
-  Vec<D, S> separation(std::size_t p) const
+  Vec<D, S> separation(std::size_t p) const { return separation_in<S>(p); }
+
+  template <class T> Vec<D, T> separation_in(std::size_t p) const
   {
     const std::size_t i = first(p), j = second(p);
     Split apart[D];
@@ -101,8 +106,8 @@ template <class Model, int D, class S> class PosedPairs {
       const std::int64_t turns = pairs.shift[D * p + m];
       if (turns != 0) move_along(m, static_cast<double>(turns), apart);
     }
-    Vec<D, S> r;
-    for (int k = 0; k < D; ++k) r[k] = strained(apart[k]);
+    Vec<D, T> r;
+    for (int k = 0; k < D; ++k) r[k] = strained<T>(apart[k]);
     return r;
   }
 
@@ -130,7 +135,30 @@ template <class Model, int D, class S> class PosedPairs {
   ContactOf<Model, D, S> contact(std::size_t p, const Vec<D, S> &r,
                                  StartIn<Model, D, S> *start = nullptr) const
   {
-    return detail::contact_begun(first_body(p, r), second_body(p), law, start);
+    const auto found = detail::contact_begun(first_body(p, r), second_body(p), law, start);
+    return to_its_digits(p, found);
+  }
+
+  /// A contact of a pair, in plain or in dual numbers, in long doubles where S is too short.
+  template <class Found> Found to_its_digits(std::size_t p, const Found &found) const
+  {
+    if constexpr (std::is_same_v<S, double>) {
+      return jamshape::to_its_digits<Model, D>(found, [&] { return pair_in_long(p); });
+    } else {
+      return found;
+    }
+  }
+
+  /// What errors of a contact are bounded against.
+  PosedPair<Model, D, Long> pair_in_long(std::size_t p) const
+  {
+    const std::size_t i = first(p), j = second(p);
+    return {shapes[i],
+            shapes[j],
+            separation_in<Long>(p),
+            orientation_in<Long>(i),
+            orientation_in<Long>(j),
+            law};
   }
 
   /// Whether packs take all of these particles.
@@ -163,8 +191,6 @@ template <class Model, int D, class S> class PosedPairs {
   }
 
  private:
-  using Long = long double;
-
   /// So that rounding hides no contact of tips.
   static constexpr double WIDER = 1.0 + 1e-14;
 
@@ -183,25 +209,27 @@ template <class Model, int D, class S> class PosedPairs {
     }
   }
 
-  S strained(const Split &length) const
+  template <class T> T strained(const Split &length) const
   {
-    if constexpr (std::is_same_v<S, double>) {
+    if constexpr (std::is_same_v<T, double>) {
       return length.value + (length.rest + poses.strain * length.value);
     } else {
-      return (S(1) + poses.strain) * joined(length);
+      return (T(1) + poses.strain) * joined(length);
     }
   }
 
-  QuaternionOf<S> orientation_of(std::size_t n) const
+  QuaternionOf<S> orientation_of(std::size_t n) const { return orientation_in<S>(n); }
+
+  template <class T> QuaternionOf<T> orientation_in(std::size_t n) const
   {
     const auto component = [&](std::size_t k) { return joined(at(poses.orientation, k)); };
     if constexpr (D == 2) {
-      const S half = 0.5 * static_cast<S>(component(n));
-      return {std::cos(half), S(0.0), S(0.0), std::sin(half)};
+      const T half = 0.5 * static_cast<T>(component(n));
+      return {std::cos(half), T(0.0), T(0.0), std::sin(half)};
     } else {
       const auto q = normalized(QuaternionOf<Long>{component(4 * n), component(4 * n + 1),
                                                    component(4 * n + 2), component(4 * n + 3)});
-      return {static_cast<S>(q.w), static_cast<S>(q.i), static_cast<S>(q.j), static_cast<S>(q.k)};
+      return {static_cast<T>(q.w), static_cast<T>(q.i), static_cast<T>(q.j), static_cast<T>(q.k)};
     }
   }
 };
@@ -226,7 +254,9 @@ template <class Model, int D, class S> class TurnedBodies {
   {
     auto body_i = as_i[pairs.first(p)];
     body_i.centre = as_variables<D, S>(pairs.separation(p));
-    return detail::contact_begun(body_i, as_j[pairs.second(p)], pairs.contact_law(), start);
+    const auto found =
+        detail::contact_begun(body_i, as_j[pairs.second(p)], pairs.contact_law(), start);
+    return pairs.to_its_digits(p, found);
   }
 
  private:
@@ -242,7 +272,6 @@ template <int D, class S> struct PairSums {
   Vec<D * D, S> virial{};  // sum of r (x) force on i
   S bond_force = 0.0;      // sum of the magnitudes
   std::size_t n_bonds = 0;
-  double error = 0.0;             // the largest of a contact
   std::int64_t crossing = -1;     // the first pair of this status, -1 for none
   std::int64_t unconverged = -1;  // likewise
 
@@ -264,7 +293,6 @@ template <int D, class S> struct PairSums {
     torque[pairs.second(p)] += contact.torque_j;
     for (int b = 0; b < contact.n_bonds; ++b) bond_force += norm(contact.bond[b].force);
     n_bonds += contact.n_bonds;
-    error = std::max(error, contact.error);
   }
 
   /// The k-th contact of a block, one that touches and is not alone.
@@ -277,7 +305,6 @@ template <int D, class S> struct PairSums {
     torque[j] += block.torque_j_of(k);
     bond_force += block.bond_force[k];
     n_bonds += 1 + (block.two_bonds >> k & 1);
-    error = std::max(error, block.error[k]);
   }
 
   /// Adds those over pairs that come after.
@@ -291,7 +318,6 @@ template <int D, class S> struct PairSums {
     virial += next.virial;
     bond_force += next.bond_force;
     n_bonds += next.n_bonds;
-    error = std::max(error, next.error);
     if (crossing < 0) crossing = next.crossing;
     if (unconverged < 0) unconverged = next.unconverged;
   }

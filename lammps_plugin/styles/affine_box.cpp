@@ -24,45 +24,74 @@ Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
 }  // namespace
 
 AffineBox::AffineBox(LAMMPS_NS::LAMMPS *lmp, const Upper &gradient, Reference fixed_point) :
-    Pointers(lmp), fixed(fixed_point), dimension(domain->dimension), now{}, started(false)
+    Pointers(lmp), fixed(fixed_point), dimension(domain->dimension), now{}, time_base(0.0),
+    reached_step(update->ntimestep), started(false), left{}
 {
   now.rate = gradient;
 }
 
-void AffineBox::restore(const State &from)
+AffineBox::State AffineBox::saved_state() const
+{
+  State found = now;
+  found.step_base += update->ntimestep - reached_step;
+  return found;
+}
+
+void AffineBox::restore(const State &from, double time_until_base)
 {
   const Upper gradient = now.rate;
   now = from;
-  started = true;
+  time_base = time_until_base;
+  reached_step = update->ntimestep;
+  started = from.dt != 0.0;  // the fix had run
   if (!(gradient == from.rate)) go_on_from(update->ntimestep);
   now.rate = gradient;
 }
 
-void AffineBox::begin_run()
+bool AffineBox::begin_run(bigint step)
 {
-  const bigint step = update->ntimestep;
-  if (!started || !is_in_box(bounds(deformation(step)))) {
+  now.step_base += step - reached_step;
+  reached_step = step;
+  const bool was_started = started, continues = started && is_in_box(bounds(deformation(step)));
+  if (continues) {
+    follow_timestep();
+  } else {
     start_here(step);
-  } else if (now.dt != update->dt) {
-    go_on_from(step);
   }
   now.dt = update->dt;
   started = true;
+  left = present_bounds();
+  return continues || !was_started;
+}
+
+bool AffineBox::follow_timestep()
+{
+  if (now.dt == update->dt) return false;
+  go_on_from(reached_step);
+  now.dt = update->dt;
+  return true;
+}
+
+bool AffineBox::is_as_left() const { return is_in_box(left); }
+
+AffineBox::Bounds AffineBox::present_bounds() const
+{
+  return {vec3(domain->boxlo), vec3(domain->boxhi), domain->xy, domain->xz, domain->yz};
 }
 
 bool AffineBox::is_in_box(const Bounds &at) const
 {
-  bool same = at.xy == domain->xy && at.xz == domain->xz && at.yz == domain->yz;
-  for (int k = 0; k < 3; ++k) {
-    same = same && at.lo[k] == domain->boxlo[k] && at.hi[k] == domain->boxhi[k];
-  }
-  return same;
+  const Bounds present = present_bounds();
+  return at.xy == present.xy && at.xz == present.xz && at.yz == present.yz &&
+         std::equal(at.lo.c, at.lo.c + 3, present.lo.c) &&
+         std::equal(at.hi.c, at.hi.c + 3, present.hi.c);
 }
 
 void AffineBox::start_here(bigint step)
 {
   const Upper gradient = now.rate;
   now = State{};
+  time_base = 0.0;
   for (int k = 0; k < 3; ++k) {
     now.lo[k] = domain->boxlo[k];
     now.hi[k] = domain->boxhi[k];
@@ -78,35 +107,39 @@ void AffineBox::start_here(bigint step)
 
 void AffineBox::go_on_from(bigint step)
 {
-  const double elapsed = time(step);
+  const double passed = elapsed(step);
   const Upper present = deformation(step);
-  now.stretch_base = stretch(elapsed);
+  now.stretch_base = stretch(passed);
+  time_base += passed;
   const double shears[3] = {present.xy, present.xz, present.yz};
   const double rates[3] = {now.rate.xy, now.rate.xz, now.rate.yz};
   for (int k = 0; k < 3; ++k) {
     now.base[k] = shears[k];
-    now.sheared[k] += rates[k] * elapsed;
+    now.sheared[k] += rates[k] * passed;
   }
   now.flips = {0.0, 0.0, 0.0};
   now.step_base = step;
 }
 
-double AffineBox::time(bigint step) const
+/// Time since `step_base`.
+double AffineBox::elapsed(bigint step) const
 {
   return static_cast<double>(step - now.step_base) * now.dt;
 }
 
+double AffineBox::time(bigint step) const { return time_base + elapsed(step); }
+
 /// Logarithms of the diagonal of F.
-Vec<3> AffineBox::stretch(double elapsed) const
+Vec<3> AffineBox::stretch(double passed) const
 {
   Vec<3> found;
-  for (int k = 0; k < 3; ++k) found[k] = now.stretch_base[k] + now.rate.diagonal[k] * elapsed;
+  for (int k = 0; k < 3; ++k) found[k] = now.stretch_base[k] + now.rate.diagonal[k] * passed;
   return found;
 }
 
 double AffineBox::strain(bigint step) const
 {
-  const Vec<3> log = stretch(time(step));
+  const Vec<3> log = stretch(elapsed(step));
   double uneven = 0.0;
   for (int k = 1; k < dimension; ++k) uneven += log[k] - log[0];
   return -(log[0] + uneven / dimension);
@@ -114,12 +147,12 @@ double AffineBox::strain(bigint step) const
 
 double AffineBox::shear_strain(bigint step) const
 {
-  return now.sheared[0] + now.rate.xy * time(step);
+  return now.sheared[0] + now.rate.xy * elapsed(step);
 }
 
 double AffineBox::pure_strain(bigint step) const
 {
-  const Vec<3> log = stretch(time(step));
+  const Vec<3> log = stretch(elapsed(step));
   return 0.5 * (log[0] - log[1]);
 }
 
@@ -138,19 +171,19 @@ bool AffineBox::is_isotropic() const
 }
 
 /// F but for the flips.
-Upper AffineBox::unflipped(double elapsed) const
+Upper AffineBox::unflipped(double passed) const
 {
   Upper base{{}, now.base[0], now.base[1], now.base[2]};
   for (int k = 0; k < 3; ++k) base.diagonal[k] = std::exp(now.stretch_base[k]);
-  Upper found = exponential(elapsed * now.rate) * base;
-  const Vec<3> log = stretch(elapsed);
+  Upper found = exponential(passed * now.rate) * base;
+  const Vec<3> log = stretch(passed);
   for (int k = 0; k < 3; ++k) found.diagonal[k] = std::exp(log[k]);
   return found;
 }
 
 Upper AffineBox::deformation(bigint step, double time_after) const
 {
-  const Upper found = unflipped(time(step) + time_after);
+  const Upper found = unflipped(elapsed(step) + time_after);
   return now.flips.is_none() ? found : found * flips_in_reference(now.flips);
 }
 
@@ -191,6 +224,7 @@ AffineBox::Bounds AffineBox::bounds(const Upper &deformation) const
 void AffineBox::set_box(const Upper &deformation)
 {
   const Bounds at = bounds(deformation);
+  left = at;
   std::copy_n(at.lo.c, 3, domain->boxlo);
   std::copy_n(at.hi.c, 3, domain->boxhi);
   if (domain->triclinic) {

@@ -37,13 +37,23 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   AffineBox(LAMMPS_NS::LAMMPS *lmp, const Upper &gradient, Reference fixed_point);
 
   const State &state() const { return now; }
-  void restore(const State &from);
+  /// State as of LAMMPS's present step, and the time from strain 0 to its `step_base`.
+  State saved_state() const;
+  double saved_time() const { return time_base; }
+  void restore(const State &from, double time_until_base);
 
-  /// At the start of a run: takes the present box as strain 0 unless it is the box of the present
-  /// strain, and goes on from the present strain when the rates or the time step changed.
-  void begin_run();
+  /// At the start of a run from this step: takes the present box as strain 0 unless it is the one
+  /// that this left. False where that ends a strain that was reached.
+  bool begin_run(LAMMPS_NS::bigint step);
+  /// Continues from the present strain if `timestep` has changed; true where it has.
+  bool follow_timestep();
+  /// Last step that the flow has done: LAMMPS counts those of minimisers, too, in which it rests.
+  LAMMPS_NS::bigint reached() const { return reached_step; }
+  void reach(LAMMPS_NS::bigint step) { reached_step = step; }
+  /// Whether LAMMPS's box is the last one that `set_box` gave it.
+  bool is_as_left() const;
 
-  /// Time since the rates or the time step last changed.
+  /// Time since strain 0.
   double time(LAMMPS_NS::bigint step) const;
   /// By how much all lengths have shrunk on the mean, -ln(V) / D; the integrals of G_xy, and of
   /// (G_xx - G_yy) / 2.
@@ -98,14 +108,17 @@ class AffineBox : protected LAMMPS_NS::Pointers {
  private:
   const Reference fixed;
   const int dimension;
-  State now;
-  bool started;
-
   /// LAMMPS's numbers of a box.
   struct Bounds {
     Vec<3> lo, hi;
     double xy, xz, yz;
   };
+
+  State now;
+  double time_base;  // since strain 0, at step_base
+  LAMMPS_NS::bigint reached_step;
+  bool started;
+  Bounds left;
 
   /// Signed image counts from LAMMPS's packed ones.
   static Vec<3> image_counts(LAMMPS_NS::imageint image)
@@ -118,9 +131,11 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   Vec<3> fixed_point() const;
   Upper cell_at_start() const;
   Bounds bounds(const Upper &deformation) const;
+  Bounds present_bounds() const;
   bool is_in_box(const Bounds &at) const;
-  Vec<3> stretch(double elapsed) const;
-  Upper unflipped(double elapsed) const;
+  double elapsed(LAMMPS_NS::bigint step) const;
+  Vec<3> stretch(double passed) const;
+  Upper unflipped(double passed) const;
   Upper flips_in_reference(const Flip &by) const;
   void go_on_from(LAMMPS_NS::bigint step);
   void start_here(LAMMPS_NS::bigint step);

@@ -126,7 +126,7 @@ template <class Model, int D> class AssembledBodies {
   void read_centres(const double *const *x) { centres = x; }
   void read_orientations(const ParticleView &view)
   {
-    resize_closely(orientations, size());
+    resize_closely(orientations, size(), Quaternion{1.0, 0.0, 0.0, 0.0});
     view.for_each_orientation(static_cast<int>(size()),
                               [&](int i, const Quaternion &q) { orientations[i] = q; });
   }

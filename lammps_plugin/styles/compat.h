@@ -27,6 +27,7 @@ class Command : protected Pointers {
 
 namespace LAMMPS_NS {
 
+class AtomVec;
 class LAMMPS;
 class Pair;
 
@@ -35,7 +36,8 @@ class AtomVecEllipsoid {
   /// Quaternions (w, i, j, k) of the listed atoms, those without an ellipsoid left out.
   int pack_comm_bonus(int n, int *list, double *buf);
   void unpack_comm_bonus(int n, int first, double *buf);
-  /// An atom with an ellipsoid: 1, three semi-axes, quaternion; without one: 0.
+  /// An atom with an ellipsoid: 1, three semi-axes, quaternion, and what a version keeps beside
+  /// them; without one: 0. Returns the count of numbers.
   int pack_border_bonus(int n, int *list, double *buf);
   /// Three semi-axes, of an atom with an ellipsoid or without.
   void set_shape(int i, double a, double b, double c);
@@ -65,6 +67,10 @@ extern "C" int lammps_version(void *handle);
 
 namespace jamshape::compat {
 
+/// An atom style's object as AtomVecEllipsoid, or null if it is of another class: asked of the
+/// object itself, since no header says how the two classes are laid out.
+LAMMPS_NS::AtomVecEllipsoid *as_ellipsoids(LAMMPS_NS::AtomVec *style);
+
 /// Sends n numbers a particle of a fix to ghosts: `forward_comm_fix` until 2021.
 template <class Comm, class Fix>
 auto forward(Comm *comm, Fix *fix, int n) -> decltype(comm->forward_comm(fix, n))
@@ -87,6 +93,17 @@ template <class Modify>
 auto has_post_force(const Modify *modify) -> decltype(modify->n_post_force != 0)
 {
   return modify->n_post_force != 0;
+}
+
+/// Number of regions that a deck has defined: counted in public until 2022.
+template <class Domain> auto n_regions(Domain *domain) -> decltype(int(domain->nregion))
+{
+  return domain->nregion;
+}
+template <class Domain>
+auto n_regions(Domain *domain) -> decltype(int(domain->get_region_list().size()))
+{
+  return static_cast<int>(domain->get_region_list().size());
 }
 
 }  // namespace jamshape::compat

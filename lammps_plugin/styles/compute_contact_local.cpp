@@ -44,7 +44,7 @@ const std::map<std::string, Column> COLUMNS = {
 }  // namespace
 
 ComputeContactLocal::ComputeContactLocal(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
-    Compute(lmp, narg, arg), pair(nullptr)
+    Compute(lmp, narg, arg)
 {
   if (igroup != 0)
     error->all(FLERR,
@@ -67,12 +67,13 @@ ComputeContactLocal::ComputeContactLocal(LAMMPS_NS::LAMMPS *lmp, int narg, char 
   size_local_cols = columns.size() == 1 ? 0 : static_cast<int>(columns.size());
 }
 
-void ComputeContactLocal::init() { pair = &PairContact::of(lmp, "compute contact/local"); }
+void ComputeContactLocal::init() { PairContact::of(lmp, "compute contact/local"); }
 
 void ComputeContactLocal::compute_local()
 {
   invoked_local = update->ntimestep;
-  const std::vector<LocalBond> bonds = pair->reported_bonds();
+  const std::vector<LocalBond> bonds =
+      PairContact::evaluated(lmp, "compute contact/local").reported_bonds();
   values.clear();
   for (const LocalBond &bond : bonds) {
     for (const Column column : columns) values.push_back(column(bond, *atom));

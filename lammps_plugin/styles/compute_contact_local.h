@@ -33,7 +33,6 @@ class ComputeContactLocal : public LAMMPS_NS::Compute {
   std::vector<Column> columns;
   std::vector<double> values;
   std::vector<double *> rows;
-  PairContact *pair;
 };
 
 }  // namespace jamshape

@@ -4,8 +4,11 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "compat.h"
 #include "domain.h"
 #include "error.h"
+#include "force.h"
+#include "modify.h"
 #include "packing/rattlers.hpp"
 #include "update.h"
 
@@ -109,7 +112,7 @@ ComputePacking::ComputePacking(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
 
 ComputePacking::~ComputePacking() { delete[] vector; }
 
-void ComputePacking::init() { pair = &PairContact::of(lmp, "compute packing"); }
+void ComputePacking::init() { PairContact::of(lmp, "compute packing"); }
 
 double ComputePacking::sum(double mine) const
 {
@@ -134,21 +137,37 @@ void ComputePacking::compute_vector()
         std::string("compute packing found that energy and virial were not tallied on this step, "
                     "expected them: use it in thermo output or in a fix that asks a step ahead."));
   }
-  compute_density_and_stress();
+  pair = &PairContact::evaluated(lmp, "compute packing");
+  const std::vector<LocalBond> bonds = pair->reported_bonds();
+  compute_density_and_stress(bonds);
   compute_order();
   compute_cubatic_order();
-  compute_contacts();
+  compute_contacts(bonds);
 }
 
-void ComputePacking::compute_density_and_stress()
+/// The sum of all torques of contacts on this rank's particles, or of this rank's contacts.
+Vec<3> ComputePacking::torque_of_contacts(const std::vector<LocalBond> &bonds) const
+{
+  Vec<3> torque{};
+  if (compat::has_post_force(modify)) {  // such as freeze, which changes the torques of particles
+    for (const LocalBond &bond : bonds) torque += cross(bond.arm_i - bond.arm_j, bond.force);
+    return torque;
+  }
+  for (int i = 0; i < atom->nlocal; ++i) {
+    for (int k = 0; k < 3; ++k) torque[k] += atom->torque[i][k];
+  }
+  return torque;
+}
+
+void ComputePacking::compute_density_and_stress(const std::vector<LocalBond> &bonds)
 {
   const int d = domain->dimension;
-  double volume = 1.0, measure = 0.0, trace = 0.0, mine[6], sums[6], torque[3] = {};
+  double volume = 1.0, measure = 0.0, trace = 0.0, mine[6], sums[6];
   for (int k = 0; k < d; ++k) volume *= domain->prd[k];
   for (int i = 0; i < atom->nlocal; ++i) {
     measure += pair->drag(pair->particle_view().semi_axes(i), atom->type[i]).measure;
-    for (int k = 0; k < 3; ++k) torque[k] += atom->torque[i][k];
   }
+  const Vec<3> torque = torque_of_contacts(bonds);
   vector[PHI] = sum(measure) / volume;
   vector[U] = sum(pair->eng_vdwl) / volume;
   // LAMMPS's virial is xx, yy, zz, xy, xz, yz of r_k f_l. What shear of x along y works against is
@@ -158,6 +177,7 @@ void ComputePacking::compute_density_and_stress()
   mine[4] -= torque[1];
   mine[5] += torque[0];
   MPI_Allreduce(mine, sums, 6, MPI_DOUBLE, MPI_SUM, world);
+  for (double &component : sums) component *= force->nktv2p;  // 1 with `units lj`
   for (int k = 0; k < d; ++k) trace += sums[k];
   vector[P] = trace / (d * volume);
   vector[N_1] = (sums[0] - sums[1]) / volume;
@@ -242,9 +262,8 @@ void ComputePacking::compute_cubatic_order()
   }
 }
 
-void ComputePacking::compute_contacts()
+void ComputePacking::compute_contacts(const std::vector<LocalBond> &bonds)
 {
-  const std::vector<LocalBond> bonds = pair->reported_bonds();
   double force_sum = 0.0, overlap = 0.0;
   for (const LocalBond &bond : bonds) {
     force_sum += norm(bond.force);

@@ -45,14 +45,15 @@ class ComputePacking : public LAMMPS_NS::Compute {
 
  private:
   static constexpr int N_VALUES = 22;
-  PairContact *pair;
+  PairContact *pair;  // as of this call: another pair_style ends it
 
   double sum(double mine) const;
   double largest(double mine) const;
-  void compute_density_and_stress();
+  Vec<3> torque_of_contacts(const std::vector<LocalBond> &bonds) const;
+  void compute_density_and_stress(const std::vector<LocalBond> &bonds);
   void compute_order();
   void compute_cubatic_order();
-  void compute_contacts();
+  void compute_contacts(const std::vector<LocalBond> &bonds);
   void count_contacts(const std::vector<LocalBond> &bonds);
   void compute_residuals(double mean_bond_force);
 };

@@ -5,6 +5,7 @@
 #include "compat.h"
 #include "domain.h"
 #include "error.h"
+#include "force.h"
 #include "modify.h"
 #include "neighbor.h"
 #include "text.hpp"
@@ -13,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -42,14 +44,26 @@ constexpr const char *SYNTAX =
     "[flip F] [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]'.";
 
 /// What is global in a restart file. The first number tells files of other versions apart.
-constexpr std::uint64_t SAVED_AS = 0x6a616d7368617002;
+constexpr std::uint64_t SAVED_AS = 0x6a616d7368617003, WITHOUT_TIME = SAVED_AS - 1;
 
 struct Saved {
   std::uint64_t format;
   AffineBox::State box;
   StepState steps;
   double mean_turn;
+  double time;  // not in files of the format WITHOUT_TIME
 };
+
+/// Beginnings of the names of fixes that act on velocities or by them; EVENT/ is of accelerated
+/// dynamics at a temperature, as by `tad`.
+constexpr const char *OF_VELOCITIES[] = {
+    "langevin", "viscous", "viscosity", "temp/", "heat", "ehex", "momentum", "thermal/",
+    "ffl",      "gle",     "gld",       "ttm",   "srd",  "nvk",  "pimd",     "EVENT/"};
+
+bool begins_with(const std::string &text, const std::string &with)
+{
+  return text.compare(0, with.size(), with) == 0;
+}
 
 }  // namespace
 
@@ -65,7 +79,8 @@ struct FixOverdampedAffine::Command {
 
 FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), check_every(1000), next_check(0), largest_rate(0.0), largest_tilt(0.5),
-    warned(false), was_told(false), running(false), inside_step(false)
+    warned(false), was_told(false), running(false), inside_step(false), has_begun(false),
+    next_look(0)
 {
   make_parts(read(narg, arg));
   tell_what_this_is();
@@ -243,11 +258,45 @@ FixOverdampedAffine::~FixOverdampedAffine()
 int FixOverdampedAffine::setmask()
 {
   using namespace LAMMPS_NS::FixConst;
-  return INITIAL_INTEGRATE | POST_NEIGHBOR | (domain->triclinic ? PRE_EXCHANGE : 0);
+  return INITIAL_INTEGRATE | POST_NEIGHBOR | MIN_POST_NEIGHBOR | POST_RUN |
+         (domain->triclinic ? PRE_EXCHANGE : 0);
+}
+
+/// Refuses what LAMMPS would let move the same particles, and what would act on nothing.
+void FixOverdampedAffine::require_alone() const
+{
+  const std::string integrate = update->integrate_style ? update->integrate_style : "verlet";
+  if (integrate != "verlet") {
+    fail("run_style " + integrate +
+         ", expected verlet: use 'run_style verlet'; integrators rkc2 and heun/adaptive choose "
+         "substeps by themselves.");
+  }
+  if (force->kspace || force->bond || force->angle || force->dihedral || force->improper) {
+    fail(
+        "bonds, angles, dihedrals, impropers or a kspace_style, expected forces of contacts and of "
+        "fixes alone: set these styles to none.");
+  }
+  for (int k = 0; k < modify->nfix; ++k) {
+    const Fix &other = *modify->fix[k];
+    if (&other == this) continue;
+    const std::string named = "fix " + std::string(other.style) + " (" + other.id + ")";
+    const std::string cure = std::string(": use 'unfix ") + other.id + "'.";
+    if (other.time_integrate) {
+      fail(named + ", which moves particles, too, expected this fix alone to move them" + cure);
+    }
+    for (const char *const style : OF_VELOCITIES) {
+      if (!begins_with(other.style, style)) continue;
+      fail(named +
+           ", which acts on velocities, expected none: the motion has no inertia and no "
+           "temperature" +
+           cure);
+    }
+  }
 }
 
 void FixOverdampedAffine::init()
 {
+  require_alone();
   for (int k = 0; k < domain->dimension; ++k) {
     if (!domain->periodicity[k]) {
       error->all(
@@ -283,19 +332,58 @@ void FixOverdampedAffine::require_cell(const Upper &gradient) const
 
 void FixOverdampedAffine::setup_post_neighbor()
 {
-  box->begin_run();
+  begin_run(update->ntimestep);
+  tell_what_is_left_out();
+  running = update->whichflag == 1;
+}
+
+/// Takes up all that may have changed since the last run.
+void FixOverdampedAffine::begin_run(bigint step)
+{
+  if (!box->begin_run(step)) {
+    flow->set_mean_turn(0.0);
+    if (comm->me == 0) {
+      error->warning(FLERR, std::string("fix overdamped/affine found another box than it left, so "
+                                        "that its strain begins again at 0"));
+    }
+  }
   const bool is_known = flow->begin_run();
   if (StepState *const state = integrator->state(); state && !is_known) state->h = 0.0;
-  require_timestep();
-  tell_what_is_left_out();
-  running = true;
+  has_begun = true;
+  if (update->whichflag != 1) return;
+  if (update->nsteps > 0) require_timestep();
+  if (flow->stop_particles() && comm->me == 0) {
+    error->warning(FLERR,
+                   std::string("fix overdamped/affine set velocities to 0: its motion has no "
+                               "inertia, and pressure and temperature would count them"));
+  }
+}
+
+/// Follows, or refuses, what has changed at the start of a step without a call to this fix.
+void FixOverdampedAffine::take_up(bigint from)
+{
+  if (!has_begun) begin_run(from);  // 'run N pre no'
+  if (!box->is_as_left()) {
+    flow->stop("found that something else changed the box in the last step, expected no other fix "
+               "that does: use 'unfix', or run that fix before or after the flow.");
+  }
+  if (box->follow_timestep()) {
+    require_timestep();
+    next_check = from;
+  }
+  if (from == next_look) flow->require_untouched();
+  if (from == update->firststep) next_look = from + 1;
 }
 
 void FixOverdampedAffine::require_timestep() const
 {
   const double strain = box->speed() * update->dt;
-  if (!integrator->state()) return require_strain(std::abs(strain));
-  if (update->dt >= 0.0 && strain <= LARGEST_STRAIN) return;
+  if (!(update->dt > 0.0)) {
+    flow->stop("found timestep " + shown(update->dt) +
+               ", expected a positive one: to open the box, give 'compress' a negative rate.");
+  }
+  if (!integrator->state()) return require_strain(strain);
+  if (strain <= LARGEST_STRAIN) return;
   flow->stop("found timestep " + shown(update->dt) + ", a strain of " + shown(strain) +
              ", expected a step from 0 to a strain of 1: the integrator divides it.");
 }
@@ -306,11 +394,10 @@ void FixOverdampedAffine::require_strain(double strain) const
 {
   const double radii = 0.5 * strain / flow->largest_strain();
   if (radii <= 0.5) return;  // false for NaN
-  char found[128];
-  std::snprintf(found, sizeof(found),
-                "a strain of %g in one step, which pushes a particle %g radii", strain, radii);
-  flow->stop("found " + std::string(found) +
-             " into its neighbour, expected at most half its radius: use a smaller timestep.");
+  flow->stop(
+      "found a strain of " + shown(strain) + " in one step, which pushes a particle " +
+      shown(radii) +
+      " radii into its neighbour, expected at most half its radius: use a smaller timestep.");
 }
 
 /// The numbers are the pair style's to say; see PairContact::report_left_out.
@@ -328,6 +415,16 @@ void FixOverdampedAffine::post_neighbor()
   if (!running) return;
   flow->measure_particles();
   if (domain->triclinic) flow->follow_images();
+  if (!inside_step) flow->require_untouched();
+}
+
+void FixOverdampedAffine::min_post_neighbor() { flow->measure_particles(); }
+
+/// LAMMPS calls it after minimisations, too.
+void FixOverdampedAffine::post_run()
+{
+  if (running) flow->require_untouched();
+  has_begun = false;
 }
 
 void FixOverdampedAffine::setup(int)
@@ -341,11 +438,13 @@ void FixOverdampedAffine::setup(int)
 void FixOverdampedAffine::initial_integrate(int)
 {
   const bigint to = update->ntimestep, from = to - 1;
+  take_up(from);
   if (from >= next_check) check_stability(from);
   flow->count_evaluation();  // LAMMPS's own, at the end of the last step
   inside_step = true;
   integrator->step(*flow, to, update->dt);
   inside_step = false;
+  box->reach(to);
   ask_for_flip();
 }
 
@@ -414,7 +513,7 @@ void FixOverdampedAffine::check_stability(bigint step)
 
 double FixOverdampedAffine::compute_vector(int n)
 {
-  const bigint step = update->ntimestep;
+  const bigint step = box->reached();
   switch (n) {
     case 0:
       return box->time(step);
@@ -425,7 +524,7 @@ double FixOverdampedAffine::compute_vector(int n)
     case 3:
       return largest_stable_dt();
     case 4:
-      return flow->dissipated_power();
+      return flow->knows_particles() ? flow->dissipated_power() : NAN;
     case 5:
       return static_cast<double>(flow->n_evaluations());
     case 6:
@@ -439,7 +538,7 @@ double FixOverdampedAffine::compute_vector(int n)
     case 18:
       return flow->mean_turn();
     case 19:
-      return flow->power_of_host();
+      return flow->knows_particles() ? flow->power_of_host() : NAN;
     default:
       return of_substeps(n - 8);
   }
@@ -472,7 +571,8 @@ void FixOverdampedAffine::write_restart(FILE *fp)
   const double mean_turn = flow->mean_turn();
   if (comm->me != 0) return;
   const StepState *const of_steps = integrator->state();
-  const Saved saved{SAVED_AS, box->state(), of_steps ? *of_steps : StepState{}, mean_turn};
+  const Saved saved{SAVED_AS, box->saved_state(), of_steps ? *of_steps : StepState{}, mean_turn,
+                    box->saved_time()};
   const int size = sizeof(saved);
   fwrite(&size, sizeof(int), 1, fp);
   fwrite(&saved, size, 1, fp);
@@ -480,14 +580,14 @@ void FixOverdampedAffine::write_restart(FILE *fp)
 
 void FixOverdampedAffine::restart(char *buf)
 {
-  Saved saved;
+  Saved saved{};
   std::memcpy(&saved.format, buf, sizeof(saved.format));
-  if (saved.format != SAVED_AS) {
+  if (saved.format != SAVED_AS && saved.format != WITHOUT_TIME) {
     fail("a restart file that another version of jamshape wrote, expected one of this version: go "
          "on with that version, or start from a data file.");
   }
-  std::memcpy(&saved, buf, sizeof(saved));
-  box->restore(saved.box);
+  std::memcpy(&saved, buf, saved.format == SAVED_AS ? sizeof(saved) : offsetof(Saved, time));
+  box->restore(saved.box, saved.time);
   if (StepState *const of_steps = integrator->state()) *of_steps = saved.steps;
   flow->set_mean_turn(saved.mean_turn);
 }

@@ -36,7 +36,9 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   void setup(int vflag) override;
   void setup_post_neighbor() override;
   void post_neighbor() override;
+  void min_post_neighbor() override;
   void pre_exchange() override;
+  void post_run() override;
   void initial_integrate(int vflag) override;
   double compute_vector(int n) override;
   double memory_usage() override;
@@ -63,6 +65,8 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   LAMMPS_NS::bigint check_every, next_check;
   double largest_rate, largest_tilt;
   bool warned, was_told, running, inside_step;
+  bool has_begun;               // the present run
+  LAMMPS_NS::bigint next_look;  // at what other fixes did
 
   struct Command;
   Command read(int narg, char **arg);
@@ -74,6 +78,9 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   void require_no_trace(const Upper &gradient) const;
   void tell_what_this_is();
   [[noreturn]] void fail(const std::string &found_and_expected) const;
+  void begin_run(LAMMPS_NS::bigint step);
+  void require_alone() const;
+  void take_up(LAMMPS_NS::bigint from);
   void require_timestep() const;
   void require_strain(double strain) const;
   void require_cell(const Upper &gradient) const;

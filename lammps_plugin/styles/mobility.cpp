@@ -3,7 +3,9 @@
 #include "contact/contact.hpp"
 #include "contact/math/rotation.hpp"
 
+#include "atom.h"
 #include "pair_contact.h"
+#include "refusal.h"
 
 #include <algorithm>
 #include <cmath>
@@ -33,6 +35,12 @@ void Mobilities::measure(const PairContact &of)
   kinds.clear();
   resize_closely(kind, static_cast<std::size_t>(atom->nlocal));
   for (int i = 0; i < atom->nlocal; ++i) {
+    if (!pair->particle_view().has_shape(i)) {
+      refuse(lmp, FLERR,
+             "fix overdamped/affine found atom " + std::to_string(atom->tag[i]) +
+                 " without a shape, expected an ellipsoid: list it in the data file's Ellipsoids "
+                 "section or use 'set atom ... shape'.");
+    }
     const Vec<3> axes = pair->particle_view().semi_axes(i);
     const auto found =
         number_of.emplace(std::make_tuple(atom->type[i], axes[0], axes[1], axes[2]), kinds.size());

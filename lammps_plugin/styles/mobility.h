@@ -59,10 +59,12 @@ class Mobilities : protected LAMMPS_NS::Pointers {
     double gyration;    // length that a radian stands for
   };
 
-  /// Reads sizes of own atoms; after every exchange of atoms.
+  /// Reads sizes of own atoms; after every exchange of atoms. Stops with one sentence at one
+  /// without a shape, which may have come in between.
   void measure(const PairContact &of);
   const Mobility &operator[](int i) const { return kinds[kind[i]]; }
   const std::vector<Mobility> &all_kinds() const { return kinds; }
+  int n_measured() const { return static_cast<int>(kind.size()); }
 
   /// The rate that a force and torque give, that of the present ones, and the force and torque (in
   /// the places of a rate) that a rate takes.

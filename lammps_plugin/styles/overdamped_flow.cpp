@@ -41,6 +41,9 @@ constexpr double LARGEST_TRIAL = 0.5;
 /// Coordinates that agree with the atom's position to this fraction of the box are its own.
 constexpr double SAME_POSITION = 1e-13;
 
+/// The same within a run, in which rounding and counts of images grow.
+constexpr double UNTOUCHED = 1e-10;
+
 }  // namespace
 
 /// What is kept of a particle, in its order: coordinates, rates of the stored stage, orientation at
@@ -117,9 +120,9 @@ bool OverdampedFlow::begin_run()
   measure_particles();
   double moved = 0.0;
   in_dimension(dimension, [&](auto D) {
-    const auto present = box.deformed<D>(box.deformation(update->ntimestep));
+    const auto present = box.deformed<D>(box.deformation(box.reached()));
     for (int i = 0; i < atom->nlocal; ++i) {
-      if (is_as_it_was<D>(i, present)) continue;
+      if (is_at<D>(i, present, SAME_POSITION)) continue;
       set(i);
       moved = 1.0;
     }
@@ -127,15 +130,58 @@ bool OverdampedFlow::begin_run()
   return sum(moved) == 0.0;
 }
 
+/// Whether atom i is where its coordinates put it, to this fraction of the box.
 template <int D>
-bool OverdampedFlow::is_as_it_was(int i, const AffineBox::Deformed<D> &present) const
+bool OverdampedFlow::is_at(int i, const AffineBox::Deformed<D> &present, double tolerance) const
 {
   const Vec<D> expected = present.position(Row<D>{row(i)}.coordinates(), atom->image[i]);
   bool same = true;
   for (int k = 0; k < D; ++k) {
-    same = same && std::abs(expected[k] - atom->x[i][k]) <= SAME_POSITION * domain->prd[k];
+    same = same && std::abs(expected[k] - atom->x[i][k]) <= tolerance * domain->prd[k];
   }
   return same;
+}
+
+bool OverdampedFlow::is_moving(int i) const
+{
+  const Vec<3> v = vec3(atom->v[i]), spin = atom->angmom ? vec3(atom->angmom[i]) : Vec<3>{};
+  return norm_sq(v) + norm_sq(spin) != 0.0;
+}
+
+bool OverdampedFlow::stop_particles()
+{
+  double found = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!is_moving(i)) continue;
+    std::fill_n(atom->v[i], 3, 0.0);
+    if (atom->angmom) std::fill_n(atom->angmom[i], 3, 0.0);
+    found = 1.0;
+  }
+  return sum(found) > 0.0;
+}
+
+bool OverdampedFlow::knows_particles() const
+{
+  const bool is_known = pair && pair == PairContact::find(lmp);
+  return sum(is_known && mobilities.n_measured() == atom->nlocal ? 0.0 : 1.0) == 0.0;
+}
+
+void OverdampedFlow::require_untouched() const
+{
+  const auto refuse_it = [&](int i, const char *what) {
+    refuse(lmp, FLERR,
+           "fix overdamped/affine found that something else " + std::string(what) + " atom " +
+               std::to_string(atom->tag[i]) +
+               " in the last steps, expected no other fix that moves particles: use 'unfix', or "
+               "run that fix before or after the flow.");
+  };
+  in_dimension(dimension, [&](auto D) {
+    const auto present = box.deformed<D>(box.deformation(box.reached()));
+    for (int i = 0; i < atom->nlocal; ++i) {
+      if (!is_at<D>(i, present, UNTOUCHED)) refuse_it(i, "moved");
+      if (is_moving(i)) refuse_it(i, "gave a velocity to");
+    }
+  });
 }
 
 double OverdampedFlow::largest_strain() const
@@ -530,7 +576,7 @@ void OverdampedFlow::copy(int from, int to) { std::copy_n(row(from), width(), ro
 
 void OverdampedFlow::set(int i)
 {
-  const Vec<3> y = box.reference(atom->x[i], atom->image[i], box.deformation(update->ntimestep));
+  const Vec<3> y = box.reference(atom->x[i], atom->image[i], box.deformation(box.reached()));
   std::fill_n(row(i), width(), 0.0);
   std::copy_n(y.c, dimension, row(i));
 }

@@ -26,6 +26,13 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
 
   /// False when particles are not where the last run left them.
   bool begin_run();
+  /// Sets velocities to 0, since this motion has none; true if there were any.
+  bool stop_particles();
+  /// Whether the last `begin_run` was for the present particles and pair style.
+  bool knows_particles() const;
+  /// Between steps: ends the run, with one sentence, where something else has moved a particle or
+  /// given it a velocity.
+  void require_untouched() const;
   /// Strain of a step that pushes touching particles into each other by half their radius, as far
   /// as forces may move them in a step; over all particles, after `begin_run`.
   double largest_strain() const;
@@ -147,7 +154,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   double *row(int i) const { return values + static_cast<std::size_t>(width()) * i; }
 
   template <int D> struct Row;
-  template <int D> bool is_as_it_was(int i, const AffineBox::Deformed<D> &present) const;
+  template <int D> bool is_at(int i, const AffineBox::Deformed<D> &present, double tolerance) const;
+  bool is_moving(int i) const;
   template <int D> void hold(int begin, int end, const Upper &inverse);
   template <int D> struct Spins;
   bool host_turns() const;

@@ -2,10 +2,13 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "decimal_point.h"
 #include "domain.h"
 #include "error.h"
+#include "fix.h"
 #include "force.h"
 #include "memory.h"
+#include "modify.h"
 #include "neighbor.h"
 #include "refusal.h"
 #include "text.hpp"
@@ -15,6 +18,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
+#include <cstring>
 #include <mpi.h>
 #include <stdexcept>
 
@@ -27,6 +32,15 @@ namespace {
 /// What two ways to compute a length may differ by, relative.
 constexpr double ROUNDING = 1e-12;
 
+/// The largest rotation out of the plane that rounding can explain [rad]: it changes lengths seen
+/// in the plane by 1e-16 of themselves.
+constexpr double MOST_TILT = 1e-8;
+
+bool begins_with(const char *text, const char *beginning)
+{
+  return std::strncmp(text, beginning, std::strlen(beginning)) == 0;
+}
+
 }  // namespace
 
 PairContact::PairContact(LAMMPS_NS::LAMMPS *lmp) :
@@ -35,7 +49,7 @@ PairContact::PairContact(LAMMPS_NS::LAMMPS *lmp) :
 {
   no_virial_fdotr_compute = 1;  // sum_i x_i F_i loses digits that the pairwise sum keeps
   single_enable = 0;
-  restartinfo = 1;
+  restartinfo = writedata = 1;
   centroidstressflag = LAMMPS_NS::CENTROID_NOTAVAIL;
 }
 
@@ -47,9 +61,14 @@ PairContact::~PairContact()
   memory->destroy(k_e);
 }
 
+PairContact *PairContact::find(LAMMPS_NS::LAMMPS *lmp)
+{
+  return dynamic_cast<PairContact *>(lmp->force->pair);
+}
+
 PairContact &PairContact::of(LAMMPS_NS::LAMMPS *lmp, const std::string &who)
 {
-  auto *const pair = dynamic_cast<PairContact *>(lmp->force->pair);
+  auto *const pair = find(lmp);
   if (!pair) {
     const char *const style = lmp->force->pair_style;
     lmp->error->all(FLERR, who + " found pair_style " + (style ? style : "none") +
@@ -58,13 +77,32 @@ PairContact &PairContact::of(LAMMPS_NS::LAMMPS *lmp, const std::string &who)
   return *pair;
 }
 
+PairContact &PairContact::evaluated(LAMMPS_NS::LAMMPS *lmp, const std::string &who)
+{
+  PairContact &pair = of(lmp, who);
+  if (!pair.has_current_contacts()) {
+    lmp->error->all(FLERR, who +
+                               " found no contacts of the present atoms, expected those of a run: "
+                               "ask after 'run 0' or another run, and again after one where the "
+                               "pair style or the number of atoms has changed.");
+  }
+  if (!lmp->atom->tag_enable) {
+    lmp->error->all(FLERR, who + " found atoms without IDs, expected one for each: leave out "
+                                 "'atom_modify id no'.");
+  }
+  return pair;
+}
+
 void PairContact::allocate()
 {
   const int n = atom->ntypes + 1;
   memory->create(setflag, n, n, "pair:setflag");
   memory->create(cutsq, n, n, "pair:cutsq");
   memory->create(k_e, n, n, "pair:k_e");
-  for (int i = 0; i < n; ++i) std::fill_n(setflag[i], n, 0);
+  for (int i = 0; i < n; ++i) {
+    std::fill_n(setflag[i], n, 0);
+    std::fill_n(k_e[i], n, 0.0);
+  }
   allocated = 1;
 }
 
@@ -83,17 +121,25 @@ void PairContact::coeff(int narg, char **arg)
   LAMMPS_NS::utils::bounds(FLERR, std::string(arg[0]), 1, atom->ntypes, ilo, ihi, error);
   LAMMPS_NS::utils::bounds(FLERR, std::string(arg[1]), 1, atom->ntypes, jlo, jhi, error);
   const double stiffness = LAMMPS_NS::utils::numeric(FLERR, arg[2], false, lmp);
-  if (!(stiffness > 0.0) || !std::isfinite(stiffness)) {
-    error->all(FLERR,
-               "pair_coeff of " + style_name() + " found " + energy_name() + " = " + arg[2] +
-                   ", expected a positive energy: give the contacts a stiffness such as 1.0.");
-  }
+  require_energy(stiffness, arg[2], "pair_coeff of " + style_name());
+  int n_set = 0;
   for (int i = ilo; i <= ihi; ++i) {
-    for (int j = std::max(jlo, i); j <= jhi; ++j) {
+    for (int j = std::max(jlo, i); j <= jhi; ++j, ++n_set) {
       k_e[i][j] = k_e[j][i] = stiffness;
       setflag[i][j] = 1;
     }
   }
+  if (n_set > 0) return;
+  error->all(FLERR, "pair_coeff of " + style_name() + " found types '" + arg[0] + " " + arg[1] +
+                        "', expected I <= J: write the smaller type first.");
+}
+
+void PairContact::require_energy(double energy, const std::string &text,
+                                 const std::string &where) const
+{
+  if (energy > 0.0 && std::isfinite(energy)) return;
+  error->all(FLERR, where + " found " + energy_name() + " = " + text +
+                        ", expected a positive energy: give the contacts a stiffness such as 1.0.");
 }
 
 void PairContact::require_arguments(bool is_right, int narg) const
@@ -103,8 +149,31 @@ void PairContact::require_arguments(bool is_right, int narg) const
                         " arguments, expected " + coeff_rule() + ".");
 }
 
+void PairContact::require_shape(int i, const Vec<3> &semi_axes) const
+{
+  if (is_valid_shape(semi_axes, atom->type[i])) return;
+  stop_at_shape(semi_axes, "atom " + std::to_string(atom->tag[i]));
+}
+
+void PairContact::stop_at_shape(const Vec<3> &semi_axes, const std::string &which) const
+{
+  const std::string found = style_name() + " found " + which;
+  const Vec<3> diameters = 2.0 * semi_axes;
+  if (dot(diameters, diameters) == 0.0) {
+    refuse(lmp, FLERR,
+           "pair_style " + found +
+               " without a shape, expected an ellipsoid: list it in the data file's Ellipsoids "
+               "section or use 'set atom ... shape'.");
+  }
+  refuse(lmp, FLERR,
+         found + " with diameters " + shown(diameters[0]) + " " + shown(diameters[1]) + " " +
+             shown(diameters[2]) + ", expected that " + shape_rule() + ": correct its shape.");
+}
+
 /// The largest particle of each type, and whether any particle can turn. Sizes are per particle, so
-/// cutoffs follow from the particles themselves, never from an input that could be too short.
+/// cutoffs follow from the particles themselves, never from an input that could be too short. Where
+/// LAMMPS has yet to say which types are this style's, as in a hybrid pair style, all that have a
+/// valid shape are measured.
 void PairContact::measure_particles()
 {
   std::vector<double> mine(atom->ntypes + 1, 0.0);
@@ -112,12 +181,10 @@ void PairContact::measure_particles()
   for (int i = 0; i < atom->nlocal; ++i) {
     const int type = atom->type[i];
     const Vec<3> semi_axes = particles.semi_axes(i);
-    if (!is_valid_shape(semi_axes, type)) {
-      const Vec<3> diameters = 2.0 * semi_axes;
-      refuse(lmp, FLERR,
-             style_name() + " found atom " + std::to_string(atom->tag[i]) + " with diameters " +
-                 shown(diameters[0]) + " " + shown(diameters[1]) + " " + shown(diameters[2]) +
-                 ", expected that " + shape_rule() + ": correct its shape.");
+    if (handles(i)) {
+      require_shape(i, semi_axes);
+    } else if (!is_valid_shape(semi_axes, type)) {
+      continue;
     }
     mine[type] = std::max(mine[type], bounding_radius(semi_axes, type));
     const Shortcut its = shortcut(semi_axes, type);
@@ -137,9 +204,18 @@ void PairContact::measure_particles()
 
 void PairContact::init_style()
 {
-  particles.require_ellipsoids("pair_style " + style_name());
+  require_decimal_point(lmp, "pair_style " + style_name());
+  if (mix_flag == SIXTHPOWER) {
+    error->all(FLERR, "pair_style " + style_name() +
+                          " found 'pair_modify mix sixthpower', expected geometric or arithmetic, "
+                          "which both give the geometric mean of energies: leave it out.");
+  }
+  particles.find_ellipsoids("pair_style " + style_name());
   choose_instructions();
+  is_ours.assign(atom->ntypes + 1, force->pair == this);  // of a hybrid style init_one learns them
   measure_particles();
+  require_orientations_of_rerun();
+  if (update->whichflag == 2) require_held_in_minimisation();
   neighbor->request(this, instance_me);
   if (update->whichflag == 2 && any_turns) request_minimiser();
 }
@@ -153,8 +229,56 @@ void PairContact::choose_instructions()
   }
 }
 
+/// LAMMPS reads positions alone from a dump. Of all commands that evaluate forces `rerun` alone
+/// begins at another step than the present one or has a last step that no number of steps leads to.
+void PairContact::require_orientations_of_rerun() const
+{
+  const bigint first = update->firststep, last = update->laststep;
+  const bool is_run = first == update->ntimestep && last == first + update->nsteps;
+  const bool is_unset = first == 0 && last == 0;
+  if (!any_turns || update->whichflag != 1 || is_run || is_unset) return;
+  error->all(
+      FLERR,
+      std::string("rerun reads no orientations from a dump, expected particles that cannot turn: "
+                  "read its frames with jamshape.load, or use data or restart files."));
+}
+
+/// Fixes that hold particles in dynamics, of those that LAMMPS leaves out of a minimisation.
+void PairContact::require_held_in_minimisation() const
+{
+  for (int k = 0; k < modify->nfix; ++k) {
+    const LAMMPS_NS::Fix &fix = *modify->fix[k];
+    const bool holds = begins_with(fix.style, "freeze") || begins_with(fix.style, "rigid");
+    if (!holds || modify->fmask[k] & LAMMPS_NS::FixConst::MIN_POST_FORCE) continue;
+    error->all(FLERR,
+               std::string("minimize found fix ") + fix.id + " of style " + fix.style +
+                   ", which LAMMPS leaves out of minimisations: hold its particles with 'fix "
+                   "ID group setforce 0 0 0' and use 'unfix " +
+                   fix.id + "'.");
+  }
+}
+
+/// Two styles that turn the same particles would each give them rotations of their own.
+void PairContact::require_only_one_turns() const
+{
+  if (force->pair == this) return;
+  int n_ours = 0;
+  LAMMPS_NS::Pair *last = nullptr;  // the only one that matches has every number
+  for (int n = 1; auto *const style = force->pair_match("/harmonic", 0, n); ++n) {
+    if (style == last) break;
+    n_ours += dynamic_cast<PairContact *>(style) != nullptr;
+    last = style;
+  }
+  if (n_ours < 2) return;
+  error->all(
+      FLERR,
+      std::string("minimize found several of jamshape's pair styles in a hybrid one, expected one "
+                  "that turns particles: use one of them."));
+}
+
 void PairContact::request_minimiser()
 {
+  require_only_one_turns();
   const std::string style = update->minimize_style;
   if (style != "cg" && style != "sd") {
     error->all(FLERR, "min_style " + style +
@@ -172,14 +296,17 @@ double PairContact::init_one(int i, int j)
       error->all(FLERR, std::string("All pair coeffs are not set"));
     k_e[i][j] = std::sqrt(k_e[i][i] * k_e[j][j]);
   }
+  // A fix such as adapt may have changed it.
+  require_energy(k_e[i][j], shown(k_e[i][j]), "pair_style " + style_name());
   k_e[j][i] = k_e[i][j];
+  is_ours[i] = is_ours[j] = true;
   return largest_radius[i] + largest_radius[j];
 }
 
 void PairContact::setup()
 {
   is_new_run = true;
-  const double needed = cutforce + neighbor->skin;
+  const double needed = largest_reach() + neighbor->skin;
   // Of a tilted box LAMMPS counts cutoffs in parts of the distance between its faces.
   const double *const h = domain->h_inv;  // xx, yy, zz, yz, xz, xy
   const double inverse[3] = {std::hypot(h[0], h[5], h[4]), std::hypot(h[1], h[3]), h[2]};
@@ -191,6 +318,15 @@ void PairContact::setup()
                             ": raise it with 'comm_modify cutoff' so that no contact is missed.");
     }
   }
+}
+
+double PairContact::largest_reach() const
+{
+  double largest = 0.0;
+  for (std::size_t type = 1; type < largest_radius.size(); ++type) {
+    if (is_ours[type]) largest = std::max(largest, largest_radius[type]);
+  }
+  return 2.0 * largest;
 }
 
 /* ----------------------------------------------------------------------
@@ -266,10 +402,30 @@ void PairContact::require_same_bound(int i, const Vec<3> &semi_axes) const
              "do not use 'pre no' in the run after changing shapes.");
 }
 
+void PairContact::stop_at_unexpected_turns(int i) const
+{
+  refuse(lmp, FLERR,
+         "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+             " with a shape that turns, where none did at the start of the run: give shapes before "
+             "it, and do not use 'pre no' in the run after changing them.");
+}
+
+double PairContact::special_weight(int i, int j, int which) const
+{
+  const double weight = force->special_lj[which];
+  if (weight == 0.0 || weight == 1.0) return weight;
+  refuse(lmp, FLERR,
+         "pair_style " + style_name() + " found special_bonds with a factor of " + shown(weight) +
+             " for bonded atoms " + std::to_string(atom->tag[i]) + " and " +
+             std::to_string(atom->tag[j]) +
+             ", expected 0 or 1: such a pair is in contact like any other, or not at all.");
+}
+
 /// Contacts of a particle that is nowhere would be dropped in silence.
 void PairContact::require_numbers(int n) const
 {
   for (int i = 0; i < n; ++i) {
+    if (!handles(i)) continue;
     const double *const x = atom->x[i];
     const Quaternion q = particles.orientation(i);
     if (std::isfinite(x[0] + x[1] + x[2] + q.w + q.i + q.j + q.k)) continue;
@@ -285,8 +441,9 @@ void PairContact::require_numbers(int n) const
 void PairContact::require_in_plane(int n) const
 {
   for (int i = 0; i < n; ++i) {
+    if (!handles(i)) continue;
     const Quaternion q = particles.orientation(i);
-    if (q.i != 0.0 || q.j != 0.0) {
+    if (!(2.0 * std::hypot(q.i, q.j) <= MOST_TILT)) {
       refuse(lmp, FLERR,
              "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
                  " turned out of the plane, expected a quaternion (w, 0, 0, k) in dimension "
@@ -381,6 +538,29 @@ void PairContact::read_restart(FILE *fp)
   }
 }
 
+void PairContact::write_data(FILE *fp)
+{
+  for (int i = 1; i <= atom->ntypes; ++i) {
+    std::fprintf(fp, "%d %s%s\n", i, exactly(k_e[i][i]).c_str(), more_coefficients(i).c_str());
+  }
+}
+
+void PairContact::write_data_all(FILE *fp)
+{
+  for (int i = 1; i <= atom->ntypes; ++i) {
+    for (int j = i; j <= atom->ntypes; ++j) {
+      const std::string more = i == j ? more_coefficients(i) : "";
+      std::fprintf(fp, "%d %d %s%s\n", i, j, exactly(k_e[i][j]).c_str(), more.c_str());
+    }
+  }
+}
+
+void *PairContact::extract(const char *name, int &dimension)
+{
+  dimension = 2;
+  return energy_name() == name ? k_e : nullptr;
+}
+
 double PairContact::memory_usage()
 {
   return Pair::memory_usage() +
@@ -408,8 +588,9 @@ void PairContact::min_xf_pointers(int, double **x, double **f)
   const std::size_t n = static_cast<std::size_t>(atom->nlocal);
   x_extra.resize(std::max<std::size_t>(1, n * rotations()));
   f_extra.resize(x_extra.size());
-  gyration.resize(n);
+  gyration.assign(n, 1.0);
   for (int i = 0; i < atom->nlocal; ++i) {
+    if (!handles(i)) continue;
     const Vec<3> moment = drag(particles.semi_axes(i), atom->type[i]).moment;
     gyration[i] = std::sqrt(std::max({moment[0], moment[1], moment[2]}));
   }
@@ -421,10 +602,12 @@ void PairContact::min_xf_get(int)
 {
   double *x = nullptr, *f = nullptr;
   min_xf_pointers(0, &x, &f);
+  find_held();
   const int nlocal = atom->nlocal;
+  const double none[3] = {};
   for (int i = 0; i < nlocal; ++i) {
     const Quaternion q = particles.orientation(i);
-    const double *torque = atom->torque[i];
+    const double *torque = is_held[i] ? none : atom->torque[i];
     if (rotations() == 1) {
       x[i] = gyration[i] * 2.0 * std::atan2(q.k, q.w);
       f[i] = torque[2] / gyration[i];
@@ -439,10 +622,35 @@ void PairContact::min_xf_get(int)
   }
 }
 
+/// A particle is held in a minimisation where fix setforce, whose arguments no header tells, makes
+/// every component of a force on it zero: it is asked to do so with forces of one. What other
+/// styles of a hybrid one handle is not ours to turn.
+void PairContact::find_held()
+{
+  const int nlocal = atom->nlocal, d = domain->dimension;
+  is_held.assign(nlocal, false);
+  for (int i = 0; i < nlocal; ++i) is_held[i] = !handles(i);
+  std::vector<double> kept;
+  double **const f = atom->f, *const all = nlocal > 0 ? f[0] : nullptr;
+  for (int k = 0; k < modify->nfix; ++k) {
+    LAMMPS_NS::Fix &fix = *modify->fix[k];
+    const bool acts = modify->fmask[k] & LAMMPS_NS::FixConst::MIN_POST_FORCE;
+    if (!acts || !begins_with(fix.style, "setforce")) continue;
+    kept.assign(all, all + 3 * nlocal);
+    std::fill_n(all, 3 * nlocal, 1.0);
+    fix.min_post_force(0);  // by all ranks: it may evaluate variables
+    for (int i = 0; i < nlocal; ++i) {
+      is_held[i] |= std::all_of(f[i], f[i] + d, [](double component) { return component == 0.0; });
+    }
+    std::copy(kept.begin(), kept.end(), all);
+  }
+}
+
 void PairContact::min_x_set(int)
 {
   const int nlocal = atom->nlocal;
   for (int i = 0; i < nlocal; ++i) {
+    if (is_held[i]) continue;
     const double scale = 1.0 / gyration[i];
     const Quaternion q =
         rotations() == 1

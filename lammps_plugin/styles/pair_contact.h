@@ -41,8 +41,12 @@ class PairContact : public LAMMPS_NS::Pair {
   explicit PairContact(LAMMPS_NS::LAMMPS *lmp);
   ~PairContact() override;
 
-  /// The pair style in use; ends the run with a sentence about `who` asks if it is none of ours.
+  /// The pair style in use, null if it is none of ours.
+  static PairContact *find(LAMMPS_NS::LAMMPS *lmp);
+  /// The same; ends the run with a sentence about `who` asks if it is none of ours.
   static PairContact &of(LAMMPS_NS::LAMMPS *lmp, const std::string &who);
+  /// The same, and with one if its contacts are not those of the present atoms.
+  static PairContact &evaluated(LAMMPS_NS::LAMMPS *lmp, const std::string &who);
 
   void settings(int narg, char **arg) override;
   void coeff(int narg, char **arg) override;
@@ -51,6 +55,9 @@ class PairContact : public LAMMPS_NS::Pair {
   void setup() override;
   void write_restart(FILE *fp) override;
   void read_restart(FILE *fp) override;
+  void write_data(FILE *fp) override;
+  void write_data_all(FILE *fp) override;
+  void *extract(const char *name, int &dimension) override;
   double memory_usage() override;
 
   void min_xf_pointers(int ignore, double **x, double **f) override;
@@ -106,7 +113,12 @@ class PairContact : public LAMMPS_NS::Pair {
   virtual std::string settings_rule() const { return "no arguments: leave them out"; }
   virtual std::string energy_name() const { return "k_e"; }
   virtual std::string coeff_rule() const { return "'I J k_e'"; }
+  /// Coefficients of a type beside its energy, as they follow that in 'pair_coeff I I'.
+  virtual std::string more_coefficients(int /*type*/) const { return ""; }
   virtual std::string without_force() const { return "crossing spines or coinciding centres"; }
+
+  /// Whether the contacts of the last evaluation are those of the present atoms.
+  virtual bool has_current_contacts() const = 0;
 
   /// Checks one shape and says what it should be. Some shapes have an exponent, by type.
   virtual double exponent(int /*type*/) const { return 1.0; }
@@ -120,7 +132,20 @@ class PairContact : public LAMMPS_NS::Pair {
 
   [[noreturn]] void stop_at_crossing(int i, int j);
   [[noreturn]] void stop_at_unconverged(int i, int j);
+  /// Whether an atom is this style's to judge: in a hybrid pair style those of its types are.
+  bool handles(int i) const { return is_ours[atom->type[i]]; }
+  void require_shape(int i, const Vec<3> &semi_axes) const;
+  [[noreturn]] void stop_at_shape(const Vec<3> &semi_axes, const std::string &which) const;
   void require_same_bound(int i, const Vec<3> &semi_axes) const;
+  [[noreturn]] void stop_at_unexpected_turns(int i) const;
+  /// Whether special_bonds leaves pair (i, j), as it stands in LAMMPS's list, in the sum.
+  bool has_full_weight(int i, int listed) const
+  {
+    const int which = sbmask(listed);
+    return which == 0 || special_weight(i, listed & NEIGHMASK, which) != 0.0;
+  }
+  /// Largest sum of two bounding radii.
+  double largest_reach() const;
   void require_numbers(int n) const;
   void require_in_plane(int n) const;
 
@@ -132,9 +157,11 @@ class PairContact : public LAMMPS_NS::Pair {
   bool is_mine(int i, int j) const;
 
  private:
+  std::vector<char> is_ours;             // per type: whether this style acts on particles of it
   std::vector<double> largest_radius;    // per type: bounding radius of the largest particle
   std::vector<double> x_extra, f_extra;  // rotations as lengths, for the minimiser
   std::vector<double> gyration;          // length per radian of each own particle
+  std::vector<char> is_held;             // whether a minimisation keeps an own particle's pose
   bool any_round, any_ellipsoids;
   bool is_new_run;
   std::string told, said;  // the last line in the log, without and with its numbers
@@ -142,7 +169,13 @@ class PairContact : public LAMMPS_NS::Pair {
   void allocate();
   void choose_instructions();
   void measure_particles();
+  void require_energy(double energy, const std::string &text, const std::string &where) const;
+  double special_weight(int i, int j, int which) const;
+  void require_orientations_of_rerun() const;
   void request_minimiser();
+  void require_held_in_minimisation() const;
+  void require_only_one_turns() const;
+  void find_held();
   int rotations() const;
   std::vector<std::string> spared() const;
 };

@@ -2,12 +2,12 @@
 
 #include "contact/contact.hpp"
 #include "contact/contact_block.hpp"
+#include "contact/extended.hpp"
 #include "contact/math/dimension.hpp"
 #include "contact/math/rotation.hpp"
 #include "contact/math/upper.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/packs.hpp"
-#include "contact/pair_derivatives.hpp"
 
 #include "atom.h"
 #include "bodies.h"
@@ -17,11 +17,16 @@
 #include "neigh_list.h"
 #include "neighbor.h"
 #include "pair_contact.h"
+#include "timer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <optional>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -69,18 +74,26 @@ template <class Model> class PairContactOf : public PairContact {
 
   SubstrateDrag drag(const Vec<3> &semi_axes, int type) const override
   {
-    const auto shape = *shape_from(semi_axes, type);
+    const auto shape = required_shape(semi_axes, type);
     return in_dimension(domain->dimension, [&](auto D) { return Model::template drag<D>(shape); });
   }
 
   std::optional<int> director(const Vec<3> &semi_axes, int type) const override
   {
-    const auto shape = *shape_from(semi_axes, type);
+    const auto shape = required_shape(semi_axes, type);
     return in_dimension(domain->dimension,
                         [&](auto D) { return Model::template director<D>(shape); });
   }
 
   bool bonds_are_contacts() const override { return Model::BONDS_ARE_CONTACTS; }
+
+  bool has_current_contacts() const override
+  {
+    const std::size_t known = domain->dimension == 2 ? in_2d.now.size() : in_3d.now.size();
+    return !first.empty() && chosen_at == neighbor->lastcall &&
+           known == static_cast<std::size_t>(n_all()) &&
+           first.size() == static_cast<std::size_t>(list->inum) + 1;
+  }
 
   double memory_usage() override
   {
@@ -136,6 +149,13 @@ template <class Model> class PairContactOf : public PairContact {
     return Model::shape_from(semi_axes, exponent(type));
   }
 
+  typename Model::Shape required_shape(const Vec<3> &semi_axes, int type) const
+  {
+    const auto shape = shape_from(semi_axes, type);
+    if (!shape) stop_at_shape(semi_axes, "an atom of type " + std::to_string(type));
+    return *shape;
+  }
+
   typename Model::Law law_of(int i, int j) const
   {
     return Model::law(k_e[atom->type[i]][atom->type[j]], sides, !general.contact);
@@ -157,6 +177,9 @@ template <class Model> class PairContactOf : public PairContact {
   Bodies<2> in_2d;
   Bodies<3> in_3d;
   double margin = 0.0, n_listed = 0.0;
+  LAMMPS_NS::bigint chosen_at = -1;  // step of the list that pairs were chosen from
+  double shapes_read = -1.0;         // when the run began in which shapes were read last
+  std::uint64_t shapes = 0;          // a checksum of them
   bool packs_take_all = false;
   std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
   std::vector<float> last_normal;   // D a close pair, if contacts start from it; zeros at first
@@ -283,7 +306,7 @@ template <class Model> class PairContactOf : public PairContact {
   {
     const BodiesOf<Model, D> &bodies = all<D>().now;
     const Body<D> &body = bodies[i], &other = bodies[j];
-    const Touch<D> contact = contact_of_pair<D>(pair, body, other, law_of(i, j));
+    const Touch<D> contact = contact_of_pair<D>(pair, {i, j}, body, other);
     if (contact.status == ContactStatus::APART) return;
     if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
     if (contact.status == ContactStatus::UNCONVERGED) stop_at_unconverged(i, j);
@@ -304,7 +327,7 @@ template <class Model> class PairContactOf : public PairContact {
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
         const Body<D> &other = bodies[j];
-        const Touch<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
+        const Touch<D> contact = contact_of_pair<D>(k, {i, j}, body, other);
         if (contact.status == ContactStatus::APART) continue;
         if (contact.status == ContactStatus::CROSSING) stop_at_crossing(i, j);
         if (contact.status == ContactStatus::UNCONVERGED) stop_at_unconverged(i, j);
@@ -322,10 +345,18 @@ template <class Model> class PairContactOf : public PairContact {
     }
   }
 
-  /// Contact of the k-th close pair. Where it starts from is worth time only, so floats do.
+  /// Contact of the k-th close pair, of these particles and their bodies.
   template <int D>
-  Touch<D> contact_of_pair(int k, const Body<D> &i, const Body<D> &j,
-                           const typename Model::Law &law)
+  Touch<D> contact_of_pair(int k, const std::array<int, 2> &pair, const Body<D> &i,
+                           const Body<D> &j)
+  {
+    return to_its_digits<Model, D>(contact_begun<D>(k, i, j, law_of(pair[0], pair[1])),
+                                   [&] { return pair_in_long<D>(pair[0], pair[1]); });
+  }
+
+  /// Where it starts from is worth time only, so floats do.
+  template <int D>
+  Touch<D> contact_begun(int k, const Body<D> &i, const Body<D> &j, const typename Model::Law &law)
   {
     if constexpr (StartsFromNormal<D>::value) {
       float *const last = any_turns ? &last_normal[static_cast<std::size_t>(D) * k] : nullptr;
@@ -374,29 +405,57 @@ template <class Model> class PairContactOf : public PairContact {
       read_poses<D>();
       choose_pairs<D>();
     } else {
+      const bool have_shapes_changed = run_began() != shapes_read && read_shapes<D>();
       read_poses<D>();
-      if (have_outrun_margin<D>()) choose_pairs<D>();
+      if (have_shapes_changed || have_outrun_margin<D>()) choose_pairs<D>();
     }
   }
 
   int n_all() const { return atom->nlocal + atom->nghost; }
 
-  template <int D> void read_shapes()
+  /// Another number in each run, also where 'pre no' leaves out the set-up.
+  double run_began() const { return timer->get_wall(LAMMPS_NS::Timer::TOTAL); }
+
+  /// What stands for an atom of other styles in a hybrid one, of which no pair is listed here.
+  static typename Model::Shape ball() { return *Model::shape_from({{1.0, 1.0, 1.0}}, 1.0); }
+
+  /// Returns whether any has changed. What the set-up of the run found of them must hold still.
+  template <int D> bool read_shapes()
   {
     BodiesOf<Model, D> &bodies = all<D>().now;
     bodies.begin_shapes(static_cast<std::size_t>(n_all()));
     packs_take_all = !general.contact;
-    typename Model::Shape of_first{};
+    std::optional<typename Model::Shape> of_first;
+    std::uint64_t checksum = 0;
     for (int i = 0; i < n_all(); ++i) {
+      if (!handles(i)) {
+        bodies.set_shape(i, ball());
+        continue;
+      }
       const Vec<3> semi_axes = particles.semi_axes(i);
+      require_shape(i, semi_axes);
       require_same_bound(i, semi_axes);
       const typename Model::Shape shape = *shape_from(semi_axes, atom->type[i]);
+      if (!any_turns && Model::template turns<D>(shape)) stop_at_unexpected_turns(i);
       bodies.set_shape(i, shape);
+      for (const double axis : semi_axes.c) checksum = mixed(checksum, axis);
+      checksum = mixed(checksum, exponent(atom->type[i]));
       if constexpr (PacksOf<Model, D>::EXIST) {
-        if (i == 0) of_first = shape;
-        packs_take_all = packs_take_all && PacksOf<Model, D>::take(shape, of_first);
+        if (!of_first) of_first = shape;
+        packs_take_all = packs_take_all && PacksOf<Model, D>::take(shape, *of_first);
       }
     }
+    shapes_read = run_began();
+    return std::exchange(shapes, checksum) != checksum;
+  }
+
+  /// A step of a checksum over numbers in their order.
+  static std::uint64_t mixed(std::uint64_t sum, double number)
+  {
+    std::uint64_t bits;
+    std::memcpy(&bits, &number, sizeof bits);
+    sum = (sum ^ bits) * 0x9e3779b97f4a7c15U;
+    return sum ^ sum >> 32;
   }
 
   template <int D> void read_poses()
@@ -420,7 +479,8 @@ template <class Model> class PairContactOf : public PairContact {
       const int *const neighbours = list->firstneigh[i];
       for (int k = 0; k < list->numneigh[i]; ++k) {
         const int j = neighbours[k] & NEIGHMASK;
-        if (general.pairs || Model::template closer_than<D>(margin, body, bodies.now[j])) {
+        if ((general.pairs || Model::template closer_than<D>(margin, body, bodies.now[j])) &&
+            has_full_weight(i, neighbours[k])) {
           partner.push_back(j);
         }
       }
@@ -436,6 +496,7 @@ template <class Model> class PairContactOf : public PairContact {
     resize_closely(bodies.then, comm->nprocs == 1 ? atom->nlocal : bodies.now.size());
     for (std::size_t i = 0; i < bodies.then.size(); ++i) bodies.then[i] = bodies.now.pose(i);
     bodies.cell_then = cell();
+    chosen_at = neighbor->lastcall;
   }
 
   /// Whether two particles may have come closer by the margin, or a pose is no number: their own
@@ -453,8 +514,8 @@ template <class Model> class PairContactOf : public PairContact {
       stretch = std::max(stretch, std::abs(1.0 - since.diagonal[k]));
     }
     const double strain = stretch + std::hypot(since.xy, since.xz, since.yz);
-    const double left =
-        margin - strain * (cutforce + margin) - BodiesOf<Model, D>::POSE_ERROR * cutforce;
+    const double reach = largest_reach();
+    const double left = margin - strain * (reach + margin) - BodiesOf<Model, D>::POSE_ERROR * reach;
     if (!(left > 0.0)) return true;
     for (std::size_t i = 0; i < bodies.then.size(); ++i) {
       const Body<D> &now = bodies.now[i];
@@ -477,7 +538,7 @@ template <class Model> class PairContactOf : public PairContact {
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
         const Body<D> &other = bodies[j];
-        const Touch<D> contact = contact_of_pair<D>(k, body, other, law_of(i, j));
+        const Touch<D> contact = contact_of_pair<D>(k, {i, j}, body, other);
         if (contact.status != ContactStatus::TOUCHING) continue;
         const Vec<D> r = body.centre - other.centre;
         for (int b = 0; b < contact.n_bonds; ++b) {
@@ -499,7 +560,7 @@ template <class Model> class PairContactOf : public PairContact {
       for (int k = first[n]; k < first[n + 1]; ++k) {
         const int j = partner[k];
         const ContactDerivatives<Model, D, double> found =
-            derivatives_at<Model, D, double>(posed_pair<D>(i, j));
+            derivatives_at<Model, D>(posed_pair<D>(i, j));
         if (found.contact.status != ContactStatus::TOUCHING) continue;
         fill_triangle<D>(found, triangle);
         visit({i, j, triangle});
@@ -517,6 +578,15 @@ template <class Model> class PairContactOf : public PairContact {
             particles.orientation(i),
             particles.orientation(j),
             law_of(i, j)};
+  }
+
+  template <int D> PosedPair<Model, D, long double> pair_in_long(int i, int j) const
+  {
+    auto pair = in_long(posed_pair<D>(i, j));
+    for (int k = 0; k < D; ++k) {
+      pair.r[k] = static_cast<long double>(atom->x[i][k]) - atom->x[j][k];
+    }
+    return pair;
   }
 
   template <int D>

@@ -3,6 +3,9 @@
 #include "atom.h"
 #include "comm.h"
 #include "error.h"
+#include "fix.h"
+#include "modify.h"
+#include "text.hpp"
 #include "utils.h"
 
 #include <algorithm>
@@ -25,11 +28,30 @@ double PairSuperellipsoidHarmonic::exponent(int type) const
   return exponent_of.empty() ? ELLIPSOID : exponent_of[type];
 }
 
+std::string PairSuperellipsoidHarmonic::more_coefficients(int type) const
+{
+  return " " + exactly(exponent(type));
+}
+
 void PairSuperellipsoidHarmonic::coeff(int narg, char **arg)
 {
   require_arguments(narg == 3 || narg == 4, narg);
   if (narg == 4) read_exponent(arg);
   PairContactOf::coeff(3, arg);
+}
+
+void PairSuperellipsoidHarmonic::init_style()
+{
+  PairContactOf::init_style();
+  const bool is_mixture =
+      std::any_of(exponent_of.begin() + (exponent_of.empty() ? 0 : 1), exponent_of.end(),
+                  [this](double p) { return p != exponent(1); });
+  for (int k = 0; is_mixture && k < modify->nfix; ++k) {
+    if (std::string(modify->fix[k]->style) != "atom/swap") continue;
+    error->all(FLERR, std::string("pair_style superellipsoid/harmonic found fix atom/swap, which "
+                                  "changes types between evaluations, expected the same p for all "
+                                  "types: give it with 'pair_coeff * * epsilon p'."));
+  }
 }
 
 /// An exponent is of a type: of all types of a line whose I and J name the same ones.

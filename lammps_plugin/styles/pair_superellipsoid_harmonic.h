@@ -19,6 +19,7 @@ class PairSuperellipsoidHarmonic : public PairContactOf<SuperellipsoidModel> {
   bool has_three_axes() const override { return true; }
 
   void coeff(int narg, char **arg) override;
+  void init_style() override;
   void write_restart(FILE *fp) override;
   void read_restart(FILE *fp) override;
 
@@ -30,6 +31,7 @@ class PairSuperellipsoidHarmonic : public PairContactOf<SuperellipsoidModel> {
   }
   std::string energy_name() const override { return "epsilon"; }
   std::string coeff_rule() const override { return "'I J epsilon' or 'I I epsilon p'"; }
+  std::string more_coefficients(int type) const override;
   std::string without_force() const override { return "coinciding centres"; }
   double exponent(int type) const override;
 

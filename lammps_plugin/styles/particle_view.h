@@ -3,6 +3,7 @@
 #include "contact/math/rotation.hpp"
 #include "contact/math/vec.hpp"
 
+#include "atom.h"
 #include "compat.h"
 #include "pointers.h"
 
@@ -15,10 +16,10 @@
 namespace jamshape {
 
 /// Resizes without the doubling that resize() grows by: numbers of ghosts vary by little.
-template <class T> void resize_closely(std::vector<T> &values, std::size_t n)
+template <class T> void resize_closely(std::vector<T> &values, std::size_t n, const T &value = {})
 {
   if (values.capacity() < n) values.reserve(n + n / 16);
-  values.resize(n);
+  values.resize(n, value);
 }
 
 /// The only reader and writer of how LAMMPS stores ellipsoids: orientations and semi-axes of own
@@ -27,10 +28,14 @@ class ParticleView : protected LAMMPS_NS::Pointers {
  public:
   explicit ParticleView(LAMMPS_NS::LAMMPS *lmp) : Pointers(lmp) {}
 
-  /// Stops with one sentence unless every atom is an ellipsoid. `style` is named in it.
-  void require_ellipsoids(const std::string &style) const;
+  /// Finds the ellipsoids among LAMMPS's atom styles, before anything else is asked. Stops with one
+  /// sentence, which names `style`, if there are none or they hold more than a shape.
+  void find_ellipsoids(const std::string &style);
 
+  bool has_shape(int i) const { return atom->ellipsoid[i] >= 0; }
+  /// Zeros for an atom without a shape.
   Vec<3> semi_axes(int i) const;
+  /// No rotation for an atom without a shape.
   Quaternion orientation(int i) const;
   void set_orientation(int i, const Quaternion &q) const;
   /// Makes an atom an ellipsoid of density 1.
@@ -44,19 +49,25 @@ class ParticleView : protected LAMMPS_NS::Pointers {
     for (int begin = 0; begin < n; begin += BLOCK) visit(begin, std::min(begin + BLOCK, n));
   }
 
-  /// Shows the orientations of atoms begin to end - 1 (own first, then ghosts) as `visit(i, q)`:
-  /// for many atoms less work than to ask for each.
+  /// Shows the orientations of those of atoms begin to end - 1 (own first, then ghosts) that have a
+  /// shape as `visit(i, q)`: for many atoms less work than to ask for each.
   template <class Visit> void for_each_orientation(int begin, int end, const Visit &visit) const
   {
     in_blocks(end - begin, [&](int first, int last) {
-      int index[BLOCK];
+      int index[BLOCK], size = 0;
       double packed[PER_ORIENTATION * BLOCK];
-      const int size = last - first;
-      std::iota(index, index + size, begin + first);
-      ellipsoids()->pack_comm_bonus(size, index, packed);
-      for (int k = 0; k < size; ++k) {
-        visit(begin + first + k, quaternion(packed + PER_ORIENTATION * k));
+      const int from = begin + first, to = begin + last;
+      if (all_have_shapes(from, to)) {  // as ever but in hybrid pair styles
+        std::iota(index, index + (to - from), from);
+        ellipsoids->pack_comm_bonus(to - from, index, packed);
+        for (int i = from; i < to; ++i) visit(i, quaternion(packed + PER_ORIENTATION * (i - from)));
+        return;
       }
+      for (int i = from; i < to; ++i) {
+        if (has_shape(i)) index[size++] = i;
+      }
+      ellipsoids->pack_comm_bonus(size, index, packed);
+      for (int k = 0; k < size; ++k) visit(index[k], quaternion(packed + PER_ORIENTATION * k));
     });
   }
 
@@ -65,10 +76,16 @@ class ParticleView : protected LAMMPS_NS::Pointers {
     for_each_orientation(0, n, visit);
   }
 
-  /// Gives atoms begin to end - 1 the orientations `orientation_of(i)`.
+  /// Gives those of atoms begin to end - 1 that have a shape the orientations `orientation_of(i)`.
   template <class Of> void set_orientations(int begin, int end, const Of &orientation_of) const
   {
     in_blocks(end - begin, [&](int first, int last) {
+      if (!all_have_shapes(begin + first, begin + last)) {
+        for (int i = begin + first; i < begin + last; ++i) {
+          if (has_shape(i)) set_orientation(i, orientation_of(i));
+        }
+        return;
+      }
       double packed[PER_ORIENTATION * BLOCK];
       for (int k = 0; k < last - first; ++k) {
         const Quaternion q = orientation_of(begin + first + k);
@@ -78,14 +95,24 @@ class ParticleView : protected LAMMPS_NS::Pointers {
         to[2] = q.j;
         to[3] = q.k;
       }
-      ellipsoids()->unpack_comm_bonus(last - first, begin + first, packed);
+      ellipsoids->unpack_comm_bonus(last - first, begin + first, packed);
     });
   }
 
  private:
   static constexpr int PER_ORIENTATION = 4, PER_SHAPE = 8;
+  static constexpr int MOST_PER_SHAPE = 64;  // room for what versions keep beside a shape
 
-  LAMMPS_NS::AtomVecEllipsoid *ellipsoids() const;
+  LAMMPS_NS::AtomVecEllipsoid *ellipsoids = nullptr;
+
+  bool all_have_shapes(int begin, int end) const
+  {
+    const int *const index = atom->ellipsoid;  // below zero without a shape
+    int signs = 0;
+    for (int i = begin; i < end; ++i) signs |= index[i];
+    return signs >= 0;
+  }
+
   static Quaternion quaternion(const double *q) { return {q[0], q[1], q[2], q[3]}; }
 };
 

@@ -5,6 +5,7 @@
 #include "compute_contact_local.h"
 #include "compute_packing.h"
 #include "create_random.h"
+#include "decimal_point.h"
 #include "error.h"
 #include "fix_overdamped_affine.h"
 #include "force.h"
@@ -204,6 +205,7 @@ void jamshape_register(void *handle)
   auto *lmp = static_cast<LAMMPS *>(handle);
   const std::string wrong = what_differs(handle);
   if (!wrong.empty()) lmp->error->all(FLERR, wrong);
+  jamshape::give_decimal_point(lmp);
   for_all_styles(AddToMaps{lmp});
   tell_plugin_file(lmp);
 }
@@ -218,6 +220,7 @@ void lammpsplugin_init(void *handle, void *library, void *add)
     if (lmp->comm->me == 0) lmp->error->warning(FLERR, wrong);
     return;
   }
+  jamshape::give_decimal_point(lmp);
   for_all_styles(AddAsPlugins{lmp, library, reinterpret_cast<lammpsplugin_regfunc>(add)});
   tell_plugin_file(lmp);
 }

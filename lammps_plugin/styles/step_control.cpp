@@ -1,10 +1,10 @@
 #include "step_control.h"
 
+#include "text.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
-#include <string>
 
 namespace jamshape {
 
@@ -185,9 +185,7 @@ double StepControl::smallest_step() const
 void StepControl::require_progress(const OverdampedFlow &flow, double h) const
 {
   if (h > NO_PROGRESS * std::max(smallest_step(), 1e-9 * box.state().dt)) return;
-  char step[32];
-  std::snprintf(step, sizeof(step), "%g", h);
-  flow.stop(std::string("found that a time step of ") + step +
+  flow.stop("found that a time step of " + shown(h) +
             " still moves a particle by more than a quarter of its radius, expected overlaps that "
             "can be resolved: start from a state with smaller ones.");
 }

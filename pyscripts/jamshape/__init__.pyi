@@ -1,5 +1,6 @@
 """Jamming of soft, frictionless, athermal particles that are not round; see `jamshape.__init__`."""
 
+from .checks import NotReachedWarning as NotReachedWarning
 from .front.compressing import compress as compress
 from .front.compressing import slow_compress as slow_compress
 from .front.files import load as load
@@ -22,5 +23,6 @@ from .shapes.named import Spherocylinders as Spherocylinders
 from .shapes.named import Superellipsoids as Superellipsoids
 from .shapes.particles import Kind as Kind
 from .shapes.particles import Particles as Particles
+from .shapes.shape import Interaction as Interaction
 
 __version__: str

@@ -62,6 +62,7 @@ class _Shape:
         pairs: NDArray[np.int64],
         shift: NDArray[np.int64],
         extended: bool = False,
+        errors: bool = False,
     ) -> dict[str, NDArray[Any]]: ...
     def sums(
         self,
@@ -124,7 +125,11 @@ def spine_distances(
     bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
 def superellipsoid_contacts(
-    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64], epsilon: float
+    bodies_i: NDArray[np.float64],
+    bodies_j: NDArray[np.float64],
+    epsilon: float,
+    extended: bool = False,
+    errors: bool = False,
 ) -> dict[str, NDArray[Any]]: ...
 def superellipsoid_scales(
     bodies_i: NDArray[np.float64],

@@ -26,6 +26,131 @@ class Range(NamedTuple):
     """Whether it counts something."""
 
 
+class _Typed(NamedTuple):
+    """An argument in a sentence."""
+
+    name: str
+    value: Any
+    is_option: bool
+
+    def __format__(self, spec: str) -> str:
+        """Write it with its value, or with the spec ``name`` without; options that are true need no value."""
+        if self.is_option:
+            option = f"--{_OPTIONS.get(self.name, self.name).replace('_', '-')}"
+            return option if spec == "name" or self.value is True else f"{option} {self.value}"
+        value = str(self.value) if isinstance(self.value, Path) else self.value
+        return self.name if spec == "name" else f"{self.name}={_shown(value)}"
+
+
+# Arguments whose options are called otherwise.
+_OPTIONS = {"file": "out"}
+
+
+class Sentence(Exception):  # noqa: N818 - warnings are of this kind as well
+    """A sentence of an exception or a warning that names arguments as they were typed.
+
+    Parameters
+    ----------
+    template : str
+        With ``{name}`` for an argument with its value and ``{name:name}`` for its name.
+    given : mapping of str to Any
+        The values of the arguments.
+    """
+
+    def __init__(self, template: str, given: Mapping[str, Any]) -> None:
+        super().__init__(template, given)
+        self.template, self.given = template, dict(given)
+
+    def __str__(self) -> str:
+        return self._written(is_option=False)
+
+    @property
+    def with_options(self) -> str:
+        """The sentence for a command line."""
+        return self._written(is_option=True)
+
+    def _written(self, *, is_option: bool) -> str:
+        typed = {name: _Typed(name, value, is_option) for name, value in self.given.items()}
+        return self.template.format_map(typed)
+
+
+class ArgumentError(Sentence, ValueError):
+    """Arguments that contradict each other, or have no effect; parameters as of `Sentence`.
+
+    Examples
+    --------
+    >>> error = ArgumentError("{phi} has no effect with {start}", {"phi": 0.7, "start": "run.h5"})
+    >>> print(error)
+    phi=0.7 has no effect with start='run.h5'
+    >>> print(error.with_options)
+    --phi 0.7 has no effect with --start run.h5
+    """
+
+
+class NotReachedWarning(Sentence, UserWarning):
+    """A result that did not reach its goal: what was reached, and what to try; parameters as of `Sentence`.
+
+    A command that has said so ends with the exit code 1.
+
+    Examples
+    --------
+    >>> said = NotReachedWarning("forces do not balance; try {strict} or another {u0:name}", {"strict": True, "u0": None})
+    >>> print(said)
+    forces do not balance; try strict=True or another u0
+    >>> print(said.with_options)
+    forces do not balance; try --strict or another --u0
+    """
+
+
+def require_no_effect(beside: str, value: Any, **given: Any) -> None:
+    """Refuse arguments that have no effect beside another one.
+
+    Parameters
+    ----------
+    beside : str
+        Name of the other one.
+    value : Any
+        That was given for it; nothing is refused where it is None.
+    **given
+        The arguments, None where they were left out.
+
+    Raises
+    ------
+    ArgumentError
+
+    Examples
+    --------
+    >>> require_no_effect("start", "run.h5", n=None, phi=0.7)
+    Traceback (most recent call last):
+    jamshape.checks.ArgumentError: phi=0.7 has no effect with start='run.h5', expected one of them; leave the other out
+    """
+    for name, other in given.items():
+        if value is not None and other is not None:
+            template = f"{{{name}}} has no effect with {{{beside}}}, expected one of them; leave the other out"
+            raise ArgumentError(template, {name: other, beside: value})
+
+
+def require_with(needed: str, value: Any, **given: Any) -> None:
+    """Refuse arguments that have no effect without another one; parameters as of `require_no_effect`.
+
+    Raises
+    ------
+    ArgumentError
+
+    Examples
+    --------
+    >>> require_with("u0", None, accuracy=1e-9)
+    Traceback (most recent call last):
+    jamshape.checks.ArgumentError: accuracy=1e-09 has no effect without u0, expected both or neither
+    """
+    for name, other in given.items():
+        if value is None and other is not None:
+            template = (
+                f"{{{name}}} has no effect without {{{needed}:name}}, expected both or neither"
+            )
+            raise ArgumentError(template, {name: other, needed: value})
+
+
 _COUNT = 1_000_000
 
 RANGES = {
@@ -82,7 +207,7 @@ def require_number(name: str, value: Any) -> float:
     ValueError: dt is '4; ls', expected a finite number
     """
     if not (_is_a(numbers.Real, value) and math.isfinite(value)):
-        msg = f"{name} is {_said(value)}, expected a finite number"
+        msg = f"{name} is {said(value)}, expected a finite number"
         raise ValueError(msg)
     return float(value)
 
@@ -98,7 +223,7 @@ def require_positive(**values: Any) -> None:
     """
     for name, value in values.items():
         if not (_is_a(numbers.Real, value) and math.isfinite(value) and value > 0):
-            msg = f"{name} is {_said(value)}, expected a positive number"
+            msg = f"{name} is {said(value)}, expected a positive number"
             raise ValueError(msg)
 
 
@@ -118,6 +243,11 @@ def require_stated(**values: Any) -> None:
     """
     for name, value in values.items():
         require_in(name, value, RANGES[name])
+
+
+def require_given(**values: Any) -> None:
+    """Refuse numbers as `require_stated` does, those that are None left out."""
+    require_stated(**{name: value for name, value in values.items() if value is not None})
 
 
 def require_options(given: Mapping[str, Any]) -> None:
@@ -153,7 +283,7 @@ def require_in(name: str, value: Any, allowed: Range) -> None:
     kind = numbers.Integral if allowed.whole else numbers.Real
     if _is_a(kind, value) and (allowed.low <= value <= allowed.high or value in allowed.also):
         return
-    msg = f"{name} is {_said(value)}, expected {_described(allowed)}"
+    msg = f"{name} is {said(value)}, expected {described(allowed)}"
     raise ValueError(msg)
 
 
@@ -185,32 +315,8 @@ def require_one_of(name: str, value: Any, table: Iterable[Any]) -> None:
     if not ((isinstance(value, str) or _is_a(numbers.Real, value)) and value in names):
         texts = [name for name in names if isinstance(name, str)]
         known = f"one of {', '.join(texts)}" if texts else " or ".join(map(str, names))
-        msg = f"{name} is {_said(value)}, expected {known}"
+        msg = f"{name} is {said(value)}, expected {known}"
         raise ValueError(msg)
-
-
-# LAMMPS reads the names of files as words of its input: these would end a word or stand for something.
-_TAKEN = {'"': "a double quote", "$": "a dollar", "*": "an asterisk", "%": "a percent sign"}
-
-
-def require_path_for_lammps(path: Path) -> None:
-    """Refuse a path that LAMMPS cannot be told.
-
-    Examples
-    --------
-    >>> require_path_for_lammps(Path("runs/my run.h5"))
-    >>> require_path_for_lammps(Path("runs/$HOME.h5"))
-    Traceback (most recent call last):
-    ValueError: the path 'runs/$HOME.h5' holds a dollar, which LAMMPS cannot take, expected another name
-    """
-    require_path(path)
-    text = str(path)
-    for sign, called in _TAKEN.items():
-        if sign in text:
-            msg = (
-                f"the path {text!r} holds {called}, which LAMMPS cannot take, expected another name"
-            )
-            raise ValueError(msg)
 
 
 def require_path(path: Path) -> None:
@@ -222,7 +328,8 @@ def require_path(path: Path) -> None:
     Traceback (most recent call last):
     ValueError: the path 'a\nb' holds a control character, expected letters and signs; choose another name
     """
-    if any(unicodedata.category(sign) in {"Cc", "Cs"} for sign in str(path)):
+    # Bytes of a name that the locale cannot read are no control characters, and files may have them.
+    if any(unicodedata.category(sign) == "Cc" for sign in str(path)):
         msg = (
             f"the path {str(path)!r} holds a control character, expected letters and signs;"
             " choose another name"
@@ -273,18 +380,23 @@ def _is_a(kind: type, value: Any) -> bool:
     return isinstance(value, kind) and type(value) is not bool
 
 
-def _described(allowed: Range) -> str:
+def described(allowed: Range) -> str:
+    """Say which numbers are in a range."""
     words = [f"{value:g} or" for value in allowed.also]
     low, high = (f"{v}" if allowed.whole else f"{v:g}" for v in (allowed.low, allowed.high))
     whole = "a whole number of " if allowed.whole and not allowed.meaning.startswith("a ") else ""
     return " ".join([*words, f"{whole}{allowed.meaning} from {low} to {high}"])
 
 
-def _said(value: Any) -> str:
+def _shown(value: Any) -> str:
+    """Show the value of an argument in one line, numbers of NumPy as those of Python."""
+    return said(value.item() if hasattr(value, "item") else value)
+
+
+def said(value: Any) -> str:
     """Show a value in one line."""
-    text = value if isinstance(value, numbers.Real) else repr(value)
-    said = str(text)
-    return said if len(said) <= 80 else f"{said[:77]}..."
+    text = " ".join(str(value if isinstance(value, numbers.Real) else repr(value)).split("\n"))
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 RANKS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
@@ -292,8 +404,13 @@ RANKS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
 what a job was given, in which one process may run.)"""
 
 
-def require_one_process() -> None:
+def require_one_process(why: str = "", instead: str = "") -> None:
     """Refuse to be one of several ranks, which were all told to write the same file.
+
+    Parameters
+    ----------
+    why, instead : str
+        In place of these words, why not, and what to do.
 
     Raises
     ------
@@ -307,9 +424,11 @@ def require_one_process() -> None:
     for name in RANKS:
         ranks = os.environ.get(name, "1")
         if ranks.isdecimal() and int(ranks) > 1:
+            why = why or "each would write the same file"
+            unset = f"or unset {name} where each writes a file of its own"
+            instead = instead or f" (jamshape sweep makes packings on all cores), {unset}"
             msg = (
-                f"found {ranks} MPI ranks ({name}), expected one process, since each would write the same file;"
-                " start it without mpirun or srun (jamshape sweep makes packings on all cores), or unset"
-                f" {name} where each writes a file of its own"
+                f"found {ranks} MPI ranks ({name}), expected one process, since {why};"
+                f" start it without mpirun or srun{instead}"
             )
             raise RuntimeError(msg)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import signal
 import sys
 import warnings
@@ -23,7 +24,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from jamshape.checks import require_options
+from jamshape.checks import NotReachedWarning, Sentence, require_options
 
 # What wrong input, missing files and searches without an end raise, each with one sentence.
 PROBLEMS = (OSError, ValueError, RuntimeError)
@@ -32,6 +33,7 @@ SET_UP = "run ./run setup in the repository, then use .venv/bin/python"
 """What to do where something that jamshape needs is not there."""
 
 _INTERRUPTED = 130  # as shells tell that a program was ended by Ctrl-C
+_BROKEN_PIPE = 141  # and that nobody reads what it writes
 
 
 def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser:
@@ -55,11 +57,19 @@ def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser
 
 
 def add_numbers(parser: ArgumentParser, *rows: tuple[str, int | float, str]) -> None:
-    """Add options that are numbers, each with its name, what it is where it is left out, and what it means."""
+    """Add options that are numbers, each with its name, what it is where it is left out, and what it means.
+
+    What is left out is None: the function that the command calls knows what is usual, and what was not typed cannot
+    contradict anything.
+    """
     for name, default, meaning in rows:
-        parser.add_argument(
-            name, type=type(default), default=default, help=f"{meaning} ({default})"
-        )
+        parser.add_argument(name, type=type(default), help=f"{meaning} ({default})")
+
+
+def typed(options: Namespace, *names: str) -> dict[str, Any]:
+    """Pick the options of these names that were typed."""
+    found = {name: getattr(options, name) for name in names}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def report(found: Mapping[str, Any]) -> None:
@@ -70,10 +80,13 @@ def report(found: Mapping[str, Any]) -> None:
 def plain(value: Any) -> Any:
     """Turn a value into what JSON knows.
 
-    NaN and infinity become null, named tuples objects, arrays and other tuples lists, paths text.
+    NaN and infinity become null, what has a method ``as_json`` what that returns, named tuples objects, arrays and other
+    tuples lists, paths text.
     """
     if hasattr(value, "tolist"):  # arrays and numbers of numpy
         return plain(value.tolist())
+    if hasattr(value, "as_json"):
+        return plain(value.as_json())
     if hasattr(value, "_asdict"):
         return plain(value._asdict())
     if isinstance(value, Mapping):
@@ -100,7 +113,8 @@ def run(parser: ArgumentParser, main: Callable[[Namespace], int | None]) -> NoRe
 def sentences(name: str, go_on: str = "it may be started again") -> Iterator[None]:
     """End the program with one sentence after its name where its body raises what users may meet; warn in one, too.
 
-    The exit code is 1 after one of `PROBLEMS` or where a module is missing, and 130 after Ctrl-C.
+    The exit code is 1 after one of `PROBLEMS`, where a module is missing, and where a result did not reach its goal
+    (`checks.NotReachedWarning`), and 130 after Ctrl-C.
 
     Parameters
     ----------
@@ -109,14 +123,29 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
     go_on : str
         How to go on after Ctrl-C.
     """
+    short: list[Warning | str] = []
+
+    def show(said: Warning | str, *_: Any, **__: Any) -> None:
+        print(f"{name}: warning: {_typed(said)}", file=sys.stderr)
+        short.extend([said] * isinstance(said, NotReachedWarning))
+
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = lambda said, *_: print(
-                f"{name}: warning: {said}", file=sys.stderr
-            )
-            yield
+            warnings.simplefilter("always", NotReachedWarning)
+            warnings.showwarning = show  # type: ignore[assignment]
+            try:
+                yield
+            finally:
+                sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads has seen enough, as `head` has
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(_BROKEN_PIPE)
+    except SystemExit as end:
+        if short and not end.code:
+            sys.exit(1)
+        raise
     except PROBLEMS as error:
-        sys.exit(f"{name}: {error}")
+        sys.exit(f"{name}: {_typed(error)}")
     except ImportError as error:
         sys.exit(f"{name}: {what_is_missing(error)}")
     except KeyboardInterrupt:
@@ -125,6 +154,11 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
         # Below a bar of progress.
         print(f"\n{name}: interrupted; {go_on}", file=sys.stderr)
         sys.exit(_INTERRUPTED)
+
+
+def _typed(said: BaseException | str) -> str:
+    """Write a sentence with the options of a command in place of the arguments of a function."""
+    return said.with_options if isinstance(said, Sentence) else str(said)
 
 
 def what_is_missing(error: ImportError) -> str:

@@ -21,6 +21,7 @@ def stored(tmp_path_factory):
     rods, start = js.Spherocylinders(alpha=1), random_packing(8, 0.3, 1)
     write_packing(folder / "start.h5", start)
     write_data(folder / "start.data", start)
+    write_packing(folder / "dense.h5", js.make_packing(rods, n=8, u0=1e-4, progress=False))
     js.compress(rods, n=8, kappa=1e-2, dt=0.1, phi=(0.3, 0.32), rows=4, frames=2,
                 file=folder / "run.h5", progress=False)  # fmt: skip
     with h5py.File(folder / "other.h5", "w") as file:

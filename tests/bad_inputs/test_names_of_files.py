@@ -8,7 +8,7 @@ import pytest
 
 from jamshape import commands
 
-STRANGE = "it's; a [b] {c} \\d é #&`touch X` ~ ?"
+STRANGE = 'it\'s; a [b] {c} \\d é #&`touch X` ~ ? $HOME * 50% "q"'
 
 
 def run(*arguments):

@@ -276,3 +276,64 @@ def test_stages_and_factors_of_another_size_are_refused():
         fewer.solve(np.ones((1, 9)))
     with pytest.raises(ValueError, match="factors are of another number of coordinates"):
         of.solve_stage(stage(), fewer, 0, lambda *_: None)
+
+
+def deformation(dimension=2):
+    return np.stack([np.eye(dimension), np.zeros((dimension, dimension))]), np.zeros((N, 1))
+
+
+def test_only_a_base_that_is_held_can_be_deformed():
+    of = vicinity()
+    with pytest.raises(ValueError, match="there is no base yet, expected move_to before"):
+        of.hold()
+    for prepare in (lambda: None, lambda: of.move_to(**split(poses(2)))):
+        prepare()
+        with pytest.raises(ValueError, match="no base is held, expected move_to and hold before"):
+            of.deform(*deformation())
+    of.hold()
+    of.deform(*deformation())
+    np.testing.assert_array_equal(of.poses[0], split(poses(2))["position"])
+
+
+def test_deformations_that_are_none_are_refused():
+    of, *_ = about_a_base()
+    of.hold()
+    before = [x.copy() for x in of.poses]
+    for bad in BAD_NUMBERS:
+        matrix, turns = deformation()
+        matrix[1, 0, 1] = bad
+        with pytest.raises(ValueError, match="of matrix is"):
+            of.deform(matrix, turns)
+        matrix, turns = deformation()
+        turns[1] = bad
+        with pytest.raises(ValueError, match="of turns is"):
+            of.deform(matrix, turns)
+    for matrix, sentence in (
+        (np.ones((2, 2, 2)), "matrix is not upper triangular"),
+        (-deformation()[0], "matrix holds an edge that is no length"),
+        (np.ones((2, 3, 3)), "matrix has no shape"),
+    ):
+        with pytest.raises(ValueError, match=sentence):
+            of.deform(matrix, np.zeros((N, 1)))
+    for found, expected in zip(of.poses, before, strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1025, 2**40])
+def test_teams_of_no_size_are_refused(threads):
+    with pytest.raises(ValueError, match=f"threads is {threads}, expected from 1 to 1024"):
+        _contact.counts_of_team(threads, 1, 1)
+    with pytest.raises(ValueError, match=f"threads is {threads}, expected from 1 to 1024"):
+        vicinity().share(threads)
+
+
+def test_particles_without_coordinates_have_an_empty_gradient():
+    """Arrays without rows have no place to begin at."""
+    of, given, pairs = about_a_base()
+    of = vicinity(np.full_like(COLUMN, -1))
+    of.move_to(**given)
+    of.take_pairs(**given, **pairs)
+    assert of.evaluate(np.zeros(0), 0.0, False)[1].shape == (0,)
+    assert _contact.find_rattlers(
+        0, 2, np.zeros((0, 2), int), np.zeros((0, 3)), np.zeros((0, 2), bool)
+    ).shape == (0,)

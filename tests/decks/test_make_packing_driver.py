@@ -47,7 +47,7 @@ def test_a_run_ends_with_one_json_line_and_says_whether_it_got_there(made):
     assert report["out"] == str(out)
     assert (report["n"], report["alpha"], report["seed"]) == (16, 1.0, 1)
     assert report["reached"] is (finished.returncode == 0)
-    assert report["reached"] is (report["outcome"] in {"converged", "sliding"})
+    assert report["reached"] is (report["outcome"] in {"converged", "corner"})
     assert report["u"] == pytest.approx(1e-9, rel=1e-7, abs=0)
     assert report["phi"] > report["phi_J"]
 

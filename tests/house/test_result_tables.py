@@ -28,7 +28,10 @@ def line_of(script, row):
     published = script["Published"](
         row["quantity"], row["where"], number["paper"], number["paper_error"], "", "", row["remark"]
     )
-    ours = script["Ours"](number["ours"], number["our_error"], int(row["samples"] or 0))
+    at_rest = row.get("reached_samples")
+    reached = float(row.get("ours_reached") or "nan"), int(at_rest) if at_rest else None
+    samples = int(row["samples"] or 0)
+    ours = script["Ours"](number["ours"], number["our_error"], samples, *reached)
     ours = None if math.isnan(ours.value) else ours
     told = script["Row"](published, ours, number["difference"], row["verdict"])
     return f"| {' | '.join(script['cells'](told))} |"

@@ -43,6 +43,7 @@ def tilted(name, dimension):
 def assert_same(a, b):
     """Compare bit for bit, with what doubles leave out."""
     assert_identical(a, b)
+    assert a.law == b.law
     for name in ("exponent", *RESTS):
         assert getattr(a, name).tobytes() == getattr(b, name).tobytes(), name
 

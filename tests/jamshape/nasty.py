@@ -42,7 +42,7 @@ def assert_identical(a, b):
     assert a.box.lo.tobytes() == b.box.lo.tobytes()
     assert a.box.edges.tobytes() == b.box.edges.tobytes()
     assert a.box.tilt.tobytes() == b.box.tilt.tobytes()
-    assert (a.shape_style, a.step, a.time) == (b.shape_style, b.step, b.time)
+    assert (a.shape_style, a.law, a.step, a.time) == (b.shape_style, b.law, b.step, b.time)
 
 
 def tilted_box(dimension):

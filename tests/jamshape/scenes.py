@@ -42,7 +42,7 @@ def pressed(n=24, dimension=2, seed=3, mixture=None, phi=None):
     packing = packing.with_(box=Box(lo=np.full(dimension, -1.3), edges=packing.box.edges))
     for _ in range(200):
         packing = scaled(packing, 0.995)
-        bonds = find_contacts(packing).bonds
+        bonds = find_contacts(packing, sides=1).bonds
         if (1 - bonds.distance / bonds.reach).max(initial=0) > 0.2:
             return packing
     raise AssertionError

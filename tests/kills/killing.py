@@ -13,6 +13,8 @@ import random
 import signal
 import sys
 import time
+import warnings
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -147,11 +149,16 @@ def _read_restart(path):
     assert is_whole(path), f"{path} has no end"
 
 
+def _read_data(path):
+    with warnings.catch_warnings(action="ignore"):  # of what LAMMPS does not write
+        read_data(path)
+
+
 READERS = {
     "*.h5": _read_hdf5,
     "*.h5md": _read_hdf5,
     "*.png": imread,
-    "*.data": read_data,
+    "*.data": _read_data,
     "*.gsd": read_gsd,
     "final.restart": _read_restart,
 }

@@ -120,7 +120,7 @@ def test_the_page_tells_the_rule_the_figures_and_what_was_run(made):
     assert "![fig05.png](figures/fig05.png)" in page
     assert "| jamshape sweep | 1 | 60 |" in page
     assert "| fig05_phi_j.py | 1 | 2 |" in page
-    assert "Not made: a.h5: it fell apart." in page
+    assert "Not made, or not at rest: a.h5: it fell apart." in page
     assert "| n | 128 |" in page  # of the scale
 
 

@@ -7,14 +7,14 @@ HEADER = "file,alpha,u0,n_backbone,n_modes,z,n_grazing,low,middle,high"
 
 
 def test_a_bond_that_grazes_is_a_mode_of_the_low_band(report, tmp_path):
-    # N' = 100 with 300 modes, and 2 and 4 bonds that graze; z is that of the high band.
+    # N' = 100 with 300 modes and two translations, and 2 and 4 bonds that graze; z is that of the high band.
     table = tmp_path / "modes.csv"
     rows = [
-        "modes/a.h5,4,1e-15,100,300,5.8,2,10,0,290",
-        "modes/b.h5,4,1e-15,100,300,5.8,4,10,0,290",
+        "modes/a.h5,4,1e-15,100,302,5.8,2,10,0,290",
+        "modes/b.h5,4,1e-15,100,302,5.8,4,10,0,290",
     ]
     # The first of them once more, led to other energies and back.
-    rows.append("ladder/a.h5,4,1e-15,100,300,5.8,2,10,0,290")
+    rows.append("ladder/a.h5,4,1e-15,100,302,5.8,2,10,0,290")
     table.write_text("\n".join([HEADER, *rows]) + "\n")
     _, row = report(SCRIPT, table)["rows"]
     assert row["folder"] == "modes"

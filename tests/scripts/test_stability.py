@@ -23,10 +23,6 @@ _LINE_SEARCH = (
     "LAMMPS's quadratic line search goes back where all contacts open in one step: energy ratio 1, "
     "0 with backtrack, which the deck uses"
 )
-_ROUNDING = (
-    "flat on flat at a tilt of 1e-12 the bounds of the scale meet to 5.1e-13 (p 0.55) and 5.7e-13 "
-    "(p 10), not to 1e-13"
-)
 _FREE_MOTION = (
     "a single contact below jamming may open and close by more than its overlap at a kappa of 1e-14: "
     "free motion is resolved to sqrt(overlap size) only, as docs/explanation/slow-compressions.md says"
@@ -56,13 +52,12 @@ KNOWN = {
         f"implicit compression: kappa {case} of the steady overlap": _FREE_MOTION
         for case in ("1e-14, tr-bdf2, from 1", "1e-14, tr-bdf2, from 10")
     },
-    **{f"contact of superellipsoids: aligned to 1e-12, p {p}": _ROUNDING for p in ("0.55", "10")},
     **{
         f"LAMMPS minimize, spherocylinders: alpha 1e-6 to 100 in one box, {style}, line quadratic": _LINE_SEARCH
         for style in ("cg", "sd")
     },
 }
-_OF_SOME_MINIMA = (_ROUNDING, _FREE_MOTION, _FLAT_ON_FLAT, _NO_MODES)
+_OF_SOME_MINIMA = (_FREE_MOTION, _FLAT_ON_FLAT, _NO_MODES)
 
 
 def marked(case):

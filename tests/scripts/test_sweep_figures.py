@@ -104,7 +104,6 @@ def test_files_that_do_not_belong_together_or_lack_numbers(problem, tmp_path):
     for path, changes in zip(paths, ({}, {"n": 30}, {"outcome": "stalled"}, {}), strict=True):
         write_packing(path, squeezed(1.0, 1), made_up(1.0, **changes))
     assert "n is 20 and 30, expected one ensemble" in problem(PHI_J, *paths[:2], *out)
-    assert "in equilibrium, of 1 that ended otherwise" in problem(NUMBER, paths[2], *out)
     assert "has no observable 'net_force'" in problem(RESIDUALS, paths[0], *out)
     assert "no packing has alpha = 7" in problem(ANGLES, paths[0], "--alpha", 7, *out)
     attributes = made_up(1.0)
@@ -126,7 +125,11 @@ def test_phi_j_of_a_sweep(report, sweep, tmp_path):
     assert one["phi_J"]["value"] == pytest.approx(0.88 + 0.0015)
     assert one["phi_J"]["error"] == pytest.approx(0.0005)
     assert one["phi_J"]["samples"] == 2
-    assert one["phi_J_compression"] == {"value": 0.885, "error": None, "samples": 1}
+    reached = one["phi_J"]["reached"]  # but for the one that slides
+    assert reached == {"value": pytest.approx(0.881), "error": None, "samples": 1}
+    assert one["phi_J_compression"]["value"] == 0.885
+    assert one["phi_J_compression"]["reached"]["samples"] == 0
+    assert found["conditions"]["not_reached"] == 2
 
 
 def test_contact_number_of_a_sweep_and_its_fit(report, sweep, tmp_path):
@@ -135,7 +138,11 @@ def test_contact_number_of_a_sweep_and_its_fit(report, sweep, tmp_path):
     rows = {row["alpha"]: row for row in found["contact_numbers"]}
     assert rows[0.01]["z"]["value"] == pytest.approx(z_of(0.01))
     assert rows[0.01]["paper_rattlers"] == 34
-    assert rows[1.0]["rattlers"] == {"value": 1, "error": 0, "samples": 2}
+    rattlers = {"value": 1, "error": 0, "samples": 2}
+    assert rows[1.0]["rattlers"] == rattlers | {
+        "reached": {"value": 1, "error": None, "samples": 1}
+    }
+    assert "reached" not in rows[0.2]["rattlers"]
     (fits,) = found["fits"]
     law = fits["z"]["fit"]
     assert (law["a"], law["b"], law["x"]) == pytest.approx((0.31, 2.7, 0.68), rel=1e-4)
@@ -206,7 +213,7 @@ def test_residuals_of_a_sweep(report, sweep, tmp_path):
     asked = ("--alpha", 0, 0.1, 1)
     found = report(RESIDUALS, sweep, *asked, "--out", tmp_path / "a.png")["residuals"]
     image(tmp_path / "a.png")
-    assert [(row["samples"], row["stalled"]) for row in found] == [(1, 0), (2, 1), (2, 0)]
+    assert [(row["samples"], row["not_reached"]) for row in found] == [(1, 0), (2, 1), (2, 1)]
     assert found[0]["net_torque"] == {"median": None, "percentile_99": None, "largest": None}
     for row in found[1:]:
         for name in ("net_force", "net_torque"):

@@ -89,9 +89,9 @@ def test_moduli_do_not_depend_on_the_cell(case):
     )
     assert not np.array_equal(other.box.tilt, packing.box.tilt)
     for name in ("bulk", "pure_shear", "simple_shear"):
-        affine, relaxed, _ = getattr(one, name)
-        assert getattr(same, name).affine == close_to(affine, 1e-8)
-        assert getattr(same, name).relaxed == pytest.approx(relaxed, rel=1e-3, abs=1e-6 * affine)
+        own, other = getattr(one, name), getattr(same, name)
+        assert other.affine == close_to(own.affine, 1e-8)
+        assert other.relaxed == pytest.approx(own.relaxed, rel=1e-3, abs=1e-6 * own.affine)
 
 
 @PLANE

@@ -153,11 +153,19 @@ def test_wrong_fix_commands(command, sentence, sentence_of):
     assert re.fullmatch(f"fix overdamped/affine found {sentence}", sentence_of(command))
 
 
-@pytest.mark.parametrize(("dt", "strain"), [("-0.5", "-0.0005"), ("2000", "2")])
-def test_steps_that_cannot_be_divided(dt, strain, sentence_of):
-    assert sentence_of(f"{FIX} integrator rkc2\ntimestep {dt}\nrun 1") == (
-        f"fix overdamped/affine found timestep {dt}, a strain of {strain}, expected a "
-        "step from 0 to a strain of 1: the integrator divides it."
+@pytest.mark.parametrize("integrator", ["heun", "heun/adaptive", "rkc2"])
+@pytest.mark.parametrize("dt", ["0", "-0.5"])
+def test_time_passes_forwards(dt, integrator, sentence_of):
+    assert sentence_of(f"{FIX} integrator {integrator}\ntimestep {dt}\nrun 1") == (
+        f"fix overdamped/affine found timestep {dt}, expected a positive one: to open the box, give "
+        "'compress' a negative rate."
+    )
+
+
+def test_steps_that_cannot_be_divided(sentence_of):
+    assert sentence_of(f"{FIX} integrator rkc2\ntimestep 2000\nrun 1") == (
+        "fix overdamped/affine found timestep 2000, a strain of 2, expected a step from 0 to a strain "
+        "of 1: the integrator divides it."
     )
 
 
@@ -247,15 +255,27 @@ def test_shapes_must_be_spherocylinders(diameters, sentence_of):
     )
 
 
-def test_plane_needs_quaternions_about_z(tmp_path):
-    packing = rods_3d([[0, 0, 0], [0, 2, 0]], [[1, 0, 0, 0], [1, 0, 0.1, 0]], 1.0, 0.5, [12] * 3)
+def plane_of_tilted(tmp_path, tilt):
+    """What LAMMPS says of two rods of which one is rotated out of the plane, by twice this."""
+    packing = rods_3d([[0, 0, 0], [0, 2, 0]], [[1, 0, 0, 0], [1, 0, tilt, 0]], 1.0, 0.5, [12] * 3)
     packing = packing.with_(box=type(packing.box)(lo=[-6, -6, -0.5], edges=[12, 12, 1]))
     write_data(tmp_path / "s.data", packing)
     text = f"{before_box(2)}\nread_data {tmp_path / 's.data'}\n{after_box()}\nrun 0"
-    assert error_of(run_lmp(f"{load_plugin()}\n{text}", tmp_path)) == (
+    return run_lmp(f"{load_plugin()}\n{text}", tmp_path)
+
+
+@pytest.mark.parametrize("tilt", [0.1, 1e-6])
+def test_plane_needs_quaternions_about_z(tilt, tmp_path):
+    assert error_of(plane_of_tilted(tmp_path, tilt)) == (
         "pair_style spherocylinder/harmonic found atom 2 turned out of the plane, expected a "
         "quaternion (w, 0, 0, k) in dimension 2: turn it about z only."
     )
+
+
+@pytest.mark.parametrize("tilt", [6e-17, 1e-9])
+def test_quaternions_that_rounding_leaves_out_of_the_plane_are_taken(tilt, tmp_path):
+    """As those of `fix rigid`; a tilt of 2e-9 changes lengths by 2e-18."""
+    assert plane_of_tilted(tmp_path, tilt).returncode == 0
 
 
 CROSSING = (

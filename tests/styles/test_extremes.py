@@ -86,7 +86,7 @@ def test_extreme_scenes_run_and_equal_the_bindings(name, sides, tmp_path, measur
         before = state_of(session)
         session.commands("run 300")
         after = state_of(session)
-    n_contacts = len(contacts.find_contacts(packing).pairs)
+    n_contacts = len(contacts.find_contacts(packing, sides=1).pairs)
     assert n_contacts > 3
     differences = [difference_from_bindings(state, sides) for state in (before, after)]
     measured(contacts=n_contacts, before=differences[0], after=differences[1])
@@ -98,7 +98,7 @@ def test_extreme_scenes_run_and_equal_the_bindings(name, sides, tmp_path, measur
 
 
 def test_scenes_hold_what_they_stand_for():
-    network = contacts.find_contacts(longer_than_the_box())
+    network = contacts.find_contacts(longer_than_the_box(), sides=1)
     assert (network.pairs[:, 0] == network.pairs[:, 1]).sum() == 4
     sizes = SCENES["sizes 1 to 10"]().radius
     assert sizes.max() / sizes.min() == 10
@@ -160,7 +160,7 @@ def test_overlaps_from_rounding_to_a_third(dimension, sides, tmp_path, measured)
     torque = np.abs(state.torque - expected.torque).reshape(packing.n, -1).max(axis=1)
     assert (torque <= 1e-14 * size).all()
     assert (size[packing.n // 12 :] > 0).all(), "only overlaps of 1e-14 may drown in rounding"
-    assert contacts.find_contacts(packing).kind.max() == 2
+    assert contacts.find_contacts(packing, sides=1).kind.max() == 2
     for pair in range(0, packing.n, 2):
         np.testing.assert_allclose(state.force[pair], -state.force[pair + 1], rtol=1e-15)
 

@@ -279,7 +279,7 @@ class Flight:
             position = self.packing.position + length * self.velocity
             moved_on = turned(self.packing.with_(position=position), length * self.spin)
             with suppress(ValueError):
-                contacts.find_contacts(moved_on)
+                contacts.find_contacts(moved_on, sides=1)
                 self.packing = moved_on
                 return
             self.draw()
@@ -298,7 +298,7 @@ def test_no_contact_is_missed_however_rods_move(motion, skin, dimension, tmp_pat
         session.commands("run 0")
         for step in range(150):
             state = state_of(session)
-            network = contacts.find_contacts(state.exact)
+            network = contacts.find_contacts(state.exact, sides=1)
             largest = max(largest, difference_from(network, state))
             seen |= set(map(tuple, network.pairs))
             flight.go_on([0.004, 0.012, 0.04][step % 3])
@@ -316,7 +316,7 @@ def test_no_contact_is_missed_while_the_box_shrinks(dimension, tmp_path, measure
     for seed in range(6):
         phi = {2: 0.4, 3: 0.15}[dimension]
         packing = dense(dimension, alpha=6.0, n=9, phi=phi, kick=0.0, seed=seed)
-        before = contacts.find_contacts(packing).pairs
+        before = contacts.find_contacts(packing, sides=1).pairs
         with loaded(packing, tmp_path, skin=4.0) as session:
             session.commands("""
                 fix drive all overdamped/affine drag 1e6 compress 0.1
@@ -325,7 +325,7 @@ def test_no_contact_is_missed_while_the_box_shrinks(dimension, tmp_path, measure
             for _ in range(25):
                 session.commands("run 4 pre no post no")
                 largest = max(largest, difference_from_bindings(state_of(session)))
-            after = contacts.find_contacts(state_of(session).packing).pairs
+            after = contacts.find_contacts(state_of(session).packing, sides=1).pairs
         n_new += len(set(map(tuple, after)) - set(map(tuple, before)))
     measured(difference=largest, new=n_new)
     assert n_new > 10

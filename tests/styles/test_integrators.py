@@ -309,10 +309,3 @@ def test_deep_overlaps_relax(method, tmp_path):
     state, vector = end_of(packing, tmp_path, fix(method, 1e-3, 0.0, 5.0), "run 3", sides="two")
     assert difference_from_bindings(state, "two") < 1e-12
     assert vector[ERROR] <= 1e-3 or vector[FORCED] > 0
-
-
-def test_no_motion_in_no_time(tmp_path):
-    packing = rods_at(0.9)
-    state, vector = end_of(packing, tmp_path, fix("rkc2", 1e-4, 1e-3, 0.0), "run 3", sides="two")
-    np.testing.assert_array_equal(state.packing.box.edges, packing.box.edges)
-    assert vector[SUBSTEPS] == 0

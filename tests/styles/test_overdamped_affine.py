@@ -89,7 +89,7 @@ def test_without_contact_particles_follow_the_box(
     options = f"reference {reference}"
     start, end = run_fix(packing, tmp_path, "run 0", f"run {steps}", kappa=kappa, dt=dt,
                          options=options)  # fmt: skip
-    assert not len(contacts.find_contacts(end.packing).pairs)
+    assert not len(contacts.find_contacts(end.packing, sides=1).pairs)
     scale = np.exp(-kappa * dt * steps)
     fixed = {"center": np.zeros(dimension), "corner": packing.box.lo}[reference]
 
@@ -177,7 +177,7 @@ def test_heun_is_of_second_order(dimension, kappa, tmp_path, measured):
         before, after = run_fix(packing, tmp_path, "run 0", f"run {steps}", dt=time / steps,
                                 kappa=kappa)  # fmt: skip
         for state in (before, after):
-            assert contacts.find_contacts(state.packing).kind.tolist() == [1]
+            assert contacts.find_contacts(state.packing, sides=1).kind.tolist() == [1]
         return before, after
 
     start, exact = end_of(12800)
@@ -342,7 +342,7 @@ def test_pressure_is_minus_dU_dV(dimension, sides, tmp_path, measured):
 
 def points_of_contact(state):
     """Points of contact relative to the first particle, under their pair."""
-    network = contacts.find_contacts(state.packing)
+    network = contacts.find_contacts(state.packing, sides=1)
     arms = network.bonds.point - state.packing.position[network.pairs[:, 0]]
     return {(*pair, *shift): arm
             for pair, shift, arm in zip(network.pairs, network.shift, arms, strict=True)}  # fmt: skip
@@ -448,7 +448,7 @@ def hessian_by_differences(packing, step=1e-7, sides=1):
 
 def hessian_of_bonds(packing):
     """The same without the prestress: one row a bond, squared."""
-    network = contacts.find_contacts(packing)
+    network = contacts.find_contacts(packing, sides=1)
     bonds, (i, j) = network.bonds, network.pairs.T
     D, n = packing.dimension, packing.n
     arms_i = bonds.point - packing.position[i]

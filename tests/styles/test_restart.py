@@ -26,6 +26,9 @@ pytestmark = pytest.mark.lammps
 
 KAPPA, DT, STEPS = 1.3e-3, 0.07, 150
 
+# The first number of the fix in restart files, which tells formats apart.
+FORMAT = 0x6A616D7368617003
+
 
 def fix(kappa=KAPPA, dt=DT, options=""):
     return f"""
@@ -206,7 +209,7 @@ def test_state_that_something_else_changed_is_taken_as_it_is(change, packings, t
 
 
 def test_a_restart_file_of_another_version_is_refused(packings, tmp_path):
-    path, mark = tmp_path / "half.restart", (0x6A616D7368617002).to_bytes(8, "little")
+    path, mark = tmp_path / "half.restart", FORMAT.to_bytes(8, "little")
     with loaded(packings["rods"], tmp_path) as session:
         session.commands(f"{fix()}\nrun 1\nwrite_restart {path}")
     content = path.read_bytes()
@@ -214,3 +217,53 @@ def test_a_restart_file_of_another_version_is_refused(packings, tmp_path):
     path.write_bytes(content.replace(mark, bytes(8)))
     done = run_lmp(f"{load_plugin()}\nread_restart {path}\n{after_restart()}\n{fix()}", tmp_path)
     assert "found a restart file that another version of jamshape wrote" in error_of(done)
+
+
+def test_a_restart_file_without_the_time_is_read(packings, tmp_path):
+    """As written before the fix counted time across changes of the time step."""
+    path, mark = tmp_path / "half.restart", FORMAT.to_bytes(8, "little")
+    with loaded(packings["rods"], tmp_path) as session:
+        session.commands(f"{fix()}\nrun 10\nwrite_restart {path}")
+    path.write_bytes(path.read_bytes().replace(mark, (FORMAT - 1).to_bytes(8, "little")))
+    with restarted(path, after_restart() + fix()) as session:
+        session.commands("run 5")
+        assert fix_vector(session, "drive", 1) == pytest.approx(15 * DT, rel=1e-14)
+        assert fix_vector(session, "drive", 2) == pytest.approx(15 * DT * KAPPA, rel=1e-14)
+
+
+def test_minimisation_leaves_strain_and_time_where_they_were(packings, tmp_path):
+    """LAMMPS counts its iterations as steps; a restart file written after it knows, too."""
+    path = tmp_path / "after.restart"
+    with loaded(packings["rods"], tmp_path, sides="two") as session:
+        session.commands(f"""
+            {fix()}
+            run 20
+            minimize 0.0 0.0 30 300
+            write_restart {path}""")
+        assert session.step > 20
+        session.commands("timestep 0.02\nrun 10")
+        step, box = session.step, state_of(session).packing.box
+        assert fix_vector(session, "drive", 1) == pytest.approx(20 * DT + 10 * 0.02, rel=1e-14)
+        assert fix_vector(session, "drive", 2) == pytest.approx(KAPPA * (20 * DT + 0.2), rel=1e-14)
+    np.testing.assert_allclose(
+        strain_of(box, packings["rods"].box), KAPPA * (20 * DT + 0.2), rtol=1e-12
+    )
+    with restarted(path, after_restart() + fix(dt=0.02)) as session:
+        session.commands("run 10")
+        assert session.step == step
+        np.testing.assert_array_equal(state_of(session).packing.box.edges, box.edges)
+        assert fix_vector(session, "drive", 1) == pytest.approx(20 * DT + 10 * 0.02, rel=1e-14)
+
+
+def test_numbers_of_forces_before_a_run_are_not_there(packings, tmp_path):
+    """Neither before the first run nor after another pair style or particles have come."""
+    with loaded(packings["rods"], tmp_path, sides="two") as session:
+        session.commands(fix())
+        asked = {k: fix_vector(session, "drive", k) for k in range(1, 21)}
+        assert {k for k, value in asked.items() if np.isnan(value)} == {5, 20}
+        session.commands("run 1")
+        assert fix_vector(session, "drive", 5) > 0
+        session.commands("create_atoms 1 single 0 0 0")
+        assert np.isnan(fix_vector(session, "drive", 5))
+        session.commands("pair_style none")
+        assert np.isnan(fix_vector(session, "drive", 20))

@@ -18,7 +18,7 @@ def overlapping(packing: Packing, pairs: IntArray, shift: IntArray) -> BoolArray
 
 
 def contacts_of(packing: Packing, pairs: IntArray, shift: IntArray) -> dict[str, NDArray[Any]]:
-    """Contacts of the (C,) pairs that are not apart, k_e = 1."""
+    """Contacts of the (C,) pairs that are not apart, k_e = 1, and their errors."""
     found: dict[str, NDArray[Any]]
-    found = packing.compiled().contacts(*State.of(packing).split, pairs, shift, False)
+    found = packing.compiled().contacts(*State.of(packing).split, pairs, shift, False, True)
     return found

@@ -11,9 +11,12 @@ namespace jamshape {
 using std::abs;
 using std::copysign;
 using std::exp;
+using std::floor;
+using std::isfinite;
 using std::log;
 using std::log1p;
 using std::pow;
+using std::round;
 using std::sqrt;
 
 /// The plain number in a scalar: of a dual number its value.

@@ -64,7 +64,7 @@ template <int D, class T> class ConeBarrier {
 
     Cone(T alpha, T x, T u, T t)
     {
-      const T beta = 1 - alpha, mean = t * std::pow(u / t, alpha);
+      const T beta = 1 - alpha, mean = t * pow(u / t, alpha);
       const T over[2] = {1 / (mean - x), 1 / (mean + x)};
       const T by_u = alpha * mean / u, by_t = beta * mean / t;
       const T bent = alpha * beta * mean * (over[0] + over[1]);
@@ -105,16 +105,16 @@ template <int D, class T> class ConeBarrier {
     T gauge(const Vec<D, T> &x) const
     {
       T most = 0, sum = 0;
-      for (int k = 0; k < D; ++k) most = std::max(most, std::abs(x[k]));
+      for (int k = 0; k < D; ++k) most = std::max(most, abs(x[k]));
       if (most == 0) return 0;
-      for (int k = 0; k < D; ++k) sum += std::pow(std::abs(x[k]) / most, 1 / alpha[k]);
-      return most * std::pow(sum, alpha[0]);
+      for (int k = 0; k < D; ++k) sum += pow(abs(x[k]) / most, 1 / alpha[k]);
+      return most * pow(sum, alpha[0]);
     }
 
     void share(const Vec<D, T> &x, T t, T *u) const
     {
       T sum = 0;
-      for (int k = 0; k < D; ++k) sum += u[k] = std::pow(std::abs(x[k]) / t, 1 / alpha[k]);
+      for (int k = 0; k < D; ++k) sum += u[k] = pow(abs(x[k]) / t, 1 / alpha[k]);
       for (int k = 0; k < D; ++k) u[k] = t * (u[k] + (1 - sum) / (D + 1));
     }
 
@@ -122,7 +122,7 @@ template <int D, class T> class ConeBarrier {
     {
       T sum = 0;
       for (int k = 0; k < D; ++k) {
-        if (!(u[k] > 0) || !(std::abs(x[k]) < t * std::pow(u[k] / t, alpha[k]))) return false;
+        if (!(u[k] > 0) || !(abs(x[k]) < t * pow(u[k] / t, alpha[k]))) return false;
         sum += u[k];
       }
       return sum < t;
@@ -157,7 +157,7 @@ template <int D, class T> class ConeBarrier {
     for (int n = 0; n < LONGEST; ++n) {
       const Linearised<M, T> at = linearised();
       const Vec<M, T> step = solved_symmetric(at.jacobian, at.residual), before = z;
-      const T decrement = std::sqrt(dot(step, at.residual));
+      const T decrement = sqrt(dot(step, at.residual));
       ++iterations;
       z -= (decrement < NEAR ? T(1) : 1 / (1 + decrement)) * step;
       if (!is_inside()) {  // nor is what is no number

@@ -4,6 +4,7 @@
 #include "contact/superellipsoid/shape.hpp"
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -89,13 +90,42 @@ template <int D, int M, class T> void lift_diagonal(Matrix<M, T> &a)
 {
   T largest = 0.0;
   for (int k = 0; k < D; ++k) largest = most(largest, a.row[k][k]);
-  for (int k = 0; k < D; ++k) a.row[k][k] += T(FLAT) * largest;
+  constexpr auto SHORTER = std::numeric_limits<Common<T>>::epsilon() / Common<T>(DBL_EPSILON);
+  for (int k = 0; k < D; ++k) a.row[k][k] += T(FLAT * SHORTER) * largest;
 }
 
 template <int M, class T> struct Linearised {
   Vec<M, T> residual;
   Matrix<M, T> jacobian;
 };
+
+/// How a search ended, and the matrix at its last step.
+template <int M, class T> struct Solved {
+  Truth<T> is_converged;
+  Matrix<M, T> jacobian;
+};
+
+/// A symmetric positive definite matrix is well posed if its largest eigenvalue is no more than so
+/// many times the smallest: what equations of contact lose by rounding then turns a normal by no
+/// more than 1e-9 or so. (Times up to D^2: compared are sums of eigenvalues and of their products.)
+inline constexpr double WELL_POSED = 1e6;
+
+template <class T> Truth<T> is_well_posed(const Matrix<2, T> &a)
+{
+  const T trace = a.row[0][0] + a.row[1][1];
+  const T determinant = a.row[0][0] * a.row[1][1] - a.row[1][0] * a.row[1][0];
+  return trace * trace < T(WELL_POSED) * determinant;
+}
+template <class T> Truth<T> is_well_posed(const Matrix<3, T> &a)
+{
+  const T xx = a.row[0][0], yx = a.row[1][0], yy = a.row[1][1];
+  const T zx = a.row[2][0], zy = a.row[2][1], zz = a.row[2][2];
+  const T c_xx = yy * zz - zy * zy, c_yy = xx * zz - zx * zx, c_zz = xx * yy - yx * yx;
+  const T trace = xx + yy + zz, minors = c_xx + c_yy + c_zz;
+  const T determinant = xx * c_xx - yx * (yx * zz - zx * zy) + zx * (yx * zy - zx * yy);
+  // Where two eigenvalues are lost in rounding, only the first of these sees it.
+  return (trace * trace < T(WELL_POSED) * minors) & (trace * minors < T(WELL_POSED) * determinant);
+}
 
 /// Whether the normal n of a plane is what the equations know of a body, or a point of its surface.
 inline bool is_by_normal(double p) { return p <= 1.0; }
@@ -160,6 +190,13 @@ template <int D, class S> class ByNormal {
   static Vec<M, T> step(const Linearised<M, T> &at)
   {
     return solved_symmetric(at.jacobian, at.residual);
+  }
+
+  /// Tips leave the matrix nearly singular: their point is the same for many a normal.
+  static constexpr bool MAY_BE_ILL_POSED = true;
+  static Truth<T> is_well_posed(const Matrix<M, T> &jacobian)
+  {
+    return detail::is_well_posed(jacobian);
   }
 
   /// Of all lengths of n the one that makes F^2 / 2 - r.n least.
@@ -310,6 +347,9 @@ template <int D, class S> class ByPointAndNormal {
 
   static Vec<M, T> step(const Linearised<M, T> &at) { return solved(at.jacobian, at.residual); }
 
+  /// A tip knows the point and a face the normal.
+  static constexpr bool MAY_BE_ILL_POSED = false;
+
   Vec<M, T> start(const Tangency<D, T> &from) const { return from.point_i; }
 
   Tangency<D, S> tangency(const Vec<M, S> &y) const
@@ -363,6 +403,9 @@ template <int D, class S> class ByPoint {
 
   static Vec<M, T> step(const Linearised<M, T> &at) { return solved(at.jacobian, at.residual); }
 
+  /// Faces leave the point open, but they know the normal.
+  static constexpr bool MAY_BE_ILL_POSED = false;
+
   Vec<M, T> start(const Tangency<D, T> &from) const
   {
     Vec<M, T> z;
@@ -402,26 +445,27 @@ template <int D, class S> class ByPoint {
   }
 };
 
-/// Newton's method with steps cut until the residual falls. True when a step was shorter than
-/// `tolerance` of the unknowns: that step is taken and leaves an error of its square.
+/// Newton's method with steps cut until the residual falls. It has converged when a step was
+/// shorter than `tolerance` of the unknowns: that step is taken and leaves an error of its square.
 template <class Equations, int M, class T>
-bool newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iterations)
+Solved<M, T> newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iterations)
 {
-  constexpr int LONGEST = 60;
+  constexpr int LONGEST = sizeof(T) > 8 ? 200 : 60;
   auto at = equations.linearised(z);
   T size = norm_sq(at.residual);
   for (int n = 0; n < LONGEST; ++n) {
     const Vec<M, T> step = equations.step(at);
     const T step_sq = norm_sq(step);
-    if (!(step_sq < std::numeric_limits<T>::max())) return false;
+    if (!(step_sq < std::numeric_limits<T>::max())) break;
     ++iterations;
     if (step_sq <= tolerance * tolerance * norm_sq(z)) {
       z -= step;
-      return true;
+      return {true, at.jacobian};
     }
     T fraction = 1;
+    const T smallest = T(1e-4) * std::min(T(1), T(sqrt(norm_sq(z) / step_sq)));
     for (;; fraction *= T(0.5)) {
-      if (fraction < T(1e-4)) return false;
+      if (fraction < smallest) return {false, at.jacobian};
       const Vec<M, T> trial = z - fraction * step;
       const auto next = equations.linearised(trial);
       const T next_size = norm_sq(next.residual);
@@ -433,18 +477,18 @@ bool newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iteratio
       }
     }
   }
-  return false;
+  return {false, at.jacobian};
 }
 
 /// The same of all lanes of a pack that are `sought`, where no step is cut: true of those that such
 /// steps lead to the end. A lane that has come there waits.
 template <class Equations, int M, class T>
-Truth<T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolerance,
-                         const Truth<T> &sought)
+Solved<M, T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolerance,
+                             const Truth<T> &sought)
 {
   constexpr int LONGEST = 12;
   Truth<T> found = sought & !sought, open = sought;
-  if (!any(open)) return found;
+  if (!any(open)) return {found, {}};
   auto at = equations.linearised(z);
   for (int n = 0; n < LONGEST; ++n) {
     const Vec<M, T> step = equations.step(at);
@@ -457,7 +501,7 @@ Truth<T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolera
     open = open & (norm_sq(next.residual) <= 0.8 * norm_sq(at.residual));
     at = next;
   }
-  return found;
+  return {found, at.jacobian};
 }
 
 }  // namespace detail

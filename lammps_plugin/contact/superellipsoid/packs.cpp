@@ -79,7 +79,7 @@ template <int D> FoundLanes<D> found_by_ellipsoids(const PairLanes<D> &pairs, Ve
 {
   const detail::ByNormalOfEllipsoids<D, Pack> equations(pairs.i, pairs.j, pairs.r);
   const Mask sought = pairs.near & (dot(pairs.r, n) < Pack(1.0));
-  const Mask found = detail::newton_in_lanes(equations, n, SHORT_STEP, sought);
+  const Mask found = detail::newton_in_lanes(equations, n, SHORT_STEP, sought).is_converged;
   return {equations.tangency(n), sought, found};
 }
 
@@ -93,7 +93,10 @@ FoundLanes<D> found_by(const PairLanes<D> &pairs, const Vec<D, Pack> &n)
   const Mask sought = pairs.near & (scale < Pack(1.0));
   const Equations equations(detail::TangencyProblem<D, Pack>::of(pairs.i, pairs.j, pairs.r));
   auto z = equations.start({scale, n, scale * h_i.gradient, scale * h_j.gradient});
-  const Mask found = detail::newton_in_lanes(equations, z, SHORT_STEP, sought);
+  const auto solved = detail::newton_in_lanes(equations, z, SHORT_STEP, sought);
+  Mask found = solved.is_converged;
+  if constexpr (Equations::MAY_BE_ILL_POSED)
+    found = found & Equations::is_well_posed(solved.jacobian);
   return {equations.tangency(z), sought, found};
 }
 
@@ -132,8 +135,9 @@ ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBl
   } else {
     of = found_from(pairs, begin(pairs, block, first));
     end(of.at.normal, pairs.near, block, first);
-    lanes.error = gap_of(detail::TangencyProblem<D, Pack>::of(pairs.i, pairs.j, pairs.r), of.at);
-    const Mask bounded = lanes.error <= Pack(TangencySearch<D, double>::GAP);
+    const Pack gap = gap_of(detail::TangencyProblem<D, Pack>::of(pairs.i, pairs.j, pairs.r), of.at);
+    const Mask bounded =
+        (gap <= Pack(TangencySearch<D, double>::GAP)) & is_far_below(gap, of.at.scale);
     lanes.alone = lanes.alone | (of.sought & !(of.found & bounded));
   }
   lanes.touching = (of.found & (of.at.scale < Pack(1.0))) | lanes.alone;

@@ -153,7 +153,7 @@ template <class T> class Exponent {
   static int halves_in(T exponent)
   {
     const T twice = 2 * exponent;
-    return twice == std::floor(twice) && exponent <= T(32) ? static_cast<int>(twice) : -1;
+    return twice == floor(twice) && exponent <= T(32) ? static_cast<int>(twice) : -1;
   }
 
   template <class S> static S product(const S &x, int times)

@@ -5,12 +5,14 @@
 #include "contact/instruction_set.hpp"
 #include "contact/math/vec.hpp"
 #include "contact/packs.hpp"
+#include "contact/superellipsoid/errors.hpp"
 #include "contact/superellipsoid/shape.hpp"
 #include "contact/superellipsoid/tangency.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 
 namespace jamshape {
 
@@ -57,8 +59,9 @@ template <int D, class S> struct TangencyLoad {
 /// laws; as distance reach times x, so that 1 - distance / reach is the overlap. For two spheres of
 /// contact distance d the distance is r / 2, and reach d / 2 where they touch.
 ///
-/// Where two faces lie on each other, the scale hardly depends on the point of tangency: a relative
-/// error of it, `error`, leaves lever arms open by error^(1/2p) of the semi-axes.
+/// Where two faces lie on each other, the scale hardly depends on the point of tangency, and where
+/// two tips do, hardly on the normal: a small gap between the bounds of the scale says nothing of
+/// these (see errors.hpp).
 template <int D, class S> class SuperellipsoidContact {
  public:
   using Found = Contact<D, S, 1>;
@@ -98,6 +101,13 @@ template <int D, class S> class SuperellipsoidContact {
       return touching(tangency_of_spheres(r, i.semi_axes[0], j.semi_axes[0]), T(0));
     const FoundTangency<D, T> found = find_tangency(last);
     if (last != nullptr) *last = found.at.normal;
+    Found contact = contact_at(found);
+    if constexpr (std::is_same_v<T, double>) contact.needs_digits = needs_digits(found);
+    return contact;
+  }
+
+  Found contact_at(const FoundTangency<D, T> &found) const
+  {
     if (found.is_apart) return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::APART);
     if (!(found.gap < T(USELESS)))
       return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::UNCONVERGED);
@@ -139,7 +149,7 @@ template <int D, class S> class SuperellipsoidContact {
     const S steepness = norm(load.gradient), reach = T(1) / steepness;
     Found contact = without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::TOUCHING);
     contact.n_bonds = 1;
-    contact.error = static_cast<double>(gap);
+    contact.gap = static_cast<double>(gap);
     contact.energy = load.energy;
     contact.force = load.force;
     contact.torque_i = load.torque_i;
@@ -336,7 +346,11 @@ bool are_overlapping(const SuperellipsoidBody<D> &i, const SuperellipsoidBody<D>
   const double distance_sq = norm_sq(r), bounding = i.bounding_radius + j.bounding_radius;
   if (distance_sq >= bounding * bounding) return false;
   if (distance_sq <= COINCIDENT * bounding * COINCIDENT * bounding) return true;
-  return TangencySearch<D, double>(i, j, {r, true, nullptr}).is_overlap();
+  const auto found = TangencySearch<D, double>(i, j, {r, true, nullptr}).is_overlap();
+  if (found.has_value()) return *found;
+  using Long = long double;
+  const TangencyWish<D, Long> wish{plain<Long>(i.centre) - plain<Long>(j.centre), false, nullptr};
+  return tangency_of(plain<Long>(i), plain<Long>(j), wish).at.scale < 1;
 }
 
 }  // namespace jamshape

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 namespace jamshape {
@@ -15,14 +16,40 @@ namespace jamshape {
 /// A step of Newton's method that is shorter than this part of the unknowns is the last.
 inline constexpr double SHORT_STEP = 1e-9;
 
+/// The same in a scalar of more digits: the error that such a step leaves, its square, is below
+/// these.
+template <class T> constexpr double short_step()
+{
+  constexpr int DIGITS = std::numeric_limits<T>::digits;
+  return DIGITS <= 53 ? SHORT_STEP : DIGITS <= 64 ? 1e-11 : 1e-18;
+}
+
 /// A tangency found by iteration: eta lies in scale (1 +- gap), whatever the iteration did.
 template <int D, class T> struct FoundTangency {
   Tangency<D, T> at;
   T gap;
   int iterations;
   bool is_fallback;
-  bool is_apart;  // decided by a separating plane; the tangency was not sought then
+  bool is_apart;    // decided by a separating plane; the tangency was not sought then
+  bool is_settled;  // the iteration converged, its bounds meet, and its equations have one solution
 };
+
+/// A gap between bounds of the scale that is larger than this part of the overlap is no longer far
+/// below it.
+inline constexpr double FAR_BELOW = 1e-3;
+
+/// Whether an overlap of two bounds, 1 - scale^2, has its leading digits.
+template <class T> Truth<T> is_far_below(const T &gap, const T &scale)
+{
+  return gap <= T(FAR_BELOW) * abs((T(1.0) - scale) * (T(1.0) + scale));
+}
+
+/// Whether doubles are too short to say if two bodies touch, and with which force.
+template <int D> bool needs_digits(const FoundTangency<D, double> &found)
+{
+  if (found.is_apart || found.at.scale * (1.0 - found.gap) >= 1.0) return false;
+  return !found.is_settled || !is_far_below(found.gap, found.at.scale);
+}
 
 /// What is asked of a pair: r = x_i - x_j, whether "apart" is answer enough where a plane divides
 /// the bodies, a normal to begin with (or null), and whether ellipsoids may take their own path.
@@ -94,22 +121,18 @@ template <int D, class T> class TangencySearch {
     if (are_ellipsoids()) {
       const detail::ByNormalOfEllipsoids<D, T> ellipsoids(i, j, r);
       found = of_ellipsoids(ellipsoids, ellipsoids.scaled(n));
-      return found.gap <= GAP ? found : find();
+      return found.is_settled ? found : find();
     }
     if (may_stop_apart && separates(n)) return apart(found, n);
     const auto h_i = Norm::support(i).at(n), h_j = Norm::support(j).at(n);
     const T scale = dot(r, n) / (h_i.value + h_j.value);
     found.at = {scale, n, scale * h_i.gradient, scale * h_j.gradient};
-    if (to_own_exponents(found, 1.0)) {
-      certify(found);
-      if (found.gap <= GAP) return ordered(found);
-    }
-    return find();
+    return is_found(found, 1.0) ? ordered(found) : find();
   }
 
-  /// Whether the scale is below 1; a point inside both bodies ends it early, as a plane between
-  /// them.
-  bool is_overlap() const
+  /// Whether the scale is below 1, or nothing where doubles are too short to say; a point inside
+  /// both bodies ends it early, as a plane between them.
+  std::optional<bool> is_overlap() const
   {
     FoundTangency<D, T> found{};
     const detail::ByNormalOfEllipsoids<D, T> ellipsoids(i, j, r);
@@ -119,9 +142,11 @@ template <int D, class T> class TangencySearch {
     if (reach_of(found.at.point_i) < 1) return true;
     if (separates(n)) return false;
     if (are_ellipsoids()) {
-      return of_ellipsoids(ellipsoids, ellipsoids.scaled(n)).at.scale < 1;
+      found = of_ellipsoids(ellipsoids, ellipsoids.scaled(n));
+    } else {
+      follow(found);
     }
-    follow(found);
+    if (needs_digits(found)) return std::nullopt;
     return found.at.scale < 1;
   }
 
@@ -130,16 +155,15 @@ template <int D, class T> class TangencySearch {
   bool improve(FoundTangency<D, T> &found) const
   {
     found = ordered(found);
-    const bool is_improved = to_own_exponents(found, 1.0);
-    if (is_improved) certify(found);
+    const bool is_improved = is_found(found, 1.0);
     found = ordered(found);
-    return is_improved && found.gap <= GAP;
+    return is_improved;
   }
 
   void certify(FoundTangency<D, T> &found) const
   {
     const T gap = gap_of(detail::TangencyProblem<D, T>::of(i, j, r), found.at);
-    const bool is_bound = std::isfinite(gap) && found.at.scale > T(0);
+    const bool is_bound = isfinite(gap) && found.at.scale > T(0);
     found.gap = is_bound ? gap : std::numeric_limits<T>::infinity();
   }
 
@@ -148,11 +172,11 @@ template <int D, class T> class TangencySearch {
   bool may_stop_apart, shortcuts, is_swapped;
   const Body &i, &j;  // a body with p > 1 comes first
 
-  static constexpr T TOLERANCE = sizeof(T) > 8 ? T(1e-11) : T(SHORT_STEP);
+  static constexpr T TOLERANCE = T(short_step<T>());
   static constexpr T ROUGH = T(1e-2);
   static constexpr double RATIOS[] = {3.0, 1.5};  // of exponents, stage to stage
-  static constexpr double BARRIERS[] = {1e-4,  1e-6,  1e-8,  1e-9,
-                                        1e-10, 1e-11, 1e-12, 1e-13};  // their last mu
+  static constexpr double BARRIERS[] = {1e-4,  1e-6,  1e-8,  1e-9,  1e-10, 1e-11, 1e-12, 1e-13,
+                                        1e-15, 1e-17, 1e-20, 1e-23, 1e-26, 1e-29};  // their last mu
 
   bool are_ellipsoids() const { return shortcuts && i.p == 1.0 && j.p == 1.0; }
 
@@ -165,6 +189,7 @@ template <int D, class T> class TangencySearch {
     newton(ellipsoids, n, TOLERANCE, found.iterations);
     found.at = ellipsoids.tangency(n);
     certify(found);
+    found.is_settled = found.gap <= GAP;
     return found;
   }
 
@@ -213,7 +238,7 @@ template <int D, class T> class TangencySearch {
     }
     detail::ConeBarrier<D, T> barrier(i, j, r);
     for (const double mu : BARRIERS) {
-      if (sizeof(T) > 8 && best.gap <= T(TangencySearch<D, double>::GAP)) break;  // no closer then
+      if (T(mu) < 50 * std::numeric_limits<T>::epsilon()) break;
       barrier.follow(T(mu), found.iterations);
       found.at = barrier.tangency();
       bound(found);
@@ -223,6 +248,7 @@ template <int D, class T> class TangencySearch {
     }
     found.at = best.at;
     found.gap = best.gap;
+    found.is_settled = false;
   }
 
   bool is_found(FoundTangency<D, T> &found, double ratio) const
@@ -263,8 +289,13 @@ template <int D, class T> class TangencySearch {
           detail::TangencyProblem<D, T>{i, j, r, stage < last ? between(e_i, share) : e_i,
                                         stage < last ? between(e_j, share) : e_j});
       if (stage == 1) z = equations.start(found.at);
-      is_converged = newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations);
-      if (stage == last) found.at = equations.tangency(z);
+      auto solved = newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations);
+      is_converged = solved.is_converged;
+      if (stage < last) continue;
+      found.at = equations.tangency(z);
+      found.is_settled = is_converged;
+      if constexpr (Equations::MAY_BE_ILL_POSED)
+        found.is_settled = is_converged && Equations::is_well_posed(solved.jacobian);
     }
     return is_converged;
   }
@@ -272,8 +303,8 @@ template <int D, class T> class TangencySearch {
   /// Whole powers cost no logarithm.
   static T between(T exponent, T share)
   {
-    const T power = std::pow(exponent, share);
-    return exponent > 4 && share < 1 && std::round(power) > 1 ? std::round(power) : power;
+    const T power = pow(exponent, share);
+    return exponent > 4 && share < 1 && round(power) > 1 ? round(power) : power;
   }
 };
 
@@ -323,8 +354,8 @@ FoundTangency<D, long double> tangency_of(const SuperellipsoidBody<D, long doubl
   const SuperellipsoidBody<D, double> short_i = plain<double>(i), short_j = plain<double>(j);
   const auto begun =
       tangency_of(short_i, short_j, TangencyWish<D, double>{plain<double>(wish.r), false, nullptr});
-  FoundTangency<D, long double> found{plain<long double>(begun.at), begun.gap, begun.iterations,
-                                      begun.is_fallback, false};
+  FoundTangency<D, long double> found{
+      plain<long double>(begun.at), begun.gap, begun.iterations, begun.is_fallback, false, false};
   const TangencySearch<D, long double> search(i, j, wish);
   return search.improve(found) ? found : search.find();
 }

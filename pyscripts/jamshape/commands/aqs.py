@@ -5,7 +5,8 @@
 Starts from the last frame of a packing or run file (--start), or compresses a random packing to --phi by such steps, too.
 The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the stress at
 the end, the modulus of the first step, averages over the steady state, and the drops of the stress, each with the strain and the
-stress before it, and the energy over the volume that is lost. Needs no LAMMPS. Run again after a kill, it goes on; a finished run is left alone.
+stress before it, and the energy over the volume that is lost. not_at_rest counts rows in which forces do not balance to
+--tolerance; the exit code is 0 only if there is none. Needs no LAMMPS. Run again after a kill, it goes on; a finished run is left alone.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.checks import RANGES, require_in
-from jamshape.command import add_numbers, parser_of, report
+from jamshape.command import add_numbers, parser_of, report, typed
 from jamshape.flow.shear import FLOWS
 from jamshape.front.run import QuasistaticShearFile
 from jamshape.front.shearing import quasistatic_shear
-from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
+from jamshape.shapes.command_line import add_particle_options, particles_beside
 
 GO_ON = "the same command goes on from the last frame"
 
@@ -56,12 +57,12 @@ def main(options: Namespace) -> None:
     )
     names = ("n", "dimension", "phi", "step", "strain", "flow", "pressure", "tolerance", "seed",
              "start", "frames", "again")  # fmt: skip
-    given = {name: getattr(options, name) for name in names}
-    particles = particles_of(options) if are_particles_given(options) or not options.start else None
-    run = quasistatic_shear(particles, **given, file=options.out)
+    given = typed(options, *names)
+    run = quasistatic_shear(particles_beside(options), **given, file=options.out)
     at_end = ("strain", "phi", "stress", "pressure", "sigma", "mu", "z")
     found = {name: float(run[name][-1]) for name in at_end}
     events = run.events(options.least_drop)
+    found |= {"not_at_rest": int((~run.at_rest).sum())}
     found = {"out": options.out, **found, "modulus": run.modulus(), **_steady(run)}
     report(found | {"events": events})
 

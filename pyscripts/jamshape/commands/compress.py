@@ -5,24 +5,41 @@
 At the end frames are minimised: p(phi) of a flow rises, too, and its onset phi_J(kappa) is that of jamming only
 where states stay jammed when nothing drives them; --no-minimising leaves that out. A sentence says so, and the last
 line of standard output is one JSON object. With --resume a killed run goes on from its
-last restart file, with the settings it began with, and a finished one is left alone. A file that is
+last restart file, with the settings it began with, and a finished one is left alone; other settings are refused. A file that is
 there is replaced only with --again.
 """
 
 from __future__ import annotations
 
+import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from jamshape.checks import require_free
-from jamshape.command import add_numbers, parser_of, report
+from jamshape.checks import ArgumentError, require_free
+from jamshape.command import add_numbers, parser_of, report, typed
 from jamshape.commands.onset import add_onset_options, tell_onset
+from jamshape.files.h5md import read_attributes, read_style
 from jamshape.flow.recording import summary_of
-from jamshape.front.compressing import compress
+from jamshape.front.compressing import PHI, compress
 from jamshape.front.recorded import resume
-from jamshape.shapes.command_line import add_particle_options, particles_of
+from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
 
 GO_ON = "the same command with --resume goes on from the last restart file"
+
+_SETTINGS = (
+    "n",
+    "dimension",
+    "kappa",
+    "seed",
+    "integrator",
+    "dt",
+    "tolerance",
+    "sides",
+    "rows",
+    "frames",
+)
+
+_SAME = 1e-6  # the packing fraction of a start is as asked for to rounding
 
 
 def options_of() -> ArgumentParser:
@@ -55,13 +72,36 @@ def options_of() -> ArgumentParser:
 
 def main(options: Namespace) -> None:
     """Compress, or go on, and report."""
-    if options.resume and options.out.exists():
+    if options.resume:
+        _require_same(options)
         resume(options.out)
     else:
         require_free(options.out, again=options.again, go_on="--resume to go on with it, ")
-        names = ("n", "dimension", "kappa", "seed", "integrator", "dt", "tolerance", "sides")
-        given = {name: getattr(options, name) for name in (*names, "rows", "frames")}
-        phi = (options.phi_start, options.phi_end)
+        usual = {"phi_start": PHI[0], "phi_end": PHI[1]} | typed(options, "phi_start", "phi_end")
+        phi = (usual["phi_start"], usual["phi_end"])
+        given = typed(options, *_SETTINGS)
         compress(particles_of(options), phi=phi, **given, file=options.out, again=options.again)
     tell_onset(options)
     report(summary_of(options.out))
+
+
+def _require_same(options: Namespace) -> None:
+    """Refuse to resume a run that is not there, or another one than was asked for.
+
+    Raises
+    ------
+    ArgumentError
+    """
+    if not options.out.exists():
+        said = "{file} is not there, expected the file of a run to resume; leave {resume} out to begin one"
+        raise ArgumentError(said, {"file": options.out, "resume": True})
+    stored = read_attributes(options.out)
+    asked = typed(options, *_SETTINGS, "phi_start", "phi_end")
+    if are_particles_given(options):
+        asked |= particles_of(options).told
+    for name, value in asked.items():
+        own = read_style(options.out)[1] if name == "dimension" else stored.get(name, value)
+        same = math.isclose(own, value, rel_tol=_SAME) if isinstance(value, float) else own == value
+        if not same:
+            said = f"{{{name}}} is not what the run in {{file}} has, {own}, expected the same; leave it out"
+            raise ArgumentError(said, {name: value, "file": options.out})

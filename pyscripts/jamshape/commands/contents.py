@@ -12,20 +12,23 @@ import numpy as np
 from jamshape.drawing.kinds import kinds_of
 from jamshape.exchange.gsd import read_gsd
 from jamshape.files.h5md import (
+    FileFormatError,
     count_frames,
     read_attributes,
     read_creator,
     read_format_version,
     read_observables,
+    read_origin,
     read_packing,
     read_report,
 )
 from jamshape.files.lammps_text import iter_dump, read_data
-from jamshape.files.sets import REACHED
-from jamshape.files.signature import DATA, DUMP, GSD, HDF5, RESTART, SIGNATURES, format_of
-from jamshape.front.packing import MeasuredPacking
+from jamshape.files.meaning import NOTHING, Wanted
+from jamshape.files.outcomes import is_reached, shortfall
+from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
+from jamshape.front.packing import MeasuredPacking, results_of
 from jamshape.packing import Packing
-from jamshape.vibration.sets import TOLD, of_packing
+from jamshape.vibration.sets import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
 _STATE = ("phi", "pressure", "u", "z", "rattlers")
@@ -49,6 +52,8 @@ _OTHER_COMMAND = "start the command that makes {result} again, which goes on fro
 # The first that fits.
 _STORED = (
     _Stored("search for an energy", "search_step", _OTHER_COMMAND),
+    _Stored("search for a strict minimum", "strict_search", _OTHER_COMMAND),
+    _Stored("second try of a packing", "retry_budget", _OTHER_COMMAND),
     _Stored("steps on the way to a packing", "loose_phi", _OTHER_COMMAND),
     _Stored("slow run", "flow_steps", _SAME_COMMAND),
     _Stored("compression on the way to a packing", "restart_step", _OTHER_COMMAND),
@@ -60,15 +65,17 @@ _STORED = (
 )
 
 # Of files beside a packing that is not made yet.
-_ENDS = (".search.h5", ".path.h5", ".run.h5")
+_ENDS = (".search.h5", ".path.h5", ".run.h5", ".strict.h5")
 
 
-def contents_of(path: Path) -> dict[str, Any]:
+def contents_of(path: Path, wanted: Wanted = NOTHING) -> dict[str, Any]:
     """Tell what is in a file.
 
     Parameters
     ----------
     path : Path
+    wanted : Wanted
+        Dimension and shape of a data or dump file that does not say them.
 
     Returns
     -------
@@ -85,8 +92,16 @@ def contents_of(path: Path) -> dict[str, Any]:
     OSError
         If it cannot be read.
     """
-    if tell := _READERS.get(format_of(path)):
-        return {"file": path, **tell(path)}
+    found = format_of(path)
+    if found in _TEXTS:
+        return {"file": path, **_TEXTS[found](path, wanted)}
+    if found in _READERS:
+        told = {"file": path, **_READERS[found](path)}
+        _require_told(told, wanted)
+        return told
+    if found in REFUSED:
+        msg = f"{path} {REFUSED[found]}"
+        raise FileFormatError(msg)
     msg = (
         f"{path} is no file that jamshape knows, expected a packing, a run or modes in HDF5, a data, dump"
         " or restart file of LAMMPS, or a GSD file"
@@ -103,14 +118,16 @@ def _particles(path: Path) -> dict[str, Any]:
     known, packing = read_attributes(path), read_packing(path)
     stored = next(one for one in _STORED if not one.mark or one.mark in known)
     found: dict[str, Any] = {"kind": stored.kind, **_of_packing(packing)}
-    found |= _state(packing, _measured(path, known), known)
+    is_changed = bool(known) and not results_of(path, packing)
+    found |= _state(packing, {} if is_changed else _measured(path, known))
     found |= _picked(known, _MADE) | {"finished": bool(known.get("finished", not stored.mark))}
     if "kappa" in found:
         found["kappa"] = np.ravel(found["kappa"])[-1].item()
     if "outcome" in known:
-        found["reached"] = known["outcome"] in REACHED
+        found |= {"reached": is_reached(known), "shortfall": shortfall(known) or None}
     found |= {"frames": count_frames(path), **_cost(path, known)}
     found |= {"format_version": read_format_version(path), "jamshape_version": read_creator(path)}
+    found |= {"origin": origin} if (origin := read_origin(path)) else {}
     if not found["finished"]:
         found["go_on"] = stored.go_on.format(path=path, result=_result_of(path))
     return found
@@ -127,6 +144,7 @@ def _of_packing(packing: Packing) -> dict[str, Any]:
         parameters, size = packing.shape.parameters_of(*row)
         rows.append({**parameters, "size": size, "count": int(own.sum())})
     found = {"shape": packing.shape_style, "dimension": packing.dimension, "n": packing.n}
+    found |= packing.law._asdict()
     found |= {"kinds": rows, "unit": packing.shape.unit, "box": packing.box.edges.tolist()}
     found |= {"tilt": packing.box.tilt.tolist()} if packing.box.is_tilted else {}
     return found | ({"step": packing.step, "time": packing.time} if packing.step else {})
@@ -144,13 +162,11 @@ def _rattlers(found: Mapping[str, Any], known: Mapping[str, Any]) -> int | None:
     return None if number is None else int(number)
 
 
-def _state(
-    packing: Packing, measured: Mapping[str, Any], known: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
+def _state(packing: Packing, measured: Mapping[str, Any]) -> dict[str, Any]:
     """Give the numbers of a state, those that are not stored from its contacts."""
     if all(name in measured for name in _STATE):
         return dict(measured)
-    of = MeasuredPacking.of(packing, known)
+    of = MeasuredPacking.of(packing)
     found = {"phi": of.phi, "pressure": of.pressure, "u": of.u, "z": of.z}
     return found | {"rattlers": int(of.rattlers.sum())} | dict(measured)
 
@@ -183,17 +199,25 @@ def _modes(table: ModeTable) -> dict[str, Any]:
     found |= _picked(own, ("n", "n_modes", "z", "pressure", "method", "wall_seconds"))
     found |= {"modes": len(table["eigenvalues"]), "rattlers": own["n"] - own["n_backbone"]}
     found |= {"error": own["residual"], "vectors": table.vectors.shape[1] > 0}
-    return found | {"bands": {name: len(table.in_band(name)) for name in TOLD}, "finished": True}
+    return found | {"bands": {name: count_of(table, name) for name in TOLD}, "finished": True}
 
 
-def _dump(path: Path) -> dict[str, Any]:
-    for frames, packing in enumerate(iter_dump(path), 1):
+def _require_told(told: Mapping[str, Any], wanted: Wanted) -> None:
+    """Refuse a dimension or shape that is not that of a file that says it."""
+    for name, asked in wanted._asdict().items():
+        if asked and told.get(name, asked) != asked:
+            msg = f"{told['file']} says {name} {told[name]}, expected --{name} to be the same; leave it out"
+            raise ValueError(msg)
+
+
+def _dump(path: Path, wanted: Wanted) -> dict[str, Any]:
+    for frames, packing in enumerate(iter_dump(path, *wanted), 1):
         last, count = packing, frames
     return _text("LAMMPS dump", last) | {"frames": count}
 
 
-def _data(path: Path) -> dict[str, Any]:
-    return _text("LAMMPS data file", read_data(path)) | {"frames": 1}
+def _data(path: Path, wanted: Wanted) -> dict[str, Any]:
+    return _text("LAMMPS data file", read_data(path, *wanted)) | {"frames": 1}
 
 
 def _gsd(path: Path) -> dict[str, Any]:
@@ -232,8 +256,7 @@ def _picked(known: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
 
 _READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
     HDF5: _hdf5,
-    DUMP: _dump,
     RESTART: _restart,
     GSD: _gsd,
-    DATA: _data,
 }
+_TEXTS: dict[str, Callable[[Path, Wanted], dict[str, Any]]] = {DUMP: _dump, DATA: _data}

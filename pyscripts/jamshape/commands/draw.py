@@ -18,13 +18,23 @@ from pathlib import Path
 
 import numpy as np
 
-from jamshape.checks import Range, require_in, require_other_file, require_stated
-from jamshape.command import parser_of, report
+from jamshape.checks import (
+    ArgumentError,
+    Range,
+    require_in,
+    require_other_file,
+    require_stated,
+)
+from jamshape.command import parser_of, report, typed
 from jamshape.drawing.colors import CHOICES
 from jamshape.drawing.packing import Look
 from jamshape.drawing.pictures import draw_pictures, read_picture, save_pictures
+from jamshape.files.meaning import Wanted
+from jamshape.shapes.command_line import add_meaning_options
 
 _ANGLE = Range(-360.0, 360.0, "degrees")
+
+_HEIGHT, _TURN = 22, -58  # where nobody says others
 
 
 def options_of() -> ArgumentParser:
@@ -37,25 +47,38 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--color", choices=CHOICES, default="kind", help="by what (%(default)s)")
     sides = "points of a side-to-side contact; auto: as the file says, or else 2 (auto)"
     parser.add_argument("--sides", choices=("auto", "1", "2"), default="auto", help=sides)
-    up, around = "of the eye in space, degrees (%(default)s)", "of it about z (%(default)s)"
-    parser.add_argument("--height", type=float, default=22, help=up)
-    parser.add_argument("--turn", type=float, default=-58, help=around)
+    up, around = f"of the eye in space, degrees ({_HEIGHT})", f"of it about z ({_TURN})"
+    parser.add_argument("--height", type=float, help=up)
+    parser.add_argument("--turn", type=float, help=around)
     finer = "of meshes in space, 1 to 4; each makes four triangles of one (3, or 2 for many)"
     parser.add_argument("--level", type=int, choices=range(1, 5), help=finer)
     parser.add_argument("--dpi", type=int, default=200, help="dots per inch (%(default)s)")
+    add_meaning_options(parser)
     return parser
+
+
+def _look(options: Namespace, *, in_space: bool) -> Look:
+    """Read how packings are to look, and refuse what has no effect in the plane."""
+    asked = typed(options, "height", "turn", "level")
+    if asked and not in_space:
+        name, value = next(iter(asked.items()))
+        said = f"{{{name}}} has no effect in the plane, expected a packing in space; leave it out"
+        raise ArgumentError(said, {name: value})
+    asked = {"height": _HEIGHT, "turn": _TURN, "level": 0} | asked
+    return Look(options.color, asked["height"], asked["turn"], asked["level"])
 
 
 def main(options: Namespace) -> None:
     """Read, find the contacts, draw, report."""
     require_other_file(options.out, options.files)
     require_stated(dpi=options.dpi)
-    for name in ("height", "turn"):
-        require_in(f"--{name}", getattr(options, name), _ANGLE)
+    for name, value in typed(options, "height", "turn").items():
+        require_in(f"--{name}", value, _ANGLE)
     sides = None if options.sides == "auto" else int(options.sides)
     how = options.frame, sides, options.color
-    pictures = [read_picture(path, *how) for path in options.files]
-    look = Look(options.color, options.height, options.turn, options.level or 0)
+    wanted = Wanted(options.dimension, options.shape)
+    pictures = [read_picture(path, *how, wanted) for path in options.files]
+    look = _look(options, in_space=any(row.report["dimension"] == 3 for row in pictures))
     figure, colored = draw_pictures(pictures, look)
     save_pictures(figure, pictures, options.out, options.dpi)
     rows = [one.report for one in pictures]

@@ -24,13 +24,15 @@ from jamshape.exchange.mdanalysis import write_mdanalysis
 from jamshape.exchange.ovito import to_ovito
 from jamshape.exchange.tools import tool
 from jamshape.files.disk import replacing
-from jamshape.files.h5md import write_run
+from jamshape.files.h5md import write_packing, write_run
 from jamshape.files.lammps_text import read_dump, write_data
+from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.files.signature import DUMP, format_of
 from jamshape.front.files import load
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.run import RunFile
+from jamshape.front.run import Recorded
 from jamshape.packing import Packing
+from jamshape.shapes.command_line import add_meaning_options
 
 _PICTURES = {".png", ".pdf", ".svg", ".jpg"}
 
@@ -61,7 +63,7 @@ def _write_h5(path: Path, packings: Sequence[Packing]) -> None:
     if others:
         write_run(path, packings, measured.to_store)
     else:
-        measured.save(path)
+        write_packing(path, first, measured.to_store)
 
 
 def _write_data(path: Path, packings: Sequence[Packing]) -> None:
@@ -93,6 +95,7 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--out", type=Path, required=True, help="file to write")
     parser.add_argument("--frame", type=int, help="one frame, negative: from the end (all)")
     parser.add_argument("--again", action="store_true", help="replace an H5MD file that is there")
+    add_meaning_options(parser)
     return parser
 
 
@@ -104,7 +107,7 @@ def main(options: Namespace) -> None:
     require_free(options.out, again=options.again or name != "h5")
     chosen = FORMATS[name]
     frame = -1 if options.frame is None and not chosen.holds_many else options.frame
-    packings = frames_of(options.file, frame)
+    packings = frames_of(options.file, frame, Wanted(options.dimension, options.shape))
     options.out.parent.mkdir(parents=True, exist_ok=True)
     chosen.write(options.out, packings)
     last = packings[-1]
@@ -112,7 +115,7 @@ def main(options: Namespace) -> None:
     report({"out": options.out, "to": name, "frames": len(packings), **told})
 
 
-def frames_of(path: Path, frame: int | None) -> Sequence[Packing]:
+def frames_of(path: Path, frame: int | None, wanted: Wanted = NOTHING) -> Sequence[Packing]:
     """Read one frame of a file, or all.
 
     Raises
@@ -122,11 +125,13 @@ def frames_of(path: Path, frame: int | None) -> Sequence[Packing]:
     ValueError
         If there is no such frame, or it holds modes.
     """
-    found = load(path, frame)
-    if isinstance(found, RunFile):
+    if frame is None and format_of(path) == DUMP:
+        return read_dump(path, *wanted)
+    found = load(path, frame, **wanted._asdict())
+    if isinstance(found, Recorded):
         return list(found)
     if isinstance(found, Packing):
-        return read_dump(path) if frame is None and format_of(path) == DUMP else [found]
+        return [found]
     msg = f"{path} holds modes, expected a packing or a run"
     raise ValueError(msg)
 

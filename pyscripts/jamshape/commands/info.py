@@ -15,6 +15,8 @@ from typing import Any
 
 from jamshape.command import parser_of, report
 from jamshape.commands.contents import contents_of
+from jamshape.files.meaning import Wanted
+from jamshape.shapes.command_line import add_meaning_options
 
 # Lines of what is known; each part is said where its number is there.
 _LINES = {
@@ -48,6 +50,8 @@ _LINES = {
         "jamshape {jamshape_version}",
         "format {format_version}",
     ),
+    "not reached": ("{shortfall}",),
+    "made on": ("{origin}",),
     "go on with": ("{go_on}",),
 }
 
@@ -59,12 +63,13 @@ def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_of(__doc__)
     parser.add_argument("file", type=Path, metavar="FILE", help="any file of jamshape or LAMMPS")
+    add_meaning_options(parser)
     return parser
 
 
 def main(options: Namespace) -> None:
     """Read, tell, report."""
-    found = contents_of(options.file)
+    found = contents_of(options.file, Wanted(options.dimension, options.shape))
     print(f"{options.file}: {_title(found)}")
     for line in lines_of(found):
         print(f"  {line}")
@@ -83,7 +88,9 @@ def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
     if found.get("kinds"):
         known["kinds_text"] = "; ".join(_kind(kind, found["unit"]) for kind in found["kinds"])
     if "bands" in found:
-        known["bands_text"] = ", ".join(f"{count} {name}" for name, count in found["bands"].items())
+        counts = {name: count for name, count in found["bands"].items() if count is not None}
+        told = ", ".join(f"{count} {name}" for name, count in counts.items())
+        known["bands_text"] = told or "no bands"
     for subject, parts in _LINES.items():
         said = [text for text in (_filled(part, known) for part in parts) if text]
         if said:

@@ -26,7 +26,7 @@ from jamshape.front.modes import modes, require_modes_file
 from jamshape.vibration.sets import TOLD
 from jamshape.vibration.spectrum import METHODS
 from jamshape.vibration.statistics import Redundancy, redundancies
-from jamshape.vibration.table import BANDS, ModeTable
+from jamshape.vibration.table import BANDS, MODULI, ModeTable
 
 SHOWN = 12  # modes of the printed table
 KINDS = ("rotation", "parallel", "perpendicular")
@@ -37,7 +37,8 @@ def options_of() -> ArgumentParser:
     parser = parser_of(__doc__, "modes.h5")
     parser.add_argument("packing", type=Path, metavar="PACKING.h5")
     parser.add_argument("--plot", type=Path, help="D(omega), participation and kinds of motion")
-    parser.add_argument("--method", choices=[*METHODS, "sparse"], default="projected")
+    usual = "(projected; sparse with --lowest and --near)"
+    parser.add_argument("--method", choices=[*METHODS, "sparse"], help=usual)
     parser.add_argument("--lowest", type=int, metavar="K", help="only the K softest, sparse")
     parser.add_argument("--near", type=float, metavar="OMEGA", help="K modes near it instead")
     counts = "what a radian counts for (%(default)s)"
@@ -53,17 +54,20 @@ def options_of() -> ArgumentParser:
 
 
 def summary_of(table: ModeTable) -> dict[str, Any]:
-    """Count the bands and average their frequencies; unstable modes are counted, not averaged."""
-    found: dict[str, Any] = {}
-    for name in TOLD:
+    """Count the bands and average their frequencies: of modes that are stable beyond doubt.
+
+    None for bands that are not apart from each other.
+    """
+    found: dict[str, Any] = dict.fromkeys(TOLD)
+    for name in filter(table.has_band, TOLD):
         rows = table.in_band(name)
         omega, sign = table["omega"][rows], table["sign"][rows]
         found[name] = {
             "modes": len(rows),
-            "fraction": len(rows) / table.attributes["n_modes"],
+            "fraction": len(rows) / max(table.n_vibrational, 1),
             "negative": int((sign < 0).sum()),
             "unsure": int((sign == 0).sum()),
-            "mean_omega": omega[omega > 0].mean() if (omega > 0).any() else None,
+            "mean_omega": omega[sign > 0].mean() if (sign > 0).any() else None,
             **{kind: table[kind][rows].mean() if len(rows) else None for kind in KINDS},
         }
     return found
@@ -79,24 +83,48 @@ def show(table: ModeTable, bands: dict[str, Any]) -> None:
     )
     if "rank" in a:
         show_bands(table, bands)
+    if "why_no_bands" in a:
+        print(a["why_no_bands"])
     print("lambda          sign  bound     of state  P       par.   perp.  rot.   band")
     for k in np.flatnonzero(~table["is_translation"])[:SHOWN]:
         kinds = " ".join(f"{table[n][k]:6.3f}" for n in ("parallel", "perpendicular", "rotation"))
         errors = f"{table.bound[k]:.2e}  {table['state_error'][k]:.2e}"
         start = f"{table['eigenvalues'][k]:14.6e} {table['sign'][k]:4d}  {errors}"
         print(f"{start}  {table['participation'][k]:.4f} {kinds}  {BANDS[table['band'][k]]}")
-    keys = ("bulk_modulus", "pure_shear_modulus", "simple_shear_modulus", "pressure")
-    print(", ".join(f"{key.replace('_', ' ')} {a[key]:.5g}" for key in keys))
+    show_moduli(table)
+
+
+def show_moduli(table: ModeTable) -> None:
+    """Print moduli with their bounds."""
+    found = table.moduli
+    if found.n_floppy:
+        print(f"floppy modes, left out of moduli: {found.n_floppy}")
+    if found.n_unsettled:
+        print(f"modes along which the packing has not settled, left out too: {found.n_unsettled}")
+    if found.n_negative:
+        print(
+            f"a saddle, with {found.n_negative} negative eigenvalues: moduli hold as long as it stays"
+        )
+    for name in MODULI:
+        modulus = getattr(found, name)
+        defined = math.isfinite(modulus.relaxed)
+        bound = f" +- {modulus.bound:.2g}" if math.isfinite(modulus.bound) else ""
+        value = f"{modulus.relaxed:.8g}{bound}" if defined else "not defined"
+        why = f": {modulus.reason}" if modulus.reason else ""
+        print(f"{name.replace('_', ' ')} modulus {value}{why}")
+    print(f"pressure {found.pressure:.8g}")
 
 
 def show_bands(table: ModeTable, bands: dict[str, Any]) -> None:
-    """Print the counts of a whole spectrum, beside those that are expected."""
+    """Print the counts of a whole spectrum, beside those that are expected; fractions are of all modes but translations."""
     a = table.attributes
     print(f"rank of H {a['rank']} = N_c - {a['n_self_stress']}; N z / 2 = {a['high_expected']:g}")
     print(f"modes below: {a['n_floppy']} and {a['n_translations']} translations;", end=" ")
     print(f"N (z_iso - z) / 2 = {a['low_expected']:g}; {a['n_grazing']} bonds only graze")
     print("band      modes  fraction  negative  unsure  mean omega")
     for name, b in bands.items():
+        if b is None:
+            continue
         omega = math.nan if b["mean_omega"] is None else b["mean_omega"]
         row = f"{name:8} {b['modes']:6} {b['fraction']:9.5f} {b['negative']:9} {b['unsure']:7}"
         print(f"{row} {omega:11.4g}")

@@ -11,8 +11,8 @@ density u0. --way takes slow compression in LAMMPS or equal steps instead; --pro
 paper's numbers: marschall-2018 by a compression at one rate and the energy of Sec. III C, yuan-2019-1 and
 yuan-2019-2 by the steps of Sec. 2.2.
 
-The last line of standard output is one JSON object; the exit code is 0 only if the minimum was
-reached. Beside the result lies, until it is done, all that is needed to go on: a run that was killed does
+The last line of standard output is one JSON object; the exit code is 0 only if forces balance to --tolerance. Where they
+do not at first, there is a second try, as long as the first one. Beside the result lies, until it is done, all that is needed to go on: a run that was killed does
 so when started again.
 """
 
@@ -23,8 +23,9 @@ from pathlib import Path
 
 from jamshape.command import parser_of, report
 from jamshape.front.making import make_packing
-from jamshape.protocols.command_line import add_recipe_options, asked_particles, settings_of
+from jamshape.protocols.command_line import add_recipe_options, settings_of
 from jamshape.protocols.make import summary_of
+from jamshape.shapes.command_line import particles_beside
 
 GO_ON = "the same command goes on from the files beside the result"
 
@@ -45,9 +46,9 @@ def main(options: Namespace) -> int:
     """Make the packing unless it is there; return the exit code."""
     settings = settings_of(options)
     make_packing(
-        asked_particles(options), **settings, threads=options.threads, file=options.out,
+        particles_beside(options), **settings, threads=options.threads, file=options.out,
         again=options.again,
     )  # fmt: skip
     found = summary_of(options.out)
     report(found)
-    return 0 if found["reached"] else 1
+    return 0 if found["reached"] else 1  # a warning has said so

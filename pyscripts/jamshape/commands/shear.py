@@ -15,13 +15,13 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from jamshape.checks import RANGES, require_in
-from jamshape.command import add_numbers, parser_of, report
+from jamshape.command import add_numbers, parser_of, report, typed
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.motion import INTEGRATORS
 from jamshape.flow.shear import FLOWS
 from jamshape.front.shearing import shear
 from jamshape.measures.shears import shear_report
-from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
+from jamshape.shapes.command_line import add_particle_options, particles_beside
 
 GO_ON = "the same command goes on from the last restart file"
 
@@ -62,7 +62,6 @@ def main(options: Namespace) -> None:
         require_in("--after", options.after, RANGES["strain"]._replace(also=(0.0,)))
     names = ("n", "dimension", "phi", "gdot", "strain", "flow", "seed", "start", "sides",
              "integrator", "dt", "tolerance", "rows", "frames", "again")  # fmt: skip
-    given = {name: getattr(options, name) for name in names}
-    particles = particles_of(options) if are_particles_given(options) or not options.start else None
-    shear(particles, **given, file=options.out)
+    given = typed(options, *names)
+    shear(particles_beside(options), **given, file=options.out)
     report(shear_report(options.out, options.after))

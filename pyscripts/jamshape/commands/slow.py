@@ -13,19 +13,26 @@ from __future__ import annotations
 import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import Any
 
-from jamshape.checks import RANGES, Range, require_in
-from jamshape.command import add_numbers, parser_of, report
+from jamshape.checks import (
+    RANGES,
+    ArgumentError,
+    require_in,
+    require_no_effect,
+    require_with,
+)
+from jamshape.command import add_numbers, parser_of, report, typed
 from jamshape.commands.onset import add_onset_options, tell_onset
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.slow_recording import summary_of
 from jamshape.front.compressing import slow_compress
-from jamshape.shapes.command_line import add_particle_options, particles_of
+from jamshape.shapes.command_line import add_particle_options, particles_beside
 
 GO_ON = "the same command goes on from the last frame"
 
 
-_PHI_SLOW = Range(1e-6, 2.0, "a packing fraction", also=(0.0,))
+_PHI_END, _KAPPA, _KAPPA_BEFORE = 0.9, 1e-8, 1e-6  # where nobody says others
 
 
 def options_of() -> ArgumentParser:
@@ -35,11 +42,11 @@ def options_of() -> ArgumentParser:
     add_numbers(
         parser,
         ("--n", 256, "particles"),
-        ("--kappa", 1e-8, "compression rate"),
+        ("--kappa", _KAPPA, "compression rate"),
         ("--phi-start", 0.8, "packing fraction where the fast compression ends"),
         ("--phi-slow", 0.0, "packing fraction from which --kappa holds; before it --kappa-before"),
-        ("--kappa-before", 1e-6, "compression rate up to --phi-slow"),
-        ("--phi-end", 0.9, "packing fraction to reach"),
+        ("--kappa-before", _KAPPA_BEFORE, "compression rate up to --phi-slow"),
+        ("--phi-end", _PHI_END, "packing fraction to reach"),
         ("--p-end", math.inf, "pressure to reach"),
         ("--seed", 1, "of the random start"),
         ("--tolerance", 1e-3, "local error of a step over the typical overlap"),
@@ -52,15 +59,29 @@ def options_of() -> ArgumentParser:
     return parser
 
 
+def _rates(options: Namespace) -> dict[str, Any]:
+    """Read the rate, or the packing fraction from which it holds and the one before."""
+    slow, before = options.phi_slow or None, options.kappa_before
+    require_with("phi_slow", slow, kappa_before=before)
+    if slow is None:
+        return typed(options, "kappa")
+    require_in("--phi-slow", slow, RANGES["phi"])
+    kappa = _KAPPA if options.kappa is None else options.kappa
+    before = _KAPPA_BEFORE if before is None else before
+    require_in("--kappa-before", before, RANGES["kappa"])
+    if slow >= (_PHI_END if options.phi_end is None else options.phi_end):
+        said = "{phi_slow} is not below {phi_end:name}, so that the rate from there on has no effect, expected a smaller one"
+        raise ArgumentError(said, {"phi_slow": slow, "phi_end": None})
+    return {"kappa": ((0.0, before), (slow, kappa))}
+
+
 def main(options: Namespace) -> None:
     """Begin, or go on; a finished run is left alone."""
-    require_in("--phi-slow", options.phi_slow, _PHI_SLOW)
-    require_in("--kappa-before", options.kappa_before, RANGES["kappa"])
+    require_no_effect("start", options.start, phi_start=options.phi_start)
     names = ("n", "p_end", "seed", "start", "method", "tolerance", "largest_drop")
-    given = {name: getattr(options, name) for name in names}
-    slowly = (options.phi_slow, options.kappa)
-    kappa = ((0.0, options.kappa_before), slowly) if options.phi_slow else options.kappa
-    phi = (options.phi_start, options.phi_end)
-    slow_compress(particles_of(options), phi=phi, kappa=kappa, **given, file=options.out)
+    given = typed(options, *names) | _rates(options)
+    phi_end = _PHI_END if options.phi_end is None else options.phi_end
+    phi = (options.phi_start, phi_end)
+    slow_compress(particles_beside(options), phi=phi, **given, file=options.out)
     tell_onset(options)
     report(summary_of(options.out))

@@ -7,8 +7,9 @@
 
 Each sample is one run of `jamshape pack` in a process of its own, one a core, which ends with the sweep,
 however that ends. Started again after a kill it goes on: packings that are there are not made again, those under way go on from their own files, and those of
-other parameters are refused. A sample that fails is listed, the others go on. The last line of standard output is one JSON
-object; the exit code is 0 only if all samples are there. For clusters see docs/how-to/cluster.md.
+other parameters are refused. A sample that fails, or whose forces do not balance, is listed as failed, and the others go on; of the latter
+the packing is there. The last line of standard output is one JSON object: made and not_made count packings, not_reached those of them
+whose forces do not balance. The exit code is 0 only if nothing failed. For clusters see docs/how-to/cluster.md.
 """
 
 from __future__ import annotations
@@ -56,6 +57,10 @@ class _Parser(ArgumentParser):
                 self.error(f"--{name.replace('_', '-')} is {value}, expected at least {least}")
         if not particles(options):
             self.error("no particles were given, expected --alpha, --kind or the name of a shape")
+        if options.shape and not (options.alpha or options.kind):
+            self.error(
+                f"--shape {options.shape} has no effect without --alpha or --kind, expected one of them"
+            )
         self._require_options_of_a_packing(options)
         return options, []
 
@@ -87,7 +92,7 @@ def options_of() -> ArgumentParser:
     parser.add_argument(
         "--alpha", type=float, nargs="+", action="extend", default=[], help="aspect ratios A/R"
     )
-    parser.add_argument("--shape", choices=SHAPES, default=DEFAULT, help="of --alpha and --kind")
+    parser.add_argument("--shape", choices=SHAPES, help=f"of --alpha and --kind ({DEFAULT})")
     parser.add_argument("--kind", action="append", default=[], help="one mixture, of these kinds")
     for shape in SHAPES.values():
         parser.add_argument(
@@ -123,7 +128,7 @@ class Particle(NamedTuple):
 
 def particles(options: Namespace) -> list[Particle]:
     """List the particles that are asked for, each once."""
-    shape = shape_named(options.shape)
+    shape = shape_named(options.shape or DEFAULT)
     found = [particle_of(shape, {"alpha": alpha}) for alpha in options.alpha]
     for other in SHAPES.values():
         names = [p.name for p in other.parameters]
@@ -189,13 +194,22 @@ def sample() -> None:
     command(["pack", *sys.argv[1:]])
 
 
-def make(particle: Particle, seed: int, options: Namespace, leash: Leash) -> str | None:
-    """Make one sample; return its complaint if it fails."""
+class Complaint(NamedTuple):
+    """What is wrong with a sample."""
+
+    said: str
+    is_made: bool = False
+    """Whether its packing is there, but did not reach its goal."""
+
+
+def make(particle: Particle, seed: int, options: Namespace, leash: Leash) -> Complaint | None:
+    """Make one sample; return its complaint if it fails or does not reach its goal."""
     out = file_of(particle, seed, options)
     log = out.with_suffix(".log")
     with log.open("a") as errors:
         if not _is_ours(errors):
-            return f"{out.name}: another process is making it, expected none; wait until it ends"
+            said = f"{out.name}: another process is making it, expected none; wait until it ends"
+            return Complaint(said)
         done = subprocess.run(
             [*_PACK, *arguments_of(particle, seed, options)],
             check=False,
@@ -204,10 +218,11 @@ def make(particle: Particle, seed: int, options: Namespace, leash: Leash) -> str
             stderr=errors,
             env=os.environ | _ONE_THREAD | {"PYTHONPATH": python_path()},
         )
-    if done.stdout.strip():  # a finished packing, which says itself whether it is in equilibrium
+    if not done.returncode:
         return None
     last = log.read_text().strip().replace("\r", "\n").splitlines()
-    return f"{out.name}: {last[-1] if last else f'exit code {done.returncode}'}"
+    said = f"{out.name}: {last[-1] if last else f'exit code {done.returncode}'}"
+    return Complaint(said, is_made=bool(done.stdout.strip()))
 
 
 def _is_ours(log: IO[str]) -> bool:
@@ -232,7 +247,7 @@ def python_path() -> str:
     return os.pathsep.join([str(Path(__file__).parents[2]), *([before] if before else [])])
 
 
-def made(options: Namespace) -> Iterator[str | None]:
+def made(options: Namespace) -> Iterator[Complaint | None]:
     """Make all samples, and yield the complaint of each, or None, when it ends."""
     samples = [(p, s) for s in seeds(options) for p in particles(options)]
     leash = Leash.new()
@@ -251,16 +266,20 @@ def main(options: Namespace) -> int:
     """Run all samples; return the exit code."""
     options.out.mkdir(parents=True, exist_ok=True)
     total, done = options.samples * len(particles(options)), 0
-    failures: list[str] = []
+    failures: list[Complaint] = []
 
-    def told(complaint: str | None) -> Told:
+    def told(complaint: Complaint | None) -> Told:
         nonlocal done
         done += 1
         if complaint:
             failures.append(complaint)
         failed = f", {len(failures)} failed" if failures else ""
-        return Told("packings", f"{done} of {total}{failed}", done / total, complaint)
+        aside = complaint and complaint.said
+        return Told("packings", f"{done} of {total}{failed}", done / total, aside)
 
     follow(made(options), told)
-    report({"out": options.out, "made": total - len(failures), "failed": failures})
+    missing = sum(not complaint.is_made for complaint in failures)
+    found = {"out": options.out, "made": total - missing, "not_made": missing}
+    found |= {"not_reached": len(failures) - missing}
+    report(found | {"failed": [complaint.said for complaint in failures]})
     return 1 if failures else 0

@@ -4,6 +4,7 @@ from jamshape.contacts.found import Contacts
 from jamshape.contacts.near import NearPairs, PairArrays
 from jamshape.contacts.network import (
     Bonds,
+    ContactErrors,
     ContactKind,
     ContactNetwork,
     CrossingError,
@@ -17,6 +18,7 @@ from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers
 
 __all__ = [
     "Bonds",
+    "ContactErrors",
     "ContactKind",
     "ContactNetwork",
     "Contacts",

@@ -9,10 +9,11 @@ from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.contacts.network import ContactNetwork, find_contacts
 from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers
 from jamshape.packing import Packing
+from jamshape.records import Record
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class Contacts(Record):
     """A packing with its M contacts, and which of its N particles are rattlers.
 
     Parameters
@@ -28,7 +29,7 @@ class Contacts:
     rattlers: BoolArray
 
     @classmethod
-    def of(cls, packing: Packing, k_e: float = 1.0, sides: int = 2) -> Contacts:
+    def of(cls, packing: Packing, k_e: float | None = None, sides: int | None = None) -> Contacts:
         """Find them; arguments and errors as `find_contacts`."""
         network = find_contacts(packing, k_e, sides)
         return cls(packing, network, find_rattlers(packing, network))

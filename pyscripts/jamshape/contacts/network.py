@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.contacts.near import NearPairs, PairArrays, near_particles
 from jamshape.packing import Packing, State
-from jamshape.shapes.shape import Interaction
 
 _CROSSING, _UNCONVERGED = 2, 3  # ContactStatus of contact/contact.hpp
 
@@ -68,6 +67,25 @@ class Bonds:
 
 
 @dataclass(frozen=True, eq=False)
+class ContactErrors:
+    """Bounds of how far M contacts are from those of exactly these particles.
+
+    Parameters
+    ----------
+    energy : (M,) array of float64, [energy]
+        By the error of the overlap.
+    force : (M,) array of float64, [energy / length]
+        Length of the difference, by the errors of the overlap and of the normal.
+    torque : (M,) array of float64, [energy]
+        Of the larger of both, by these and by the error of the point of contact.
+    """
+
+    energy: FloatArray
+    force: FloatArray
+    torque: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class ContactNetwork:
     """The M contacts of a packing, each pair of touching images once, in ascending order.
 
@@ -91,6 +109,8 @@ class ContactNetwork:
     bonds_are_contacts : bool
         Whether each bond holds a particle by itself, as a contact of its own: where particles are made of
         several round parts.
+    errors : ContactErrors or None
+        If they were asked for.
     """
 
     pairs: IntArray
@@ -104,6 +124,7 @@ class ContactNetwork:
     torque_j: FloatArray
     bonds: Bonds
     bonds_are_contacts: bool = False
+    errors: ContactErrors | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,17 +150,21 @@ class Forces:
     pressure: float
 
 
-def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> ContactNetwork:
+def find_contacts(
+    packing: Packing, k_e: float | None = None, sides: int | None = None, *, errors: bool = False
+) -> ContactNetwork:
     """Find all contacts, with all periodic images in reach.
 
     Parameters
     ----------
     packing : Packing
         Positions need not lie in the box.
-    k_e : float, [energy]
-    sides : {1, 2}
-        Bonds of a side-to-side contact, of shapes that have both laws: one in the dynamics, two for
-        minima and modes.
+    k_e : float, [energy], optional
+    sides : {1, 2}, optional
+        Bonds of a side-to-side contact, of shapes that have both laws: one in the dynamics of Marschall
+        & Teitel, two for minima and modes. Both are those of the packing's law when left out.
+    errors : bool
+        Bound the error of each contact as well, which takes many times as long as the contacts.
 
     Returns
     -------
@@ -159,9 +184,9 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
     >>> len(find_contacts(random_packing(n=10, phi=0.3, seed=1)).pairs)
     0
     """
-    bodies, state = packing.compiled(Interaction(k_e, sides)), State.of(packing)
+    bodies, state = packing.compiled(packing.law.but(k_e, sides)), State.of(packing)
     near = near_particles(packing, bodies)
-    found = bodies.contacts(*PairArrays.of(state, near), packing.has_rests)
+    found = bodies.contacts(*PairArrays.of(state, near), packing.has_rests, errors)
     near = near.take(found["pair"])
     refuse_crossing(packing, bodies.core, near.take(found["status"] == _CROSSING))
     refuse_unconverged(packing, near.take(found["status"] == _UNCONVERGED))
@@ -177,10 +202,11 @@ def find_contacts(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Contact
         torque_j=_rotation(found["torque_j"]),
         bonds=_bonds(found, packing.position[near.first]),
         bonds_are_contacts=bodies.bonds_are_contacts,
+        errors=_errors(found) if errors else None,
     )
 
 
-def forces(packing: Packing, k_e: float = 1.0, sides: int = 1) -> Forces:
+def forces(packing: Packing, k_e: float | None = None, sides: int | None = None) -> Forces:
     """Sum energy, forces, torques and pressure; arguments and errors as `find_contacts`."""
     return sum_forces(packing, find_contacts(packing, k_e, sides))
 
@@ -246,6 +272,10 @@ def _separation(state: State, near: NearPairs) -> FloatArray:
 def _rotation(torque: FloatArray) -> FloatArray:
     """(M,) about z in 2D, (M, 3) in 3D."""
     return torque[:, 0] if torque.shape[1] == 1 else torque
+
+
+def _errors(found: dict[str, NDArray[Any]]) -> ContactErrors:
+    return ContactErrors(*(found[f"{name}_error"] for name in ("energy", "force", "torque")))
 
 
 def _bonds(found: dict[str, NDArray[Any]], position: FloatArray) -> Bonds:

@@ -18,6 +18,7 @@ from jamshape.drawing.space import save_smooth
 from jamshape.drawing.text import attributes_text, scientific
 from jamshape.files.h5md import FileFormatError, PathLike, read_attributes
 from jamshape.files.lammps_text import read_any
+from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.measures.minimum import order
 
 if TYPE_CHECKING:
@@ -45,7 +46,13 @@ class Drawn(NamedTuple):
     colorings: list[Coloring]
 
 
-def read_picture(path: Path, frame: int = -1, sides: int | None = None, color: str = "") -> Picture:
+def read_picture(
+    path: Path,
+    frame: int = -1,
+    sides: int | None = None,
+    color: str = "",
+    wanted: Wanted = NOTHING,
+) -> Picture:
     """Read a packing, find its contacts and count.
 
     Parameters
@@ -55,20 +62,22 @@ def read_picture(path: Path, frame: int = -1, sides: int | None = None, color: s
     frame : int
         From 0; negative ones count from the end.
     sides : int, optional
-        Bonds of a side-to-side contact; None for what the file says, or else 2.
+        Bonds of a side-to-side contact; None for those of the packing's law.
     color : str
         What it will be coloured by; kinds of order are told with the numbers.
+    wanted : Wanted
+        Dimension and shape of a data or dump file that does not say them.
 
     Raises
     ------
     FileFormatError, ValueError, OSError
         As `read_any`.
     """
-    packing = read_any(path, frame)
-    known: dict[str, Any] = {"sides": 2, "k_e": 1.0}
+    packing = read_any(path, frame, *wanted)
+    known: dict[str, Any] = {}
     with contextlib.suppress(FileFormatError):  # dumps and data files have no attributes
         known |= read_attributes(path)
-    found = Contacts.of(packing, known["k_e"], sides or known["sides"])
+    found = Contacts.of(packing, sides=sides)
     counts = found.counts
     told = {"packing": path, "shape": packing.shape_style, "dimension": packing.dimension}
     told |= {"n": packing.n, "rattlers": counts.n_rattlers, "contacts": len(found)}

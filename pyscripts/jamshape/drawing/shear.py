@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from jamshape.drawing.text import ensemble_text, pressure_unit
+from jamshape.drawing.text import ensemble_text, pressure_unit, systems_text
+from jamshape.measures.events import stress_drops
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.axes import Axes
 
+    from jamshape.arrays import FloatArray
+    from jamshape.files.sets import System
     from jamshape.measures.shears import ShearOf
 
 
@@ -31,6 +36,21 @@ def draw_stress(axes: Axes, run: ShearOf) -> None:
     unit = pressure_unit([run.ensemble.system])
     axes.set(xlabel=r"strain $\gamma$", ylabel=rf"stress  ${unit}$", xlim=(0, strain[-1]))
     axes.set_title(title_of(run), size=9)
+    axes.legend(fontsize=8)
+
+
+def draw_steps(axes: Axes, observables: Mapping[str, FloatArray], system: System) -> None:
+    """Draw pressure and shear stress of a quasistatic shear, with a mark where the stress begins to drop."""
+    strain, stress = observables["strain"], observables["stress"]
+    axes.plot(strain, observables["pressure"], color="C0", lw=0.8, label="pressure $p$")
+    axes.plot(strain, stress, color="C1", lw=0.8, label=r"shear stress $\sigma$")
+    events = stress_drops(observables)
+    if events:
+        places = [event.strain for event in events], [event.stress for event in events]
+        axes.plot(*places, "k.", ms=4, label="stress begins to drop")
+    unit = pressure_unit([system])
+    axes.set(xlabel=r"strain $\gamma$", ylabel=rf"stress  ${unit}$", xlim=(0, strain[-1]))
+    axes.set_title(f"{systems_text([system])}, quasistatic shear", size=9)
     axes.legend(fontsize=8)
 
 

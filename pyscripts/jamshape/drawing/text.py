@@ -90,7 +90,12 @@ def _titled(groups: Mapping[Any, Sequence[PackingFile]], count: str) -> str:
     known = conditions(groups)
     first = [systems_text(file.system() for of in groups.values() for file in of)]
     first += [_told(name, known) for name in ("size_ratio",) if name in known]
-    return "\n".join([", ".join(first), ", ".join([count, *attributes_text(known)])])
+    second = [count, *attributes_text(known)]
+    if n := known["not_reached"]:
+        second.append(
+            f"with {n} of {counted(sum(map(len, groups.values())), 'packing')} not at rest"
+        )
+    return "\n".join([", ".join(first), ", ".join(second)])
 
 
 def attributes_text(known: Mapping[str, Any]) -> list[str]:

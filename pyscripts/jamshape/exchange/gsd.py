@@ -6,7 +6,8 @@ or else a mesh whose corners lie on the surface. (GSD could call a rod a polyhed
 radius. OVITO reads that only along z, which is not where the orientation of our rods points.)
 
 GSD keeps single precision. So a frame logs all that the packing holds once more under `log/jamshape` and
-`log/particles/jamshape`, and is read back from there to the last bit.
+`log/particles/jamshape`, and is read back from there to the last bit. Where another program has since changed the
+single numbers, which are all that it knows, these count: see `jamshape.exchange.edited`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jamshape.exchange.edited import as_edited
 from jamshape.exchange.fields import (
     alike,
     box_fields,
@@ -30,6 +32,7 @@ from jamshape.files.frames import Form
 from jamshape.files.layout import FileFormatError
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
+from jamshape.shapes.shape import Interaction
 from jamshape.shapes.solid import Balls, Solid, Superquadric
 from jamshape.shapes.table import shape_named
 
@@ -83,6 +86,9 @@ def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
 def read_gsd(path: PathLike, frame: int = -1) -> Packing:
     """Read one frame of a file that `write_gsd` wrote, to the last bit.
 
+    Positions, orientations and box that another program has changed since are read in single precision,
+    as it left them.
+
     Parameters
     ----------
     path : path-like
@@ -92,7 +98,7 @@ def read_gsd(path: PathLike, frame: int = -1) -> Packing:
     Raises
     ------
     FileFormatError
-        If it is no such file.
+        If it is no such file, or another program has changed the kinds of particles or their number.
     ValueError
         If there is no such frame.
     ImportError
@@ -110,7 +116,7 @@ def read_gsd(path: PathLike, frame: int = -1) -> Packing:
         if not -len(file) <= frame < len(file):
             msg = f"{path}: has {len(file)} frames, expected frame {frame} to be one of them"
             raise ValueError(msg)
-        return _packing(path, file[frame % len(file)])
+        return _packing(path, hoomd, file[frame % len(file)])
 
 
 def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
@@ -133,6 +139,7 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
     of_box = box_fields(packing, rests=form.rests, tilted=form.tilted)
     exact |= {_LOG + name: x for name, x in of_box.items()}
     exact[_LOG + "time"] = np.array([packing.time])
+    exact[_LOG + "law"] = np.array(packing.law, np.float64)
     # As numbers: OVITO before 3.17 fails on texts.
     exact[_LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
     frame.log = exact
@@ -200,7 +207,7 @@ def _mesh(surface: SurfaceMesh) -> dict[str, Any]:
     return {"type": "Mesh", "vertices": corners, "indices": surface.triangles.tolist()}
 
 
-def _packing(path: PathLike, frame: Any) -> Packing:
+def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
     logged: Mapping[str, Any] = frame.log
     prefixes = (_LOG, _PARTICLES)
     found = {
@@ -211,10 +218,14 @@ def _packing(path: PathLike, frame: Any) -> Packing:
     }
     try:
         style, time = bytes(found.pop("shape_style")).decode(), float(found.pop("time")[0])
-        return packing_of(found, style, int(frame.configuration.step), time)
+        if "law" in found:  # files of 0.1.0 have none
+            k_e, sides = found["law"].tolist()
+            found["law"] = Interaction(k_e, sides)
+        packing = packing_of(found, style, int(frame.configuration.step), time)
+        return as_edited(packing, _frame(hoomd, packing, Form.of(packing)), frame)
     except (KeyError, TypeError) as error:
         msg = f"{path}: holds no log/jamshape of a packing, expected a file of write_gsd"
         raise FileFormatError(msg) from error
     except ValueError as error:
-        msg = f"{path}: {error}; write it again"
+        msg = f"{path}: {error}"
         raise FileFormatError(msg) from error

@@ -25,13 +25,17 @@ from jamshape.exchange.fields import (
     particle_fields,
 )
 from jamshape.exchange.tools import tool
+from jamshape.files.frames import as_rest
 from jamshape.files.layout import FileFormatError
-from jamshape.packing import Lengths, Packing
+from jamshape.packing import Lengths, Packing, angle_from_quaternion
 from jamshape.packing.rotation import product
+from jamshape.shapes.shape import Interaction
 from jamshape.shapes.solid import RoundedSegment, Solid, Superquadric
 
 _PREFIX = "Jamshape "
 _OWN = ("position", "id")  # what OVITO holds in full itself
+
+_ROUNDING = 4 * 2.0**-24  # of a number in single precision
 
 _Z_TO_X = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)  # w i j k
 _STILL = (1.0, 0.0, 0.0, 0.0)
@@ -104,6 +108,8 @@ def to_ovito(packing: Packing, rattlers: BoolArray | None = None) -> Any:
             particles.create_property(title, data=values)
     data.attributes["Timestep"], data.attributes["Time"] = packing.step, packing.time
     data.attributes[_PREFIX + "shape style"] = packing.shape_style
+    for name, value in packing.law._asdict().items():
+        data.attributes[_PREFIX + name] = value
     for field, titles in _rests_of_box(packing.dimension).items():
         for title, rest in zip(titles, getattr(packing, field).tolist(), strict=True):
             data.attributes[title] = rest
@@ -111,7 +117,9 @@ def to_ovito(packing: Packing, rattlers: BoolArray | None = None) -> Any:
 
 
 def from_ovito(data: Any) -> Packing:
-    """Read a packing that `to_ovito` made back, with positions and box as they are in OVITO now.
+    """Read a packing that `to_ovito` made back, with positions, orientations and box as they are in OVITO now.
+
+    Orientations that were changed there are in single precision.
 
     Parameters
     ----------
@@ -127,7 +135,7 @@ def from_ovito(data: Any) -> Packing:
         D = 2 if cell.is2D else 3
         matrix = np.asarray(cell[...])
         lengths = Lengths.of(matrix[:D, :D])
-        fields = {
+        fields: dict[str, Any] = {
             "position": np.asarray(particles["Position"][...])[:, :D],
             "id": np.asarray(particles["Particle Identifier"][...]),
             "lo": matrix[:D, 3],
@@ -142,11 +150,38 @@ def from_ovito(data: Any) -> Packing:
         known = data.attributes
         for field, titles in _rests_of_box(D).items():
             fields[field] = np.array([float(known[title]) for title in titles])
+        for name in ("position", "orientation", "edges", "tilt"):
+            if f"{name}_rest" in fields:
+                fields[f"{name}_rest"] = as_rest(fields[f"{name}_rest"], fields[name])
+        # Data of 0.1.0 have no law.
+        law = {name: known.get(_PREFIX + name) for name in Interaction._fields}
+        fields["law"] = Interaction.told({k: v for k, v in law.items() if v is not None})
         style = str(known[_PREFIX + "shape style"])
-        return packing_of(fields, style, int(known["Timestep"]), float(known["Time"]))
+        packing = packing_of(fields, style, int(known["Timestep"]), float(known["Time"]))
+        return _as_turned(packing, np.asarray(particles["Orientation"][...]))
     except (KeyError, AttributeError, TypeError) as error:
         msg = f"the data of OVITO lack {error}, expected what to_ovito made"
         raise FileFormatError(msg) from error
+
+
+def _as_turned(packing: Packing, found: FloatArray) -> Packing:
+    """Take orientations x y z w that were changed in OVITO, where our doubles are of an earlier state."""
+    glyphs, _ = _glyphs(packing)
+    before = product(packing.quaternions, glyphs[0].first_turned)
+    now = np.asarray(found, np.float64)[:, [3, 0, 1, 2]]
+    sign = np.where((now * before).sum(axis=1, keepdims=True) < 0, -1, 1)
+    turned = (np.abs(now - sign * before) > _ROUNDING).any(axis=1)
+    if not turned.any():
+        return packing
+    w, *vector = glyphs[0].first_turned
+    quaternion = product(now, (w, *(-x for x in vector)))
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    if packing.dimension == 2:
+        orientation = np.where(turned, angle_from_quaternion(quaternion), packing.orientation)
+    else:
+        orientation = np.where(turned[:, None], quaternion, packing.orientation)
+    rest = packing.orientation_rest * (orientation == packing.orientation)
+    return packing.with_(orientation=orientation, orientation_rest=rest)
 
 
 def _rests_of_box(dimension: int) -> dict[str, list[str]]:

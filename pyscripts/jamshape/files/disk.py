@@ -20,6 +20,9 @@ _REFUSALS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO}
 
 _END = ".tmp"
 
+# Ends of names that say what a file is, and not HDF5.
+_OTHERS = {".data", ".gsd", ".dump", ".png", ".pdf", ".csv", ".json", ".txt"}
+
 
 @contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
@@ -72,6 +75,35 @@ def refusals(path: PathLike, temporary: Path) -> Iterator[None]:
         refusal = OSError(msg)
         refusal.errno = error.errno  # for those who ask; the sentence is all that is printed
         raise refusal from error
+
+
+def settled(path: PathLike | None) -> Path | None:
+    """Make a path absolute, so that it leads to the same file wherever the process goes."""
+    return None if path is None else Path(path).absolute()
+
+
+def named(path: Path) -> str:
+    """Name a file as one would type it here: from the working folder on, if it lies in it.
+
+    Examples
+    --------
+    >>> named(Path.cwd() / "run.h5")
+    'run.h5'
+    """
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)
+
+
+def require_hdf5_name(path: Path) -> None:
+    """Refuse to write HDF5 under a name that says another format.
+
+    Raises
+    ------
+    ValueError
+    """
+    if path.suffix in _OTHERS:
+        msg = f"{path} ends in {path.suffix!r}, expected the name of an HDF5 file, such as {path.stem}.h5"
+        raise ValueError(msg)
 
 
 def real(path: PathLike) -> Path:

@@ -67,3 +67,12 @@ def frame_values(packing: Packing, form: Form) -> dict[str, NDArray[Any]]:
 def lengths_of(edges: FloatArray) -> Lengths:
     """Take a box as H5MD has it: edges (D,), or (D, D) edge vectors as rows."""
     return Lengths.of(edges.T) if edges.ndim > 1 else Lengths(edges, np.empty(0))
+
+
+def as_rest(rest: NDArray[Any], whole: NDArray[Any]) -> NDArray[Any]:
+    """Take what doubles leave out; 0 where it is more than that, after another program has changed the doubles."""
+    if rest.shape != whole.shape or {rest.dtype.kind, whole.dtype.kind} != {"f"}:
+        return rest  # which a packing refuses
+    with np.errstate(over="ignore"):
+        is_more = np.abs(rest) > np.spacing(np.abs(whole))
+    return np.where(is_more & np.isfinite(rest), 0.0, rest)

@@ -3,8 +3,9 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
 ::
 
     /h5md               +version [1, 1]   author/+name   creator/+name, version, format_version (2; 1 where
-                        it is not there)
-    /particles/all      +shape_style
+                        it is not there), origin (what the last bits depend on: `jamshape.files.origin`)
+    /particles/all      +shape_style   +k_e, sides: the law of the contacts (where they are not there, those
+                        of /parameters, or else 1 and 2)
         box             +dimension D   +boundary D times "periodic"
             edges       {step, time, value (T, D), or (T, D, D) with the edge vectors as rows: of all
                         frames of a file that has a tilted box, the transposes of `Box.matrix`}
@@ -46,9 +47,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jamshape.checks import require_other_file
 from jamshape.files import layout
 from jamshape.files.disk import PathLike, replacing
 from jamshape.files.frames import Form
+from jamshape.files.journal import read_journal
 from jamshape.files.layout import (
     FileFormatError,
     Report,
@@ -64,11 +67,13 @@ __all__ = [
     "PathLike",
     "Report",
     "Series",
+    "copy_run",
     "count_frames",
     "read_attributes",
     "read_creator",
     "read_format_version",
     "read_observables",
+    "read_origin",
     "read_packing",
     "read_report",
     "read_series",
@@ -164,6 +169,25 @@ def write_run(
             last = frame.step
 
 
+def copy_run(path: PathLike, out: PathLike) -> None:
+    """Write a copy of a run, with the rows that are in its journal still, to another file.
+
+    Raises
+    ------
+    FileFormatError
+        As `read_packing`.
+    ValueError
+        If both are the same file.
+    OSError
+        If one cannot be read or the other written.
+    """
+    require_other_file(Path(out), [Path(path)])
+    pending = read_journal(path)
+    with layout.changed(path, out) as file:
+        layout.fold(file, pending)
+        layout.set_token(file, None)
+
+
 def read_packing(path: PathLike, frame: int = -1) -> Packing:
     """Read one frame of a packing or a run.
 
@@ -239,9 +263,18 @@ def read_format_version(path: PathLike) -> int:
 
 def read_creator(path: PathLike) -> str:
     """Read which version of jamshape wrote a file; errors as `read_packing`."""
+    return _of_creator(path, "version", "unknown")
+
+
+def read_origin(path: PathLike) -> str:
+    """Read what the bits of a file depend on, as `jamshape.files.origin.origin` names it, "" where it is not told; errors as `read_packing`."""
+    return _of_creator(path, "origin", "")
+
+
+def _of_creator(path: PathLike, name: str, otherwise: str) -> str:
     with layout.opened(path) as file:
-        version = layout.require_item(file, "h5md/creator").attrs.get("version", b"unknown")
-        return version.decode() if isinstance(version, bytes) else str(version)
+        text = layout.require_item(file, "h5md/creator").attrs.get(name, otherwise)
+        return text.decode() if isinstance(text, bytes) else str(text)
 
 
 def read_observables(path: PathLike) -> dict[str, NDArray[Any]]:

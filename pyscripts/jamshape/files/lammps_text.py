@@ -6,12 +6,13 @@ goes through its quaternion, and an edge of the box, which goes through its uppe
 exact where the lower corner is 0 or half an edge below it). Dumps of a box with a tilt tell the bounds of
 the cuboid around it, from which its own are found with as much rounding.
 
-Neither format names the shape style: the first shape of `jamshape.shapes.table` that can have such
-diameters, and an exponent where the file tells one, is taken; use ``packing.with_(shape_style=...)`` for
-another one.
+Neither format has a place for the shape and the law of contacts. In data files of ours the first line, which LAMMPS does
+not read, tells them with the dimension, and a comment behind each row of Ellipsoids its exponent. Of other files
+`jamshape.files.meaning` says what they are taken for.
 
 Dumps tell the exponent p twice: in a column ``exponent``, to all digits, and as 1/p in
-``SuperquadricRoundness.Phi`` and ``.Theta``, which OVITO draws the bodies from. Data files tell none.
+``SuperquadricRoundness.Phi`` and ``.Theta``, which OVITO draws the bodies from. Data files of LAMMPS from 2026 on may tell
+2p twice, behind each row of Ellipsoids.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from __future__ import annotations
 import itertools
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
@@ -26,11 +28,22 @@ import numpy as np
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.h5md import FileFormatError, PathLike, read_packing, replacing
-from jamshape.files.signature import DUMP, HDF5, format_of
+from jamshape.files.meaning import (
+    PLANE,
+    Geometry,
+    Said,
+    Wanted,
+    meaning_of,
+    most_digits,
+    require_told,
+)
+from jamshape.files.signature import DUMP, GSD, HDF5, REFUSED, format_of
 from jamshape.packing import Box, Lengths, Packing, angle_from_quaternion, cuboid_around
-from jamshape.shapes.table import guess_shape_style
+from jamshape.shapes.shape import Interaction
+from jamshape.shapes.table import SHAPES
 
-_PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional file
+_TITLE = "LAMMPS data file by jamshape"
+_EXPONENT_COMMENT = "exponent="
 _POSITION = ("x", "y", "z")
 _IMAGE = ("ix", "iy", "iz")
 _QUATERNION = ("quatw", "quati", "quatj", "quatk")
@@ -40,6 +53,14 @@ _ROUNDNESS = ("SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta")  # nam
 _DUMP_COLUMNS = ("id", "type", *_POSITION, *_QUATERNION, *_DIAMETERS)
 _ATOMS = ("id", "type", "ellipsoidflag", "density", *_POSITION)
 _ELLIPSOIDS = ("id", *_DIAMETERS, *_QUATERNION)
+_BLOCKS = ("block1", "block2")  # 2p each, of atom_style ellipsoid superellipsoid
+_ATOM_STYLE = "ellipsoid"
+# Columns that other styles have behind those of ellipsoids in an atom style hybrid.
+_HYBRID = {"atomic": 0, "molecular": 1, "bond": 1, "angle": 1, "charge": 1, "full": 2}
+_ATOMS_OF_HYBRID = ("id", "type", "x", "y", "z", "ellipsoidflag", "density")
+_PAIRS = {"Pair Coeffs": 1, "PairIJ Coeffs": 2}  # types in a row
+_ALIKE = 1e-9  # relative difference of exponents that rounding leaves
+_COUNTED = 200  # rows whose digits tell those of a file
 # TIMESTEP stands before TIME because the one begins with the other.
 _ITEM_ROWS = {"UNITS": 1, "TIMESTEP": 1, "TIME": 1, "NUMBER OF ATOMS": 1, "BOX BOUNDS": 3}
 
@@ -51,6 +72,7 @@ class _Frame(NamedTuple):
     """(3, 2) lower and upper ends."""
     tilt: FloatArray
     """(3,) xy, xz, yz."""
+    said: Said = Said()
     step: int = 0
     time: float = 0.0
 
@@ -63,7 +85,7 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
     path : path-like
     packing : Packing
         Every particle, discs too, is written as an ellipsoid. In 2D, z is 0 and the box reaches
-        from -0.5 to 0.5 in z.
+        from -0.5 to 0.5 in z. Shape, law and exponents go along as comments.
     density : float, [mass / length^3]
         LAMMPS makes the mass of it.
 
@@ -86,18 +108,25 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
         file.write("\nAtoms # ellipsoid\n\n")
         np.savetxt(file, atoms, fmt=["%d"] * 3 + ["%.17g"] * 4 + ["%d"] * 3)
         file.write("\nEllipsoids\n\n")
-        np.savetxt(file, ellipsoids, fmt=["%d"] + ["%.17g"] * 7)
+        row = ["%d"] + ["%.17g"] * 7
+        if packing.shape.has_exponent:
+            row += [f"# {_EXPONENT_COMMENT}%.17g"]
+            ellipsoids = np.column_stack([ellipsoids, packing.exponent])
+        np.savetxt(file, ellipsoids, fmt=row)
 
 
-def read_data(path: PathLike, dimension: int | None = None) -> Packing:
+def read_data(path: PathLike, dimension: int | None = None, shape: str | None = None) -> Packing:
     """Read a data file of ``atom_style ellipsoid``, ours or one of LAMMPS's ``write_data``.
 
     Parameters
     ----------
     path : path-like
-    dimension : {2, 3, None}
-        None takes 2 if all z are 0, all quaternions are rotations about z and the box reaches
-        from -0.5 to 0.5 in z, and 3 otherwise.
+    dimension : {2, 3}, optional
+        What the file says when left out, or else 2 if all particles lie at one z and are turned about z;
+        a warning says where that is doubtful.
+    shape : str, optional
+        A name of `jamshape.shapes.table.SHAPES`; what the file says when left out, or else the first shape of
+        that table that can have such diameters, with a warning.
 
     Returns
     -------
@@ -107,19 +136,22 @@ def read_data(path: PathLike, dimension: int | None = None) -> Packing:
     Raises
     ------
     FileFormatError
-        If the file is cut short, is not of that style, or what it holds is not a packing.
+        If the file is cut short, is not of that style, what it holds is not a packing, or it says another
+        dimension or shape.
     OSError
         If the file cannot be opened.
     """
     text = Path(path).read_text(encoding="utf-8", errors="replace")
     try:
-        return _packing(_data_frame(text), dimension)
+        return _packing(path, _data_frame(text), Wanted(dimension, shape))
     except ValueError as error:
         msg = f"{path}: {error}"
         raise FileFormatError(msg) from error
 
 
-def iter_dump(path: PathLike, dimension: int | None = None) -> Iterator[Packing]:
+def iter_dump(
+    path: PathLike, dimension: int | None = None, shape: str | None = None
+) -> Iterator[Packing]:
     """Read the frames of a text dump one by one.
 
     Parameters
@@ -130,8 +162,8 @@ def iter_dump(path: PathLike, dimension: int | None = None) -> Iterator[Packing]
         Quaternions and shapes may come from a compute of their name, ``compute quatw all
         property/atom quatw`` and the column ``c_quatw``, and so on; the exponent from a variable.
         Without it, p is 1 over ``SuperquadricRoundness.Phi``, if that is there.
-    dimension : {2, 3, None}
-        As in `read_data`.
+    dimension, shape
+        As of `read_data`; those of the first frame hold for all.
 
     Yields
     ------
@@ -145,25 +177,31 @@ def iter_dump(path: PathLike, dimension: int | None = None) -> Iterator[Packing]
     OSError
         If the file cannot be opened.
     """
+    wanted = Wanted(dimension, shape)
     with Path(path).open(encoding="utf-8", errors="replace") as lines:
         for number in itertools.count():
             title = lines.readline()
             if not title:
                 return
             try:
-                packing = _packing(_dump_frame(title, lines), dimension)
+                packing = _packing(path, _dump_frame(title, lines, is_first=not number), wanted)
             except ValueError as error:
                 msg = f"{path}: frame {number}: {error}"
                 raise FileFormatError(msg) from error
+            wanted = Wanted(packing.dimension, packing.shape_style)
             yield packing
 
 
-def read_dump(path: PathLike, dimension: int | None = None) -> list[Packing]:
+def read_dump(
+    path: PathLike, dimension: int | None = None, shape: str | None = None
+) -> list[Packing]:
     """Read all frames of a text dump; see `iter_dump`."""
-    return list(iter_dump(path, dimension))
+    return list(iter_dump(path, dimension, shape))
 
 
-def read_any(path: PathLike, frame: int = -1) -> Packing:
+def read_any(
+    path: PathLike, frame: int = -1, dimension: int | None = None, shape: str | None = None
+) -> Packing:
     """Read one packing from an H5MD file, a text dump or a data file, told by their content.
 
     Parameters
@@ -171,6 +209,8 @@ def read_any(path: PathLike, frame: int = -1) -> Packing:
     path : path-like
     frame : int
         From 0; negative ones count from the end.
+    dimension, shape
+        As of `read_data`; an H5MD file says both itself.
 
     Raises
     ------
@@ -182,9 +222,20 @@ def read_any(path: PathLike, frame: int = -1) -> Packing:
         If the file cannot be opened.
     """
     found_format = format_of(path)
+    if found_format in REFUSED:
+        msg = f"{path} {REFUSED[found_format]}"
+        raise FileFormatError(msg)
+    if found_format == GSD:
+        msg = f"{path} is a GSD file, expected H5MD, a dump or a data file; make one with jamshape export"
+        raise FileFormatError(msg)
     if found_format == HDF5:
-        return read_packing(path, frame)
-    frames = iter_dump(path) if found_format == DUMP else iter([read_data(path)])
+        packing = read_packing(path, frame)
+        require_told(path, packing, Wanted(dimension, shape))
+        return packing
+    if found_format == DUMP:
+        frames = iter_dump(path, dimension, shape)
+    else:
+        frames = iter([read_data(path, dimension, shape)])
     if frame >= 0:
         found = list(itertools.islice(frames, frame, frame + 1))
     else:
@@ -202,7 +253,7 @@ def _padded(vectors: FloatArray | IntArray) -> FloatArray:
 
 def _header_text(packing: Packing) -> str:
     lo, hi = packing.box.lo, packing.box.lo + packing.box.edges
-    bounds = [*zip(lo, hi, strict=True), _PLANE][:3]
+    bounds = [*zip(lo, hi, strict=True), PLANE][:3]
     sides = [f"{a:.17g} {b:.17g} {x}lo {x}hi" for x, (a, b) in zip("xyz", bounds, strict=True)]
     counts = [
         f"{packing.n} atoms",
@@ -212,33 +263,34 @@ def _header_text(packing: Packing) -> str:
     if packing.box.is_tilted:
         tilt = [*packing.box.tilt.tolist(), 0.0, 0.0][:3]
         sides.append(" ".join(f"{x:.17g}" for x in tilt) + " xy xz yz")
-    return "\n".join(["LAMMPS data file by jamshape", "", *counts, "", *sides, ""])
+    told = {"shape": packing.shape_style, "dimension": packing.dimension, **packing.law._asdict()}
+    title = f"{_TITLE} # " + " ".join(f"{name}={value}" for name, value in told.items())
+    return "\n".join([title, "", *counts, "", *sides, ""])
 
 
-def _packing(frame: _Frame, dimension: int | None) -> Packing:
+def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
     def stack(names: Sequence[str]) -> FloatArray:
         return np.column_stack([frame.columns[name] for name in names])
 
-    quaternion, diameters = stack(_QUATERNION), stack(_DIAMETERS)
-    flat = not (frame.columns["z"].any() or quaternion[:, 1:3].any() or frame.tilt[1:].any())
-    if dimension is None:
-        dimension = 2 if flat and tuple(frame.bounds[2]) == _PLANE else 3
-    if dimension == 2 and not flat:
-        msg = "a z, a rotation or a tilt out of the plane is not 0, expected a two-dimensional packing"
-        raise ValueError(msg)
+    exponent = _exponent(frame.columns)
+    quaternion = stack(_QUATERNION)
+    there = Geometry(stack(_POSITION), quaternion, stack(_DIAMETERS), frame.bounds, frame.tilt)
+    said = replace(frame.said, has_exponent=len(exponent) > 0)
+    dimension, shape, law = meaning = meaning_of(path, there, said, wanted)
+    quaternion = meaning.turned(quaternion)
     lo, hi = frame.bounds[:dimension].T
     has_image = set(_IMAGE) <= set(frame.columns)
-    exponent = _exponent(frame.columns)
     return Packing(
-        position=stack(_POSITION[:dimension]),
+        position=there.position[:, :dimension],
         orientation=angle_from_quaternion(quaternion) if dimension == 2 else quaternion,
-        diameters=diameters,
+        diameters=shape.diameters,
         species=_whole(frame.columns["type"]),
         id=_whole(frame.columns["id"]),
         image=_whole(stack(_IMAGE[:dimension])) if has_image else np.empty((0, 0), np.int64),
         box=Box(lo=lo, edges=hi - lo, tilt=frame.tilt[: 1 if dimension == 2 else 3]),
-        shape_style=guess_shape_style(diameters, has_exponent=len(exponent) > 0),
+        shape_style=shape.name,
         exponent=exponent,
+        law=law,
         step=frame.step,
         time=frame.time,
     )
@@ -280,36 +332,155 @@ def _columns(
 
 
 def _data_frame(text: str) -> _Frame:
+    if not text:
+        msg = "the file is empty, expected a LAMMPS data file"
+        raise ValueError(msg)
     if not text.endswith("\n"):
         msg = "the file ends within a line, expected a complete data file"
         raise ValueError(msg)
     sections = _sections(text)
-    header = _header(sections[""])
+    header = _header(sections[""].rows)
     if "atoms" not in header:
         msg = "the header has no line 'N atoms', expected a LAMMPS data file"
         raise ValueError(msg)
     n = int(header["atoms"][0])
     atom_rows, ellipsoid_rows = (_section(sections, name, n) for name in ("Atoms", "Ellipsoids"))
-    names = _ATOMS if len(atom_rows[0].split()) == len(_ATOMS) else (*_ATOMS, *_IMAGE)
-    atoms = _columns(atom_rows, names, names)
-    ellipsoids = _columns(ellipsoid_rows, _ELLIPSOIDS, _ELLIPSOIDS)
+    atom_rows = _numbered(atom_rows, sections.get("Atom Type Labels"))
+    names = _atom_columns(sections["Atoms"].title, len(atom_rows[0].split()))
+    atoms = _columns(atom_rows, names, [name for name in names if name])
+    _require_ellipsoids(atoms)
+    ellipsoids = _ellipsoids(ellipsoid_rows, sections["Ellipsoids"].comments)
     if not np.array_equal(atoms["id"], ellipsoids["id"]):
         msg = "Atoms and Ellipsoids hold different ids, expected one ellipsoid for each atom"
         raise ValueError(msg)
-    return _Frame({**atoms, **ellipsoids}, *_bounds(header))
+    columns = {**atoms, **ellipsoids}
+    said = _said(text, sections, columns)
+    return _Frame(columns, *_bounds(header), replace(said, digits=_digits(atom_rows, names)))
 
 
-def _sections(text: str) -> dict[str, list[str]]:
-    """Rows under their section's title, comments and blank lines removed; the header's is ''."""
-    sections: dict[str, list[str]] = {"": []}
-    rows = sections[""]
+class _Section(NamedTuple):
+    """Rows of a data file under a title."""
+
+    title: str
+    """The comment behind it, such as the atom style."""
+    rows: list[str]
+    """Without comments and blank lines."""
+    comments: list[str]
+    """Behind each row."""
+
+
+def _sections(text: str) -> dict[str, _Section]:
+    """Rows under their section's title; the header's is ''."""
+    sections = {"": _Section("", [], [])}
+    here = sections[""]
     for line in text.splitlines()[1:]:
-        content = line.partition("#")[0].strip()
+        content, _, comment = (part.strip() for part in line.partition("#"))
         if content[:1].isalpha():
-            rows = sections.setdefault(content, [])
+            here = sections.setdefault(content, _Section(comment, [], []))
         elif content:
-            rows.append(content)
+            here.rows.append(content)
+            here.comments.append(comment)
     return sections
+
+
+def _numbered(rows: list[str], labels: _Section | None) -> list[str]:
+    """Put numbers of types for their labels, where a file has some."""
+    if labels is None:
+        return rows
+    numbers = {words[1]: words[0] for words in (row.split() for row in labels.rows)}
+    words = [row.split() for row in rows]
+    return [" ".join([id_, numbers.get(label, label), *rest]) for id_, label, *rest in words]
+
+
+def _atom_columns(title: str, count: int) -> tuple[str, ...]:
+    """Name the columns of Atoms by the atom style that its title names; "" where nobody needs one."""
+    style, *others = title.split() or [_ATOM_STYLE]
+    if style == _ATOM_STYLE:
+        return _ATOMS if count == len(_ATOMS) else (*_ATOMS, *_IMAGE)
+    what = "expected atoms of style ellipsoid; write the file from LAMMPS with atom_style ellipsoid"
+    if style != "hybrid":
+        msg = f"the section is titled 'Atoms # {title}', {what}"
+        raise ValueError(msg)
+    known = others[:1] == [_ATOM_STYLE] and set(others[1:]) <= set(_HYBRID)
+    more = sum(_HYBRID[name] for name in others[1:]) if known else 0
+    plain = (*_ATOMS_OF_HYBRID, *[""] * more)
+    if not known or count not in {len(plain), len(plain) + len(_IMAGE)}:
+        msg = (
+            f"the section is titled 'Atoms # {title}', which does not tell its {count} columns, {what}, or"
+            " name the styles of the hybrid in the title, ellipsoid first, such as"
+            " 'Atoms # hybrid ellipsoid molecular'"
+        )
+        raise ValueError(msg)
+    return plain if count == len(plain) else (*plain, *_IMAGE)
+
+
+def _require_ellipsoids(atoms: Mapping[str, FloatArray]) -> None:
+    """Refuse columns of another atom style, and atoms that are no ellipsoids."""
+    if not ((atoms["ellipsoidflag"] == 1) & (atoms["density"] > 0)).all():
+        msg = (
+            "columns of Atoms are not those of atom_style ellipsoid, expected 1 as ellipsoidflag and a"
+            " positive density in each row; name the atom style in the title, such as 'Atoms # ellipsoid'"
+        )
+        raise ValueError(msg)
+
+
+def _ellipsoids(rows: Sequence[str], comments: Sequence[str]) -> dict[str, FloatArray]:
+    """Read the section Ellipsoids, with exponents where they are told."""
+    if len(rows[0].split()) == len(_ELLIPSOIDS) + len(_BLOCKS):
+        wide = (*_ELLIPSOIDS, *_BLOCKS)
+        found = _columns(rows, wide, wide)
+        one, two = (found.pop(name) for name in _BLOCKS)
+        if not ((one > 0) & (np.abs(one - two) <= _ALIKE * one)).all():
+            msg = (
+                "Ellipsoids have two block exponents that differ or are not positive, expected both to be 2p"
+                " of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1"
+            )
+            raise ValueError(msg)
+        return found | {"exponent": one / 2}
+    told = [comment.removeprefix(_EXPONENT_COMMENT) for comment in comments]
+    if not all(comment.startswith(_EXPONENT_COMMENT) for comment in comments):
+        return _columns(rows, _ELLIPSOIDS, _ELLIPSOIDS)
+    names = (*_ELLIPSOIDS, *_EXPONENT)
+    return _columns([f"{a} {b}" for a, b in zip(rows, told, strict=True)], names, names)
+
+
+def _said(text: str, sections: Mapping[str, _Section], columns: dict[str, FloatArray]) -> Said:
+    """Collect what a data file says beside its columns; exponents of types go to the columns."""
+    first = text.partition("\n")[0]
+    if first.startswith(_TITLE) and "#" in first:
+        words = dict(word.split("=", 1) for word in first.split("#")[1].split() if "=" in word)
+        law = {name: float(words[name]) for name in Interaction._fields if name in words}
+        dimension = int(words["dimension"]) if "dimension" in words else None
+        return Said(dimension, words.get("shape", ""), law, is_ours=True)
+    for name, n_types in _PAIRS.items():
+        shape = sections[name].title.partition("/")[0] if name in sections else ""
+        if shape in SHAPES:
+            return _of_pairs(shape, [row.split() for row in sections[name].rows], n_types, columns)
+    return Said()
+
+
+def _of_pairs(
+    shape: str, rows: Sequence[Sequence[str]], n_types: int, columns: dict[str, FloatArray]
+) -> Said:
+    """Read the coefficients of our pair styles, as `write_data` of LAMMPS writes them."""
+    stiffness = {float(row[n_types]) for row in rows}
+    if len(stiffness) != 1:
+        msg = (
+            f"pairs of types have the stiffnesses k_e {sorted(stiffness)}, expected a single one, which a packing"
+            " holds; remove the section Pair Coeffs to read the particles alone"
+        )
+        raise ValueError(msg)
+    own = {int(row[0]): row for row in rows if len(set(row[:n_types])) == 1}
+    if SHAPES[shape].has_exponent and "exponent" not in columns:
+        p = {kind: float(row[n_types + 1]) for kind, row in own.items() if len(row) > n_types + 1}
+        columns["exponent"] = np.array([p.get(int(kind), 1.0) for kind in columns["type"]])
+    return Said(shape=shape, law={"k_e": stiffness.pop()})
+
+
+def _digits(rows: Sequence[str], names: Sequence[str]) -> int:
+    """Count the digits of coordinates in the first rows."""
+    places = [names.index(name) for name in _POSITION]
+    return most_digits([row.split()[k] for row in rows[:_COUNTED] for k in places])
 
 
 def _header(lines: Sequence[str]) -> dict[str, list[str]]:
@@ -322,8 +493,8 @@ def _header(lines: Sequence[str]) -> dict[str, list[str]]:
     return header
 
 
-def _section(sections: Mapping[str, list[str]], name: str, n: int) -> list[str]:
-    rows = sections.get(name, [])
+def _section(sections: Mapping[str, _Section], name: str, n: int) -> list[str]:
+    rows = sections[name].rows if name in sections else []
     if len(rows) != n or n == 0:
         msg = f"section {name} has {len(rows)} rows for {n} atoms, expected one for each ellipsoid"
         raise ValueError(msg)
@@ -342,7 +513,7 @@ def _bounds(header: Mapping[str, list[str]]) -> tuple[FloatArray, FloatArray]:
     return np.array(bounds, dtype=np.float64), np.array(tilt, dtype=np.float64)
 
 
-def _dump_frame(title: str, lines: TextIO) -> _Frame:
+def _dump_frame(title: str, lines: TextIO, *, is_first: bool) -> _Frame:
     items: dict[str, list[str]] = {}
     while not title.startswith("ITEM: ATOMS "):
         keyword = next((k for k in _ITEM_ROWS if title.startswith(f"ITEM: {k}")), None)
@@ -357,9 +528,11 @@ def _dump_frame(title: str, lines: TextIO) -> _Frame:
         msg = f"items {sorted(missing)} are missing before the atoms, expected an atom dump"
         raise ValueError(msg)
     rows = _take(lines, int(items["NUMBER OF ATOMS"][1]))
-    columns = _dump_columns([_plain_name(name) for name in title.split()[2:]], rows)
+    names = [_plain_name(name) for name in title.split()[2:]]
+    columns = _dump_columns(names, rows)
+    said = Said(digits=_digits(rows, names)) if is_first else Said(is_later=True)
     step, time = int(items["TIMESTEP"][1]), float(items.get("TIME", ["", "0"])[1])
-    return _Frame(columns, *_dump_bounds(items["BOX BOUNDS"]), step, time)
+    return _Frame(columns, *_dump_bounds(items["BOX BOUNDS"]), said, step, time)
 
 
 def _plain_name(column: str) -> str:

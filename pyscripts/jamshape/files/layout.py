@@ -15,12 +15,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.disk import PathLike, store
-from jamshape.files.frames import EDGES, EDGES_REST, RESTS, Form, frame_values, lengths_of
+from jamshape.files.frames import (
+    EDGES,
+    EDGES_REST,
+    RESTS,
+    Form,
+    as_rest,
+    frame_values,
+    lengths_of,
+)
 from jamshape.files.journal import Pending, Table, read_journal
+from jamshape.files.origin import origin
 from jamshape.files.rows import Columns, Stored, as_column, gathered, table
 from jamshape.files.signature import HDF5, format_of
 from jamshape.files.vocabulary import FORMAT_VERSION, RENAMED, former
 from jamshape.packing import Box, Packing
+from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
     import h5py
@@ -30,6 +40,7 @@ if TYPE_CHECKING:
 _CHUNK_BYTES = 1024
 _ATTRIBUTE_BYTES = 60_000  # HDF5 refuses attributes of 64 kB and more
 REPORT = {"step": np.int64, "wall_seconds": np.float64, "error": np.float64}
+_SAME_SIZE = 1e-12  # of a diameter: what rounding leaves between two copies of a size
 # Tables of a journal.
 FRAMES, OBSERVABLES, REPORT_TABLE = "frames", "observables", "report"
 _TOKEN = "journal"  # the attribute of a file that has one
@@ -109,8 +120,15 @@ def written(path: PathLike) -> Iterator[h5py.File]:
 @contextmanager
 def rewritten(path: PathLike) -> Iterator[h5py.File]:
     """Give a copy of an HDF5 file to change, which replaces it if the body succeeds; errors as `opened`."""
+    with changed(path, path) as file:
+        yield file
+
+
+@contextmanager
+def changed(path: PathLike, out: PathLike) -> Iterator[h5py.File]:
+    """Give a copy of an HDF5 file to change, which is written to `out` if the body succeeds; errors as `opened`."""
     with readable(path):
-        image = Image(path, Path(path).read_bytes())
+        image = Image(out, Path(path).read_bytes())
         with hdf5().File(image, "r+") as file:
             check_h5md(file)
             yield file
@@ -249,6 +267,7 @@ def write_metadata(file: h5py.File) -> None:
     creator.attrs["name"] = np.bytes_("jamshape")
     creator.attrs["version"] = np.bytes_(version)
     creator.attrs["format_version"] = FORMAT_VERSION
+    creator.attrs["origin"] = np.bytes_(origin())
 
 
 def create_file(
@@ -273,6 +292,7 @@ def create_file(
 def create_particles(group: h5py.Group, packing: Packing) -> None:
     """Create the elements of particles, still without frames."""
     group.attrs["shape_style"] = packing.shape_style
+    group.attrs.update(packing.law._asdict())
     for name in ("species", "id", "diameters"):
         group[name] = getattr(packing, name)
     if packing.shape.has_exponent:
@@ -435,6 +455,32 @@ def set_attributes(group: h5py.Group, attributes: Mapping[str, Any]) -> None:
     group.attrs.update(attributes)
 
 
+def _require_one_size(file: h5py.File, packing: Packing) -> None:
+    """Refuse a file in which another program has changed one of two copies of sizes."""
+    for name in ("half_length", "radius"):
+        element, own = f"particles/all/{name}", getattr(packing, name)
+        stored = np.asarray(require_dataset(file, element)[()] if element in file else own)
+        bound = _SAME_SIZE * packing.diameters[:, 0]
+        is_size = stored.shape == own.shape and stored.dtype.kind in "fiu"
+        if not is_size or not (np.abs(stored - own) <= bound).all():
+            msg = (
+                f"{file.filename}: {name} is not that of diameters, which are (2(A+R), 2R, 2R), expected both to"
+                " say the same; change both"
+            )
+            raise FileFormatError(msg)
+
+
+def _read_law(file: h5py.File) -> Interaction:
+    """Read the law of the particles; files of 0.1.0 have it among the attributes of runs only."""
+    known = dict(file["parameters"].attrs) if "parameters" in file else {}
+    known |= dict(require_item(file, "particles/all").attrs)
+    try:
+        return Interaction.told(known)
+    except (TypeError, ValueError) as error:
+        msg = f"{file.filename}: k_e and sides are no numbers ({error}), expected those of the contacts"
+        raise FileFormatError(msg) from error
+
+
 def read_frame(file: h5py.File, frame: int) -> Packing:
     """Read a frame as a packing."""
 
@@ -451,15 +497,19 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
     fields |= {name: row(f"{name}/value") for name in ("position", "orientation", "image")}
     for name, element in RESTS.items():
         if f"particles/all/{element}" in file:
-            fields[name] = row(f"{element}/value")
+            whole = fields[name.removesuffix("_rest")]
+            fields[name] = as_rest(row(f"{element}/value"), whole)
     fields["shape_style"] = require_item(file, "particles/all").attrs.get("shape_style")
+    fields["law"] = _read_law(file)
     fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
     lo, edges = row("box/lo/value"), row(f"{EDGES}/value")
     try:
         if f"particles/all/{EDGES_REST}" in file:
-            rest = lengths_of(row(f"{EDGES_REST}/value"))
+            rest = lengths_of(as_rest(row(f"{EDGES_REST}/value"), edges))
             fields |= {"edges_rest": rest.edges, "tilt_rest": rest.tilt}
-        return Packing(box=Box(lo, *lengths_of(edges)), **fields)
+        packing = Packing(box=Box(lo, *lengths_of(edges)), **fields)
     except ValueError as error:
         msg = f"{file.filename}: {error}; write it again"
         raise FileFormatError(msg) from error
+    _require_one_size(file, packing)
+    return packing

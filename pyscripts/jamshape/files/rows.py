@@ -139,7 +139,7 @@ def check_after(name: str, last: int | None, step: int) -> None:
 
 def check_same_particles(path: PathLike, first: Packing, packing: Packing) -> None:
     """Refuse a frame of other particles than those of the first one."""
-    for name in ("dimension", "shape_style", "id", "species", "diameters", "exponent"):
+    for name in ("dimension", "shape_style", "id", "species", "diameters", "exponent", "law"):
         if not np.array_equal(getattr(packing, name), getattr(first, name)):
             msg = (
                 f"{path}: {name} differs from the first frame,"

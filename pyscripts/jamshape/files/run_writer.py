@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jamshape.files import layout
-from jamshape.files.disk import PathLike, real
+from jamshape.files.disk import PathLike, named, real
 from jamshape.files.frames import Form
 from jamshape.files.h5md import read_packing
 from jamshape.files.journal import Journal, Table, journal_of, new_token
@@ -73,7 +73,7 @@ class RunWriter:
     """
 
     def __init__(self, path: PathLike) -> None:
-        self.path = Path(path)
+        self.path = Path(path).absolute()
         self.first = read_packing(path, 0)
         self._journal = Journal(path)
         try:
@@ -93,7 +93,7 @@ class RunWriter:
     ) -> Self:
         """Write the file with its first frame, as `write_packing`, and return its writer."""
         journal, writer = Journal(path), cls.__new__(cls)
-        writer.path, writer.first, writer._journal = Path(path), first, journal
+        writer.path, writer.first, writer._journal = Path(path).absolute(), first, journal
         try:
             with writer._replacing(layout.written(path)) as file:
                 layout.create_file(file, first, attributes or {}, observables or {})
@@ -149,7 +149,7 @@ class RunWriter:
             If the particles are not those of the first frame in the same order, or the step is
             not after the last one.
         """
-        check_same_particles(self.path, self.first, packing)
+        check_same_particles(named(self.path), self.first, packing)
         step, stored = packing.step, self._stored
         check_after("position", stored.frame, step)
         columns = {name: as_column(value) for name, value in (observables or {}).items()}
@@ -202,10 +202,12 @@ class RunWriter:
         steps, times = np.asarray(steps, np.int64), np.asarray(times, np.float64)
         columns = {name: np.asarray(value, np.float64) for name, value in observables.items()}
         if any(column.shape != steps.shape for column in (times, *columns.values())):
-            msg = f"{self.path}: rows of a series differ in length, expected {steps.shape}"
+            msg = f"{named(self.path)}: rows of a series differ in length, expected {steps.shape}"
             raise ValueError(msg)
         if (np.diff(steps) <= 0).any():
-            msg = f"{self.path}: the steps of a series do not ascend, expected ascending ones"
+            msg = (
+                f"{named(self.path)}: the steps of a series do not ascend, expected ascending ones"
+            )
             raise ValueError(msg)
         self._append_columns(steps, times, columns, {})
 
@@ -228,7 +230,7 @@ class RunWriter:
             If no frame would be left.
         """
         if step < self.first.step:
-            msg = f"{self.path}: starts at step {self.first.step}, expected to keep step {step}"
+            msg = f"{named(self.path)}: starts at step {self.first.step}, expected to keep step {step}"
             raise ValueError(msg)
         self._fold(up_to=step)
 
@@ -256,7 +258,7 @@ class RunWriter:
         columns = dict(zip(layout.REPORT, given, strict=True))
         steps, last = columns["step"], self._stored.report
         if (np.diff(steps, prepend=steps[:1] if last is None else last) < 0).any():
-            msg = f"{self.path}: the report's steps decrease, expected ascending steps"
+            msg = f"{named(self.path)}: the report's steps decrease, expected ascending steps"
             raise ValueError(msg)
         return {layout.REPORT_TABLE: beside(columns, layout.REPORT)} if len(steps) else {}
 
@@ -300,7 +302,7 @@ class RunWriter:
         is_own = layout.fold(file, pending)
         if self._journal.length and not is_own:
             msg = (
-                f"{self.path}: another program has replaced this file, expected to be the only one"
+                f"{named(self.path)}: another program has replaced this file, expected to be the only one"
                 " that writes it; write to another file"
             )
             raise layout.FileFormatError(msg)

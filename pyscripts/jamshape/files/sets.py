@@ -25,11 +25,10 @@ from jamshape.files.h5md import (
     read_packing,
     read_style,
 )
+from jamshape.files.outcomes import is_reached
 from jamshape.files.vocabulary import protocol_named
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT, shape_named
-
-REACHED = ("converged", "sliding", "corner")  # outcomes with mechanical equilibrium; others stalled
 
 # Ends of the names of files that may lie beside a packing and are none.
 OTHERS = (".run.h5", ".search.h5", ".path.h5", ".strict.h5", ".modes.h5")
@@ -89,8 +88,8 @@ class PackingFile:
 
     @property
     def reached(self) -> bool:
-        """Whether it is in mechanical equilibrium."""
-        return self.attributes["outcome"] in REACHED
+        """Whether it reached its goal: forces that balance."""
+        return is_reached(self.attributes)
 
     def number(self, name: str) -> float:
         """Look up an attribute that is a number.
@@ -111,9 +110,9 @@ class PackingFile:
         return system_of(self.attributes, *self.style)
 
     def contacts(self) -> Contacts:
-        """Read the packing and find its contacts, with two bonds side to side, and its rattlers."""
+        """Read the packing and find its contacts, by its own law, and its rattlers."""
         packing = self.packing()
-        network = find_contacts(packing, sides=2)
+        network = find_contacts(packing)
         observables = read_observables(self.path)
         if "rattler_ids" not in observables:
             return Contacts(packing, network, find_rattlers(packing, network))
@@ -162,9 +161,11 @@ def read_groups(
     *,
     needs: Sequence[str] = (),
     same: Sequence[str] = ("n",),
-    with_stalled: bool = False,
 ) -> Groups:
     """Find the finished packings in folders and files, by system in ascending order, then by seed.
+
+    Those that did not reach their goal are among them: `PackingFile.reached` says so, and averages are given with and
+    without them (`measures.averages.mean_over`).
 
     Parameters
     ----------
@@ -174,8 +175,6 @@ def read_groups(
         Numbers that every file must have, such as the parameters of the shapes that are drawn.
     same
         Attributes in which all must agree.
-    with_stalled
-        Keep packings whose minimisation did not reach equilibrium.
 
     Raises
     ------
@@ -184,7 +183,7 @@ def read_groups(
     OSError
         If one cannot be read.
     """
-    files = finished(list(paths), with_stalled=with_stalled)
+    files = finished(list(paths))
     for file in files:
         for name in needs:
             file.number(name)
@@ -196,18 +195,14 @@ def read_groups(
     return groups
 
 
-def finished(paths: list[Path], *, with_stalled: bool = False) -> list[PackingFile]:
+def finished(paths: list[Path]) -> list[PackingFile]:
     """Find the finished packings in folders and files, at least one; arguments as `read_groups`."""
     files = [file for path in paths for file in _files(path)]
-    kept = [file for file in files if with_stalled or file.reached]
-    if not kept:
-        places, n = ", ".join(map(str, paths)), len(files)
-        stalled = f" in equilibrium, of {n} that ended otherwise" if files else ""
-        msg = (
-            f"{places}: no finished packing{stalled}, expected files of sweep.py or make_packing.py"
-        )
+    if not files:
+        places = ", ".join(map(str, paths))
+        msg = f"{places}: no finished packing, expected files of sweep.py or make_packing.py"
         raise ValueError(msg)
-    return kept
+    return files
 
 
 def _files(path: Path) -> list[PackingFile]:
@@ -283,10 +278,16 @@ def n_of(groups: Mapping[Any, Sequence[PackingFile]]) -> int:
 
 
 def conditions(groups: Mapping[Any, Sequence[PackingFile]]) -> dict[str, Any]:
-    """Return what all files share of N, size ratio, energy and compression rate, for JSON."""
+    """Return what all files share of N, size ratio, energy and compression rate, and how many did not reach their goal."""
     every = [file.attributes for files in groups.values() for file in files]
     values = {name: {known.get(name) for known in every} for name in CONDITIONS}
-    return {name: of.pop() for name, of in values.items() if len(of) == 1 and None not in of}
+    shared = {name: of.pop() for name, of in values.items() if len(of) == 1 and None not in of}
+    return shared | {"not_reached": n_not_reached(groups)}
+
+
+def n_not_reached(groups: Mapping[Any, Sequence[PackingFile]]) -> int:
+    """Count the packings that did not reach their goal."""
+    return sum(not file.reached for files in groups.values() for file in files)
 
 
 def of_paper(system: System) -> bool:

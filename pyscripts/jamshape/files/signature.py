@@ -7,20 +7,34 @@ from pathlib import Path
 from jamshape.files.disk import PathLike
 
 HDF5, DUMP, RESTART, GSD, DATA = "HDF5", "dump", "restart", "GSD", "data"
+GZIP, ZSTD, EMPTY = "gzip", "Zstandard", "empty"
 
 SIGNATURES = {
     HDF5: b"\x89HDF\r\n\x1a\n",
     DUMP: b"ITEM: ",
     RESTART: b"LammpS RestartT\0",
     GSD: b"\xdf\x65" * 4,
+    GZIP: b"\x1f\x8b",
+    ZSTD: b"\x28\xb5\x2f\xfd",
 }
 """The first bytes of files by their format; data files of LAMMPS begin with any line."""
+
+REFUSED = {
+    RESTART: (
+        "is a restart file of LAMMPS, expected a state that is told to other programs; read it in a deck"
+        " (read_restart) and write a data file (write_data)"
+    ),
+    GZIP: "is compressed, expected the file itself; unpack it with gunzip",
+    ZSTD: "is compressed, expected the file itself; unpack it with unzstd",
+    EMPTY: "is empty, expected a packing, a run or modes in HDF5, a LAMMPS dump or data file, or a GSD file",
+}
+"""What to say of files whose format is known and that nothing reads as a state."""
 
 _HEAD = 4096  # bytes within which a data file of LAMMPS has named its box
 
 
 def format_of(path: PathLike) -> str:
-    """Tell the format of a file: HDF5, GSD, or a dump, restart or data file of LAMMPS; "" for others.
+    """Tell the format of a file: HDF5, GSD, a dump, restart or data file of LAMMPS, compressed; "" for others.
 
     Raises
     ------
@@ -29,6 +43,8 @@ def format_of(path: PathLike) -> str:
     """
     with Path(path).open("rb") as file:
         head = file.read(_HEAD)
+    if not head:
+        return EMPTY
     for name, signature in SIGNATURES.items():
         if head.startswith(signature):
             return name

@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from jamshape.checks import require_one_of, require_positive
+from jamshape.lammps.module import one_at_a_time
 from jamshape.packing import Packing
 from jamshape.shapes.shape import Interaction
 
@@ -240,10 +241,11 @@ class FlowRun(Generic[_Motion]):
     def measure(self) -> dict[str, float]:
         """Return observables of the present state, named as in `compute packing`."""
         lmp = self.session.lmp
-        values = lmp.extract_compute("packing", 0, 1)
-        found = {name: float(values[k]) for name, k in self.settings.of_packing.items()}
         flow = dict(self.settings.of_fix) | (_SUBSTEPS if self.settings.chooses_steps else {})
-        found |= {name: float(lmp.extract_fix("flow", 0, 1, k)) for name, k in flow.items()}
+        with one_at_a_time():
+            values = lmp.extract_compute("packing", 0, 1)
+            found = {name: float(values[k]) for name, k in self.settings.of_packing.items()}
+            found |= {name: float(lmp.extract_fix("flow", 0, 1, k)) for name, k in flow.items()}
         found["evaluations"] += self._evaluations
         return found
 

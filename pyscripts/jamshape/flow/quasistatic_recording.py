@@ -25,8 +25,9 @@ _COUNTS = ("steps", "u", "stress", "pressure", "volume", "evaluations", "wall_se
 def begin(
     path: Path, start: Packing, how: QuasistaticShear, attributes: Mapping[str, Any] | None = None
 ) -> None:
-    """Write the file of a run with its start as the first frame."""
-    stored = dataclasses.asdict(how) | {"sides": 2} | dict(attributes or {})
+    """Write the file of a run with its start as the first frame, which has two bonds side to side from then on."""
+    start = start.with_(law=start.law.but(sides=2))
+    stored = dataclasses.asdict(how) | start.law._asdict() | dict(attributes or {})
     stored |= {"phi_start": start.phi, "finished": False} | _counts(Sheared(State.of(start)))
     # Images would count cell vectors that are not there any more.
     first = start.with_(step=0, time=0.0, image=np.zeros_like(start.image))

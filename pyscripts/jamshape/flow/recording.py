@@ -117,7 +117,7 @@ def begin(session: Session, settings: Motion, start: Packing, to: Recording) -> 
     run.write_restart(to.restarts.next())
     attributes = dataclasses.asdict(settings) | dict(to.attributes)
     attributes |= {"phi_start": start.phi, "rows": to.rows, "frames": to.frames, "finished": False}
-    attributes["left_out"] = session.left_out()
+    attributes |= {"left_out": session.left_out(), "lammps_version": session.version}
     RunWriter.create(to.path, run.packing(), attributes, first).close()
     return run
 

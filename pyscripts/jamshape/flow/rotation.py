@@ -22,7 +22,7 @@ def rotation_rates(
     packing : Packing
     host : Host
     law : Interaction, optional
-        With k_e = 1 and two bonds side to side when left out.
+        That of the packing when left out.
     k_d : float, [energy time / length^4]
 
     Returns
@@ -35,8 +35,7 @@ def rotation_rates(
     ValueError
         If the packing is not in two dimensions.
     """
-    law = law or Interaction(1.0, 2)
-    landscape = Landscape(packing, law.k_e, law.sides)
+    landscape = Landscape(packing, *(law or packing.law))
     velocity = -landscape.evaluate(State.of(packing)).gradient / drag_coefficients(landscape, k_d)
     _, turns = landscape.motion(velocity)
     angle = np.asarray(packing.orientation, np.float64)

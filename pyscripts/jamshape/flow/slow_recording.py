@@ -43,8 +43,9 @@ def begin(
     protocol: Protocol | SlowShear,
     attributes: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write the file of a run with its first frame."""
-    stored = _as_attributes(protocol) | {"sides": 2}
+    """Write the file of a run with its first frame, which has two bonds side to side from then on."""
+    start = start.with_(law=start.law.but(sides=2))
+    stored = _as_attributes(protocol) | start.law._asdict()
     flow = Flow(State.of(start))
     stored |= dict(attributes or {}) | {"phi_start": start.phi, "finished": False}
     first = start.with_(step=0, time=0.0)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from jamshape.arguments import checked
 from jamshape.checks import (
+    ArgumentError,
     Range,
+    require_given,
     require_in,
+    require_no_effect,
     require_one_of,
-    require_path_for_lammps,
+    require_path,
     require_rising,
     require_stated,
 )
@@ -19,6 +23,7 @@ from jamshape.flow import recording, slow_recording
 from jamshape.flow.compression import Compression
 from jamshape.flow.implicit import Protocol
 from jamshape.flow.recording import Recording
+from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import place
 from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import RunFile
@@ -28,22 +33,31 @@ from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
 
+PHI = (0.4, 0.9)
+"""Packing fractions of the random start and of the end of a compression, where nobody says others."""
+
+_PHI_SLOW_USUAL = (0.8, 0.9)
+_N, _SEED = 256, 1
+_SAME = 1e-9  # of packing fractions, up to rounding
+_DT, _ERROR = 0.05, 1e-4
+
 _PHI_RANDOM = 0.4  # of the random start of a slow compression
 _PHI_SLOW = Range(0.41, 2.0, "a packing fraction above that of the random start, which is 0.4,")
 
 
+@checked
 def compress(
     particles: Particles,
     *,
     n: int = 256,
     dimension: int = 2,
-    phi: tuple[float, float] = (0.4, 0.9),
+    phi: tuple[float, float] = PHI,
     kappa: float = 1e-5,
     seed: int = 1,
     sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
-    tolerance: float = 1e-4,
+    tolerance: float | None = None,
     rows: int = 400,
     frames: int = 20,
     file: str | Path | None = None,
@@ -73,8 +87,8 @@ def compress(
         fastest, when left out, and ``heun`` where there is one bond or `dt` is given.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 when left out.
-    tolerance : float
-        Of the others: local error of a step over the typical overlap.
+    tolerance : float, optional
+        Of the others: local error of a step over the typical overlap; 1e-4 when left out.
     rows, frames : int
         How many samples of p(phi) and how many snapshots to keep.
     file : path, optional
@@ -92,7 +106,7 @@ def compress(
     Raises
     ------
     ValueError
-        If a number is out of its range, or the file holds another run.
+        If a number is out of its range or has no effect, or the file holds another run.
     PluginError
         If there is no LAMMPS or no plugin for it.
 
@@ -105,20 +119,22 @@ def compress(
     <Run of 24 spherocylinders in 2D at kappa = 0.001: 21 frames to phi = 0.95, pressure = 0.0547, in run.h5>
     """
     require_rising(*phi)
-    require_stated(n=n, seed=seed, kappa=kappa, tolerance=tolerance, rows=rows, frames=frames)
+    require_stated(n=n, seed=seed, kappa=kappa, rows=rows, frames=frames)
     require_one_of("dimension", dimension, (2, 3))
-    if dt is not None:
-        require_stated(dt=dt)
+    require_given(dt=dt, tolerance=tolerance)
     integrator = integrator or ("rkc2" if dt is None and sides == 2 else "heun")
     settings = Compression(
-        kappa=kappa, phi_end=phi[1], dt=0.05 if dt is None else dt,
-        sides=sides, integrator=integrator, tolerance=tolerance,
+        kappa=kappa, phi_end=phi[1], dt=_DT if dt is None else dt,
+        sides=sides, integrator=integrator, tolerance=_ERROR if tolerance is None else tolerance,
     )  # fmt: skip
     if settings.chooses_steps:
+        require_no_effect("integrator", integrator, dt=dt)
         settings = settings.in_steps(phi[0], rows, dimension)
+    else:
+        require_no_effect("integrator", integrator, tolerance=tolerance)
     settings.steps(phi[0], dimension)  # refuses what does not end
     at = place(file, "run.h5")
-    require_path_for_lammps(at.path)  # restart files lie beside it
+    require_path(at.path)
     made_from = dict(particles.told) | {"n": n, "seed": seed}
     to = Recording(at.path, rows, frames, made_from)
     if again or not at.path.exists():
@@ -130,14 +146,15 @@ def compress(
     return RunFile(*at)
 
 
+@checked
 def slow_compress(
     particles: Particles | None = None,
     *,
-    n: int = 256,
-    phi: tuple[float, float] = (0.8, 0.9),
+    n: int | None = None,
+    phi: tuple[float | None, float] | None = None,
     kappa: float | Sequence[tuple[float, float]] = 1e-8,
     p_end: float = math.inf,
-    seed: int = 1,
+    seed: int | None = None,
     start: Packing | str | Path | None = None,
     method: str = "tr-bdf2",
     tolerance: float = 1e-3,
@@ -152,17 +169,18 @@ def slow_compress(
     ----------
     particles : Particles
         Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
-    n : int
-        Number of particles.
-    phi : (float, float)
-        Packing fractions at which a fast compression in LAMMPS ends and this one begins, and to reach.
+    n : int, optional
+        Number of particles; 256 when left out, or those of the start.
+    phi : (float, float), optional
+        Packing fractions at which a fast compression in LAMMPS ends and this one begins, and to reach; (0.8, 0.9)
+        when left out. A start has its own: the first is then that, or None.
     kappa : float, [1/time], or sequence of (float, float)
         Rate: the box shrinks with dL/dt = -kappa L. Or pairs of a packing fraction and the rate from
         there on, ascending.
     p_end : float, [energy / length^2]
         It also ends where this pressure is reached.
-    seed : int
-        Of the random start.
+    seed : int, optional
+        Of the random start; 1 when left out.
     start : Packing or path, optional
         What to begin with; of a path, its last frame.
     method : {"tr-bdf2", "sdirk2", ...}
@@ -181,10 +199,15 @@ def slow_compress(
     Raises
     ------
     ValueError
-        If a number is out of its range, the file holds another run, or neither particles nor a start
+        If a number is out of its range or has no effect, the file holds another run, or neither particles nor a start
         is given.
     PluginError
         If the fast compression finds no LAMMPS or no plugin for it.
+
+    Warns
+    -----
+    NotReachedWarning
+        If `p_end` is given and not reached.
 
     Examples
     --------
@@ -194,41 +217,89 @@ def slow_compress(
     >>> round(float(run.phi[-1]), 6)
     0.72
     """
-    require_stated(n=n, seed=seed, phi_end=phi[1], tolerance=tolerance, largest_drop=largest_drop)
+    require_no_effect("start", start, particles=particles, n=n, seed=seed)
+    phi_start, phi_end = phi or (None, _PHI_SLOW_USUAL[1])
+    require_stated(phi_end=phi_end, tolerance=tolerance, largest_drop=largest_drop)
     if p_end != math.inf:
         require_stated(p_end=p_end)
-    rates = kappa if isinstance(kappa, int | float) else tuple(kappa)
-    protocol = Protocol(rates, phi[1], p_end, tolerance, largest_drop=largest_drop, method=method)
+    rates = tuple(kappa) if isinstance(kappa, Iterable) else float(kappa)
+    protocol = Protocol(rates, phi_end, p_end, tolerance, largest_drop=largest_drop, method=method)
     for _, rate in protocol.rates:
         require_stated(kappa=rate)
-    if start is None:
-        require_rising(*phi)
-        require_in("phi_start", phi[0], _PHI_SLOW)
     at = place(file, "slow.h5")
-    if at.path.exists() and not again:
-        slow_recording.require_same(at.path, protocol)
+    if start is not None:
+        of: _Known | _Random = _Known.of(start, phi_start)
     else:
-        first, made_from = _slow_start(particles, (n, phi[0], seed), start)
-        if not first.phi < protocol.phi_end:
-            msg = f"the start has phi = {first.phi:.6g}, expected one below phi_end = {protocol.phi_end:g}"
-            raise ValueError(msg)
-        slow_recording.begin(at.path, first, protocol, made_from)
+        of = _Random.of(particles, n=n, phi=phi_start, seed=seed)
+        require_rising(of.phi, phi_end)
+    if at.path.exists() and not again:
+        slow_recording.require_same(at.path, protocol, of.made_from)
+    else:
+        first = of.packing()
+        _require_end_ahead(first, protocol)
+        slow_recording.begin(at.path, first, protocol, of.made_from)
     resume(at.path, progress=progress)
     return RunFile(*at)
 
 
-def _slow_start(
-    particles: Particles | None,
-    numbers: tuple[int, float, int],
-    start: Packing | str | Path | None,
-) -> tuple[Packing, dict[str, Any]]:
-    """Take or make the start of n, phi and a seed, and say what it was made from."""
-    if start is not None:
-        known = start_of(start)
-        return known, told_of(known)
-    if particles is None:
-        msg = "there are neither particles nor a start, expected one of them"
+def _require_end_ahead(first: Packing, protocol: Protocol) -> None:
+    """Refuse a start that is beyond the end."""
+    if not first.phi < protocol.phi_end:
+        msg = f"the start has phi = {first.phi:.6g}, expected one below phi_end = {protocol.phi_end:g}"
         raise ValueError(msg)
-    n, phi, seed = numbers
-    random = random_packing(n, _PHI_RANDOM, seed, particles)
-    return compressed_start(random, phi), dict(particles.told) | {"n": n, "seed": seed}
+    pressure = MeasuredPacking.of(first).pressure
+    if pressure >= protocol.p_end:
+        said = f"{{p_end}} is not above the pressure of the start, {pressure:.4g}, expected a larger one"
+        raise ArgumentError(said, {"p_end": protocol.p_end})
+
+
+class _Known(NamedTuple):
+    """A start that was given."""
+
+    start: MeasuredPacking
+
+    @classmethod
+    def of(cls, start: Packing | str | Path, phi: float | None) -> _Known:
+        """Take it, and refuse another packing fraction than its own."""
+        found = start_of(start)
+        if phi is not None and not math.isclose(phi, found.phi, rel_tol=_SAME):
+            said = f"{{phi_start}} is not that of the start, {found.phi:.6g}, which has its own, expected None in its place"
+            raise ArgumentError(said, {"phi_start": phi})
+        return cls(found)
+
+    @property
+    def made_from(self) -> dict[str, Any]:
+        return told_of(self.start)
+
+    def packing(self) -> Packing:
+        return self.start
+
+
+class _Random(NamedTuple):
+    """A random start, compressed fast."""
+
+    particles: Particles
+    n: int
+    phi: float
+    seed: int
+
+    @classmethod
+    def of(cls, particles: Particles | None, **asked: Any) -> _Random:
+        """Take what was asked for, n, phi and seed, and what is usual for those that are None."""
+        if particles is None:
+            msg = "there are neither particles nor a start, expected one of them"
+            raise ValueError(msg)
+        given = {name: value for name, value in asked.items() if value is not None}
+        found = cls(particles, **{"n": _N, "phi": _PHI_SLOW_USUAL[0], "seed": _SEED} | given)
+        require_stated(n=found.n, seed=found.seed)
+        require_in("phi_start", found.phi, _PHI_SLOW)
+        return found
+
+    @property
+    def made_from(self) -> dict[str, Any]:
+        return dict(self.particles.told) | {"n": self.n, "seed": self.seed}
+
+    def packing(self) -> Packing:
+        return compressed_start(
+            random_packing(self.n, _PHI_RANDOM, self.seed, self.particles), self.phi
+        )

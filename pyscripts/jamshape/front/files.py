@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from jamshape.files.h5md import read_attributes
+from jamshape.arguments import checked
+from jamshape.files.h5md import copy_run, read_attributes, write_packing
 from jamshape.files.lammps_text import read_any, write_data
+from jamshape.files.meaning import Wanted, require_told
 from jamshape.files.signature import GSD, HDF5, format_of
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
@@ -15,7 +18,14 @@ from jamshape.packing import Packing
 from jamshape.vibration.table import holds_modes
 
 
-def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | Recorded | Modes:
+@checked
+def load(
+    path: str | Path,
+    frame: int | None = None,
+    *,
+    dimension: int | None = None,
+    shape: str | None = None,
+) -> MeasuredPacking | Recorded | Modes:
     """Load what is in a file.
 
     Parameters
@@ -25,6 +35,11 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | Record
     frame : int, optional
         Which frame of a run, a dump or a GSD file to take as a packing, from 0 or, if negative, from
         the end; a whole run, or the last frame of the others, when left out.
+    dimension : {2, 3}, optional
+        Of a dump or data file that does not say it; what is most plausible when left out, with a warning.
+    shape : str, optional
+        The same of the shape: ``"spherocylinder"``, ``"superellipsoid"`` or ``"dimer"``. The law of such a
+        file is the usual one; use ``packing.with_(law=js.Interaction(k_e, sides))`` for another one.
 
     Returns
     -------
@@ -34,6 +49,8 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | Record
     ------
     FileFormatError
         If the file is none of these.
+    ValueError
+        If the file says another dimension or shape.
     OSError
         If it cannot be opened.
 
@@ -45,36 +62,44 @@ def load(path: str | Path, frame: int | None = None) -> MeasuredPacking | Record
     >>> js.load("packing.h5")
     <Packing of 16 spherocylinders in 2D: phi = 0.8..., pressure = ...e-05, u = 1e-08, z = 5..., rattlers = 0, in packing.h5>
     """
-    path = Path(path)
+    path, wanted = Path(path), Wanted(dimension, shape)
     found = format_of(path)
+    last = -1 if frame is None else frame
     if found == GSD:
         from jamshape.exchange.gsd import read_gsd  # noqa: PLC0415 - gsd may be missing
 
-        return MeasuredPacking.of(read_gsd(path, -1 if frame is None else frame), file=path)
-    if found != HDF5:
-        packing = read_any(path, -1 if frame is None else frame)
+        packing = read_gsd(path, last)
+        require_told(path, packing, wanted)
         return MeasuredPacking.of(packing, file=path)
+    if found != HDF5:
+        return MeasuredPacking.of(read_any(path, last, *wanted), file=path)
     if holds_modes(path):
         return Modes.read(path)
     if frame is None and "finished" in read_attributes(path):
-        return run_file(path)
-    return MeasuredPacking.read(path, -1 if frame is None else frame)
+        run = run_file(path)
+        require_told(path, run.packing(0), wanted)
+        return run
+    measured = MeasuredPacking.read(path, last)
+    require_told(path, measured, wanted)
+    return measured
 
 
-def save(path: str | Path, packing: Packing) -> None:
-    """Write a packing, replacing the file that is there only when all is written.
+@checked
+def save(path: str | Path, thing: Packing | Recorded | Modes) -> None:
+    """Write a packing, a run or modes, replacing the file that is there only when all is written.
 
     Parameters
     ----------
     path : path
-        Its end says how: ``.h5`` (H5MD, to all digits and with the results), ``.data`` (a LAMMPS data
-        file), ``.gsd`` (HOOMD-blue, OVITO).
-    packing : Packing
+        Its end says how: ``.h5`` (HDF5, to all digits and with the results), ``.data`` (a LAMMPS data
+        file of one packing, in doubles), ``.gsd`` (HOOMD-blue, OVITO; of a run all frames).
+    thing : Packing, RunFile, ShearFile, QuasistaticShearFile or Modes
+        Of a run in ``.h5`` the copy holds all that its file does. It cannot be resumed if the run is not finished.
 
     Raises
     ------
     ValueError
-        If the end of the name is none of these.
+        If the end of the name is none of these, or the format holds no such thing.
     OSError
         If the file cannot be written.
 
@@ -86,26 +111,41 @@ def save(path: str | Path, packing: Packing) -> None:
     >>> js.save("packing.data", packing)
     """
     path = Path(path)
-    writer = _WRITERS.get(path.suffix)
-    if writer is None:
+    if path.suffix not in _WRITERS:
         msg = f"{path} ends in {path.suffix!r}, expected one of {', '.join(_WRITERS)}"
         raise ValueError(msg)
-    writer(path, packing)
+    for kind, write in _WRITERS[path.suffix].items():
+        if isinstance(thing, kind):
+            write(path, thing)
+            return
+    held = sorted({_NAMES[kind] for kind in _WRITERS[path.suffix]})
+    msg = f"{path}: a {type(thing).__name__} was given, expected {' or '.join(held)} in a file {path.suffix}"
+    raise ValueError(msg)
 
 
 def _save_h5(path: Path, packing: Packing) -> None:
     measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
-    measured.save(path)
+    write_packing(path, measured, measured.to_store)
 
 
-def _save_gsd(path: Path, packing: Packing) -> None:
+def _save_run(path: Path, run: Recorded) -> None:
+    copy_run(run.file, path)
+
+
+def _save_modes(path: Path, modes: Modes) -> None:
+    modes.save(path)
+
+
+def _save_gsd(path: Path, packings: Packing | Recorded) -> None:
     from jamshape.exchange.gsd import write_gsd  # noqa: PLC0415 - gsd may be missing
 
-    write_gsd(path, packing)
+    write_gsd(path, packings)
 
 
-_WRITERS: dict[str, Callable[[Path, Packing], None]] = {
-    ".h5": _save_h5,
-    ".data": write_data,
-    ".gsd": _save_gsd,
+_NAMES = {Packing: "a packing", Recorded: "a run", Modes: "modes"}
+_WRITERS: dict[str, dict[type, Callable[[Path, Any], None]]] = {
+    ".h5": {Packing: _save_h5, Recorded: _save_run, Modes: _save_modes},
+    ".data": {Packing: write_data},
+    ".gsd": {Packing: _save_gsd, Recorded: _save_gsd},
 }
+"""What a file holds, by the end of its name, and how it is written."""

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jamshape.checks import require_path, require_path_for_lammps, require_stated
+from jamshape.arguments import checked
+from jamshape.checks import require_path, require_stated
+from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow, place
 from jamshape.landscape.threads import sharing
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Progress, is_done, make, require_same, tidy
-from jamshape.protocols.recipe import Compressed, Dynamics
 from jamshape.shapes.particles import Particles
 
 
+@checked
 def make_packing(
     particles: Particles | None = None,
     *,
@@ -110,7 +112,7 @@ def make_packing(
     Returns
     -------
     MeasuredPacking
-        Its ``results["outcome"]`` says whether forces balance to the tolerance.
+        Its ``reached`` says whether forces balance to the tolerance, and ``results["outcome"]`` how it ended.
 
     Raises
     ------
@@ -120,6 +122,11 @@ def make_packing(
         If the energy is not reached.
     PluginError
         If the way by dynamics finds no LAMMPS or no plugin for it.
+
+    Warns
+    -----
+    NotReachedWarning
+        If forces do not balance to the tolerance, after a second try as long as the first one.
 
     Examples
     --------
@@ -137,9 +144,7 @@ def make_packing(
     )  # fmt: skip
     require_stated(threads=threads)
     at = place(file, "packing.h5")
-    (require_path_for_lammps if isinstance(recipe.way, Dynamics | Compressed) else require_path)(
-        at.path
-    )
+    require_path(at.path)
     if again or not is_done(at.path):
         steps = make(recipe, at.path, again=again)
         with sharing(threads):
@@ -148,6 +153,7 @@ def make_packing(
         require_same(at.path, recipe)
         tidy(recipe, at.path)
     packing = MeasuredPacking.read(at.path)
+    warn_unless_reached(packing.results)
     # A file that goes with its folder is nothing to name.
     return packing if at.folder is None else MeasuredPacking.of(packing, packing.results)
 

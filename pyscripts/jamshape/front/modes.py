@@ -7,17 +7,35 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jamshape.arrays import FloatArray
-from jamshape.checks import Range, require_in, require_one_of, require_other_file
+from jamshape.arguments import checked
+from jamshape.arrays import FloatArray, IntArray
+from jamshape.checks import (
+    Range,
+    require_in,
+    require_no_effect,
+    require_one_of,
+    require_other_file,
+)
+from jamshape.files.disk import require_hdf5_name, settled
+from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
+from jamshape.vibration.elasticity import Moduli
 from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
 from jamshape.vibration.sets import TOLD, to_store
 from jamshape.vibration.sparse_modes import lowest as lowest_modes
 from jamshape.vibration.sparse_modes import near as modes_near
+from jamshape.vibration.sparse_modes import with_translations
 from jamshape.vibration.spectrum import METHODS, Spectrum, spectrum
-from jamshape.vibration.table import ModeTable, holds_modes, read_modes, tabulate, write_modes
+from jamshape.vibration.table import (
+    BANDS,
+    ModeTable,
+    holds_modes,
+    read_modes,
+    tabulate,
+    write_modes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,6 +83,9 @@ class Modes:
     file: Path | None = None
     matrix: DynamicalMatrix | None = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "file", settled(self.file))
+
     @classmethod
     def read(cls, path: Path) -> Modes:
         """Read modes from a file; errors as `read_modes`."""
@@ -102,9 +123,33 @@ class Modes:
     def __len__(self) -> int:
         return len(self.table["eigenvalues"])
 
-    def in_band(self, name: str) -> Any:
-        """Rows of the modes of a band: translation, low, middle or high."""
+    def in_band(self, name: str) -> IntArray:
+        """Rows of the modes of a band: translation, low, middle or high.
+
+        There are none where bands are not apart, as far above jamming; ``repr(modes)`` says why.
+        """
+        require_one_of("band", name, BANDS.values())
         return self.table.in_band(name)
+
+    @property
+    def vibrational(self) -> IntArray:
+        """Rows of all modes but translations, which are flagged by ``modes["is_translation"]`` and have omega = 0."""
+        return self.table.vibrational
+
+    @property
+    def moduli(self) -> Moduli:
+        """Elastic moduli ``bulk``, ``pure_shear`` and ``simple_shear``, each with its ``bound``.
+
+        Examples
+        --------
+        >>> import jamshape as js
+        >>> discs = js.Spherocylinders(alpha=0)
+        >>> packing = js.make_packing(discs, n=16, u0=1e-8, file="discs.h5", progress=False)
+        >>> bulk = js.modes(packing).moduli.bulk
+        >>> bulk.bound < 1e-6 * bulk.relaxed
+        True
+        """
+        return self.table.moduli
 
     def plot(self, axes: Axes | None = None, **look: Any) -> Axes:
         """Draw the density of their frequencies; arguments as `jamshape.plot`."""
@@ -112,6 +157,7 @@ class Modes:
 
         return plot(self, axes, **look)
 
+    @checked
     def save(self, path: str | Path, *, vectors: bool = True) -> None:
         """Write them to an HDF5 file, with or without their vectors, replacing modes that are there.
 
@@ -121,15 +167,19 @@ class Modes:
             If the file is there and holds anything else, such as the packing.
         """
         read = [self.packing.file] if self.packing and self.packing.file else []
+        require_hdf5_name(Path(path))
         require_modes_file(Path(path), read)
         write_modes(path, self.table, self.about, vectors=vectors)
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{len(self.in_band(name))} {name}" for name in TOLD)
+        known = [name for name in TOLD if self.table.has_band(name)]
+        counts = ", ".join(f"{len(self.in_band(name))} {name}" for name in known)
         a = self.table.attributes
         of = f"{a['n_backbone']} of {a['n']} particles held by {a['n_bonds']} bonds"
-        bands = f" ({counts})" if len(self) == a["n_modes"] else f" of {a['n_modes']}"
-        return f"<{len(self)} modes{bands} of {of}: z = {a['z']:.4g}>"
+        is_whole = len(self) == a["n_modes"]
+        bands = f" ({counts or 'no bands'})" if is_whole else f" of {a['n_modes']}"
+        why = f"; {a['why_no_bands']}" if is_whole and "why_no_bands" in a else ""
+        return f"<{len(self)} modes{bands} of {of}: z = {a['z']:.4g}{why}>"
 
     def _repr_html_(self) -> str:
         from jamshape.front.pictures import html  # noqa: PLC0415 - only notebooks ask
@@ -157,12 +207,13 @@ def require_modes_file(out: Path, read: Sequence[Path] = ()) -> None:
         raise ValueError(msg)
 
 
+@checked
 def modes(
     packing: Packing | str | Path,
     *,
     lowest: int | None = None,
     near: float | None = None,
-    method: str = "projected",
+    method: str | None = None,
     rotation: str = "half_length",
     least_force: float = 0.0,
     force: bool = False,
@@ -172,14 +223,15 @@ def modes(
     Parameters
     ----------
     packing : Packing or path
-        At a minimum of its energy, as `make_packing` leaves it.
+        At a minimum of its energy, as `make_packing` leaves it; the energy is that of its law, ``packing.law``.
     lowest : int, optional
-        Only so many of the softest modes, by a sparse method; all when left out.
+        Only this number of softest modes, by a sparse method; all when left out. Translations do not count
+        and come in addition, flagged, as in the whole spectrum.
     near : float, [sqrt(energy) / length], optional
         As many modes as `lowest` says, or 20, whose frequencies are nearest to this one.
-    method : {"projected", "refined", "plain", "first_order", "sparse"}
+    method : {"projected", "refined", "plain", "first_order", "sparse"}, optional
         Of the whole spectrum; see `jamshape.vibration.spectrum.spectrum`. ``sparse`` finds 20 modes
-        where nobody says how many.
+        where nobody says how many. When left out ``sparse`` where only some modes are asked for, and else ``projected``.
     rotation : {"half_length", "radius"}
         What a radian counts for as a length.
     least_force : float
@@ -190,7 +242,8 @@ def modes(
     Returns
     -------
     Modes
-        Each eigenvalue with its sign, the bound of its error, participation, kind of motion and band.
+        Each eigenvalue with its sign, the bound of its error, participation, kind of motion and band;
+        translations have the eigenvalue 0.
 
     Raises
     ------
@@ -199,29 +252,41 @@ def modes(
     NotAtMinimumError
         If forces do not balance, unless `force` is given.
 
+    Warns
+    -----
+    NotReachedWarning
+        If forces balance well enough for modes, but not to the tolerance of the packing, unless `force` is given.
+
     Examples
     --------
     >>> import jamshape as js
     >>> rods = js.Spherocylinders(alpha=1)
     >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> softest = js.modes(packing, lowest=4)
-    >>> softest.omega.shape
+    >>> softest.omega[softest.vibrational].shape
     (4,)
+    >>> len(softest), len(softest.in_band("translation"))
+    (6, 2)
     """
-    require_one_of("the method", method, (*METHODS, _SPARSE))
+    require_one_of("the method", method or _SPARSE, (*METHODS, _SPARSE))
     require_one_of("rotation", rotation, ("half_length", "radius"))
     require_in("least_force", least_force, _LEAST_FORCE)
     if lowest is not None:
         require_in("lowest", lowest, _LOWEST)
     if near is not None:
         require_in("near", near, _NEAR)
+    if method != _SPARSE:
+        require_no_effect("lowest", lowest, method=method)
+        require_no_effect("near", near, method=method)
     if not isinstance(packing, Packing):
         packing = MeasuredPacking.read(Path(packing))
     measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
+    if not force and not measured.reached:
+        warn_unless_reached(measured.results)
     landscape, state = Landscape(measured), State.of(measured)
     scope = Scope(rotation, least_force, force=force)
     matrix = dynamical_matrix(landscape, state, scope)
-    found = _found(matrix, method, lowest, near)
+    found = _found(matrix, method or next(iter(METHODS)), lowest, near)
     table = tabulate(landscape, state, matrix, found)
     asked = {"rotation": rotation, "least_force": least_force}
     about = to_store(measured.results, measured) | asked
@@ -231,9 +296,10 @@ def modes(
 def _found(
     matrix: DynamicalMatrix, method: str, lowest: int | None, near: float | None
 ) -> Spectrum:
-    """Find the modes that were asked for, by the method that was."""
+    """Find the modes that were asked for, by the method that was, and translations."""
+    few = lowest or min(FEW, max(1, matrix.size - matrix.translations.shape[1]))
     if near is not None:
-        return modes_near(matrix, lowest or FEW, near**2)
+        return with_translations(matrix, modes_near(matrix, few, near**2))
     if method == _SPARSE or lowest:
-        return lowest_modes(matrix, lowest or FEW)
+        return with_translations(matrix, lowest_modes(matrix, few))
     return spectrum(matrix, method)

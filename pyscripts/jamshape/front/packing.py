@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,12 +11,16 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from jamshape.arguments import checked, checked_fields
 from jamshape.arrays import BoolArray
 from jamshape.contacts import Contacts
 from jamshape.contacts.network import sum_forces
-from jamshape.files.h5md import read_attributes, read_packing, write_packing
-from jamshape.files.sets import REACHED
+from jamshape.files.disk import named, settled
+from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.files.outcomes import AT_REST, is_reached, shortfall
 from jamshape.packing import Packing
+
+_SAME_PHI = 1e-6  # relative; more than any rounding, and than that of boxes in single precision
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,11 +28,12 @@ if TYPE_CHECKING:
     from jamshape.front.modes import Modes
 
 
+@checked_fields
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuredPacking(Packing):
     """A `Packing` with what is known of it and what can be asked of it.
 
-    Its contacts have the law with two bonds side to side and k_e = 1, unless its file says otherwise.
+    Its contacts have the law that it carries, ``packing.law``, as its copies and files do.
 
     Parameters
     ----------
@@ -50,6 +56,10 @@ class MeasuredPacking(Packing):
     results: Mapping[str, Any] = field(default_factory=dict)
     file: Path | None = None
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "file", settled(self.file))
+
     @classmethod
     def of(
         cls, packing: Packing, results: Mapping[str, Any] | None = None, file: Path | None = None
@@ -61,7 +71,8 @@ class MeasuredPacking(Packing):
     @classmethod
     def read(cls, path: Path, frame: int = -1) -> Self:
         """Read one frame of an H5MD file; errors as `jamshape.files.h5md.read_packing`."""
-        return cls.of(read_packing(path, frame), read_attributes(path), path)
+        packing = read_packing(path, frame)
+        return cls.of(packing, results_of(path, packing), path)
 
     def with_(self, **changes: Any) -> Self:
         """Return a packing with the named fields replaced, of which its file says nothing any more."""
@@ -69,8 +80,7 @@ class MeasuredPacking(Packing):
 
     @cached_property
     def _contacts(self) -> Contacts:
-        k_e, sides = self.results.get("k_e", 1.0), self.results.get("sides", 2)
-        return Contacts.of(self, float(k_e), int(sides))
+        return Contacts.of(self)
 
     def contacts(self) -> Contacts:
         """Find its contacts.
@@ -86,6 +96,11 @@ class MeasuredPacking(Packing):
             If what must not cross of two particles does.
         """
         return self._contacts
+
+    @property
+    def reached(self) -> bool:
+        """Whether it reached its goal, forces that balance; True where its file says nothing of that."""
+        return "outcome" not in self.results or is_reached(self.results)
 
     @property
     def z(self) -> float:
@@ -119,15 +134,19 @@ class MeasuredPacking(Packing):
 
         return plot(self, axes, **look)
 
+    @checked
     def save(self, path: str | Path) -> None:
-        """Write it with its results to an H5MD file, replacing what is there."""
-        write_packing(path, self, self.to_store)
+        """Write it, as `jamshape.save`: how says the end of the name."""
+        from jamshape.front.files import save  # noqa: PLC0415 - which knows packings
+
+        save(path, self)
 
     @property
     def to_store(self) -> dict[str, Any]:
         """Give the results without what tells of a run: a frame is not that run, which could be gone on with."""
         return {k: v for k, v in self.results.items() if k != "finished"}
 
+    @checked
     def to_gsd(self, path: str | Path) -> None:
         """Write it for HOOMD-blue, OVITO and freud; needs the package gsd."""
         from jamshape.exchange.gsd import write_gsd  # noqa: PLC0415 - gsd may be missing
@@ -159,9 +178,11 @@ class MeasuredPacking(Packing):
         known = (("pressure", "pressure"), ("u", "u"), ("z", "z"), ("n_rattlers", "rattlers"))
         numbers = {name: self.results.get(key) for key, name in known}
         said += [f"{k} = {v:.4g}" for k, v in numbers.items() if _is_number(v)]
-        outcome = self.results.get("outcome", REACHED[0])
-        said += [f"{outcome}: forces do not balance"] * (outcome not in REACHED)
-        said += [f"in {self.file}"] * (self.file is not None)
+        if not self.reached:
+            outcome = self.results["outcome"]
+            unbalanced = f"{outcome}: forces do not balance"
+            said.append(shortfall(self.results) if outcome in AT_REST else unbalanced)
+        said += [f"in {named(self.file)}"] if self.file else []
         what = f"{self.n} {self.shape.name}s in {self.dimension}D"
         return f"<Packing of {what}: {', '.join(said)}>"
 
@@ -169,6 +190,25 @@ class MeasuredPacking(Packing):
         from jamshape.front.pictures import html  # noqa: PLC0415 - only notebooks ask
 
         return html(self)
+
+
+def results_of(path: Path, packing: Packing) -> dict[str, Any]:
+    """Read what a file says of a packing in it; nothing, with a warning, if its particles were changed since.
+
+    Errors are those of `read_packing`.
+    """
+    known = read_attributes(path)
+    if "outcome" not in known or not _is_number(known.get("phi")):
+        return known
+    phi = float(known["phi"])
+    if abs(phi - packing.phi) <= _SAME_PHI * packing.phi:
+        return known
+    said = (
+        f"{path}: its attributes say phi = {phi:.8g} and its particles have phi = {packing.phi:.8g}: another program has"
+        " changed them, and what the file says of its packing is left out"
+    )
+    warnings.warn(said, stacklevel=3)
+    return {}
 
 
 def _is_number(value: Any) -> bool:

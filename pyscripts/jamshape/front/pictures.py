@@ -7,14 +7,17 @@ import html as markup
 import io
 from typing import TYPE_CHECKING, Any
 
+from jamshape.arguments import ArgumentTypeError, checked
+from jamshape.checks import ArgumentError, said
 from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
 from jamshape.drawing.pressure import draw_pressure
-from jamshape.drawing.shear import draw_stress
+from jamshape.drawing.shear import draw_steps, draw_stress
+from jamshape.files.sets import PackingFile
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.run import Recorded, RunFile, ShearFile
+from jamshape.front.run import QuasistaticShearFile, Recorded, RunFile, ShearFile
 from jamshape.measures.runs import read_run
 from jamshape.measures.shears import read_shear
 from jamshape.packing import Packing
@@ -28,18 +31,20 @@ _INCHES = {"packing": (5.0, 5.8), "curve": (5.0, 3.6)}
 _DPI = 100
 
 
+@checked
 def plot(
-    thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str = "kind"
+    thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str | None = None
 ) -> Axes:
     """Draw a packing, the pressure of a compression, the stress of a shear, or the density of modes.
 
     Parameters
     ----------
-    thing : Packing, RunFile, ShearFile or Modes
+    thing : Packing, RunFile, ShearFile, QuasistaticShearFile or Modes
     axes : matplotlib Axes, optional
-        Where to draw; a new figure of `matplotlib.pyplot` when left out.
-    color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}
-        What the colours of a packing's particles tell.
+        Where to draw, without a projection, also packings in space, whose picture is computed; a new figure of
+        `matplotlib.pyplot` when left out.
+    color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}, optional
+        What the colours of a packing's particles tell; "kind" when left out.
 
     Returns
     -------
@@ -48,9 +53,9 @@ def plot(
     Raises
     ------
     TypeError
-        If it is none of these.
+        If it is none of these, or axes are no such axes.
     ValueError
-        If the packing's dimension knows no such order.
+        If the packing's dimension knows no such order, or there is a colour for what is no packing.
 
     Examples
     --------
@@ -63,11 +68,17 @@ def plot(
     >>> "N=16" in axes.get_title()
     True
     """
+    if color is not None and not isinstance(thing, Packing):
+        msg = (
+            f"{{color}} has no effect on a {type(thing).__name__}, expected a packing; leave it out"
+        )
+        raise ArgumentError(msg, {"color": color})
     if axes is None:
         import matplotlib.pyplot as plt  # noqa: PLC0415 - not needed where axes are given
 
         axes = plt.figure(figsize=_size(thing), layout="constrained").add_subplot()
-    _draw(thing, axes, color)
+    _require_plane(axes)
+    _draw(thing, axes, color or "kind")
     return axes
 
 
@@ -82,6 +93,16 @@ def html(thing: MeasuredPacking | Recorded | Modes) -> str:
     picture = base64.b64encode(stream.getvalue()).decode()
     image = f'<img alt="picture" src="data:image/png;base64,{picture}"/>'
     return f"<div><code>{markup.escape(repr(thing))}</code><br/>{image}</div>"
+
+
+def _require_plane(axes: Any) -> None:
+    from matplotlib.axes import Axes  # noqa: PLC0415 - slow
+
+    if isinstance(axes, Axes) and axes.name == "rectilinear":
+        return
+    found = f"axes with projection={axes.name!r}" if isinstance(axes, Axes) else said(axes)
+    msg = f"axes is {found}, expected matplotlib axes without a projection, as figure.add_subplot() makes them"
+    raise ArgumentTypeError(msg)
 
 
 def _size(thing: Any) -> tuple[float, float]:
@@ -119,6 +140,11 @@ def _shear(run: ShearFile, axes: Axes, color: str) -> None:
     draw_stress(axes, read_shear(run.file))
 
 
+def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
+    del color
+    draw_steps(axes, run.observables, PackingFile.read(run.file).system())
+
+
 def _modes(modes: Modes, axes: Axes, color: str) -> None:
     del color
     draw_density(axes, modes.told)
@@ -130,5 +156,6 @@ _DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {
     Packing: _packing,
     RunFile: _run,
     ShearFile: _shear,
+    QuasistaticShearFile: _quasistatic,
     Modes: _modes,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import tempfile
@@ -157,11 +158,17 @@ def _how_far(at: Told, first: float, seconds: float) -> str:
 
 
 class Folder:
-    """A temporary folder that goes with the last who holds this."""
+    """A temporary folder that goes with the last who holds this, in the process that made it."""
 
     def __init__(self) -> None:
         self.path = Path(tempfile.mkdtemp(prefix="jamshape-"))
-        self._end = weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
+        self._end = weakref.finalize(self, _remove_if_own, self.path, os.getpid())
+
+
+def _remove_if_own(folder: Path, maker: int) -> None:
+    """Remove a folder, but not from a forked process, whose parent may still need it."""
+    if os.getpid() == maker:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 class Place(NamedTuple):

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from jamshape.checks import require_path_for_lammps
+from jamshape.arguments import checked
+from jamshape.checks import require_path
 from jamshape.files.h5md import FileFormatError, read_attributes, read_packing
 from jamshape.flow import quasistatic, quasistatic_recording, recording, slow_recording
 from jamshape.flow.implicit import Step
@@ -19,6 +20,7 @@ from jamshape.front.run import Recorded, run_file
 from jamshape.lammps.session import Session
 
 
+@checked
 def resume(file: str | Path, *, progress: bool = True) -> Recorded:
     """Go on with a run that was cut off, as it was set; a finished one is loaded.
 
@@ -38,6 +40,12 @@ def resume(file: str | Path, *, progress: bool = True) -> Recorded:
     FileFormatError, OSError
         If it is no such file, or not to be read.
 
+    Warns
+    -----
+    NotReachedWarning
+        If the run did not reach its goal: forces that balance after each step of a quasistatic shear, or the pressure
+        ``p_end`` of a slow compression.
+
     Examples
     --------
     >>> import jamshape as js
@@ -56,11 +64,13 @@ def resume(file: str | Path, *, progress: bool = True) -> Recorded:
         if record:
             record(path, progress)
         else:
-            require_path_for_lammps(path)
+            require_path(path)
             to = Recording(path, stored["rows"], stored["frames"])
             record_flow(lambda session: recording.resume(session, path)[0], to, progress)
     recording.tidy(path)
-    return run_file(path)
+    run = run_file(path)
+    run.warn_unless_reached()
+    return run
 
 
 def record_flow(start: Callable[[Session], FlowRun[Motion]], to: Recording, progress: bool) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -11,17 +13,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jamshape.arrays import FloatArray
+from jamshape.arguments import checked
+from jamshape.arrays import BoolArray, FloatArray
+from jamshape.checks import RANGES, NotReachedWarning, require_number
+from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
     count_frames,
     read_attributes,
     read_observables,
     read_packing,
+    read_report,
     read_style,
 )
 from jamshape.files.run_writer import RunWriter
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.progress import Told, follow
+from jamshape.front.progress import Told, follow, place
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
@@ -29,6 +35,10 @@ from jamshape.measures.steady import SteadyState, steady_state
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+# Below, forces have nothing to balance.
+_NO_ENERGY = RANGES["u0"].low
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +55,20 @@ class Recorded:
     file: Path
     folder: Any = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "file", settled(self.file))
+
+    def save(self, path: str | Path) -> None:
+        """Write a copy, as `jamshape.save`."""
+        from jamshape.front.files import save  # noqa: PLC0415 - which knows runs
+
+        save(path, self)
+
+    def __reduce__(self) -> Any:
+        if self.folder is None:
+            return type(self), (self.file,)
+        return _brought_along, (type(self), self.file.name, self.file.read_bytes())
+
     @cached_property
     def about(self) -> dict[str, Any]:
         """What it is of and how it was set: attributes of its file."""
@@ -57,6 +81,9 @@ class Recorded:
 
     def __getitem__(self, name: str) -> FloatArray:
         """Look up an observable by its name."""
+        if name not in self.observables:
+            msg = f"{name} is no observable of {self.file}, expected one of {', '.join(self.observables)}"
+            raise KeyError(msg)
         return self.observables[name]
 
     @property
@@ -69,10 +96,14 @@ class Recorded:
         """(T,) pressures, [energy / length^D]."""
         return self["pressure"]
 
+    def warn_unless_reached(self) -> None:
+        """Warn where a finished run did not reach its goal."""
+
     def __len__(self) -> int:
         """Count the frames."""
         return count_frames(self.file)
 
+    @checked
     def packing(self, frame: int = -1) -> MeasuredPacking:
         """Read a frame, counted from 0, or with negative numbers from the end."""
         return MeasuredPacking.read(self.file, frame)
@@ -99,7 +130,7 @@ class Recorded:
 
     def _where(self) -> str:
         state = "" if self.about.get("finished") else ", not finished"
-        return f"{state}, in {self.file}"
+        return f"{state}, in {named(self.file)}"
 
 
 class RunFile(Recorded):
@@ -121,6 +152,16 @@ class RunFile(Recorded):
         """Compression rate at the end, [1/time]."""
         return float(np.ravel(self.about["kappa"])[-1])
 
+    def warn_unless_reached(self) -> None:
+        """Warn where the pressure that was to be reached is not."""
+        aim = float(self.about.get("p_end", math.inf))
+        if self.about.get("finished") and math.isfinite(aim) and self.pressure[-1] < aim:
+            said = (
+                f"the pressure is {self.pressure[-1]:.3g} at the end, phi = {self.phi[-1]:.6g}, expected"
+                " {p_end}; take a larger {phi_end:name}"
+            )
+            warnings.warn(NotReachedWarning(said, {"p_end": aim, "phi_end": None}), stacklevel=3)
+
     def onset(self) -> OnsetFit | None:
         """Fit phi_J(kappa), where the pressure begins at this rate; None where it does not rise.
 
@@ -137,6 +178,7 @@ class RunFile(Recorded):
         except ValueError:  # it ends below jamming
             return None
 
+    @checked
     def jamming(self, *, progress: bool = True) -> Jamming:
         """Minimise frames, from the densest on, to see which stay jammed when nothing drives them.
 
@@ -151,6 +193,11 @@ class RunFile(Recorded):
             The packing fractions ``unjams`` and ``jams`` of the densest frame that unjams and of the next one
             that stays jammed. The file of a finished run keeps them, and figures of it show them.
 
+        Warns
+        -----
+        NotReachedWarning
+            If minimisations of some frames came to no end.
+
         Examples
         --------
         >>> import jamshape as js
@@ -160,17 +207,19 @@ class RunFile(Recorded):
         >>> run.onset().phi_J < found.unjams < found.jams
         True
         """
-        known = Jamming.stored(self.about)
-        if known is not None:
-            return known
+        found = Jamming.stored(self.about) or self._minimised(progress=progress)
+        found.warn_if_undecided()
+        return found
+
+    def _minimised(self, *, progress: bool) -> Jamming:
+        """Minimise frames, and keep what it finds in the file of a finished run."""
         tried: list[Tried] = []
 
         def told(one: Tried) -> Told:
             tried.append(one)
             return Told("minimising frames", str(one))
 
-        k_e = float(self.about.get("k_e", 1.0))
-        frames = minimised_frames(len(self), lambda frame: read_packing(self.file, frame), k_e)
+        frames = minimised_frames(len(self), lambda frame: read_packing(self.file, frame))
         follow(frames, told, shown=progress)
         found = Jamming.of(tried)
         if self.about.get("finished"):
@@ -209,6 +258,7 @@ class ShearFile(Recorded):
         """Rate, [1/time]."""
         return float(self.about["gdot"])
 
+    @checked
     def steady(self, after: float | None = None) -> SteadyState:
         """Average over the steady state, apart from the start-up.
 
@@ -262,6 +312,7 @@ class QuasistaticShearFile(Recorded):
         """(T,) dU/d(strain) over the volume, [energy / length^D]: the shear stress of simple shear."""
         return self["stress"]
 
+    @checked
     def events(self, least: float = 1e-2) -> list[Event]:
         """List the drops of the stress.
 
@@ -270,12 +321,33 @@ class QuasistaticShearFile(Recorded):
         least : float
             Drops below this part of the largest stress are left out.
         """
+        require_number("least", least)
         return stress_drops(self.observables, least)
+
+    @property
+    def at_rest(self) -> BoolArray:
+        """(T,) in which rows forces balance to the tolerance, or there are none; of a running run those that are stored."""
+        residual, u = read_report(self.file).error, self["u"]
+        n = min(len(residual), len(u))
+        return np.asarray((residual[:n] <= self.about["tolerance"]) | (u[:n] <= _NO_ENERGY))
+
+    def warn_unless_reached(self) -> None:
+        """Warn where a minimisation after a step did not bring forces to balance."""
+        wrong = ~self.at_rest
+        if wrong.any():
+            largest = read_report(self.file).error[: len(wrong)][wrong].max()
+            said = (
+                f"forces do not balance in {wrong.sum()} of {len(wrong)} rows: net forces there are up to"
+                f" {largest:.2g} of the mean force of a bond, expected at most {self.about['tolerance']:g};"
+                " try a smaller {step:name} or another {seed:name}"
+            )
+            warnings.warn(NotReachedWarning(said, {"step": None, "seed": None}), stacklevel=3)
 
     def modulus(self) -> float:
         """Slope of the stress in the first step, [energy / length^D]; that of the Hessian where the step is small."""
         return float((self.stress[1] - self.stress[0]) / (self.strain[1] - self.strain[0]))
 
+    @checked
     def steady(self, after: float | None = None) -> SteadyState:
         """Average over the steady state, as `ShearFile.steady`."""
         return steady_state(self.observables, self.strain, after)
@@ -284,6 +356,13 @@ class QuasistaticShearFile(Recorded):
         end = f"strain = {self.strain[-1]:.5g}, phi = {self.phi[-1]:.5g}, stress = {self.stress[-1]:.3g}"
         steps = len(self.strain) - 1
         return f"<Quasistatic shear of {self._who()}: {steps} steps to {end}{self._where()}>"
+
+
+def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:
+    """Make a run of what a pickle holds of one without a file of its own."""
+    at = place(None, name)
+    at.path.write_bytes(content)
+    return kind(*at)
 
 
 def run_file(path: Path, folder: Any = None) -> Recorded:

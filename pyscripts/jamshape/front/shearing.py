@@ -6,10 +6,12 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from jamshape.arguments import checked
 from jamshape.checks import (
+    require_given,
+    require_no_effect,
     require_one_of,
     require_path,
-    require_path_for_lammps,
     require_stated,
 )
 from jamshape.flow import quasistatic_recording, recording, slow_recording
@@ -28,6 +30,7 @@ from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.quasistatic import compressed_to
 from jamshape.protocols.random_start import start_below
 from jamshape.shapes.particles import Particles
+from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
     from jamshape.front.packing import MeasuredPacking
@@ -37,27 +40,30 @@ if TYPE_CHECKING:
 _SLOW = 3e-7
 _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
 
+_FRAMES = 20
+
 # A random start that is as dense as was asked for is so to this part.
 _ROUNDING = 1e-9
 
 
+@checked
 def shear(
     particles: Particles | None = None,
     *,
-    n: int = 256,
-    dimension: int = 2,
-    phi: float = 0.8,
+    n: int | None = None,
+    dimension: int | None = None,
+    phi: float | None = None,
     gdot: float = 1e-4,
     strain: float = 5.0,
     flow: str = "simple",
-    seed: int = 1,
+    seed: int | None = None,
     start: Packing | str | Path | None = None,
     sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
     tolerance: float | None = None,
     rows: int = 1000,
-    frames: int = 20,
+    frames: int | None = None,
     file: str | Path | None = None,
     again: bool = False,
     progress: bool = True,
@@ -68,18 +74,19 @@ def shear(
     ----------
     particles : Particles
         Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
-    n : int
-        Number of particles.
-    dimension : {2, 3}
-    phi : float
-        Packing fraction, to which a random packing is compressed fast.
+    n : int, optional
+        Number of particles; 256 when left out, or those of the start.
+    dimension : {2, 3}, optional
+        2 when left out, or that of the start.
+    phi : float, optional
+        Packing fraction, to which a random packing is compressed fast; 0.8 when left out, or that of the start.
     gdot : float, [1/time]
         Rate: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
     strain : float
         Strain to reach, the rate times the time.
     flow : {"simple", "pure"}
-    seed : int
-        Of the random start.
+    seed : int, optional
+        Of the random start; 1 when left out.
     start : Packing or path, optional
         What to begin with, at its own packing fraction; of a path, its last frame.
     sides : {1, 2}
@@ -93,9 +100,10 @@ def shear(
     tolerance : float, optional
         Of the others: local error of a step over the typical overlap; 1e-4 in LAMMPS and 1e-3 of implicit steps
         when left out.
-    rows, frames : int
-        How many samples of stress and order and how many snapshots to keep; implicit steps
-        are as many as samples, or more.
+    rows : int
+        How many samples of stress and order to keep; implicit steps are as many, or more.
+    frames : int, optional
+        How many snapshots to keep; 20 when left out. Implicit steps keep one of every 100 steps.
     file : path, optional
         H5MD file of the run, as of `compress`: a finished run of these settings is loaded from it, and one
         that was cut off goes on.
@@ -111,7 +119,7 @@ def shear(
     Raises
     ------
     ValueError
-        If a number is out of its range, the file holds another run, or neither particles nor a start
+        If a number is out of its range or has no effect, the file holds another run, or neither particles nor a start
         is given.
     PluginError
         If there is no LAMMPS or no plugin for it.
@@ -130,16 +138,13 @@ def shear(
     >>> found.startup < 2 and 0 < found["mu"].value < 1
     True
     """
-    require_stated(n=n, phi=phi, gdot=gdot, strain=strain, seed=seed, rows=rows, frames=frames)
-    require_one_of("dimension", dimension, (2, 3))
-    if dt is not None:
-        require_stated(dt=dt)
-    if tolerance is not None:
-        require_stated(tolerance=tolerance)
+    require_stated(gdot=gdot, strain=strain, rows=rows)
+    require_given(dt=dt, tolerance=tolerance, frames=frames)
+    of = _Start.of(particles, _Asked(n, phi, seed, dimension), start, usual_phi=0.8, sides=sides)
     at = place(file, "shear.h5")
-    of = _Start.of(particles, _Numbers(n, phi, seed, dimension), start)
     integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
     if integrator in METHODS:
+        require_no_effect("integrator", integrator, dt=dt, frames=frames)
         longest = min(SlowShear.largest_strain, strain / rows)
         error = tolerance or _IMPLICIT_ERROR
         slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
@@ -148,27 +153,31 @@ def shear(
         return ShearFile(*at)
     settings = Shear(
         gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
-        sides=sides, integrator=integrator, tolerance=tolerance or _ERROR,
+        sides=sides, k_e=of.k_e, integrator=integrator, tolerance=tolerance or _ERROR,
     )  # fmt: skip
     if settings.chooses_steps:
+        require_no_effect("integrator", integrator, dt=dt)
         settings = settings.in_steps(rows)
-    to = Recording(at.path, rows, frames, of.made_from)
+    else:
+        require_no_effect("integrator", integrator, tolerance=tolerance)
+    to = Recording(at.path, rows, _FRAMES if frames is None else frames, of.made_from)
     _shear_in_lammps(settings, of, to, _How(again, progress))
     return ShearFile(*at)
 
 
+@checked
 def quasistatic_shear(
     particles: Particles | None = None,
     *,
-    n: int = 256,
-    dimension: int = 2,
-    phi: float = 0.9,
+    n: int | None = None,
+    dimension: int | None = None,
+    phi: float | None = None,
     step: float = 1e-3,
     strain: float = 0.5,
     flow: str = "simple",
     pressure: float = 0.0,
     tolerance: float = 1e-8,
-    seed: int = 1,
+    seed: int | None = None,
     start: Packing | str | Path | None = None,
     frames: int = 20,
     file: str | Path | None = None,
@@ -181,11 +190,12 @@ def quasistatic_shear(
     ----------
     particles : Particles
         Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
-    n : int
-        Number of particles.
-    dimension : {2, 3}
-    phi : float
-        Packing fraction, to which a random packing is compressed by such steps, too.
+    n : int, optional
+        Number of particles; 256 when left out, or those of the start.
+    dimension : {2, 3}, optional
+        2 when left out, or that of the start.
+    phi : float, optional
+        Packing fraction, to which a random packing is compressed by such steps, too; 0.9 when left out, or that of the start.
     step, strain : float
         Strain of each step, and the one to reach.
     flow : {"simple", "pure"}
@@ -193,8 +203,8 @@ def quasistatic_shear(
         To hold, in place of the volume.
     tolerance : float
         Largest net force and torque of a particle over the mean bond force.
-    seed : int
-        Of the random start.
+    seed : int, optional
+        Of the random start; 1 when left out.
     start : Packing or path, optional
         What to begin with, at its own packing fraction; of a path, its last frame.
     frames : int
@@ -209,10 +219,15 @@ def quasistatic_shear(
     Raises
     ------
     ValueError
-        If a number is out of its range, the file holds another run, or neither particles nor a start
+        If a number is out of its range or has no effect, the file holds another run, or neither particles nor a start
         is given.
     PressureError
         If the pressure cannot be held.
+
+    Warns
+    -----
+    NotReachedWarning
+        If forces do not balance to the tolerance after some of the steps; ``run.at_rest`` says after which they do.
 
     Examples
     --------
@@ -223,13 +238,12 @@ def quasistatic_shear(
     >>> run.strain.shape, bool((run.phi == run.phi[0]).all())
     ((51,), True)
     """
-    require_stated(n=n, phi=phi, seed=seed, frames=frames, strain_step=step, strain_end=strain)
+    require_stated(frames=frames, strain_step=step, strain_end=strain)
     require_stated(tolerance=tolerance, hold_pressure=pressure)
-    require_one_of("dimension", dimension, (2, 3))
+    of = _Start.of(particles, _Asked(n, phi, seed, dimension), start, usual_phi=0.9)
     how = QuasistaticShear(step, strain, flow, pressure, tolerance)
     at = place(file, "aqs.h5")
     require_path(at.path)
-    of = _Start.of(particles, _Numbers(n, phi, seed, dimension), start)
     made_from = of.made_from | {"frames": frames}
     if again or not at.path.exists():
         quasistatic_recording.begin(at.path, of.still(), how, made_from)
@@ -244,6 +258,15 @@ class _How(NamedTuple):
     progress: bool
 
 
+class _Asked(NamedTuple):
+    """What was given of a random start."""
+
+    n: int | None
+    phi: float | None
+    seed: int | None
+    dimension: int | None
+
+
 class _Numbers(NamedTuple):
     """What a random start is made with."""
 
@@ -251,6 +274,14 @@ class _Numbers(NamedTuple):
     phi: float
     seed: int
     dimension: int
+
+    @classmethod
+    def of(cls, asked: _Asked, usual_phi: float) -> _Numbers:
+        """Take what is usual for what was left out."""
+        given = {name: value for name, value in asked._asdict().items() if value is not None}
+        require_one_of("dimension", given.get("dimension", 2), (2, 3))
+        require_stated(**{name: value for name, value in given.items() if name != "dimension"})
+        return cls(**{"n": 256, "phi": usual_phi, "seed": 1, "dimension": 2} | given)
 
 
 class _Start(NamedTuple):
@@ -262,10 +293,19 @@ class _Start(NamedTuple):
 
     @classmethod
     def of(
-        cls, particles: Particles | None, numbers: _Numbers, start: Packing | str | Path | None
+        cls,
+        particles: Particles | None,
+        asked: _Asked,
+        start: Packing | str | Path | None,
+        *,
+        usual_phi: float,
+        sides: int = 2,
     ) -> _Start:
+        """Take a start, beside which nothing else may be given, or particles with what is usual."""
+        require_no_effect("start", start, particles=particles, **asked._asdict())
+        numbers = _Numbers.of(asked, usual_phi)
         if start is not None:
-            return cls(start_of(start), None, numbers)
+            return cls(start_of(start, sides), None, numbers)
         if particles is None:
             msg = "there are neither particles nor a start, expected one of them"
             raise ValueError(msg)
@@ -274,6 +314,11 @@ class _Start(NamedTuple):
     @property
     def dimension(self) -> int:
         return self.known.dimension if self.known else self.numbers.dimension
+
+    @property
+    def k_e(self) -> float:
+        """Stiffness of the contacts, [energy]."""
+        return self.known.law.k_e if self.known else Interaction().k_e
 
     @property
     def made_from(self) -> dict[str, Any]:
@@ -314,7 +359,7 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
 
 
 def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> None:
-    require_path_for_lammps(to.path)  # restart files lie beside it
+    require_path(to.path)
     if how.again or not to.path.exists():
         first = of.flowing()
         settings.all_steps(first)  # refuses what does not end

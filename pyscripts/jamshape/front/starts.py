@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
+import os
+import warnings
 from pathlib import Path
 from typing import Any
 
+from jamshape.files.disk import named
 from jamshape.front.packing import MeasuredPacking
 from jamshape.packing import Packing
+from jamshape.shapes.shape import Interaction
 
 
-def start_of(start: Packing | str | Path) -> MeasuredPacking:
-    """Take the packing to begin with, of a path its last frame."""
+def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
+    """Take the packing to begin with, of a path its last frame, under the law that the run has.
+
+    Warns where the usual bonds of side-to-side contacts are not those that the start has.
+    """
     if isinstance(start, str | Path):
-        return MeasuredPacking.read(Path(start))
-    return start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
+        start = MeasuredPacking.read(Path(start))
+    known = start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
+    if known.law.sides == sides:
+        return known
+    # Other ones than the usual were asked for.
+    is_asked = sides != Interaction().sides
+    if not is_asked and known.compiled().has_sides and not known.is_round.all():
+        said = (
+            f"the start has sides={known.law.sides}, bonds of a side-to-side contact, and the run has"
+            f" sides={sides}: energy and forces of the start change"
+        )
+        warnings.warn(said, stacklevel=4)
+    law = known.law.but(sides=sides)
+    return known.with_(law=law, results=known.results, file=known.file)
 
 
 def told_of(start: MeasuredPacking) -> dict[str, Any]:
@@ -21,4 +40,6 @@ def told_of(start: MeasuredPacking) -> dict[str, Any]:
     own = [parameter.name for parameter in start.shape.parameters]
     names, results = (*own, "size_ratio", "kinds", "seed"), start.results
     found = {name: results[name] for name in names if name in results}
-    return found | {"n": start.n, "start": str(start.file or "")}
+    # As UTF-8, whatever the locale: names may hold bytes that it cannot read.
+    name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else ""
+    return found | {"n": start.n, "start": name}

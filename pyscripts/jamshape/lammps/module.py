@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import ctypes
+import functools
+import locale
+import os
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import metadata, util
 from pathlib import Path
 from typing import Any
 
-from jamshape.lammps.plugin import PluginError
+from jamshape.lammps.plugin import PluginError, errors_path
 
 # What a LAMMPS says that is told to stop, without its own words around it.
 _AROUND = ("ERROR: ", "ERROR on proc 0: ")
+
+# For the sentence of an error, in bytes.
+_ROOM = 4096
 
 
 class LammpsError(RuntimeError):
@@ -68,10 +78,87 @@ def start_lammps(arguments: list[str]) -> Any:
     True
     """
     lammps = lammps_class()
+    errors = load_errors()
     try:
-        return lammps(cmdargs=arguments)
+        started = lammps(cmdargs=arguments)
     except OSError as error:
         raise PluginError(_not_loaded(error)) from error
+    if errors is not None and not errors.jamshape_is_asked():
+        warnings.warn(_LOADED_BEFORE, stacklevel=3)
+    return started
+
+
+_one_at_a_time = threading.RLock()
+
+
+@contextmanager
+def _decimal_point() -> Iterator[None]:
+    """Let C code of this thread read and write numbers with a point, whatever LC_NUMERIC the host program has set.
+
+    LAMMPS reads "0.5" as 0 under a decimal comma.
+    """
+    c = ctypes.CDLL(None)
+    c.uselocale.argtypes = c.duplocale.argtypes = c.freelocale.argtypes = [ctypes.c_void_p]
+    c.newlocale.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_void_p]
+    c.uselocale.restype = c.duplocale.restype = c.newlocale.restype = ctypes.c_void_p
+    before = c.uselocale(None)
+    point = c.newlocale(1 << locale.LC_NUMERIC, b"C", c.duplocale(before))
+    c.uselocale(point)
+    try:
+        yield
+    finally:
+        c.uselocale(before)
+        c.freelocale(point)
+
+
+@contextmanager
+def one_at_a_time() -> Iterator[None]:
+    """Let no other thread of this process call LAMMPS meanwhile, whose MPI library is not made for that, under a decimal point."""
+    with _one_at_a_time, _decimal_point():
+        yield
+
+
+def _renew_lock() -> None:
+    """Take a new lock in a forked process, where the thread that held the old one is gone."""
+    global _one_at_a_time  # noqa: PLW0603
+    _one_at_a_time = threading.RLock()
+
+
+os.register_at_fork(after_in_child=_renew_lock)
+
+
+_LOADED_BEFORE = (
+    "LAMMPS was loaded in this process before jamshape, so an error of LAMMPS ends the process, expected an exception:"
+    " call jamshape before other programs load LAMMPS"
+)
+
+
+@functools.cache
+def load_errors() -> Any:
+    """Library that turns errors of LAMMPS into exceptions, loaded; None of a LAMMPS that raises them by itself."""
+    path = errors_path()
+    return None if path is None else ctypes.CDLL(str(path), mode=os.RTLD_GLOBAL | os.RTLD_NOW)
+
+
+def run_command(lmp: Any, line: str) -> None:
+    """Give LAMMPS a line of input.
+
+    Raises
+    ------
+    LammpsError
+        Where LAMMPS, or one of our styles, refuses it.
+    """
+    errors = None if lmp.has_exceptions else load_errors()
+    if errors is None:
+        try:
+            lmp.command(line)
+        except Exception as error:  # LAMMPS raises plain ones
+            raise LammpsError(sentence_of(error)) from error
+        return
+    sentence = ctypes.create_string_buffer(_ROOM)
+    room = ctypes.c_size_t(_ROOM)
+    if errors.jamshape_command(lmp.lib.lammps_command, lmp.lmp, line.encode(), sentence, room):
+        raise LammpsError(sentence_of(Exception(sentence.value.decode(errors="replace"))))
 
 
 def sentence_of(error: Exception) -> str:

@@ -8,6 +8,7 @@ from importlib import metadata
 from pathlib import Path
 
 PLUGIN_NAME = "jamshape_plugin.so"
+ERRORS_NAME = "jamshape_errors.so"
 LOADER_NAME = "load_plugin.lmp"
 
 # The version of Debian 12, whose `include` takes its path as it is.
@@ -43,6 +44,12 @@ def plugin_path() -> Path:
         )
         raise PluginError(msg)
     return path
+
+
+def errors_path() -> Path | None:
+    """Path of the library that turns errors of LAMMPS into exceptions; None where LAMMPS raises them by itself."""
+    path = _folder_of_binaries() / ERRORS_NAME
+    return path if path.is_file() else None
 
 
 def plugin_folder() -> str:

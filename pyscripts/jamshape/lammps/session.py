@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import subprocess
 import tempfile
 from contextlib import contextmanager
@@ -13,9 +14,10 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from jamshape.checks import require_one_process
 from jamshape.files.disk import store
 from jamshape.files.lammps_text import write_data
-from jamshape.lammps.module import LammpsError, lammps_class, sentence_of, start_lammps
+from jamshape.lammps.module import lammps_class, one_at_a_time, run_command, start_lammps
 from jamshape.lammps.plugin import PluginError, built_for, plugin_path
 from jamshape.packing import Box, Packing, angle_from_quaternion
 from jamshape.shapes.shape import Interaction
@@ -40,17 +42,23 @@ _WIDEST_BIN = 50.0
 # By these Open MPI tells that srun began a process.
 _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
 
+# A folder of temporary files whose name has anything else ends Open MPI 4 in a segmentation fault.
+_PLAIN_NAME = re.compile(r"[\w./+-]*", re.ASCII)
+
 
 @contextmanager
 def _as_one_process() -> Iterator[None]:
-    """Let MPI start in a step of one process that Slurm's srun began, as Snakemake's jobs are.
+    """Hide from MPI, while it starts, what ends it.
 
-    Open MPI ends such a process unless srun told it, too, how to find other processes (PMIX_RANK); here there are
-    none to find.
+    Open MPI ends a step of one process that Slurm's srun began, as Snakemake's jobs are, unless srun told it, too,
+    how to find other processes (PMIX_RANK); here there are none to find.
     """
-    hidden = {}
+    names: tuple[str, ...] = ()
     if os.environ.get("SLURM_STEP_NUM_TASKS") == "1" and "PMIX_RANK" not in os.environ:
-        hidden = {name: os.environ.pop(name) for name in _STEP if name in os.environ}
+        names = _STEP
+    if not _PLAIN_NAME.fullmatch(os.environ.get("TMPDIR", "")):
+        names = (*names, "TMPDIR")
+    hidden = {name: os.environ.pop(name) for name in names if name in os.environ}
     try:
         yield
     finally:
@@ -59,6 +67,15 @@ def _as_one_process() -> Iterator[None]:
 
 class Session:
     """One LAMMPS instance that knows our styles; a context manager.
+
+    Raises
+    ------
+    PluginError
+        If there is no LAMMPS, or no plugin for it.
+    RuntimeError
+        If mpirun or srun started several processes.
+    OSError
+        If the log cannot be written.
 
     Parameters
     ----------
@@ -71,16 +88,22 @@ class Session:
 
     Notes
     -----
-    Debian 12's LAMMPS has no C++ exceptions: an error in a command prints its sentence and ends the
-    process. Close what must survive before each call. That of the wheel raises `LammpsError`. Without
-    `screen`, errors and warnings still reach standard error, through a filter that outlives the process.
+    An error in a command raises `LammpsError`, also where LAMMPS itself would end the process. Without `screen`, warnings
+    still reach standard error, through a filter that outlives the process. Threads take turns, command by command.
     """
 
     def __init__(
         self, log: str | Path | None = None, *, screen: bool = False, arguments: Sequence[str] = ()
     ) -> None:
         lammps_class()  # says what is missing before anything is started
+        require_one_process(
+            "they would share each run, and each make its own copy of the result",
+            ", or give mpirun the command lmp and a deck",
+        )
+        if log:
+            Path(log).open("a").close()  # where LAMMPS cannot, it ends the process
         self._like: Packing | None = None
+        self._law: Interaction | None = None
         plugin = plugin_path()
         options = ["-nocite", "-log", str(log) if log else "none"]
         self._complaints: subprocess.Popen[bytes] | None = None
@@ -90,8 +113,12 @@ class Session:
             )
             assert self._complaints.stdin is not None
             options += ["-screen", f"/dev/fd/{self._complaints.stdin.fileno()}"]
-        with _as_one_process():
-            self.lmp: Any = start_lammps([*options, *arguments])
+        try:
+            with one_at_a_time(), _as_one_process():
+                self.lmp: Any = start_lammps([*options, *arguments])
+        except BaseException:
+            self._end_complaints()
+            raise
         self._library = self._load(plugin)
 
     def __enter__(self) -> Self:
@@ -107,7 +134,11 @@ class Session:
 
     def close(self) -> None:
         """End the instance."""
-        self.lmp.close()
+        with one_at_a_time():
+            self.lmp.close()
+        self._end_complaints()
+
+    def _end_complaints(self) -> None:
         if self._complaints:
             self._complaints.communicate()
 
@@ -124,7 +155,7 @@ class Session:
 
     def _checked(self, plugin: Path) -> ctypes.CDLL:
         again = "install jamshape again beside this LAMMPS"
-        found, expected = int(self.lmp.version()), built_for(plugin)
+        found, expected = self.version, built_for(plugin)
         if found != expected:
             msg = f"Found LAMMPS version {found}, expected {expected} for which {plugin} was built: {again}."
             raise PluginError(msg)
@@ -146,13 +177,11 @@ class Session:
         Raises
         ------
         LammpsError
-            Where LAMMPS refuses one and was built with exceptions; Debian 12's ends the process.
+            Where LAMMPS refuses one.
         """
         for line in text.strip().splitlines():
-            try:
-                self.lmp.command(line.strip())
-            except Exception as error:  # LAMMPS raises plain ones
-                raise LammpsError(sentence_of(error)) from error
+            with one_at_a_time():
+                run_command(self.lmp, line.strip())
 
     def left_out(self) -> str:
         """Say what the last run spared this scene, as the log does."""
@@ -171,13 +200,14 @@ class Session:
             write_data(path, packing.with_(species=types, id=rank))
             if packing.box.is_tilted:
                 self.commands("box tilt large")
-            self.commands(f'read_data "{path}"')
+            # Through a descriptor, as LAMMPS reads `$`, `*` and quotes in names in ways of its own.
+            with path.open("rb") as file:
+                self.commands(f"read_data /dev/fd/{file.fileno()}")
         self.commands(_POSES)
 
     def load_restart(self, path: str | Path, like: Packing | None = None) -> None:
         """Read a restart file into a fresh instance, of the particles of a packing."""
         self._like = like
-        # Through a descriptor, as LAMMPS reads `$`, `*` and `%` in names in ways of its own.
         with Path(path).open("rb") as file:
             self.commands(f"{_ATOMS}\nread_restart /dev/fd/{file.fileno()}\n{_POSES}")
 
@@ -195,7 +225,8 @@ class Session:
             store(path, file.read(), wait=False)
 
     def interact(self, law: Interaction) -> None:
-        """Set the pair style of the particles that were loaded."""
+        """Set the pair style of the particles that were loaded; packings carry this law from then on."""
+        self._law = law
         self.commands(self._loaded.shape.style(self._loaded, law).commands)
 
     @property
@@ -211,6 +242,10 @@ class Session:
         Shapes, exponents and species are those of the packing that was loaded; without one, shapes are
         guessed from diameters, as of files.
         """
+        with one_at_a_time():
+            return self._packing(time)
+
+    def _packing(self, time: float) -> Packing:
         lmp = self.lmp
         n = lmp.get_natoms()
         lo, hi, xy, yz, xz, *_ = lmp.extract_box()
@@ -242,7 +277,7 @@ class Session:
             return known | {"id": np.arange(1, len(types) + 1)}
         like = self._like.sorted_by_id()
         names = ("shape_style", "exponent", "species", "id")
-        return {name: getattr(like, name) for name in names}
+        return {name: getattr(like, name) for name in names} | {"law": self._law or like.law}
 
     def neighbours(self) -> str:
         """Input that sets the neighbour list up in the unit of length of the particles."""
@@ -259,6 +294,11 @@ class Session:
     def is_tilted(self) -> bool:
         """Whether the box may tilt (LAMMPS: is triclinic)."""
         return bool(self.lmp.extract_setting("triclinic"))
+
+    @property
+    def version(self) -> int:
+        """Version of LAMMPS, such as 20210929."""
+        return int(self.lmp.version())
 
     @property
     def step(self) -> int:

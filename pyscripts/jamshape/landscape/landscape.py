@@ -19,7 +19,6 @@ from jamshape.contacts import PairArrays, Pairs, find_contacts, find_rattlers
 from jamshape.contacts.near import near_particles, nearer
 from jamshape.contacts.network import refuse_crossing, refuse_unconverged
 from jamshape.packing import Packing, State
-from jamshape.shapes.shape import Interaction
 
 # Pairs whose surfaces are closer than this fraction of the smallest radius are looked at; they are looked for among
 # those that are closer than so many times as much.
@@ -56,22 +55,29 @@ class Landscape:
     Parameters
     ----------
     packing : Packing
-        Only the shapes of its particles are taken.
-    k_e : float, [energy]
-    sides : {1, 2}
-        Bonds of a side-to-side contact, of shapes that have both laws; minima exist for 2 only.
+        The shapes of its particles and their law are taken.
+    k_e : float, [energy], optional
+    sides : {1, 2}, optional
+        Bonds of a side-to-side contact, of shapes that have both laws; minima exist for 2 only. Both are
+        those of the packing's law when left out.
 
     Notes
     -----
     Keeps the list of pairs that may touch and makes it anew when particles have moved too far.
     """
 
-    def __init__(self, packing: Packing, k_e: float = 1.0, sides: int = 2) -> None:
-        self.particles, self.k_e, self.sides = packing, k_e, sides
-        self.bodies = packing.compiled(Interaction(k_e, sides))
+    def __init__(
+        self, packing: Packing, k_e: float | None = None, sides: int | None = None
+    ) -> None:
+        law = packing.law.but(k_e, sides)
+        self.particles, self.k_e, self.sides = packing, law.k_e, law.sides
+        self.bodies = packing.compiled(law)
         self.evaluations = 0
         self._pairs: Pairs | None = None
         self._wide: Pairs | None = None
+
+    def __reduce__(self) -> tuple[type[Landscape], tuple[Packing, float, int]]:
+        return type(self), (self.particles, self.k_e, self.sides)
 
     @cached_property
     def rotation_length(self) -> FloatArray:

@@ -23,7 +23,7 @@ def sharing(number: int) -> Iterator[None]:
     Parameters
     ----------
     number : int
-        At least 1. The last bits of results depend on it, and on nothing that happens to threads. Packings of
+        At least 1. The last bits of results depend on it, not on which thread is faster. Packings of
         fewer than some thousand contacts are evaluated by one, which takes no longer.
 
     Raises

@@ -21,6 +21,10 @@ _Group = TypeVar("_Group")
 class Measured(Protocol):
     """A sample with numbers by name, such as `jamshape.files.sets.PackingFile`."""
 
+    @property
+    def reached(self) -> bool:
+        """Whether it reached its goal."""
+
     def number(self, name: str) -> float:
         """Look up a number."""
 
@@ -43,6 +47,13 @@ class Mean(NamedTuple):
     """NaN for one sample."""
     samples: int = 0
     """0 where that is not known."""
+    reached: Mean | None = None
+    """The same without samples that did not reach their goal, where there are some."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Name its numbers for JSON; `reached` only where there are two averages."""
+        found = self._asdict()
+        return found if self.reached else {k: v for k, v in found.items() if k != "reached"}
 
     @property
     def tex(self) -> str:
@@ -66,13 +77,21 @@ def mean(values: ArrayLike) -> Mean:
     Examples
     --------
     >>> mean([1.0, 3.0, float("nan")])
-    Mean(value=2.0, error=1.0, samples=2)
+    Mean(value=2.0, error=1.0, samples=2, reached=None)
     """
     array = np.asarray(values, np.float64)
     array = array[np.isfinite(array)]
     n = len(array)
     error = float(np.std(array, ddof=1) / np.sqrt(n)) if n > 1 else math.nan
     return Mean(float(array.mean()) if n else math.nan, error, n)
+
+
+def mean_over(samples: Sequence[Measured], values: Sequence[float]) -> Mean:
+    """Average a number of each sample, with and without samples that did not reach their goal."""
+    found = mean(values)
+    of = zip(samples, values, strict=True)
+    reached = [value for sample, value in of if sample.reached]
+    return found if len(reached) == len(values) else found._replace(reached=mean(reached))
 
 
 def standard_error(values: ArrayLike) -> FloatArray:
@@ -82,8 +101,8 @@ def standard_error(values: ArrayLike) -> FloatArray:
 
 
 def averages(groups: Mapping[_Group, Sequence[Measured]], name: str) -> dict[_Group, Mean]:
-    """Average one number over the samples of each group."""
-    return {group: mean([s.number(name) for s in samples]) for group, samples in groups.items()}
+    """Average one number over the samples of each group, as `mean_over`."""
+    return {group: mean_over(of, [s.number(name) for s in of]) for group, of in groups.items()}
 
 
 def exactly(

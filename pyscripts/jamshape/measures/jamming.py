@@ -7,9 +7,11 @@ of jamming only if states there stay jammed when nothing drives them any more.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from jamshape.checks import NotReachedWarning
 from jamshape.contacts.network import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.measures.averages import Mean
@@ -32,6 +34,7 @@ _VERDICTS = {
 }
 
 _NAMES = {"unjams": "phi_unjams", "jams": "phi_jams", "tried": "frames_minimised"}
+_UNDECIDED = "frames_undecided"  # files of earlier versions do not have it
 
 
 class Tried(NamedTuple):
@@ -56,6 +59,8 @@ class Jamming(NamedTuple):
     """Of the first frame from there on that stays jammed; NaN if none does."""
     tried: int = 0
     """How many frames were minimised."""
+    undecided: int = 0
+    """How many of these came to no end, neither at rest nor without energy; they count for nothing."""
 
     @classmethod
     def of(cls, tried: Iterable[Tried]) -> Jamming:
@@ -64,12 +69,13 @@ class Jamming(NamedTuple):
         Examples
         --------
         >>> Jamming.of([Tried(3, 0.87, True), Tried(2, 0.86, True), Tried(1, 0.85, False)])
-        Jamming(unjams=0.85, jams=0.86, tried=3)
+        Jamming(unjams=0.85, jams=0.86, tried=3, undecided=0)
         """
         tried = list(tried)
         unjams = max((one.phi for one in tried if one.stays is False), default=math.nan)
         above = (one.phi for one in tried if one.stays and not one.phi <= unjams)
-        return cls(unjams, min(above, default=math.nan), len(tried))
+        undecided = sum(one.stays is None for one in tried)
+        return cls(unjams, min(above, default=math.nan), len(tried), undecided)
 
     @classmethod
     def stored(cls, attributes: Mapping[str, Any]) -> Jamming | None:
@@ -77,7 +83,7 @@ class Jamming(NamedTuple):
         if not set(_NAMES.values()) <= attributes.keys():
             return None
         unjams, jams, tried = (attributes[name] for name in _NAMES.values())
-        return cls(float(unjams), float(jams), int(tried))
+        return cls(float(unjams), float(jams), int(tried), int(attributes.get(_UNDECIDED, 0)))
 
     @property
     def phi_J(self) -> float:
@@ -97,7 +103,8 @@ class Jamming(NamedTuple):
 
     def attributes(self) -> dict[str, Any]:
         """Name its numbers as they are stored."""
-        return {name: getattr(self, own) for own, name in _NAMES.items()}
+        found = {name: getattr(self, own) for own, name in _NAMES.items()}
+        return found | {_UNDECIDED: self.undecided}
 
     def text(self) -> str:
         """Say it in words, up to the end of a sentence."""
@@ -108,6 +115,15 @@ class Jamming(NamedTuple):
         if math.isnan(self.jams):
             return f"{low} and no denser one stays jammed"
         return f"{low} and that at phi = {self.jams:.5f} stays jammed"
+
+    def warn_if_undecided(self) -> None:
+        """Warn where minimisations came to no end."""
+        if self.undecided:
+            said = (
+                f"{self.undecided} of {self.tried} frames that were minimised came to no end, neither at rest nor"
+                f" without energy, and count for nothing: {self.text()}; record more {{frames:name}}"
+            )
+            warnings.warn(NotReachedWarning(said, {"frames": None}), stacklevel=3)
 
     def differs(self, fit: OnsetFit) -> bool:
         """Whether an onset of p(phi) lies outside by more than its error."""
@@ -134,13 +150,15 @@ class Jamming(NamedTuple):
         return f"{onset} is the onset of flow and not of jamming: {told}"
 
 
-def stays_jammed(packing: Packing, k_e: float = 1.0) -> bool | None:
+def stays_jammed(packing: Packing, k_e: float | None = None) -> bool | None:
     """Tell whether a state keeps energy in balanced contacts when it is minimised at fixed box.
 
     Parameters
     ----------
     packing : Packing
-    k_e : float, [energy]
+        Minimised with two bonds side to side, whatever its law: with one there are no minima.
+    k_e : float, [energy], optional
+        That of the packing's law when left out.
 
     Returns
     -------
@@ -155,8 +173,8 @@ def stays_jammed(packing: Packing, k_e: float = 1.0) -> bool | None:
     >>> stays_jammed(packing)
     True
     """
-    landscape, state = Landscape(packing, k_e), State.of(packing)
-    lowest = _LOWEST * k_e / landscape.length**packing.dimension
+    landscape, state = Landscape(packing, k_e, sides=2), State.of(packing)
+    lowest = _LOWEST * landscape.k_e / landscape.length**packing.dimension
     stop = Stop(tolerance=_TOLERANCE, lowest=lowest, evaluations=_EVALUATIONS)
     try:
         found = minimise(landscape, state, "auto", stop)
@@ -168,7 +186,7 @@ def stays_jammed(packing: Packing, k_e: float = 1.0) -> bool | None:
 
 
 def minimised_frames(
-    count: int, read: Callable[[int], Packing], k_e: float = 1.0
+    count: int, read: Callable[[int], Packing], k_e: float | None = None
 ) -> Iterator[Tried]:
     """Minimise frames of a compression from the densest on, until one unjams.
 
@@ -181,7 +199,8 @@ def minimised_frames(
         How many frames there are.
     read : callable
         Reads one by its number, from 0.
-    k_e : float, [energy]
+    k_e : float, [energy], optional
+        That of the law of each frame when left out.
 
     Yields
     ------

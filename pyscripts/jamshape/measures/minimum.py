@@ -12,17 +12,16 @@ import numpy as np
 from jamshape.arrays import BoolArray, FloatArray
 from jamshape.contacts import Contacts
 from jamshape.files.h5md import read_attributes, write_packing
+from jamshape.files.outcomes import is_reached
 from jamshape.landscape import Landscape
 from jamshape.measures.contact_statistics import contact_scale, residuals
 from jamshape.measures.order import planar_order
 from jamshape.measures.order3d import cubatic_order, nematic_order
-from jamshape.minima import History, Minimum, Outcome, residual_of, rounding_floor
+from jamshape.minima import History, Minimum, residual_of, rounding_floor
 from jamshape.packing import Packing, body_axes
 
 # Rows of the convergence history that are kept in a packing's file.
 _REPORT_ROWS = 2000
-
-_REACHED = (Outcome.CONVERGED, Outcome.SLIDING, Outcome.CORNER)
 
 _SUMMARY = (
     *("alpha", "exponent", "w1", "w2", "kinds", "n", "protocol", "seed", "outcome", "phi", "phi_J"),
@@ -161,8 +160,8 @@ def thinned(history: History) -> tuple[list[int], list[float], list[float]]:
 
 
 def summary_of(out: Path, names: Iterable[str] = _SUMMARY) -> dict[str, Any]:
-    """Pick attributes of a finished packing, None for NaN, and say whether it is in equilibrium."""
+    """Pick attributes of a finished packing, None for NaN, and say whether it reached its goal."""
     stored = read_attributes(out)
     found = {name: stored[name] for name in names if name in stored}
     tidy = {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in found.items()}
-    return {"out": str(out), **tidy, "reached": stored["outcome"] in {o.value for o in _REACHED}}
+    return {"out": str(out), **tidy, "reached": is_reached(stored)}

@@ -38,7 +38,7 @@ def minimise(
     Returns
     -------
     Minimum
-        Look at its outcome.
+        Look at its outcome. There is no warning: many who call this want no more than a few evaluations.
 
     Raises
     ------

@@ -14,12 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jamshape.arrays import FloatArray, IntArray
+from jamshape.arrays import FloatArray, IntArray, real_numbers
 from jamshape.packing.given import as_floats
+from jamshape.records import Record
+
+# Of the largest entry of a matrix: entries that are left where a program turns a box and back.
+_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class Box(Record):
     """Periodic box, orthogonal unless it has a tilt.
 
     Parameters
@@ -51,12 +55,12 @@ class Box:
     tilt: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        shape = np.shape(self.edges)
+        shape = real_numbers("box edges", self.edges).shape
         if shape not in {(2,), (3,)}:
             msg = f"box edges have shape {shape}, expected (2,) or (3,)"
             raise ValueError(msg)
         n_tilts = number_of_tilts(shape[0])
-        if np.size(self.tilt) == 0:
+        if real_numbers("box tilt", self.tilt).size == 0:
             object.__setattr__(self, "tilt", np.zeros(n_tilts))
         for name, expected in (("lo", shape), ("edges", shape), ("tilt", (n_tilts,))):
             value = as_floats(f"box {name}", getattr(self, name), expected)
@@ -78,7 +82,7 @@ class Box:
         Raises
         ------
         ValueError
-            As `Box`, or if the matrix is not upper triangular.
+            As `Box`, or if the matrix is not upper triangular, but for rounding.
         """
         return cls(np.asarray(lo), *Lengths.of(np.asarray(matrix, np.float64)))
 
@@ -178,9 +182,12 @@ class Lengths(NamedTuple):
         Raises
         ------
         ValueError
-            If it is no upper triangular matrix.
+            If it is no upper triangular matrix, but for rounding.
         """
-        if matrix.shape not in {(2, 2), (3, 3)} or np.tril(matrix, -1).any():
+        below = np.abs(np.tril(matrix, -1)).max(initial=0)
+        if matrix.shape not in {(2, 2), (3, 3)} or below > _ROUNDING * np.abs(matrix).max(
+            initial=0
+        ):
             msg = (
                 f"the cell vectors are the columns of {matrix.tolist()}, expected the first one along x"
                 " and the second one in the x-y plane; turn box and particles"

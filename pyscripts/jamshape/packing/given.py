@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jamshape.arrays import FloatArray, IntArray
+from jamshape.arrays import FloatArray, IntArray, real_numbers, whole_numbers
 
 
 def as_floats(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     """Take finite numbers of a shape, or raise a ValueError."""
-    array = np.array(values, dtype=np.float64, order="C")
+    array = np.array(real_numbers(name, values), dtype=np.float64, order="C")
     _check_shape(name, array.shape, shape)
     if not np.isfinite(array).all():
         msg = f"{name} holds NaN or infinity, expected finite numbers"
@@ -21,11 +21,7 @@ def as_floats(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArra
 
 def as_integers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> IntArray:
     """Take integers of a shape, or raise a ValueError."""
-    given = np.asarray(values)
-    if given.dtype.kind not in "iu":
-        msg = f"{name} has dtype {given.dtype}, expected integers"
-        raise ValueError(msg)
-    array = np.array(given, dtype=np.int64, order="C")
+    array = np.array(whole_numbers(name, values), dtype=np.int64, order="C")
     _check_shape(name, array.shape, shape)
     array.flags.writeable = False
     return array

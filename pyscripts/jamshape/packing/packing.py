@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray
+from jamshape.arguments import checked_fields
+from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray, real_numbers
 from jamshape.packing.box import Box, Lengths, number_of_tilts
 from jamshape.packing.given import as_floats, as_integers
 from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
+from jamshape.records import Record
 from jamshape.shapes.shape import Interaction, Shape
 from jamshape.shapes.table import DEFAULT, shape_named
 
@@ -24,8 +26,9 @@ _REST_OF = {
 }
 
 
+@checked_fields
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Packing:
+class Packing(Record):
     """Particles in a periodic box.
 
     Arrays are copied and made read-only; use `with_` to change one.
@@ -49,6 +52,9 @@ class Packing:
         A name of `jamshape.shapes.table.SHAPES`.
     exponent : (N,) array of float64, optional
         p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones when left out.
+    law : Interaction
+        Constants of the contacts, which energy and forces depend on; k_e = 1 and two bonds side to side
+        when left out.
     step : int
     time : float, [time]
     position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional
@@ -59,7 +65,8 @@ class Packing:
     ------
     ValueError
         If shapes disagree, a number is not finite, a diameter is not positive, an exponent is not
-        above 1/2, an ID is there twice, or the diameters are not those of the shape style.
+        above 1/2, an ID is there twice, the diameters are not those of the shape style, or the law
+        is none.
 
     Examples
     --------
@@ -81,6 +88,7 @@ class Packing:
     image: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
     shape_style: str = DEFAULT
     exponent: FloatArray = field(default_factory=lambda: np.empty(0))
+    law: Interaction = field(default_factory=Interaction)
     step: int = 0
     time: float = 0.0
     position_rest: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
@@ -89,20 +97,21 @@ class Packing:
     tilt_rest: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        n, dimension = len(self.position), self.box.dimension
+        n = len(np.atleast_1d(real_numbers("position", self.position)))
+        dimension = self.box.dimension
         if n == 0:
             msg = "packing has no particles, expected at least one"
             raise ValueError(msg)
-        if np.size(self.image) == 0:
+        if real_numbers("image", self.image).size == 0:
             object.__setattr__(self, "image", np.zeros((n, dimension), dtype=np.int64))
-        if np.size(self.exponent) == 0:
+        if real_numbers("exponent", self.exponent).size == 0:
             object.__setattr__(self, "exponent", np.ones(n))
         vector = (n, dimension)
         rotation = (n,) if dimension == 2 else (n, 4)
         rests = {"position_rest": vector, "orientation_rest": rotation, "edges_rest": (dimension,)}
         rests["tilt_rest"] = (number_of_tilts(dimension),)
         for name, shape in rests.items():
-            if np.size(getattr(self, name)) == 0:
+            if real_numbers(name, getattr(self, name)).size == 0:
                 object.__setattr__(self, name, np.zeros(shape))
         floats = {"position": vector, "orientation": rotation, "diameters": (n, 3), **rests}
         floats["exponent"] = (n,)
@@ -112,6 +121,7 @@ class Packing:
             object.__setattr__(self, name, as_integers(name, getattr(self, name), shape))
         _check_labels(self)
         _check_shapes(self)
+        object.__setattr__(self, "law", _checked_law(self.law))
 
     @property
     def n(self) -> int:
@@ -129,14 +139,14 @@ class Packing:
         return shape_named(self.shape_style)
 
     def compiled(self, law: Interaction | None = None) -> Any:
-        """Make the compiled object that knows these particles' contacts; see `Shape.compiled`."""
+        """Make the compiled object that knows these particles' contacts; of their own law if none is given."""
         sizes = (self.diameters, self.exponent)
-        return self.shape.compiled(sizes, self.dimension, law or Interaction())
+        return self.shape.compiled(sizes, self.dimension, law or self.law)
 
     @cached_property
     def _bodies(self) -> Any:
         """The particles, whatever their interaction."""
-        return self.compiled()
+        return self.compiled(Interaction())
 
     @property
     def half_length(self) -> FloatArray:
@@ -299,6 +309,26 @@ def _check_labels(packing: Packing) -> None:
     if not np.isfinite(packing.time):
         msg = f"time is {packing.time}, expected a finite number"
         raise ValueError(msg)
+
+
+def _checked_law(law: Interaction) -> Interaction:
+    """Take the constants of the contacts, or raise a ValueError."""
+    try:
+        k_e, sides = float(law[0]), int(law[1])
+        is_law = (
+            0 < k_e < np.inf
+            and sides in {1, 2}
+            and sides == law[1]
+            and len(law) == len(Interaction._fields)
+        )
+    except (TypeError, ValueError, LookupError):
+        is_law = False
+    if not is_law:
+        msg = (
+            f"law is {law!r}, expected Interaction(k_e, sides) with a positive k_e and sides 1 or 2"
+        )
+        raise ValueError(msg)
+    return Interaction(k_e, sides)
 
 
 def _check_shapes(packing: Packing) -> None:

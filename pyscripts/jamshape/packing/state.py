@@ -11,12 +11,13 @@ import numpy as np
 from jamshape.arrays import FloatArray, LongArray
 from jamshape.packing.packing import Packing
 from jamshape.packing.rotation import product
+from jamshape.records import Record
 
 _TURN = 2 * np.arccos(np.longdouble(-1))
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(Record):
     """Poses of particles and the box, in extended precision.
 
     A double has lost the last eight digits of an overlap of 1e-9 by the time it holds a position in a box

@@ -24,6 +24,7 @@ from jamshape.minima.target import require_reachable
 from jamshape.packing import Packing, State
 from jamshape.protocols.making import Progress
 from jamshape.protocols.recipe import Compressed, Recipe
+from jamshape.shapes.shape import Interaction
 
 # Of a compression: frames are about 2e-3 of phi apart at jamming.
 _ROWS, _FRAMES = 600, 300
@@ -176,7 +177,8 @@ class ByCompression:
     def _minimised(self, frame: int) -> Chosen:
         """Minimise a frame until forces balance, or until it is seen to be unjammed."""
         assert self.recipe.target is not None
-        packing = read_packing(self.run_file, frame)
+        # Minima exist with two bonds side to side, whatever the dynamics had.
+        packing = read_packing(self.run_file, frame).with_(law=Interaction())
         landscape, state = Landscape(packing), State.of(packing)
         before = landscape.evaluate(state)
         stop = Stop(_GOOD, lowest=self.recipe.target.u0)

@@ -148,6 +148,7 @@ class ByDynamics:
         run.write_restart(self._restart(run.session.step))
         self._newest = _of_restart(run)
         attributes = self.recipe.attributes() | {"finished": False} | self._newest
+        attributes["lammps_version"] = session.version
         RunWriter.create(self.run_file, run.packing(), attributes).close()
         return run
 

@@ -11,10 +11,8 @@ from jamshape.protocols.defaults import PROTOCOLS, SETTINGS, WAYS, recipe_for
 from jamshape.protocols.recipe import SEARCHES, Recipe
 from jamshape.shapes.command_line import (
     add_particle_options,
-    are_particles_given,
-    particles_of,
+    particles_beside,
 )
-from jamshape.shapes.particles import Particles
 
 _CHOICES = {"search": tuple(SEARCHES), "minimiser": tuple(METHODS)}
 
@@ -67,11 +65,6 @@ def settings_of(options: Namespace) -> dict[str, Any]:
     return {name: getattr(options, name) for name in names}
 
 
-def asked_particles(options: Namespace) -> Particles | None:
-    """Read the particles; None where there is a start, which has its own, and none were asked for."""
-    return None if options.start and not are_particles_given(options) else particles_of(options)
-
-
 def recipe_of(options: Namespace) -> Recipe:
     """Read a recipe from the options.
 
@@ -80,4 +73,4 @@ def recipe_of(options: Namespace) -> Recipe:
     ValueError
         If an option is none of the shape or the way, or out of its range.
     """
-    return recipe_for(asked_particles(options), **settings_of(options))
+    return recipe_for(particles_beside(options), **settings_of(options))

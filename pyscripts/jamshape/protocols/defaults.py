@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from jamshape.checks import RANGES, require_one_of, require_stated
+from jamshape.checks import RANGES, ArgumentError, require_one_of, require_stated, require_with
 from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL, protocol_named
 from jamshape.minima import METHODS
 from jamshape.minima.target import Target
@@ -228,6 +228,7 @@ def recipe_for(
     particles, dimension = _placed(particles, dimension)
     usual, called = _chosen(way, protocol)
     get = usual.defaults(dimension) | _allowed(given, usual, called)
+    require_with("u0", get["u0"] or None, accuracy=given.get("accuracy"))
     if source is not None:
         get |= _of_source(source, given)
     how, target = usual.compose(get)
@@ -270,8 +271,8 @@ def _allowed(given: dict[str, Any], usual: UsualWay, called: str) -> dict[str, A
             msg = f"{name} is no setting of a recipe, expected one of {', '.join(known)}"
             raise ValueError(msg)
         if value is not None and name not in usual.usual:
-            msg = f"{name} is no setting of {called}, expected another way or setting"
-            raise ValueError(msg)
+            said = f"{{{name}:name}} is no setting of {called}, expected another way or setting"
+            raise ArgumentError(said, {name: value})
     kept = {name: value for name, value in given.items() if value is not None}
     require_stated(**{name: value for name, value in kept.items() if name in RANGES})
     return kept
@@ -281,7 +282,7 @@ def _of_source(source: Source, given: dict[str, Any]) -> dict[str, Any]:
     """Take from a start what it is made of; what was asked for beside it would mean nothing."""
     for name in ("phi_start", "phi_end", "kappa"):
         if given.get(name) is not None:
-            msg = f"{name} means nothing to a start that is compressed already; leave {name} out"
-            raise ValueError(msg)
+            said = f"{{{name}}} means nothing to a start that is compressed already; leave it out"
+            raise ArgumentError(said, {name: given[name]})
     own = {name: getattr(source, name) for name in ("n", "phi_start", "phi_end", "kappa")}
     return own | {"start": source.path}

@@ -23,12 +23,16 @@ from jamshape.minima import Outcome, Stop, minimise
 from jamshape.minima.target import Search, Target, TargetError, direct
 from jamshape.packing import Packing
 from jamshape.protocols.make import is_done
+from jamshape.protocols.retry import retried
 from jamshape.shapes.shape import in_name
 
 # What must agree in the packing and in a rung that is there already.
 _IDENTITY = (
     *("alpha", "exponent", "w1", "w2", "kinds", "n", "seed", "size_ratio", "protocol", "n_sweeps"),
 )
+
+# What a packing's file says of how its own minimum was found, which is not that of a rung.
+_OF_SOURCE = ("strict", "retry_", "n_negative", "n_kinked", "lowest_eigenvalue")
 
 # A box that was opened has been opened too far below this fraction of u0; how long to look.
 _FALLEN = 1e-2
@@ -112,14 +116,18 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
     except TargetError as error:
         return Rung(out, goal.u0, made=False, failure=str(error))
     assert search.minimum is not None
-    shared = _shared(read_packing(source), search.minimum.state.packing(start))
-    attributes = stored | {name: getattr(goal, name) for name in ("u0", "accuracy", "tolerance")}
+    minimum = search.minimum
+    if not minimum.is_at_rest:
+        minimum = retried(landscape, minimum, goal, landscape.evaluations)
+    shared = _shared(read_packing(source), minimum.state.packing(start))
+    known = {name: value for name, value in stored.items() if not name.startswith(_OF_SOURCE)}
+    attributes = known | {name: getattr(goal, name) for name in ("u0", "accuracy", "tolerance")}
     attributes |= {"ladder_source": source.name, "contacts_shared": shared}
     attributes |= {
         "evaluations": landscape.evaluations,
         "wall_seconds": time.perf_counter() - began,
     }
-    write_minimum(out, landscape, search.minimum, attributes)
+    write_minimum(out, landscape, minimum, attributes)
     return Rung(out, goal.u0, made=True, failure="")
 
 

@@ -28,6 +28,7 @@ from jamshape.protocols.recipe import (
     Thermalisation,
     Way,
 )
+from jamshape.protocols.retry_file import RetryFile, try_again
 from jamshape.protocols.strict_file import StrictFile, lead_strictly
 
 _MAKING: dict[type[Way], Callable[[Recipe, Path], Making]] = {
@@ -54,8 +55,12 @@ __all__ = [
 ]
 
 
-def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress]:
+def make(
+    recipe: Recipe, out: Path, *, again: bool = False, retry: bool = True
+) -> Iterator[Progress]:
     """Make a packing and write it to `out`, going on with what an earlier call has left.
+
+    Where forces do not balance at the energy, there is a second try (`protocols.retry`).
 
     Parameters
     ----------
@@ -64,6 +69,8 @@ def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress
         Replaced when the packing is found.
     again : bool
         Begin anew where files of another recipe, or damaged ones, are in the way.
+    retry : bool
+        Whether there is a second try.
 
     Yields
     ------
@@ -91,14 +98,17 @@ def make(recipe: Recipe, out: Path, *, again: bool = False) -> Iterator[Progress
     if recipe.target:
         minimum = yield from lead(landscape, way.state(), recipe.target, search)
     assert minimum is not None
-    strict = StrictFile(_strict_file(out), recipe)
+    searched = landscape.evaluations
+    strict, second = StrictFile(_strict_file(out), recipe), RetryFile(_strict_file(out), recipe)
     if recipe.strict:
         minimum = yield from lead_strictly(landscape, minimum, strict)
+    elif retry and recipe.is_searched and not minimum.is_at_rest:
+        minimum = yield from try_again(landscape, minimum, second)
     attributes: dict[str, Any] = recipe.attributes() | way.measured()
     if recipe.target:
         attributes |= {"search": recipe.way.search, "search_minimisations": search.minimisations}
-        attributes |= {"search_evaluations": landscape.evaluations - before}
-    attributes |= strict.attributes
+        attributes |= {"search_evaluations": searched - before}
+    attributes |= strict.attributes | second.attributes
     seconds = attributes.pop("seconds_before", 0.0) + time.perf_counter() - began
     attributes |= {"wall_seconds": seconds, "evaluations": landscape.evaluations}
     write_minimum(out, landscape, minimum, attributes)

@@ -19,6 +19,7 @@ from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
 from jamshape.protocols.random_start import dilute_packing, random_packing
 from jamshape.shapes.particles import Particles
+from jamshape.shapes.shape import Interaction
 
 SEARCHES = {"direct": direct, "halving": halving}
 """Ways to lead a jammed state to an energy: ours, and that of Marschall & Teitel 2018, Sec. III C, as written."""
@@ -210,7 +211,7 @@ class Compressed:
     def start(self, recipe: Recipe) -> Packing:
         """Make the random start, without overlaps, or take the first frame of the file."""
         if self.source is not None:
-            return read_packing(self.source, 0)
+            return read_packing(self.source, 0).with_(law=Interaction())
         return random_packing(
             recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension
         )
@@ -284,6 +285,11 @@ class Recipe:
     def start(self) -> Packing:
         """Make the random start; errors as `random_start.random_packing`."""
         return self.way.start(self)
+
+    @property
+    def is_searched(self) -> bool:
+        """Whether the energy is looked for by our own search, not by one as published."""
+        return self.target is not None and self.way.search == "direct"
 
     def attributes(self) -> dict[str, Any]:
         """Return what identifies it, to be stored."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.checks import RANGES
+from jamshape.files.disk import named
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.measures.runs import rate_of
 from jamshape.shapes.particles import Particles
@@ -44,7 +45,7 @@ class Source(NamedTuple):
         first = read_packing(path, 0).phi
         low, high = RANGES["phi_start"].low, RANGES["phi_start"].high
         return cls(
-            path=path,
+            path=Path(path).absolute(),
             particles=particles,
             n=last.n,
             dimension=last.dimension,
@@ -64,11 +65,11 @@ class Source(NamedTuple):
         for name, value in asked.items():
             own = getattr(self, name)
             if value is not None and value != own:
-                msg = f"{name} is {value} and that of the start {self.path} {own}; leave {name} out"
+                msg = f"{name} is {value} and that of the start {named(self.path)} {own}; leave {name} out"
                 raise ValueError(msg)
         if particles is not None and not self._has(particles):
             msg = (
-                f"the start {self.path} holds {self.n} particles of {self.particles}, expected those"
+                f"the start {named(self.path)} holds {self.n} particles of {self.particles}, expected those"
                 f" that were asked for, {particles}; leave the particles out"
             )
             raise ValueError(msg)

@@ -49,7 +49,7 @@ class StrictFile:
 
     def write(self, search: StrictSearch, landscape: Landscape) -> None:
         """Write a search between two steps."""
-        attributes = self.recipe.attributes() | search.counts()
+        attributes = self.recipe.attributes() | search.counts() | {"strict_search": True}
         write_states(self.path, [search.minimum.state], landscape.particles, attributes)
 
 

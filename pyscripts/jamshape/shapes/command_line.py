@@ -31,6 +31,15 @@ def add_particle_options(parser: ArgumentParser) -> None:
     )
 
 
+def add_meaning_options(parser: ArgumentParser) -> None:
+    """Add --dimension and --shape, of files that do not say them."""
+    group = parser.add_argument_group(
+        "LAMMPS's data files and dumps that do not say what they hold"
+    )
+    group.add_argument("--dimension", type=int, choices=(2, 3), help="of the file's state")
+    group.add_argument("--shape", choices=SHAPES, help="of the file's particles")
+
+
 def particles_of(options: Namespace) -> Particles:
     """Read the particles from the options.
 
@@ -52,6 +61,11 @@ def are_particles_given(options: Namespace) -> bool:
     """Whether any of the options of `add_particle_options` was given."""
     others = options.shape, options.size_ratio
     return bool(options.kind or _given(options)) or any(value is not None for value in others)
+
+
+def particles_beside(options: Namespace) -> Particles | None:
+    """Read the particles; None where there is a start, which has its own, and none were asked for."""
+    return None if options.start and not are_particles_given(options) else particles_of(options)
 
 
 def _shape(options: Namespace) -> Shape:

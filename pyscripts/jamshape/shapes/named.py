@@ -7,14 +7,16 @@ one.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jamshape.arguments import checked
+from jamshape.arrays import real_numbers
 from jamshape.shapes.particles import Kind, Particles
 
 
+@checked
 def Spherocylinders(
     alpha: ArrayLike = 4.0, size_ratio: float | None = None, **kinds: ArrayLike
 ) -> Particles:
@@ -53,6 +55,7 @@ def Spherocylinders(
     return _particles("spherocylinder", {"alpha": alpha}, size_ratio, kinds)
 
 
+@checked
 def Superellipsoids(
     p: ArrayLike = 1.0,
     w1: ArrayLike = 1.0,
@@ -92,6 +95,7 @@ def Superellipsoids(
     return _particles("superellipsoid", {"p": p, "w1": w1, "w2": w2}, size_ratio, kinds)
 
 
+@checked
 def Dimers(
     alpha: ArrayLike = 1.0, size_ratio: float | None = None, **kinds: ArrayLike
 ) -> Particles:
@@ -138,7 +142,7 @@ def _particles(
         if name not in _OF_KINDS:
             msg = f"{name} is no number of {shape}s, expected {', '.join((*parameters, 'size_ratio', *_OF_KINDS))}"
             raise ValueError(msg)
-    values: dict[str, Any] = {**parameters, **kinds}
+    values = {name: real_numbers(name, value) for name, value in {**parameters, **kinds}.items()}
     if not kinds and all(np.ndim(value) == 0 for value in values.values()):
         numbers = {name: float(value) for name, value in values.items()}
         return Particles.of(shape, size_ratio, **numbers)
@@ -146,7 +150,9 @@ def _particles(
         msg = "size_ratio and kinds were given, expected the size of each kind in size alone"
         raise ValueError(msg)
     try:
-        columns = np.broadcast_arrays(*(np.atleast_1d(v).astype(float) for v in values.values()))
+        columns = np.broadcast_arrays(
+            *(np.atleast_1d(v).astype(np.float64) for v in values.values())
+        )
     except ValueError:
         lengths = {name: np.size(value) for name, value in values.items()}
         msg = f"arrays of kinds have lengths {lengths}, expected one entry for each kind"

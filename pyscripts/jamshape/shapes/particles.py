@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jamshape.arrays import FloatArray, IntArray
+from jamshape.arguments import checked, checked_fields
+from jamshape.arrays import FloatArray, IntArray, real_numbers, whole_numbers
 from jamshape.checks import RANGES, require_in, require_stated
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import DEFAULT, shape_named
@@ -26,6 +27,7 @@ class Sizes(NamedTuple):
     """(n,) kinds, LAMMPS types, from 1."""
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Kind:
     """Particles of a mixture that are alike.
@@ -62,6 +64,7 @@ class Kind:
         require_stated(size=self.size, share=self.share, spread=self.spread)
 
 
+@checked_fields
 @dataclass(frozen=True)
 class Particles:
     """A distribution of particles of one shape.
@@ -92,6 +95,7 @@ class Particles:
         return f"Particles({', '.join([repr(self.shape.name), *known])})"
 
     @classmethod
+    @checked
     def of(
         cls, shape: str | Shape = DEFAULT, size_ratio: float | None = None, **parameters: float
     ) -> Particles:
@@ -118,9 +122,10 @@ class Particles:
         sizes = [1.0] if ratio == 1 else [1.0, ratio]
         is_plain = its.size_ratio == 1 == ratio
         told = chosen | ({} if is_plain else {"size_ratio": ratio})
-        return cls(its, _draw_of(its, [Kind(chosen, size) for size in sizes]), told)
+        return cls(its, _Mixture(its, [Kind(chosen, size) for size in sizes]), told)
 
     @classmethod
+    @checked
     def mixture(cls, shape: str | Shape, kinds: Sequence[Kind]) -> Particles:
         """Mix kinds that may differ in everything but the shape, such as discs among rods.
 
@@ -137,9 +142,10 @@ class Particles:
         require_in("the largest size over the smallest", big / small, RANGES["size_ratio"])
         full = [Kind(_with_defaults(its, k.parameters), k.size, k.share, k.spread) for k in kinds]
         told = {"kinds": "; ".join(map(_text, full))}
-        return cls(its, _draw_of(its, full), told)
+        return cls(its, _Mixture(its, full), told)
 
     @classmethod
+    @checked
     def given(
         cls,
         shape: str | Shape,
@@ -149,10 +155,15 @@ class Particles:
     ) -> Particles:
         """Particles one by one: (n, 3) diameters, (n,) exponents and species from 1."""
         its = shape_named(shape) if isinstance(shape, str) else shape
-        d = np.atleast_2d(np.asarray(diameters, np.float64))
-        p = np.ones(len(d)) if exponent is None else np.asarray(exponent, np.float64)
-        kinds = np.ones(len(d), np.int64) if species is None else np.asarray(species, np.int64)
-        return cls(its, lambda _n, _rng: Sizes(d, p, kinds), {"kinds": "given one by one"})
+        d = np.atleast_2d(real_numbers("diameters", diameters).astype(np.float64))
+        p = (
+            np.ones(len(d))
+            if exponent is None
+            else real_numbers("exponent", exponent).astype(np.float64)
+        )
+        kinds = np.ones(len(d)) if species is None else whole_numbers("species", species)
+        sizes = Sizes(d, p, kinds.astype(np.int64))
+        return cls(its, _Given(sizes), {"kinds": "given one by one"})
 
     def sample(self, n: int, rng: np.random.Generator) -> Sizes:
         """Draw n particles.
@@ -203,7 +214,7 @@ def _text(kind: Kind) -> str:
 def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, float]:
     known = {p.name: p.default for p in shape.parameters}
     by_option = {p.option: p.name for p in shape.parameters}
-    given = {by_option.get(name, name): float(value) for name, value in parameters.items()}
+    given = {by_option.get(name, name): value for name, value in parameters.items()}
     for name in given:
         if name not in known:
             msg = f"{name} is no parameter of {shape.name}s, expected {', '.join(known)}"
@@ -211,11 +222,18 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, f
     chosen = known | given
     for parameter in shape.parameters:
         require_in(parameter.option, chosen[parameter.name], parameter.allowed)
-    return chosen
+    return {name: float(value) for name, value in chosen.items()}
 
 
-def _draw_of(shape: Shape, kinds: Sequence[Kind]) -> Callable[[int, np.random.Generator], Sizes]:
-    def draw(n: int, rng: np.random.Generator) -> Sizes:
+@dataclass(frozen=True)
+class _Mixture:
+    """Draws particles of kinds by their shares. A class, as pickles do not take functions within functions."""
+
+    shape: Shape
+    kinds: Sequence[Kind]
+
+    def __call__(self, n: int, rng: np.random.Generator) -> Sizes:
+        kinds = self.kinds
         species = np.repeat(np.arange(1, len(kinds) + 1), _numbers(n, [k.share for k in kinds]))
         diameters, exponent = np.empty((n, 3)), np.empty(n)
         for number, kind in enumerate(kinds, 1):
@@ -223,10 +241,19 @@ def _draw_of(shape: Shape, kinds: Sequence[Kind]) -> Callable[[int, np.random.Ge
             size = np.full(int(own.sum()), kind.size)
             if kind.spread:
                 size *= np.exp(kind.spread * rng.standard_normal(len(size)))
-            diameters[own], exponent[own] = shape.sizes(kind.parameters, size)
+            diameters[own], exponent[own] = self.shape.sizes(kind.parameters, size)
         return Sizes(diameters, exponent, species)
 
-    return draw
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """Gives particles that are known one by one."""
+
+    sizes: Sizes
+
+    def __call__(self, n: int, rng: np.random.Generator) -> Sizes:
+        del n, rng
+        return self.sizes
 
 
 def _numbers(n: int, shares: Sequence[float]) -> IntArray:

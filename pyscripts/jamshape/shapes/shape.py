@@ -61,12 +61,42 @@ class Style(NamedTuple):
 
 
 class Interaction(NamedTuple):
-    """The constants of the contacts."""
+    """The constants of the contacts: what energy and forces of a packing depend on beside its particles.
+
+    Parameters
+    ----------
+    k_e : float, [energy]
+        Stiffness of a contact.
+    sides : {1, 2}
+        Bonds of a side-to-side contact, of shapes that have both laws.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> discs = js.Packing(
+    ...     position=[[2, 5], [2.9, 5]], orientation=[0, 0], diameters=[[1, 1, 1]] * 2,
+    ...     species=[1, 1], id=[1, 2], box=js.Box(lo=[0, 0], edges=[10, 10]),
+    ... )
+    >>> stiff = discs.with_(law=js.Interaction(k_e=2.0))
+    >>> round(float(js.MeasuredPacking.of(stiff).u / js.MeasuredPacking.of(discs).u), 12)
+    2.0
+    """
 
     k_e: float = 1.0
     """[energy]"""
     sides: int = 2
     """Bonds of a side-to-side contact, 1 or 2, of shapes that have both laws."""
+
+    @classmethod
+    def told(cls, known: Mapping[str, Any]) -> Interaction:
+        """Take the constants that a mapping holds under their names; the usual ones where it holds none."""
+        usual = cls()
+        k_e, sides = (known.get(name, getattr(usual, name)) for name in cls._fields)
+        return cls(float(k_e), int(sides))
+
+    def but(self, k_e: float | None = None, sides: int | None = None) -> Interaction:
+        """Replace constants; those that are None stay."""
+        return Interaction(self.k_e if k_e is None else k_e, self.sides if sides is None else sides)
 
 
 class Shape(ABC):
@@ -86,6 +116,13 @@ class Shape(ABC):
     size_ratio: ClassVar[float] = 1.0
     """Of mixtures, when nobody says; 1 for equal particles."""
     has_exponent: ClassVar[bool] = False
+
+    def __eq__(self, other: object) -> bool:
+        """Tell whether it is the same shape; copies and pickles of a shape are."""
+        return type(self) is type(other) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
 
     def compiled(
         self, particles: tuple[FloatArray, FloatArray], dimension: int, law: Interaction
@@ -111,6 +148,23 @@ class Shape(ABC):
     @abstractmethod
     def fits(self, diameters: FloatArray) -> bool:
         """Whether (N, 3) diameters can be those of this shape."""
+
+    def placed(self, diameters: FloatArray, dimension: int) -> tuple[FloatArray, IntArray]:
+        """Name the axes of bodies as this shape names them, where other programs have another order.
+
+        Parameters
+        ----------
+        diameters : (N, 3) array of float64, [length]
+        dimension : {2, 3}
+
+        Returns
+        -------
+        (N, 3) array of float64, (N,) array of int64
+            Diameters of the same bodies, and which of the axes that were given is now the first one, after a
+            rotation about one axis.
+        """
+        del dimension
+        return diameters, np.zeros(len(diameters), np.int64)
 
     @abstractmethod
     def rule(self) -> str:
@@ -172,6 +226,10 @@ class Shape(ABC):
         return "_".join([self.name, *numbers])
 
 
+# Diameters that differ by less are alike, but for rounding.
+_ROUNDING = 1e-12
+
+
 class ElongatedShape(Shape):
     """A shape of half length A along the body's x and radius R: diameters (2(A+R), 2R, 2R)."""
 
@@ -188,6 +246,21 @@ class ElongatedShape(Shape):
         """As `Shape.fits`."""
         long, short, other = diameters.T
         return bool(((short == other) & (long >= short)).all())
+
+    def placed(self, diameters: FloatArray, dimension: int) -> tuple[FloatArray, IntArray]:
+        """As `Shape.placed`: the long axis comes first, and diameters that differ by rounding are alike."""
+        low, middle, high = np.sort(diameters).T
+        is_round = high - low <= _ROUNDING * high
+        first = np.where(is_round, 0, diameters.argmax(axis=1))
+        is_body = (middle - low <= _ROUNDING * high) | is_round
+        # In the plane bodies turn about z only.
+        is_body &= (first < 2) | (dimension == 3)
+        fits = (diameters[:, 1] == diameters[:, 2]) & (diameters[:, 0] >= diameters[:, 1])
+        is_other = is_body & (~fits | (is_round & (high > low)))
+        short = np.where(is_round, high, middle)
+        as_named = np.column_stack([high, short, short])
+        found = np.where(is_other[:, None], as_named, diameters)
+        return found, np.where(is_other, first, 0)
 
     def rule(self) -> str:
         """As `Shape.rule`."""

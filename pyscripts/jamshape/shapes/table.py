@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from jamshape.shapes.dimer import Dimer
 from jamshape.shapes.shape import Shape
@@ -10,7 +11,7 @@ from jamshape.shapes.spherocylinder import Spherocylinder
 from jamshape.shapes.superellipsoid import Superellipsoid
 
 if TYPE_CHECKING:
-    from jamshape.arrays import FloatArray
+    from jamshape.arrays import FloatArray, IntArray
 
 SHAPES: dict[str, Shape] = {
     shape.name: shape
@@ -37,6 +38,34 @@ def shape_named(name: str) -> Shape:
         msg = f"shape style is {name!r}, expected one of {', '.join(SHAPES)}"
         raise ValueError(msg)
     return SHAPES[name]
+
+
+class Fitted(NamedTuple):
+    """A shape with the bodies that it fits, their axes named as it names them."""
+
+    name: str
+    diameters: FloatArray
+    """(N, 3), [length]"""
+    first: IntArray
+    """(N,) which of the axes that were given is the body's first one."""
+
+
+def fitted(names: Sequence[str], diameters: FloatArray, dimension: int) -> Fitted:
+    """Find the first of some shapes that (N, 3) diameters can be those of, whichever axis is the longest.
+
+    Raises
+    ------
+    ValueError
+        If they are those of none.
+    """
+    for name in names:
+        shape = shape_named(name)
+        there, first = shape.placed(diameters, dimension)
+        if shape.fits(there):
+            return Fitted(name, there, first)
+    rules = ", or ".join(f"{shape_named(name).rule()} of a {name}" for name in names)
+    msg = f"diameters are such as {diameters[0].tolist()}, expected {rules}"
+    raise ValueError(msg)
 
 
 def guess_shape_style(diameters: FloatArray, *, has_exponent: bool = False) -> str:

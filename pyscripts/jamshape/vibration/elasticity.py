@@ -1,36 +1,59 @@
 """Elastic moduli of a packing from its dynamical matrix: affine strain, and how particles relax from it.
 
 A strain e moves r_i - r_j of each contact by e (r_i - r_j), at fixed orientations, and then forces balance
-again: with s the change of the bonds' lengths by the strain (times the roots of their stiffness) and f that
-of the forces by the prestress, the motion x and the change y of the bonds' forces solve
+again. With s the change of the bonds' lengths by the strain (times the roots of their stiffness) and f that
+of the forces by the prestress, the energy is to second order half of
 
-    [ -S   C^T ] [ x ]   [ -f ]
-    [  C   -1  ] [ y ] = [ -s ]
+    E(x) = |C x + s|^2 - x.S x + 2 x.f + (what the prestress does to the affine strain itself)
 
-and the energy's second derivative is y.s + x.f + what the prestress does to the affine strain itself.
+for a motion x of the particles, and the modulus is the stationary value of E over the volume. There the
+error of x enters squared, over the eigenvalues.
+
+A floppy mode, of which the eigenvalue is below its bound, is left out where it does not couple to the
+strain. Where one couples, E has no stationary value: the modulus is not defined. Modes along which the state has
+not settled are left out as well; where one couples, the bound is not known.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import FloatArray
-from jamshape.vibration.hessian import DynamicalMatrix, Strains
-from jamshape.vibration.sparse_modes import ShiftedInverse
-from jamshape.vibration.spectrum import Spectrum
+from jamshape.arrays import BoolArray, FloatArray, LongArray
+from jamshape.landscape import Landscape, State
+from jamshape.vibration.extended import SparseRows
+from jamshape.vibration.hessian import LARGEST_RESIDUAL, DynamicalMatrix, Strains
+from jamshape.vibration.quotients import EPS, ROUNDINGS
+from jamshape.vibration.sparse_modes import ShiftedInverse, softest
+from jamshape.vibration.spectrum import Spectrum, is_unsettled, nearer_minimum
+
+# Corrections of a solution by what it leaves of its equation.
+_REFINEMENTS = 3
+
+# What changes on the way to the minimum is an estimate, of which this multiple is taken.
+_SAFETY = 2.0
 
 
 class Modulus(NamedTuple):
-    """One elastic modulus, [energy / length^D]."""
+    """An elastic modulus with what bounds its error, [energy / length^D] each."""
 
-    affine: float
-    """Were particles to follow the strain."""
     relaxed: float
-    """With forces balanced."""
-    without_soft: float
-    """The same with those modes held that were given as soft."""
+    """The modulus, with forces balanced; NaN where it is not defined."""
+    affine: float
+    """The modulus if particles followed the strain."""
+    rounding: float
+    """Bound of the numerical error, for the state as it is."""
+    of_state: float
+    """Bound of the change up to the minimum, as far as it can be estimated; inf where it is not known."""
+    reason: str = ""
+    """One sentence that says why the modulus is not defined, or its bound not known."""
+
+    @property
+    def bound(self) -> float:
+        """Bound of the error; inf where it is not known."""
+        return self.rounding + self.of_state
 
 
 class Moduli(NamedTuple):
@@ -44,54 +67,295 @@ class Moduli(NamedTuple):
     """By gamma, x moved by gamma y."""
     pressure: float
     """[energy / length^D], of the same state."""
+    n_floppy: int = 0
+    """Number of floppy modes: eigenvalues below their bounds. Moduli are those of all other modes."""
+    n_unsettled: int = 0
+    """Number of further modes left out: along these the minimum is further away than the mean overlap."""
+    n_negative: int = 0
+    """Number of negative eigenvalues, as far as modes are known: at a saddle, moduli are not what shear measures."""
 
 
-def moduli(matrix: DynamicalMatrix, soft: Spectrum | None = None) -> Moduli:
-    """Compute bulk and shear moduli.
+def moduli(
+    matrix: DynamicalMatrix,
+    soft: Spectrum | None = None,
+    at: tuple[Landscape, State] | None = None,
+) -> Moduli:
+    """Compute bulk and shear moduli with bounds of their errors.
 
     Parameters
     ----------
     matrix : DynamicalMatrix
         Of a minimum.
     soft : Spectrum, optional
-        Modes to report the effect of. Sliding modes, which move far under any force, can lower moduli
-        by much, or raise them where they are unstable; but in reality soon end at a new contact.
+        Modes that are known. The softest ones, all floppy ones among them, are found if these do not hold them.
+    at : Landscape and State, optional
+        What the matrix is of. Without them the effect of the residual, and so the bound, is not known.
 
     Returns
     -------
     Moduli
     """
-    D, V = matrix.coordinates.dimension, matrix.volume
-    stretch, shear, tilt = np.eye(D), np.zeros((D, D)), np.zeros((D, D))
-    shear[0, 0], shear[1, 1], tilt[0, 1] = 0.5, -0.5, 1.0
-    strains = matrix.strained(np.stack([stretch, shear, tilt]))
-    second = _second_derivatives(matrix, strains, soft)
-    virial = matrix.contacts["separation"].T @ matrix.contacts["force"]
-    pressure = float(np.trace(virial)) / (D * V)
-    in_plane = float(virial[0, 0] + virial[1, 1]) / V
+    response = Response.of(matrix, _strains(matrix), softest(matrix, soft))
+    here = _Combined.of(matrix, response.here.value)
+    affine = _Combined.of(matrix, _point(matrix, response.strains, 0 * response.motion).value)
+    rounding = response.rounding() / matrix.volume * here.scale + here.rounding
+    drift, of_state, unknown = None, np.full(3, np.inf), ""
+    if at is not None:
+        near = nearer_minimum(*at, matrix, response.solved(-matrix.gradient))
+        unknown = _changed(matrix, near.matrix)
+    if at is not None and not unknown:
+        there = _point(near.matrix, response.strains, response.motion)
+        change = np.abs(_Combined.of(near.matrix, there.value).value - here.value) / near.part
+        drift = (there.left - response.here.left).astype(np.float64) / near.part
+        further = response.squared(response.along(drift)) / matrix.volume * here.scale
+        of_state = _SAFETY * (change + further)
+    verdicts, value = response.verdicts(drift), here.value
+    bulk, pure_shear, simple_shear = (
+        Modulus(
+            relaxed=float(value[k]) if verdicts[k].is_defined else np.nan,
+            affine=float(affine.value[k]),
+            rounding=float(rounding[k]),
+            of_state=np.inf if verdicts[k].reason else float(of_state[k]),
+            reason=verdicts[k].reason or unknown,
+        )
+        for k in range(3)
+    )
+    known = response.soft
+    n_floppy, n_unsettled = (
+        int(part.sum()) for part in (known.is_floppy, response.is_unsettled & ~known.is_floppy)
+    )
+    n_negative = int((known.sign[known.is_firm] < 0).sum())
+    return Moduli(bulk, pure_shear, simple_shear, here.pressure, n_floppy, n_unsettled, n_negative)
 
-    def modulus(k: int, scale: float, add: float) -> Modulus:
-        return Modulus(*(float(u / V * scale + add) for u in second[:, k]))
 
-    return Moduli(
-        bulk=modulus(0, 1 / D**2, (D - 1) / D * pressure),
-        pure_shear=modulus(1, 1.0, -in_plane / 4),
-        simple_shear=modulus(2, 1.0, 0.0),
-        pressure=pressure,
+def _strains(matrix: DynamicalMatrix) -> FloatArray:
+    """(3, D, D) strains of `Moduli`: dilation, pure shear and simple shear."""
+    D = matrix.coordinates.dimension
+    strains = np.zeros((3, D, D))
+    strains[0] = np.eye(D)
+    strains[1, 0, 0], strains[1, 1, 1], strains[2, 0, 1] = 0.5, -0.5, 1.0
+    return strains
+
+
+def _changed(matrix: DynamicalMatrix, nearer: DynamicalMatrix) -> str:
+    """Say whether other bonds hold the packing nearer to the minimum; an empty text if it is the same ones."""
+    here, there = (np.column_stack([m.bonds.particles, m.bonds.slot]) for m in (matrix, nearer))
+    if sorted(here.tolist()) == sorted(there.tolist()):
+        return ""
+    return (
+        "the bound is not known, as contacts open or close on the way to the minimum; the residual is"
+        f" {matrix.residual.largest:.2g}, minimise further or choose another u0"
     )
 
 
-def _second_derivatives(
-    matrix: DynamicalMatrix, strains: Strains, soft: Spectrum | None
-) -> FloatArray:
-    """(3, k): affine, relaxed, relaxed without soft modes."""
-    s, f = strains.stretched, strains.pushed
-    x, y = ShiftedInverse(matrix, 0.0).solve_both(-f, -s)
-    affine = (s**2).sum(axis=0) + strains.affine
-    relaxed = (y * s).sum(axis=0) + (x * f).sum(axis=0) + strains.affine
-    held = relaxed
-    if soft is not None and len(soft.eigenvalues):
-        v = soft.vectors[:, ~soft.is_translation]
-        along = (matrix.compatibility @ v).T @ s + v.T @ f
-        held = relaxed + (along**2 / soft.eigenvalues[~soft.is_translation, None]).sum(axis=0)
-    return np.stack([affine, relaxed, held])
+class _Combined(NamedTuple):
+    """Moduli as sums of second derivatives over the volume and of the pressure; (3,) each."""
+
+    value: FloatArray
+    scale: FloatArray
+    rounding: FloatArray
+    pressure: float
+
+    @classmethod
+    def of(cls, matrix: DynamicalMatrix, second: LongArray) -> _Combined:
+        D, V = matrix.coordinates.dimension, matrix.volume
+        separation, force = matrix.contacts["separation"], matrix.contacts["force"]
+        virial = (separation * force).sum(axis=0) / V
+        lost = ROUNDINGS * EPS + matrix.overlap_rounding
+        sizes = (np.abs(separation * force) * lost[:, None]).sum(axis=0) / V
+        weights = np.zeros((3, D))
+        weights[0], weights[1, :2] = (D - 1) / D**2, -0.25
+        scale = np.array([1 / D**2, 1.0, 1.0])
+        value = np.asarray(second, np.float64) / V * scale + weights @ virial
+        return cls(value, scale, np.abs(weights) @ sizes, float(virial.sum()) / D)
+
+
+class _Point(NamedTuple):
+    """E(x) of k strains at some motions."""
+
+    value: LongArray
+    """(k,) E."""
+    left: LongArray
+    """(n, k) half the slope of E."""
+    stretched: LongArray
+    """(m, k) C x + s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """How the particles of a packing relax from k affine strains.
+
+    Parameters
+    ----------
+    matrix : DynamicalMatrix
+    strains : (k, D, D) array of float64
+    soft : Spectrum
+        All floppy modes and those along which the state has not settled, and others.
+    is_unsettled : (l,) array of bool
+        Which of them these are.
+    inverse : ShiftedInverse
+    motion : (n, k) array of float64
+        Without translations and modes that are left out.
+    here : _Point
+    errors : Strains
+        Bounds of what rounding changes.
+    """
+
+    matrix: DynamicalMatrix
+    strains: FloatArray
+    soft: Spectrum
+    is_unsettled: BoolArray
+    inverse: ShiftedInverse
+    motion: FloatArray
+    here: _Point
+    errors: Strains
+
+    @classmethod
+    def of(cls, matrix: DynamicalMatrix, strains: FloatArray, soft: Spectrum) -> Response:
+        """Relax a packing from strains."""
+        unsettled = is_unsettled(matrix, soft)
+        inverse = ShiftedInverse(matrix, 0.0, soft.vectors[:, soft.is_floppy | unsettled])
+        given = matrix.strained(strains)
+        s, f = given.stretched, given.pushed
+        held = _onto(inverse.held, matrix.compatibility.T @ s + f)
+        x = inverse.solve_both(held - f, -s).v
+        for _ in range(_REFINEMENTS):
+            x = x - _onto(inverse.held, x)
+            left = _point(matrix, strains, x).left.astype(np.float64)
+            x = x - inverse.solve(left - _onto(inverse.held, left)).v
+        x = np.asarray(x - _onto(inverse.held, x))
+        here = _point(matrix, strains, x)
+        errors = _errors_of(matrix, strains)
+        return cls(matrix, strains, soft, unsettled, inverse, x, here, errors)
+
+    @property
+    def _is_left_out(self) -> BoolArray:
+        return self.soft.is_floppy | self.is_unsettled
+
+    @property
+    def _is_in(self) -> BoolArray:
+        return self.soft.is_firm & ~self.is_unsettled
+
+    def solved(self, push: FloatArray) -> FloatArray:
+        """(n,) motion under forces, those on translations and modes that are left out not among them."""
+        found = self.inverse.solve(push - _onto(self.inverse.held, push)).v
+        return np.asarray(found - _onto(self.inverse.held, found))
+
+    def along(self, left: FloatArray) -> FloatArray:
+        """(l + 1, k) magnitudes of (n, k) columns along l modes that are taken in, and of what is left."""
+        modes = self.soft.vectors[:, self._is_in]
+        parts = modes.T @ left
+        beside = left - modes @ parts - _onto(self.inverse.held, left)
+        return np.asarray(np.abs(np.vstack([parts, np.linalg.norm(beside, axis=0)])))
+
+    def squared(self, along: FloatArray) -> FloatArray:
+        """(k,) bound of what such a slope that is left can change E by."""
+        values, bound = (
+            np.abs(self.soft.eigenvalues[self._is_in]),
+            self.soft.bound[self._is_in],
+        )
+        # All modes that are not known are stiffer than those that are; of a whole spectrum there is none.
+        beside = 0.5 * values.max(initial=0.0) if values.size else np.inf
+        stiffness = np.append(values - bound, beside)
+        return np.asarray((along**2 / stiffness[:, None]).sum(axis=0))
+
+    def rounding(self) -> FloatArray:
+        """(k,) bound of the error of E by rounding of C, S, s and f, and of the motion."""
+        x, y = np.abs(self.motion), np.abs(self.here.stretched).astype(np.float64)
+        by_C, by_S = self._changes()
+        first = 2 * (y * by_C).sum(axis=0) + (x * by_S).sum(axis=0)
+        first += 2 * (x * self.errors.pushed).sum(axis=0) + self.errors.affine
+        left = self.here.left.astype(np.float64)
+        along = self.along(left)
+        along[:-1] += np.abs(self.soft.vectors[:, self._is_in]).T @ self._left_error()
+        along[-1] += np.linalg.norm(self._left_error(), axis=0)
+        return np.asarray(first + (by_C**2).sum(axis=0) + self.squared(along))
+
+    def verdicts(self, drift: FloatArray | None) -> list[_Verdict]:
+        """Say of each strain whether there is a modulus, and why it is not known."""
+        largest = self.matrix.residual.largest
+        if largest > LARGEST_RESIDUAL:
+            why = (
+                f"the state is not at a minimum: its largest net force is {largest:.2g} of the mean"
+                f" bond force, expected at most {LARGEST_RESIDUAL:g}"
+            )
+            return [_Verdict(False, why)] * len(self.strains)
+        out = self._is_left_out
+        Z, unsettled = self.soft.vectors[:, out], (self.is_unsettled & ~self.soft.is_floppy)[out]
+        coupling = np.abs(Z.T @ self.here.left.astype(np.float64))
+        error = np.abs(Z).T @ self._left_error()
+        if drift is not None:
+            error += _SAFETY * np.abs(Z.T @ drift)
+        if drift is None or unsettled.any():  # what net forces can do to a stress directly
+            net = self.matrix.compatibility.T @ self.matrix.bonds.pull
+            error[~unsettled] += _SAFETY * np.linalg.norm(net)
+        return [
+            _verdict(coupling[:, k], error[:, k], unsettled, largest)
+            for k in range(len(self.strains))
+        ]
+
+    def _changes(self) -> tuple[FloatArray, FloatArray]:
+        """(m, k) and (n, k) bounds of what rounding changes C x + s and S x by."""
+        x, M = np.abs(self.motion), self.matrix
+        by_C = ROUNDINGS * EPS * (abs(M.compatibility) @ x) + self.errors.stretched
+        by_S = ROUNDINGS * EPS * (M.prestress_sizes @ x) + M.prestress_rounding @ x
+        return np.asarray(by_C), np.asarray(by_S)
+
+    def _left_error(self) -> FloatArray:
+        """(n, k) bound of what rounding changes the slope by."""
+        C, y = abs(self.matrix.compatibility), np.abs(self.here.stretched).astype(np.float64)
+        by_C, by_S = self._changes()
+        return np.asarray(C.T @ (by_C + ROUNDINGS * EPS * y) + by_S + self.errors.pushed)
+
+
+class _Verdict(NamedTuple):
+    is_defined: bool
+    reason: str
+    """Why there is no modulus, or no bound; an empty text where there are both."""
+
+
+def _verdict(
+    coupling: FloatArray, error: FloatArray, is_unsettled: BoolArray, residual: float
+) -> _Verdict:
+    """Judge by the couplings of the modes that are left out."""
+    couples = coupling > error
+
+    def by(which: BoolArray) -> str:
+        worst = int(np.argmax(np.where(which, coupling, 0.0)))
+        return f"to this strain (by {coupling[worst]:.2g}, known to {error[worst]:.1g})"
+
+    if (floppy := couples & ~is_unsettled).any():
+        why = f"a floppy motion couples {by(floppy)}, so that nothing holds the packing against it"
+        return _Verdict(False, why)
+    if couples.any():
+        why = (
+            f"the bound is not known, as the packing has not settled along a motion that couples {by(couples)};"
+            f" the residual is {residual:.2g}, minimise further or choose another u0"
+        )
+        return _Verdict(True, why)
+    return _Verdict(True, "")
+
+
+def _onto(held: FloatArray, columns: FloatArray) -> FloatArray:
+    return np.asarray(held @ (held.T @ columns))
+
+
+def _point(matrix: DynamicalMatrix, strains: FloatArray, x: FloatArray) -> _Point:
+    """Evaluate E in long double."""
+    given, long = matrix.strained(strains), np.asarray(x, np.longdouble)
+    stretched = SparseRows(matrix.compatibility) @ long + given.stretched
+    pushed = SparseRows(matrix.prestress) @ long
+    value = (stretched**2).sum(axis=0) - (long * pushed).sum(axis=0)
+    value += 2 * (long * given.pushed).sum(axis=0) + given.affine
+    left = SparseRows(matrix.compatibility.T) @ stretched - pushed + given.pushed
+    return _Point(value, np.asarray(left, np.longdouble), stretched)
+
+
+def _errors_of(matrix: DynamicalMatrix, strains: FloatArray) -> Strains:
+    """Bound what rounding changes in what strains do."""
+    sizes, lost = matrix.strained_sizes(strains)
+    return Strains(
+        stretched=ROUNDINGS * EPS * sizes.stretched + lost.stretched,
+        pushed=ROUNDINGS * EPS * sizes.pushed + lost.pushed,
+        affine=ROUNDINGS * EPS * sizes.affine + lost.affine,
+    )

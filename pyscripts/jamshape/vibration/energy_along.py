@@ -232,10 +232,13 @@ class AlongModes:
         At a minimum.
     coordinates : Coordinates
         Those of the modes.
-    k_e : float, [energy]
+    k_e : float, [energy], optional
+        That of the packing's law when left out.
     """
 
-    def __init__(self, packing: Packing, coordinates: Coordinates, k_e: float = 1.0) -> None:
+    def __init__(
+        self, packing: Packing, coordinates: Coordinates, k_e: float | None = None
+    ) -> None:
         self.coordinates = coordinates
         rows = ["position", "orientation", "diameters", "exponent", "species", "id", "image"]
         rows += ["position_rest", "orientation_rest"]

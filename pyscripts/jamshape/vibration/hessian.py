@@ -17,9 +17,10 @@ import scipy.sparse
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from jamshape.arrays import FloatArray, IntArray
+from jamshape.arrays import FloatArray, IntArray, LongArray
 from jamshape.landscape import Evaluation, Landscape, State
 from jamshape.minima import Residual, residual_of
+from jamshape.records import Record
 from jamshape.vibration.extended import EPS
 
 # Lengths are off by so many roundings of long doubles at most: sums of squares, roots, and where feet lie.
@@ -34,7 +35,7 @@ class NotAtMinimumError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Coordinates:
+class Coordinates(Record):
     """What the components of a mode are.
 
     Parameters
@@ -116,12 +117,12 @@ class Strains(NamedTuple):
     """(m, k) change of the bonds' lengths, times the roots of their stiffness."""
     pushed: FloatArray
     """(n, k) change of the forces by the prestress alone: -S between strain and coordinates."""
-    affine: FloatArray
-    """(k,) second derivative of the energy by the prestress alone."""
+    affine: LongArray
+    """(k,) second derivative of the energy by the prestress alone, in long double."""
 
 
 @dataclass(frozen=True, eq=False)
-class DynamicalMatrix:
+class DynamicalMatrix(Record):
     """M = C^T C - S of n coordinates and m bonds (Marschall & Teitel 2018, Eqs. 38-40).
 
     Every entry is a double that is off by a few roundings of the sizes that it was summed of.
@@ -195,16 +196,20 @@ class DynamicalMatrix:
         return (self.stiffness - self.prestress).tocsr()
 
     @cached_property
-    def prestress_rounding(self) -> Any:
-        """(n, n) scipy.sparse CSR matrix: how far entries of S may be off, as overlaps are small differences of lengths.
+    def overlap_rounding(self) -> FloatArray:
+        """(C,) how far the contacts' forces may be off, relative, as overlaps are small differences of lengths.
 
         A force is the stiffness times the overlap, and lengths are of the size of the separation, in long double.
         """
         distance = np.linalg.norm(self.contacts["separation"], axis=1)
         lost = _ROUNDINGS * EPS * self.contacts["stiffness"].sum(axis=1) * distance
-        part = lost / self.contacts["bond_force"].sum(axis=1)
+        return np.asarray(lost / self.contacts["bond_force"].sum(axis=1))
+
+    @cached_property
+    def prestress_rounding(self) -> Any:
+        """(n, n) scipy.sparse CSR matrix: how far entries of S may be off by the rounding of overlaps."""
         scatter = _Scatter(self.contacts["particles"], self.coordinates)
-        return scatter.sizes(part[:, None, None] * self.curvature)
+        return scatter.sizes(self.overlap_rounding[:, None, None] * self.curvature)
 
     @cached_property
     def translations(self) -> FloatArray:
@@ -230,7 +235,25 @@ class DynamicalMatrix:
         bent = np.einsum("cva,cka->ckv", self.curvature[:, :, :D], moved)
         scatter = _Scatter(self.contacts["particles"], self.coordinates)
         pushed = np.column_stack([scatter.vector(bent[:, k]) for k in range(len(strains))])
-        return Strains(stretched, pushed, np.einsum("cka,cka->k", bent[:, :, :D], moved))
+        affine = (bent[:, :, :D] * moved).sum(axis=(0, 2), dtype=np.longdouble)
+        return Strains(stretched, pushed, affine)
+
+    def strained_sizes(self, strains: FloatArray) -> tuple[Strains, Strains]:
+        """Sum the magnitudes of what `strained` adds up, and what the rounding of overlaps can change in it."""
+        D = self.coordinates.dimension
+        moved = np.einsum("kab,cb->cka", np.abs(strains), np.abs(self.contacts["separation"]))
+        rows = np.abs(np.sqrt(self.bonds.stiffness)[:, None] * self.bonds.gradient[:, :D])
+        stretched = np.einsum("ma,mka->mk", rows, moved[self.bonds.contact])
+        scatter = _Scatter(self.contacts["particles"], self.coordinates)
+
+        def added(curvature: FloatArray, stretched: FloatArray) -> Strains:
+            bent = np.einsum("cva,cka->ckv", np.abs(curvature[:, :, :D]), moved)
+            pushed = [scatter.vector_sizes(bent[:, k]) for k in range(len(strains))]
+            affine = np.einsum("cka,cka->k", bent[:, :, :D], moved)
+            return Strains(stretched, np.column_stack(pushed), affine)
+
+        lost = self.overlap_rounding[:, None, None] * self.curvature
+        return added(self.curvature, stretched), added(lost, 0 * stretched)
 
 
 @dataclass(frozen=True, eq=False)
@@ -471,6 +494,12 @@ class _Scatter:
         full = np.zeros(self._embedding.shape[0])
         np.add.at(full, self._place, vectors[:, self._variable] * self._sign)
         return np.asarray(self._embedding.T @ full)
+
+    def vector_sizes(self, vectors: FloatArray) -> FloatArray:
+        """(n,) sum of the magnitudes of what such vectors add."""
+        full = np.zeros(self._embedding.shape[0])
+        np.add.at(full, self._place, np.abs(vectors[:, self._variable]))
+        return np.asarray(abs(self._embedding).T @ full)
 
     def blocks(self, blocks: FloatArray) -> Any:
         """(n, n) CSR matrix of (C, v, v) blocks, symmetric to the last bit."""

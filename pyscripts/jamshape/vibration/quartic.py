@@ -31,7 +31,7 @@ class QuarticCount(NamedTuple):
     n_coordinates: int
     """d_f (N - N_r), without spins that no contact can drive."""
     n_quartic: int
-    """N_q: modes below the gap of the spectrum, translations left out."""
+    """N_q: modes below the gap of the spectrum, translations left out; by rank where there is no gap."""
     n_quartic_by_rank: int
     """The same from the rank of H: modes that contacts leave free to first order."""
     gap: float
@@ -88,13 +88,15 @@ def by_size(table: ModeTable) -> IntArray:
 
 def quartic_count(table: ModeTable) -> QuarticCount:
     """Count contacts and quartic modes."""
-    below = len(table.in_band("low")) + len(table.in_band("middle"))
+    n_floppy = int(table.attributes["n_floppy"])
+    is_apart = table.has_band("high")
+    below = table.n_vibrational - len(table.in_band("high")) if is_apart else n_floppy
     size = np.abs(table["eigenvalues"][by_size(table)])
     return QuarticCount(
         n_contacts=int(table.attributes["n_bonds"]),
         n_coordinates=int(table.attributes["n_modes"]),
         n_quartic=below,
-        n_quartic_by_rank=int(table.attributes["n_floppy"]),
+        n_quartic_by_rank=n_floppy,
         gap=float(size[below] / size[below - 1]) if 0 < below < len(size) else 0.0,
         n_negative=int((table["sign"] < 0).sum()),
         n_translations=table.coordinates.dimension,

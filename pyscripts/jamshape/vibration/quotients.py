@@ -16,7 +16,7 @@ from jamshape.vibration.hessian import DynamicalMatrix
 EPS = float(np.finfo(np.float64).eps)
 
 # Entries of C and S are off by so many roundings at most: of their factors, and of sums.
-_ROUNDINGS = 4.0
+ROUNDINGS = 4.0
 
 # Columns that are multiplied in long double at once, to bound memory.
 _COLUMNS = 256
@@ -78,7 +78,7 @@ class Products:
             value=value,
             residual=norms(residual),
             rounding=digits * sizes + EPS * np.abs(value).astype(np.float64),
-            entries=_ROUNDINGS * EPS * sizes,
+            entries=ROUNDINGS * EPS * sizes,
             overlaps=(size * (self._of_overlaps @ size)).sum(axis=0),
         )
         return Images(stretched, pushed, quotients, residual)

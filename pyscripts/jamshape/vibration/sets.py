@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import BoolArray, FloatArray
+from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.files.h5md import FileFormatError
 from jamshape.files.sets import System, is_among, number, require_one_ensemble, system_of
 from jamshape.files.vocabulary import renamed
@@ -94,8 +95,8 @@ def of_packing(table: ModeTable) -> dict[str, Any]:
 
 
 def to_store(attributes: Mapping[str, Any], packing: Packing) -> dict[str, Any]:
-    """Return what a file of modes keeps of its packing: what that file said, and the shape."""
-    known = dict(attributes) | {"shape": packing.shape_style}
+    """Return what a file of modes keeps of its packing: what that file said, the shape and the law."""
+    known = dict(attributes) | {"shape": packing.shape_style, **packing.law._asdict()}
     return {f"{_PREFIX}{name}": value for name, value in known.items()}
 
 
@@ -161,6 +162,16 @@ def unstable(table: ModeTable) -> BoolArray:
     return np.asarray(~table["is_translation"] & (table["sign"] < 0))
 
 
+def fraction_of(table: ModeTable, name: str) -> float:
+    """Fraction of all modes but translations that is in a band; NaN where bands are not apart."""
+    return len(table.in_band(name)) / table.n_vibrational if table.has_band(name) else math.nan
+
+
+def count_of(table: ModeTable, name: str) -> int | None:
+    """Count the modes of a band; None where bands are not apart."""
+    return len(table.in_band(name)) if table.has_band(name) else None
+
+
 def sizes(table: ModeTable) -> FloatArray:
     """Return sqrt(|lambda|) of all modes."""
     return np.asarray(np.sqrt(np.abs(table["eigenvalues"])))
@@ -211,8 +222,8 @@ class Wanted(NamedTuple):
     """The modes with the nearest frequencies, by ratio; negative ones are sought among modes of
     negative eigenvalue, at -sqrt(-lambda)."""
     per_band: Mapping[str, int] = {}
-    """Where neither is asked for: so many of each band, evenly by rank. Those of a band that is empty
-    come from the next one."""
+    """Where neither is asked for: numbers of modes of each band, evenly by rank. Those of a band that is empty
+    come from the next one, and all from the whole spectrum where bands are not apart."""
 
 
 def pick_modes(table: ModeTable, wanted: Wanted) -> list[int]:
@@ -231,14 +242,21 @@ def pick_modes(table: ModeTable, wanted: Wanted) -> list[int]:
     chosen = [*wanted.numbers, *(_nearest(table, omega) for omega in wanted.omegas)]
     if chosen:
         return chosen
+    if not all(map(table.has_band, TOLD)):
+        return _evenly(table, table.vibrational, sum(wanted.per_band.values()))
     left = 0
     for name in TOLD:
         rows, count = table.in_band(name), wanted.per_band.get(name, 0) + left
         left = count if not len(rows) else 0
-        by_size = rows[np.argsort(sizes(table)[rows])]
-        places = (np.arange(count) + 0.5) / max(count, 1) * len(rows)
-        chosen += [int(by_size[int(place)]) for place in places[: count - left]]
+        chosen += _evenly(table, rows, count - left)
     return sorted(set(chosen))
+
+
+def _evenly(table: ModeTable, rows: IntArray, count: int) -> list[int]:
+    """Choose modes of some rows evenly by rank."""
+    by_size = rows[np.argsort(sizes(table)[rows])]
+    places = (np.arange(count) + 0.5) / max(count, 1) * len(rows)
+    return [int(by_size[int(place)]) for place in places]
 
 
 def _nearest(table: ModeTable, omega: float) -> int:

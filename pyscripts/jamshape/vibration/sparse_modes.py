@@ -17,13 +17,14 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy.linalg
 import scipy.sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from jamshape.arrays import FloatArray
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.vibration.hessian import DynamicalMatrix
 from jamshape.vibration.quotients import Products, isolated_error, norms
-from jamshape.vibration.spectrum import Spectrum
+from jamshape.vibration.spectrum import COLUMNS, Spectrum, is_unsettled, spectrum
 
 # The shift for the lowest modes, over the square of the prestress that sliding modes come from.
 _BELOW = -4.0
@@ -34,7 +35,11 @@ _RESOLVED = 1e-9
 _FAR = 100.0
 _CLIMBS = 4
 
-_COLUMNS = ("eigenvalues", "solver_error", "entry_error", "overlap_error", "is_translation")
+# Number of softest modes among which floppy ones are sought at first.
+_SOME = 8
+
+# Lanczos iteration cannot find the last modes, of this number; dense methods do.
+_BEYOND = 2
 
 
 class Solution(NamedTuple):
@@ -54,16 +59,22 @@ class ShiftedInverse:
     matrix : DynamicalMatrix
     shift : float, [energy / length^2]
         No eigenvalue, but for that of translations, 0: there, one particle of each cluster is held.
+    floppy : (n, k) array of float64, optional
+        Orthonormal modes of no stiffness beside translations, of which as many coordinates are held at a shift of 0.
     """
 
-    def __init__(self, matrix: DynamicalMatrix, shift: float) -> None:
+    def __init__(
+        self, matrix: DynamicalMatrix, shift: float, floppy: FloatArray | None = None
+    ) -> None:
         self.matrix, self.shift = matrix, shift
+        floppy = np.empty((matrix.size, 0)) if floppy is None else floppy
+        self.held = np.column_stack([matrix.translations, floppy])
+        """(n, l) modes that do not move at a shift of 0."""
         C, S = matrix.compatibility, matrix.prestress
         self.scale = max(typical_prestress(matrix), abs(shift))
         held = shift * np.ones(matrix.size)
         if shift == 0.0:
-            first = np.abs(matrix.translations).argmax(axis=0)
-            held[first] = -self.scale
+            held[_supports(matrix.translations, floppy)] = -self.scale
         one = scipy.sparse.identity(C.shape[0])
         blocks = [
             [-(S + scipy.sparse.diags(held)) / self.scale, C.T],
@@ -84,6 +95,16 @@ class ShiftedInverse:
     def _solved(self, b: FloatArray, c: FloatArray) -> Solution:
         both = self._factors.solve(np.concatenate([b, c]))
         return Solution(both[: self.matrix.size], both[self.matrix.size :])
+
+
+def _supports(translations: FloatArray, floppy: FloatArray) -> IntArray:
+    """Choose as many coordinates as there are modes, such that no mode moves without them."""
+    first = np.abs(translations).argmax(axis=0)
+    if not floppy.shape[1]:
+        return np.asarray(first)
+    both = np.column_stack([translations, floppy]).T
+    order = scipy.linalg.qr(both, mode="r", pivoting=True)[1]
+    return np.asarray(order[: len(both)])
 
 
 def typical_prestress(matrix: DynamicalMatrix) -> float:
@@ -116,10 +137,11 @@ def lowest(matrix: DynamicalMatrix, k: int) -> Spectrum:
     Raises
     ------
     ValueError
-        If k is not from 1 to the number of modes less two, translations not counted.
+        If k is less than one, or more than there are modes.
     """
     began, known = time.perf_counter(), matrix.translations
-    _check(matrix, k)
+    if _is_most(matrix, k):
+        return _nearest(matrix, k, 0.0)
     shift = _BELOW * typical_prestress(matrix) ** 2 / _stiffest(matrix)
     found: list[Spectrum] = []
     for climb in range(_CLIMBS):
@@ -130,7 +152,7 @@ def lowest(matrix: DynamicalMatrix, k: int) -> Spectrum:
         if resolved.all() or climb == _CLIMBS - 1:
             found.append(some)
             break
-        found.append(_picked(some, resolved))
+        found.append(some.picked(resolved))
         known = np.linalg.qr(np.column_stack([known, some.vectors[:, resolved]]))[0]
         shift = -0.5 * float(size[~resolved].min())
     return _joined(found, time.perf_counter() - began)
@@ -141,15 +163,59 @@ def near(matrix: DynamicalMatrix, k: int, shift: float) -> Spectrum:
 
     Arguments, result and errors otherwise as `lowest`.
     """
-    _check(matrix, k)
-    return _near(matrix, k, shift, matrix.translations)
+    if _is_most(matrix, k):
+        return _nearest(matrix, k, shift)
+    return replace(_near(matrix, k, shift, matrix.translations), has_softest=False)
 
 
-def _check(matrix: DynamicalMatrix, k: int) -> None:
-    most = matrix.size - matrix.translations.shape[1] - 2
-    if not 1 <= k <= most:
-        msg = f"{k} modes were asked for, expected from 1 to {most}; take the whole spectrum"
+def softest(matrix: DynamicalMatrix, known: Spectrum | None = None) -> Spectrum:
+    """Find the softest modes, up to some that are neither floppy nor unsettled, unless those known hold them."""
+    most, k = matrix.size - matrix.translations.shape[1], _SOME
+    found = known if known is not None and known.has_softest else None
+    while found is None or not (found.is_firm & ~is_unsettled(matrix, found)).any():
+        if k >= most:
+            return spectrum(matrix)
+        found = lowest(matrix, k)
+        k *= 2
+    return found
+
+
+def with_translations(matrix: DynamicalMatrix, found: Spectrum) -> Spectrum:
+    """Add the translations to modes found without them, flagged as in a whole spectrum."""
+    n = matrix.translations.shape[1]
+    if not n or found.is_translation.any():
+        return found
+    nothing: dict[str, Any] = dict.fromkeys(COLUMNS, np.zeros(n))
+    nothing["is_translation"] = np.ones(n, bool)
+    own = replace(found, vectors=matrix.translations, **nothing)
+    return _joined([own, found], found.wall_seconds)
+
+
+def _is_most(matrix: DynamicalMatrix, k: int) -> bool:
+    """Whether k is all modes but a few, which Lanczos iteration leaves to dense methods."""
+    n = matrix.size - matrix.translations.shape[1]
+    if n == 0:
+        msg = (
+            f"the packing has no modes of vibration, as all its {matrix.size} modes are translations;"
+            " ask for the whole spectrum to see them"
+        )
         raise ValueError(msg)
+    if not 1 <= k <= n:
+        msg = (
+            f"{k} modes were asked for, expected from 1 to {n}, the number of modes of vibration;"
+            " leave the number out for the whole spectrum"
+        )
+        raise ValueError(msg)
+    return bool(k > n - _BEYOND)
+
+
+def _nearest(matrix: DynamicalMatrix, k: int, shift: float) -> Spectrum:
+    """Pick the k modes nearest to a shift from the whole spectrum."""
+    whole = spectrum(matrix)
+    own = np.flatnonzero(~whole.is_translation)
+    nearest = own[np.argsort(np.abs(whole.eigenvalues[own] - shift), kind="stable")[:k]]
+    some = whole.picked(np.sort(nearest))
+    return replace(some, n_before=-1, singular_values=np.empty(0), has_softest=shift == 0.0)
 
 
 def _near(matrix: DynamicalMatrix, k: int, shift: float, known: FloatArray) -> Spectrum:
@@ -167,18 +233,13 @@ def _near(matrix: DynamicalMatrix, k: int, shift: float, known: FloatArray) -> S
     return _bounded(inverse, _without(known, v), time.perf_counter() - began)
 
 
-def _picked(some: Spectrum, chosen: Any) -> Spectrum:
-    columns: dict[str, Any] = {name: getattr(some, name)[chosen] for name in _COLUMNS}
-    return replace(some, vectors=some.vectors[:, chosen], **columns)
-
-
 def _joined(parts: list[Spectrum], seconds: float) -> Spectrum:
     columns: dict[str, Any] = {
-        name: np.concatenate([getattr(p, name) for p in parts]) for name in _COLUMNS
+        name: np.concatenate([getattr(p, name) for p in parts]) for name in COLUMNS
     }
     vectors = np.column_stack([p.vectors for p in parts])
     whole = replace(parts[0], vectors=vectors, wall_seconds=seconds, **columns)
-    return _picked(whole, np.argsort(whole.eigenvalues))
+    return whole.picked(np.argsort(whole.eigenvalues))
 
 
 def _without(T: FloatArray, vectors: FloatArray) -> FloatArray:

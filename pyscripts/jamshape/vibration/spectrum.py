@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -25,6 +26,10 @@ _SHORT = 1e-3
 
 # Modes above this fraction of the largest eigenvalue follow the others on that way.
 _STIFF = 1e-5
+
+
+COLUMNS = ("eigenvalues", "solver_error", "entry_error", "overlap_error", "is_translation")
+"""Fields of a spectrum with a number for each mode."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +56,8 @@ class Spectrum:
         Number of modes below the first of these; -1 where unknown.
     singular_values : (min(m, n),) array of float64, or empty
         Of C, descending.
+    has_softest : bool
+        Whether no mode is softer than those of these, and soft ones are known to their bounds.
     """
 
     eigenvalues: FloatArray
@@ -63,6 +70,7 @@ class Spectrum:
     wall_seconds: float
     n_before: int
     singular_values: FloatArray
+    has_softest: bool = True
 
     @property
     def bound(self) -> FloatArray:
@@ -74,6 +82,29 @@ class Spectrum:
         """(k,) 1 or -1 where the bound leaves no doubt, 0 elsewhere."""
         sure = np.abs(self.eigenvalues) > self.bound
         return np.where(sure, np.sign(self.eigenvalues), 0).astype(np.int64)
+
+    @property
+    def is_floppy(self) -> NDArray[np.bool_]:
+        """(k,) modes but translations of which not even the sign is known: eigenvalues below their bounds."""
+        return np.asarray((self.sign == 0) & ~self.is_translation)
+
+    @property
+    def is_firm(self) -> NDArray[np.bool_]:
+        """(k,) modes that are neither floppy nor translations."""
+        return np.asarray((self.sign != 0) & ~self.is_translation)
+
+    def picked(self, rows: NDArray[Any]) -> Spectrum:
+        """Choose modes, by rows or by a mask."""
+        columns: dict[str, Any] = {name: getattr(self, name)[rows] for name in COLUMNS}
+        return replace(self, vectors=self.vectors[:, rows], **columns)
+
+    def with_exact_translations(self) -> Spectrum:
+        """Give translations the eigenvalue 0, which they have, without an error."""
+        exact: dict[str, Any] = {
+            name: np.where(self.is_translation, 0.0, getattr(self, name)) for name in COLUMNS[:-1]
+        }
+        order = np.argsort(exact["eigenvalues"], kind="stable")
+        return replace(self, **exact).picked(order)
 
     @property
     def omega(self) -> FloatArray:
@@ -132,7 +163,40 @@ def spectrum(matrix: DynamicalMatrix, method: str = "projected") -> Spectrum:
         wall_seconds=time.perf_counter() - began,
         n_before=0,
         singular_values=found.singular_values,
+        has_softest=method in _EXACT,
     )
+
+
+def is_unsettled(matrix: DynamicalMatrix, found: Spectrum) -> NDArray[np.bool_]:
+    """Select modes but translations along which the minimum is further away than the mean overlap.
+
+    So far off no eigenvalue tells what is there: often other contacts.
+
+    Returns
+    -------
+    (k,) array of bool
+    """
+    overlap = matrix.bond_force / float(matrix.bonds.stiffness.mean())
+    slope = np.abs(found.vectors.T @ matrix.gradient)
+    return np.asarray((slope > overlap * np.abs(found.eigenvalues)) & ~found.is_translation)
+
+
+class Nearer(NamedTuple):
+    """The dynamical matrix on the way to the minimum."""
+
+    matrix: DynamicalMatrix
+    part: float
+    """Which part of the way this is."""
+
+
+def nearer_minimum(
+    landscape: Landscape, state: State, matrix: DynamicalMatrix, newton: FloatArray
+) -> Nearer:
+    """Go (n,) a Newton step, or that part of it which moves nothing by more than a thousandth of a radius."""
+    farthest = float(np.abs(newton).max(initial=0.0))
+    part = min(1.0, _SHORT * float(landscape.inner_radius.min()) / max(farthest, 1e-300))
+    shift, turn = matrix.coordinates.motion(part * newton)
+    return Nearer(matrix_at(landscape, state.displaced(shift, turn), matrix), part)
 
 
 def state_error(
@@ -160,10 +224,8 @@ def state_error(
     sure = (found.sign != 0) & ~found.is_translation
     slope = found.vectors[:, sure].T @ matrix.gradient
     newton = -(found.vectors[:, sure] @ (slope / found.eigenvalues[sure]))
-    farthest = float(np.abs(newton).max(initial=0.0))
-    part = min(1.0, _SHORT * float(landscape.inner_radius.min()) / max(farthest, 1e-300))
-    shift, turn = matrix.coordinates.motion(part * newton)
-    there = Products(matrix_at(landscape, state.displaced(shift, turn), matrix))
+    near = nearer_minimum(landscape, state, matrix, newton)
+    there = Products(near.matrix)
 
     stiff = found.eigenvalues > _STIFF * found.eigenvalues.max(initial=0.0)
     at = there.images(found.vectors[:, ~stiff])
@@ -172,7 +234,7 @@ def state_error(
     values = found.eigenvalues.copy()
     values[~stiff] = at.quotients.value - relaxed.sum(axis=0)
     values[stiff] = there.quotients(found.vectors[:, stiff]).value
-    change = np.abs(values - found.eigenvalues) / part
+    change = np.abs(values - found.eigenvalues) / near.part
     return np.where(found.is_translation, 0.0, change)
 
 
@@ -209,6 +271,8 @@ def _projected(matrix: DynamicalMatrix) -> Found:
 def _refined(matrix: DynamicalMatrix) -> Found:
     return two_levels(matrix, refine=True)
 
+
+_EXACT = ("projected", "refined")
 
 METHODS: dict[str, Callable[[DynamicalMatrix], Found]] = {
     "projected": _projected,

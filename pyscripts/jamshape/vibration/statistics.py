@@ -17,10 +17,17 @@ from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum
 from jamshape.vibration.two_levels import rank_of
 
-# The gap below the high band is the widest within this fraction of all modes (or so many modes) of
+# The gap below the high band is the widest within this fraction of all modes, or this number of modes, of
 # where the rank of H says that it is.
-_NEAR_RANK = 0.02
+_NEAR_RANK = 0.002
 _NEAR_RANK_MODES = 3
+
+# Where the rank is that of all modes, bonds in excess of this fraction of them leave no band.
+_EXCESS = 0.02
+
+# Bands are apart if eigenvalues on both sides of the gap between them differ by this factor, as much as
+# `jamshape.vibration.two_levels` asks of modes that only the stiffness holds.
+_GAP = 3.0
 
 # Bonds with a larger share than this in further states of self stress belong to them.
 _SHARE = 1e-3
@@ -69,7 +76,7 @@ class Band(NamedTuple):
     n_unsure: int
     """Modes whose sign is within the error."""
     mean_omega: float
-    """Mean frequency of those with positive eigenvalues; NaN if there is none."""
+    """Mean frequency of those with positive eigenvalues beyond doubt; NaN if there is none."""
     gap_below: float
     """Smallest |lambda| of the band over the largest of the band below; inf if there is none."""
 
@@ -225,8 +232,9 @@ def bands(matrix: DynamicalMatrix, found: Spectrum) -> list[Band]:
     """Split a whole spectrum into its bands, from the lowest, translations left out.
 
     The high band begins at the widest gap near where the rank of H says so. Below it, modes of first and
-    of second order in the prestress are told apart by size: with the mean overlap x and stiffness k of
-    bonds, first order is about k x and second k x^2, and the cut is at k x^(3/2).
+    of second order in the prestress are distinguished by size: with the mean overlap x and stiffness k of
+    bonds, first order is about k x and second k x^2, and the cut is at k x^(3/2). Far above jamming there
+    are no such gaps, and more bonds than modes: see `why_no_bands`.
 
     Parameters
     ----------
@@ -236,29 +244,70 @@ def bands(matrix: DynamicalMatrix, found: Spectrum) -> list[Band]:
     Returns
     -------
     list of Band
-        Those that are not empty.
+        Those that are not empty, and apart from the others.
     """
+    return _split(matrix, found).bands
+
+
+def why_no_bands(matrix: DynamicalMatrix, found: Spectrum) -> str:
+    """Say why modes of a whole spectrum are in no band; an empty text if all but translations are in one."""
+    return _split(matrix, found).reason
+
+
+class _Split(NamedTuple):
+    bands: list[Band]
+    reason: str
+    """Why other modes are in no band."""
+
+
+def _split(matrix: DynamicalMatrix, found: Spectrum) -> _Split:
     real = np.flatnonzero(~found.is_translation)
     order = real[np.argsort(np.abs(found.eigenvalues[real]), kind="stable")]
     size = np.abs(found.eigenvalues[order])
-    stiffness = float(matrix.bonds.stiffness.mean())
-    distance = float(matrix.contacts["distance"][matrix.contacts["distance"] > 0].mean())
-    cut = stiffness * (matrix.bond_force / (stiffness * distance)) ** 1.5
-    n_low = int((size < cut).sum())
-    n_below = _gap_near(size, n_low, len(size) - found.rank(matrix.residual.largest))
-    limits = {"low": (0, n_low), "middle": (n_low, n_below), "high": (n_below, len(size))}
-    return [
-        _band(found, name, order[first:last], size[first] / size[first - 1] if first else np.inf)
+    n, rank = len(size), found.rank(matrix.residual.largest)
+    if n and not len(found.singular_values):
+        return _Split([], f"no bands: the method {found.method} does not find the rank of H")
+    reach = max(_NEAR_RANK_MODES, int(_NEAR_RANK * n))
+    n_low = int((size < _cut(matrix)).sum())
+    n_below = _gap_near(size, n_low, n - rank, reach)
+    if rank >= n and matrix.n_bonds - n > max(_NEAR_RANK_MODES, _EXCESS * n):
+        held = f"{matrix.n_bonds} bonds, more than the {n} modes of vibration, hold all of them"
+        return _Split([], f"no bands: {held}, as far above jamming")
+    gap = _ratio(size, n_below)
+    if gap < _GAP or abs(n_below - (n - rank)) > reach:
+        below = f"the rank of H, {rank}, leaves {n - rank} modes below the high band"
+        widest = f"the widest gap near there, above {n_below} modes, is a factor of {gap:.2g}"
+        return _Split([], f"no bands: {below}, but {widest} between eigenvalues, expected {_GAP:g}")
+    high = [_band(found, "high", order[n_below:], gap)] if n_below < n else []
+    if _ratio(size, n_low) < _GAP and n_low < n_below:
+        where = f"the softest {n_below} modes are no low and middle bands"
+        reason = f"{where}: no gap of a factor of {_GAP:g} between first and second order in the prestress"
+        return _Split(high, reason)
+    limits = {"low": (0, n_low), "middle": (n_low, n_below)}
+    soft = [
+        _band(found, name, order[first:last], _ratio(size, first))
         for name, (first, last) in limits.items()
         if last > first
     ]
+    return _Split(soft + high, "")
 
 
-def _gap_near(size: FloatArray, least: int, expected: int) -> int:
+def _cut(matrix: DynamicalMatrix) -> float:
+    """Eigenvalue between those of first and of second order in the prestress."""
+    stiffness = float(matrix.bonds.stiffness.mean())
+    distance = float(matrix.contacts["distance"][matrix.contacts["distance"] > 0].mean())
+    return float(stiffness * (matrix.bond_force / (stiffness * distance)) ** 1.5)
+
+
+def _ratio(size: FloatArray, first: int) -> float:
+    """Ratio of a size to the one below; inf if it is the lowest, or there is none."""
+    return float(size[first] / size[first - 1]) if 0 < first < len(size) else np.inf
+
+
+def _gap_near(size: FloatArray, least: int, expected: int, reach: int) -> int:
     """Count the modes below the widest gap that lies near an expected number."""
     if expected <= least:
         return least
-    reach = max(_NEAR_RANK_MODES, int(_NEAR_RANK * len(size)))
     candidates = np.arange(max(least + 1, expected - reach), min(len(size) - 1, expected + reach))
     width = size[candidates] / size[candidates - 1]
     return int(candidates[np.argmax(width)]) if len(candidates) else expected
@@ -266,7 +315,7 @@ def _gap_near(size: FloatArray, least: int, expected: int) -> int:
 
 def _band(found: Spectrum, name: str, modes: IntArray, gap: float) -> Band:
     values, sign = found.eigenvalues[modes], found.sign[modes]
-    omega = np.sqrt(values[values > 0])
+    omega = np.sqrt(values[sign > 0])
     return Band(
         name=name,
         modes=np.sort(modes),

@@ -7,7 +7,8 @@
                     vectors (n, k) if asked for
     /coordinates    particle, kind (n,), direction (n, D + T): see `jamshape.vibration.hessian.Coordinates`
     /singular_values
-    /parameters     +every result that is one number, and what the packing and the method were
+    /parameters     +every result that is one number, and what the packing and the method were: of each modulus
+                    its value (NaN where it is not defined), _affine, _rounding, _of_state and, if needed, _reason
 """
 
 from __future__ import annotations
@@ -24,15 +25,20 @@ from jamshape.files import layout
 from jamshape.files.disk import PathLike
 from jamshape.files.h5md import FileFormatError
 from jamshape.landscape import Landscape, State
-from jamshape.vibration.elasticity import moduli
+from jamshape.vibration.elasticity import Moduli, Modulus, moduli
 from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum, state_error
-from jamshape.vibration.statistics import bands, components, count, participation
+from jamshape.vibration.statistics import bands, components, count, participation, why_no_bands
 
 if TYPE_CHECKING:
     import h5py
 
-BANDS = {-1: "translation", 0: "low", 1: "middle", 2: "high", 3: "not told"}
+BANDS = {-1: "translation", 0: "low", 1: "middle", 2: "high", 3: "none"}
+_TRANSLATION, _HIGH, _NONE = -1, 2, 3
+
+MODULI = ("bulk", "pure_shear", "simple_shear")
+_COUNTS = ("n_floppy_left_out", "n_unsettled_left_out", "n_negative_modes")
+_PARTS = ("affine", "rounding", "of_state")
 
 # Of each eigenvalue, which together bound it.
 _ERRORS = ("solver_error", "entry_error", "overlap_error")
@@ -86,6 +92,30 @@ class ModeTable:
         code = next(code for code, word in BANDS.items() if word == name)
         return np.flatnonzero(self["band"] == code)
 
+    def has_band(self, name: str) -> bool:
+        """Whether modes are known to be in this band or not: not where bands are not apart, or modes are few."""
+        is_none = bool((self["band"] == _NONE).any())
+        return not is_none or (name == BANDS[_HIGH] and len(self.in_band(name)) > 0)
+
+    @property
+    def vibrational(self) -> IntArray:
+        """Rows of all modes but translations."""
+        return np.flatnonzero(~np.asarray(self["is_translation"], bool))
+
+    @property
+    def n_vibrational(self) -> int:
+        """Number of modes of the packing, translations left out, whether or not they were found."""
+        n_translations = self.attributes.get("n_translations", self["is_translation"].sum())
+        return int(self.attributes["n_modes"] - n_translations)
+
+    @property
+    def moduli(self) -> Moduli:
+        """Elastic moduli; bounds are inf in files of versions that did not have them."""
+        a = self.attributes
+        bulk, pure_shear, simple_shear = (_stored_modulus(a, f"{name}_modulus") for name in MODULI)
+        counts = (int(a.get(name, 0)) for name in _COUNTS)
+        return Moduli(bulk, pure_shear, simple_shear, a["pressure"], *counts)
+
 
 def tabulate(
     landscape: Landscape, state: State, matrix: DynamicalMatrix, found: Spectrum
@@ -102,40 +132,39 @@ def tabulate(
     Returns
     -------
     ModeTable
-        Of a few modes, bands and errors of the state are not told; nor are these errors where contacts
-        were left out, without which the state is no minimum.
+        Translations have the eigenvalue 0.
+        A few modes have no bands and no errors of the state; nor are these errors, and those of moduli, known
+        where contacts were left out, without which the state is no minimum.
     """
+    found = found.with_exact_translations()
     coordinates, k = matrix.coordinates, len(found.eigenvalues)
     whole = k == matrix.size
-    band = np.full(k, 3)
+    band = np.where(found.is_translation, _TRANSLATION, _NONE)
     attributes: dict[str, Any] = {
         "method": found.method,
         "wall_seconds": found.wall_seconds,
         "n": coordinates.n_all,
         "n_backbone": matrix.n_particles,
         "n_modes": matrix.size,
+        "n_translations": matrix.translations.shape[1],
         "n_bonds": matrix.n_bonds,
         "z": matrix.z,
         "residual": matrix.residual.largest,
         "bond_force": matrix.bond_force,
         "n_left_out": matrix.n_left_out,
     }
+    why = f"no bands: {len(found.vectors.T)} of {matrix.size} modes are known"
     if whole:
-        band[found.is_translation] = -1
         for b in bands(matrix, found):
             band[b.modes] = {word: code for code, word in BANDS.items()}[b.name]
+        why = why_no_bands(matrix, found)
+    attributes |= {"why_no_bands": why} if why else {}
     if whole and len(found.singular_values):
         attributes |= count(matrix, found)._asdict()
-    elastic = moduli(matrix)
-    attributes |= {
-        "bulk_modulus": elastic.bulk.relaxed,
-        "pure_shear_modulus": elastic.pure_shear.relaxed,
-        "simple_shear_modulus": elastic.simple_shear.relaxed,
-        "pressure": elastic.pressure,
-    }
+    at = None if matrix.n_left_out else (landscape, state)
+    attributes |= _to_store(_moduli(matrix, found, at))
     kinds = components(coordinates, state.packing(landscape.particles), found.vectors)
-    settled = whole and not matrix.n_left_out
-    error = state_error(landscape, state, matrix, found) if settled else np.full(k, np.nan)
+    error = state_error(*at, matrix, found) if whole and at else np.full(k, np.nan)
     columns = {
         "participation": participation(coordinates, found.vectors),
         **kinds._asdict(),
@@ -144,6 +173,38 @@ def tabulate(
     }
     columns |= {name: getattr(found, name) for name in _COLUMNS if name not in columns}
     return ModeTable(columns, found.vectors, coordinates, found.singular_values, attributes)
+
+
+def _moduli(matrix: DynamicalMatrix, found: Spectrum, at: tuple[Landscape, State] | None) -> Moduli:
+    """Compute moduli; where contacts were left out, say that their bounds are not known."""
+    elastic = moduli(matrix, found, at)
+    if at is not None:
+        return elastic
+    why = f"the bound is not known, as {matrix.n_left_out} contacts were left out"
+    given = {name: getattr(elastic, name) for name in MODULI}
+    return elastic._replace(
+        **{name: m._replace(reason=m.reason or why) for name, m in given.items()}
+    )
+
+
+def _to_store(elastic: Moduli) -> dict[str, Any]:
+    """Spread moduli over attributes."""
+    found: dict[str, Any] = {"pressure": elastic.pressure}
+    counts = (elastic.n_floppy, elastic.n_unsettled, elastic.n_negative)
+    found |= dict(zip(_COUNTS, counts, strict=True))
+    for name in MODULI:
+        modulus: Modulus = getattr(elastic, name)
+        key = f"{name}_modulus"
+        found |= {key: modulus.relaxed, f"{key}_bound": modulus.bound}
+        found |= {f"{key}_{part}": getattr(modulus, part) for part in _PARTS}
+        found |= {f"{key}_reason": modulus.reason} if modulus.reason else {}
+    return found
+
+
+def _stored_modulus(attributes: Mapping[str, Any], key: str) -> Modulus:
+    affine, rounding, of_state = (float(attributes.get(f"{key}_{p}", np.inf)) for p in _PARTS)
+    reason = str(attributes.get(f"{key}_reason", ""))
+    return Modulus(float(attributes[key]), affine, rounding, of_state, reason)
 
 
 def write_modes(
@@ -209,6 +270,12 @@ def _read(file: h5py.File) -> ModeTable:
     columns = {"overlap_error": np.zeros(len(stored_of["eigenvalues"]))} | stored_of
     if missing := set(_COLUMNS) - columns.keys():
         raise KeyError(*missing)
+    for name in (
+        "eigenvalues",
+        "omega",
+        *_ERRORS,
+    ):  # files of earlier versions have what rounding left
+        columns[name] = np.where(columns["is_translation"], 0.0, columns[name])
     particle, kind, direction = (of[name][()] for name in ("particle", "kind", "direction"))
     n_all, dimension = int(of.attrs["n_all"]), int(of.attrs["dimension"])
     coordinates = Coordinates(particle, kind, direction, n_all, dimension)

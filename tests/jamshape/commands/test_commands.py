@@ -45,6 +45,26 @@ def test_a_finished_packing_is_not_made_again(tiny, jamshape):
     assert (folder / "packing.h5").stat().st_mtime_ns == before
 
 
+def test_what_does_not_reach_its_goal_ends_with_the_exit_code_1(jamshape, tmp_path, capfd):
+    """Forces cannot balance better than rounding lets them."""
+    short = ("--n", 8, "--phi-start", 0.5, "--u0", 1e-16, "--tolerance", 1e-14)
+    out = tmp_path / "packing.h5"
+    said = "the packing is not at rest: it ended stalled after a second try, with net forces up to"
+    ended = jamshape("pack", "--alpha", 0, *short, "--out", out)
+    assert (ended.code, ended.report["reached"], ended.report["outcome"]) == (1, False, "stalled")
+    last = capfd.readouterr().err.strip().splitlines()[-1]
+    assert last.startswith(f"jamshape pack: warning: {said}")
+    assert last.endswith("try a larger --u0 or --tolerance, since rounding leaves more")
+    told = jamshape("info", out)
+    assert (told.report["reached"], told.code) == (False, None)
+    assert "not reached: it ended stalled after a second try" in told.out
+    swept = jamshape("sweep", "--alpha", 0, "--samples", 1, *short, "--out", tmp_path / "sweep")
+    counts = [swept.report[name] for name in ("made", "not_made", "not_reached")]
+    assert (swept.code, counts) == (1, [1, 0, 1])
+    (failed,) = swept.report["failed"]
+    assert failed.startswith(f"alpha0_seed1.h5: jamshape pack: warning: {said}")
+
+
 def test_a_packing_is_the_same_by_any_number_of_threads(tiny, jamshape):
     _, said = tiny
     made = said["packing.h5"]

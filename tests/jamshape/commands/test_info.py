@@ -1,5 +1,7 @@
 """``jamshape info`` on every kind of file."""
 
+import gzip
+
 import h5py
 import numpy as np
 import pytest
@@ -13,9 +15,9 @@ from jamshape.protocols.random_start import random_packing
 pytestmark = pytest.mark.lammps
 
 
-def info(jamshape, path):
+def info(jamshape, path, *more):
     """What is said of a file: the lines by their subjects, and the last one."""
-    ended = jamshape("info", path)
+    ended = jamshape("info", path, *more)
     assert not ended.code
     first, *lines, _ = ended.out.splitlines()
     assert first.startswith(f"{path}: {ended.report['kind']}")
@@ -155,13 +157,29 @@ def test_dumps_and_restart_files_of_lammps(jamshape, tiny, tmp_path):
     for given, known in COLUMNS.items():
         text = text.replace(given, known)
     dump.write_text(text * 3)
-    _, report = info(jamshape, dump)
+    _, report = info(jamshape, dump, "--shape", "spherocylinder", "--dimension", "2")
     assert (report["kind"], report["frames"], report["n"]) == ("LAMMPS dump", 3, 16)
     assert report["phi"] == pytest.approx(packing.phi, rel=1e-12)
     lines, report = info(jamshape, restart)
     assert (report["kind"], report["step"], report["dimension"]) == ("LAMMPS restart file", 7, 2)
     assert report["lammps"][-4:].isdigit()
     assert f"-var restart {restart}" in lines["go on with"]
+
+
+def test_what_a_data_file_does_not_say_is_said_by_options(jamshape, tiny, tmp_path, capsys):
+    packing = read_packing(tiny[0] / "packing.h5")
+    write_data(tmp_path / "bare.data", packing)
+    text = (tmp_path / "bare.data").read_text().replace("-0.5 0.5 zlo", "-3 3 zlo")
+    (tmp_path / "bare.data").write_text("of another program\n" + text.split("\n", 1)[1])
+    said = "--shape", "dimer", "--dimension", "2"
+    _, report = info(jamshape, tmp_path / "bare.data", *said)
+    assert (report["shape"], report["dimension"]) == ("dimer", 2)
+    for command, out in (("draw", "p.png"), ("export", "p.h5")):
+        ended = jamshape(command, tmp_path / "bare.data", *said, "--out", tmp_path / out)
+        assert (ended.report["shape"], ended.report["dimension"]) == ("dimer", 2)
+    refused = jamshape("info", tiny[0] / "packing.h5", *said).code
+    assert "says shape spherocylinder, expected --shape to be the same; leave it out" in refused
+    capsys.readouterr()
 
 
 def test_gsd(jamshape, tiny, tmp_path):
@@ -172,12 +190,20 @@ def test_gsd(jamshape, tiny, tmp_path):
     assert report["phi"] == pytest.approx(tiny[1]["run.h5"].report["phi"], rel=1e-12)
 
 
-@pytest.mark.parametrize("content", [b"", b"notes\n", bytes(range(256))])
-def test_what_is_none_of_ours_is_one_sentence(jamshape, tmp_path, content):
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"", "is empty, expected"),
+        (b"notes\n", "is no file that jamshape knows, expected"),
+        (bytes(range(256)), "is no file that jamshape knows, expected"),
+        (gzip.compress(b"notes"), "is compressed, expected the file itself; unpack it with gunzip"),
+    ],
+)
+def test_what_is_none_of_ours_is_one_sentence(jamshape, tmp_path, content, sentence):
     path = tmp_path / "notes.txt"
     path.write_bytes(content)
     said = jamshape("info", path).code
-    assert said.startswith(f"jamshape info: {path} is no file that jamshape knows, expected ")
+    assert said.startswith(f"jamshape info: {path} {sentence}")
     assert "\n" not in said
 
 

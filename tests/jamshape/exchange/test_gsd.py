@@ -168,3 +168,88 @@ def test_bad_files_and_packings_are_told_in_a_sentence(path, tmp_path):
         read_gsd(path)
     with pytest.raises(FileNotFoundError):
         read_gsd(tmp_path / "nowhere.gsd")
+
+
+def edited(path, change):
+    """Read a file of ours as another program does, change its frame, and write all of it."""
+    out = path.with_name("edited.gsd")
+    with hoomd.open(path) as old, hoomd.open(out, "w") as new:
+        frame = old[0]
+        change(frame)
+        new.append(frame)
+    return out
+
+
+@pytest.mark.parametrize(("name", "dimension"), PLACES)
+def test_a_file_that_another_program_scaled_is_as_that_left_it(path, name, dimension):
+    packing = mixed(name, dimension)
+    write_gsd(path, packing)
+
+    def scale(frame):
+        frame.particles.position = frame.particles.position * 1.1
+        box = frame.configuration.box.copy()
+        box[:dimension] *= 1.1
+        frame.configuration.box = box
+
+    found = read_gsd(edited(path, scale))
+    assert found.phi == pytest.approx(packing.phi / 1.1**dimension, rel=1e-6)
+    np.testing.assert_allclose(found.box.edges, 1.1 * packing.box.edges, rtol=1e-6)
+    there, here = (x.position - x.box.center + x.image * x.box.edges for x in (found, packing))
+    np.testing.assert_allclose(there, 1.1 * here, atol=1e-5 * np.abs(here).max())
+    np.testing.assert_array_equal(found.orientation, packing.orientation)
+    assert found.law == packing.law
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_only_what_was_changed_is_in_single_precision(path, dimension):
+    packing = mixed("spherocylinder", dimension)
+    write_gsd(path, packing)
+
+    def move_and_turn(frame):
+        frame.particles.position[3, 0] += 0.01
+        frame.particles.orientation[5] = [0.5**0.5, 0, 0, 0.5**0.5]
+        frame.particles.orientation[6] *= -1  # the same rotation
+
+    found = read_gsd(edited(path, move_and_turn))
+    moved = np.arange(packing.n) == 3
+    assert (found.position[~moved] == packing.position[~moved]).all()
+    shift = found.box.fractions(found.position[3] - packing.position[3])
+    shift = found.box.vectors(shift - np.rint(shift))
+    assert shift[0] == pytest.approx(0.01, abs=1e-5)
+    turned = np.arange(packing.n) == 5
+    assert (found.orientation[~turned] == packing.orientation[~turned]).all()
+    np.testing.assert_allclose(found.axes[5, :2], [0, 1], atol=1e-6)
+
+
+def test_a_particle_in_another_image_of_the_box_is_where_it_was(path):
+    packing = mixed("dimer", 2)
+    write_gsd(path, packing)
+
+    def wrap(frame):
+        frame.particles.position[2, 0] += frame.configuration.box[0]
+        frame.particles.image[2, 0] -= 1
+
+    assert_same(read_gsd(edited(path, wrap)), packing)
+
+    def count(frame):
+        frame.particles.image[2, 1] += 4
+
+    found = read_gsd(edited(path, count))
+    assert (found.position == packing.position).all()
+    assert (found.image - packing.image).sum() == 4 == (found.image - packing.image)[2, 1]
+
+
+def test_other_kinds_of_particles_are_refused(path):
+    write_gsd(path, mixed("spherocylinder", 2))
+
+    def rename(frame):
+        frame.particles.typeid = frame.particles.typeid[::-1].copy()
+
+    def grow(frame):
+        frame.particles.type_shapes = [
+            {"type": "Sphere", "diameter": 9.0} for _ in frame.particles.type_shapes
+        ]
+
+    for change in (rename, grow):
+        with pytest.raises(FileFormatError, match="another program has changed types of particles"):
+            read_gsd(edited(path, change))

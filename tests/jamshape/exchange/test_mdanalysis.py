@@ -5,6 +5,7 @@ from scenes import pressed, scaled
 
 from jamshape.contacts import find_contacts
 from jamshape.exchange.mdanalysis import to_mdanalysis, write_mdanalysis
+from jamshape.files.h5md import write_run
 from jamshape.files.run_writer import RunWriter
 
 MDAnalysis = pytest.importorskip("MDAnalysis")
@@ -30,6 +31,23 @@ def run_file(tmp_path, request):
         writer.append(packing)
     writer.close()
     return tmp_path / "run.h5", frames
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("how", [{}, {"convert_units": False}])
+def test_which_of_our_own_files_it_opens(tmp_path, dimension, how):
+    """As the page on files says: of runs in space, without units."""
+    frames = run(dimension)
+    write_run(tmp_path / "run.h5", frames)
+    universe = MDAnalysis.Universe.empty(frames[0].n, trajectory=True)
+    if dimension == 3 and how:
+        universe.load_new(str(tmp_path / "run.h5"), format="H5MD", **how)
+        assert [ts.time for ts in universe.trajectory] == TIMES
+        last = universe.trajectory[-1].positions
+        np.testing.assert_allclose(last, frames[-1].position, rtol=1e-6)
+    else:
+        with pytest.raises(ValueError, match=r"3-dimensional simulation boxes|readable units"):
+            universe.load_new(str(tmp_path / "run.h5"), format="H5MD", **how)
 
 
 def assert_is_the_run(universe, frames):

@@ -11,8 +11,10 @@ from jamshape.drawing.styles import KINDS, RATTLER
 from jamshape.exchange.gsd import write_gsd
 from jamshape.exchange.ovito import from_ovito, to_ovito
 from jamshape.files.h5md import FileFormatError
+from jamshape.packing.rotation import product
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Kind, Particles
+from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import SHAPES
 
 pytest.importorskip("ovito")
@@ -208,3 +210,18 @@ def test_a_dump_of_ours_tells_ovito_shape_and_roundness(tmp_path):
     np.testing.assert_allclose(particles["Superquadric Roundness"], [[2 / 3, 2 / 3]], rtol=1e-6)
     np.testing.assert_allclose(particles["Aspherical Shape"], [[1, 1.2, 1.5]], rtol=1e-6)
     np.testing.assert_allclose(particles["Orientation"], [[0.7, 0.5, 0.5, 0.1]], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "dimension"), PLACES)
+def test_what_was_turned_in_ovito_comes_back_turned(name, dimension):
+    packing = mixed(name, dimension).with_(law=Interaction(2.5, 1))
+    data = to_ovito(packing)
+    assert from_ovito(data).law == packing.law
+    quarter = (0.5**0.5, 0.0, 0.0, 0.5**0.5)  # about z
+    with data.particles_.orientations_ as orientations:
+        w, x, y, z = product(quarter, np.array(orientations)[:1, [3, 0, 1, 2]])[0]
+        orientations[0] = (x, y, z, w)
+    found = from_ovito(data)
+    x, y, *rest = packing.axes[0]
+    np.testing.assert_allclose(found.axes[0], [-y, x, *rest], atol=1e-6)
+    assert (found.orientation[1:] == packing.orientation[1:]).all()

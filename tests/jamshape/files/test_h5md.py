@@ -585,3 +585,25 @@ def test_a_reader_finds_the_half_lengths_and_radii_that_contacts_are_computed_wi
         group = file["particles/all"]
         np.testing.assert_array_equal(group["half_length"], packing.half_length)
         np.testing.assert_array_equal(2 * group["radius"][()], packing.diameters[:, 1])
+
+
+def test_rests_of_other_doubles_are_left_out(tmp_path):
+    """After another program has changed units, they are no digits of its numbers."""
+    packing = with_rests(2)
+    write_packing(tmp_path / "fine.h5", packing)
+    with h5py.File(tmp_path / "fine.h5", "a") as file:
+        for name in ("position", "box/edges"):
+            file[f"particles/all/{name}/value"][...] *= 2.0**-20
+    found = read_packing(tmp_path / "fine.h5")
+    assert (found.position == packing.position * 2.0**-20).all()
+    assert not found.position_rest[found.position != 0].any()
+    assert not found.edges_rest.any()
+    assert (found.orientation_rest == packing.orientation_rest).all()
+
+
+def test_two_copies_of_a_size_that_disagree_are_refused(tmp_path):
+    write_packing(tmp_path / "rods.h5", nasty_packing(2))
+    with h5py.File(tmp_path / "rods.h5", "a") as file:
+        file["particles/all/radius"][2] *= 1.1
+    with pytest.raises(FileFormatError, match="radius is not that of diameters"):
+        read_packing(tmp_path / "rods.h5")

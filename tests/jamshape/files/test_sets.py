@@ -4,7 +4,7 @@ import pytest
 from mixtures import bidisperse, superellipsoids
 
 from jamshape.command import plain
-from jamshape.drawing.text import system_labels
+from jamshape.drawing.text import conditions_text, system_labels
 from jamshape.files.h5md import write_packing
 from jamshape.files.run_writer import RunWriter
 from jamshape.files.sets import (
@@ -20,6 +20,7 @@ from jamshape.files.sets import (
     one_curve,
     read_groups,
 )
+from jamshape.measures.averages import averages
 from jamshape.protocols.random_start import random_packing
 
 ROD, OTHER = "spherocylinder", "superellipsoid"
@@ -52,15 +53,30 @@ def test_packings_are_grouped_by_what_they_are_samples_of(folder):
     groups = read_groups([folder], needs=["alpha"], same=("n", "size_ratio", "u0"))
     assert list(groups) == [
         System(ROD, 2, (("alpha", 0.0),)),
+        System(ROD, 2, (("alpha", 1.0),)),
         System(ROD, 2, (("alpha", 4.0),)),
         System(ROD, 3, (("alpha", 4.0),)),
     ]
-    assert [[file.number("seed") for file in of] for of in groups.values()] == [[1], [1, 2], [1]]
+    seeds = [[file.number("seed") for file in of] for of in groups.values()]
+    assert seeds == [[1], [1], [1, 2], [1]]
     assert n_of(groups) == 8
-    assert conditions(groups) == {"n": 8, "size_ratio": 1.4, "u0": 1e-15}
-    assert [of_paper(system) for system in groups] == [True, True, False]
-    with_all = read_groups([folder], with_stalled=True)
-    assert System(ROD, 2, (("alpha", 1.0),)) in with_all
+    assert conditions(groups) == {"n": 8, "size_ratio": 1.4, "u0": 1e-15, "not_reached": 1}
+    assert [of_paper(system) for system in groups] == [True, True, True, False]
+
+
+def test_averages_are_given_with_and_without_what_did_not_reach_its_goal(tmp_path):
+    write(tmp_path, "a", bidisperse(4), seed=1, z=5.9)
+    write(tmp_path, "b", bidisperse(4), seed=2, z=5.7)
+    write(tmp_path, "c", bidisperse(4), seed=3, z=5.5, outcome="sliding", residual=1e-6)
+    write(tmp_path, "d", bidisperse(0), seed=1, z=4.0)
+    groups = read_groups([tmp_path])
+    discs, rods = averages(groups, "z").values()
+    assert (rods.value, rods.samples) == (pytest.approx(5.7), 3)
+    assert (rods.reached.value, rods.reached.samples) == (pytest.approx(5.8), 2)
+    assert discs.reached is None
+    assert "with 1 of 4 packings not at rest" in conditions_text(groups)
+    told = plain(rods)
+    assert (told["samples"], told["reached"]["samples"]) == (3, 2)
 
 
 def test_shapes_with_other_parameters_and_protocols(tmp_path):
@@ -116,11 +132,11 @@ def test_a_mixture_is_named_by_its_kinds(tmp_path):
 def test_curves_are_of_systems_that_differ_in_nothing_else(folder):
     groups = read_groups([folder])
     plane, space = curves_over(groups, "alpha").values()
-    assert ([*plane], [*space]) == ([0.0, 4.0], [4.0])
+    assert ([*plane], [*space]) == ([0.0, 1.0, 4.0], [4.0])
     with pytest.raises(ValueError, match="expected systems that differ in alpha only"):
         one_curve(groups, "alpha")
     system, curve = one_curve({s: of for s, of in groups.items() if s.dimension == 2}, "alpha")
-    assert (system, [*curve]) == (System(ROD, 2, ()), [0, 4])
+    assert (system, [*curve]) == (System(ROD, 2, ()), [0, 1, 4])
 
 
 def test_choice_of_systems(folder):
@@ -132,7 +148,7 @@ def test_choice_of_systems(folder):
     assert chosen([0.0], [4.0], 1) == [0.0]
     assert chosen([], [4.0, 7.0], 1) == [4.0, 4.0]
     assert chosen([], [7.0], 2) == [0.0, 4.0]
-    with pytest.raises(ValueError, match=r"no packing has alpha = 7, expected one of 0, 4"):
+    with pytest.raises(ValueError, match=r"no packing has alpha = 7, expected one of 0, 1, 4"):
         chosen([7.0], [], 1)
 
 
@@ -142,8 +158,9 @@ def test_what_is_not_there_or_not_alike_is_said(folder, tmp_path):
     other = write(tmp_path, "other", bidisperse(1), u0=1e-12)
     with pytest.raises(ValueError, match="u0 is 1e-15 and 1e-12, expected one ensemble"):
         read_groups([folder, other], same=["u0"])
-    with pytest.raises(ValueError, match="in equilibrium, of 1 that ended otherwise"):
-        finished([folder / "stalled.h5"])
+    (tmp_path / "nothing").mkdir()
+    with pytest.raises(ValueError, match=r"no finished packing, expected files of sweep\.py"):
+        finished([tmp_path / "nothing"])
     with pytest.raises(ValueError, match="has no attribute 'outcome'"):
         finished([folder / "start.h5"])
     with pytest.raises(FileNotFoundError):

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import h5py
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -206,14 +207,14 @@ def test_plots_are_drawn_where_they_shall_be(run, color):
 
 
 def test_what_cannot_be_drawn_is_named():
-    with pytest.raises(TypeError, match="a float was given, expected a packing, a run or modes"):
+    with pytest.raises(TypeError, match=r"^thing is 1\.0, expected a packing or a run or modes"):
         js.plot(1.0, Figure().add_subplot())
 
 
 @pytest.mark.lammps
 def test_a_slow_run_begins_with_any_packing_and_goes_on_by_its_file(run, tmp_path):
     start = run.packing(0)
-    slow = {"phi": (0.3, 0.31), "kappa": 1e-4, "progress": False, "file": tmp_path / "slow.h5"}
+    slow = {"phi": (None, 0.31), "kappa": 1e-4, "progress": False, "file": tmp_path / "slow.h5"}
     first = js.slow_compress(start=start, **slow)
     assert first.phi[-1] == pytest.approx(0.31)
     assert first.about["start"] == str(run.file)
@@ -235,4 +236,69 @@ def test_a_packing_whose_forces_do_not_balance_says_so(run):
     packing = run.packing()
     stalled = js.MeasuredPacking.of(packing, {"outcome": "stalled"})
     assert "stalled: forces do not balance" in repr(stalled)
-    assert "balance" not in repr(js.MeasuredPacking.of(packing, {"outcome": "sliding"}))
+    assert not stalled.reached
+    assert "balance" not in repr(js.MeasuredPacking.of(packing, {"outcome": "corner"}))
+    saddle = {"outcome": "converged", "strict": True, "n_negative": 2}
+    said = "2 of its modes have a negative eigenvalue, expected none"
+    assert said in repr(js.MeasuredPacking.of(packing, saddle))
+
+
+@pytest.mark.lammps
+def test_objects_know_their_files_wherever_the_process_goes(tmp_path, monkeypatch):
+    runs, packings = {}, {}
+    for name, alpha in (("discs", 0.0), ("rods", 4.0)):
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        runs[name] = js.compress(
+            js.Spherocylinders(alpha=alpha), n=12, phi=(0.4, 0.9), kappa=1e-2, rows=20, frames=4,
+            file="run.h5", progress=False,
+        )  # fmt: skip
+        packings[name] = js.load("run.h5", frame=-1)
+        assert repr(runs[name]).endswith("in run.h5>")
+    for name, run in runs.items():
+        right = js.load(tmp_path / name / "run.h5")
+        assert run.about["alpha"] == right.about["alpha"]
+        assert run.pressure[-1] == right.pressure[-1]
+        assert run.packing().phi == right.packing().phi
+        assert packings[name].file == right.file == run.file
+    assert runs["discs"].pressure[-1] == pytest.approx(0.0518685, rel=1e-5)
+    assert repr(runs["discs"]).endswith(f"in {tmp_path / 'discs' / 'run.h5'}>")
+
+
+@pytest.mark.lammps
+def test_all_entrances_save_alike(run, tmp_path):
+    packing = run.packing()
+    for end in ("h5", "data"):
+        js.save(tmp_path / f"a.{end}", packing)
+        packing.save(tmp_path / f"b.{end}")
+    assert (tmp_path / "a.data").read_bytes() == (tmp_path / "b.data").read_bytes()
+    with pytest.raises(ValueError, match=r"ends in '.xyz', expected one of .h5, .data, .gsd"):
+        packing.save(tmp_path / "packing.xyz")
+    run.save(tmp_path / "copy.h5")
+    copy = js.load(tmp_path / "copy.h5")
+    assert (type(copy), len(copy)) == (type(run), len(run))
+    assert (copy.pressure == run.pressure).all()
+    assert (copy.packing().position == packing.position).all()
+    with pytest.raises(ValueError, match="a RunFile was given, expected a packing in a file"):
+        js.save(tmp_path / "run.data", run)
+    modes = js.modes(packing, force=True)
+    js.save(tmp_path / "modes.h5", modes)
+    assert len(js.load(tmp_path / "modes.h5")) == len(modes)
+    for write in (modes.save, lambda path: js.save(path, modes)):
+        with pytest.raises(ValueError, match=r"modes\.gsd"):
+            write(tmp_path / "modes.gsd")
+    assert not (tmp_path / "modes.gsd").exists()
+
+
+def test_results_of_a_file_that_was_changed_are_left_out(tmp_path):
+    rods = js.Spherocylinders(alpha=1)
+    js.make_packing(rods, n=8, u0=1e-6, file=tmp_path / "packing.h5", progress=False)
+    with h5py.File(tmp_path / "packing.h5", "a") as file:
+        for name in ("position", "box/edges"):
+            file[f"particles/all/{name}/value"][...] *= 1.1
+    with pytest.warns(
+        UserWarning, match="another program has changed them, and what the file says"
+    ):
+        packing = js.load(tmp_path / "packing.h5")
+    assert not packing.results
+    assert packing.pressure == 0

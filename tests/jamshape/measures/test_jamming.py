@@ -49,11 +49,13 @@ def test_it_is_the_densest_frame_that_unjams(monkeypatch):
     stays = [False, False, True, True, False, None, True, True, None, True, True]
     tried = minimised(monkeypatch, phi, stays)
     assert [one.frame for one in tried] == [10, 9, 8, 7, 6, 5, 4]
-    assert Jamming.of(tried) == (phi[4], phi[6], 7)
+    assert Jamming.of(tried) == (phi[4], phi[6], 7, 2)
 
 
 def test_frames_that_are_undecided_bound_nothing():
-    assert str(Jamming.of([Tried(1, 0.9, None), Tried(0, 0.8, None)])) == str(Jamming(NAN, NAN, 2))
+    assert str(Jamming.of([Tried(1, 0.9, None), Tried(0, 0.8, None)])) == str(
+        Jamming(NAN, NAN, 2, 2)
+    )
     assert Jamming.of([Tried(1, 0.9, None), Tried(0, 0.8, False)])[0] == 0.8
 
 

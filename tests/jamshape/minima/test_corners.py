@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chosen_seeds import chosen_by_seed
 from mixtures import bidisperse
 
 import jamshape as js
@@ -14,7 +15,11 @@ from jamshape.minima.corners import at_rest, weights_of
 from jamshape.protocols.random_start import random_packing
 
 TOLERANCE = 1e-8
-N, SEED = 32, 5  # a packing of nearly round rods that comes to rest on a corner
+N = 32
+SEEDS = (
+    5,
+    *range(1, 60),
+)  # nearly round rods, of which one packing comes to rest on a corner: the first, on most machines
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +27,9 @@ def cornered(tmp_path_factory):
     """The file of a packing that ended on a corner."""
     file = Path(tmp_path_factory.mktemp("corner")) / "packing.h5"
     rods = js.Spherocylinders(alpha=0.001)
-    js.make_packing(rods, n=N, seed=SEED, u0=1e-15, file=file, progress=False)
+    how = {"n": N, "u0": 1e-15, "file": file, "again": True, "progress": False}
+    made = (js.make_packing(rods, seed=seed, **how) for seed in SEEDS)
+    next(packing for packing in made if packing.results["outcome"] == "corner")
     return file
 
 
@@ -70,6 +77,7 @@ def test_forces_turn_round_within_a_hair(landscape, state):
     assert jump > 1e3 * near / (here.bond_force * landscape.length**2)
 
 
+@chosen_by_seed
 def test_what_is_pushed_away_comes_back(landscape, state):
     rng = np.random.default_rng(2)
     overlap = landscape.evaluate(state).bond_force * landscape.length**2

@@ -135,3 +135,9 @@ def test_near_pairs_are_those_of_all_images(dimension, strength, edge):
     assert len(rows) == len(set(map(tuple, rows)))
     assert set(map(tuple, rows)) == tried(spheres, box)
     assert len(rows) > 0
+
+
+def test_what_rounding_leaves_below_the_diagonal_is_no_rotation():
+    assert Box.of([0, 0], [[10, 3], [1e-16, 12]]).matrix.tolist() == [[10, 3], [0, 12]]
+    with pytest.raises(ValueError, match="expected the first one along x"):
+        Box.of([0, 0], [[10, 3], [1e-9, 12]])

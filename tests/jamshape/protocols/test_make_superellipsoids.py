@@ -12,7 +12,7 @@ from jamshape.protocols.make import Recipe, Steps, Thermalisation, make, require
 from jamshape.protocols.quasistatic import Quasistatic
 from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
-from jamshape.vibration.statistics import bands, count
+from jamshape.vibration.statistics import bands, count, why_no_bands
 
 COARSE = Steps(Quasistatic(step=1e-2))
 
@@ -78,6 +78,8 @@ def test_missing_contacts_are_quartic_modes(packings, name):
     assert matrix.size == d_f * matrix.n_particles
     assert read_attributes(packings(name))["z_iso"] == 2 * d_f
     n_quartic = sum(band.n_modes for band in bands(matrix, found) if band.name != "high")
+    if why_no_bands(matrix, found):  # no gap of a factor of three: by rank alone
+        n_quartic = counts.n_floppy
     assert matrix.n_bonds == d_f * matrix.n_particles - 2 - n_quartic
     assert (n_quartic == 0) == (name == "spheres")
     assert (found.sign[~found.is_translation] > 0).all()  # a minimum, to second order too

@@ -5,6 +5,7 @@ import itertools
 import mpmath
 import numpy as np
 import pytest
+from chosen_seeds import chosen_by_seed
 from mixtures import bidisperse
 
 from jamshape.files.h5md import read_attributes, read_packing
@@ -114,6 +115,7 @@ def test_strict_packing_has_no_negative_eigenvalue(strict):
     assert np.sort(np.abs(values))[2] == pytest.approx(stored["lowest_eigenvalue"], rel=1e-6)
 
 
+@chosen_by_seed
 @pytest.mark.parametrize(
     ("n", "seed"), [(32, 1), (32, 3), pytest.param(128, 1, marks=pytest.mark.validate)]
 )
@@ -141,6 +143,7 @@ def energies_beside(landscape, minimum, size):
     return np.array(energies) / landscape.evaluate(minimum).energy
 
 
+@chosen_by_seed
 @pytest.mark.parametrize(
     ("n", "seed"), [(32, 36), pytest.param(128, 5, marks=pytest.mark.validate)]
 )

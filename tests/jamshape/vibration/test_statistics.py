@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lattices import discs
 from scenes import make
 from small_packings import SMALL, jammed, matrix_of
 
@@ -16,6 +17,7 @@ from jamshape.vibration.statistics import (
     mean_in_bins,
     participation,
     redundancies,
+    why_no_bands,
 )
 
 
@@ -90,23 +92,25 @@ def test_no_mode_is_unaccounted_for(name):
     assert parts[-1].mean_omega == pytest.approx(found.omega[parts[-1].modes].mean())
 
 
-def test_bands_of_a_spectrum_with_all_three():
+def with_values(low, above):
+    """A spectrum of nearly round rods with these eigenvalues, and their rank: four translations and soft modes fewer."""
     matrix = matrix_of("rods of alpha 1")
     found = spectrum(matrix)
-    rank = found.rank()
-    below = matrix.size - rank
-    values = np.concatenate([[-1e-15, 0, 0, 1e-16, 3e-9, 4e-8], np.linspace(0.01, 1, rank)])
+    values = np.concatenate([low, above])
     values = np.append(values, [1.0] * (matrix.size - len(values)))[: matrix.size]
-    assert below == 3
-    translation = np.zeros(matrix.size, bool)
-    translation[1:3] = True
+    translation = values == 0
     sigma = found.singular_values.copy()
-    sigma[rank - 3 :] = 0  # three constraints less
-    made = replace(
+    sigma[matrix.size - len(low) :] = 0
+    return matrix, replace(
         found, eigenvalues=values, is_translation=translation, singular_values=sigma,
         solver_error=np.full(matrix.size, 1e-20), entry_error=np.zeros(matrix.size),
         overlap_error=np.zeros(matrix.size),
     )  # fmt: skip
+
+
+def test_bands_of_a_spectrum_with_all_three():
+    matrix, made = with_values([-1e-15, 0, 0, 1e-16, 3e-9, 4e-8], np.linspace(0.01, 1, 40))
+    assert why_no_bands(matrix, made) == ""
     low, middle, high = bands(matrix, made)
     assert (low.n_modes, middle.n_modes, high.n_modes) == (2, 2, matrix.size - 6)
     assert (low.n_negative, low.n_unsure) == (1, 0)
@@ -114,6 +118,33 @@ def test_bands_of_a_spectrum_with_all_three():
     assert low.gap_below == np.inf
     assert middle.gap_below == pytest.approx(3e6)
     assert high.gap_below == pytest.approx(0.01 / 4e-8)
+
+
+def test_there_are_no_bands_without_a_gap_where_the_rank_says_so():
+    matrix, made = with_values([0, 0, 2e-3, 4e-3, 6e-3], np.geomspace(0.01, 1, 40))
+    assert bands(matrix, made) == []
+    assert "leaves 3 modes below the high band, but the widest gap near there" in why_no_bands(
+        matrix, made
+    )
+
+
+def test_low_and_middle_modes_that_run_into_each_other_are_in_no_band():
+    matrix, made = with_values([0, 0, *np.geomspace(1e-14, 1e-10, 12)], np.linspace(0.01, 1, 40))
+    (high,) = bands(matrix, made)
+    assert (high.name, high.n_modes) == ("high", matrix.size - 14)
+    assert "the softest 12 modes are no low and middle bands" in why_no_bands(matrix, made)
+
+
+def test_bonds_in_excess_of_the_modes_leave_no_bands():
+    """Discs of a hexagonal crystal, far above jamming: three bonds for each, which has two coordinates."""
+    a, h = 0.9, 0.9 * np.sqrt(0.75)
+    position = [[(i + 0.5 * (j % 2)) * a, j * h] for j in range(4) for i in range(4)]
+    packing = discs(np.array(position), (4 * a, 4 * h))
+    matrix = dynamical_matrix(Landscape(packing), State.of(packing))
+    found = spectrum(matrix)
+    assert (matrix.n_bonds, found.rank()) == (48, 30)
+    assert bands(matrix, found) == []
+    assert why_no_bands(matrix, found).startswith("no bands: 48 bonds, more than the 30 modes")
 
 
 def test_bonds_of_a_brick_wall_of_rods_are_redundant():

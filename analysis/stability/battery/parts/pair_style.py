@@ -123,7 +123,8 @@ def lost_digits(p: float) -> float:
     small = at.packing.diameters[1::2].min(axis=1) / 2
     force = np.linalg.norm(contact["force"], axis=1)
     rounded = EPS * np.abs(x).max(axis=1)
-    allowed = (4 / r**2 + force / small) * rounded + (EPS + contact["error"]) * 4 / r
+    allowed = (4 / r**2 + force / small) * rounded + EPS * 4 / r
+    allowed += contact["force_error"]
     return float((error / allowed).max())
 
 

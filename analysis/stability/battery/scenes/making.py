@@ -73,7 +73,7 @@ def widened(packing: Packing, strain: float) -> Packing:
 
 def deepest(packing: Packing) -> float:
     """Largest overlap; 0 without contacts."""
-    bonds = find_contacts(packing).bonds
+    bonds = find_contacts(packing, sides=1).bonds
     return float((1 - bonds.distance / bonds.reach).max(initial=0.0))
 
 

@@ -1,0 +1,1 @@
+"""Features of LAMMPS beside ours: what a row of the table is, and the rows."""

@@ -1,0 +1,270 @@
+#pragma once
+
+#include "contact/contact.hpp"
+#include "contact/errors.hpp"
+#include "contact/math/vec.hpp"
+#include "contact/superellipsoid/equations.hpp"
+#include "contact/superellipsoid/shape.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace jamshape {
+
+namespace detail {
+
+/// Matrices in the plane across a normal.
+template <int D, class T> using AcrossMatrix = Matrix<D - 1, T>;
+
+template <class T> Matrix<1, T> inverse(const Matrix<1, T> &a) { return {{{1 / a.row[0][0]}}}; }
+template <class T> Matrix<2, T> inverse(const Matrix<2, T> &a)
+{
+  const T over = 1 / (a.row[0][0] * a.row[1][1] - a.row[0][1] * a.row[1][0]);
+  return {{{over * a.row[1][1], -over * a.row[0][1]}, {-over * a.row[1][0], over * a.row[0][0]}}};
+}
+
+template <int M, class T> Matrix<M, T> product(const Matrix<M, T> &a, const Matrix<M, T> &b)
+{
+  Matrix<M, T> c{};
+  for (int row = 0; row < M; ++row) {
+    for (int col = 0; col < M; ++col) {
+      for (int k = 0; k < M; ++k) c.row[row][col] += a.row[row][k] * b.row[k][col];
+    }
+  }
+  return c;
+}
+
+template <int M, class T> Matrix<M, T> sum(Matrix<M, T> a, const Matrix<M, T> &b)
+{
+  for (int row = 0; row < M; ++row) {
+    for (int col = 0; col < M; ++col) a.row[row][col] += b.row[row][col];
+  }
+  return a;
+}
+
+/// At least the factor by which a matrix makes a vector longer; infinite where it is no number.
+template <int M, class T> T size_of(const Matrix<M, T> &a)
+{
+  T square = 0;
+  for (int row = 0; row < M; ++row) {
+    for (int col = 0; col < M; ++col) square += a.row[row][col] * a.row[row][col];
+  }
+  const T size = sqrt(square);
+  return size < std::numeric_limits<T>::max() ? size : std::numeric_limits<T>::infinity();
+}
+
+/// By how much |x|^power changes for every x at most that changes by `off`, in units of `unit`.
+template <int D, class T> struct PowerOff {
+  Vec<D, T> x, off, unit;
+  T power;
+
+  T length() const
+  {
+    T square = 0;
+    for (int k = 0; k < D; ++k) {
+      const T above = pow(x[k] + off[k], power), below = pow(abs(x[k] - off[k]), power);
+      const T most = x[k] > off[k] ? above - below : above + below;
+      square += most * most * unit[k] * unit[k];
+    }
+    return sqrt(square);
+  }
+};
+
+/// One body at the point where another touches it, both scaled by eta: how normal and point change
+/// with each other. Of p <= 1 the normal is the smooth unknown, `bend` takes changes of it to those
+/// of the point; of p > 1 it takes changes of the point to those of the normal.
+template <int D, class T> class BodyAtPoint {
+ public:
+  using Body = SuperellipsoidBody<D, T>;
+
+  BodyAtPoint(const Body &of, const Vec<D, T> &at, const Vec<D, T> &across, const T &eta) :
+      body(of), scale(eta), width(PowerNorm<D, T>::support(of).value(across))
+  {
+    if (by_normal()) {
+      const auto h = PowerNorm<D, T>::support(body).curved_at(across);
+      normal = across;
+      point = scale * h.gradient;
+      set_bend(h.hessian, scale);
+    } else {
+      const auto g = PowerNorm<D, T>::gauge(body).curved_at(at);
+      const T steepness = norm(g.gradient);
+      normal = (1 / steepness) * g.gradient;
+      point = at;
+      set_bend(g.hessian, 1 / steepness);
+    }
+  }
+
+  bool by_normal() const { return is_by_normal(body.p); }
+  T exponent() const { return smooth_exponent<T>(body.p); }
+
+  Vec<D, T> normal, point;  // each from the other
+  AcrossMatrix<D, T> bend;
+
+  /// How far the normal is off at most where the point is by `off`, and the other way round: also
+  /// where a face or a tip leaves `bend` zero.
+  T normal_off(const T &off) const
+  {
+    PowerOff<D, T> from{{}, {}, {}, 2 * T(body.p) - 1};
+    T square = 0;
+    for (int k = 0; k < D; ++k) {
+      const T length = scale * body.semi_axes[k];
+      from.x[k] = abs(dot(body.axis[k], point)) / length;
+      from.off[k] = off / length;
+      from.unit[k] = 1 / T(body.semi_axes[k]);
+      const T component = pow(from.x[k], from.power) * from.unit[k];
+      square += component * component;
+    }
+    return from.length() / sqrt(square);
+  }
+  T point_off(const T &off) const
+  {
+    PowerOff<D, T> from{{}, {}, {}, 1 / (2 * T(body.p) - 1)};
+    for (int k = 0; k < D; ++k) {
+      const T a = body.semi_axes[k];
+      from.x[k] = abs(dot(body.axis[k], normal)) * a / width;
+      from.off[k] = off * a / width;
+      from.unit[k] = scale * a;
+    }
+    return from.length();
+  }
+
+ private:
+  const Body &body;
+  T scale, width;
+
+  void set_bend(const T (&hessian)[D][D], const T &factor)
+  {
+    Vec<D, T> across[D - 1];
+    set_across(across);
+    for (int a = 0; a < D - 1; ++a) {
+      for (int b = 0; b < D - 1; ++b) {
+        T sum = 0;
+        for (int row = 0; row < D; ++row) {
+          for (int col = 0; col < D; ++col) {
+            sum += across[a][row] * hessian[row][col] * across[b][col];
+          }
+        }
+        bend.row[a][b] = factor * sum;
+      }
+    }
+  }
+
+  void set_across(Vec<2, T> (&across)[1]) const { across[0] = {{-normal[1], normal[0]}}; }
+  void set_across(Vec<3, T> (&across)[2]) const
+  {
+    int least = 0;
+    for (int k = 1; k < 3; ++k) {
+      if (abs(normal[k]) < abs(normal[least])) least = k;
+    }
+    Vec<3, T> beside{};
+    beside[least] = 1;
+    across[0] = cross(normal, beside);
+    across[0] = (1 / norm(across[0])) * across[0];
+    across[1] = cross(normal, across[0]);
+  }
+};
+
+/// How far the normal (of length 1) and the point are off.
+template <class T> struct OffByResidual {
+  T normal, point;
+};
+
+/// By the residual of the equations of contact, the rounding of these, and their conditioning:
+/// linearly, with a factor for how the bend changes on the way to the solution, and by how normal
+/// and point of each body bound each other.
+template <int D, class T> class Conditioning {
+ public:
+  using At = BodyAtPoint<D, T>;
+
+  /// A body with p > 1 comes first.
+  Conditioning(const At &first, const At &second, const Vec<D, T> &separation) :
+      i(first), j(second), r(separation), steepest(std::max(i.exponent(), j.exponent())),
+      b_i(size_of(i.bend)), b_j(size_of(j.bend))
+  {
+  }
+
+  OffByResidual<T> off() const
+  {
+    OffByResidual<T> off = i.by_normal() ? of_normals() : j.by_normal() ? of_both() : of_points();
+    off.normal = std::min(off.normal, T(2));
+    return off;
+  }
+
+ private:
+  const At &i, &j;
+  Vec<D, T> r;
+  T steepest, b_i, b_j;
+
+  static constexpr T ROUNDING = 16 * std::numeric_limits<T>::epsilon();
+
+  T lengths() const { return norm(r) + norm(i.point) + norm(j.point); }
+
+  OffByResidual<T> of_normals() const
+  {
+    const T residual = norm(i.point + j.point - r) + ROUNDING * (lengths() + b_i + b_j);
+    const auto inverse_sum = inverse(sum(i.bend, j.bend));
+    const T point = residual * shared(inverse_sum);
+    const T normal = std::min(
+        {steepest * size_of(inverse_sum) * residual, i.normal_off(point), j.normal_off(point)});
+    return {normal + ROUNDING, point};
+  }
+
+  OffByResidual<T> of_points() const
+  {
+    const T residual =
+        norm(i.normal - j.normal) + ROUNDING * (1 + b_i * norm(i.point) + b_j * norm(j.point));
+    const auto inverse_sum = inverse(sum(i.bend, j.bend));
+    const T normal = residual * shared(inverse_sum);
+    const T point = std::min(
+        {steepest * size_of(inverse_sum) * residual, i.point_off(normal), j.point_off(normal)});
+    return {normal, point + ROUNDING * lengths()};
+  }
+
+  OffByResidual<T> of_both() const
+  {
+    const T residual =
+        norm(i.point + j.point - r) + ROUNDING * (lengths() + b_j * (1 + b_i * norm(i.point)));
+    auto matrix = product(j.bend, i.bend);
+    for (int k = 0; k < D - 1; ++k) matrix.row[k][k] += 1;
+    const auto inverted = inverse(matrix);
+    const T point = size_of(inverted) * residual;
+    const T normal = size_of(product(i.bend, inverted)) * residual;
+    return {std::min(steepest * normal, j.normal_off(point)) + ROUNDING, point};
+  }
+
+  /// The share of a residual that one of two bends takes, at least 1; the smaller of both.
+  T shared(const AcrossMatrix<D, T> &inverse_sum) const
+  {
+    const T share =
+        std::min(size_of(product(i.bend, inverse_sum)), size_of(product(j.bend, inverse_sum)));
+    return 1 + (share < std::numeric_limits<T>::max() ? share : T(1));
+  }
+};
+
+}  // namespace detail
+
+/// Of the two bounds of the scale, and of Conditioning.
+template <int D, class T>
+ErrorsOfGeometry<T> errors_of_geometry(const SuperellipsoidBody<D, T> &i,
+                                       const SuperellipsoidBody<D, T> &j,
+                                       const Contact<D, T, 1> &contact)
+{
+  using namespace detail;
+  using Norm = PowerNorm<D, T>;
+  const Bond<D, T> &bond = contact.bond[0];
+  const Vec<D, T> r = i.centre - j.centre, y = -bond.arm_i;
+  const T eta = sqrt(bond.distance / bond.reach), along = dot(r, bond.normal);
+  const T below =
+      along / (Norm::support(i).value(bond.normal) + Norm::support(j).value(bond.normal));
+  const T above = std::max(Norm::gauge(i).value(y), Norm::gauge(j).value(r - y));
+  const T of_scale = std::max(eta - below, above - eta) + 16 * std::numeric_limits<T>::epsilon();
+  const BodyAtPoint<D, T> at_i(i, y, bond.normal, eta), at_j(j, r - y, bond.normal, eta);
+  const bool in_order = !at_i.by_normal() || at_j.by_normal();
+  const OffByResidual<T> off =
+      in_order ? Conditioning<D, T>(at_i, at_j, r).off() : Conditioning<D, T>(at_j, at_i, r).off();
+  const T overlap = (1 - eta) * (1 + eta);
+  return {2 * of_scale / overlap, off.normal * (1 + norm(r) / along) + 2 * of_scale, off.point};
+}
+
+}  // namespace jamshape

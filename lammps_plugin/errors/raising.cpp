@@ -1,0 +1,104 @@
+// Errors of a LAMMPS that was compiled without exceptions, as of Debian 12, which ends its process
+// where it meets one. Python loads this library before LAMMPS's, so that calls of `Error::all` and
+// `Error::one`, in LAMMPS as in the plugin, come here: within a command that Python gave they
+// throw, and `jamshape_command` returns their sentence. Everywhere else, as in decks and on several
+// ranks, LAMMPS's own functions do what they do.
+
+#include "comm.h"
+#include "error.h"
+#include "update.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <dlfcn.h>
+#include <exception>
+#include <string>
+
+namespace {
+
+struct Refusal {
+  std::string sentence;
+};
+
+/// Whether this thread is within a command that Python gave.
+thread_local bool is_within = false;
+
+constexpr char ALL[] =
+    "_ZN9LAMMPS_NS5Error3allERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEEiS8_";
+constexpr char ONE[] =
+    "_ZN9LAMMPS_NS5Error3oneERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEEiS8_";
+
+/// A function of LAMMPS's library, which is found by the table of virtual functions of one of its
+/// objects.
+void *of_lammps(const LAMMPS_NS::Error *object, const char *name)
+{
+  Dl_info found;
+  if (!dladdr(*reinterpret_cast<void *const *>(object), &found)) return nullptr;
+  void *const library = dlopen(found.dli_fname, RTLD_NOLOAD | RTLD_LAZY);
+  return library ? dlsym(library, name) : nullptr;
+}
+
+[[noreturn]] void leave_to_lammps(const char *name, LAMMPS_NS::Error *error,
+                                  const std::string &file, int line, const std::string &sentence)
+{
+  using Stop = void (*)(LAMMPS_NS::Error *, const std::string &, int, const std::string &);
+  if (const auto stop = reinterpret_cast<Stop>(of_lammps(error, name)))
+    stop(error, file, line, sentence);
+  std::fprintf(stderr, "ERROR: %s\n", sentence.c_str());
+  std::abort();
+}
+
+}  // namespace
+
+namespace LAMMPS_NS {
+
+void Error::all(const std::string &file, int line, const std::string &sentence)
+{
+  if (!is_within || comm->nprocs > 1) leave_to_lammps(ALL, this, file, line, sentence);
+  if (logfile) std::fprintf(logfile, "ERROR: %s\n", sentence.c_str());
+  update->whichflag = 0;  // no run and no minimisation goes on: the next command may begin one
+  throw Refusal{sentence};
+}
+
+void Error::one(const std::string &file, int line, const std::string &sentence)
+{
+  if (!is_within || comm->nprocs > 1) leave_to_lammps(ONE, this, file, line, sentence);
+  all(file, line, sentence);
+}
+
+}  // namespace LAMMPS_NS
+
+extern "C" {
+
+/// Whether LAMMPS's calls come here: not where its library was loaded before this one.
+int jamshape_is_asked()
+{
+  Dl_info found;
+  Dl_info own;
+  return dladdr(dlsym(RTLD_DEFAULT, ALL), &found) &&
+         dladdr(reinterpret_cast<void *>(&jamshape_is_asked), &own) &&
+         found.dli_fbase == own.dli_fbase;
+}
+
+/// Gives LAMMPS a command by its function `lammps_command`; writes the sentence of an error, cut to
+/// `room` bytes with a closing 0, or nothing, and returns whether there was one.
+int jamshape_command(char *(*lammps_command)(void *, const char *), void *lammps, const char *line,
+                     char *sentence, std::size_t room)
+{
+  const auto refused = [&](const char *text) {
+    is_within = false;
+    std::snprintf(sentence, room, "%s", text);
+    return 1;
+  };
+  is_within = true;
+  try {
+    lammps_command(lammps, line);
+  } catch (const Refusal &refusal) {
+    return refused(refusal.sentence.c_str());
+  } catch (const std::exception &error) {  // such as std::bad_alloc
+    return refused(error.what());
+  }
+  is_within = false;
+  return 0;
+}
+}

@@ -1,0 +1,197 @@
+"""Arguments of public functions: of the types that their annotations name, or refused in one sentence."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import numbers
+import os
+import sys
+import types
+import typing
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+from jamshape.checks import RANGES, described, said
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+_T = TypeVar("_T")
+
+
+class ArgumentTypeError(TypeError, ValueError):
+    """An argument is not of a type that the function takes; the text is one sentence."""
+
+
+def checked(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Refuse arguments that are not of the types that a public function's annotations name.
+
+    Numbers of NumPy, also arrays without dimensions, become Python's. What an annotation says beyond classes,
+    numbers, paths and sequences of these is left to the function.
+
+    Examples
+    --------
+    >>> @checked
+    ... def double(number: float) -> float:
+    ...     return 2 * number
+    >>> double("1")
+    Traceback (most recent call last):
+    jamshape.arguments.ArgumentTypeError: number is '1', expected a number
+    """
+    return _checked(function, function.__globals__)
+
+
+def checked_fields(record: type[_T]) -> type[_T]:
+    """Check what a dataclass is made of as `checked` does arguments."""
+    names: dict[str, Any] = {}
+    for one in reversed(record.__mro__):
+        names |= vars(sys.modules[one.__module__])  # fields of a base are named as there
+    record.__init__ = _checked(record.__init__, names)  # type: ignore[method-assign]
+    return record
+
+
+def _checked(function: Callable[_P, _R], names: dict[str, Any]) -> Callable[_P, _R]:
+    """Check arguments, whose annotations hold names."""
+    parameters = inspect.signature(function).parameters
+    positions = list(parameters)
+    rest = next((p.name for p in parameters.values() if p.kind is p.VAR_KEYWORD), "")
+
+    @functools.cache
+    def kinds_of(name: str) -> tuple[Any, ...]:
+        known = parameters.get(name) or parameters.get(rest)
+        return _kinds_of(known.annotation, names) if known else ()
+
+    @functools.wraps(function)
+    def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        # What is missing or too much the function says as Python does.
+        first = [
+            _taken(name, value, kinds_of(name))
+            for name, value in zip(positions, args, strict=False)
+        ]
+        named = {name: _taken(name, value, kinds_of(name)) for name, value in kwargs.items()}
+        return function(*first, *args[len(first) :], **named)  # type: ignore[arg-type]
+
+    return call
+
+
+def _kinds_of(annotation: Any, names: dict[str, Any]) -> tuple[Any, ...]:
+    """Types that an annotation names; none where one is of a module that only checkers of types import, or is unknown."""
+    if not isinstance(annotation, str):
+        return ()
+    try:
+        kind = eval(annotation, names)
+    except NameError:
+        return ()
+    kinds = typing.get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
+    return kinds if all(map(_is_known, kinds)) else ()
+
+
+def _is_known(kind: Any) -> bool:
+    """Tell whether a type is one that is looked at here."""
+    return kind is None or isinstance(kind, type) or typing.get_origin(kind) in _SEVERAL
+
+
+_SEVERAL = (Mapping, Sequence, tuple)
+
+
+class _UnfitError(Exception):
+    """A value is not of a type."""
+
+
+def _taken(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
+    """Give a value as the first of some types that it fits, or refuse it."""
+    if not kinds or type(value) in kinds:
+        return value
+    for kind in kinds:
+        try:
+            return _fitted(value, kind)
+        except _UnfitError:
+            continue
+    msg = f"{name} is {_shown(value)}, expected {_named(name, kinds)}"
+    raise ArgumentTypeError(msg)
+
+
+def _fitted(value: Any, kind: Any) -> Any:
+    """Give a value as a type, or raise an `_UnfitError`."""
+    if kind in _NUMBERS:
+        return _number(value, kind)
+    if kind in (None, types.NoneType):
+        fits = value is None
+    elif kind is Path:
+        fits = isinstance(value, os.PathLike)
+    elif isinstance(kind, type):
+        fits = isinstance(value, kind)
+    else:
+        return (_mapping if typing.get_origin(kind) is Mapping else _sequence)(value, kind)
+    if not fits:
+        raise _UnfitError
+    return value
+
+
+_NUMBERS = {bool: numbers.Integral, int: numbers.Integral, float: numbers.Real}
+
+
+def _number(value: Any, kind: Any) -> Any:
+    if getattr(value, "shape", None) == () and not hasattr(value, "mask"):
+        value = value.item()  # a number of NumPy
+    if kind is bool and isinstance(value, numbers.Integral) and value in (0, 1):
+        return bool(value)
+    if isinstance(value, bool) or not isinstance(value, _NUMBERS[kind]):
+        raise _UnfitError
+    return value if type(value) in _NUMBERS else kind(value)
+
+
+def _mapping(value: Any, kind: Any) -> Any:
+    if not isinstance(value, Mapping):
+        raise _UnfitError
+    _, of = typing.get_args(kind)
+    return value if of is Any else {name: _fitted(one, of) for name, one in value.items()}
+
+
+def _sequence(value: Any, kind: Any) -> Any:
+    of = typing.get_args(kind)
+    is_pair = typing.get_origin(kind) is tuple and Ellipsis not in of
+    if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
+        raise _UnfitError
+    if is_pair and len(value) != len(of):
+        raise _UnfitError
+    if not hasattr(value, "__iter__") or hasattr(value, "keys"):
+        raise _UnfitError
+    return tuple(_fitted(one, of[k] if is_pair else of[0]) for k, one in enumerate(value))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, type):
+        return f"the class {value.__name__} itself"
+    if inspect.isroutine(value):
+        return f"the function {value.__name__} itself"
+    return said(value)
+
+
+def _named(name: str, kinds: tuple[Any, ...]) -> str:
+    """Say what is expected."""
+    if name in RANGES and set(kinds) & {int, float}:
+        return described(RANGES[name])
+    kinds = tuple(kind for kind in kinds if kind is not str) if Path in kinds else kinds
+    return " or ".join(dict.fromkeys(_name(kind) for kind in kinds if kind is not types.NoneType))
+
+
+def _name(kind: Any) -> str:
+    if kind in _NAMES:
+        return _NAMES[kind]
+    if typing.get_origin(kind) is Mapping:
+        return "a mapping of names to numbers"
+    if typing.get_origin(kind) is tuple:
+        return f"a tuple of {len(typing.get_args(kind))} numbers"
+    if typing.get_origin(kind) is Sequence:
+        (of,) = typing.get_args(kind)
+        return f"a sequence, each {_name(of)}"
+    return _NAMES.get(kind.__name__, f"a {kind.__name__}")
+
+
+_NAMES = {
+    bool: "True or False", int: "a whole number", float: "a number", str: "text", Path: "a path",
+    "Particles": "particles such as Particles.of(alpha=4)", "Packing": "a packing",
+    "Recorded": "a run", "Modes": "modes",
+}  # fmt: skip

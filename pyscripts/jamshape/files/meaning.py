@@ -1,0 +1,236 @@
+"""What a text file of LAMMPS means: dimension, shape and law, which its columns do not tell.
+
+They are those that the file says, or the user; what neither says is the most plausible one, with a warning of one
+sentence. Numbers that rounding can reach decide nothing: a plane holds all particles to within `_ROUNDING`.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from jamshape.arrays import FloatArray
+from jamshape.files.disk import PathLike
+from jamshape.packing import Packing
+from jamshape.packing.rotation import product
+from jamshape.shapes.shape import Interaction
+from jamshape.shapes.table import SHAPES, Fitted, fitted, shape_named
+
+_ROUNDING = 1e-9  # of a length over a diameter, of a quaternion over its length
+PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional system, as LAMMPS has it when nobody says
+# Rotations that bring the body's x to its axis k, w i j k.
+_FROM_X = np.array([[1, 0, 0, 0], [0.5**0.5, 0, 0, 0.5**0.5], [0.5**0.5, 0, -(0.5**0.5), 0]])
+_EXACT, _FEW = 15, 5  # digits: of numbers as good as doubles; most that a person writes
+
+
+class Wanted(NamedTuple):
+    """What the user says of a file; None where nothing is said."""
+
+    dimension: int | None = None
+    shape: str | None = None
+
+
+NOTHING = Wanted()
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a file says beside its columns; None and "" where it says nothing."""
+
+    dimension: int | None = None
+    shape: str = ""
+    law: Mapping[str, float] = field(default_factory=dict)
+    """k_e and sides, as far as they are told."""
+    has_exponent: bool = False
+    """Whether exponents are told."""
+    digits: int = 0
+    """The largest number of significant digits of a coordinate; 0 if nobody counted."""
+    is_ours: bool = False
+    """Whether sizes are those that we wrote, to the last bit."""
+    is_later: bool = False
+    """Whether it is a frame after the first one, of which all is said already."""
+
+
+class Geometry(NamedTuple):
+    """Where particles are and how large, as a file has it."""
+
+    position: FloatArray
+    """(N, 3), [length]"""
+    quaternion: FloatArray
+    """(N, 4) w i j k of any length."""
+    diameters: FloatArray
+    """(N, 3), [length]"""
+    bounds: FloatArray
+    """(3, 2) ends of the box, [length]."""
+    tilt: FloatArray
+    """(3,) xy, xz, yz, [length]."""
+
+    @property
+    def size(self) -> float:
+        """The smallest diameter."""
+        return float(self.diameters.min())
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether all lies in a plane of one z, but for rounding."""
+        z, q = self.position[:, 2], self.quaternion
+        tilt = np.abs(self.tilt[1:]).max()
+        is_level = bool((np.abs(z - z[0]) <= _ROUNDING * self.size).all())
+        length = np.linalg.norm(q, axis=1, keepdims=True)
+        is_upright = bool((np.abs(q[:, 1:3]) <= _ROUNDING * length).all())
+        return is_level and is_upright and bool(tilt <= _ROUNDING * self.size)
+
+    @property
+    def is_at_zero(self) -> bool:
+        """Whether the first particle is at z = 0, within the box."""
+        low, high = self.bounds[2]
+        return bool(abs(self.position[0, 2]) <= _ROUNDING * self.size and low <= 0 <= high)
+
+    @property
+    def is_usual_plane(self) -> bool:
+        """Whether the box is as high as that of two-dimensional systems is where nobody says otherwise."""
+        return bool((np.abs(self.bounds[2] - PLANE) <= _ROUNDING).all())
+
+    @property
+    def is_thin(self) -> bool:
+        """Whether particles would overlap their own images above."""
+        low, high = self.bounds[2]
+        return bool(high - low < self.size)
+
+    @property
+    def is_tall(self) -> bool:
+        """Whether a body is longer along its z than along x and y."""
+        return bool((self.diameters[:, 2] > self.diameters[:, :2].max(axis=1)).any())
+
+
+class Meaning(NamedTuple):
+    """What a file means."""
+
+    dimension: int
+    shape: Fitted
+    law: Interaction
+
+    def turned(self, quaternion: FloatArray) -> FloatArray:
+        """Give (N, 4) quaternions of bodies whose axes are named as the shape names them."""
+        if not self.shape.first.any():
+            return quaternion
+        return product(quaternion, _FROM_X[self.shape.first])
+
+
+def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> Meaning:
+    """Tell dimension, shape and law of the particles of a file, with warnings of what is doubtful.
+
+    What the user says comes first, then what the file says.
+
+    Parameters
+    ----------
+    path : path-like
+        Named in warnings.
+    there : Geometry
+    said : Said
+    wanted : Wanted
+
+    Raises
+    ------
+    ValueError
+        If particles cannot be what the user or the file says.
+    """
+    if not len(there.position):
+        msg = "packing has no particles, expected at least one"
+        raise ValueError(msg)
+    dimension, why = _dimension(there, wanted.dimension or said.dimension)
+    name = wanted.shape or said.shape
+    # Of a file that tells exponents, the only shape that has them.
+    able = [shape.name for shape in SHAPES.values() if shape.has_exponent >= said.has_exponent]
+    if name and shape_named(name).name not in able:
+        msg = f"there are exponents, which no {name} has, expected one of {', '.join(able)}"
+        raise ValueError(msg)
+    if name and said.is_ours:
+        found = Fitted(name, there.diameters, np.zeros(len(there.diameters), np.int64))
+    else:
+        found = fitted([name] if name else able, there.diameters, dimension)
+    law = Interaction.told(said.law)
+    if said.is_later:
+        return Meaning(dimension, found, law)
+    if not name and len(able) > 1:
+        doubt = "shape= and dimension= (--shape, --dimension)" if why else "shape= (--shape)"
+        said_so = _of_shape(path, found.name, dimension, law)
+        warnings.warn(f"{said_so}; say {doubt}, a shape of {', '.join(able)}", stacklevel=2)
+    elif why:
+        say = "say dimension= or --dimension if it is another"
+        warnings.warn(f"{path} {why}: it is read as {dimension}D; {say}", stacklevel=2)
+    if shape_named(found.name).has_exponent and not said.has_exponent:
+        warnings.warn(
+            f"{path} does not say the exponents of its particles: they are read as p = 1, ellipsoids; use"
+            " packing.with_(exponent=...) for others",
+            stacklevel=2,
+        )
+    if _FEW < said.digits < _EXACT:
+        warnings.warn(_of_digits(path, there, said.digits), stacklevel=2)
+    return Meaning(dimension, found, law)
+
+
+def require_told(path: PathLike, packing: Packing, wanted: Wanted) -> None:
+    """Refuse what the user says of a file that says itself what it holds, unless it says the same.
+
+    Raises
+    ------
+    ValueError
+    """
+    for name, own in (("dimension", packing.dimension), ("shape", packing.shape_style)):
+        asked = getattr(wanted, name)
+        if asked and asked != own:
+            msg = f"{path} says {name} {own} and {asked} was asked for, expected the same; leave {name} out"
+            raise ValueError(msg)
+
+
+def _dimension(there: Geometry, told: int | None) -> tuple[int, str]:
+    """Tell the dimension, and why it is doubtful."""
+    if told is not None:
+        if told == 2 and not there.is_flat:
+            msg = "a z, a rotation or a tilt out of the plane is not 0, expected a two-dimensional packing"
+            raise ValueError(msg)
+        return told, ""
+    if not there.is_flat:
+        return 3, ""
+    if there.is_usual_plane and there.is_at_zero and not there.is_tall:
+        return 2, ""
+    is_plane = not there.is_tall and (there.is_at_zero or there.is_thin)
+    low, high = there.bounds[2].tolist()
+    why = f"does not say its dimension, has all particles in one plane and a box from {low:g} to {high:g} in z"
+    return (2 if is_plane else 3), why
+
+
+def _of_shape(path: PathLike, name: str, dimension: int, law: Interaction) -> str:
+    bonds = {1: "one bond", 2: "two bonds"}[law.sides]
+    return (
+        f"{path} does not say which shape its particles have: they are read as {name}s in {dimension}D with"
+        f" k_e = {law.k_e:g} and {bonds} side to side"
+    )
+
+
+def _of_digits(path: PathLike, there: Geometry, digits: int) -> str:
+    largest = float(np.abs(there.position).max())
+    off = 0.5 * 10.0 ** (math.floor(math.log10(largest)) + 1 - digits)
+    return (
+        f"{path} has coordinates of {digits} digits, which are off by up to {off:.1g},"
+        f" {off / there.size:.1g} of the smallest diameter: overlaps of that size are not what they were;"
+        " write them with 17 digits (dump_modify ... format float %.17g)"
+    )
+
+
+def most_digits(words: Sequence[str]) -> int:
+    """Count the significant digits of the longest number.
+
+    Examples
+    --------
+    >>> most_digits(["0.5", "-12.3456", "1.0e-07"])
+    6
+    """
+    mantissas = (word.lower().partition("e")[0] for word in words)
+    return max((len(m.replace(".", "").strip("+-").strip("0")) for m in mantissas), default=0)

@@ -1,0 +1,103 @@
+"""Whether a packing reached its goal, by what its file says of it, and the warning where it did not.
+
+The goal is that forces balance to the tolerance, be it on a kink of the energy, and of a strict packing also that no mode
+has a negative eigenvalue. Everything that says so, and whatever averages over packings, asks here.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+from jamshape.checks import NotReachedWarning
+
+AT_REST = ("converged", "corner")
+"""Outcomes of minimisations after which forces balance."""
+
+_SLIDING = "sliding"  # forces that are left lie along what slides: they may be below the tolerance
+
+_ADVICE = "{strict}, another {u0:name} or another {seed:name}"
+_ADVICE_OF_STRICT = "another {u0:name} or another {seed:name}"
+_ADVICE_OF_DIGITS = "a larger {u0:name} or {tolerance:name}, since rounding leaves more"
+
+
+def is_reached(known: Mapping[str, Any]) -> bool:
+    """Tell whether a packing reached its goal.
+
+    Parameters
+    ----------
+    known : mapping of str to Any
+        Attributes of its file.
+
+    Examples
+    --------
+    >>> is_reached({"outcome": "corner"}), is_reached({"outcome": "stalled"})
+    (True, False)
+    >>> is_reached({"outcome": "sliding", "residual": 2e-7, "tolerance": 1e-8})
+    False
+    """
+    return _is_balanced(known) and not _n_negative(known)
+
+
+def shortfall(known: Mapping[str, Any]) -> str:
+    """Say in what a packing falls short of its goal; empty where it does not.
+
+    Examples
+    --------
+    >>> shortfall({"outcome": "sliding", "residual": 2e-7, "tolerance": 1e-8})
+    'it ended sliding, with net forces up to 2e-07 of the mean force of a bond, expected at most 1e-08'
+    """
+    if not _is_balanced(known):
+        found = f"with net forces up to {_residual(known):.2g} of the mean force of a bond"
+        most = f", expected at most {_tolerance(known):g}" if "tolerance" in known else ""
+        again = " after a second try" if "retry_of" in known else ""
+        return f"it ended {known['outcome']}{again}, {found}{most}"
+    if n := _n_negative(known):
+        return f"{n} of its modes have a negative eigenvalue, expected none"
+    return ""
+
+
+def warn_unless_reached(known: Mapping[str, Any], stacklevel: int = 2) -> None:
+    """Warn where a packing did not reach its goal.
+
+    Parameters
+    ----------
+    known : mapping of str to Any
+        Attributes of its file.
+    stacklevel : int
+        As of `warnings.warn`, counted from the caller.
+
+    Warns
+    -----
+    NotReachedWarning
+    """
+    if found := shortfall(known):
+        advice = _ADVICE_OF_STRICT if known.get("strict") else _ADVICE
+        if known.get("rounding_floor", 0.0) > _tolerance(known):
+            advice = _ADVICE_OF_DIGITS
+        given = {"strict": True, "u0": None, "seed": None, "tolerance": None}
+        said = NotReachedWarning(f"the packing is not at rest: {found}; try {advice}", given)
+        warnings.warn(said, stacklevel=stacklevel + 1)
+
+
+def _is_balanced(known: Mapping[str, Any]) -> bool:
+    outcome = known["outcome"]
+    return outcome in AT_REST or (outcome == _SLIDING and _residual(known) <= _tolerance(known))
+
+
+def _n_negative(known: Mapping[str, Any]) -> int:
+    return int(known.get("n_negative", 0)) if known.get("strict") else 0
+
+
+def _residual(known: Mapping[str, Any]) -> float:
+    """Give the largest net force or torque; NaN where nobody knows."""
+    if "residual" in known:
+        return float(known["residual"])
+    return max(float(known.get(f"residual_{name}", math.nan)) for name in ("force", "torque"))
+
+
+def _tolerance(known: Mapping[str, Any]) -> float:
+    """Give what forces were to balance to; NaN where nobody knows, which nothing is below."""
+    return float(known.get("tolerance", known.get("quasistatic_tolerance", math.nan)))

@@ -1,0 +1,41 @@
+"""Base of records, which pickles and copies reduce to their fields."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+
+class Record:
+    """Base of dataclasses whose pickles and copies hold their fields alone.
+
+    Compiled objects and properties that were computed on the way stay behind, so that a record is pickled to the same
+    bytes before and after use. Arrays that were read-only are so again.
+
+    Examples
+    --------
+    >>> import pickle
+    >>> from jamshape import Box
+    >>> box = Box(lo=[0, 0], edges=[10, 12])
+    >>> before, _ = pickle.dumps(box), box.matrix
+    >>> before == pickle.dumps(box), pickle.loads(before).edges.flags.writeable
+    (True, False)
+    """
+
+    def __getstate__(self) -> Any:
+        names = [one.name for one in dataclasses.fields(self)]  # type: ignore[arg-type]
+        fields = {name: getattr(self, name) for name in names}
+        return fields, [name for name, value in fields.items() if _is_read_only(value)]
+
+    def __setstate__(self, state: Any) -> None:
+        fields, read_only = state
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+        for name in read_only:
+            fields[name].flags.writeable = False
+
+
+def _is_read_only(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and not value.flags.writeable

@@ -1,0 +1,54 @@
+"""Runs that do not reach their goals, or whose frames tell nothing, say so."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import jamshape as js
+from jamshape.measures.jamming import Jamming, Tried
+from jamshape.protocols.random_start import random_packing
+
+DISCS = js.Spherocylinders(alpha=0)
+
+
+@pytest.fixture(scope="module")
+def start():
+    return random_packing(8, 0.5, 1, DISCS)
+
+
+def test_a_pressure_that_is_not_reached_is_said(start, tmp_path):
+    how = {"phi": (None, 0.52), "kappa": 1e-3, "file": tmp_path / "slow.h5", "progress": False}
+    with pytest.warns(js.NotReachedWarning, match=r"expected p_end=0.5; take a larger phi_end"):
+        js.slow_compress(start=start, p_end=0.5, **how)
+    with pytest.warns(js.NotReachedWarning, match=r"at the end, phi = 0.52, expected p_end=0.5"):
+        js.resume(tmp_path / "slow.h5", progress=False)
+    with pytest.raises(ValueError, match=r"a compression with p_end = 0\.5, expected inf"):
+        js.slow_compress(start=start, **how)
+
+
+def test_frames_that_come_to_no_end_are_said(start, tmp_path, monkeypatch):
+    how = {"phi": (None, 0.52), "kappa": 1e-3, "file": tmp_path / "slow.h5", "progress": False}
+    run = js.slow_compress(start=start, **how)
+    tried = [Tried(2, 0.52, True), Tried(1, 0.51, None), Tried(0, 0.5, False)]
+    monkeypatch.setattr("jamshape.front.run.minimised_frames", lambda *_: iter(tried))
+    said = "1 of 3 frames that were minimised came to no end.* phi = 0.50000 unjams"
+    with pytest.warns(js.NotReachedWarning, match=said):
+        found = run.jamming(progress=False)
+    assert found == Jamming(0.5, 0.52, 3, 1)
+    with pytest.warns(js.NotReachedWarning, match=said):  # from the file
+        assert js.load(tmp_path / "slow.h5").jamming(progress=False) == found
+    earlier = {k: v for k, v in found.attributes().items() if k != "frames_undecided"}
+    assert Jamming.stored(earlier) == found._replace(undecided=0)
+
+
+def test_rows_of_a_quasistatic_shear_whose_forces_do_not_balance_are_said(tmp_path):
+    packing = js.make_packing(DISCS, n=8, u0=1e-14, phi_start=0.5, progress=False)
+    how = {"start": packing, "step": 1e-9, "strain": 2e-9, "progress": False}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert js.quasistatic_shear(**how).at_rest.all()
+    # Forces cannot balance better than rounding lets them.
+    with pytest.warns(js.NotReachedWarning, match="forces do not balance in 3 of 3 rows"):
+        run = js.quasistatic_shear(**how, tolerance=1e-14, file=tmp_path / "aqs.h5")
+    np.testing.assert_array_equal(run.at_rest, False)
