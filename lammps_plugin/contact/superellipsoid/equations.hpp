@@ -99,12 +99,6 @@ template <int M, class T> struct Linearised {
   Matrix<M, T> jacobian;
 };
 
-/// How a search ended, and the matrix at its last step.
-template <int M, class T> struct Solved {
-  Truth<T> is_converged;
-  Matrix<M, T> jacobian;
-};
-
 /// A symmetric positive definite matrix is well posed if its largest eigenvalue is no more than so
 /// many times the smallest: what equations of contact lose by rounding then turns a normal by no
 /// more than 1e-9 or so. (Times up to D^2: compared are sums of eigenvalues and of their products.)
@@ -445,10 +439,12 @@ template <int D, class S> class ByPoint {
   }
 };
 
-/// Newton's method with steps cut until the residual falls. It has converged when a step was
-/// shorter than `tolerance` of the unknowns: that step is taken and leaves an error of its square.
+/// Newton's method with steps cut until the residual falls. True when a step was shorter than
+/// `tolerance` of the unknowns: that step is taken and leaves an error of its square. Where the
+/// matrix of the last step is asked for, it is given, too.
 template <class Equations, int M, class T>
-Solved<M, T> newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iterations)
+bool newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iterations,
+            Matrix<M, T> *matrix = nullptr)
 {
   constexpr int LONGEST = sizeof(T) > 8 ? 200 : 60;
   auto at = equations.linearised(z);
@@ -460,12 +456,13 @@ Solved<M, T> newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &
     ++iterations;
     if (step_sq <= tolerance * tolerance * norm_sq(z)) {
       z -= step;
-      return {true, at.jacobian};
+      if (matrix != nullptr) *matrix = at.jacobian;
+      return true;
     }
     T fraction = 1;
     const T smallest = T(1e-4) * std::min(T(1), T(sqrt(norm_sq(z) / step_sq)));
     for (;; fraction *= T(0.5)) {
-      if (fraction < smallest) return {false, at.jacobian};
+      if (fraction < smallest) return false;
       const Vec<M, T> trial = z - fraction * step;
       const auto next = equations.linearised(trial);
       const T next_size = norm_sq(next.residual);
@@ -477,18 +474,18 @@ Solved<M, T> newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &
       }
     }
   }
-  return {false, at.jacobian};
+  return false;
 }
 
 /// The same of all lanes of a pack that are `sought`, where no step is cut: true of those that such
 /// steps lead to the end. A lane that has come there waits.
 template <class Equations, int M, class T>
-Solved<M, T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolerance,
-                             const Truth<T> &sought)
+Truth<T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolerance,
+                         const Truth<T> &sought, Matrix<M, T> *matrix = nullptr)
 {
   constexpr int LONGEST = 12;
   Truth<T> found = sought & !sought, open = sought;
-  if (!any(open)) return {found, {}};
+  if (!any(open)) return found;
   auto at = equations.linearised(z);
   for (int n = 0; n < LONGEST; ++n) {
     const Vec<M, T> step = equations.step(at);
@@ -501,7 +498,8 @@ Solved<M, T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double to
     open = open & (norm_sq(next.residual) <= 0.8 * norm_sq(at.residual));
     at = next;
   }
-  return {found, at.jacobian};
+  if (matrix != nullptr) *matrix = at.jacobian;
+  return found;
 }
 
 }  // namespace detail
