@@ -4,7 +4,6 @@
 #include "contact/superellipsoid/shape.hpp"
 
 #include <algorithm>
-#include <cfloat>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -90,7 +89,7 @@ template <int D, int M, class T> void lift_diagonal(Matrix<M, T> &a)
 {
   T largest = 0.0;
   for (int k = 0; k < D; ++k) largest = most(largest, a.row[k][k]);
-  constexpr auto SHORTER = std::numeric_limits<Common<T>>::epsilon() / Common<T>(DBL_EPSILON);
+  constexpr auto SHORTER = std::numeric_limits<Common<T>>::epsilon() / Common<T>(std::numeric_limits<double>::epsilon());
   for (int k = 0; k < D; ++k) a.row[k][k] += T(FLAT * SHORTER) * largest;
 }
 
