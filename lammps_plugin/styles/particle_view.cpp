@@ -43,8 +43,8 @@ void ParticleView::find_ellipsoids(const std::string &style)
         lmp, FLERR,
         style + " found " + std::to_string(size) + " numbers with the shape of an atom, expected " +
             std::to_string(PER_SHAPE) +
-            ": leave the word 'superellipsoid' out of 'atom_style ellipsoid superellipsoid', and "
-            "give exponents with 'pair_coeff I I epsilon p'.");
+            ": write 'atom_style ellipsoid' without a word after it, and give exponents with "
+            "'pair_coeff I I epsilon p'.");
   }
 }
 

@@ -153,6 +153,8 @@ def check_git(place, words):
 
 
 def check_lmp(place, words):
+    if "-in" not in words:
+        return
     deck = place / words[words.index("-in") + 1]
     if deck.is_file():  # else a reader's own
         known = known_settings(deck.read_text(encoding="utf-8"))
