@@ -25,7 +25,9 @@ def command(out, *options, settings=SMALL):
 
 
 def run(out, *options, **settings):
-    return subprocess.run(command(out, *options, **settings), capture_output=True, text=True, check=False)
+    return subprocess.run(
+        command(out, *options, **settings), capture_output=True, text=True, check=False
+    )
 
 
 @pytest.fixture(scope="module")

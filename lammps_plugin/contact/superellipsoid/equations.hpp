@@ -89,7 +89,8 @@ template <int D, int M, class T> void lift_diagonal(Matrix<M, T> &a)
 {
   T largest = 0.0;
   for (int k = 0; k < D; ++k) largest = most(largest, a.row[k][k]);
-  constexpr auto SHORTER = std::numeric_limits<Common<T>>::epsilon() / Common<T>(std::numeric_limits<double>::epsilon());
+  constexpr auto SHORTER =
+      std::numeric_limits<Common<T>>::epsilon() / Common<T>(std::numeric_limits<double>::epsilon());
   for (int k = 0; k < D; ++k) a.row[k][k] += T(FLAT * SHORTER) * largest;
 }
 

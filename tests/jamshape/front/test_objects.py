@@ -98,7 +98,9 @@ def objects(tmp_path_factory):
 
 NAMES = """Box|Packing|MeasuredPacking|its copy|Kind|Particles|Particles mixed|Particles given|Modes|Modes of a file
 ModeTable|DynamicalMatrix|Moduli|Contacts|ContactNetwork|State|Landscape|Recipe|RunFile|RunFile of a file|OnsetFit
-Jamming|ShearFile|QuasistaticShearFile|Event|Interaction|NotReachedWarning""".replace("\n", "|").split("|")
+Jamming|ShearFile|QuasistaticShearFile|Event|Interaction|NotReachedWarning""".replace(
+    "\n", "|"
+).split("|")
 NAMES += [f"shape {name}" for name in SHAPES]
 
 
