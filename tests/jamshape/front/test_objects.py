@@ -130,6 +130,8 @@ def same(one, other):
         return len(one) == len(other) and all(map(same, one, other))
     if isinstance(one, Landscape):
         return same(vars(one)["particles"], vars(other)["particles"])
+    if isinstance(one, Exception):
+        return one.args == other.args and str(one) == str(other)
     is_nan = isinstance(one, float) and math.isnan(one)
     return math.isnan(other) if is_nan else one == other
 
