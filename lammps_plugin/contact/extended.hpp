@@ -68,13 +68,28 @@ PosedPair<Model, D, long double> in_long(const PosedPair<Model, D, double> &pair
           pair.law};
 }
 
+/// The contact of a pair in long doubles, and the one in dual numbers: apart from the code of the
+/// many pairs that need neither, into which it would be copied.
+template <class Model, int D>
+[[gnu::noinline, gnu::cold]] ContactOf<Model, D>
+contact_in_long(const PosedPair<Model, D, long double> &pair)
+{
+  return rounded(contact_at(pair));
+}
+template <class Model, int D>
+[[gnu::noinline, gnu::cold]] ContactOf<Model, D, Dual<PAIR_VARIABLES<D>>>
+turned_contact_in_long(const PosedPair<Model, D, long double> &pair)
+{
+  return rounded(turned_contact_at(pair));
+}
+
 /// A contact that may be of few digits; where it is (rarely), that of `pair()` in long doubles
 /// instead, which alone is asked for then.
 template <class Model, int D, class PairInLong>
 ContactOf<Model, D> to_its_digits(const ContactOf<Model, D> &found, const PairInLong &pair)
 {
   if constexpr (IS_SEARCHED<Model, D>) {
-    if (found.needs_digits) return rounded(contact_at<Model, D, long double>(pair()));
+    if (found.needs_digits) return contact_in_long<Model, D>(pair());
   }
   return found;
 }
@@ -85,7 +100,7 @@ ContactOf<Model, D, Dual<PAIR_VARIABLES<D>>>
 to_its_digits(const ContactOf<Model, D, Dual<PAIR_VARIABLES<D>>> &found, const PairInLong &pair)
 {
   if constexpr (IS_SEARCHED<Model, D>) {
-    if (found.needs_digits) return rounded(turned_contact_at<Model, D, long double>(pair()));
+    if (found.needs_digits) return turned_contact_in_long<Model, D>(pair());
   }
   return found;
 }

@@ -150,7 +150,7 @@ template <class Model, int D, class S> class PosedPairs {
   }
 
   /// What errors of a contact are bounded against.
-  PosedPair<Model, D, Long> pair_in_long(std::size_t p) const
+  [[gnu::noinline, gnu::cold]] PosedPair<Model, D, Long> pair_in_long(std::size_t p) const
   {
     const std::size_t i = first(p), j = second(p);
     return {shapes[i],

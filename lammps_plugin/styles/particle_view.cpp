@@ -40,12 +40,11 @@ void ParticleView::find_ellipsoids(const std::string &style)
     double packed[MOST_PER_SHAPE];
     const int size = ellipsoids->pack_border_bonus(1, &i, packed);
     if (size == PER_SHAPE) return;
-    refuse(
-        lmp, FLERR,
-        style + " found " + std::to_string(size) + " numbers with the shape of an atom, expected " +
-            std::to_string(PER_SHAPE) +
-            ": leave the word 'superellipsoid' out of 'atom_style ellipsoid superellipsoid', and "
-            "give exponents with 'pair_coeff I I epsilon p'.");
+    refuse(lmp, FLERR,
+           style + " found " + std::to_string(size) +
+               " numbers with the shape of an atom, expected " + std::to_string(PER_SHAPE) +
+               ": write 'atom_style ellipsoid' without a word after it, and give exponents with "
+               "'pair_coeff I I epsilon p'.");
   }
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import inspect
 import numbers
@@ -103,17 +104,24 @@ def _taken(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
     """Give a value as the first of some types that it fits, or refuse it."""
     if not kinds or type(value) in kinds:
         return value
-    for kind in kinds:
-        try:
-            return _fitted(value, kind)
-        except _UnfitError:
-            continue
+    with contextlib.suppress(_UnfitError):
+        return _fitted_to_one(value, kinds)
     msg = f"{name} is {_shown(value)}, expected {_named(name, kinds)}"
     raise ArgumentTypeError(msg)
 
 
+def _fitted_to_one(value: Any, kinds: tuple[Any, ...]) -> Any:
+    """Give a value as the first of some types that it fits, or raise an `_UnfitError`."""
+    for kind in kinds:
+        with contextlib.suppress(_UnfitError):
+            return _fitted(value, kind)
+    raise _UnfitError
+
+
 def _fitted(value: Any, kind: Any) -> Any:
     """Give a value as a type, or raise an `_UnfitError`."""
+    if isinstance(kind, types.UnionType):
+        return _fitted_to_one(value, typing.get_args(kind))
     if kind in _NUMBERS:
         return _number(value, kind)
     if kind in (None, types.NoneType):
@@ -193,5 +201,5 @@ def _name(kind: Any) -> str:
 _NAMES = {
     bool: "True or False", int: "a whole number", float: "a number", str: "text", Path: "a path",
     "Particles": "particles such as Particles.of(alpha=4)", "Packing": "a packing",
-    "Recorded": "a run", "Modes": "modes",
+    "Recorded": "a run", "Modes": "modes", "Interaction": "Interaction(k_e, sides)",
 }  # fmt: skip

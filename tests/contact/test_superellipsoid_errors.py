@@ -130,6 +130,18 @@ def test_energy_force_and_torque_are_within_their_errors(study, dimension, measu
     assert np.mean(of.stated[:, 0] < 1e-5) > 0.99
 
 
+def test_a_face_on_a_round_side_of_another_exponent(study):
+    """A pair among a million whose long doubles were off by 1.8 of what they stated."""
+    script, reference = study
+    i = [[0.0, 0.0, 2.0300922680431195, 1.9969134343204828, 3.1667676604474844, 0.9930406030815092]]
+    j = [[2.401993270078174, -2.9762187407186005, 4.609080120266083, 1.1111867477908566,
+          1.7621546318152315, 5.0]]  # fmt: skip
+    for pair in ((i, j), (j, i)):
+        for of in script.measured(reference, script.Couples(*map(np.array, pair))).values():
+            assert not of.beyond.any()
+            assert np.all(of.stated < 1e-10)
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_the_reference_is_that_of_another_formulation(study, dimension):
     from studies.judge import judged  # noqa: PLC0415

@@ -152,6 +152,8 @@ def check_git(place, words):
 
 
 def check_lmp(place, words):
+    if "-in" not in words:
+        return
     deck = place / words[words.index("-in") + 1]
     if deck.is_file():  # else a reader's own
         text = deck.read_text(encoding="utf-8") + (deck.parent / "run.lmp").read_text(

@@ -150,7 +150,7 @@ def test_every_shape_in_the_plane_and_in_space(report, tmp_path, shape, dimensio
     orders = {2: ("S2", "S4"), 3: ("S2", "C4")}[dimension]
     for color in ("kind", "orientation", "one", *orders):
         out = tmp_path / f"{color}.png"
-        asked = ("--color", color, "--level", 2, "--dpi", 80)
+        asked = ("--color", color, "--dpi", 80, *(("--level", 2) if dimension == 3 else ()))
         found = report(SCRIPT, path, *asked, "--out", out)
         assert (found["shape"], found["dimension"]) == (shape, dimension)
         assert ("mean_local" in found) == (color in orders)

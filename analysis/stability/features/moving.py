@@ -112,7 +112,7 @@ _FIXES = (
             "fix overdamped/affine found that something else moved atom 1 in the last steps, .*"),
     _beside("`fix wall/reflect`", "wall/reflect xlo EDGE",
             "Cannot use fix wall/reflect in periodic dimension"),
-    Feature("`fix deposit`",
+    Feature("`fix deposit` beside the fix",
             f"{FLOW}\nregion r block 2 4 2 4 -0.1 0.1\nfix g all deposit 1 1 5 3 region r\nrun 50",
             refused="fix overdamped/affine found atom 3 without a shape, expected an ellipsoid: .*"),
     Feature("a group other than all", f"group one id 1\n{FIX.replace('all', 'one')}",
@@ -137,7 +137,7 @@ _FIXES = (
                "fix g all ave/time 1 5 10 c_poses\nfix h all vector 5 c_turned\nfix p all print 10 here"),
     _unchanged("`fix store/state`, `fix store/force`", "fix g all store/state 5 x y\nfix h all store/force"),
     _unchanged("`fix balance`, `comm_style tiled`", "comm_style tiled\nfix g all balance 5 1.0 rcb"),
-    Feature("`fix evaporate`", f"{FLOW}\nregion r block INF INF INF INF INF INF\n"
+    Feature("`fix evaporate` beside the fix", f"{FLOW}\nregion r block INF INF INF INF INF INF\n"
             "fix g all evaporate 10 1 r 3\nrun 50", "count(all)", 59, scene=CROWD),
 )  # fmt: skip
 
@@ -151,7 +151,7 @@ _STATES = (
             "f_f[2]", 0.03, warned="fix overdamped/affine found another box than it left"),
     Feature("`change_box triclinic`", f"{FLOW}\nrun 20\nchange_box all triclinic",
             refused="Cannot change box ortho/triclinic with certain fixes defined"),
-    Feature("`replicate`", f"{FLOW}\nrun 25\nreplicate 2 2 1",
+    Feature("`replicate` beside the fix", f"{FLOW}\nrun 25\nreplicate 2 2 1",
             refused="Cannot replicate with fixes that store atom quantities"),
     Feature("`displace_atoms` between runs", f"{FLOW}\nrun 25\ndisplace_atoms all move 1 0 0\nrun 25", "x[1]",
             10 + (-5 * exp(-0.025) + 1) * exp(-0.025), scene=DISC),
@@ -174,9 +174,7 @@ _STATES = (
             f"read_restart r.rst remap\npair_style spherocylinder/harmonic sides two\n{FIX}\nrun 25",
             "f_f[2]", 0.05),
     Feature("`f_f[5]` before a run", FLOW, "f_f[5] != f_f[5]", 1),
-    Feature("`rerun` beside the fix", f"{FLOW}\ndump d all custom 25 d.dump id type x y\nrun 50\n"
-            "rerun d.dump dump x y", refused="Cannot reset timestep with a time-dependent fix defined"),
-    Feature("`rerun` of discs", f"{_DISCS}\ndump d all custom 25 d.dump id type x y\ndump_modify d format float "
+    Feature("`rerun` of discs beside the fix", f"{_DISCS}\ndump d all custom 25 d.dump id type x y\ndump_modify d format float "
             "%.17g\nrun 0\ndisplace_atoms all random 0.1 0.1 0 5\nrerun d.dump dump x y", "pe",
             f"{_DISCS}\nrun 0", scene=CROWD),
     _unchanged("`balance`", "balance 1.0 shift x 5 1.05"),

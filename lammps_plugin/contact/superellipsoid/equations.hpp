@@ -4,7 +4,6 @@
 #include "contact/superellipsoid/shape.hpp"
 
 #include <algorithm>
-#include <cfloat>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -90,18 +89,13 @@ template <int D, int M, class T> void lift_diagonal(Matrix<M, T> &a)
 {
   T largest = 0.0;
   for (int k = 0; k < D; ++k) largest = most(largest, a.row[k][k]);
-  constexpr auto SHORTER = std::numeric_limits<Common<T>>::epsilon() / Common<T>(DBL_EPSILON);
+  constexpr auto SHORTER =
+      std::numeric_limits<Common<T>>::epsilon() / Common<T>(std::numeric_limits<double>::epsilon());
   for (int k = 0; k < D; ++k) a.row[k][k] += T(FLAT * SHORTER) * largest;
 }
 
 template <int M, class T> struct Linearised {
   Vec<M, T> residual;
-  Matrix<M, T> jacobian;
-};
-
-/// How a search ended, and the matrix at its last step.
-template <int M, class T> struct Solved {
-  Truth<T> is_converged;
   Matrix<M, T> jacobian;
 };
 
@@ -445,10 +439,12 @@ template <int D, class S> class ByPoint {
   }
 };
 
-/// Newton's method with steps cut until the residual falls. It has converged when a step was
-/// shorter than `tolerance` of the unknowns: that step is taken and leaves an error of its square.
+/// Newton's method with steps cut until the residual falls. True when a step was shorter than
+/// `tolerance` of the unknowns: that step is taken and leaves an error of its square. Where the
+/// matrix of the last step is asked for, it is given, too.
 template <class Equations, int M, class T>
-Solved<M, T> newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iterations)
+bool newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iterations,
+            Matrix<M, T> *matrix = nullptr)
 {
   constexpr int LONGEST = sizeof(T) > 8 ? 200 : 60;
   auto at = equations.linearised(z);
@@ -460,12 +456,13 @@ Solved<M, T> newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &
     ++iterations;
     if (step_sq <= tolerance * tolerance * norm_sq(z)) {
       z -= step;
-      return {true, at.jacobian};
+      if (matrix != nullptr) *matrix = at.jacobian;
+      return true;
     }
     T fraction = 1;
     const T smallest = T(1e-4) * std::min(T(1), T(sqrt(norm_sq(z) / step_sq)));
     for (;; fraction *= T(0.5)) {
-      if (fraction < smallest) return {false, at.jacobian};
+      if (fraction < smallest) return false;
       const Vec<M, T> trial = z - fraction * step;
       const auto next = equations.linearised(trial);
       const T next_size = norm_sq(next.residual);
@@ -477,18 +474,18 @@ Solved<M, T> newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &
       }
     }
   }
-  return {false, at.jacobian};
+  return false;
 }
 
 /// The same of all lanes of a pack that are `sought`, where no step is cut: true of those that such
 /// steps lead to the end. A lane that has come there waits.
 template <class Equations, int M, class T>
-Solved<M, T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolerance,
-                             const Truth<T> &sought)
+Truth<T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolerance,
+                         const Truth<T> &sought, Matrix<M, T> *matrix = nullptr)
 {
   constexpr int LONGEST = 12;
   Truth<T> found = sought & !sought, open = sought;
-  if (!any(open)) return {found, {}};
+  if (!any(open)) return found;
   auto at = equations.linearised(z);
   for (int n = 0; n < LONGEST; ++n) {
     const Vec<M, T> step = equations.step(at);
@@ -501,7 +498,8 @@ Solved<M, T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double to
     open = open & (norm_sq(next.residual) <= 0.8 * norm_sq(at.residual));
     at = next;
   }
-  return {found, at.jacobian};
+  if (matrix != nullptr) *matrix = at.jacobian;
+  return found;
 }
 
 }  // namespace detail

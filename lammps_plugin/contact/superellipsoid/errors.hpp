@@ -95,6 +95,9 @@ template <int D, class T> class BodyAtPoint {
     }
   }
 
+  /// Both points lie within each of the bodies.
+  T width_at_most() const { return 2 * scale * body.bounding_radius; }
+
   bool by_normal() const { return is_by_normal(body.p); }
   T exponent() const { return smooth_exponent<T>(body.p); }
 
@@ -187,8 +190,8 @@ template <int D, class T> class Conditioning {
   OffByResidual<T> off() const
   {
     OffByResidual<T> off = i.by_normal() ? of_normals() : j.by_normal() ? of_both() : of_points();
-    off.normal = std::min(off.normal, T(2));
-    return off;
+    return {std::min(off.normal, T(2)),
+            std::min({off.point, i.width_at_most(), j.width_at_most()})};
   }
 
  private:
@@ -230,7 +233,8 @@ template <int D, class T> class Conditioning {
     const auto inverted = inverse(matrix);
     const T point = size_of(inverted) * residual;
     const T normal = size_of(product(i.bend, inverted)) * residual;
-    return {std::min(steepest * normal, j.normal_off(point)) + ROUNDING, point};
+    // The point of j is as far from that of this normal as the residual says.
+    return {std::min(steepest * normal, j.normal_off(point + residual)) + ROUNDING, point};
   }
 
   /// The share of a residual that one of two bends takes, at least 1; the smaller of both.

@@ -79,7 +79,7 @@ template <int D> FoundLanes<D> found_by_ellipsoids(const PairLanes<D> &pairs, Ve
 {
   const detail::ByNormalOfEllipsoids<D, Pack> equations(pairs.i, pairs.j, pairs.r);
   const Mask sought = pairs.near & (dot(pairs.r, n) < Pack(1.0));
-  const Mask found = detail::newton_in_lanes(equations, n, SHORT_STEP, sought).is_converged;
+  const Mask found = detail::newton_in_lanes(equations, n, SHORT_STEP, sought);
   return {equations.tangency(n), sought, found};
 }
 
@@ -93,10 +93,14 @@ FoundLanes<D> found_by(const PairLanes<D> &pairs, const Vec<D, Pack> &n)
   const Mask sought = pairs.near & (scale < Pack(1.0));
   const Equations equations(detail::TangencyProblem<D, Pack>::of(pairs.i, pairs.j, pairs.r));
   auto z = equations.start({scale, n, scale * h_i.gradient, scale * h_j.gradient});
-  const auto solved = detail::newton_in_lanes(equations, z, SHORT_STEP, sought);
-  Mask found = solved.is_converged;
-  if constexpr (Equations::MAY_BE_ILL_POSED)
-    found = found & Equations::is_well_posed(solved.jacobian);
+  Mask found;
+  if constexpr (Equations::MAY_BE_ILL_POSED) {
+    detail::Matrix<Equations::M, Pack> matrix{};
+    found = detail::newton_in_lanes(equations, z, SHORT_STEP, sought, &matrix);
+    found = found & Equations::is_well_posed(matrix);
+  } else {
+    found = detail::newton_in_lanes(equations, z, SHORT_STEP, sought);
+  }
   return {equations.tangency(z), sought, found};
 }
 

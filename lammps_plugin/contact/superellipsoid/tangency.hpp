@@ -289,13 +289,14 @@ template <int D, class T> class TangencySearch {
           detail::TangencyProblem<D, T>{i, j, r, stage < last ? between(e_i, share) : e_i,
                                         stage < last ? between(e_j, share) : e_j});
       if (stage == 1) z = equations.start(found.at);
-      auto solved = newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations);
-      is_converged = solved.is_converged;
+      detail::Matrix<Equations::M, T> matrix{};
+      is_converged =
+          newton(equations, z, stage < last ? ROUGH : TOLERANCE, found.iterations, &matrix);
       if (stage < last) continue;
       found.at = equations.tangency(z);
       found.is_settled = is_converged;
       if constexpr (Equations::MAY_BE_ILL_POSED)
-        found.is_settled = is_converged && Equations::is_well_posed(solved.jacobian);
+        found.is_settled = is_converged && Equations::is_well_posed(matrix);
     }
     return is_converged;
   }

@@ -195,7 +195,7 @@ def sample() -> None:
 
 
 class Complaint(NamedTuple):
-    """What is wrong with a sample."""
+    """Name the fault of a sample."""
 
     said: str
     is_made: bool = False

@@ -1,4 +1,4 @@
-"""What a text file of LAMMPS means: dimension, shape and law, which its columns do not tell.
+"""Meaning of a text file of LAMMPS: dimension, shape and law, which its columns do not hold.
 
 They are those that the file says, or the user; what neither says is the most plausible one, with a warning of one
 sentence. Numbers that rounding can reach decide nothing: a plane holds all particles to within `_ROUNDING`.
@@ -29,7 +29,7 @@ _EXACT, _FEW = 15, 5  # digits: of numbers as good as doubles; most that a perso
 
 
 class Wanted(NamedTuple):
-    """What the user says of a file; None where nothing is said."""
+    """Meaning that the user gives to a file; None where nothing is given."""
 
     dimension: int | None = None
     shape: str | None = None
@@ -40,7 +40,7 @@ NOTHING = Wanted()
 
 @dataclass(frozen=True)
 class Said:
-    """What a file says beside its columns; None and "" where it says nothing."""
+    """Statements of a file beside its columns; None and "" where there are none."""
 
     dimension: int | None = None
     shape: str = ""
@@ -57,7 +57,7 @@ class Said:
 
 
 class Geometry(NamedTuple):
-    """Where particles are and how large, as a file has it."""
+    """Positions, orientations and sizes, as a file has them."""
 
     position: FloatArray
     """(N, 3), [length]"""
@@ -109,7 +109,7 @@ class Geometry(NamedTuple):
 
 
 class Meaning(NamedTuple):
-    """What a file means."""
+    """Meaning of a file."""
 
     dimension: int
     shape: Fitted

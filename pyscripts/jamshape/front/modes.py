@@ -144,7 +144,7 @@ class Modes:
         --------
         >>> import jamshape as js
         >>> discs = js.Spherocylinders(alpha=0)
-        >>> packing = js.make_packing(discs, n=16, u0=1e-8, file="discs.h5", progress=False)
+        >>> packing = js.make_packing(discs, n=16, u0=1e-8, file="dense_discs.h5", progress=False)
         >>> bulk = js.modes(packing).moduli.bulk
         >>> bulk.bound < 1e-6 * bulk.relaxed
         True

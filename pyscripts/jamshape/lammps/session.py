@@ -119,7 +119,8 @@ class Session:
         except BaseException:
             self._end_complaints()
             raise
-        self._library = self._load(plugin)
+        with one_at_a_time():
+            self._library = self._load(plugin)
 
     def __enter__(self) -> Self:
         return self

@@ -87,5 +87,5 @@ def test_what_is_no_number_of_threads_is_refused(number):
         pass
     assert threads() == 1
     packing, state = crowd("discs")
-    with pytest.raises(ValueError, match="expected at least 1"):
+    with pytest.raises(ValueError, match="expected from 1 to 1024"):
         Vicinity(Landscape(packing), state)._compiled.share(0)

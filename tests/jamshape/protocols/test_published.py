@@ -211,9 +211,9 @@ OTHERS = {
     "n is 32 and that of the start": {"n": 32},
     "seed is 4 and that of the start": {"seed": 4},
     "dimension is 3 and that of the start": {"dimension": 3},
-    "kappa means nothing to a start": {"kappa": 1e-6},
-    "phi_end means nothing to a start": {"phi_end": 0.9},
-    "phi_start means nothing to a start": {"phi_start": 0.3},
+    "kappa=1e-06 means nothing to a start": {"kappa": 1e-6},
+    "phi_end=0.9 means nothing to a start": {"phi_end": 0.9},
+    "phi_start=0.3 means nothing to a start": {"phi_start": 0.3},
     "asked for, Particles('spherocylinder', alpha=4": {"particles": js.Spherocylinders(alpha=4)},
     "asked for, Particles('dimer'": {"particles": js.Dimers(alpha=1)},
 }
