@@ -95,7 +95,7 @@ void CreateRandom::command(int narg, char **arg)
 {
   words = "create_random " + joined(narg, arg);
   require(!domain->box_exist, "no box before: leave out read_data and create_box");
-  require(atom->ellipsoid_flag, "'atom_style ellipsoid' before");
+  view.find_ellipsoids("create_random");
   require(domain->xperiodic && domain->yperiodic && domain->zperiodic, "'boundary p p p'");
   read(narg, arg);
   bool is_known = false;
@@ -223,6 +223,7 @@ void CreateRandom::create(const Start &start)
   for (int i = 0; i < atom->nlocal; ++i) {
     view.set_diameters(i, kinds[atom->type[i] - 1].diameters);
   }
+  view.find_ellipsoids("create_random");  // now with atoms, whose layout it checks
   atom->nellipsoids = n;
   view.set_orientations(0, atom->nlocal, [&](int i) {
     const double *const q = &start.orientation[4 * (atom->tag[i] - 1)];

@@ -52,6 +52,20 @@ def whole(tmp_path_factory):
     return of
 
 
+def shape_of(deck):
+    return deck.rsplit("_", 1)[1]
+
+
+def dump_of(deck, path):
+    return read_dump(path, shape=shape_of(deck))
+
+
+def bodies_in(path):
+    with pytest.warns(UserWarning, match="does not say the exponents"):
+        found = read_data(path, shape="superellipsoid")
+    return found.with_(exponent=np.full(found.n, SMALL[BODIES]["p"]))
+
+
 def said(line):
     return not re.match(r"\s*(#|$)", line)
 
@@ -86,7 +100,7 @@ def test_rods_are_compressed_from_the_start_of_python_to_the_end(whole):
     assert rows["pressure"][-1] > 1e-2
     assert rows["z"][-1] > 4
     assert np.isfinite([column for name, column in rows.items() if name != "dt_max"]).all()
-    first = read_dump(whole(RODS) / "out.dump")[0]
+    first = dump_of(RODS, whole(RODS) / "out.dump")[0]
     start = random_packing(32, 0.4, 1, Particles.of(alpha=2))
     for name in ("position", "diameters", "species"):
         np.testing.assert_array_equal(getattr(first, name), getattr(start, name))
@@ -117,10 +131,10 @@ def test_shear_is_at_constant_density_to_its_strain(whole):
 
 @pytest.mark.parametrize("name", [RODS, SHEAR])
 def test_dumps_of_rods_hold_the_states_that_the_log_shows(name, whole):
-    rows, frames = thermo(whole(name) / "out.log"), read_dump(whole(name) / "out.dump")
+    rows, frames = thermo(whole(name) / "out.log"), dump_of(name, whole(name) / "out.dump")
     sides = 2 if SMALL[name].get("sides") == "two" else 1
     assert 15 < len(frames) < 25 if name == RODS else len(frames) == 8
-    assert read_any(whole(name) / "out.dump").step == frames[-1].step
+    assert read_any(whole(name) / "out.dump", shape=shape_of(name)).step == frames[-1].step
     tables = (whole(name) / "out.contacts.dump").read_text().split("ITEM: TIMESTEP\n")[1:]
     assert len(tables) == len(frames)
     for frame, text in zip(frames, tables, strict=True):
@@ -140,7 +154,7 @@ def test_dumps_of_rods_hold_the_states_that_the_log_shows(name, whole):
 
 
 def test_dumps_of_bodies_hold_the_states_that_the_log_shows(whole):
-    rows, frames = thermo(whole(BODIES) / "out.log"), read_dump(whole(BODIES) / "out.dump")
+    rows, frames = thermo(whole(BODIES) / "out.log"), dump_of(BODIES, whole(BODIES) / "out.dump")
     assert 15 < len(frames) < 25
     for frame in frames:
         assert frame.shape_style == "superellipsoid"
@@ -172,7 +186,7 @@ def test_two_ranks_agree_until_rounding_has_grown(name, whole, tmp_path):
     np.testing.assert_allclose(
         two["pressure"][early], one["pressure"][early], rtol=1e-6, atol=1e-12
     )
-    starts = [read_dump(folder / "out.dump")[0] for folder in (whole(name), tmp_path)]
+    starts = [dump_of(name, folder / "out.dump")[0] for folder in (whole(name), tmp_path)]
     for field in ("position", "orientation", "diameters", "species"):
         np.testing.assert_array_equal(*(getattr(start, field) for start in starts))
 
@@ -184,16 +198,14 @@ def test_pressure_ends_a_compression(tmp_path):
     assert rows["pressure"][:-2].max() <= 2e-3
     assert rows["phi"][-1] < 0.69
     assert (tmp_path / "out.restart").is_file()
-    jammed = read_data(tmp_path / "out.data").with_(shape_style="superellipsoid")
-    phi = jammed.with_(exponent=np.full(jammed.n, SMALL[BODIES]["p"])).phi
-    np.testing.assert_allclose(phi, rows["phi"][-1], rtol=1e-7)
+    np.testing.assert_allclose(bodies_in(tmp_path / "out.data").phi, rows["phi"][-1], rtol=1e-7)
 
 
 def test_a_deck_takes_data_of_ones_own(tmp_path):
     packing = random_packing(16, 0.3, 4, Particles.of(alpha=1))
     write_data(tmp_path / "own.data", packing)
     run_deck(RODS, tmp_path, data="own.data", kappa=1e-2, phi_end=0.5)
-    first = read_dump(tmp_path / "compress.dump")[0]
+    first = dump_of(RODS, tmp_path / "compress.dump")[0]
     np.testing.assert_array_equal(first.position, packing.position)
 
 
@@ -213,8 +225,7 @@ def test_minimising_balances_forces(source, jammed, tmp_path):
     np.testing.assert_allclose(rows["phi"], thermo(jammed / "out.log")["phi"][-1], rtol=1e-7)
     assert rows["u"][-1] < rows["u"][0]
     assert max(rows["fmax"][-1], rows["tmax"][-1]) < 1e-3
-    end = read_data(tmp_path / "out.data").with_(shape_style="superellipsoid")
-    end = end.with_(exponent=np.full(end.n, SMALL[BODIES]["p"]))
+    end = bodies_in(tmp_path / "out.data")
     np.testing.assert_allclose(rows["u"][-1], sums(end, 1.0)["energy"] / end.box.volume, rtol=1e-6)
 
 
@@ -233,8 +244,8 @@ def test_a_restart_gives_the_same_bits(name, ranks, whole, tmp_path):
     files = [tmp_path / f"out.restart.{k}" for k in (1, 2)]
     oldest = min(files, key=os.path.getmtime)
     run_deck(name, tmp_path, ranks, restart=oldest.name, out="again")
-    expected = {frame.step: frame for frame in read_dump(tmp_path / "out.dump")}
-    first, *frames = read_dump(tmp_path / "again.dump")
+    expected = {frame.step: frame for frame in dump_of(name, tmp_path / "out.dump")}
+    first, *frames = dump_of(name, tmp_path / "again.dump")
     assert frames[-1].step == max(expected)
     # LAMMPS turns coordinates of a tilted box into fractions and back where it begins.
     at_begin = np.abs(first.position - expected[first.step].position).max()
@@ -262,7 +273,9 @@ def test_a_restart_halfway_gives_the_same_bits_and_appends(whole, tmp_path):
         both = np.isin(one["Step"], two["Step"])
         np.testing.assert_array_equal(two[name][later], one[name][both])
     assert two["Step"][-1] == one["Step"][-1]
-    last, expected = (read_dump(folder / "out.dump")[-1] for folder in (tmp_path, whole(BODIES)))
+    last, expected = (
+        dump_of(BODIES, folder / "out.dump")[-1] for folder in (tmp_path, whole(BODIES))
+    )
     np.testing.assert_array_equal(last.position, expected.position)
 
 
