@@ -18,7 +18,7 @@ NAMES = re.compile("|".join(SHAPES), re.IGNORECASE)
 # The places that may know which shapes there are.
 OF_A_SHAPE = re.compile(
     rf"jamshape/shapes/|_contact\.pyi$|contact/({'|'.join(SHAPES)})/|/pair_({'|'.join(SHAPES)})_"
-    r"|styles/register\.cpp$|bindings/(shapes|probes)\.[ch]pp$"
+    r"|styles/register\.cpp$|(contact/shapes\.hpp|bindings/(shapes|probes)\.cpp)$"
 )
 
 LONGEST, MOST_PARAMETERS = 60, 5
