@@ -89,7 +89,7 @@ def _kinds_of(annotation: Any, names: dict[str, Any]) -> tuple[Any, ...]:
 
 
 def _is_known(kind: Any) -> bool:
-    """Tell whether a type is one that is looked at here."""
+    """Return whether a type is one that is looked at here."""
     return kind is None or isinstance(kind, type) or typing.get_origin(kind) in _SEVERAL
 
 
@@ -101,7 +101,7 @@ class _UnfitError(Exception):
 
 
 def _taken(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
-    """Give a value as the first of some types that it fits, or refuse it."""
+    """Return a value as the first of some types that it fits, or refuse it."""
     if not kinds or type(value) in kinds:
         return value
     with contextlib.suppress(_UnfitError):
@@ -111,7 +111,7 @@ def _taken(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
 
 
 def _fitted_to_one(value: Any, kinds: tuple[Any, ...]) -> Any:
-    """Give a value as the first of some types that it fits, or raise an `_UnfitError`."""
+    """Return a value as the first of some types that it fits, or raise an `_UnfitError`."""
     for kind in kinds:
         with contextlib.suppress(_UnfitError):
             return _fitted(value, kind)
@@ -119,7 +119,7 @@ def _fitted_to_one(value: Any, kinds: tuple[Any, ...]) -> Any:
 
 
 def _fitted(value: Any, kind: Any) -> Any:
-    """Give a value as a type, or raise an `_UnfitError`."""
+    """Return a value as a type, or raise an `_UnfitError`."""
     if isinstance(kind, types.UnionType):
         return _fitted_to_one(value, typing.get_args(kind))
     if kind in _NUMBERS:

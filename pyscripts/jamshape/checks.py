@@ -75,7 +75,7 @@ class Sentence(Exception):  # noqa: N818 - warnings are of this kind as well
 
 
 class ArgumentError(Sentence, ValueError):
-    """Arguments that contradict each other, or have no effect; parameters as of `Sentence`.
+    """Arguments that contradict each other, or have no effect; parameters as in `Sentence`.
 
     Examples
     --------
@@ -88,7 +88,7 @@ class ArgumentError(Sentence, ValueError):
 
 
 class NotReachedWarning(Sentence, UserWarning):
-    """A result that did not reach its goal: what was reached, and what to try; parameters as of `Sentence`.
+    """A result that did not reach its goal: what was reached, and what to try; parameters as in `Sentence`.
 
     A command that has said so ends with the exit code 1.
 
@@ -131,7 +131,7 @@ def require_no_effect(beside: str, value: Any, **given: Any) -> None:
 
 
 def require_with(needed: str, value: Any, **given: Any) -> None:
-    """Refuse arguments that have no effect without another one; parameters as of `require_no_effect`.
+    """Refuse arguments that have no effect without another one; parameters as in `require_no_effect`.
 
     Raises
     ------

@@ -163,7 +163,7 @@ def _rattlers(found: Mapping[str, Any], known: Mapping[str, Any]) -> int | None:
 
 
 def _state(packing: Packing, measured: Mapping[str, Any]) -> dict[str, Any]:
-    """Give the numbers of a state, those that are not stored from its contacts."""
+    """Return the numbers of a state, those that are not stored from its contacts."""
     if all(name in measured for name in _STATE):
         return dict(measured)
     of = MeasuredPacking.of(packing)

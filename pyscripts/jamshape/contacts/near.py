@@ -41,7 +41,7 @@ class PairArrays(NamedTuple):
     """Poses and pairs as the classes of `jamshape._contact` take them."""
 
     position: FloatArray
-    """(2, N, D) doubles and their small rests."""
+    """(2, N, D) doubles and their low parts."""
     orientation: FloatArray
     """(2, N, 1) or (2, N, 4)"""
     cell: FloatArray

@@ -162,7 +162,7 @@ def find_contacts(
     k_e : float, [energy], optional
     sides : {1, 2}, optional
         Bonds of a side-to-side contact, of shapes that have both laws: one in the dynamics of Marschall
-        & Teitel, two for minima and modes. Both are those of the packing's law when left out.
+        & Teitel, two for minima and modes. Both are those of the packing's law by default.
     errors : bool
         Bound the error of each contact as well, which takes many times as long as the contacts.
 

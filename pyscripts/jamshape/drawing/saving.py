@@ -41,6 +41,6 @@ def save_figure(figure: Figure, path: PathLike, **how: Any) -> None:
 
 
 def with_end(path: PathLike) -> Path:
-    """Give the path of a picture, with an end that tells its format."""
+    """Return the path of a picture, with an end that tells its format."""
     place = Path(path)
     return place if place.suffix else place.with_name(f"{place.name}.png")

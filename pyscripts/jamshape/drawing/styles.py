@@ -39,6 +39,6 @@ def color(k: int) -> str:
 
 
 def marked(k: int, line: str = "") -> dict[str, Any]:
-    """Give the curve with that number, from 0, its colour and mark, open, with a thin line or none."""
+    """Return the curve with that number, from 0, its colour and mark, open, with a thin line or none."""
     style: dict[str, Any] = {"fmt": f"{MARKERS[k % len(MARKERS)]}{line}", "color": color(k)}
     return style | {"mfc": "none", "ms": 4, "lw": 0.8, "elinewidth": 0.8, "capsize": 1.5}

@@ -94,7 +94,7 @@ def _box(sizes: FloatArray, dimension: int) -> Box:
 
 
 def _moved(packing: Packing, ours: Any, frame: Any, box: Box) -> dict[str, Any]:
-    """Give positions and images where they changed; a particle in another image of the box is where it was."""
+    """Return positions and images where they changed; a particle in another image of the box is where it was."""
     D = packing.dimension
     found, before = (np.asarray(x.particles.position, np.float64)[:, :D] for x in (frame, ours))
     turns = np.rint(box.fractions(found - before))

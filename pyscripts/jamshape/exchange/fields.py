@@ -20,12 +20,12 @@ _INT32 = np.iinfo(np.int32)
 
 
 def particle_fields(packing: Packing, *, rests: bool) -> Fields:
-    """Give arrays with a row for each particle."""
+    """Return arrays with a row for each particle."""
     return {name: getattr(packing, name) for name in PARTICLES + PARTICLE_RESTS * rests}
 
 
 def box_fields(packing: Packing, *, rests: bool, tilted: bool) -> Fields:
-    """Give the arrays of the box; without its tilt where no box has one."""
+    """Return the arrays of the box; without its tilt where no box has one."""
     fields = {"lo": packing.box.lo, "edges": packing.box.edges}
     fields |= {"tilt": packing.box.tilt} if tilted else {}
     fields |= {"edges_rest": packing.edges_rest} if rests else {}

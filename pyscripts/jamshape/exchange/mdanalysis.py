@@ -158,7 +158,7 @@ def _write(file: h5py.File, source: Source) -> Packing:
 
 
 def _values(packing: Packing) -> dict[str, Any]:
-    """Give what a frame holds; the box begins at 0, as MDAnalysis has it."""
+    """Return what a frame holds; the box begins at 0, as MDAnalysis has it."""
     # Always edge vectors as rows: frames with and without a tilt are of one form.
     edges = _HEIGHT * np.eye(3)
     edges[: packing.dimension, : packing.dimension] = packing.box.matrix.T

@@ -206,7 +206,7 @@ def _add_cell(data: Any, packing: Packing) -> None:
 
 
 def _glyphs(packing: Packing) -> tuple[list[_Glyph], IntArray]:
-    """Give the glyph of each body, and which one a particle has."""
+    """Return the glyph of each body, and which one a particle has."""
     bodies = alike(packing)
     rows = zip(packing.diameters[bodies.first], packing.exponent[bodies.first], strict=True)
     return [_glyph(packing.shape.solid(d, float(p))) for d, p in rows], bodies.of

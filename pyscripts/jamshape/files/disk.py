@@ -26,7 +26,7 @@ _OTHERS = {".data", ".gsd", ".dump", ".png", ".pdf", ".csv", ".json", ".txt"}
 
 @contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """Give a temporary path in the folder of `path`, which takes its place if the body succeeds.
+    """Return a temporary path in the folder of `path`, which takes its place if the body succeeds.
 
     If the body raises, the temporary file is removed and what stood at `path` still stands. Where `path`
     is a link, what it leads to is replaced.

@@ -45,7 +45,7 @@ class Form(NamedTuple):
 
 
 def frame_values(packing: Packing, form: Form) -> dict[str, NDArray[Any]]:
-    """Give what a frame holds, by element."""
+    """Return what a frame holds, by element."""
 
     def stored(edges: FloatArray, tilt: FloatArray) -> FloatArray:
         # H5MD has edge vectors as rows.

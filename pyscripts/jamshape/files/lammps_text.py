@@ -122,10 +122,10 @@ def read_data(path: PathLike, dimension: int | None = None, shape: str | None = 
     ----------
     path : path-like
     dimension : {2, 3}, optional
-        What the file says when left out, or else 2 if all particles lie at one z and are turned about z;
+        What the file says by default, or else 2 if all particles lie at one z and are turned about z;
         a warning says where that is doubtful.
     shape : str, optional
-        A name of `jamshape.shapes.table.SHAPES`; what the file says when left out, or else the first shape of
+        A name of `jamshape.shapes.table.SHAPES`; what the file says by default, or else the first shape of
         that table that can have such diameters, with a warning.
 
     Returns
@@ -163,7 +163,7 @@ def iter_dump(
         property/atom quatw`` and the column ``c_quatw``, and so on; the exponent from a variable.
         Without it, p is 1 over ``SuperquadricRoundness.Phi``, if that is there.
     dimension, shape
-        As of `read_data`; those of the first frame hold for all.
+        See `read_data`; those of the first frame hold for all.
 
     Yields
     ------
@@ -210,7 +210,7 @@ def read_any(
     frame : int
         From 0; negative ones count from the end.
     dimension, shape
-        As of `read_data`; an H5MD file says both itself.
+        See `read_data`; an H5MD file says both itself.
 
     Raises
     ------

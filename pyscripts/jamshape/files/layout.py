@@ -90,7 +90,7 @@ class Image(io.BytesIO):
         self._path = path
 
     def __repr__(self) -> str:
-        """Give the path, which h5py takes as the name of the file."""
+        """Return the path, which h5py takes as the name of the file."""
         return str(self._path)
 
     def store(self) -> None:
@@ -104,7 +104,7 @@ class Image(io.BytesIO):
 
 @contextmanager
 def written(path: PathLike) -> Iterator[h5py.File]:
-    """Give an empty HDF5 file, which replaces the one at `path` if the body succeeds.
+    """Return an empty HDF5 file, which replaces the one at `path` if the body succeeds.
 
     Raises
     ------
@@ -119,14 +119,14 @@ def written(path: PathLike) -> Iterator[h5py.File]:
 
 @contextmanager
 def rewritten(path: PathLike) -> Iterator[h5py.File]:
-    """Give a copy of an HDF5 file to change, which replaces it if the body succeeds; errors as `opened`."""
+    """Return a copy of an HDF5 file to change, which replaces it if the body succeeds; errors as `opened`."""
     with changed(path, path) as file:
         yield file
 
 
 @contextmanager
 def changed(path: PathLike, out: PathLike) -> Iterator[h5py.File]:
-    """Give a copy of an HDF5 file to change, which is written to `out` if the body succeeds; errors as `opened`."""
+    """Return a copy of an HDF5 file to change, which is written to `out` if the body succeeds; errors as `opened`."""
     with readable(path):
         image = Image(out, Path(path).read_bytes())
         with hdf5().File(image, "r+") as file:
@@ -229,7 +229,7 @@ def stored_name(file: h5py.File, name: str) -> str:
 
 
 def rename_observables(file: h5py.File) -> None:
-    """Give the observables of a file of an earlier version their names of today."""
+    """Return the observables of a file of an earlier version their names of today."""
     for new, old in ((new, stored_name(file, new)) for new in RENAMED):
         if old != new and old in require_item(file, "observables"):
             file.move(f"observables/{old}", f"observables/{new}")

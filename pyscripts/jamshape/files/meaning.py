@@ -116,7 +116,7 @@ class Meaning(NamedTuple):
     law: Interaction
 
     def turned(self, quaternion: FloatArray) -> FloatArray:
-        """Give (N, 4) quaternions of bodies whose axes are named as the shape names them."""
+        """Return (N, 4) quaternions of bodies whose axes are named as the shape names them."""
         if not self.shape.first.any():
             return quaternion
         return product(quaternion, _FROM_X[self.shape.first])

@@ -24,7 +24,7 @@ _ADVICE_OF_DIGITS = "a larger {u0:name} or {tolerance:name}, since rounding leav
 
 
 def is_reached(known: Mapping[str, Any]) -> bool:
-    """Tell whether a packing reached its goal.
+    """Return whether a packing reached its goal.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def warn_unless_reached(known: Mapping[str, Any], stacklevel: int = 2) -> None:
     known : mapping of str to Any
         Attributes of its file.
     stacklevel : int
-        As of `warnings.warn`, counted from the caller.
+        See `warnings.warn`, counted from the caller.
 
     Warns
     -----
@@ -92,12 +92,12 @@ def _n_negative(known: Mapping[str, Any]) -> int:
 
 
 def _residual(known: Mapping[str, Any]) -> float:
-    """Give the largest net force or torque; NaN where nobody knows."""
+    """Return the largest net force or torque; NaN where nobody knows."""
     if "residual" in known:
         return float(known["residual"])
     return max(float(known.get(f"residual_{name}", math.nan)) for name in ("force", "torque"))
 
 
 def _tolerance(known: Mapping[str, Any]) -> float:
-    """Give what forces were to balance to; NaN where nobody knows, which nothing is below."""
+    """Return what forces were to balance to; NaN where nobody knows, which nothing is below."""
     return float(known.get("tolerance", known.get("quasistatic_tolerance", math.nan)))

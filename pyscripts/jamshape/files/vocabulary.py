@@ -29,7 +29,7 @@ _RATIO = "w1"  # only files of bodies with an exponent have it
 
 
 def renamed(found: Mapping[str, _Value]) -> dict[str, _Value]:
-    """Give attributes or observables of a file the names that they have today.
+    """Return attributes or observables of a file the names that they have today.
 
     What has such a name already stays as it is.
 
@@ -45,7 +45,7 @@ def renamed(found: Mapping[str, _Value]) -> dict[str, _Value]:
 
 
 def protocol_named(value: Any) -> Any:
-    """Give a protocol its name; what is no number of one stays as it is.
+    """Return a protocol its name; what is no number of one stays as it is.
 
     Examples
     --------

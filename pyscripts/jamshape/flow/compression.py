@@ -27,7 +27,7 @@ class Compression(Motion):
     phi_end
         Packing fraction to reach.
 
-    Others as of `Motion`.
+    Others as in `Motion`.
 
     Raises
     ------
@@ -79,7 +79,7 @@ class Compression(Motion):
         return self.steps(start.phi, start.dimension)
 
     def steps_left(self, found: Mapping[str, float], dimension: int) -> int:
-        """Count those from where observables were found to the end; errors as of `Motion`."""
+        """Count those from where observables were found to the end; errors as in `Motion`."""
         phi = found["phi"]
         if phi > self.phi_end:
             msg = f"The state has phi = {phi:.6g}, expected one below phi_end = {self.phi_end}."
@@ -91,7 +91,7 @@ class Compression(Motion):
         return f"phi {found['phi']:.4f} of {self.phi_end:g}"
 
     def part(self, found: Mapping[str, float], phi_start: float) -> float:
-        """Give the part of the whole strain that is done."""
+        """Return the part of the whole strain that is done."""
         done = math.log(found["phi"] / phi_start) / math.log(self.phi_end / phi_start)
         return min(1.0, done)
 

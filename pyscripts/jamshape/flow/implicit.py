@@ -166,7 +166,7 @@ class Protocol:
         return ((0.0, self.kappa),)
 
     def leg(self, flow: Flow, phi: float) -> Leg:
-        """Give the host at a packing fraction, and how long it moves like this."""
+        """Return the host at a packing fraction, and how long it moves like this."""
         del flow
         kappa, end = self._rate_at(phi)
         return Leg(Host.compressing(kappa), 0.5 * math.log(end / phi) / kappa)
@@ -187,7 +187,7 @@ class Protocol:
         return f"at phi = {phi:.6g} at the rate kappa = {kappa:g}"
 
     def _rate_at(self, phi: float) -> tuple[float, float]:
-        """Give the rate at phi, and the packing fraction up to which it holds."""
+        """Return the rate at phi, and the packing fraction up to which it holds."""
         nearly = phi * (1 + 1e-13)
         kappa = next((rate for start, rate in reversed(self.rates) if start <= nearly),
                      self.rates[0][1])  # fmt: skip
@@ -337,7 +337,7 @@ class Course(Proto):
         """One of `METHODS`."""
 
     def leg(self, flow: Flow, phi: float) -> Leg:
-        """Give the host, and how long it moves like this."""
+        """Return the host, and how long it moves like this."""
 
     def is_over(self, flow: Flow, phi: float) -> bool:
         """Whether the end is reached."""
@@ -641,7 +641,7 @@ class _Run:
 
 
 def _as_slice(numbers: IntArray) -> slice | IntArray:
-    """Give numbers at equal distances, as those of particles that all turn or none, as a slice: it is faster."""
+    """Return numbers at equal distances, as those of particles that all turn or none, as a slice: it is faster."""
     apart = np.diff(numbers)
     if len(apart) and (apart == apart[0]).all() and apart[0] > 0:
         return slice(int(numbers[0]), int(numbers[-1]) + 1, int(apart[0]))
@@ -670,7 +670,7 @@ class _Path:
         self.velocities.append(velocity)
 
     def velocity(self, stage: int) -> FloatArray:
-        """Give a velocity, as it is carried to the next stage."""
+        """Return a velocity, as it is carried to the next stage."""
         return self.carried(self.velocities[stage], self.times[stage])
 
     def carried(self, vector: FloatArray, begun: float) -> FloatArray:

@@ -115,7 +115,7 @@ class Motion(ABC):
 
     @abstractmethod
     def part(self, found: Mapping[str, float], phi_start: float) -> float:
-        """Give the part that is done where observables were found, from 0 to 1."""
+        """Return the part that is done where observables were found, from 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class FlowRun(Generic[_Motion]):
     restart
         Restart file of an earlier run, to go on from.
     time
-        Of that state; step times time step when left out.
+        Of that state; step times time step by default.
 
     Raises
     ------
@@ -215,7 +215,7 @@ class FlowRun(Generic[_Motion]):
         return self._time + (self.session.step - self._step_of_time) * self.settings.dt
 
     def write_restart(self, path: Path) -> None:
-        """Write a LAMMPS restart file of the present state; errors as `Session.write_restart`."""
+        """Write a LAMMPS restart file of the present state; errors as in `Session.write_restart`."""
         self.session.write_restart(path)
         # That moves atoms into the box and orders them anew, which neighbour lists must follow.
         self.session.commands("run 0 post no")

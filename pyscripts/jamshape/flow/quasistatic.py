@@ -100,7 +100,7 @@ class QuasistaticShear:
         return found
 
     def resisted(self, pressure: FloatArray) -> float:
-        """Give the energy's derivative by the strain over the volume, of a pressure tensor (D, D)."""
+        """Return the energy's derivative by the strain over the volume, of a pressure tensor (D, D)."""
         return -float((pressure[:2, :2] * self._host.gradient).sum())
 
     @property
@@ -201,7 +201,7 @@ def shear(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Iterator
 
 
 def _strain_of(how: QuasistaticShear, done: int) -> float:
-    """Give the strain of the step after so many: the last one may be shorter."""
+    """Return the strain of the step after so many: the last one may be shorter."""
     return min(how.strain_end, (done + 1) * how.strain_step) - done * how.strain_step
 
 
@@ -212,7 +212,7 @@ def _minimum(landscape: Landscape, state: State, how: QuasistaticShear) -> Minim
 
 
 def pressure_of(found: Minimum) -> float:
-    """Give the pressure of a minimum, [energy / length^D]."""
+    """Return the pressure of a minimum, [energy / length^D]."""
     D = found.state.dimension
     return -found.evaluation.strain_gradient / (D * found.state.volume)
 
@@ -237,7 +237,7 @@ def _at_pressure(landscape: Landscape, found: Minimum, stop: Stop, asked: float)
 
 
 def _strain_to(landscape: Landscape, found: Minimum, asked: float) -> float:
-    """Give the strain that takes the pressure to the asked one, as far as contacts stay."""
+    """Return the strain that takes the pressure to the asked one, as far as contacts stay."""
     pressure = pressure_of(found)
     there = followed(landscape, found, -_TRIED)
     evaluation = landscape.evaluate(there)

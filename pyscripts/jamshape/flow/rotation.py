@@ -15,14 +15,14 @@ from jamshape.shapes.shape import Interaction
 def rotation_rates(
     packing: Packing, host: Host, law: Interaction | None = None, k_d: float = 1.0
 ) -> FloatArray:
-    """Give the angular velocity of each particle of a packing in the plane.
+    """Return the angular velocity of each particle of a packing in the plane.
 
     Parameters
     ----------
     packing : Packing
     host : Host
     law : Interaction, optional
-        That of the packing when left out.
+        That of the packing by default.
     k_d : float, [energy time / length^4]
 
     Returns

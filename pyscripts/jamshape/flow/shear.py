@@ -42,7 +42,7 @@ class Shear(Motion):
     flow
         One of `FLOWS`.
 
-    Others as of `Motion`.
+    Others as in `Motion`.
 
     Raises
     ------
@@ -126,7 +126,7 @@ class Shear(Motion):
         return f"{strain}, shear stress {-found['p_xy']:.2e}"
 
     def part(self, found: Mapping[str, float], phi_start: float) -> float:
-        """Give the part of the whole strain that is done."""
+        """Return the part of the whole strain that is done."""
         del phi_start
         return min(1.0, self.strained(found) / self.strain_end)
 

@@ -22,9 +22,9 @@ class SlowShear:
     Parameters
     ----------
     gdot, strain_end, flow
-        As of `jamshape.flow.shear.Shear`.
+        See `jamshape.flow.shear.Shear`.
     tolerance, k_d, largest_strain, largest_drop, method
-        As of `jamshape.flow.implicit.Protocol`.
+        See `jamshape.flow.implicit.Protocol`.
 
     Raises
     ------
@@ -52,7 +52,7 @@ class SlowShear:
             require_in("strain", self.strain_end, RANGES["pure_strain"])
 
     def leg(self, flow: Flow, phi: float) -> Leg:
-        """Give the host, and how long it moves like this."""
+        """Return the host, and how long it moves like this."""
         del phi
         return Leg(Host.shearing(self.gdot, self.flow), (self.strain_end - flow.strain) / self.gdot)
 

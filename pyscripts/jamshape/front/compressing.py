@@ -84,11 +84,11 @@ def compress(
         chatter, so that small steps are needed; with two they rest, as in minima and modes.
     integrator : {"rkc2", "heun/adaptive", "heun"}, optional
         The paper's is ``heun``, with equal time steps; the others choose their own. ``rkc2``, the
-        fastest, when left out, and ``heun`` where there is one bond or `dt` is given.
+        fastest, by default, and ``heun`` where there is one bond or `dt` is given.
     dt : float, [time], optional
-        Time step of ``heun``; 0.05 when left out.
+        Time step of ``heun``; 0.05 by default.
     tolerance : float, optional
-        Of the others: local error of a step over the typical overlap; 1e-4 when left out.
+        Of the others: local error of a step over the typical overlap; 1e-4 by default.
     rows, frames : int
         How many samples of p(phi) and how many snapshots to keep.
     file : path, optional
@@ -170,17 +170,17 @@ def slow_compress(
     particles : Particles
         Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     phi : (float, float), optional
         Packing fractions at which a fast compression in LAMMPS ends and this one begins, and to reach; (0.8, 0.9)
-        when left out. A start has its own: the first is then that, or None.
+        by default. A start has its own: the first is then that, or None.
     kappa : float, [1/time], or sequence of (float, float)
         Rate: the box shrinks with dL/dt = -kappa L. Or pairs of a packing fraction and the rate from
         there on, ascending.
     p_end : float, [energy / length^2]
         It also ends where this pressure is reached.
     seed : int, optional
-        Of the random start; 1 when left out.
+        Of the random start; 1 by default.
     start : Packing or path, optional
         What to begin with; of a path, its last frame.
     method : {"tr-bdf2", "sdirk2", ...}
@@ -190,7 +190,7 @@ def slow_compress(
     largest_drop : float
         Part of the elastic energy that one step may lose, so that plastic events are resolved in time.
     file, again, progress
-        As of `compress`.
+        See `compress`.
 
     Returns
     -------

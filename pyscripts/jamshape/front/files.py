@@ -34,9 +34,9 @@ def load(
         H5MD of a packing or a run, HDF5 of modes, a LAMMPS dump or data file, or a GSD file.
     frame : int, optional
         Which frame of a run, a dump or a GSD file to take as a packing, from 0 or, if negative, from
-        the end; a whole run, or the last frame of the others, when left out.
+        the end; a whole run, or the last frame of the others, by default.
     dimension : {2, 3}, optional
-        Of a dump or data file that does not say it; what is most plausible when left out, with a warning.
+        Of a dump or data file that does not say it; what is most plausible by default, with a warning.
     shape : str, optional
         The same of the shape: ``"spherocylinder"``, ``"superellipsoid"`` or ``"dimer"``. The law of such a
         file is the usual one; use ``packing.with_(law=js.Interaction(k_e, sides))`` for another one.

@@ -50,31 +50,31 @@ def make_packing(
     particles : Particles, optional
         Such as ``Spherocylinders(alpha=4)``; not needed where a start is given, which has its own.
     n : int, optional
-        Number of particles; 256 in 2D, 400 in 3D when left out, or that of the protocol.
+        Number of particles; 256 in 2D, 400 in 3D by default, or that of the protocol.
     dimension : {2, 3}, optional
-        That of the shape's paper when left out.
+        That of the shape's paper by default.
     seed : int, optional
-        Of all that is random; 1 when left out.
+        Of all that is random; 1 by default.
     u0 : float, [energy / length^D], optional
         Elastic energy over the box's area (volume) to lead the packing to, which says how far above
-        jamming it is; 1e-15 in 2D and 1e-12 in 3D when left out. 0, usual for equal steps, is the first
+        jamming it is; 1e-15 in 2D and 1e-12 in 3D by default. 0, usual for equal steps, is the first
         jammed packing as it is.
     accuracy : float, optional
-        Of the energy, (u - u0) / u0; 1e-7 when left out.
+        Of the energy, (u - u0) / u0; 1e-7 by default.
     tolerance : float, optional
-        Largest net force and torque on a particle over the mean force of a bond; 1e-8 when left out, or
+        Largest net force and torque on a particle over the mean force of a bond; 1e-8 by default, or
         1e-4 for equal steps.
     way : {"quasistatic", "dynamics", "steps"}, optional
         To jamming: by quasistatic steps that are large far from it, the fastest way and the usual one, by
         slow compression in LAMMPS (Marschall & Teitel 2018, Sec. III B), or by equal quasistatic steps
         (Yuan et al. 2019, Sec. 2.2).
     phi_start : float, optional
-        Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D when left out.
+        Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D by default.
     kappa : float, [1/time], optional
-        Of the way by dynamics the slowest compression rate, 4e-7 when left out; of marschall-2018 the
-        only one, 1e-6 when left out.
+        Of the way by dynamics the slowest compression rate, 4e-7 by default; of marschall-2018 the
+        only one, 1e-6 by default.
     p_end : float, [energy / length^D], optional
-        Of the way by dynamics: the pressure to compress to at that rate; 1e-3 when left out.
+        Of the way by dynamics: the pressure to compress to at that rate; 1e-3 by default.
     phi_end : float, optional
         Of marschall-2018: the packing fraction to compress to, beyond jamming; 0.95 in 2D, 0.8 in 3D when
         left out.
@@ -83,9 +83,9 @@ def make_packing(
         2018, Sec. II and III B-C; Yuan et al. 2019, Sec. 2.2, where 2 has Monte Carlo of hard particles on
         the way, which orders them). 1 and 2 are short for the last two.
     phi_thermal, n_sweeps : float, int, optional
-        Of yuan-2019-2: packing fraction and sweeps of the Monte Carlo; 0.55 and 100000 when left out.
+        Of yuan-2019-2: packing fraction and sweeps of the Monte Carlo; 0.55 and 100000 by default.
     delta_phi : float, optional
-        The step of the packing fraction near jamming, 2e-3 when left out, or of equal steps, 1e-3.
+        The step of the packing fraction near jamming, 2e-3 by default, or of equal steps, 1e-3.
     start : path, optional
         Of marschall-2018: a file of `compress` or `slow_compress` in place of the compression. The search
         begins at its first frame that stays jammed when it is minimised; particles, n and seed are its own.
@@ -93,7 +93,7 @@ def make_packing(
         Of marschall-2018: how u0 is found; by ours, which leads box and particles at once (usual), or by
         the paper's steps of the box, 1e-6 at first and halved where u crosses u0 (Sec. III C, Eq. 20).
     minimiser : {"auto", "paper", "newton", "lbfgs", "lammps"}, optional
-        Of the halving search: "paper" is the conjugate gradients of its App. A; "auto" when left out.
+        Of the halving search: "paper" is the conjugate gradients of its App. A; "auto" by default.
     strict : bool
         Go on at the energy, along what slides, until no mode has an eigenvalue below zero by more than its
         bound; ``results["n_negative"]`` says how many have. Rods of alpha = 4 end at saddles otherwise.

@@ -152,7 +152,7 @@ class Modes:
         return self.table.moduli
 
     def plot(self, axes: Axes | None = None, **look: Any) -> Axes:
-        """Draw the density of their frequencies; arguments as `jamshape.plot`."""
+        """Draw the density of their frequencies; arguments as in `jamshape.plot`."""
         from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows modes
 
         return plot(self, axes, **look)
@@ -225,7 +225,7 @@ def modes(
     packing : Packing or path
         At a minimum of its energy, as `make_packing` leaves it; the energy is that of its law, ``packing.law``.
     lowest : int, optional
-        Only this number of softest modes, by a sparse method; all when left out. Translations do not count
+        Only this number of softest modes, by a sparse method; all by default. Translations do not count
         and come in addition, flagged, as in the whole spectrum.
     near : float, [sqrt(energy) / length], optional
         As many modes as `lowest` says, or 20, whose frequencies are nearest to this one.

@@ -123,13 +123,13 @@ class MeasuredPacking(Packing):
         return sum_forces(self, self._contacts.network).pressure
 
     def modes(self, **how: Any) -> Modes:
-        """Find its modes of vibration; arguments and errors as `jamshape.modes`."""
+        """Find its modes of vibration; arguments and errors as in `jamshape.modes`."""
         from jamshape.front.modes import modes  # noqa: PLC0415 - which knows packings
 
         return modes(self, **how)
 
     def plot(self, axes: Axes | None = None, **look: Any) -> Axes:
-        """Draw it; arguments as `jamshape.plot`."""
+        """Draw it; arguments as in `jamshape.plot`."""
         from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows packings
 
         return plot(self, axes, **look)
@@ -143,7 +143,7 @@ class MeasuredPacking(Packing):
 
     @property
     def to_store(self) -> dict[str, Any]:
-        """Give the results without what tells of a run: a frame is not that run, which could be gone on with."""
+        """Return the results without what tells of a run: a frame is not that run, which could be gone on with."""
         return {k: v for k, v in self.results.items() if k != "finished"}
 
     @checked
@@ -154,19 +154,19 @@ class MeasuredPacking(Packing):
         write_gsd(path, self)
 
     def to_freud(self) -> Any:
-        """Give what freud's functions take; see `jamshape.exchange.freud.to_freud`."""
+        """Return what freud's functions take; see `jamshape.exchange.freud.to_freud`."""
         from jamshape.exchange.freud import to_freud  # noqa: PLC0415 - freud may be missing
 
         return to_freud(self)
 
     def to_ovito(self) -> Any:
-        """Give an `ovito.data.DataCollection`; see `jamshape.exchange.ovito.to_ovito`."""
+        """Return an `ovito.data.DataCollection`; see `jamshape.exchange.ovito.to_ovito`."""
         from jamshape.exchange.ovito import to_ovito  # noqa: PLC0415 - ovito may be missing
 
         return to_ovito(self, self.rattlers)
 
     def to_mdanalysis(self) -> Any:
-        """Give an `MDAnalysis.Universe`; see `jamshape.exchange.mdanalysis.to_mdanalysis`."""
+        """Return an `MDAnalysis.Universe`; see `jamshape.exchange.mdanalysis.to_mdanalysis`."""
         from jamshape.exchange.mdanalysis import (  # noqa: PLC0415 - MDAnalysis may be missing
             to_mdanalysis,
         )

@@ -42,9 +42,9 @@ def plot(
     thing : Packing, RunFile, ShearFile, QuasistaticShearFile or Modes
     axes : matplotlib Axes, optional
         Where to draw, without a projection, also packings in space, whose picture is computed; a new figure of
-        `matplotlib.pyplot` when left out.
+        `matplotlib.pyplot` by default.
     color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}, optional
-        What the colours of a packing's particles tell; "kind" when left out.
+        What the colours of a packing's particles tell; "kind" by default.
 
     Returns
     -------

@@ -59,7 +59,7 @@ class Recorded:
         object.__setattr__(self, "file", settled(self.file))
 
     def save(self, path: str | Path) -> None:
-        """Write a copy, as `jamshape.save`."""
+        """Write a copy, as in `jamshape.save`."""
         from jamshape.front.files import save  # noqa: PLC0415 - which knows runs
 
         save(path, self)
@@ -112,7 +112,7 @@ class Recorded:
         return map(self.packing, range(len(self)))
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw its pressure; arguments as `jamshape.plot`."""
+        """Draw its pressure; arguments as in `jamshape.plot`."""
         from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows runs
 
         return plot(self, axes)
@@ -134,7 +134,7 @@ class Recorded:
 
 
 class RunFile(Recorded):
-    """A compression in its H5MD file; parameters as of `Recorded`.
+    """A compression in its H5MD file; parameters as in `Recorded`.
 
     Examples
     --------
@@ -234,7 +234,7 @@ class RunFile(Recorded):
 
 
 class ShearFile(Recorded):
-    """A shear in its H5MD file; parameters as of `Recorded`.
+    """A shear in its H5MD file; parameters as in `Recorded`.
 
     Examples
     --------
@@ -265,7 +265,7 @@ class ShearFile(Recorded):
         Parameters
         ----------
         after : float, optional
-            Strain from which to average; chosen when left out.
+            Strain from which to average; chosen by default.
 
         Returns
         -------
@@ -287,7 +287,7 @@ class ShearFile(Recorded):
 
 
 class QuasistaticShearFile(Recorded):
-    """A quasistatic shear in its H5MD file; parameters as of `Recorded`.
+    """A quasistatic shear in its H5MD file; parameters as in `Recorded`.
 
     Its first row is the start as it was minimised. Frame 0 is the start itself.
 
@@ -349,7 +349,7 @@ class QuasistaticShearFile(Recorded):
 
     @checked
     def steady(self, after: float | None = None) -> SteadyState:
-        """Average over the steady state, as `ShearFile.steady`."""
+        """Average over the steady state, as in `ShearFile.steady`."""
         return steady_state(self.observables, self.strain, after)
 
     def __repr__(self) -> str:
@@ -366,7 +366,7 @@ def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:
 
 
 def run_file(path: Path, folder: Any = None) -> Recorded:
-    """Give a run in its file, of the class that knows what it is a run of."""
+    """Return a run in its file, of the class that knows what it is a run of."""
     known = read_attributes(path)
     kind = next((kind for mark, kind in _KINDS.items() if mark in known), RunFile)
     return kind(path, folder)

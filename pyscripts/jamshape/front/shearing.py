@@ -75,37 +75,37 @@ def shear(
     particles : Particles
         Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     dimension : {2, 3}, optional
-        2 when left out, or that of the start.
+        2 by default, or that of the start.
     phi : float, optional
-        Packing fraction, to which a random packing is compressed fast; 0.8 when left out, or that of the start.
+        Packing fraction, to which a random packing is compressed fast; 0.8 by default, or that of the start.
     gdot : float, [1/time]
         Rate: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
     strain : float
         Strain to reach, the rate times the time.
     flow : {"simple", "pure"}
     seed : int, optional
-        Of the random start; 1 when left out.
+        Of the random start; 1 by default.
     start : Packing or path, optional
         What to begin with, at its own packing fraction; of a path, its last frame.
     sides : {1, 2}
         Bonds of a side-to-side contact of rods.
     integrator : {"rkc2", "heun/adaptive", "heun", "tr-bdf2", "sdirk2"}, optional
-        The first three are LAMMPS's, as of `compress`; the last two take implicit steps in the plane, without LAMMPS, at a
+        The first three are LAMMPS's, as in `compress`; the last two take implicit steps in the plane, without LAMMPS, at a
         cost that hardly grows as the rate falls. ``heun`` with one bond or where `dt` is given; else ``tr-bdf2`` in
         the plane at rates of 3e-7 and below, and ``rkc2`` otherwise.
     dt : float, [time], optional
-        Time step of ``heun``; 0.05 when left out.
+        Time step of ``heun``; 0.05 by default.
     tolerance : float, optional
         Of the others: local error of a step over the typical overlap; 1e-4 in LAMMPS and 1e-3 of implicit steps
-        when left out.
+        by default.
     rows : int
         How many samples of stress and order to keep; implicit steps are as many, or more.
     frames : int, optional
-        How many snapshots to keep; 20 when left out. Implicit steps keep one of every 100 steps.
+        How many snapshots to keep; 20 by default. Implicit steps keep one of every 100 steps.
     file : path, optional
-        H5MD file of the run, as of `compress`: a finished run of these settings is loaded from it, and one
+        H5MD file of the run, as in `compress`: a finished run of these settings is loaded from it, and one
         that was cut off goes on.
     again : bool
         Begin anew, whatever the file holds.
@@ -191,11 +191,11 @@ def quasistatic_shear(
     particles : Particles
         Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     dimension : {2, 3}, optional
-        2 when left out, or that of the start.
+        2 by default, or that of the start.
     phi : float, optional
-        Packing fraction, to which a random packing is compressed by such steps, too; 0.9 when left out, or that of the start.
+        Packing fraction, to which a random packing is compressed by such steps, too; 0.9 by default, or that of the start.
     step, strain : float
         Strain of each step, and the one to reach.
     flow : {"simple", "pure"}
@@ -204,13 +204,13 @@ def quasistatic_shear(
     tolerance : float
         Largest net force and torque of a particle over the mean bond force.
     seed : int, optional
-        Of the random start; 1 when left out.
+        Of the random start; 1 by default.
     start : Packing or path, optional
         What to begin with, at its own packing fraction; of a path, its last frame.
     frames : int
         About how many snapshots to keep.
     file, again, progress
-        As of `compress`.
+        See `compress`.
 
     Returns
     -------
@@ -334,7 +334,7 @@ class _Start(NamedTuple):
         return start_below(phi, n, seed, self.particles, dimension)
 
     def flowing(self) -> Packing:
-        """Give the start, compressed at a rate."""
+        """Return the start, compressed at a rate."""
         if self.known:
             return self.known
         random = self._random()
@@ -343,7 +343,7 @@ class _Start(NamedTuple):
         return compressed_start(random, phi) if is_looser else random
 
     def still(self) -> Packing:
-        """Give the start, compressed by minimisations."""
+        """Return the start, compressed by minimisations."""
         if self.known:
             return self.known
         random = self._random()

@@ -141,7 +141,7 @@ def load_errors() -> Any:
 
 
 def run_command(lmp: Any, line: str) -> None:
-    """Give LAMMPS a line of input.
+    """Return LAMMPS a line of input.
 
     Raises
     ------

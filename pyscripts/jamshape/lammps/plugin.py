@@ -124,9 +124,9 @@ def loader_lines(folder: Path | None = None, version: int | None = None) -> tupl
     Parameters
     ----------
     folder
-        The folder that holds ``inputs/load_plugin.lmp``; that of this installation when left out.
+        The folder that holds ``inputs/load_plugin.lmp``; that of this installation by default.
     version
-        Of the LAMMPS that reads the deck; that of the plugin when left out.
+        Of the LAMMPS that reads the deck; that of the plugin by default.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def built_for(plugin: Path | None = None) -> int:
     Parameters
     ----------
     plugin
-        The compiled file; that of this installation when left out.
+        The compiled file; that of this installation by default.
 
     Raises
     ------

@@ -272,7 +272,7 @@ class Session:
         )
 
     def _known(self, diameters: FloatArray, types: IntArray) -> dict[str, Any]:
-        """Give what LAMMPS does not know of its particles."""
+        """Return what LAMMPS does not know of its particles."""
         if self._like is None:
             known = {"shape_style": guess_shape_style(diameters), "species": types}
             return known | {"id": np.arange(1, len(types) + 1)}

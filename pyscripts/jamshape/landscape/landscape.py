@@ -59,7 +59,7 @@ class Landscape:
     k_e : float, [energy], optional
     sides : {1, 2}, optional
         Bonds of a side-to-side contact, of shapes that have both laws; minima exist for 2 only. Both are
-        those of the packing's law when left out.
+        those of the packing's law by default.
 
     Notes
     -----
@@ -206,7 +206,7 @@ class Landscape:
         return find_rattlers(packing, find_contacts(packing, self.k_e, self.sides))
 
     def derivatives(self, state: State, *, extended: bool = False) -> dict[str, NDArray[Any]]:
-        """Give second derivatives contact by contact, as the class of `jamshape._contact` does.
+        """Return second derivatives contact by contact, as the class of `jamshape._contact` does.
 
         Its rows `pair` are those of `particles`, an array (C, 2) that is added here.
         """
@@ -259,7 +259,7 @@ class Landscape:
         return PairArrays(*state.split, pairs.particles, pairs.shift)
 
     def pairs_at(self, state: State) -> Pairs:
-        """Give the pairs that may touch at a state: the list that there is, or a new one."""
+        """Return the pairs that may touch at a state: the list that there is, or a new one."""
         if self._pairs is None or self._pairs.outrun_by(state, self.turning_radius):
             return self.renewed_pairs(state)
         return self._pairs
@@ -272,7 +272,7 @@ class Landscape:
         return self._pairs
 
     def wide_pairs(self, state: State) -> Pairs:
-        """Give the pairs of a wider skin, as long as all that may touch at a state are among them."""
+        """Return the pairs of a wider skin, as long as all that may touch at a state are among them."""
         wide = self._wide
         if wide is None or wide.outrun_by(state, self.turning_radius, self.skin):
             skin = _WIDE * self.skin

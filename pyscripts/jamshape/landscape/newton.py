@@ -40,7 +40,7 @@ class Factorisation:
 
 
 def least_shift(landscape: Landscape, evaluation: Evaluation) -> float:
-    """Give the shift of a Hessian's diagonal that forces as large as these ask for, [energy / length^2].
+    """Return the shift of a Hessian's diagonal that forces as large as these ask for, [energy / length^2].
 
     It falls with the forces, as the Levenberg-Marquardt method has it, so that Newton's method converges
     faster than linearly, and is no larger than the first one.

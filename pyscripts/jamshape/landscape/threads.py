@@ -12,7 +12,7 @@ _THREADS = ContextVar("threads", default=1)
 
 
 def threads() -> int:
-    """Give their number where this is called: 1 if nobody said another."""
+    """Return their number where this is called: 1 if nobody said another."""
     return _THREADS.get()
 
 

@@ -116,7 +116,7 @@ class Vicinity:
         Parameters
         ----------
         matrix : (2, D, D) array of float64
-            Upper triangular, doubles and their small rests: for positions and cell vectors.
+            Upper triangular, doubles and their low parts: for positions and cell vectors.
         turns : (N, 1) or (N, 3) array of float64
             Rotation vectors.
         """
@@ -199,11 +199,11 @@ class Vicinity:
         return DescentEnd(end.outcome, self._accepted(end.sums), end.rows)
 
     def newton(self, shift: float) -> NewtonSystem:
-        """Give Newton's equations at the base, with a first shift of the Hessian's diagonal."""
+        """Return Newton's equations at the base, with a first shift of the Hessian's diagonal."""
         return NewtonSystem(self._compiled, shift)
 
     def part_within(self, x: FloatArray) -> float:
-        """Give the part, at most 1, of a step along (n,) coordinates that is as long as a step may be."""
+        """Return the part, at most 1, of a step along (n,) coordinates that is as long as a step may be."""
         return float(self._compiled.part_within(x, self._longest_step, WIDEST_TURN))
 
     @property

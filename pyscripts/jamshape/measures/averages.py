@@ -108,7 +108,7 @@ def averages(groups: Mapping[_Group, Sequence[Measured]], name: str) -> dict[_Gr
 def exactly(
     groups: Mapping[_Group, Sequence[Any]], value: Callable[[_Group], float]
 ) -> dict[_Group, Mean]:
-    """Give each group a number that needs no average."""
+    """Return each group a number that needs no average."""
     return {group: Mean(value(group), math.nan, len(samples)) for group, samples in groups.items()}
 
 

@@ -9,7 +9,7 @@ from jamshape.contacts import Contacts
 
 
 def class_stress(found: Contacts) -> dict[int, FloatArray]:
-    """Give the pressure tensor of the contacts of each class.
+    """Return the pressure tensor of the contacts of each class.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ class FlowCurve(NamedTuple):
         return Mean(self.pressures[0] / self.rates[0], self.errors[0] / self.rates[0], 1)
 
     def at(self, rate: FloatArray) -> FloatArray:
-        """Give the law's pressure."""
+        """Return the law's pressure."""
         return np.asarray(self.yields + self.factor * rate**self.power)
 
 

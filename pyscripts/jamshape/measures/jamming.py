@@ -151,14 +151,14 @@ class Jamming(NamedTuple):
 
 
 def stays_jammed(packing: Packing, k_e: float | None = None) -> bool | None:
-    """Tell whether a state keeps energy in balanced contacts when it is minimised at fixed box.
+    """Return whether a state keeps energy in balanced contacts when it is minimised at fixed box.
 
     Parameters
     ----------
     packing : Packing
         Minimised with two bonds side to side, whatever its law: with one there are no minima.
     k_e : float, [energy], optional
-        That of the packing's law when left out.
+        That of the packing's law by default.
 
     Returns
     -------
@@ -200,7 +200,7 @@ def minimised_frames(
     read : callable
         Reads one by its number, from 0.
     k_e : float, [energy], optional
-        That of the law of each frame when left out.
+        That of the law of each frame by default.
 
     Yields
     ------

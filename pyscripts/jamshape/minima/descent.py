@@ -61,7 +61,7 @@ class Stop:
     tolerance
         Converged when the residual is below.
     lowest
-        Unjammed when the energy density is below, [energy / length^D]; when left out 1e-24 in units of
+        Unjammed when the energy density is below, [energy / length^D]; by default 1e-24 in units of
         k_e and `Landscape.length`.
     evaluations
         Exhausted after so many evaluations of all forces.

@@ -137,7 +137,7 @@ class Search:
     history: History = field(default_factory=History)
 
     def lowest(self, landscape: Landscape, target: Target) -> float | None:
-        """Give the energy density below which the state, once it is minimised, is unjammed.
+        """Return the energy density below which the state, once it is minimised, is unjammed.
 
         That of a jammed one which was compressed is far above; a start may be a packing at any energy.
         """
@@ -348,7 +348,7 @@ def followed(landscape: Landscape, at: Minimum, strain: float) -> State:
     landscape : Landscape
     at : Minimum
     strain : float
-        As of `State.strained`.
+        See `State.strained`.
 
     Returns
     -------
@@ -364,7 +364,7 @@ def followed(landscape: Landscape, at: Minimum, strain: float) -> State:
 
 
 def _towards(at: Minimum, u0: float, part: float = 1.0) -> float:
-    """Give sqrt(u) after a part of the way to u0, which is a bounded factor at most."""
+    """Return sqrt(u) after a part of the way to u0, which is a bounded factor at most."""
     now, aim = math.sqrt(at.energy_density), math.sqrt(u0)
     aim = min(max(aim, now / _LARGEST_FACTOR), now * _LARGEST_FACTOR)
     return now + part * (aim - now)
@@ -418,7 +418,7 @@ def halving(
     L and r are scaled by 1 -+ lambda and minimised until U crosses U0; then lambda is halved and
     the direction reversed. `Search.step` is lambda, 1e-6 to begin with in the paper.
 
-    Arguments and results as of `direct`.
+    Arguments and results as in `direct`.
 
     Raises
     ------

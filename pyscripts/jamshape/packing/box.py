@@ -204,7 +204,7 @@ class Lengths(NamedTuple):
 
 
 def cuboid_around(vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give the lower and the upper corner (D,) of what sums of some of the columns (D, D) reach, from 0 on."""
+    """Return the lower and the upper corner (D,) of what sums of some of the columns (D, D) reach, from 0 on."""
     return np.minimum(vectors, 0).sum(axis=1), np.maximum(vectors, 0).sum(axis=1)
 
 
@@ -214,6 +214,6 @@ def number_of_tilts(dimension: int) -> int:
 
 
 def affine_change(then: FloatArray, now: FloatArray) -> FloatArray:
-    """Give the (D, D) linear map that takes cell vectors, the columns of (D, D), to others."""
+    """Return the (D, D) linear map that takes cell vectors, the columns of (D, D), to others."""
     edges = np.diagonal(then)
     return np.asarray(now / edges @ np.linalg.inv(then / edges))

@@ -47,19 +47,19 @@ class Packing(Record):
         LAMMPS IDs, from 1, each once.
     box : Box
     image : (N, D) array of int64, optional
-        Periodic image counts; zeros when left out.
+        Periodic image counts; zeros by default.
     shape_style : str
         A name of `jamshape.shapes.table.SHAPES`.
     exponent : (N,) array of float64, optional
-        p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones when left out.
+        p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones by default.
     law : Interaction
         Constants of the contacts, which energy and forces depend on; k_e = 1 and two bonds side to side
-        when left out.
+        by default.
     step : int
     time : float, [time]
     position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional
         What the doubles of position, orientation, edges and tilt of the box leave out of coordinates
-        that are known to more digits; zeros when left out. See `poses`.
+        that are known to more digits; zeros by default. See `poses`.
 
     Raises
     ------

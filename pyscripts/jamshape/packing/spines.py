@@ -10,7 +10,7 @@ from jamshape.packing.packing import Packing
 
 
 def with_spines(discs: Packing, alpha: float, seed: int) -> Packing:
-    """Give each disc a spine of random direction, and open the box as far as keeps phi.
+    """Return each disc a spine of random direction, and open the box as far as keeps phi.
 
     Parameters
     ----------

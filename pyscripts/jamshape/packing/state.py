@@ -21,14 +21,14 @@ class State(Record):
     """Poses of particles and the box, in extended precision.
 
     A double has lost the last eight digits of an overlap of 1e-9 by the time it holds a position in a box
-    of 40; `numpy.longdouble` keeps them. Files hold each number as a double and its small rest.
+    of 40; `numpy.longdouble` keeps them. Files hold each number as a double and its low part.
 
     Parameters
     ----------
     position : (N, D) array of longdouble, [length]
     orientation : (N, 1) angles in 2D, (N, 4) quaternions w i j k in 3D, of longdouble
     cell : (D, D) array of longdouble, [length]
-        The box: its cell vectors are the columns, as of `Box.matrix`.
+        The box: its cell vectors are the columns, as in `Box.matrix`.
     """
 
     position: LongArray
@@ -37,19 +37,19 @@ class State(Record):
 
     @classmethod
     def of(cls, packing: Packing) -> State:
-        """Take the poses of a packing, its small rests included."""
+        """Take the poses of a packing, its low parts included."""
         position, orientation, cell = (np.asarray(x, np.longdouble) for x in packing.poses())
         return cls(position, orientation.reshape(packing.n, -1), cell)
 
     @cached_property
     def split(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Position, orientation, cell, each (2, ...): doubles and their small rests."""
+        """Position, orientation, cell, each (2, ...): doubles and their low parts."""
         position, orientation, cell = map(_split, (self.position, self.orientation, self.cell))
         return position, orientation, cell
 
     @classmethod
     def joined(cls, position: FloatArray, orientation: FloatArray, cell: FloatArray) -> State:
-        """Add doubles and their small rests, each array (2, ...) as `split` gives them."""
+        """Add doubles and their low parts, each array (2, ...) as `split` gives them."""
         return cls(*(np.longdouble(x[0]) + x[1] for x in (position, orientation, cell)))
 
     @property
@@ -59,7 +59,7 @@ class State(Record):
 
     @property
     def edges(self) -> LongArray:
-        """(D,) as of `Box.edges`, [length]."""
+        """(D,) as in `Box.edges`, [length]."""
         return np.diagonal(self.cell)
 
     @property
@@ -104,7 +104,7 @@ class State(Record):
 
 
 def _split(values: LongArray) -> FloatArray:
-    """(2, ...) a double and its small rest."""
+    """(2, ...) a double and its low part."""
     double = values.astype(np.float64)
     return np.stack([double, (values - double).astype(np.float64)])
 

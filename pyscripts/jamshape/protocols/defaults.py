@@ -81,7 +81,7 @@ class UsualWay(NamedTuple):
     """Defaults that are others in 2D."""
 
     def defaults(self, dimension: int) -> dict[str, Any]:
-        """Give all its settings as they are where nothing was asked for."""
+        """Return all its settings as they are where nothing was asked for."""
         return dict(self.usual) | (dict(self.in_plane) if dimension == 2 else {})
 
 
@@ -190,12 +190,12 @@ def recipe_for(
     particles : Particles, optional
         Needed unless there is a start.
     dimension : {2, 3}, optional
-        That of the shape's paper when left out.
+        That of the shape's paper by default.
     way : str, optional
         One of `WAYS`: quasistatic steps that adapt ("quasistatic"), usual, slow compression in LAMMPS
         ("dynamics"), or equal quasistatic steps ("steps").
     seed : int, optional
-        Of all that is random; 1 when left out.
+        Of all that is random; 1 by default.
     protocol : str or int, optional
         One of `PROTOCOLS`, which is a way with the published numbers; 1 and 2 are those of Yuan et al. 2019.
     **given

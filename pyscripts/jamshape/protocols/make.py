@@ -80,7 +80,7 @@ def make(
     Raises
     ------
     TargetError
-        As `target.direct`.
+        See `target.direct`.
     ValueError
         As `Recipe.start` and `target.direct`, or if another packing was being made there.
     """

@@ -127,7 +127,7 @@ class SearchFile:
 def lead(
     landscape: Landscape, start: State, target: Target, file: SearchFile
 ) -> Generator[Progress, None, Minimum]:
-    """Lead a state to an energy, going on with what is in the file; errors as `target.direct`.
+    """Lead a state to an energy, going on with what is in the file; errors as in `target.direct`.
 
     The search is that of the recipe's way (`SEARCHES`). Either ends by its own rule when its steps become too
     small, and after `MOST_MINIMISATIONS` at the latest.

@@ -52,7 +52,7 @@ class Quasistatic:
         Minimiser.
     coarse
         Largest step, where minimisations take few evaluations, as they do far below jamming; steps are equal
-        when left out.
+        by default.
 
     Raises
     ------

@@ -43,7 +43,7 @@ def random_packing(
     seed : int
         Of `numpy.random.default_rng`; the same arguments give the same packing.
     particles : Particles, optional
-        ``Particles.of()`` when left out.
+        ``Particles.of()`` by default.
     dimension : {2, 3}
 
     Returns
@@ -91,7 +91,7 @@ def start_below(
 ) -> Packing:
     """Make a random packing to compress to phi: as dense as long particles find room at random.
 
-    Arguments and errors as of `random_packing`.
+    Arguments and errors as in `random_packing`.
     """
     for densest in _DENSEST:
         with suppress(InsertionError):
@@ -104,7 +104,7 @@ def dilute_packing(
 ) -> Packing:
     """Place particles at random with random orientations, whether they overlap or not.
 
-    Yuan et al. 2019, Sec. 2.2. Arguments and errors as of `random_packing`; in dilute packings overlaps
+    Yuan et al. 2019, Sec. 2.2. Arguments and errors as in `random_packing`; in dilute packings overlaps
     are few and small, and the first minimisation undoes them.
     """
     unplaced, rng = _unplaced(n, phi, seed, (particles or Particles.of(), dimension))

@@ -283,7 +283,7 @@ class Recipe:
         self.way.require(self)
 
     def start(self) -> Packing:
-        """Make the random start; errors as `random_start.random_packing`."""
+        """Make the random start; errors as in `random_start.random_packing`."""
         return self.way.start(self)
 
     @property

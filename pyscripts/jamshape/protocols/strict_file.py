@@ -56,7 +56,7 @@ class StrictFile:
 def lead_strictly(
     landscape: Landscape, minimum: Minimum, file: StrictFile
 ) -> Generator[Progress, None, Minimum]:
-    """Lead a minimum on to a strict one, going on with what is in the file; errors as `strict.descend`.
+    """Lead a minimum on to a strict one, going on with what is in the file; errors as in `strict.descend`.
 
     Yields
     ------

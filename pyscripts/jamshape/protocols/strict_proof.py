@@ -2,7 +2,7 @@
 
 A minimum may lie on a kink of the energy, where the tips of two rods are level (`vibration.kinks`). Second derivatives of one
 side are then negative, and no step lowers the energy: such a state is a minimum if its energy rises to both sides of the kink
-and no motion along the kink has a negative eigenvalue. What kinks take is counted apart, as `Proof.n_kinked`.
+and no motion along the kink has a negative eigenvalue. What kinks take is counted apart, as in `Proof.n_kinked`.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ class Dimer(ElongatedShape):
     examples = ({"alpha": 1.0}, {"alpha": 0.4}, {"alpha": 1.3})
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
-        """As `Shape.outline`."""
+        """See `Shape.outline`."""
         del exponent
         radius, A = diameters[1] / 2, self.spine(diameters)
         waist = self._waist(radius, A)
@@ -37,7 +37,7 @@ class Dimer(ElongatedShape):
         return np.concatenate([right, -right])
 
     def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
-        """As `Shape.surface`."""
+        """See `Shape.surface`."""
         del exponent
         radius, A = diameters[1] / 2, self.spine(diameters)
         part = arc(np.pi, self._waist(radius, A), 2 + 2 * 2**level)  # of the left sphere
@@ -46,7 +46,7 @@ class Dimer(ElongatedShape):
         return revolved(radius * normal + centre, normal, 8 * 2**level)
 
     def solid(self, diameters: FloatArray, exponent: float) -> Balls:
-        """As `Shape.solid`."""
+        """See `Shape.solid`."""
         del exponent
         A = self.spine(diameters)
         return Balls(np.array([[-A, 0.0, 0.0], [A, 0.0, 0.0]]), float(diameters[1]) / 2)

@@ -28,7 +28,7 @@ def Spherocylinders(
         Aspect ratio A/R; 0 for discs, or spheres. An array makes a mixture of k kinds.
     size_ratio : float, optional
         Big over small of particles that are mixed 1:1, all of one aspect ratio; 1.4 as in the paper
-        when left out, 1 for equal particles.
+        by default, 1 for equal particles.
     **kinds : float or (k,) array
         ``size``, R of each kind over the unit of length 1/2 (1); ``share`` of the number of
         particles, over the sum of all shares (1); ``spread``, the standard deviation of the logarithm of
@@ -73,9 +73,9 @@ def Superellipsoids(
     w1, w2 : float or (k,) array
         Ratios a/b, at most 1, and c/b, at least 1, of the semi-axes.
     size_ratio : float, optional
-        Big over small of particles that are mixed 1:1; 1, equal particles, when left out.
+        Big over small of particles that are mixed 1:1; 1, equal particles, by default.
     **kinds : float or (k,) array
-        As of `Spherocylinders`; the unit of length is the shortest semi-axis.
+        See `Spherocylinders`; the unit of length is the shortest semi-axis.
 
     Returns
     -------
@@ -106,9 +106,9 @@ def Dimers(
     alpha : float or (k,) array
         A/R, above 0; the discs just touch at 1. An array makes a mixture of k kinds.
     size_ratio : float, optional
-        Big over small of particles that are mixed 1:1; 1.4 when left out, 1 for equal particles.
+        Big over small of particles that are mixed 1:1; 1.4 by default, 1 for equal particles.
     **kinds : float or (k,) array
-        As of `Spherocylinders`.
+        See `Spherocylinders`.
 
     Returns
     -------

@@ -105,10 +105,10 @@ class Particles:
         ----------
         shape : str or Shape
         size_ratio : float, optional
-            Big over small, at least 1; what is usual for the shape when left out (1.4 for rods,
+            Big over small, at least 1; what is usual for the shape by default (1.4 for rods,
             Marschall & Teitel 2018, Sec. II; 1, equal particles, for superellipsoids).
         **parameters : float
-            Of the shape; its defaults when left out.
+            Of the shape; its defaults by default.
 
         Raises
         ------

@@ -118,7 +118,7 @@ class Shape(ABC):
     has_exponent: ClassVar[bool] = False
 
     def __eq__(self, other: object) -> bool:
-        """Tell whether it is the same shape; copies and pickles of a shape are."""
+        """Return whether it is the same shape; copies and pickles of a shape are."""
         return type(self) is type(other) and vars(self) == vars(other)
 
     def __hash__(self) -> int:
@@ -194,7 +194,7 @@ class Shape(ABC):
         return Style(packing.species, command)
 
     def described(self, diameters: FloatArray, exponent: FloatArray) -> dict[str, float]:
-        """Give numbers that describe the first of (N, 3) diameters and (N,) exponents."""
+        """Return numbers that describe the first of (N, 3) diameters and (N,) exponents."""
         del diameters, exponent
         return {}
 
@@ -243,7 +243,7 @@ class ElongatedShape(Shape):
     size_ratio = 1.4
 
     def fits(self, diameters: FloatArray) -> bool:
-        """As `Shape.fits`."""
+        """See `Shape.fits`."""
         long, short, other = diameters.T
         return bool(((short == other) & (long >= short)).all())
 
@@ -263,13 +263,13 @@ class ElongatedShape(Shape):
         return found, np.where(is_other, first, 0)
 
     def rule(self) -> str:
-        """As `Shape.rule`."""
+        """See `Shape.rule`."""
         return "(2(A+R), 2R, 2R) with A >= 0"
 
     def sizes(
         self, parameters: Mapping[str, float], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """As `Shape.sizes`."""
+        """See `Shape.sizes`."""
         radius = 0.5 * size
         half_length = parameters["alpha"] * radius
         long = 2 * (half_length + radius)
@@ -278,11 +278,11 @@ class ElongatedShape(Shape):
     def parameters_of(
         self, diameters: FloatArray, exponent: float
     ) -> tuple[dict[str, float], float]:
-        """As `Shape.parameters_of`."""
+        """See `Shape.parameters_of`."""
         del exponent
         width = float(diameters[1])
         return {"alpha": float(diameters[0] - width) / width}, width
 
     def spine(self, diameters: FloatArray) -> float:
-        """As `Shape.spine`."""
+        """See `Shape.spine`."""
         return float(diameters[0] - diameters[1]) / 2

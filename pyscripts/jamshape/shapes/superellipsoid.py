@@ -43,17 +43,17 @@ class Superellipsoid(Shape):
     has_exponent = True
 
     def fits(self, diameters: FloatArray) -> bool:
-        """As `Shape.fits`."""
+        """See `Shape.fits`."""
         return bool((diameters > 0).all())
 
     def rule(self) -> str:
-        """As `Shape.rule`."""
+        """See `Shape.rule`."""
         return "(2a, 2b, 2c), all positive"
 
     def sizes(
         self, parameters: Mapping[str, float], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """As `Shape.sizes`."""
+        """See `Shape.sizes`."""
         axes = axes_from(parameters["w1"], parameters["w2"])
         return size[:, None] * (2 * axes), np.full(len(size), parameters["exponent"])
 
@@ -85,20 +85,20 @@ class Superellipsoid(Shape):
         }
 
     def stem(self, parameters: Mapping[str, float]) -> str:
-        """As `Shape.stem`."""
+        """See `Shape.stem`."""
         exponent, w1, w2 = (in_name(parameters[p.name]) for p in self.parameters)
         return f"p{exponent}_w{w1}_{w2}"
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
-        """As `Shape.outline`."""
+        """See `Shape.outline`."""
         turn = arc(0, 2 * np.pi, points + 1)[:-1]
         scaled: FloatArray = np.sign(turn) * np.abs(turn) ** (1 / exponent) * diameters[:2] / 2
         return scaled
 
     def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
-        """As `Shape.surface`."""
+        """See `Shape.surface`."""
         return surface_mesh(diameters / 2, exponent, level)
 
     def solid(self, diameters: FloatArray, exponent: float) -> Superquadric:
-        """As `Shape.solid`."""
+        """See `Shape.solid`."""
         return Superquadric(diameters / 2, 1 / exponent)

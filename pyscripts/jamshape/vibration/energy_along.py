@@ -233,7 +233,7 @@ class AlongModes:
     coordinates : Coordinates
         Those of the modes.
     k_e : float, [energy], optional
-        That of the packing's law when left out.
+        That of the packing's law by default.
     """
 
     def __init__(

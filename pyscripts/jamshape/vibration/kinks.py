@@ -49,7 +49,7 @@ def kinks_across(
 
 
 def held_at(matrix: DynamicalMatrix, normals: FloatArray) -> DynamicalMatrix:
-    """Give the matrix of motions that stay on kinks: across each is one more row of C, as stiff as the stiffest bond.
+    """Return the matrix of motions that stay on kinks: across each is one more row of C, as stiff as the stiffest bond.
 
     It is that of the pieces where the state is; others differ by what the forces change across a kink.
     """

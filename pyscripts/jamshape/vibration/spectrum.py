@@ -99,7 +99,7 @@ class Spectrum:
         return replace(self, vectors=self.vectors[:, rows], **columns)
 
     def with_exact_translations(self) -> Spectrum:
-        """Give translations the eigenvalue 0, which they have, without an error."""
+        """Return translations the eigenvalue 0, which they have, without an error."""
         exact: dict[str, Any] = {
             name: np.where(self.is_translation, 0.0, getattr(self, name)) for name in COLUMNS[:-1]
         }
