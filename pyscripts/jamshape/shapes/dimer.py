@@ -19,11 +19,11 @@ class Dimer(ElongatedShape):
 
     name = "dimer"
     compiled_name = "Dimers"
-    # Discs that coincide would count as four bonds with each neighbour.
+    # Coinciding discs would count as four bonds with each neighbour.
     parameters = (
         Parameter(
             "alpha", 1.0, "A/R: 1 where the discs just touch", "alpha",
-            Range(1e-6, 100.0, "A / R above 0, since a disc is a spherocylinder,"),
+            Range(1e-6, 100.0, "A / R above 0, as a disc is a spherocylinder,"),
         ),
     )  # fmt: skip
     examples = ({"alpha": 1.0}, {"alpha": 0.4}, {"alpha": 1.3})
@@ -53,5 +53,5 @@ class Dimer(ElongatedShape):
 
     @staticmethod
     def _waist(radius: float, A: float) -> float:
-        """Angle, seen from a disc's centre, between the line to the other one and where they meet."""
+        """Angle at a disc's centre between the line to the other disc and the point where they meet."""
         return float(np.arccos(min(A / radius, 1.0)))

@@ -24,7 +24,7 @@ class Spherocylinder(ElongatedShape):
     examples = ({"alpha": 4.0}, {"alpha": 0.01}, {"alpha": 0.0})
 
     def style(self, packing: Any, law: Interaction) -> Style:
-        """As `Shape.style`; `sides` says how many bonds a side-to-side contact has."""
+        """See `Shape.style`; `sides` is the number of bonds of a side-to-side contact."""
         sides = ("one", "two")[law.sides - 1]
         command = f"pair_style {self.name}/harmonic sides {sides}\npair_coeff * * {law.k_e!r}"
         return Style(packing.species, command)

@@ -60,16 +60,16 @@ class Superellipsoid(Shape):
     def parameters_of(
         self, diameters: FloatArray, exponent: float
     ) -> tuple[dict[str, float], float]:
-        """As `Shape.parameters_of`; in units of a, the shortest of the semi-axes."""
+        """See `Shape.parameters_of`; in units of the shortest semi-axis a."""
         a, b, c = (float(axis) for axis in np.sort(diameters) / 2)
         return {"exponent": float(exponent), "w1": a / b, "w2": c / b}, a
 
     def style(self, packing: Any, law: Interaction) -> Style:
-        """As `Shape.style`; exponents are per type in LAMMPS."""
+        """See `Shape.style`; exponents are per type in LAMMPS."""
         types = packing.species
         exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
         if any((own != own[0]).any() for own in exponents.values()):
-            # Species hold particles of several exponents: each exponent gets a type.
+            # A species may hold several exponents: each exponent gets a type.
             types = 1 + np.unique(packing.exponent, return_inverse=True)[1].astype(np.int64)
             exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
         lines = [f"pair_style {self.name}/harmonic", f"pair_coeff * * {law.k_e!r}"]

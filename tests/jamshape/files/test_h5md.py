@@ -393,7 +393,7 @@ def replace(file, name, value):
             r"diameters hold -1\.0, expected positive lengths; write it",
         ),
         ("id", np.ones(6), "id has dtype float64, expected integers"),
-        ("id", np.ones(6, int), "an id is there more than once"),
+        ("id", np.ones(6, int), "an id occurs more than once"),
     ],
 )
 def test_wrong_content(path, name, value, sentence):

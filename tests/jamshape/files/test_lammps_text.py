@@ -272,7 +272,7 @@ def test_dump_cut_anywhere_gives_the_complete_frames_before(path):
         ("OF ATOMS\n6", "OF ATOMS\n5", "a line reads '6 .*', expected an 'ITEM:' line"),
         ("OF ATOMS\n6", "OF ATOMS\n7", "the file ends within the frame"),
         ("\n1 1 ", "\n1 1 nan ", "row .* has 13 columns, expected 'id type x y z"),
-        ("\n1 1 ", "\n2 1 ", "an id is there more than once"),
+        ("\n1 1 ", "\n2 1 ", "an id occurs more than once"),
     ],
 )
 def test_wrong_dump(path, old, new, sentence):

@@ -75,8 +75,8 @@ def test_a_number_holds_for_all_kinds():
     ("kinds", "sentence"),
     [
         ({"alpha": [0, 4], "size": [1, 2, 3]}, "expected one entry for each kind"),
-        ({"alpha": [0, 4], "size_ratio": 1.4}, "expected the size of each kind in size alone"),
-        ({"alpha": 4, "length": 2}, "length is no number of spherocylinders"),
+        ({"alpha": [0, 4], "size_ratio": 1.4}, "give the size of each kind in size alone"),
+        ({"alpha": 4, "length": 2}, "length is unknown for spherocylinders"),
         ({"alpha": -1}, "alpha"),
     ],
 )
@@ -296,9 +296,7 @@ def test_results_of_a_file_that_was_changed_are_left_out(tmp_path):
     with h5py.File(tmp_path / "packing.h5", "a") as file:
         for name in ("position", "box/edges"):
             file[f"particles/all/{name}/value"][...] *= 1.1
-    with pytest.warns(
-        UserWarning, match="another program has changed them, and what the file says"
-    ):
+    with pytest.warns(UserWarning, match="another program changed them, so the stored results"):
         packing = js.load(tmp_path / "packing.h5")
     assert not packing.results
     assert packing.pressure == 0
