@@ -17,9 +17,8 @@ from jamshape.checks import require_one_process
 
 _Step = TypeVar("_Step")
 
-# Seconds between two lines of a log, and between two updates of a bar.
-_LOG_SECONDS = 10.0
-_BAR_SECONDS = 1.0
+_LOG_SECONDS = 10.0  # between two lines of a log
+_BAR_SECONDS = 1.0  # between two updates of a bar
 
 # Layout of a bar when the remaining time is known, and when it is not.
 _WITH_REST = "{desc}:{percentage:5.1f} %|{bar}| [{elapsed}, remain {remaining}]{postfix}"

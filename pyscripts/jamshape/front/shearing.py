@@ -36,9 +36,8 @@ if TYPE_CHECKING:
     from jamshape.front.packing import MeasuredPacking
 
 
-# Rate below which implicit steps are faster than explicit ones; default errors.
-_SLOW = 3e-7
-_ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
+_SLOW = 3e-7  # rate below which implicit steps are faster than explicit ones
+_ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3  # default tolerances
 
 _FRAMES = 20
 

@@ -20,9 +20,8 @@ from jamshape.contacts.near import near_particles, nearer
 from jamshape.contacts.network import refuse_crossing, refuse_unconverged
 from jamshape.packing import Packing, State
 
-# Skin of the pair list, as a fraction of the smallest radius; the wide list has a skin larger by the second
-# factor.
-_SKIN, _WIDE = 0.3, 5.0
+_SKIN = 0.3  # of the pair list, over the smallest radius
+_WIDE = 5.0  # skin of the wide list over that
 
 
 class Evaluation(NamedTuple):

@@ -9,10 +9,9 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.landscape.landscape import Evaluation, Landscape
 
-# Trust radius of a Newton step: displacement as a fraction of the smallest radius,
-# and rotation angle.
-LONGEST_STEP = 0.1
-WIDEST_TURN = 0.2
+# Trust radius of a Newton step.
+LONGEST_STEP = 0.1  # displacement over the smallest radius
+WIDEST_TURN = 0.2  # rotation angle
 
 # Initial shift of a Hessian's diagonal, in units of k_e and `Landscape.length`.
 _FIRST_SHIFT = 1e-6

@@ -19,7 +19,7 @@ from jamshape.arrays import FloatArray
 
 OCTAHEDRON = 0.5  # the least p of a convex body
 
-# Quadrature stops when halving its step changes the area by less than this fraction.
+# Quadrature stops when halving its step changes the area by less than this fraction; steps are tried in turn.
 _CONVERGED = 1e-13
 _STEPS = (1 / 4, 1 / 8, 1 / 16, 1 / 32)
 

@@ -9,9 +9,8 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.roundness import checked
 
-# Newton's method on logarithms takes about ten steps; steps below this are rounding.
-_STILL = 1e-12
-_MOST_STEPS = 200
+_STILL = 1e-12  # steps of Newton's method on logarithms below this are rounding
+_MOST_STEPS = 200  # it takes about ten
 
 # Below this exponent 2p the normals rotate within so little of the surface that triangles there would be
 # slivers; this exponent is used instead.
