@@ -149,7 +149,7 @@ CASES = [
     ("slow --start start.h5 --alpha 1 --out new.h5", "has no effect with --start start.h5"),
     ("slow --start start.h5 --phi-start 0.7 --out new.h5", "--phi-start 0.7 has no effect with --start start.h5"),
     ("slow --start dense.h5 --p-end 1e-9 --phi-end 1.5 --out new.h5",
-     "--p-end 1e-09 is not above the pressure of the start, 0.*; give a larger one"),
+     "--p-end 1e-09 is not above the pressure of the start, 0.*, expected a larger one"),
     (f"{SLOW} --kappa-before 1e-6", "--kappa-before 1e-06 has no effect without --phi-slow, expected both or neither"),
     (f"{SLOW} --phi-slow 0.9", "--phi-slow 0.9 is not below --phi-end, .* expected a smaller one"),
     *((f"{command} --start start.h5 {option} --out new.h5", f"{option} has no effect with --start start.h5")

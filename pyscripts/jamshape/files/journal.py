@@ -54,15 +54,15 @@ _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP}
 
 
 class Record(NamedTuple):
-    """What one call appends."""
+    """Content of one append."""
 
     tables: dict[str, Table]
     texts: dict[str, str]
-    """Attributes that are text; those that are numbers are a table."""
+    """Attributes that are text; numeric ones are a table."""
 
 
 class Pending(NamedTuple):
-    """What a journal holds."""
+    """Content of a journal."""
 
     token: str
     records: list[Record]
@@ -158,7 +158,7 @@ class Journal:
     Parameters
     ----------
     path : path-like
-        Of the run's HDF5 file.
+        Path of the run's HDF5 file.
 
     Raises
     ------

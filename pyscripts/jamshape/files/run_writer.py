@@ -1,4 +1,4 @@
-"""Appending to the file of a run, which survives whatever ends the process."""
+"""Crash-safe appending to the file of a run."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ if TYPE_CHECKING:
 # a few times its final size; and only after so many times the seconds that folding took last.
 _PART = 0.25
 _PAUSE = 200
-_SECONDS = 0.05  # about what it takes, where it was not measured yet
+_SECONDS = 0.05  # typical value, used until measured
 _REPORT = np.dtype(list(layout.REPORT.items()))
 
 
 def fold(path: PathLike) -> None:
-    """Bring into the file of a finished run the rows that a kill left in its journal.
+    """Fold rows left in the journal by a killed process into the file of a finished run.
 
     Raises
     ------
     FileFormatError, OSError
-        As `RunWriter`.
+        As in `RunWriter`.
     """
     if journal_of(path).exists():
         RunWriter.open(path).close()
@@ -62,7 +62,7 @@ class RunWriter:
     Parameters
     ----------
     path : path-like
-        A file that `write_packing` or `RunWriter.create` made.
+        A file made by `write_packing` or `RunWriter.create`.
 
     Raises
     ------
@@ -104,7 +104,7 @@ class RunWriter:
 
     @classmethod
     def open(cls, path: PathLike) -> Self:
-        """Return a writer that appends to an existing file, under today's names."""
+        """Return a writer that appends to an existing file, under current names."""
         return cls(path)
 
     def __enter__(self) -> Self:
@@ -119,7 +119,7 @@ class RunWriter:
         if error is None:
             self.close()
             return
-        with suppress(OSError):  # rows are safe in the journal; the first error is the one to tell
+        with suppress(OSError):  # rows are safe in the journal; report the first error
             self.close()
 
     def close(self) -> None:

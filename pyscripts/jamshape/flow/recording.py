@@ -96,7 +96,7 @@ def require_same(to: Recording, settings: Motion, dimension: int) -> None:
     """
     what = f"a {settings.name}"
     if "finished" not in read_attributes(to.path):
-        msg = f"{to.path} holds no {settings.name}, expected one; write to another file, or make it again"
+        msg = f"{to.path} holds no {settings.name}, expected one; write to another file, or use again to replace it"
         raise ValueError(msg)
     expected = dataclasses.asdict(settings) | dict(to.attributes)
     require_attributes(to.path, expected | {"rows": to.rows, "frames": to.frames}, what)
@@ -104,7 +104,7 @@ def require_same(to: Recording, settings: Motion, dimension: int) -> None:
     if found != dimension:
         msg = (
             f"{to.path} holds {what} in {found} dimensions, expected {dimension};"
-            " write to another file, or make it again"
+            " write to another file, or use again to replace it"
         )
         raise ValueError(msg)
 
@@ -147,7 +147,7 @@ def resume(session: Session, path: Path) -> tuple[FlowRun[Motion], Recording]:
         if session.step > last + _every(run, to, writer.first):
             msg = (
                 f"{path}: has rows up to step {last}, expected those up to step {session.step} of its"
-                " restart file; bring its journal back beside it, or make it again"
+                " restart file; bring its journal back beside it, or use again to replace it"
             )
             raise FileFormatError(msg)
         writer.truncate(session.step)

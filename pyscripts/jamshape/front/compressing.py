@@ -249,9 +249,7 @@ def _require_end_ahead(first: Packing, protocol: Protocol) -> None:
         raise ValueError(msg)
     pressure = MeasuredPacking.of(first).pressure
     if pressure >= protocol.p_end:
-        said = (
-            f"{{p_end}} is not above the pressure of the start, {pressure:.4g}; give a larger one"
-        )
+        said = f"{{p_end}} is not above the pressure of the start, {pressure:.4g}, expected a larger one"
         raise ArgumentError(said, {"p_end": protocol.p_end})
 
 
@@ -265,7 +263,7 @@ class _Known(NamedTuple):
         """Take a start; raise if another packing fraction than its own was given."""
         found = start_of(start)
         if phi is not None and not math.isclose(phi, found.phi, rel_tol=_SAME):
-            said = f"{{phi_start}} differs from {found.phi:.6g}, which the start has and keeps; leave it out"
+            said = f"{{phi_start}} differs from that of the start, {found.phi:.6g}, expected no value beside a start; leave it out"
             raise ArgumentError(said, {"phi_start": phi})
         return cls(found)
 

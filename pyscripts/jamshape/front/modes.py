@@ -203,7 +203,7 @@ def require_modes_file(out: Path, read: Sequence[Path] = ()) -> None:
     """
     require_other_file(out, read)
     if out.exists() and not holds_modes(out):
-        msg = f"{out} exists and does not hold modes; choose another output file or remove it"
+        msg = f"{out} exists and holds no modes, expected another output file; choose one or remove it"
         raise ValueError(msg)
 
 

@@ -49,7 +49,7 @@ def particles_of(options: Namespace) -> Particles:
     shape, given = _shape(options), _given(options)
     if options.kind:
         if given or options.size_ratio is not None:
-            msg = "--kind excludes --size-ratio and a shape's parameters; give the numbers of a mixture in --kind"
+            msg = "--kind excludes --size-ratio and a shape's parameters, expected a mixture's numbers in --kind"
             raise ValueError(msg)
         return Particles.mixture(shape, options.kind)
     return Particles.of(shape, options.size_ratio, **given)

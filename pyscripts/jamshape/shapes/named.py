@@ -147,7 +147,7 @@ def _particles(
         numbers = {name: float(value) for name, value in values.items()}
         return Particles.of(shape, size_ratio, **numbers)
     if size_ratio is not None:
-        msg = "size_ratio does not work with kinds; give the size of each kind in size alone"
+        msg = "size_ratio does not work with kinds, expected the size of each kind in size alone"
         raise ValueError(msg)
     try:
         columns = np.broadcast_arrays(

@@ -260,7 +260,7 @@ class AlongModes:
         """
         amplitudes = np.asarray(delta, np.float64)
         if amplitudes.ndim != 1 or not (np.diff(amplitudes, prepend=0.0) > 0).all():
-            msg = "amplitudes are not positive and ascending; sort them"
+            msg = "amplitudes are not positive and ascending, expected sorted positive ones"
             raise ValueError(msg)
         shift, turn = (part[self.coordinates.backbone] for part in self.coordinates.motion(vector))
         walks = [

@@ -220,7 +220,7 @@ def test_the_compression_of_another_sample_is_neither_taken_nor_replaced(tmp_pat
     sentence = refused(replace(RECIPE, **OTHERS[words]), out)
     assert "run.h5 holds the compression of a packing with " in sentence
     assert words in sentence
-    assert sentence.endswith("; write to another file, or make it again")
+    assert sentence.endswith("; write to another file, or use again to replace it")
 
 
 def test_the_compression_of_another_mixture_is_refused(tmp_path):
