@@ -167,7 +167,7 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
     if shape_named(found.name).has_exponent and not said.has_exponent:
         warnings.warn(
             f"{path} does not state the exponents of its particles: they are read as p = 1, ellipsoids; use"
-            " packing.with_(exponent=...) for others"
+            " packing.with_(exponent=...) for others",
             stacklevel=2,
         )
     if _FEW < said.digits < _EXACT:

@@ -24,7 +24,6 @@ _MAX_ERROR = 0.15  # of the zero of a line, over the distance from there to its 
 _MIN_SLOPES = (0.7, 0.5)  # of a line over the steepest chord: preferred, and acceptable
 _CHORD_RISE = 0.25  # of a chord, over the pressure at its end
 _CHORD_END = 10.0  # largest pressure at the end of a chord over that at the end of the line
-_CHORD_END = 10.0
 
 # Among lines with an error up to this multiple of the smallest one the lowest is chosen.
 _NEARLY_BEST = 2.0
