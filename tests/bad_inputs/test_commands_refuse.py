@@ -79,11 +79,11 @@ CASES = [
     ("compress --n 8", "required: --out"),
     (f"{COMPRESS} --integrator rkc2 --dt 0.1", "--dt 0.1 has no effect with --integrator rkc2"),
     (f"{COMPRESS} --dt 0.1 --tolerance 1e-4", "--tolerance 0.0001 has no effect with --integrator heun"),
-    ("compress --resume --out typo.h5", "--out typo.h5 is not there, expected the file of a run to resume; leave --resume out"),
-    *((f"compress --resume {option} --out run.h5", f"{option} is not what the run in --out run.h5 has, {own}, expected the same")
+    ("compress --resume --out typo.h5", "--out typo.h5 does not exist, expected the file of a run; leave --resume out"),
+    *((f"compress --resume {option} --out run.h5", f"{option} differs from that of the run in --out run.h5, {own}, expected the same")
       for option, own in (("--kappa 1e-05", "0.01"), ("--n 9", "8"), ("--phi-end 0.9", "0.32"), ("--dimension 3", "2"),
                           ("--alpha 4.0", "1.0"), ("--rows 5", "4"))),
-    *((f"compress --n 8 --out {name}", "is there, expected another --out")
+    *((f"compress --n 8 --out {name}", "exists, expected another --out")
       for name in ("start.h5", "run.h5", "text.h5", "start.data", "'a folder'")),
     ("compress --n 8 --out 'a\nb.h5'", "control character"),
     ("compress --n 8 --out text.h5/new.h5", "text.h5"),
@@ -121,7 +121,7 @@ CASES = [
     (f"{PUBLISHED} --start run.h5 --alpha 3", "asked for, Particles\\('spherocylinder', alpha=3"),
     (f"{PUBLISHED} --start run.h5 --shape dimer", "asked for, Particles\\('dimer'"),
     (f"{PUBLISHED} --start run.h5 --kappa 1e-6", "--kappa 1e-06 means nothing to a start that is compressed already"),
-    ("sweep --alpha 1 --protocol marschall-2018 --start run.h5 --out new", "--start is run.h5, which means nothing"),
+    ("sweep --alpha 1 --protocol marschall-2018 --start run.h5 --out new", "--start is run.h5, which has no effect"),
     (f"{STEPS} --protocol 2 --phi-thermal 0.2", "a start at a smaller packing fraction"),
     (f"{STEPS} --kappa 1e-6", "no setting of the way"),
     (f"{PACK} --kappa 1e-6", "--kappa is no setting of the way by quasistatic, expected another way or setting"),
@@ -163,7 +163,7 @@ CASES = [
     *each(INITIAL, ["--phi", "--alpha"], [*NO_NUMBERS, "inf"]),
     *each(INITIAL, ["--n"], NO_COUNTS),
     *each(INITIAL, ["--seed"], ["-1", "x"]),
-    ("initial --n 8 --out new.txt", "ends in .data or .h5"),
+    ("initial --n 8 --out new.txt", "a suffix .data or .h5"),
     ("initial --n 8 --out start.h5", "--again"),
     ("initial --n 8 --out none/new.data", "none"),
     ("modes start.h5 --out start.h5", "would be replaced"),

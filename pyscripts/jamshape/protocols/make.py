@@ -60,7 +60,7 @@ def make(
 ) -> Iterator[Progress]:
     """Make a packing and write it to `out`, going on with what an earlier call has left.
 
-    Where forces do not balance at the energy, there is a second try (`protocols.retry`).
+    Where forces do not balance at the energy, there is a second attempt (`protocols.retry`).
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def make(
     again : bool
         Begin anew where files of another recipe, or damaged ones, are in the way.
     retry : bool
-        Whether there is a second try.
+        Whether to make a second attempt.
 
     Yields
     ------

@@ -239,7 +239,7 @@ def test_driver_writes_what_it_says(tmp_path, name, reader, dimension):
     [
         ("--phi 0.9 --n 20 --out {}/a.data", "stalled at phi"),
         ("--alpha -1 --out {}/a.data", "alpha is -1.0"),
-        ("--out {}/a.txt", "expected a name that ends in .data or .h5"),
+        ("--out {}/a.txt", "expected a suffix .data or .h5"),
         ("--out {}/missing/a.data", "No such file or directory"),
     ],
 )
