@@ -136,7 +136,7 @@ def test_positions_are_those_that_ovito_has_now():
 
 
 def test_data_of_others_are_refused_in_a_sentence():
-    with pytest.raises(FileFormatError, match="expected what to_ovito made"):
+    with pytest.raises(FileFormatError, match="expected data from to_ovito"):
         from_ovito(DataCollection())
 
 

@@ -156,7 +156,7 @@ def test_drops_of_the_stress_are_listed(cut_off):
 
 def test_wrong_numbers_are_refused():
     for numbers, words in (
-        ({"strain_step": 0.2, "strain_end": 0.1}, "expected at most the strain to reach"),
+        ({"strain_step": 0.2, "strain_end": 0.1}, "expected at most the final strain"),
         ({"hold_pressure": -1.0}, "expected a positive number"),
         ({"flow": "none"}, "expected one of simple, pure"),
     ):

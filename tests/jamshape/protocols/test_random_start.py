@@ -140,7 +140,7 @@ def test_recommended_start_works(n, mixture, dimension, monkeypatch):
     monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS", 50_000)
     monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS_PER_PARTICLE", 0)
     sentence = (
-        rf"^random insertion of {n} particles stalled at phi = 0\.\d+ of the 0\.95 asked after"
+        rf"^random insertion of {n} particles stalled at phi = 0\.\d+ of the 0\.95 requested after"
         r" \d+ attempts: start at phi <= (0\.\d+) and compress from there$"
     )
     with pytest.raises(InsertionError, match=sentence) as error:
