@@ -43,7 +43,7 @@ class _Stored(NamedTuple):
     mark: str
     """Attribute that only files of this kind have."""
     go_on: str
-    """How to continue, if not finished."""
+    """Advice for continuing, if not finished."""
 
 
 _SAME_COMMAND = "repeat the command that began it"

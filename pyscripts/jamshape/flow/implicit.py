@@ -234,7 +234,7 @@ class Flow:
     _factors: StageFactors | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
     _here: Evaluation | None = field(default=None, repr=False)
-    """At the end of the last step, before the last correction of its last stage."""
+    """Evaluation at the end of the last step, before the last correction of its last stage."""
     _is_fresh: bool = True
 
     def forget(self) -> None:

@@ -70,7 +70,7 @@ class Solution(NamedTuple):
 
     x: FloatArray
     evaluation: Evaluation
-    """At the point before the last correction."""
+    """Evaluation before the last correction."""
     factors: StageFactors | None
     factorisations: int
     directions: int

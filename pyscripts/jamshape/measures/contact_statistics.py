@@ -38,9 +38,9 @@ class FlatFraction(NamedTuple):
     """Fraction of the particles that have a contact on at least one of their two flat sides."""
 
     of_backbone: float
-    """Of the particles without rattlers."""
+    """Fraction of the particles without rattlers."""
     of_all: float
-    """Of all particles; rattlers have none."""
+    """Fraction of all particles; rattlers have none."""
 
 
 class AngleDensity(NamedTuple):

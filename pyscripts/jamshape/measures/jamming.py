@@ -54,9 +54,9 @@ class Jamming(NamedTuple):
     """Bracket of the packing fraction at which frames of a run stay jammed when minimised."""
 
     unjams: float
-    """That of the densest frame that unjams; NaN if none does."""
+    """Packing fraction of the densest frame that unjams; NaN if none does."""
     jams: float
-    """That of the first denser frame that stays jammed; NaN if none does."""
+    """Packing fraction of the first denser frame that stays jammed; NaN if none does."""
     tried: int = 0
     """Number of minimised frames."""
     undecided: int = 0

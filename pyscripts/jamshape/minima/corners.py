@@ -65,7 +65,7 @@ class Rest(NamedTuple):
 
     state: State
     evaluation: Evaluation
-    """Its gradient is the convex combination."""
+    """Evaluation with the convex combination as gradient."""
     n_sides: int
     """Number of gradients combined; 1 without a kink."""
 

@@ -21,7 +21,7 @@ _LOWEST = 1e-24
 
 
 class Outcome(Enum):
-    """How a minimisation ended.
+    """Outcome of a minimisation.
 
     SLIDING: the remaining forces lie along modes softer than the prestress, rods sliding along flat sides,
     and do not fall any more; all others are below the tolerance.
@@ -103,7 +103,7 @@ class Minimum:
 
     state: State
     evaluation: Evaluation
-    """On a kink its gradient is the balanced combination of those around."""
+    """Evaluation there; on a kink its gradient is the balanced combination of those around."""
     outcome: Outcome
     residual: Residual
     history: History

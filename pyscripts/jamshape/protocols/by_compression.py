@@ -97,7 +97,7 @@ class ByCompression:
         return Landscape(self.chosen.packing)
 
     def state(self) -> State:
-        """Initial state of the search for the energy."""
+        """Return the initial state of the search for the energy."""
         return State.of(self.chosen.packing)
 
     def measured(self) -> dict[str, Any]:
@@ -116,7 +116,7 @@ class ByCompression:
         """Keep the run, which serves searches for other energies."""
 
     def _flow(self) -> Compression:
-        """Settings of the compression: two bonds side to side, and an integrator with error control."""
+        """Return the settings of the compression: two bonds side to side, and an integrator with error control."""
         flow = Compression(
             kappa=self.way.kappa, phi_end=self.way.phi_end, sides=2, integrator="rkc2"
         )

@@ -103,7 +103,7 @@ class ByDynamics:
         return Landscape(read_packing(self.run_file))
 
     def state(self) -> State:
-        """Initial state of the search for the energy."""
+        """Return the initial state of the search for the energy."""
         return State.of(read_packing(self.run_file))
 
     def measured(self) -> dict[str, Any]:

@@ -82,7 +82,7 @@ class BySteps:
         return self._landscape
 
     def state(self) -> State:
-        """Initial state of the search for an energy: the first jammed packing."""
+        """Return the initial state of the search for an energy: the first jammed packing."""
         assert self.minimum is not None
         return self.minimum.state
 

@@ -68,7 +68,7 @@ class Making(Protocol):
         """Landscape of the packing."""
 
     def state(self) -> State:
-        """Initial state of the search for an energy."""
+        """Return the initial state of the search for an energy."""
 
     def measured(self) -> dict[str, Any]:
         """Return results specific to this way."""

@@ -94,7 +94,7 @@ class Steps:
         return make(recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension)
 
     def compression(self, target: Target | None) -> Quasistatic:
-        """Settings of the compression; before a target energy it need not be close to the tolerance."""
+        """Return the settings of the compression; before a target energy it need not be close to the tolerance."""
         return replace(self.quasistatic, closeness=math.inf) if target else self.quasistatic
 
     def attributes(self, target: Target | None) -> dict[str, Any]:
@@ -234,7 +234,7 @@ class Compressed:
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a packing is made of, and how.
+    """Ingredients and protocol of a packing.
 
     Parameters
     ----------

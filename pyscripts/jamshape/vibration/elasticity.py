@@ -62,9 +62,9 @@ class Moduli(NamedTuple):
     bulk: Modulus
     """-V dp/dV."""
     pure_shear: Modulus
-    """For gamma with x and y stretched by exp(gamma / 2) and exp(-gamma / 2)."""
+    """Modulus for gamma, with x and y stretched by exp(gamma / 2) and exp(-gamma / 2)."""
     simple_shear: Modulus
-    """For gamma with x moved by gamma y."""
+    """Modulus for gamma, with x moved by gamma y."""
     pressure: float
     """[energy / length^D], in the same state."""
     n_floppy: int = 0
