@@ -69,8 +69,7 @@ class Contacts(Record):
 
     def __repr__(self) -> str:
         c = self.counts
-        held = self.packing.n - c.n_rattlers
         return (
-            f"<{len(self)} contacts of {self.packing.n} particles: z = {c.z:.4g} bonds for each of"
-            f" the {held} that are no rattlers>"
+            f"<{len(self)} contacts of {self.packing.n} particles: z = {c.z:.4g} bonds per particle,"
+            f" {c.n_rattlers} rattlers left out>"
         )

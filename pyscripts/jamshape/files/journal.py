@@ -11,7 +11,7 @@ then, and at the end, the rows are folded into a copy of the HDF5 file, which re
     TOKEN\n                       32 digits: of the HDF5 file that these rows go on from, its attribute `journal`
     record, record, ...
 
-    record = length (8 bytes), CRC-32 (4 bytes), and so many bytes:
+    record = length (8 bytes), CRC-32 (4 bytes), and its bytes:
         length of the head (4 bytes), the head as JSON, the rows of all tables, bytes of NumPy
         head = {"tables": [[name, dtype, number of rows], ...], "texts": {attribute: text}}
 

@@ -32,11 +32,9 @@ from jamshape.packing import Packing
 if TYPE_CHECKING:
     import h5py
 
-# Rows are folded into the HDF5 file when they are this part of it, so that all folding together writes
-# a few times its final size; and only after so many times the seconds that folding took last.
-_PART = 0.25
-_PAUSE = 200
-_SECONDS = 0.05  # typical value, used until measured
+_PART = 0.25  # of the HDF5 file, at which rows are folded into it: a few times its final size is written in all
+_PAUSE = 200  # time between foldings, over the time of the last one
+_SECONDS = 0.05  # typical time of one, used until measured
 _REPORT = np.dtype(list(layout.REPORT.items()))
 
 
@@ -292,7 +290,7 @@ class RunWriter:
         return True
 
     def _begin(self, token: str, seconds: float) -> None:
-        """Begin an empty journal, after so many seconds of writing the file."""
+        """Begin an empty journal, after writing the file in some seconds."""
         self._journal.begin(token)
         self._bytes = self.path.stat().st_size
         self._fold_after = perf_counter() + _PAUSE * seconds

@@ -50,7 +50,7 @@ class MeasuredPacking(Packing):
     >>> packing.z, packing.results["outcome"]
     (5..., 'converged')
     >>> packing.contacts()
-    <4... contacts of 16 particles: z = 5... bonds for each of the 16 that are no rattlers>
+    <4... contacts of 16 particles: z = 5... bonds per particle, 0 rattlers left out>
     """
 
     results: Mapping[str, Any] = field(default_factory=dict)

@@ -50,7 +50,7 @@ def _descend(descent: Descent, newton_below: float, *, is_near: bool = False) ->
 
 
 def _on_a_corner(descent: Descent) -> Outcome | None:
-    """Relax a state that oscillates across a kink onto it; None if there is none."""
+    """Relax a state that oscillates across a kink onto it; None without a kink."""
     if descent.outcome() is not None:
         return None
     found = at_rest(descent.landscape, descent.state, descent.stop.tolerance)
