@@ -111,7 +111,7 @@ def with_modes(folder, particles, phi):
 
 @pytest.fixture(scope="module")
 def jammed(tmp_path_factory):
-    """Of rods."""
+    """Jammed packing of rods."""
     folder = tmp_path_factory.mktemp("jammed")
     return folder, with_modes(folder, bidisperse(1), 0.84)
 

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.lammps
 
 
 def info(jamshape, path, *more):
-    """What is said of a file: the lines by their subjects, and the last one."""
+    """Return the report on a file: the lines by their subjects, and the last one."""
     ended = jamshape("info", path, *more)
     assert not ended.code
     first, *lines, _ = ended.out.splitlines()

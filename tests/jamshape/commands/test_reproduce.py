@@ -1,4 +1,4 @@
-"""What `jamshape reproduce` refuses before any job; tests/scripts/test_reproduce_with_snakemake.py plans its jobs."""
+"""Refusals of `jamshape reproduce` before any job; tests/scripts/test_reproduce_with_snakemake.py plans its jobs."""
 
 import importlib.util
 import json
@@ -12,7 +12,7 @@ PAPER = "marschall-2018"
 
 @pytest.fixture(autouse=True)
 def _with_snakemake(monkeypatch):
-    """As if it were there: none of these tests starts it."""
+    """Pretend that Snakemake is installed: none of these tests starts it."""
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *more: name == "snakemake" or find(name, *more)

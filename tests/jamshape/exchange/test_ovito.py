@@ -53,7 +53,7 @@ def three(vector):
 
 
 def seen_between(packing, point, normal):
-    """What is seen on a line through a contact along its normal, with the plane of contact edge-on."""
+    """Pixels on a line through a contact along its normal, with the plane of contact edge-on."""
     up = three(normal)
     across = np.cross(up, [0.0, 0.0, 1.0]) if packing.dimension == 3 else np.array([0.0, 0.0, -1.0])
     toward = tuple(across / np.linalg.norm(across))

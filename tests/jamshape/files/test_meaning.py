@@ -199,7 +199,7 @@ def test_a_plane_box_of_any_height(path, height):
 
 
 def test_a_plane_is_one_to_within_rounding(path):
-    """As fix rigid leaves a plane system, and a program that turned particles about z by matrices."""
+    """Planes from fix rigid, and from a program that rotated particles about z by matrices."""
     turned = changed(
         ("1 5 1 1 1 0 0 0", "1 5 1 1 0.8 6e-17 -1e-17 0.6"),
         ("10.0 0.0\n", "10.0 1e-16\n"),

@@ -151,7 +151,7 @@ def test_what_follows_a_byte_that_changed_is_not_believed(byte, tmp_path):
 
 
 class Killed(BaseException):
-    """As if the process had ended here."""
+    """Stands for the end of the process."""
 
 
 CALLS = ("pwrite", "ftruncate", "fsync", "replace", "unlink")
@@ -263,7 +263,7 @@ def test_no_kill_damages_a_run(kills, tmp_path, measured):
 
 
 def test_a_row_costs_little(tmp_path, measured):
-    """Of 25 observables, as a compression writes; opening the file for each took fifteen milliseconds."""
+    """A row of a compression has 25 observables; opening the file for each took fifteen milliseconds."""
     observables = {f"observable_{k}": k / 7 for k in range(25)}
     seconds = []
     with RunWriter.create(tmp_path / "run.h5", frame(0), {}, observables) as writer:

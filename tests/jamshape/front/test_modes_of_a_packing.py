@@ -1,4 +1,4 @@
-"""What `js.modes` says of a packing: translations, bands, moduli."""
+"""Results of `js.modes`: translations, bands, moduli."""
 
 import json
 import math

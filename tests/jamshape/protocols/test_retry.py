@@ -80,7 +80,7 @@ def test_after_a_kill_it_ends_in_the_same_packing(cured, tmp_path, monkeypatch):
 
 
 def test_what_it_does_not_cure_stays_as_it_was_and_is_said(stalled, tmp_path, monkeypatch):
-    """As where its work is used up."""
+    """The same happens when its work is used up."""
     monkeypatch.setattr("jamshape.protocols.retry._EVALUATIONS", 1)
     monkeypatch.setattr("jamshape.protocols.retry._PRICE", 10**6)
     out = tmp_path / "packing.h5"
