@@ -82,7 +82,7 @@ class Recorded:
     def __getitem__(self, name: str) -> FloatArray:
         """Look up an observable by its name."""
         if name not in self.observables:
-            msg = f"{name} is no observable of {self.file}, expected one of {', '.join(self.observables)}"
+            msg = f"{name} is not an observable of {self.file}, expected one of {', '.join(self.observables)}"
             raise KeyError(msg)
         return self.observables[name]
 

@@ -110,11 +110,8 @@ def _by_compression(get: Values) -> tuple[Way, Target | None]:
     target, minimiser = _target(get, get["tolerance"]), get["minimiser"]
     if way.search == "direct":
         if minimiser is not None:
-            msg = (
-                f"the minimiser is {minimiser} and the search direct, which has its own, expected a"
-                " halving search, or no minimiser"
-            )
-            raise ValueError(msg)
+            said = "{minimiser} has no effect with the search direct, expected the search halving"
+            raise ArgumentError(said, {"minimiser": minimiser})
         return way, target
     require_one_of("minimiser", minimiser or "auto", METHODS)
     method = minimiser or "auto"
@@ -258,8 +255,8 @@ def _chosen(way: str | None, protocol: int | str | None) -> tuple[UsualWay, str]
     if way is not None:
         require_one_of("the way", way, WAYS)
         if WAYS[way].compose is not chosen.compose:
-            msg = f"the way is {way} and the protocol {name}, which has its own; leave the way out"
-            raise ValueError(msg)
+            said = "{way} has no effect with {protocol}, expected one of them; leave the other out"
+            raise ArgumentError(said, {"way": way, "protocol": name})
     return chosen, f"the protocol {name}"
 
 

@@ -205,7 +205,7 @@ def test_a_quasistatic_shear_shows_itself(quasistatic):
 
 
 def test_what_is_not_in_a_run_is_named(quasistatic):
-    with pytest.raises(KeyError, match=r"nix is no observable of .*expected one of .*stress"):
+    with pytest.raises(KeyError, match=r"nix is not an observable of .*expected one of .*stress"):
         quasistatic["nix"]
     with pytest.raises(ValueError, match=r"^least is nan, expected a finite number"):
         quasistatic.events(np.nan)
