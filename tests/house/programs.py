@@ -1,4 +1,4 @@
-"""What is done in the place of the programs that pages show: to run them in this process, or to look at their words."""
+"""Replacements of programs on pages: calls in this process, or a check of their words."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SCRIPTS = ("analysis/", "pyscripts/")
 """Folders of scripts that a test may run; others change the machine."""
 
 NEEDED = {".gsd": "gsd", ".ovito": "ovito", ".h5md": "MDAnalysis"}
-"""What must be importable to write files that end so."""
+"""Modules required to write files with this suffix."""
 
 
 # --- to run them ----------------------------------------------------------------------------------

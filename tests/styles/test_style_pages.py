@@ -59,7 +59,9 @@ def test_examples_run(name, text, tmp_path):
 
 
 @pytest.mark.lammps
-@pytest.mark.parametrize("text", part_of("create_random", "Examples").split("```")[1].strip().splitlines())
+@pytest.mark.parametrize(
+    "text", part_of("create_random", "Examples").split("```")[1].strip().splitlines()
+)
 def test_examples_of_the_command_run(text, tmp_path):
     dimension = 2 if "spherocylinder" in text else 3
     said = run_lmp_well(f"{before_box(dimension)}\n{load_plugin()}\n{text}", tmp_path)

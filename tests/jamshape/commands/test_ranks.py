@@ -1,4 +1,4 @@
-"""What takes long is one process, also where mpirun or srun starts several."""
+"""Long calculations refuse to run as several ranks of mpirun or srun."""
 
 import os
 import subprocess

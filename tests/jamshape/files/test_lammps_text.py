@@ -87,7 +87,7 @@ def test_a_tilt_is_kept_in_data_files(path, dimension, given):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_tilt_is_kept_in_dumps(path, dimension):
-    """Which tell the cuboid around the box."""
+    """Dumps hold the bounds of the cuboid around the box."""
     packing = nasty_packing(dimension, box=tilted_box(dimension))
     frames = [packing, nasty_packing(dimension)]
     path.write_text("".join(dump_frame(one, [*COLUMNS, "ix", "iy", "iz"]) for one in frames))
@@ -272,7 +272,7 @@ def test_dump_cut_anywhere_gives_the_complete_frames_before(path):
         ("OF ATOMS\n6", "OF ATOMS\n5", "a line reads '6 .*', expected an 'ITEM:' line"),
         ("OF ATOMS\n6", "OF ATOMS\n7", "the file ends within the frame"),
         ("\n1 1 ", "\n1 1 nan ", "row .* has 13 columns, expected 'id type x y z"),
-        ("\n1 1 ", "\n2 1 ", "an id is there more than once"),
+        ("\n1 1 ", "\n2 1 ", "an id occurs more than once"),
     ],
 )
 def test_wrong_dump(path, old, new, sentence):
@@ -376,7 +376,7 @@ ROUNDNESS = ["SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta"]
 
 
 def dump_of_bodies(packing, columns):
-    """As decks of bodies with an exponent write it, with 1/p computed in LAMMPS."""
+    """Dump of a deck of bodies with an exponent, with 1/p computed in LAMMPS."""
     plain = dump_frame(packing)
     given = dict.fromkeys(ROUNDNESS, 1 / packing.exponent)
     given |= dict.fromkeys(("exponent", "v_exponent"), packing.exponent)

@@ -79,7 +79,7 @@ def test_particles_that_touch_their_own_images_have_the_factors_of_the_hessian()
 
 
 def stretch_of(landscape):
-    """By how much a coordinate moves its particle in the strained box; rotations stay."""
+    """Displacement of a particle per coordinate in the strained box; rotations stay."""
     of_particle = np.ones(landscape.column.shape[1])
     of_particle[: landscape.particles.dimension] += STRAIN
     return landscape.coordinates(np.tile(of_particle, (landscape.particles.n, 1)))
@@ -136,7 +136,7 @@ def test_pairs_are_found_anew_where_they_no_longer_hold(packing, moves):
 
 
 def test_wide_turns_find_all_pairs(packing):
-    """Of all particles by up to nearly half a turn, from one base."""
+    """All particles turn by up to nearly half a rotation, from one base."""
     landscape, state = Landscape(packing), State.of(packing)
     vicinity, rng = Vicinity(landscape, state), np.random.default_rng(9)
     D, compared = packing.dimension, 0
