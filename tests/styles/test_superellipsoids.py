@@ -21,7 +21,7 @@ from scipy.integrate import solve_ivp
 from superellipsoid_scenes import crowd, particles
 
 from jamshape import _contact
-from jamshape.contacts import find_contacts, forces
+from jamshape.contacts import find_contacts, find_rattlers, forces
 from jamshape.lammps.session import Session
 from jamshape.measures.order3d import cubatic_order, nematic_order
 from jamshape.packing import body_axes
@@ -111,6 +111,21 @@ def test_order_is_that_of_the_library(kinds, is_aligned, tmp_path):
         values = global_vector(session, "packing")
     np.testing.assert_allclose((values[4], values[13]), orders_of(packing), rtol=1e-12)
     assert values[10] == find_contacts(packing).n_bonds.sum()
+
+
+@pytest.mark.parametrize(("p", "n_rattlers"), [(5.0, 0), (1.0, 2), (0.75, 2)])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_column_of_cubes_is_held_between_faces(dimension, p, n_rattlers, tmp_path):
+    """Two particles on top of each other, and of their images: only faces hold them."""
+    position = np.zeros((2, dimension))
+    position[1, -1] = 1.97
+    turn = 0.0 if dimension == 2 else [1.0, 0.0, 0.0, 0.0]
+    packing = particles(position, turn, [1.0] * 3, p, [6.0] * (dimension - 1) + [3.94])
+    with held(packing, tmp_path) as session:
+        session.commands("compute packing all packing\nthermo_style custom c_packing[10]\nrun 0")
+        vector = global_vector(session, "packing")
+    assert vector[9] == n_rattlers == find_rattlers(packing, find_contacts(packing)).sum()
+    assert vector[3] == (2.0 if n_rattlers == 0 else 0.0)
 
 
 # --- exponents -----------------------------------------------------------------------------------
