@@ -3,7 +3,8 @@
 import re
 
 import pytest
-from lammps_scenes import REPOSITORY, before_box, dense, load_plugin, run_lmp_well
+from lammps_runs import REPOSITORY, before_box, load_plugin, run_lmp_well
+from lammps_scenes import dense
 
 from jamshape.files.lammps_text import write_data
 from jamshape.flow.motion import Motion
