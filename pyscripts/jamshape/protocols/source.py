@@ -65,10 +65,8 @@ class Source(NamedTuple):
         for name, value in asked.items():
             own = getattr(self, name)
             if value is not None and value != own:
-                said = (
-                    f"{{{name}}} differs from {own} of the start {named(self.path)}; leave it out"
-                )
-                raise ArgumentError(said, {name: value})
+                said = f"{{{name}}} differs from {own} of {{start}}; leave it out"
+                raise ArgumentError(said, {name: value, "start": named(self.path)})
         if particles is not None and not self._has(particles):
             msg = (
                 f"the start {named(self.path)} holds {self.n} particles of {self.particles}, expected those"
