@@ -436,7 +436,7 @@ def energy_strained(session, k, j, by):
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_power_balance_along_a_driven_run(dimension, packings, tmp_path, measured):
     """dU/dt = -V P:G - sum torque.w_host - what the drag takes, integrated by Simpson's rule."""
-    packing, steps, every = packings[dimension], 4000, 2
+    packing, steps, every = packings[dimension], 1600, 2
     dt = {2: 0.01, 3: 0.0025}[dimension]  # forces of twisted rods in space have kinks
     gradient = {2: np.array([[-1e-4, 2e-3], [0, 2e-4]]), 3: GRADIENT_3D / 5}[dimension]
     rows = []
