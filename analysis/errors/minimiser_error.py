@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
@@ -36,11 +37,13 @@ from jamshape.measures.minimum import write_minimum
 from jamshape.minima import History, Stop, minimise
 from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
 from jamshape.packing import Packing, State
-from jamshape.packing.spines import with_spines
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Recipe, is_done, make
 from jamshape.shapes.particles import Kind, Particles
 from jamshape.shapes.table import DEFAULT
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.spines import with_spines
 
 MINIMISERS = ("auto", "newton", "lbfgs", "lammps", "paper")
 LEVELS = (1e-4, 1e-6, 1e-8)

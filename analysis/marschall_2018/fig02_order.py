@@ -9,6 +9,7 @@ line of standard output is one JSON object with the averages over phi.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,12 +18,15 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import counted, ensemble_labels, ensembles_title
 from jamshape.files.sets import PackingFile
-from jamshape.measures.averages import Mean, mean, standard_error
+from jamshape.measures.averages import Mean
 from jamshape.measures.runs import Ensemble, ensemble_of, observables_of
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean, standard_error
+from common.axes import SMALL_TEXT
+from common.text import counted, ensemble_labels, ensembles_title
 
 ORDERS = {"S_2": "nematic", "S_4": "tetratic"}
 POINTS = 30

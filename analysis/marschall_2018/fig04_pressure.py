@@ -12,19 +12,24 @@ its rate, the band and, if the runs differ in nothing but their seed, the mean.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT
 from jamshape.drawing.pressure import draw_jamming, draw_onset, onset_text
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import ensemble_text, onset_symbol, pressure_unit
-from jamshape.files.sets import of_paper
-from jamshape.measures.averages import Mean, mean
+from jamshape.measures.averages import Mean
 from jamshape.measures.onset import OnsetFit
-from jamshape.measures.published import PHI_J
 from jamshape.measures.runs import Run, read_run
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean
+from common.axes import SMALL_TEXT
+from common.ensembles import of_paper
+from common.published import PHI_J
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

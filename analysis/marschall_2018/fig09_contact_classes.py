@@ -10,19 +10,26 @@ JSON object with the averages over samples.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import BLUE, GREEN, ORANGE, PAPER_STYLE, RED
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Curve, System, conditions, of_paper, one_curve, read_groups
-from jamshape.measures.averages import Mean, mean_over
-from jamshape.measures.touching import NAMES, class_numbers
+from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED
+from jamshape.files.sets import System
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean_over
+from common.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
+from common.contact_classes import NAMES, class_numbers
+from common.ensembles import Curve, conditions, of_paper, one_curve, read_groups
+from common.styles import PAPER_STYLE
+from common.text import conditions_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

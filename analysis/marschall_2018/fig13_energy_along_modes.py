@@ -12,6 +12,7 @@ it is dashed. Below are the bonds that have broken and formed. Dots are where a 
 from __future__ import annotations
 
 import math
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,13 +22,15 @@ from tqdm import tqdm
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.mode_axes import mode_text, packing_text
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import unit_text
+from jamshape.drawing.text import packing_text, unit_text
 from jamshape.files.sets import PackingFile
-from jamshape.vibration.energy_along import AlongModes, Crossover, EnergyAlong, fit_crossover
-from jamshape.vibration.sets import Wanted, pick_modes, table_of
 from jamshape.vibration.table import ModeTable
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.energy_along import AlongModes, Crossover, EnergyAlong, fit_crossover
+from common.mode_axes import mode_text
+from common.mode_tables import Wanted, pick_modes, table_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

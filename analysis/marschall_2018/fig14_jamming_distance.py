@@ -11,19 +11,26 @@ these numbers beside the paper's.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT, energy_label
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import PAPER_STYLE, color, marked
-from jamshape.drawing.text import bars_text, counted, system_labels, systems_text
-from jamshape.files.sets import PackingFile, System, finished, of_paper
-from jamshape.measures.averages import Mean, mean
-from jamshape.measures.published import DISTANCE
+from jamshape.drawing.text import systems_text
+from jamshape.files.sets import PackingFile, System
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean
+from common.axes import SMALL_TEXT, energy_label
+from common.ensembles import finished, of_paper
+from common.published import DISTANCE
+from common.styles import PAPER_STYLE, color, marked
+from common.text import bars_text, counted, system_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

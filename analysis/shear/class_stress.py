@@ -9,6 +9,7 @@ output is one JSON object.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import NamedTuple
@@ -19,12 +20,15 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import Contacts
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import color
 from jamshape.drawing.text import ensemble_text
 from jamshape.files.h5md import count_frames, read_packing
-from jamshape.measures.averages import Mean, mean
-from jamshape.measures.class_stress import class_stress
+from jamshape.measures.averages import Mean
 from jamshape.measures.shears import ShearOf, read_shear
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean
+from common.contact_classes import class_stress
+from common.styles import color
 
 CLASSES = ("tip-to-tip", "tip-to-side", "side-to-side")
 PARTS = {"pressure": "part of the pressure", "shear_stress": "part of the shear stress"}

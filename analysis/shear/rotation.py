@@ -9,6 +9,7 @@ turn against it. One panel for each file, of the frame `--frame`. As the picture
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import NamedTuple
@@ -24,8 +25,10 @@ from jamshape.drawing.saving import save_figure
 from jamshape.drawing.shear import title_of
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.flow.host import Host
-from jamshape.flow.rotation import rotation_rates
 from jamshape.measures.shears import ShearOf, read_shear
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.rotation import rotation_rates
 
 # Colours end here, as rates over that of the shear.
 END = 2.0

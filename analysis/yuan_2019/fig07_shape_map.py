@@ -10,20 +10,27 @@ them. The last line of standard output is one JSON object.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import beta_axis
-from jamshape.drawing.families import NEEDS, beta, is_thermal, shape_of
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import BLACK, COLORS, PAPER_LINE
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, System, conditions, only, read_groups
+from jamshape.drawing.styles import BLACK
+from jamshape.files.sets import System
 from jamshape.files.vocabulary import NUMBERED, read_protocol
-from jamshape.measures.averages import Mean, averages, exactly, rows
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages, exactly, rows
+from common.axes import beta_axis
+from common.ensembles import Groups, conditions, only, read_groups
+from common.families import NEEDS, beta, is_thermal, shape_of
+from common.styles import COLORS, PAPER_LINE
+from common.text import conditions_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

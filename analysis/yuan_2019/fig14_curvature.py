@@ -9,7 +9,9 @@ line of standard output is one JSON object with quantiles and the rank correlati
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,13 +20,16 @@ from scipy.stats import spearmanr
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import find_contacts
-from jamshape.drawing.families import NEEDS, SPHERES, family, label, mark
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, PackingFile, System, conditions, read_groups
-from jamshape.measures.averages import averages
+from jamshape.files.sets import PackingFile, System
 from jamshape.packing import body_axes
-from jamshape.shapes.curvature import contact_curvatures
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages
+from common.curvature import contact_curvatures
+from common.ensembles import Groups, conditions, read_groups
+from common.families import NEEDS, SPHERES, family, label, mark
+from common.text import conditions_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

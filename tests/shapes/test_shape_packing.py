@@ -18,6 +18,8 @@ from every_shape import (
     taken,
 )
 
+from common.energy_along import AlongModes
+from common.ladder import climb
 from jamshape.contacts import coordination, find_contacts, find_rattlers
 from jamshape.files.h5md import (
     read_attributes,
@@ -34,11 +36,9 @@ from jamshape.minima.target import Target, find
 from jamshape.packing import State
 from jamshape.protocols import by_dynamics, by_steps
 from jamshape.protocols.approach import Approach
-from jamshape.protocols.ladder import climb
 from jamshape.protocols.make import Dynamics, Recipe, Steps, Thermalisation, is_done, make
 from jamshape.protocols.quasistatic import Quasistatic
 from jamshape.vibration.elasticity import moduli
-from jamshape.vibration.energy_along import AlongModes
 from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum, state_error
 from jamshape.vibration.statistics import components, count, participation

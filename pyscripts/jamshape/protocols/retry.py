@@ -112,14 +112,6 @@ def go_on(landscape: Landscape, retry: Retry, target: Target) -> Iterator[Retry]
         yield retry
 
 
-def retried(landscape: Landscape, minimum: Minimum, target: Target, budget: int) -> Minimum:
-    """Try again with a minimum whose forces do not balance; give it back as it is where that is no use."""
-    retry = Retry(minimum.state, budget)
-    for _ in go_on(landscape, retry, target):
-        pass
-    return retry.minimum or minimum
-
-
 def _slide(landscape: Landscape, retry: Retry, target: Target) -> None:
     """Take a step along what slides, if the energy falls, and see whether forces balance there."""
     radius = 0.5 * landscape.length

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from common.families import mark
 from jamshape.arrays import FloatArray
-from jamshape.drawing.families import mark
 from jamshape.drawing.text import pressure_unit
 from jamshape.files.sets import System
 from jamshape.measures.averages import Mean
