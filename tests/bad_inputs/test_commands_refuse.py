@@ -115,7 +115,7 @@ CASES = [
     (f"{PUBLISHED} --u0 0", "no energy to reach"),
     (f"{PUBLISHED} --search blind", "invalid choice"),
     (f"{PUBLISHED} --search halving --minimiser none", "invalid choice"),
-    (f"{PUBLISHED} --minimiser paper", "the search direct, which has its own"),
+    (f"{PUBLISHED} --minimiser cg_marschall", "the search direct, which has its own"),
     *((f"{PUBLISHED} --start {name}", sentence) for name, sentence in STARTS.items()),
     (f"{PUBLISHED} --start run.h5 --n 9", "n is 9 and that of the start run.h5 8; leave n out"),
     (f"{PUBLISHED} --start run.h5 --alpha 3", "asked for, Particles\\('spherocylinder', alpha=3"),

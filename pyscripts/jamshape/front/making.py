@@ -92,8 +92,8 @@ def make_packing(
     search : {"direct", "halving"}, optional
         Of marschall-2018: how u0 is found; by ours, which leads box and particles at once (usual), or by
         the paper's steps of the box, 1e-6 at first and halved where u crosses u0 (Sec. III C, Eq. 20).
-    minimiser : {"auto", "paper", "newton", "lbfgs", "lammps"}, optional
-        Of the halving search: "paper" is the conjugate gradients of its App. A; "auto" when left out.
+    minimiser : {"auto", "near", "newton", "cg_marschall"}, optional
+        Of the halving search: "cg_marschall" is the conjugate gradients of its App. A; "auto" when left out.
     strict : bool
         Go on at the energy, along what slides, until no mode has an eigenvalue below zero by more than its
         bound; ``results["n_negative"]`` says how many have. Rods of alpha = 4 end at saddles otherwise.
