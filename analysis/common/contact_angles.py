@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from common.averages import mean, standard_error
+from common.axes import figure_of
 from common.styles import COLORS, color
 from common.text import counted
 from jamshape.arrays import BoolArray, FloatArray
@@ -189,9 +190,7 @@ def curve_of_angles(alpha: float, found: Sequence[FloatArray]) -> AngleCurve:
 
 def contact_angle_figure(curves: Mapping[str, AngleCurve], title: str) -> Figure:
     """Draw P(phi) of each, by its name, with a band of one standard error on both sides."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(6, 4.3), dpi=200, layout="constrained")
+    figure = figure_of(6, 4.3)
     axes = figure.subplots()
     for k, (name, found) in enumerate(curves.items()):
         _draw_curve(axes, found, color(k), f"{name} ({counted(found.samples, 'sample')})")

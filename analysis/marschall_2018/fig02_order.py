@@ -25,7 +25,7 @@ from jamshape.measures.runs import Ensemble, ensemble_of, observables_of
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean, standard_error
-from common.axes import SMALL_TEXT
+from common.axes import SMALL_TEXT, figure_of
 from common.text import counted, ensemble_labels, ensembles_title
 
 ORDERS = {"S_2": "nematic", "S_4": "tetratic"}
@@ -74,9 +74,7 @@ def average(n: int, runs: Samples) -> Curve:
 
 def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
     """Draw S_2 on the left and S_4 on the right."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(8, 3.7), dpi=200, layout="constrained")
+    figure = figure_of(8, 3.7)
     panels, labels = figure.subplots(1, 2, sharey=True), ensemble_labels(curves)
     for order, (axes, (name, text)) in enumerate(zip(panels, ORDERS.items(), strict=True)):
         for k, (ensemble, curve) in enumerate(curves.items()):

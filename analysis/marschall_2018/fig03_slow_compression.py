@@ -39,7 +39,7 @@ from jamshape.measures.runs import Run, read_run
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean
-from common.axes import SMALL_TEXT
+from common.axes import SMALL_TEXT, figure_of
 from common.text import counted
 
 if TYPE_CHECKING:
@@ -144,10 +144,8 @@ def cost_of(one: Run) -> Cost | None:
 
 def draw(rates: list[Rate], packings: dict[Place, list[float]], out: Path) -> None:
     """Draw one column for each system and N; `packings` are their phi_J."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
     places = list(dict.fromkeys(of.place for of in rates))
-    figure = Figure(figsize=(4.5 * len(places), 6), dpi=100, layout="constrained")
+    figure = figure_of(4.5 * len(places), 6, dpi=100)
     axes = figure.subplots(2, len(places), squeeze=False, sharex="col")
     for place, (linear, logarithmic) in zip(places, axes.T, strict=True):
         own = [of for of in rates if of.place == place]

@@ -26,7 +26,7 @@ from jamshape.vibration.table import ModeTable
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean, standard_error
-from common.axes import SMALL_TEXT, log_bars
+from common.axes import SMALL_TEXT, figure_of, log_bars
 from common.ensembles import of_paper
 from common.mode_axes import (
     Sides,
@@ -92,9 +92,7 @@ def draw_curve(row: Sides, samples: list[ModeTable], edges: FloatArray, **style:
 
 def draw(tables: Tables, options: Namespace) -> None:
     """Draw all curves."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(7, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(7, 4.2)
     (row,) = add_sides(figure, tables)
     edges, labels = bin_edges(every(tables)), key_labels(tables)
     least = min(

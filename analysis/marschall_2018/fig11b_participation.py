@@ -22,6 +22,7 @@ from jamshape.command import report, run
 from jamshape.drawing.saving import save_figure
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import figure_of
 from common.mode_axes import (
     add_sides,
     bin_edges,
@@ -38,9 +39,7 @@ from common.styles import marked
 
 def draw(tables: Tables, options: Namespace) -> None:
     """Draw all curves."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(7, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(7, 4.2)
     (row,) = add_sides(figure, tables)
     edges, labels = bin_edges(every(tables)), key_labels(tables)
     for k, (key, samples) in enumerate(tables.items()):

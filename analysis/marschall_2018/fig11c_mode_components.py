@@ -23,6 +23,7 @@ from jamshape.vibration.sets import TOLD, Key
 from jamshape.vibration.table import ModeTable
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import figure_of
 from common.mode_axes import (
     add_sides,
     bin_edges,
@@ -60,9 +61,7 @@ def turning(tables: Tables) -> Tables:
 
 def draw(tables: Tables, options: Namespace) -> None:
     """Draw one panel for each system and u0."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(7, 1.4 + 2.4 * len(tables)), dpi=200, layout="constrained")
+    figure = figure_of(7, 1.4 + 2.4 * len(tables))
     rows = add_sides(figure, tables, len(tables))
     edges = bin_edges(every(tables))
     thin: dict[str, Any] = {"mfc": "none", "ms": 4, "lw": 0.8, "elinewidth": 0.8, "capsize": 1.5}

@@ -30,7 +30,7 @@ from jamshape.vibration.table import ModeTable
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import mean
-from common.axes import energy_label, log_bars
+from common.axes import energy_label, figure_of, log_bars
 from common.ensembles import of_paper
 from common.mode_axes import modes_parser, tables_asked
 from common.mode_tables import Tables, n_of, seed_of, sizes, stable, unstable
@@ -181,9 +181,7 @@ def band_label(band: Band, law: Fit | None) -> str:
 
 def draw(found: dict[System, Ladder], tables: Tables, options: Namespace) -> None:
     """Draw one panel for each system."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(0.9 + 3.4 * len(found), 3.9), dpi=200, layout="constrained")
+    figure = figure_of(0.9 + 3.4 * len(found), 3.9)
     panels = figure.subplots(1, len(found), sharey=True, squeeze=False)[0]
     for axes, (system, ladder) in zip(panels, found.items(), strict=True):
         for band in STYLES:

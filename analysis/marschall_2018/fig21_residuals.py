@@ -26,7 +26,7 @@ from jamshape.files.sets import PackingFile, System
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import standard_error
-from common.axes import SMALL_TEXT, log_bars
+from common.axes import SMALL_TEXT, figure_of, log_bars
 from common.ensembles import Choice, choose, conditions, read_groups
 from common.styles import marked
 from common.text import bars_text, conditions_alone, counted, system_labels
@@ -79,9 +79,7 @@ def draw_curve(axes: Axes, samples: list[FloatArray], bins: FloatArray, **style:
 
 def draw(residuals: dict[str, Values], title: str, options: Namespace) -> None:
     """Draw both distributions."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(9, 4.4), dpi=200, layout="constrained")
+    figure = figure_of(9, 4.4)
     panels = figure.subplots(1, 2)
     for axes, (name, values) in zip(panels, residuals.items(), strict=True):
         bins, labels = decade_bins(values), system_labels(values)

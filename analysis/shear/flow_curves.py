@@ -24,6 +24,7 @@ from jamshape.drawing.text import ensemble_text, pressure_unit
 from jamshape.measures.shears import Sheared, ShearOf, read_shear
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import figure_of
 from common.flow_curves import FlowCurve, ShearOnset, fit_flow_curve, shear_onset, yielded
 
 if TYPE_CHECKING:
@@ -50,9 +51,8 @@ def curves_of(runs: list[ShearOf]) -> list[FlowCurve]:
 def flow_curve_figure(curves: Sequence[FlowCurve], onset: ShearOnset, of: Sheared) -> Figure:
     """Draw p against the rate on the left, and p/gdot and p_0 against phi on the right."""
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
-    from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(9.5, 4.2), dpi=160, layout="constrained")
+    figure = figure_of(9.5, 4.2, dpi=160)
     left, right = figure.subplots(1, 2)
     unit = pressure_unit([of.system])
     for curve, shade in zip(curves, np.linspace(0, 0.9, len(curves)), strict=True):

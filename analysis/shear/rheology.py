@@ -27,7 +27,7 @@ from jamshape.measures.shears import ShearOf, read_shear
 from jamshape.measures.steady import SteadyMean
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from common.axes import SMALL_TEXT
+from common.axes import SMALL_TEXT, figure_of
 from common.styles import color
 from common.text import system_labels
 
@@ -123,13 +123,11 @@ def lines_of(runs: Sequence[ShearOf]) -> dict[Line, list[ShearOf]]:
 
 def rheology_figure(runs: Sequence[ShearOf]) -> Figure:
     """Draw six panels over phi: systems by colour, rates by marker."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
     lines = lines_of(runs)
     labels = system_labels({line.system: None for line in lines})
     tints = {system: color(k) for k, system in enumerate(labels)}
     rates = sorted({line.gdot for line in lines})
-    figure = Figure(figsize=(10.5, 6.2), dpi=160, layout="constrained")
+    figure = figure_of(10.5, 6.2, dpi=160)
     panels = figure.subplots(2, 3, sharex=True)
     for axes, panel in zip(panels.flat, PANELS, strict=True):
         for line, of in lines.items():

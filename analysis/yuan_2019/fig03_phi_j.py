@@ -20,7 +20,7 @@ from jamshape.files.sets import System
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import averages, exactly, rows
-from common.axes import points
+from common.axes import figure_of, points
 from common.ensembles import Groups, conditions, only, read_groups
 from common.families import NEEDS, beta, family_legend, is_axisymmetric, shape_of
 from common.styles import PAPER_LINE
@@ -37,9 +37,7 @@ def is_superball(system: System) -> bool:
 
 def draw(groups: Groups, options: Namespace) -> None:
     """Draw phi_J against w and against p."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(9, 4), dpi=200, layout="constrained")
+    figure = figure_of(9, 4)
     panels = figure.subplots(1, 2, sharey=True)
     cases: tuple[Any, ...] = ((is_axisymmetric, beta), (is_superball, lambda s: shape_of(s)[0]))
     for axes, (belongs, x) in zip(panels, cases, strict=True):

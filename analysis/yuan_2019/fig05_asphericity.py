@@ -21,7 +21,7 @@ from jamshape.drawing.styles import YELLOW
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import averages, rows
-from common.axes import points
+from common.axes import figure_of, points
 from common.ensembles import Groups, conditions, read_groups
 from common.families import NEEDS, SPHERES, family, family_legend, is_axisymmetric
 from common.styles import PAPER_LINE
@@ -71,13 +71,11 @@ def draw_z(groups: Groups, panels: list[Axes]) -> None:
 
 def draw(groups: Groups, options: Namespace) -> None:
     """Draw one figure."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
     if options.quantity == "phi_J":
-        figure = Figure(figsize=(7.4, 4.4), dpi=200, layout="constrained")
+        figure = figure_of(7.4, 4.4)
         draw_phi(groups, figure.subplots())
     else:
-        figure = Figure(figsize=(11, 4.2), dpi=200, layout="constrained")
+        figure = figure_of(11, 4.2)
         draw_z(groups, list(figure.subplots(1, 2)))
     save_figure(figure, options.out)
 

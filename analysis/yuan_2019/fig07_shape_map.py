@@ -26,7 +26,7 @@ from jamshape.measures.averages import Mean
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import averages, exactly, rows
-from common.axes import beta_axis
+from common.axes import beta_axis, figure_of
 from common.ensembles import Groups, conditions, only, read_groups
 from common.families import NEEDS, beta, is_thermal, shape_of
 from common.styles import COLORS, PAPER_LINE
@@ -96,9 +96,7 @@ def draw_contours(axes: Axes, x: Any, y: Any, z: Any) -> None:
 
 def draw(groups: Groups, options: Namespace) -> bool:
     """Draw both panels; return whether there are contours."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(9.5, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(9.5, 4.2)
     left, right = figure.subplots(1, 2)
     A, phi = averages(groups, "asphericity"), averages(groups, "phi_J")
     draw_bands(left, A, phi)

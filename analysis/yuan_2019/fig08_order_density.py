@@ -20,7 +20,7 @@ from jamshape.files.sets import PackingFile, System
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import averages, mean, rows
-from common.axes import points
+from common.axes import figure_of, points
 from common.ensembles import Groups, conditions, only, read_groups
 from common.families import family_legend, is_thermal, mark
 from common.text import conditions_text
@@ -45,9 +45,7 @@ def with_both(groups: Groups) -> Groups:
 
 def draw(groups: Groups, options: Namespace) -> None:
     """Draw order and contacts against phi_J."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(12, 4), dpi=200, layout="constrained")
+    figure = figure_of(12, 4)
     panels = figure.subplots(1, len(PANELS))
     first, second = only(groups, lambda s: not is_thermal(s)), only(groups, is_thermal)
     for axes, (name, text) in zip(panels, PANELS.items(), strict=True):

@@ -27,7 +27,7 @@ from jamshape.files.sets import System
 from jamshape.vibration.table import ModeTable
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from common.axes import SMALL_TEXT
+from common.axes import SMALL_TEXT, figure_of
 from common.ensembles import Groups, conditions, read_groups
 from common.families import shape_of
 from common.quartic import KEPT, by_size, kept_modes, quartic_count
@@ -48,9 +48,8 @@ def smooth(values: FloatArray) -> FloatArray:
 def draw(tables: Tables, title: str, options: Namespace) -> None:
     """Draw eigenvalues and the share of rotation."""
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
-    from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(8.4, 6), dpi=200, layout="constrained")
+    figure = figure_of(8.4, 6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
     shades = colormaps["turbo"](np.linspace(0.05, 0.95, len(tables)))
     labels = system_labels(tables)

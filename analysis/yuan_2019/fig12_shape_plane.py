@@ -22,7 +22,7 @@ from jamshape.shapes.roundness import asphericity, axes_from
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import averages, exactly, rows
-from common.axes import beta_axis, points
+from common.axes import beta_axis, figure_of, points
 from common.ensembles import Groups, conditions, read_groups
 from common.families import NEEDS, beta, family_legend
 from common.text import conditions_text
@@ -33,9 +33,7 @@ BOX = 2.0  # exponent of the grey lines
 
 def draw(groups: Groups, options: Namespace) -> None:
     """Draw shapes and the curves that bound them."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(7, 4.6), dpi=200, layout="constrained")
+    figure = figure_of(7, 4.6)
     axes = figure.subplots()
     long = np.geomspace(1, LARGEST, POINTS)
     for p, style in ((1.0, "-"), (BOX, "--")):

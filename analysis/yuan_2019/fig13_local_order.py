@@ -29,7 +29,7 @@ from jamshape.packing import Packing, body_axes
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import averages, mean, rows
-from common.axes import points
+from common.axes import figure_of, points
 from common.ensembles import Groups, conditions, only, read_groups
 from common.families import family_legend
 from common.text import conditions_text
@@ -68,9 +68,7 @@ def measure(groups: Groups) -> tuple[Columns, Columns]:
 
 def draw(groups: Groups, local: Columns, lost: Columns, options: Namespace) -> None:
     """Draw both kinds of order."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(10.5, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(10.5, 4.2)
     panels = figure.subplots(1, 2)
     for axes, name in zip(panels, GLOBAL, strict=True):
         known = averages(groups, name)

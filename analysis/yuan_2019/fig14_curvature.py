@@ -26,6 +26,7 @@ from jamshape.packing import body_axes
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import averages
+from common.axes import figure_of
 from common.curvature import contact_curvatures
 from common.ensembles import Groups, conditions, read_groups
 from common.families import NEEDS, SPHERES, family, label, mark
@@ -69,9 +70,8 @@ def draw_distribution(axes: Axes, values: FloatArray, **style: Any) -> None:
 def draw(groups: Groups, known: Curvatures, options: Namespace) -> None:
     """Draw distributions, and medians against z."""
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
-    from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(11.5, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(11.5, 4.2)
     left, right = figure.subplots(1, 2)
     z, shades = averages(groups, "z"), colormaps["turbo"](np.linspace(0.05, 0.95, len(known)))
     named: set[System] = set()
