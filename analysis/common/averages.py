@@ -16,7 +16,7 @@ _Group = TypeVar("_Group")
 
 
 class Measured(Protocol):
-    """A sample with numbers by name, such as `jamshape.files.sets.PackingFile`."""
+    """A sample with named numbers, such as `jamshape.files.sets.PackingFile`."""
 
     @property
     def reached(self) -> bool:
@@ -27,17 +27,17 @@ class Measured(Protocol):
 
 
 class Reported(Protocol):
-    """A group that names itself in JSON, such as `jamshape.files.sets.System`."""
+    """A group with a JSON description, such as `jamshape.files.sets.System`."""
 
     def report(self) -> dict[str, Any]:
-        """Name it."""
+        """Return the description."""
 
 
 _Named = TypeVar("_Named", bound=Reported)
 
 
 def mean(values: ArrayLike) -> Mean:
-    """Average over samples; NaN are left out, and an average of none is NaN.
+    """Average over samples without NaN; NaN if there are none.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def mean(values: ArrayLike) -> Mean:
 
 
 def mean_over(samples: Sequence[Measured], values: Sequence[float]) -> Mean:
-    """Average a number of each sample, with and without samples that did not reach their goal."""
+    """Average one number per sample, with and without samples that did not reach their goal."""
     found = mean(values)
     of = zip(samples, values, strict=True)
     reached = [value for sample, value in of if sample.reached]
@@ -66,21 +66,21 @@ def standard_error(values: ArrayLike) -> FloatArray:
 
 
 def averages(groups: Mapping[_Group, Sequence[Measured]], name: str) -> dict[_Group, Mean]:
-    """Average one number over the samples of each group, as `mean_over`."""
+    """Average one number over the samples of each group, see `mean_over`."""
     return {group: mean_over(of, [s.number(name) for s in of]) for group, of in groups.items()}
 
 
 def exactly(
     groups: Mapping[_Group, Sequence[Any]], value: Callable[[_Group], float]
 ) -> dict[_Group, Mean]:
-    """Give each group a number that needs no average."""
+    """Return for each group a number that needs no average."""
     return {group: Mean(value(group), math.nan, len(samples)) for group, samples in groups.items()}
 
 
 def rows(
     groups: Mapping[_Named, Any], columns: Mapping[str, Mapping[_Named, Mean]]
 ) -> list[dict[str, Any]]:
-    """Report averages for JSON, a row for each group."""
+    """Return averages for JSON, a row for each group."""
     return [
         group.report() | {name: values[group] for name, values in columns.items()}
         for group in groups

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 QUARTER = np.pi / 2  # contact angles are folded to [0, QUARTER]
 
-# A bin with more than this many times the mean number of angles is cut in two.
+# A bin with more than this multiple of the mean number of angles is split in two.
 _CROWDED = 1.5
 
 
@@ -39,17 +39,17 @@ class AngleDensity(NamedTuple):
 
 
 def contact_angles(packing: Packing, network: ContactNetwork, rattlers: BoolArray) -> FloatArray:
-    """Polar angles of the contacts about the centres of both particles, from the spine.
+    """Polar angles of the contacts from the spine, about the centres of both particles.
 
-    Marschall & Teitel 2018, Fig. 10. A side-to-side contact is one, midway between its two bonds.
-    A particle looks the same from both ends and from both sides, so that angles phi, -phi, pi - phi
-    and pi + phi are one.
+    Marschall & Teitel 2018, Fig. 10. A side-to-side contact counts once, midway between its two bonds.
+    By the symmetry of a particle the angles phi, -phi, pi - phi and pi + phi
+    are equivalent.
 
     Parameters
     ----------
     packing : Packing
     network : ContactNetwork
-        Of that packing, in two dimensions.
+        Its contacts, in two dimensions.
     rattlers : (N,) array of bool
 
     Returns
@@ -74,19 +74,19 @@ def contact_angles(packing: Packing, network: ContactNetwork, rattlers: BoolArra
 
 
 def angle_edges(angles: FloatArray, coarse: int = 30, cuts: int = 6) -> FloatArray:
-    """Limits of bins that are wide where the density is smooth and narrow in its peaks.
+    """Bin edges that are wide where the density is smooth and narrow in its peaks.
 
-    Equal bins are cut in two, and their halves again, for as long as they hold more than 1.5 times
-    what they would if all angles were equally likely.
+    Equal bins are halved repeatedly as long as they hold more than 1.5 times the number
+    expected for a uniform density.
 
     Parameters
     ----------
     angles : (K,) array of float64, rad
-        Folded, from `contact_angles`, of all packings together.
+        Folded angles from `contact_angles`, of all packings together.
     coarse : int
-        Number of bins to begin with.
+        Initial number of bins.
     cuts : int
-        How often a bin is cut at most, which gives 0.05 degrees.
+        Largest number of halvings of a bin; the default resolves 0.05 degrees.
 
     Returns
     -------
@@ -118,9 +118,9 @@ def angle_density(angles: FloatArray, edges: FloatArray) -> AngleDensity:
     Parameters
     ----------
     angles : (K,) array of float64, rad
-        Folded, from `contact_angles`.
+        Folded angles from `contact_angles`.
     edges : (B + 1,) array of float64, rad
-        Ascending from 0 to pi / 2, such as `angle_edges` finds.
+        Ascending from 0 to pi / 2, such as from `angle_edges`.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def angle_density(angles: FloatArray, edges: FloatArray) -> AngleDensity:
     """
     counts, _ = np.histogram(angles, edges)
     if counts.sum() != len(angles) or not len(angles):
-        msg = f"{counts.sum()} of {len(angles)} angles are within the edges, expected all, and some"
+        msg = f"{counts.sum()} of {len(angles)} angles are within the edges, expected all, and at least one"
         raise ValueError(msg)
     half = counts / (2 * len(angles) * np.diff(edges))
     mirrored = np.pi - edges[-2::-1]
@@ -159,22 +159,22 @@ class AngleCurve(NamedTuple):
     samples: int
     n_contacts: int
     on_flat: Mean
-    """Fraction of the angles that are on the flat sides."""
+    """Fraction of the angles on the flat sides."""
 
     @property
     def peak_degrees(self) -> float:
-        """Middle of the bin where P is highest."""
+        """Centre of the bin with the highest P."""
         middles = (self.edges[1:] + self.edges[:-1]) / 2
         return float(middles[np.argmax(self.density)])
 
 
 def angle_curve(alpha: float, files: Sequence[PackingFile]) -> AngleCurve:
-    """Average P over samples in the same bins; `alpha` says where flat sides begin."""
+    """Average P over samples in common bins; `alpha` determines where flat sides begin."""
     return curve_of_angles(alpha, [angles_of(file) for file in files])
 
 
 def curve_of_angles(alpha: float, found: Sequence[FloatArray]) -> AngleCurve:
-    """Average P over the angles (K,) of packings, or of frames of a run, in the same bins."""
+    """Average P over the angles (K,) of packings, or of frames of a run, in common bins."""
     edges = angle_edges(np.concatenate(found))
     densities = np.array([angle_density(angles, edges).density for angles in found])
     corner = np.arctan2(1, alpha)
@@ -189,7 +189,7 @@ def curve_of_angles(alpha: float, found: Sequence[FloatArray]) -> AngleCurve:
 
 
 def contact_angle_figure(curves: Mapping[str, AngleCurve], title: str) -> Figure:
-    """Draw P(phi) of each, by its name, with a band of one standard error on both sides."""
+    """Draw P(phi) of each curve with its name, and a band of one standard error on both sides."""
     figure = figure_of(6, 4.3)
     axes = figure.subplots()
     for k, (name, found) in enumerate(curves.items()):
@@ -218,7 +218,7 @@ def _draw_curve(axes: Axes, found: AngleCurve, tint: str, label: str) -> None:
 
 
 def _draw_particle(axes: Axes) -> None:
-    """Draw what the angle is, on a particle."""
+    """Illustrate the angle on a particle."""
     from matplotlib.patches import Arc, Polygon  # noqa: PLC0415 - not needed for --help
 
     body = shape_named(DEFAULT).outline(np.array([3.6, 2.0, 2.0]), 1.0)

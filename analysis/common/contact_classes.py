@@ -26,21 +26,21 @@ class FlatFraction(NamedTuple):
     """Fraction of the particles that have a contact on at least one of their two flat sides."""
 
     of_backbone: float
-    """Of the particles that are no rattlers."""
+    """Fraction of the particles without rattlers."""
     of_all: float
-    """Of all particles; rattlers have none."""
+    """Fraction of all particles; rattlers have none."""
 
 
 def class_fractions(network: ContactNetwork, rattlers: BoolArray) -> ClassFractions:
-    """Fractions of bonds by class of contact, a side-to-side contact being two bonds.
+    """Fractions of bonds by class of contact; a side-to-side contact is two bonds.
 
-    Marschall & Teitel 2018, Fig. 9. Counted as in `jamshape.contacts.coordination`: two bonds also
-    where `find_contacts` was asked for one.
+    Marschall & Teitel 2018, Fig. 9. Counted as in `jamshape.contacts.coordination`: two bonds even
+    if `find_contacts` was called with sides=1.
 
     Parameters
     ----------
     network : ContactNetwork
-        Of a packing in two dimensions.
+        Contacts of a packing in two dimensions.
     rattlers : (N,) array of bool
 
     Returns
@@ -88,15 +88,15 @@ def flat_fraction(network: ContactNetwork, rattlers: BoolArray) -> FlatFraction:
     """Count the particles of `flat_contacts`; arguments and errors as there.
 
     Marschall & Teitel 2018, Sec. III C: "virtually all the particles (96.3% of them) have a contact
-    on at least one of their two flat sides" at alpha = 0.01, where 3.3 % are rattlers. They do not
-    say of how many.
+    on at least one of their two flat sides" at alpha = 0.01, where 3.3 % are rattlers; the reference number
+    is not given.
     """
     n_flat = np.count_nonzero(flat_contacts(network, rattlers))
     return FlatFraction(float(n_flat / np.count_nonzero(~rattlers)), float(n_flat / len(rattlers)))
 
 
 NAMES = (*ClassFractions._fields, *(f"flat_{name}" for name in FlatFraction._fields))
-"""Of what `class_numbers` gives."""
+"""Keys of `class_numbers`."""
 
 
 def class_numbers(found: Contacts) -> dict[str, float]:
@@ -108,18 +108,18 @@ def class_numbers(found: Contacts) -> dict[str, float]:
 
 
 def class_stress(found: Contacts) -> dict[int, FloatArray]:
-    """Give the pressure tensor of the contacts of each class.
+    """Return the pressure tensor of the contacts of each class.
 
     Parameters
     ----------
     found : Contacts
-        Whose classes are 0 tip-to-tip, 1 tip-to-side and 2 side-to-side; shapes without sides have only 0.
+        Contacts of classes 0 tip-to-tip, 1 tip-to-side and 2 side-to-side; shapes without sides have only 0.
 
     Returns
     -------
     dict
-        By class, (D, D) arrays p_kl, the sum of r_l f_k over its contacts and the volume, [energy / length^D]. Their
-        sum is the pressure tensor.
+        (D, D) arrays p_kl by class, the sum of r_l f_k over its contacts, over the volume, [energy / length^D].
+        Their sum is the pressure tensor.
     """
     network, volume = found.network, found.packing.box.volume
     tensors = np.einsum("ck,cl->ckl", network.force, network.separation) / volume

@@ -10,13 +10,12 @@ from scipy.optimize import minimize_scalar
 
 from jamshape.arrays import FloatArray
 
-# The exponents that are tried for a + b alpha^x, and by how much it may be off at the end of them.
-_EXPONENTS = (0.05, 5.0)
-_AT_END = 1e-3
+_EXPONENTS = (0.05, 5.0)  # range of x searched for a + b alpha^x
+_AT_END = 1e-3  # distance from its ends within which a fit has failed
 
 
 class OffsetPowerLaw(NamedTuple):
-    """The curve a + b alpha^x, with standard errors; NaN where nothing tells the errors."""
+    """The curve a + b alpha^x, with standard errors; NaN where they cannot be estimated."""
 
     a: float
     b: float
@@ -43,8 +42,8 @@ def fit_offset_power_law(
     alpha, values : (K,) array_like
         At least three different alpha above 0.
     errors : (K,) array_like, optional
-        Standard errors of the values, above 0. Without them all values count the same, and the
-        scatter about the curve tells the errors, if there are more than three values.
+        Standard errors of the values, above 0. Without them all values have equal weight, and the
+        scatter about the curve gives the errors, if there are more than three values.
 
     Returns
     -------
@@ -53,8 +52,8 @@ def fit_offset_power_law(
     Raises
     ------
     ValueError
-        If there are fewer than three alpha, a number is out of its range, or no exponent from 0.05
-        to 5 fits best.
+        If there are fewer than three alpha, a number is out of its range, or the best exponent is not between
+        0.05 and 5.
     """
     x, y = np.asarray(alpha, np.float64), np.asarray(values, np.float64)
     sigma = np.ones_like(y) if errors is None else np.asarray(errors, np.float64)

@@ -23,43 +23,43 @@ _OF_ENSEMBLES = ("n", "size_ratio", "kappa")
 
 
 def short(value: float) -> str:
-    """Write a number in TeX, as a power of ten where it is small."""
+    """Format a number in TeX, as a power of ten if it is small."""
     return f"{value:.2g}" if 0.01 <= value < 100 else scientific(value)
 
 
 def counted(count: int, thing: str) -> str:
-    """Write a number of things."""
+    """Format a number of things."""
     return f"{count} {thing}{'s' * (count != 1)}"
 
 
 def range_text(counts: Iterable[int], thing: str) -> str:
-    """Write a number of things that may differ from place to place."""
+    """Format a number of things that may vary."""
     known = sorted(set(counts))
     return counted(known[0], thing) if len(known) == 1 else f"{known[0]} to {known[-1]} {thing}s"
 
 
 def samples_text(n: int, groups: Mapping[Any, Sized]) -> str:
-    """Name N and the number of samples, for a legend."""
+    """Format N and the number of samples, for a legend."""
     many = range_text(map(len, groups.values()), "sample")
     return rf"$N={n}$, {many}" + " each" * (len(groups) > 1)
 
 
 def conditions_text(groups: Mapping[Any, Sequence[PackingFile]], *, bars: bool = True) -> str:
-    """Say above a figure of packings what they are of, and below N, samples, energy and rate.
+    """Describe the packings of a figure on one line, and N, samples, energy and rate on the next.
 
-    The energy density and the compression rate are those that all share, if they do. What bars are is
-    said last, if they are drawn and there are several samples.
+    Only common values of energy density and compression rate are given. Bars are explained
+    last, if they are drawn and there are several samples.
     """
     return _titled(groups, samples_text(n_of(groups), groups)) + bars_text(groups) * bars
 
 
 def bars_text(groups: Mapping[Any, Sized]) -> str:
-    """Say what bars are, in a line of its own, where there are several samples."""
+    """Explain error bars, on a line of its own, if there are several samples."""
     return "\nbars: standard error of the mean" * any(len(of) > 1 for of in groups.values())
 
 
 def conditions_alone(groups: Mapping[Any, Sequence[PackingFile]]) -> str:
-    """Say the same without the number of samples, for legends that tell it of each curve."""
+    """Return the same without the number of samples, for legends that give it for each curve."""
     return _titled(groups, f"$N={n_of(groups)}$")
 
 
@@ -76,14 +76,14 @@ def _titled(groups: Mapping[Any, Sequence[PackingFile]], count: str) -> str:
 
 
 def is_told_by_parameters(shape: Shape) -> bool:
-    """Whether it is what is meant where nothing but parameters is told: the first shape with these."""
+    """Whether parameters alone identify it: it is the first shape with these."""
     names = [p.name for p in shape.parameters]
     alike = (s for s in SHAPES.values() if [p.name for p in s.parameters] == names)
     return next(alike).name == shape.name
 
 
 def system_labels(systems: Collection[System]) -> dict[System, str]:
-    """Name what tells systems apart, for a legend; their parameters, and what is unusual, in any case."""
+    """Label systems by their differences, for a legend; always with parameters and nonstandard properties."""
     shapes, dimensions, protocols = (
         {getattr(system, name) for system in systems} for name in ("shape", "dimension", "protocol")
     )
@@ -101,7 +101,7 @@ def system_labels(systems: Collection[System]) -> dict[System, str]:
 
 
 def ensemble_labels(ensembles: Collection[Ensemble]) -> dict[Ensemble, str]:
-    """Name what tells ensembles of compressions apart, for a legend; N in any case."""
+    """Label ensembles of compressions by their differences, for a legend; always with N."""
     systems, differ = _differing(ensembles)
     labels = {}
     for e in ensembles:
@@ -111,7 +111,7 @@ def ensemble_labels(ensembles: Collection[Ensemble]) -> dict[Ensemble, str]:
 
 
 def ensembles_title(ensembles: Collection[Ensemble]) -> str:
-    """Name what ensembles of compressions have in common."""
+    """Describe the common settings of ensembles of compressions."""
     systems, differ = _differing(ensembles)
     first = next(iter(ensembles))
     told = [attribute_text(name, first._asdict()) for name in _OF_ENSEMBLES if name not in differ]
@@ -119,7 +119,7 @@ def ensembles_title(ensembles: Collection[Ensemble]) -> str:
 
 
 def _differing(ensembles: Collection[Ensemble]) -> tuple[dict[System, str], list[str]]:
-    """Labels of the systems, and names of the numbers that ensembles differ in, with N."""
+    """Return labels of the systems, and names of the numbers in which ensembles differ, with N."""
     systems = system_labels({e.system: None for e in ensembles})
     several = [k for k in _OF_ENSEMBLES if len({getattr(e, k) for e in ensembles}) > 1]
     return systems, ["n"] * ("n" not in several) + several

@@ -1,4 +1,4 @@
-"""What figures say: numbers in TeX, names of systems, N and the number of samples."""
+"""Text in figures: numbers in TeX, names of systems, N and the number of samples."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from jamshape.files.sets import PackingFile, System
+from jamshape.files.sets import System
 from jamshape.shapes.particles import parse_kind
 from jamshape.shapes.table import shape_named
 
@@ -18,17 +18,17 @@ _SMALL = frozenset({"u0", "kappa", "gdot"})
 
 
 class Grouped(Protocol):
-    """What runs that differ in their seed only have in common: a system, and numbers by name."""
+    """Common settings of runs that differ only in their seed: a system, and numbers by name."""
 
     @property
     def system(self) -> System:
-        """What they are of."""
+        """Their particles."""
 
     def _asdict(self) -> dict[str, Any]: ...
 
 
 def scientific(value: float) -> str:
-    r"""Write a number from 0 as a power of ten in TeX, without dollars, to two digits.
+    r"""Format a number >= 0 as a power of ten in TeX, without dollars, to two digits.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def scientific(value: float) -> str:
 
 
 def attributes_text(known: Mapping[str, Any]) -> list[str]:
-    r"""Write the energy density and the compression rate that a file tells, as far as it does.
+    r"""Format the energy density and the compression rate in a file, if present.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def attributes_text(known: Mapping[str, Any]) -> list[str]:
 
 
 def attribute_text(name: str, known: Mapping[str, Any]) -> str:
-    """Write a number with its symbol; of rates that follow each other the last."""
+    """Format a number with its symbol; the last one of successive rates."""
     value = float(np.ravel(known[name])[-1])
     if name == "u0" and value == 0:
         return "first jammed"
@@ -62,7 +62,7 @@ def attribute_text(name: str, known: Mapping[str, Any]) -> str:
 
 
 def systems_text(systems: Iterable[System]) -> str:
-    """Name what systems are of: shape, dimension, and parameters or from where to where these go."""
+    """Describe systems: shape, dimension, and parameters or their ranges."""
     found = list(dict.fromkeys(systems))
     shapes, dimensions, protocols = (
         sorted({getattr(system, name) for system in found})
@@ -79,7 +79,7 @@ def systems_text(systems: Iterable[System]) -> str:
 
 
 def _ranges(systems: Sequence[System]) -> list[str]:
-    """Write the parameters of systems of one shape, or from where to where they go."""
+    """Format the parameters of systems of one shape, or their ranges."""
     texts = []
     for parameter in shape_named(systems[0].shape).parameters:
         values = [system.number(parameter.name) for system in systems]
@@ -90,7 +90,7 @@ def _ranges(systems: Sequence[System]) -> list[str]:
 
 
 def system_text(system: System) -> str:
-    """Name a system by its parameters, or those that it has of them; a mixture by its kinds."""
+    """Describe a system by its known parameters; a mixture by its kinds."""
     if system.kinds:
         return mixture_text(system)
     known = dict(system.parameters)
@@ -98,12 +98,12 @@ def system_text(system: System) -> str:
 
 
 def mixture_text(system: System) -> str:
-    """Name the kinds of a mixture, as far as its file does, by parameters, size and share."""
+    """Describe the kinds of a mixture, as far as known, by parameters, size and share."""
     shape = shape_named(system.shape)
     try:
         kinds = [parse_kind(text) for text in system.kinds.split(";")]
         named = [shape.label(kind.parameters) for kind in kinds]
-    except (ValueError, KeyError):  # particles that were given one by one
+    except (ValueError, KeyError):  # individually specified particles
         return f"{system.shape}s {system.kinds}"
     total = sum(kind.share for kind in kinds)
     shares = [f"{100 * kind.share / total:.0f} %" for kind in kinds]
@@ -112,13 +112,13 @@ def mixture_text(system: System) -> str:
 
 
 def ensemble_text(ensemble: Grouped, names: Iterable[str] = ("n", "kappa")) -> str:
-    """Name an ensemble of runs by its system and the numbers of these names."""
+    """Describe an ensemble of runs by its system and the numbers of these names."""
     told = [attribute_text(name, ensemble._asdict()) for name in names]
     return ", ".join([systems_text([ensemble.system]), *told])
 
 
 def onset_symbol(kappa: float) -> str:
-    r"""Write phi_J of runs at a finite rate, which is less than that of slower ones.
+    r"""Return the symbol of phi_J at a finite rate, which is less than that at slower rates.
 
     Examples
     --------
@@ -129,29 +129,20 @@ def onset_symbol(kappa: float) -> str:
 
 
 def unit_text(systems: Iterable[System]) -> str:
-    """Name the unit of length that systems share, in TeX without dollars."""
+    """Return the common unit of length of systems, in TeX without dollars."""
     units = {shape_named(system.shape).unit for system in systems}
     unit = units.pop() if len(units) == 1 else r"\mathrm{length}"
     return unit if len(unit) == 1 else f"({unit})"
 
 
 def pressure_unit(systems: Collection[System]) -> str:
-    """Write the unit of pressure and energy density in TeX, without dollars."""
+    """Return the unit of pressure and energy density in TeX, without dollars."""
     dimensions = {system.dimension for system in systems}
     power = dimensions.pop() if len(dimensions) == 1 else "D"
     return rf"[k_e/{unit_text(systems)}^{power}]"
 
 
 def protocol_text(system: System) -> str:
-    """Name how the packings of a system were made."""
+    """Name the protocol of the packings of a system."""
     sweeps = f", {system.n_sweeps} sweeps" * (system.n_sweeps > 0)
     return f"{system.protocol}{sweeps}" if system.protocol else "dynamics"
-
-
-def packing_text(file: PackingFile) -> str:
-    """Name one packing by its system, N, energy and seed, as far as its file tells."""
-    known = file.attributes
-    told = [f"$N={known['n']}$"] if "n" in known else []
-    told += attributes_text(known)
-    told += [f"seed {known['seed']}"] if "seed" in known else []
-    return f"{systems_text([file.system()])}\n{', '.join(told)}"

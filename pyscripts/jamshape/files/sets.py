@@ -1,6 +1,6 @@
-"""Finished packings by what their files say, and the systems that they are samples of.
+"""Finished packings, and the systems to which they belong.
 
-Packings are of one system where shape, dimension, the shape's parameters, mixture, protocol and its sweeps agree.
+Packings belong to one system if shape, dimension, the shape's parameters, mixture, protocol and its sweeps agree.
 """
 
 from __future__ import annotations
@@ -27,29 +27,29 @@ from jamshape.shapes.table import shape_named
 
 
 class System(NamedTuple):
-    """What the packings of one point of a figure have in common, but for N and energy."""
+    """Common settings of the packings of one point of a figure, apart from N and energy."""
 
     shape: str
     dimension: int
     parameters: tuple[tuple[str, float], ...]
-    """Those of the shape, by name; none of a mixture, and none where files do not tell all."""
+    """Parameters of the shape by name; empty for a mixture, and if files lack some."""
     kinds: str = ""
-    """The particles of a mixture."""
+    """Particles of a mixture."""
     protocol: str = ""
-    """The published one, by name, or the way to jamming; none of compressions in LAMMPS."""
+    """Name of the published protocol, or the way to jamming; empty for compressions in LAMMPS."""
     n_sweeps: int = 0
-    """Of Monte Carlo."""
+    """Monte Carlo sweeps."""
 
     def number(self, name: str) -> float:
-        """Look up a parameter; NaN where the shape has none of that name."""
+        """Look up a parameter; NaN if the shape does not have it."""
         return dict(self.parameters).get(name, math.nan)
 
     def without(self, name: str) -> System:
-        """Leave out a parameter: what the points of a curve over it have in common."""
+        """Remove a parameter, so that the points of a curve over it compare equal."""
         return self._replace(parameters=tuple(p for p in self.parameters if p[0] != name))
 
     def report(self) -> dict[str, Any]:
-        """Name it in JSON: parameters by their names, the last three where there are any."""
+        """Return a description for JSON: parameters by name, the last three if present."""
         told = {name: getattr(self, name) for name in ("kinds", "protocol", "n_sweeps")}
         told = {name: value for name, value in told.items() if value}
         return {"shape": self.shape, "dimension": self.dimension, **dict(self.parameters), **told}
@@ -57,7 +57,7 @@ class System(NamedTuple):
 
 @dataclass(frozen=True)
 class PackingFile:
-    """One finished packing: its file and what is said of it there."""
+    """A finished packing: its file and attributes."""
 
     path: Path
     attributes: dict[str, Any]
@@ -66,12 +66,12 @@ class PackingFile:
 
     @classmethod
     def read(cls, path: Path) -> PackingFile:
-        """Read what a file says; errors as `read_attributes`."""
+        """Read the attributes of a file; errors as `read_attributes`."""
         return cls(path, read_attributes(path), read_style(path))
 
     @property
     def reached(self) -> bool:
-        """Whether it reached its goal: forces that balance."""
+        """Whether it reached its goal, force balance."""
         return is_reached(self.attributes)
 
     def number(self, name: str) -> float:
@@ -80,7 +80,7 @@ class PackingFile:
         Raises
         ------
         ValueError
-            If there is none.
+            If it does not exist.
         """
         return number(self.attributes, name, f"{self.path}: has", "a packing of make_packing.py")
 
@@ -89,11 +89,11 @@ class PackingFile:
         return read_packing(self.path)
 
     def system(self) -> System:
-        """Tell what it is a sample of."""
+        """Return the system that it is a sample of."""
         return system_of(self.attributes, *self.style)
 
     def contacts(self) -> Contacts:
-        """Read the packing and find its contacts, by its own law, and its rattlers."""
+        """Read the packing and find its contacts, under its own law, and its rattlers."""
         packing = self.packing()
         network = find_contacts(packing)
         observables = read_observables(self.path)
@@ -110,7 +110,7 @@ def number(attributes: Mapping[str, Any], name: str, who: str, expected: str) ->
     attributes : mapping
     name : str
     who, expected : str
-        Begin and end of the sentence, if there is none.
+        Begin and end of the error message.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def number(attributes: Mapping[str, Any], name: str, who: str, expected: str) ->
 
 
 def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> System:
-    """Tell what a packing is a sample of, by its attributes, shape style and dimension."""
+    """Return the system of a packing, from its attributes, shape style and dimension."""
     names = [parameter.name for parameter in shape_named(shape).parameters]
     told = set(names) <= attributes.keys()
     known = tuple((name, float(attributes[name])) for name in names if told)

@@ -1,11 +1,11 @@
-"""An average over samples, with its standard error."""
+"""Average over samples, with its standard error."""
 
 from __future__ import annotations
 
 import math
 from typing import Any, NamedTuple
 
-# Digits after the point that a number is written with, at least and at most.
+# Smallest and largest number of digits after the decimal point.
 _DIGITS = (3, 9)
 
 
@@ -16,22 +16,22 @@ class Mean(NamedTuple):
     error: float = math.nan
     """NaN for one sample."""
     samples: int = 0
-    """0 where that is not known."""
+    """0 if unknown."""
     reached: Mean | None = None
-    """The same without samples that did not reach their goal, where there are some."""
+    """Average over samples that reached their goal, if some did not."""
 
     def as_json(self) -> dict[str, Any]:
-        """Name its numbers for JSON; `reached` only where there are two averages."""
+        """Return the fields for JSON; `reached` only where there are two averages."""
         found = self._asdict()
         return found if self.reached else {k: v for k, v in found.items() if k != "reached"}
 
     @property
     def tex(self) -> str:
-        """Write it in TeX, without dollars."""
+        """Format in TeX, without dollars."""
         return self.text(r"\pm")
 
     def text(self, plus_minus: str = "+-") -> str:
-        """Write the digits that the error leaves; empty for NaN."""
+        """Format to the digits that the error supports; empty for NaN."""
         if not math.isfinite(self.value):
             return ""
         if not math.isfinite(self.error):

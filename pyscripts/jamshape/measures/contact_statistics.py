@@ -1,8 +1,8 @@
 """Contacts of the backbone, and residual forces and torques over the mean contact.
 
-In two dimensions, of spherocylinders. Marschall & Teitel 2018, Sec. III C and Appendix A. Everything
-is of the backbone: contacts of rattlers are left out, and which particles are rattlers is up to the
-caller (`jamshape.contacts.find_rattlers`, or what the file of a packing says).
+For spherocylinders in two dimensions; Marschall & Teitel 2018, Sec. III C and Appendix A. Contacts of
+rattlers are left out; the caller decides which particles are rattlers
+(`jamshape.contacts.find_rattlers`, or the file of a packing).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from jamshape.packing import Packing
 
 
 class ContactScale(NamedTuple):
-    """Average over the bonds, to measure what is left of forces and torques against."""
+    """Averages over the bonds, as units of net forces and torques."""
 
     force: float
     """[energy / length]"""
@@ -27,16 +27,16 @@ class ContactScale(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """What is left of force and torque on each particle, over the `ContactScale`."""
+    """Net force and torque on each particle, over the `ContactScale`."""
 
     force: FloatArray
     """(N,); NaN for rattlers."""
     torque: FloatArray
-    """(N,); NaN for rattlers, and for all if the mean contact torque is 0 as it is for discs."""
+    """(N,); NaN for rattlers, and for all if the mean contact torque is 0, as for discs."""
 
 
 def held_contacts(network: ContactNetwork, rattlers: BoolArray) -> BoolArray:
-    """Flag the contacts that no rattler takes part in.
+    """Flag the contacts that do not involve rattlers.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def held_contacts(network: ContactNetwork, rattlers: BoolArray) -> BoolArray:
     """
     held: BoolArray = ~np.logical_or(*rattlers[network.pairs.T])
     if not held.any():
-        found = f"of {len(held)} contacts none is between two particles that are no rattlers"
+        found = f"all {len(held)} contacts involve rattlers"
         msg = f"{found}, expected a jammed packing"
         raise ValueError(msg)
     return held
@@ -63,14 +63,14 @@ def held_contacts(network: ContactNetwork, rattlers: BoolArray) -> BoolArray:
 def contact_scale(packing: Packing, network: ContactNetwork, rattlers: BoolArray) -> ContactScale:
     """Mean bond force and mean contact torque.
 
-    Marschall & Teitel 2018, Eqs. 36 and 37; a side-to-side contact is two bonds if the network has
-    two, as their z counts it.
+    Marschall & Teitel 2018, Eqs. 36 and 37; a side-to-side contact is two bonds if it is in the
+    network, as in their z.
 
     Parameters
     ----------
     packing : Packing
     network : ContactNetwork
-        Of that packing, in two dimensions.
+        Its contacts, in two dimensions.
     rattlers : (N,) array of bool
 
     Returns
@@ -87,7 +87,7 @@ def contact_scale(packing: Packing, network: ContactNetwork, rattlers: BoolArray
     held = held_contacts(network, rattlers)[bonds.contact]
     force = bonds.force[held]
     torques = np.array([np.abs(cross(arm[held], force)) for arm in lever_arms(packing, network)])
-    # A disc's lever arm and force are parallel but for rounding.
+    # The lever arm of a disc is parallel to the force up to rounding.
     torques[packing.half_length[network.pairs[bonds.contact[held]]].T == 0] = 0
     return ContactScale(float(np.linalg.norm(force, axis=1).mean()), float(torques.mean()))
 

@@ -1,4 +1,4 @@
-"""Modes of a packing, and what a file of modes says of its packing: system, u0, bands."""
+"""System, energy and bands of the modes in a file."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from jamshape.vibration.table import ModeTable
 
 TOLD = ("low", "middle", "high")  # bands
 
-_PREFIX = "packing_"  # of what the packing's file said
+_PREFIX = "packing_"  # of attributes copied from the packing's file
 
 
 class Key(NamedTuple):
-    """What the packings of one curve have in common."""
+    """Common attributes of the packings of one curve."""
 
     system: System
     u0: float
@@ -27,25 +27,25 @@ class Key(NamedTuple):
         return self.u0 if name == "u0" else self.system.number(name)
 
     def report(self) -> dict[str, Any]:
-        """Name it in JSON."""
+        """Return a description for JSON."""
         return self.system.report() | {"u0": self.u0}
 
 
 def of_packing(table: ModeTable) -> dict[str, Any]:
-    """Return what the packing's file said."""
+    """Return the attributes of the packing's file."""
     known = table.attributes.items()
     own = {name.removeprefix(_PREFIX): v for name, v in known if name.startswith(_PREFIX)}
     return renamed(own)
 
 
 def to_store(attributes: Mapping[str, Any], packing: Packing) -> dict[str, Any]:
-    """Return what a file of modes keeps of its packing: what that file said, the shape and the law."""
+    """Return the attributes that a file of modes copies from its packing: those of its file, shape and law."""
     known = dict(attributes) | {"shape": packing.shape_style, **packing.law._asdict()}
     return {f"{_PREFIX}{name}": value for name, value in known.items()}
 
 
 def key_of(table: ModeTable) -> Key:
-    """Tell system and u0 of a packing; 0 of the first jammed one, which was led to no energy."""
+    """Return system and u0 of a packing; 0 for a first jammed packing without a target energy."""
     known = of_packing(table)
     shape = known.get("shape") or _shape_with(known)
     u0 = float(known.get("u0", 0.0))
@@ -53,14 +53,14 @@ def key_of(table: ModeTable) -> Key:
 
 
 def _shape_with(known: Mapping[str, Any]) -> str:
-    """Name the first shape of which all parameters are told, as files of old do not name theirs."""
+    """Name the first shape whose parameters are all present, for older files without a shape name."""
     for name, shape in SHAPES.items():
         if all(parameter.name in known for parameter in shape.parameters):
             return name
-    msg = "modes do not tell the shape of their packing, expected modes of a packing of make_packing.py"
+    msg = "modes do not state the shape of their packing, expected modes of a packing of make_packing.py"
     raise ValueError(msg)
 
 
 def count_of(table: ModeTable, name: str) -> int | None:
-    """Count the modes of a band; None where bands are not apart."""
+    """Count the modes of a band; None where bands do not separate."""
     return len(table.in_band(name)) if table.has_band(name) else None
