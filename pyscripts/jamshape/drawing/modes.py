@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# How kinds of motion are drawn, and what they are.
 COMPONENTS = {
     "rotation": ("o-", BLUE, r"$u_\theta^2$, rotation"),
     "parallel": ("s-", RED, r"$u_\parallel^2$, along the axis"),
@@ -25,7 +24,7 @@ COMPONENTS = {
 
 
 def frequency_unit(keys: Iterable[Key]) -> str:
-    """Write the unit of frequencies in TeX, without dollars."""
+    """Return the unit of frequencies in TeX, without dollars."""
     return rf"[\sqrt{{k_e}}\,/\,{unit_text(key.system for key in keys)}]"
 
 

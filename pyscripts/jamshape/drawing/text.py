@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from jamshape.files.sets import System
+from jamshape.files.sets import PackingFile, System
 from jamshape.shapes.particles import parse_kind
 from jamshape.shapes.table import shape_named
 
@@ -146,3 +146,12 @@ def protocol_text(system: System) -> str:
     """Name the protocol of the packings of a system."""
     sweeps = f", {system.n_sweeps} sweeps" * (system.n_sweeps > 0)
     return f"{system.protocol}{sweeps}" if system.protocol else "dynamics"
+
+
+def packing_text(file: PackingFile) -> str:
+    """Describe one packing by its system, N, energy and seed, if known."""
+    known = file.attributes
+    told = [f"$N={known['n']}$"] if "n" in known else []
+    told += attributes_text(known)
+    told += [f"seed {known['seed']}"] if "seed" in known else []
+    return f"{systems_text([file.system()])}\n{', '.join(told)}"
