@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# Style and label of each kind of motion.
 COMPONENTS = {
     "rotation": ("o-", BLUE, r"$u_\theta^2$, rotation"),
     "parallel": ("s-", RED, r"$u_\parallel^2$, along the axis"),
