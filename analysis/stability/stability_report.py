@@ -17,6 +17,7 @@ import multiprocessing
 import os
 import platform
 import re
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -25,12 +26,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from battery.case import Case, Verdict
-from battery.cases import all_cases
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
 from jamshape.files.disk import store
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from battery.case import Case, Verdict
+from battery.cases import all_cases
 
 
 def parser() -> argparse.ArgumentParser:

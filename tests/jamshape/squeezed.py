@@ -11,6 +11,7 @@ from jamshape.minima import (
     minimise,
 )
 from jamshape.protocols.random_start import random_packing
+from methods.lbfgs import lbfgs
 
 
 @cache
@@ -21,5 +22,5 @@ def squeezed(n, alpha, phi, seed=1):
     while (now := state.packing(packing).phi) < phi * (1 - 1e-12):
         state = state.strained(max(-0.01, np.sqrt(now / phi) - 1))
         rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
-        state = minimise(landscape, state, "lbfgs", rough).state
+        state = minimise(landscape, state, lbfgs, rough).state
     return packing, state

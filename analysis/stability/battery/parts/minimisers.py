@@ -16,11 +16,14 @@ from battery.scenes.making import Scene, scaled
 from battery.shapes.table import SHAPES
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Minimum, Outcome, Stop, minimise
+from jamshape.minima.minimise import Method
+from methods.lbfgs import lbfgs
 
 PART = "minimisers"
 
 # In doubles, and of first order: L-BFGS says that it stalls before 1e-8.
 STOPS = {"auto": Stop(), "newton": Stop(), "lbfgs": Stop(tolerance=1e-5)}
+METHODS: dict[str, str | Method] = {"auto": "auto", "newton": "newton", "lbfgs": lbfgs}
 
 
 def _relative(landscape: Landscape, found: Minimum) -> float:
@@ -34,7 +37,7 @@ def minimised(scene: Scene, method: str, stop: Stop) -> float:
     packing = scene()
     landscape, start = Landscape(packing), State.of(packing)
     before = landscape.evaluate(start).energy
-    found = minimise(landscape, start, method, stop)
+    found = minimise(landscape, start, METHODS[method], stop)
     if not found.evaluation.energy <= before or not np.isfinite(found.residual.largest):
         return np.inf
     if found.outcome is Outcome.UNJAMMED:
@@ -47,7 +50,7 @@ def never_worse(scene: Scene, method: str) -> float:
     packing = scene()
     landscape, start = Landscape(packing), State.of(packing)
     before = landscape.evaluate(start).energy
-    found = minimise(landscape, start, method, Stop(evaluations=300))
+    found = minimise(landscape, start, METHODS[method], Stop(evaluations=300))
     position = np.asarray(found.state.position, float)
     fine = np.isfinite(found.residual.largest) and np.isfinite(position).all()
     return found.evaluation.energy / before if fine else np.inf
@@ -59,7 +62,7 @@ def in_units(method: str, length: float, k_e: float) -> float:
     for unit, energy in ((1.0, 1.0), (length, k_e)):
         packing = scaled(jammed(0.0), unit)
         landscape = Landscape(packing, energy)
-        found = minimise(landscape, State.of(packing), method, STOPS[method])
+        found = minimise(landscape, State.of(packing), METHODS[method], STOPS[method])
         if not found.is_at_rest:
             return np.inf
         energies.append(_relative(landscape, found))
@@ -82,7 +85,7 @@ def unjams(method: str, length: float, k_e: float) -> float:
     discs = rods([[0.0, 0.0], [0.9, 0.0], [0.4, 0.7]], 0.0, 0.0, 0.5, [20.0, 20.0])
     packing = scaled(discs, length)
     landscape = Landscape(packing, k_e)
-    found = minimise(landscape, State.of(packing), method, Stop(evaluations=2000))
+    found = minimise(landscape, State.of(packing), METHODS[method], Stop(evaluations=2000))
     return float(landscape.evaluations) if found.outcome is Outcome.UNJAMMED else np.inf
 
 

@@ -15,6 +15,7 @@ from jamshape.landscape import Landscape, State
 from jamshape.minima import Minimum, Stop, minimise
 from jamshape.packing import Box, Packing
 from jamshape.protocols.thermal import without_overlaps
+from methods.lbfgs import lbfgs
 
 EPS = float(np.finfo(np.float64).eps)
 LONG_EPS = float(np.finfo(np.longdouble).eps)
@@ -108,7 +109,7 @@ def squeezed(
     landscape, state = Landscape(packing), State.of(packing)
     rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=evaluations)
     for _ in range(200):
-        found = minimise(landscape, state.strained(-strain), "lbfgs", rough)
+        found = minimise(landscape, state.strained(-strain), lbfgs, rough)
         if enough(found):
             return in_doubles(found.state.packing(packing))
         state = found.state
@@ -122,7 +123,7 @@ def squeezed_to(packing: Packing, phi: float) -> Packing:
     rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
     while (now := state.packing(packing).phi) < phi * (1 - 1e-12):
         strain = max(-0.01, (now / phi) ** (1 / packing.dimension) - 1)
-        state = minimise(landscape, state.strained(strain), "lbfgs", rough).state
+        state = minimise(landscape, state.strained(strain), lbfgs, rough).state
     return in_doubles(state.packing(packing))
 
 

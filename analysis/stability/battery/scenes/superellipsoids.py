@@ -23,6 +23,7 @@ from jamshape.landscape import Landscape, State
 from jamshape.minima import Stop, minimise
 from jamshape.packing import Box, Packing
 from jamshape.shapes.single_pairs import superellipsoid_scales
+from methods.lbfgs import lbfgs
 
 EXPONENTS = (0.55, 0.75, 1.0, 1.5, 2.0, 5.0, 10.0)
 
@@ -67,7 +68,7 @@ def scattered(
     start = superellipsoids(position, turn, axes, exponent, np.ones(dimension))
     edge = (start.phi / (0.4 if dimension == 2 else 0.2)) ** (1 / dimension)
     packing = scaled(start, edge).with_(diameters=start.diameters)
-    found = minimise(Landscape(packing), State.of(packing), "lbfgs", Stop(lowest=1e-14))
+    found = minimise(Landscape(packing), State.of(packing), lbfgs, Stop(lowest=1e-14))
     return in_doubles(pressed(found.state.packing(packing), overlap))
 
 

@@ -2,12 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from common.curvature import contact_curvatures, curvature_at_normals, curvature_at_points
 from jamshape.packing import body_axes
-from jamshape.shapes.curvature import (
-    contact_curvatures,
-    curvature_at_normals,
-    curvature_at_points,
-)
 from jamshape.shapes.superellipsoid_surface import surface_mesh
 
 AXES = np.array([0.6, 1.1, 2.3])

@@ -3,17 +3,13 @@ import pytest
 from mixtures import bidisperse
 from rods_at import rods
 
+from common.contact_angles import angle_density, angle_edges, contact_angles
+from common.contact_classes import class_fractions, flat_contacts, flat_fraction
+from common.offset_power_law import fit_offset_power_law
 from jamshape.contacts import find_contacts, sum_forces
 from jamshape.measures.contact_statistics import (
     ContactScale,
-    angle_density,
-    angle_edges,
-    class_fractions,
-    contact_angles,
     contact_scale,
-    fit_offset_power_law,
-    flat_contacts,
-    flat_fraction,
     held_contacts,
     residuals,
 )

@@ -3,14 +3,9 @@ import json
 import pytest
 from mixtures import bidisperse, superellipsoids
 
-from jamshape.command import plain
-from jamshape.drawing.text import conditions_text, system_labels
-from jamshape.files.h5md import write_packing
-from jamshape.files.run_writer import RunWriter
-from jamshape.files.sets import (
+from common.averages import averages
+from common.ensembles import (
     Choice,
-    PackingFile,
-    System,
     choose,
     conditions,
     curves_over,
@@ -20,7 +15,11 @@ from jamshape.files.sets import (
     one_curve,
     read_groups,
 )
-from jamshape.measures.averages import averages
+from common.text import conditions_text, system_labels
+from jamshape.command import plain
+from jamshape.files.h5md import write_packing
+from jamshape.files.run_writer import RunWriter
+from jamshape.files.sets import PackingFile, System
 from jamshape.protocols.random_start import random_packing
 
 ROD, OTHER = "spherocylinder", "superellipsoid"

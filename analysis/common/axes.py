@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from common.families import mark
 from jamshape.arrays import FloatArray
-from jamshape.drawing.families import mark
 from jamshape.drawing.text import pressure_unit
 from jamshape.files.sets import System
 from jamshape.measures.averages import Mean
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Distance of discs from the smallest other alpha on a logarithmic axis, as a factor.
 DISCS_LEFT_BY = 4.0
@@ -23,6 +24,13 @@ DISCS_LEFT_BY = 4.0
 SMALL_TEXT: dict[str, Any] = {"fontsize": 8, "title_fontsize": 8}
 
 _BETA_TICKS = (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10)
+
+
+def figure_of(width: float, height: float, dpi: int = 200) -> Figure:
+    """Make a figure of a size in inches; matplotlib is loaded only here, not for --help and errors."""
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    return Figure(figsize=(width, height), dpi=dpi, layout="constrained")
 
 
 def discs_at(alphas: Iterable[float]) -> float:

@@ -19,11 +19,11 @@ from jamshape.contacts import find_contacts, find_rattlers
 from jamshape.files.h5md import read_attributes, read_packing, require_attributes
 from jamshape.landscape import Landscape, State
 from jamshape.measures.minimum import write_minimum
-from jamshape.minima import Outcome, Stop, minimise
+from jamshape.minima import Minimum, Outcome, Stop, minimise
 from jamshape.minima.target import Search, Target, TargetError, direct
 from jamshape.packing import Packing
 from jamshape.protocols.make import is_done
-from jamshape.protocols.retry import retried
+from jamshape.protocols.retry import Retry, go_on
 from jamshape.shapes.shape import in_name
 
 # Attributes that the packing and existing rungs must share.
@@ -153,3 +153,11 @@ def _shared(first: Packing, other: Packing) -> float:
     now = {tuple(pair) for pair in find_contacts(other, sides=2).pairs.tolist()}
     kept = [tuple(pair) in now for pair in held.tolist()]
     return float(np.mean(kept)) if kept else 1.0
+
+
+def retried(landscape: Landscape, minimum: Minimum, target: Target, budget: int) -> Minimum:
+    """Repeat the search from an unbalanced minimum; return the minimum itself if that does not help."""
+    retry = Retry(minimum.state, budget)
+    for _ in go_on(landscape, retry, target):
+        pass
+    return retry.minimum or minimum

@@ -1,11 +1,9 @@
 import numpy as np
 import pytest
 
-from jamshape.vibration.hessian import Coordinates
-from jamshape.vibration.sets import (
+from common.mode_tables import (
     Wanted,
     band_means,
-    key_of,
     pick_modes,
     pooled,
     read_tables,
@@ -15,6 +13,8 @@ from jamshape.vibration.sets import (
     stable,
     unstable,
 )
+from jamshape.vibration.hessian import Coordinates
+from jamshape.vibration.sets import key_of
 from jamshape.vibration.table import ModeTable, write_modes
 
 N = 4

@@ -1,4 +1,4 @@
-"""L-BFGS."""
+"""SciPy's L-BFGS, in doubles: a minimiser to compare with, and rough starts of tests."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ class _LeaveError(Exception):
     """Ends SciPy's minimiser from within."""
 
 
-def lbfgs(descent: Descent, below: float = 0.0) -> Outcome:
-    """Run SciPy's L-BFGS, in doubles, on displacements from the present state."""
+def lbfgs(descent: Descent) -> Outcome:
+    """Minimise displacements from the present state; a method of `jamshape.minima.minimise`."""
     particles = descent.landscape.particles
     descent.be_patient(max(_PATIENCE, _PATIENCE_PER_PARTICLE * particles.n))
     # Its first step has unit length in its own coordinates.
     unit = 0.01 * float(descent.landscape.inner_radius.min()) * math.sqrt(particles.n)
     stuck = 0
-    while not (outcome := descent.outcome()) and descent.residual > below and stuck < _STUCK:
+    while not (outcome := descent.outcome()) and descent.residual > 0 and stuck < _STUCK:
         evaluations = descent.evaluations
         with contextlib.suppress(_LeaveError):
             scipy.optimize.minimize(
-                _Objective(descent, unit, below),
+                _Objective(descent, unit),
                 np.zeros(descent.landscape.size),
                 jac=True,
                 method="L-BFGS-B",
@@ -51,8 +51,8 @@ def lbfgs(descent: Descent, below: float = 0.0) -> Outcome:
 class _Objective:
     """The energy for SciPy: of displacements in units, relative to the energy at the start."""
 
-    def __init__(self, descent: Descent, unit: float, below: float) -> None:
-        self.descent, self.unit, self.below = descent, unit, below
+    def __init__(self, descent: Descent, unit: float) -> None:
+        self.descent, self.unit = descent, unit
         self.base, self.scale = descent.state, descent.evaluation.energy
 
     def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
@@ -64,7 +64,7 @@ class _Objective:
             raise _LeaveError from None
         if found.energy <= descent.evaluation.energy:
             descent.move_to(state, found)
-            if descent.outcome() or descent.residual <= self.below:
+            if descent.outcome() or descent.residual <= 0:
                 raise _LeaveError
         elif descent.evaluations >= descent.stop.evaluations:
             raise _LeaveError

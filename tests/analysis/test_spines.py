@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from mixtures import bidisperse
 
-from jamshape.packing.spines import with_spines
+from common.spines import with_spines
 from jamshape.protocols.random_start import random_packing
 
 

@@ -6,18 +6,13 @@ from mixtures import superellipsoids
 from numpy.testing import assert_allclose, assert_array_equal
 from small_packings import jammed, matrix_of
 
+from common.energy_along import AlongModes, EnergyAlong, fit_crossover, quartic_crossover
 from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape, State
 from jamshape.minima.target import Target
 from jamshape.packing import Box, Packing
 from jamshape.protocols.make import Recipe, Steps, make
 from jamshape.protocols.quasistatic import Quasistatic
-from jamshape.vibration.energy_along import (
-    AlongModes,
-    EnergyAlong,
-    fit_crossover,
-    quartic_crossover,
-)
 from jamshape.vibration.hessian import Coordinates, dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 

@@ -1,18 +1,14 @@
-"""LAMMPS's own conjugate gradients (`min_style cg`, Polak-Ribiere) as one of the minimisers."""
+"""LAMMPS's own conjugate gradients (`min_style cg`, Polak-Ribiere) to compare minimisers with."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jamshape.lammps.session import Session
+from jamshape.landscape import Landscape
+from jamshape.minima import Descent, Outcome
 from jamshape.packing import State
 from jamshape.shapes.shape import Interaction
-
-if TYPE_CHECKING:
-    from jamshape.landscape import Landscape
-    from jamshape.minima.descent import Descent, Outcome
 
 _ITERATIONS = 100  # between two checks of the residual
 _IDLE = 3  # checks in a row without gain that end it
@@ -22,8 +18,8 @@ _IDLE = 3  # checks in a row without gain that end it
 _ENERGY = 1e3
 
 
-def descend(descent: Descent) -> Outcome | None:
-    """Minimise in a LAMMPS session of its own, in doubles; None if LAMMPS stops making progress."""
+def lammps_cg(descent: Descent) -> Outcome:
+    """Minimise in a LAMMPS session of its own, in doubles; a method of `jamshape.minima.minimise`."""
     landscape = descent.landscape
     idle = 0
     with Session() as session:
@@ -39,7 +35,7 @@ def descend(descent: Descent) -> Outcome | None:
             is_idle = session.step - begin < _ITERATIONS or descent.evaluation.energy >= before
             idle = idle + 1 if is_idle else 0
             if idle == _IDLE:
-                return None
+                return Outcome.STALLED
     return outcome
 
 

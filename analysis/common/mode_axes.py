@@ -1,7 +1,7 @@
 """Axes of frequency, and quantities of modes on them.
 
-Unstable modes, of negative eigenvalue, have no frequency. They are drawn separately, left of the
-others, at sqrt(-lambda) on a reversed axis.
+Modes that lower the energy, of negative eigenvalue, have no frequency. They are drawn apart, left of the
+others, at sqrt(-lambda) on an axis that runs the other way.
 """
 
 from __future__ import annotations
@@ -13,22 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from jamshape.arrays import FloatArray
-from jamshape.command import parser_of
-from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED, color
-from jamshape.drawing.text import (
-    attributes_text,
-    bars_text,
-    samples_text,
-    scientific,
-    short,
-    system_labels,
-    systems_text,
-    unit_text,
-)
-from jamshape.files.sets import PackingFile
-from jamshape.vibration.sets import (
-    Key,
+from common.mode_tables import (
     Tables,
     every,
     n_of,
@@ -39,6 +24,13 @@ from jamshape.vibration.sets import (
     stable,
     unstable,
 )
+from common.styles import color
+from common.text import bars_text, samples_text, short, system_labels
+from jamshape.arrays import FloatArray
+from jamshape.command import parser_of
+from jamshape.drawing.modes import frequency_unit
+from jamshape.drawing.text import attributes_text, scientific, systems_text
+from jamshape.vibration.sets import Key
 from jamshape.vibration.statistics import mean_in_bins
 from jamshape.vibration.table import ModeTable
 
@@ -47,14 +39,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PER_DECADE = 8  # bins
-
-# Style and label of each kind of motion.
-COMPONENTS = {
-    "rotation": ("o-", BLUE, r"$u_\theta^2$, rotation"),
-    "parallel": ("s-", RED, r"$u_\parallel^2$, along the axis"),
-    "perpendicular": ("D-", GREEN, r"$u_\perp^2$, across it"),
-    "of_round": ("^-", ORANGE, r"$u^2$ of particles without such an axis"),
-}
 
 # Smallest width of the axes of unstable modes, over that of the others.
 _LEAST_WIDTH = 0.16
@@ -113,20 +97,6 @@ def legend_title(tables: Tables) -> str:
     told += map(energy_text, energies if len(energies) == 1 else [])
     text = f"{systems_text(key.system for key in tables)}\n{', '.join(told)}"
     return text + bars_text(tables)
-
-
-def frequency_unit(keys: Iterable[Key]) -> str:
-    """Return the unit of frequencies in TeX, without dollars."""
-    return rf"[\sqrt{{k_e}}\,/\,{unit_text(key.system for key in keys)}]"
-
-
-def packing_text(file: PackingFile) -> str:
-    """Describe one packing by its system, N, energy and seed, if known."""
-    known = file.attributes
-    told = [f"$N={known['n']}$"] if "n" in known else []
-    told += attributes_text(known)
-    told += [f"seed {known['seed']}"] if "seed" in known else []
-    return f"{systems_text([file.system()])}\n{', '.join(told)}"
 
 
 def bin_edges(tables: Iterable[ModeTable], per_decade: int = PER_DECADE) -> FloatArray:

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import jamshape as js
+from common.contact_classes import class_stress
+from common.rotation import rotation_rates
 from jamshape.contacts import Contacts
 from jamshape.flow.host import Host
 from jamshape.flow.implicit import Flow, follow
-from jamshape.flow.rotation import rotation_rates
 from jamshape.flow.slow_shear import SlowShear
 from jamshape.landscape import Landscape, State
-from jamshape.measures.class_stress import class_stress
 from jamshape.protocols.quasistatic import compressed_to
 from jamshape.protocols.random_start import random_packing
 

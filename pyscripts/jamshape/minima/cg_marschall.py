@@ -10,7 +10,7 @@ from jamshape.minima.descent import Descent, Outcome
 from jamshape.packing import State
 
 
-def paper(descent: Descent) -> Outcome:
+def cg_marschall(descent: Descent) -> Outcome:
     """Polak-Ribiere with the line search of Marschall & Teitel 2018, Appendix A, as printed."""
     restarted, epsilon = False, 1e-4
     direction = -descent.evaluation.gradient

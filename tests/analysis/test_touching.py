@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from mixtures import bidisperse
 
+from common.contact_angles import angle_curve, contact_angles
+from common.contact_classes import NAMES, class_fractions, class_numbers, flat_fraction
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import write_packing
 from jamshape.files.sets import PackingFile
-from jamshape.measures.contact_statistics import class_fractions, contact_angles, flat_fraction
-from jamshape.measures.touching import NAMES, angle_curve, class_numbers
 from jamshape.packing import Box
 from jamshape.protocols.random_start import random_packing
 
