@@ -1,4 +1,4 @@
-// Contact geometry of single pairs, row by row: what only tests and measurements of errors call.
+// Contact geometry of single pairs, row by row, called only by tests and measurements of errors.
 
 #include "contact/extended.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
@@ -25,7 +25,7 @@ void require_body(bool condition, std::size_t n, const char *otherwise)
   if (!condition) throw std::invalid_argument("body " + std::to_string(n) + " " + otherwise);
 }
 
-/// Rows of spherocylinders: shape and pose as they are, also where no quaternion gives such an
+/// Rows of spherocylinders: shape and pose unchanged, even if no quaternion gives exactly this
 /// axis.
 struct SpherocylinderRows {
   using Model = SpherocylinderModel;
@@ -49,7 +49,7 @@ struct SuperellipsoidRows {
   static constexpr const char *RULE =
       "6 (2D: centre, angle, semi-axes, p) or 11 (3D: centre, quaternion, semi-axes, p).";
 
-  /// The two of a pair to all digits of their numbers.
+  /// The two bodies of a pair in extended precision.
   template <int D>
   static PosedPair<Model, D, long double> in_long(const double *row_i, const double *row_j,
                                                   const Model::Law &law)
@@ -123,7 +123,7 @@ template <class Rows> class BodyPairs {
   }
 };
 
-/// (M,) of what `ask(i, j)` gives for each pair.
+/// (M,) results of `ask(i, j)` for each pair.
 template <class T, class Rows, class Ask>
 nb::object each(const BodyPairs<Rows> &pairs, const Ask &ask)
 {
@@ -289,7 +289,7 @@ nb::object superellipsoid_overlap(const Bodies &bodies_i, const Bodies &bodies_j
                     [](const auto &i, const auto &j) { return are_overlapping(i, j); });
 }
 
-/// Lets a team count its parts again and again, each time but the last with some that fail.
+/// Lets a team count its parts repeatedly; in each round but the last, some of them fail.
 nb::object counts_of_team(std::int64_t asked, std::size_t first_that_fails, int rounds)
 {
   require_threads(asked);

@@ -14,7 +14,7 @@ namespace jamshape {
 
 namespace {
 
-/// (N,) of what `value(D, shape)` gives for each particle.
+/// (N,) results of `value(D, shape)` for each particle.
 template <class T, class Model, class Value>
 nb::object each(const ShapeOf<Model> &of, const Value &value)
 {
@@ -105,7 +105,7 @@ template <class Model> void export_sizes(nb::class_<ShapeOf<Model>> &of)
       "(N,) body axis (0, 1, 2) that tells the direction, or -1.");
 }
 
-/// (M,) of what is asked of each pair.
+/// (M,) results of `ask` for each pair.
 template <class Model, class Ask>
 nb::object each_pair(const ShapeOf<Model> &of, const PairArrays &arrays, const Ask &ask)
 {
@@ -117,7 +117,7 @@ nb::object each_pair(const ShapeOf<Model> &of, const PairArrays &arrays, const A
   return answer.release();
 }
 
-/// A contact as Python sees it.
+/// A contact as a Python object.
 template <int D, int BONDS>
 const Contact<D, double, BONDS> &in_doubles(const Contact<D, double, BONDS> &contact)
 {

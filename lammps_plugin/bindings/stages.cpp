@@ -7,7 +7,7 @@ namespace jamshape {
 
 namespace {
 
-/// A stage with its scales, and the guesses that it starts from.
+/// A stage with its scales and initial guesses.
 struct PosedStage {
   Stage equation;
   StageUnits units;

@@ -10,7 +10,7 @@ namespace jamshape {
 
 namespace {
 
-/// Random numbers from functions of Python, so that a seed of NumPy's stands for the whole start.
+/// Random numbers drawn by Python functions, so that one NumPy seed determines the whole start.
 class DrawnInPython {
  public:
   DrawnInPython(const nb::callable &positions_in_box, const nb::callable &directions) :

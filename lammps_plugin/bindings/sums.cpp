@@ -1,11 +1,12 @@
-#include "bindings/shape.hpp"
 #include "contact/shapes.hpp"
+
+#include "bindings/shape.hpp"
 
 namespace jamshape {
 
 namespace {
 
-/// A function of its own: how much is inlined into one is limited by its size.
+/// Kept as a separate function: compilers limit inlining by the size of a function.
 template <class Model, int D, class S>
 [[gnu::noinline]] nb::dict sums_in(const ShapeOf<Model> &of, const PairArrays &arrays)
 {

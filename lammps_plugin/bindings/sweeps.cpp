@@ -10,7 +10,7 @@ namespace jamshape {
 
 namespace {
 
-/// Poses as they come from Python.
+/// Poses as Python passes them.
 struct HardPoses {
   const Array2<double> &position;     // (N, D)
   const Array2<double> &orientation;  // (N, 1) or (N, 4)
@@ -47,7 +47,7 @@ HardParticles<Model, D> placed(const ShapeOf<Model> &of, const HardPoses &poses,
   return particles;
 }
 
-/// Throws unless moves go no farther than the shortest edge of the box.
+/// Throws unless moves are at most as long as the shortest edge of the box.
 template <int D> void require_moves(const Moves &moves, const Vec<D> &edges)
 {
   const double shortest = *std::min_element(edges.c, edges.c + D);

@@ -1,7 +1,8 @@
 #include "bindings/vicinity.hpp"
 
-#include "bindings/shape.hpp"
 #include "contact/shapes.hpp"
+
+#include "bindings/shape.hpp"
 
 #include <memory>
 #include <nanobind/stl/shared_ptr.h>
@@ -12,7 +13,7 @@ namespace jamshape {
 
 namespace {
 
-/// Poses, each number a double and its small rest.
+/// Poses as double-doubles.
 struct PoseArrays {
   const Array3<double> &position;     // (2, N, D)
   const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
@@ -33,7 +34,7 @@ struct PoseArrays {
   }
 };
 
-/// What coordinates are, as they come from Python.
+/// Description of the coordinates, as Python passes it.
 struct CoordinateArrays {
   const Array2<std::int64_t> &column;     // (N, D + rotations)
   const Array1<double> &rotation_length;  // (N,)
@@ -58,7 +59,7 @@ struct CoordinateArrays {
   }
 
  private:
-  /// Throws unless each of so many coordinates is a column of one particle.
+  /// Throws unless each coordinate in 0 ... n - 1 is a column of one particle.
   static std::size_t number_of_columns(const std::int64_t *first, const std::int64_t *last)
   {
     std::vector<std::int64_t> numbers;
@@ -184,7 +185,7 @@ nb::object solve(const Factors &factors, const Array2<double> &right)
   return solutions(right, [&](const auto &side) { return factors.solve(side); });
 }
 
-/// A function of its own: how much is inlined into one is limited by its size.
+/// Kept as a separate function: compilers limit inlining by the size of a function.
 template <class Model, int D>
 [[gnu::noinline]] std::unique_ptr<Vicinity> vicinity_of(const ShapeOf<Model> &of, Coordinates names)
 {

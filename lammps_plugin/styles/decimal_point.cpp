@@ -31,7 +31,7 @@ void give_decimal_point(LAMMPS_NS::LAMMPS *lmp)
                                " after LAMMPS had read numbers, 0.5 as 0, expected a decimal "
                                "point: load the plugin first, or set LC_NUMERIC to C.");
   }
-  // For good: commands that follow are not ours to bracket.
+  // Set permanently, because later commands cannot be wrapped.
   uselocale(newlocale(LC_NUMERIC_MASK, "C", duplocale(uselocale(locale_t(0)))));
   if (lmp->comm->me == 0) {
     lmp->error->warning(FLERR, std::string("jamshape") + FOUND +

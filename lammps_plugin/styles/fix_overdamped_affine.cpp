@@ -28,13 +28,13 @@ using LAMMPS_NS::bigint;
 
 namespace {
 
-/// Closer to the stability limit than this fraction of it, the fix warns.
+/// The fix warns if the time step exceeds this fraction of the stability limit.
 constexpr double NEAR_LIMIT = 0.9;
 
-/// The limit is estimated anew at the latest after this strain, in which contacts may form.
+/// Largest strain between estimates of the limit, as contacts may form meanwhile.
 constexpr double STRAIN_BETWEEN_CHECKS = 0.005;
 
-/// A step of LAMMPS may shrink the box by this strain: output between has to see something.
+/// Largest strain of the box in one step of LAMMPS, so that output can resolve the motion.
 constexpr double LARGEST_STRAIN = 1.0;
 
 constexpr int N_OF_SUBSTEPS = 8, N_OF_FLOW = 4;
@@ -43,7 +43,7 @@ constexpr const char *SYNTAX =
     "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [volume free|constant] "
     "[flip F] [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]'.";
 
-/// What is global in a restart file. The first number tells files of other versions apart.
+/// Global data of a restart file. The first number identifies the format.
 constexpr std::uint64_t SAVED_AS = 0x6a616d7368617003, WITHOUT_TIME = SAVED_AS - 1;
 
 struct Saved {
@@ -51,11 +51,11 @@ struct Saved {
   AffineBox::State box;
   StepState steps;
   double mean_turn;
-  double time;  // not in files of the format WITHOUT_TIME
+  double time;  // absent from files of the format WITHOUT_TIME
 };
 
-/// Beginnings of the names of fixes that act on velocities or by them; EVENT/ is of accelerated
-/// dynamics at a temperature, as by `tad`.
+/// Prefixes of the names of fixes that act on velocities or through them; EVENT/ belongs to
+/// accelerated dynamics at a temperature, as by `tad`.
 constexpr const char *OF_VELOCITIES[] = {
     "langevin", "viscous", "viscosity", "temp/", "heat", "ehex", "momentum", "thermal/",
     "ffl",      "gle",     "gld",       "ttm",   "srd",  "nvk",  "pimd",     "EVENT/"};
@@ -67,7 +67,7 @@ bool begins_with(const std::string &text, const std::string &with)
 
 }  // namespace
 
-/// What the words of the command say, beside how often to check.
+/// Settings from the arguments of the command, except the interval of checks.
 struct FixOverdampedAffine::Command {
   double k_d;
   Upper gradient{};
@@ -132,7 +132,7 @@ double FixOverdampedAffine::number(const char *text) const
   return LAMMPS_NS::utils::numeric(FLERR, text, false, lmp);
 }
 
-/// Adds what a word says of the flow; how many words that took, 0 for one of another kind.
+/// Reads a keyword of the flow; returns the number of arguments used, 0 for any other keyword.
 int FixOverdampedAffine::read_flow(int k, int narg, char **arg, Command &to) const
 {
   const std::string keyword = arg[k];
@@ -224,7 +224,7 @@ void FixOverdampedAffine::make_parts(const Command &of)
   if (integrator->state()) flow->allow_retries();
 }
 
-/// To LAMMPS, in the members that it reads.
+/// Sets the members that LAMMPS reads.
 void FixOverdampedAffine::tell_what_this_is()
 {
   time_integrate = 1;
@@ -262,7 +262,7 @@ int FixOverdampedAffine::setmask()
          (domain->triclinic ? PRE_EXCHANGE : 0);
 }
 
-/// Refuses what LAMMPS would let move the same particles, and what would act on nothing.
+/// Rejects other fixes that move the same particles, and fixes without any effect here.
 void FixOverdampedAffine::require_alone() const
 {
   const std::string integrate = update->integrate_style ? update->integrate_style : "verlet";
@@ -306,7 +306,7 @@ void FixOverdampedAffine::init()
               "p': the whole box moves."));
     }
   }
-  // A contact that a late rebuild misses is lost without a word.
+  // A late rebuild would lose contacts silently.
   if (neighbor->every != 1 || neighbor->delay != 0 || !neighbor->dist_check) {
     if (comm->me == 0) {
       error->warning(
@@ -320,7 +320,7 @@ void FixOverdampedAffine::init()
   running = false;
 }
 
-/// A flow that shears needs a cell that can tilt.
+/// A shear flow needs a cell that can tilt.
 void FixOverdampedAffine::require_cell(const Upper &gradient) const
 {
   if (gradient.has_shear() && !domain->triclinic) {
@@ -337,7 +337,7 @@ void FixOverdampedAffine::setup_post_neighbor()
   running = update->whichflag == 1;
 }
 
-/// Takes up all that may have changed since the last run.
+/// Updates everything that may have changed since the last run.
 void FixOverdampedAffine::begin_run(bigint step)
 {
   if (!box->begin_run(step)) {
@@ -359,7 +359,7 @@ void FixOverdampedAffine::begin_run(bigint step)
   }
 }
 
-/// Follows, or refuses, what has changed at the start of a step without a call to this fix.
+/// Follows, or rejects, changes made at the start of a step without a call to this fix.
 void FixOverdampedAffine::take_up(bigint from)
 {
   if (!has_begun) begin_run(from);  // 'run N pre no'
@@ -388,19 +388,19 @@ void FixOverdampedAffine::require_timestep() const
              ", expected a step from 0 to a strain of 1: the integrator divides it.");
 }
 
-/// Of a step that is taken as it is; before it is, since a box that shrinks to nothing takes the
-/// state with it.
+/// Checks the strain of an undivided step; called before the step, since a box that shrinks to
+/// nothing takes the state with it.
 void FixOverdampedAffine::require_strain(double strain) const
 {
   const double radii = 0.5 * strain / flow->largest_strain();
-  if (radii <= 0.5) return;  // false for NaN
+  if (radii <= 0.5) return;  // also for NaN
   flow->stop(
       "found a strain of " + shown(strain) + " in one step, which pushes a particle " +
       shown(radii) +
       " radii into its neighbour, expected at most half its radius: use a smaller timestep.");
 }
 
-/// The numbers are the pair style's to say; see PairContact::report_left_out.
+/// Writes the pair style's report of skipped work; see PairContact::report_left_out.
 void FixOverdampedAffine::tell_what_is_left_out()
 {
   if (comm->me != 0 || was_told) return;
@@ -420,7 +420,7 @@ void FixOverdampedAffine::post_neighbor()
 
 void FixOverdampedAffine::min_post_neighbor() { flow->measure_particles(); }
 
-/// LAMMPS calls it after minimisations, too.
+/// LAMMPS also calls this after minimisations.
 void FixOverdampedAffine::post_run()
 {
   if (running) flow->require_untouched();
@@ -448,7 +448,7 @@ void FixOverdampedAffine::initial_integrate(int)
   ask_for_flip();
 }
 
-/// Atoms change their images with the cell, which they can only where LAMMPS makes its lists.
+/// Atoms change their images with the cell, which is possible only when LAMMPS builds its lists.
 void FixOverdampedAffine::ask_for_flip()
 {
   const bigint step = update->ntimestep;
@@ -600,7 +600,7 @@ int FixOverdampedAffine::unpack_exchange(int i, double *buf) { return flow->unpa
 
 int FixOverdampedAffine::pack_restart(int i, double *buf)
 {
-  buf[0] = size_restart(i);  // LAMMPS skips by this number
+  buf[0] = size_restart(i);  // size by which LAMMPS skips
   std::memcpy(buf + 1, flow->coordinates(i), flow->n_coordinates() * sizeof(double));
   return size_restart(i);
 }

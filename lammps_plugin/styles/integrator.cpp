@@ -15,8 +15,8 @@ namespace {
 constexpr double DEFAULT_TOLERANCE = 1e-4;
 constexpr int DEFAULT_STAGES = 200, MOST_STAGES = 1000;
 
-/// Two stages, second order (Marschall & Teitel 2018, Sec. II): Euler to the end of the step, then
-/// the mean of the rates at both ends.
+/// Two stages, second order (Marschall & Teitel 2018, Sec. II): an Euler step, then the mean of the
+/// rates at both ends.
 class Heun : public Integrator {
  public:
   explicit Heun(AffineBox &affine_box) : box(affine_box) {}
@@ -36,8 +36,8 @@ class Heun : public Integrator {
   AffineBox &box;
 };
 
-/// The same with its difference from Euler's method as the error: of Euler's step, so that Heun's
-/// is far smaller.
+/// Heun's method with its difference from Euler's as the error estimate: that of Euler's step, so
+/// that Heun's is far smaller.
 class HeunEuler : public StepControl {
  public:
   using StepControl::StepControl;
@@ -66,7 +66,7 @@ class HeunEuler : public StepControl {
   bool has_forces_at_end() const override { return false; }
 };
 
-/// Second-order Runge-Kutta-Chebyshev: s stages are stable to about 0.65 s^2 over the largest
+/// Second-order Runge-Kutta-Chebyshev: s stages are stable up to about 0.65 s^2 over the largest
 /// relaxation rate (Sommeijer, Shampine & Verwer, J. Comput. Appl. Math. 88, 315 (1998)).
 class Rkc2 : public StepControl {
  public:

@@ -29,11 +29,11 @@ using LAMMPS_NS::bigint;
 
 namespace {
 
-/// What two ways to compute a length may differ by, relative.
+/// Largest relative difference between two ways to compute a length.
 constexpr double ROUNDING = 1e-12;
 
-/// The largest rotation out of the plane that rounding can explain [rad]: it changes lengths seen
-/// in the plane by 1e-16 of themselves.
+/// Largest rotation out of the plane that rounding can explain [rad]: it changes projected lengths
+/// by a relative 1e-16.
 constexpr double MOST_TILT = 1e-8;
 
 bool begins_with(const char *text, const char *beginning)
@@ -170,14 +170,14 @@ void PairContact::stop_at_shape(const Vec<3> &semi_axes, const std::string &whic
              shown(diameters[2]) + ", expected that " + shape_rule() + ": correct its shape.");
 }
 
-/// The largest particle of each type, and whether any particle can turn. Sizes are per particle, so
-/// cutoffs follow from the particles themselves, never from an input that could be too short. Where
-/// LAMMPS has yet to say which types are this style's, as in a hybrid pair style, all that have a
-/// valid shape are measured.
+/// Finds the largest particle of each type, and whether any particle can rotate. Sizes are per
+/// particle, so that cutoffs follow from the particles themselves, never from an input that could
+/// be too small. If LAMMPS has not yet assigned types to this style, as in a hybrid pair style, all
+/// particles with a valid shape are measured.
 void PairContact::measure_particles()
 {
   std::vector<double> mine(atom->ntypes + 1, 0.0);
-  int found[3] = {0, 0, 0};  // particles that turn, round ones, ellipsoids
+  int found[3] = {0, 0, 0};  // particles that can rotate, round ones, ellipsoids
   for (int i = 0; i < atom->nlocal; ++i) {
     const int type = atom->type[i];
     const Vec<3> semi_axes = particles.semi_axes(i);
@@ -212,7 +212,7 @@ void PairContact::init_style()
   }
   particles.find_ellipsoids("pair_style " + style_name());
   choose_instructions();
-  is_ours.assign(atom->ntypes + 1, force->pair == this);  // of a hybrid style init_one learns them
+  is_ours.assign(atom->ntypes + 1, force->pair == this);  // in a hybrid style init_one sets them
   measure_particles();
   require_orientations_of_rerun();
   if (update->whichflag == 2) require_held_in_minimisation();
@@ -229,8 +229,8 @@ void PairContact::choose_instructions()
   }
 }
 
-/// LAMMPS reads positions alone from a dump. Of all commands that evaluate forces `rerun` alone
-/// begins at another step than the present one or has a last step that no number of steps leads to.
+/// LAMMPS reads only positions from a dump. Of all commands that evaluate forces, only `rerun`
+/// starts at another step than the present one or has an unreachable last step.
 void PairContact::require_orientations_of_rerun() const
 {
   const bigint first = update->firststep, last = update->laststep;
@@ -243,7 +243,7 @@ void PairContact::require_orientations_of_rerun() const
                   "read its frames with jamshape.load, or use data or restart files."));
 }
 
-/// Fixes that hold particles in dynamics, of those that LAMMPS leaves out of a minimisation.
+/// Rejects fixes that hold particles in dynamics but that LAMMPS ignores in a minimisation.
 void PairContact::require_held_in_minimisation() const
 {
   for (int k = 0; k < modify->nfix; ++k) {
@@ -258,12 +258,12 @@ void PairContact::require_held_in_minimisation() const
   }
 }
 
-/// Two styles that turn the same particles would each give them rotations of their own.
+/// Two styles that can rotate the same particles would each keep rotations of their own.
 void PairContact::require_only_one_turns() const
 {
   if (force->pair == this) return;
   int n_ours = 0;
-  LAMMPS_NS::Pair *last = nullptr;  // the only one that matches has every number
+  LAMMPS_NS::Pair *last = nullptr;  // the only match has every number
   for (int n = 1; auto *const style = force->pair_match("/harmonic", 0, n); ++n) {
     if (style == last) break;
     n_ours += dynamic_cast<PairContact *>(style) != nullptr;
@@ -296,7 +296,7 @@ double PairContact::init_one(int i, int j)
       error->all(FLERR, std::string("All pair coeffs are not set"));
     k_e[i][j] = std::sqrt(k_e[i][i] * k_e[j][j]);
   }
-  // A fix such as adapt may have changed it.
+  // A fix such as adapt may have changed the coefficient.
   require_energy(k_e[i][j], shown(k_e[i][j]), "pair_style " + style_name());
   k_e[j][i] = k_e[i][j];
   is_ours[i] = is_ours[j] = true;
@@ -307,7 +307,7 @@ void PairContact::setup()
 {
   is_new_run = true;
   const double needed = largest_reach() + neighbor->skin;
-  // Of a tilted box LAMMPS counts cutoffs in parts of the distance between its faces.
+  // In a tilted box LAMMPS expresses cutoffs as fractions of the distance between its faces.
   const double *const h = domain->h_inv;  // xx, yy, zz, yz, xz, xy
   const double inverse[3] = {std::hypot(h[0], h[5], h[4]), std::hypot(h[1], h[3]), h[2]};
   for (int k = 0; k < domain->dimension; ++k) {
@@ -421,7 +421,7 @@ double PairContact::special_weight(int i, int j, int which) const
              ", expected 0 or 1: such a pair is in contact like any other, or not at all.");
 }
 
-/// Contacts of a particle that is nowhere would be dropped in silence.
+/// Contacts of a particle without a finite position would be dropped silently.
 void PairContact::require_numbers(int n) const
 {
   for (int i = 0; i < n; ++i) {
@@ -473,7 +473,7 @@ bool PairContact::is_mine(int i, int j) const
 {
   if (force->newton_pair || j < atom->nlocal) return true;
   if (atom->tag[i] != atom->tag[j]) return atom->tag[i] < atom->tag[j];
-  // A particle and its own image: both directions of the image are in the list.
+  // A particle and its own image: the list has both directions of the image.
   const double *xi = atom->x[i], *xj = atom->x[j];
   for (int k = 0; k < 3; ++k) {
     if (xi[k] != xj[k]) return xi[k] < xj[k];
@@ -622,9 +622,9 @@ void PairContact::min_xf_get(int)
   }
 }
 
-/// A particle is held in a minimisation where fix setforce, whose arguments no header tells, makes
-/// every component of a force on it zero: it is asked to do so with forces of one. What other
-/// styles of a hybrid one handle is not ours to turn.
+/// A particle is held in a minimisation if fix setforce, whose arguments no header exposes, sets
+/// every component of its force to zero: the fix is called with unit forces to find out. Particles
+/// handled by other styles of a hybrid one are left alone.
 void PairContact::find_held()
 {
   const int nlocal = atom->nlocal, d = domain->dimension;
@@ -638,7 +638,7 @@ void PairContact::find_held()
     if (!acts || !begins_with(fix.style, "setforce")) continue;
     kept.assign(all, all + 3 * nlocal);
     std::fill_n(all, 3 * nlocal, 1.0);
-    fix.min_post_force(0);  // by all ranks: it may evaluate variables
+    fix.min_post_force(0);  // on all ranks: it may evaluate variables
     for (int i = 0; i < nlocal; ++i) {
       is_held[i] |= std::all_of(f[i], f[i] + d, [](double component) { return component == 0.0; });
     }

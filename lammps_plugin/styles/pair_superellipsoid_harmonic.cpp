@@ -19,7 +19,7 @@ template class PairContactOf<SuperellipsoidModel>;
 
 namespace {
 
-constexpr double ELLIPSOID = 1.0;  // the exponent of types that were given none
+constexpr double ELLIPSOID = 1.0;  // default exponent of types
 
 }  // namespace
 
@@ -54,7 +54,7 @@ void PairSuperellipsoidHarmonic::init_style()
   }
 }
 
-/// An exponent is of a type: of all types of a line whose I and J name the same ones.
+/// An exponent belongs to a type: to all types of a line whose I and J are the same.
 void PairSuperellipsoidHarmonic::read_exponent(char **arg)
 {
   const std::string text = arg[3];

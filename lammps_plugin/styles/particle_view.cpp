@@ -11,7 +11,7 @@ namespace jamshape {
 
 namespace compat {
 
-/// Any object with virtual functions: enough to ask it for its class and for where it begins.
+/// Any object with virtual functions: sufficient to query its class and where it begins.
 struct AnyObject {
   virtual ~AnyObject();
 };
