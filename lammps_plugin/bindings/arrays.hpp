@@ -121,7 +121,7 @@ inline void require_edges(const double *edges, std::size_t D)
 {
   const double *const end = edges + D;
   require(std::all_of(edges, end, [](double x) { return x > 0.0 && std::isfinite(x); }),
-          "edges hold what is no length, expected positive ones.");
+          "edges hold a number that is not a positive length.");
 }
 
 /// Throws unless (2, D, D), double-doubles, are an upper triangular matrix with a positive
@@ -129,15 +129,14 @@ inline void require_edges(const double *edges, std::size_t D)
 inline void require_upper(const Array3<double> &of, std::size_t D, const std::string &name)
 {
   require(of.shape(0) == 2 && of.shape(1) == D && of.shape(2) == D,
-          name + " has no shape (2, D, D).");
+          name + " does not have the shape (2, D, D).");
   require_finite(of, name.c_str());
   for (std::size_t part = 0; part < 2; ++part) {
     for (std::size_t k = 0; k < D; ++k) {
       const double *const row = of.data() + (part * D + k) * D;
       require(std::all_of(row, row + k, [](double x) { return x == 0.0; }),
               name + " is not upper triangular, expected vectors as columns, the first along x.");
-      require(part == 1 || row[k] > 0.0,
-              name + " holds an edge that is no length, expected positive ones.");
+      require(part == 1 || row[k] > 0.0, name + " has an edge that is not a positive length.");
     }
   }
 }

@@ -37,8 +37,9 @@ struct SpherocylinderRows {
     const double half_length = row[2 * D], radius = row[2 * D + 1];
     require_body(half_length >= 0.0 && std::isfinite(half_length) && radius > 0.0 &&
                      std::isfinite(radius),
-                 n, "is no such shape: a rod has a half length of at least 0 and a radius.");
-    require_body(are_finite(row, 2 * D), n, "is nowhere: its centre or axis is not finite.");
+                 n, "is not a valid shape: a rod has a half length of at least 0 and a radius.");
+    require_body(are_finite(row, 2 * D), n,
+                 "is without a finite pose: its centre or axis is not finite.");
     return {read_vec<D>(row), read_vec<D>(row + D), row[2 * D], row[2 * D + 1]};
   }
 };
@@ -70,10 +71,11 @@ struct SuperellipsoidRows {
     const auto shape = SuperellipsoidRows::shape<D>(row);
     require_body(
         shape.has_value(), n,
-        "is no such shape: a superellipsoid has positive semi-axes and an exponent p above "
+        "is not a valid shape: a superellipsoid has positive semi-axes and an exponent p above "
         "0.5.");
     require_body(are_finite(row, D) && is_turn<D>(turn), n,
-                 "is nowhere: its centre or orientation is not finite, or the quaternion zero.");
+                 "is without a finite pose: its centre or orientation is not finite, or the "
+                 "quaternion zero.");
     auto body = Model::body<D>(*shape);
     body.centre = read_vec<D>(row);
     Model::turn_to<D>(body, orientation<D>(turn));
@@ -262,7 +264,7 @@ nb::dict superellipsoid_scales(const Bodies &bodies_i, const Bodies &bodies_j,
   require(!normals.has_value() ||
               (normals->shape(0) == pairs.size() &&
                normals->shape(1) == static_cast<std::size_t>(pairs.dimension())),
-          "normals have no shape (M, D).");
+          "normals do not have the shape (M, D).");
   if (normals.has_value()) require_finite(*normals, "normals");
   return in_dimension(pairs.dimension(), [&](auto D) { return scales<D>(pairs, normals); });
 }
@@ -333,21 +335,22 @@ void export_probes(nb::module_ &m)
         "distance/reach is 1 - eta^2.");
   m.def("superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
         "normals"_a.none() = nb::none(),
-        "The scale at which both bodies of M pairs touch, whether above 1 or below, begun at\n"
-        "`normals` (M, D) where given. Returns a dict: eta, gap (relative bound of its error),\n"
+        "The scale at which both bodies of M pairs touch, whether above 1 or below, starting from\n"
+        "`normals` (M, D) if given. Returns a dict: eta, gap (relative bound of its error),\n"
         "iterations, fallback (the first attempt failed), extended (in long doubles, as doubles "
         "were\n"
         "too short), normal (into i, unit), point_i (from the\n"
         "centre of i to the tangency of the scaled bodies).");
   m.def("superellipsoid_near", &superellipsoid_near, "bodies_i"_a, "bodies_j"_a, "margin"_a,
-        "Whether surfaces may be closer than `margin` (M,): false only where they are not.");
+        "Whether surfaces may be closer than `margin` (M,): false only if they are not.");
   m.def("superellipsoid_motion_sq", &superellipsoid_motion_sq, "then"_a, "now"_a,
-        "Upper bound of the squared distance that any point of a body moved (M,).");
+        "Upper bounds of the squared displacement of any point of a body (M,).");
   m.def("superellipsoid_overlap", &superellipsoid_overlap, "bodies_i"_a, "bodies_j"_a,
         "Whether bodies share more than a point (M,).");
   m.def("counts_of_team", &counts_of_team, "threads"_a, "first_that_fails"_a, "rounds"_a,
-        "How often each of so many threads did its part (threads,), of which those from a number\n"
-        "on fail but in the last round, and what was thrown last.");
+        "Rounds in which each thread did its part (threads,), if those from first_that_fails on "
+        "fail\n"
+        "in all rounds but the last, and the last exception.");
 }
 
 }  // namespace jamshape

@@ -37,13 +37,13 @@ template <class Model> class ShapeOf {
     require(dimension == 2 || dimension == 3,
             "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
     require(diameters.shape(1) == 3 && exponent.shape(0) == diameters.shape(0),
-            "diameters and exponent have no shapes (N, 3) and (N,).");
+            "diameters and exponent do not have shapes (N, 3) and (N,).");
     particles.reserve(diameters.shape(0));
     for (std::size_t i = 0; i < diameters.shape(0); ++i) {
       const auto shape =
           Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), exponent.data()[i]);
-      require(shape.has_value(),
-              "particle " + std::to_string(i) + " is no such shape: " + Model::SHAPE_RULE + ".");
+      require(shape.has_value(), "particle " + std::to_string(i) +
+                                     " is not a valid shape: " + Model::SHAPE_RULE + ".");
       particles.push_back(*shape);
     }
   }

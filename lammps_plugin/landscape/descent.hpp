@@ -276,7 +276,7 @@ class Descent {
     shift = shift.cwiseMax(least > 0.0 ? least : 1.0);
     while (!(near = about.factors(shift))) {
       shift *= STIFFEN;
-      if (!shift.allFinite()) throw std::runtime_error("The Hessian has no factors.");
+      if (!shift.allFinite()) throw std::runtime_error("The Hessian cannot be factorised.");
     }
     ++preconditioned;
   }

@@ -33,7 +33,8 @@ class NewtonSystem {
     const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
     about.differentiate({origin.data(), 0.0});
     const double largest = about.n() > 0 ? about.diagonal().cwiseAbs().maxCoeff() : 0.0;
-    if (!std::isfinite(largest)) throw std::runtime_error("The Hessian holds what is no number.");
+    if (!std::isfinite(largest))
+      throw std::runtime_error("The Hessian has elements that are not finite.");
     scale = largest > 0.0 ? largest : 1.0;
     shift = std::max(shift, LEAST_SHIFT * scale);
     factorise();
@@ -101,7 +102,7 @@ class NewtonSystem {
     double added = shift;
     while (!(factors = factors_with(added))) {
       added = complete ? GROWTH * added : std::max(GROWTH * added, INCOMPLETE * scale);
-      if (!std::isfinite(added)) throw std::runtime_error("The Hessian has no factors.");
+      if (!std::isfinite(added)) throw std::runtime_error("The Hessian cannot be factorised.");
     }
     if (complete) shift = added;
   }

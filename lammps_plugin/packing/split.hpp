@@ -4,9 +4,10 @@
 #include <cmath>
 
 #ifdef __FAST_MATH__
-#error "The rests of sums need -fno-fast-math."
+#error "Double-double arithmetic needs -fno-fast-math."
 #endif
-static_assert(FLT_EVAL_METHOD == 0, "The rests of sums need doubles that are rounded as doubles.");
+static_assert(FLT_EVAL_METHOD == 0,
+              "Double-double arithmetic needs doubles without excess precision.");
 
 namespace jamshape {
 

@@ -134,8 +134,9 @@ void ComputePacking::compute_vector()
   if (update->vflag_global != invoked_vector || update->eflag_global != invoked_vector) {
     error->all(
         FLERR,
-        std::string("compute packing found that energy and virial were not tallied on this step, "
-                    "expected them: use it in thermo output or in a fix that asks a step ahead."));
+        std::string(
+            "compute packing found that energy and virial were not tallied on this step, "
+            "expected them: use it in thermo output or in a fix that requests it a step ahead."));
   }
   pair = &PairContact::evaluated(lmp, "compute packing");
   const std::vector<LocalBond> bonds = pair->reported_bonds();

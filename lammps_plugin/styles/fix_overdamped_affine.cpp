@@ -99,7 +99,7 @@ FixOverdampedAffine::Command FixOverdampedAffine::read(int narg, char **arg)
 {
   if (igroup != 0) fail("a group other than all, expected 'all': the whole box moves.");
   if (narg < 5 || std::strcmp(arg[3], "drag")) {
-    fail(std::string("a wrong list of arguments, expected ") + SYNTAX);
+    fail(std::string("wrong arguments, expected ") + SYNTAX);
   }
   Command command;
   command.k_d = number(arg[4]);
@@ -122,8 +122,8 @@ void FixOverdampedAffine::require_no_trace(const Upper &gradient) const
   const double trace = d[0] + d[1] + d[2];
   const double largest = std::max({std::fabs(d[0]), std::fabs(d[1]), std::fabs(d[2])});
   if (std::fabs(trace) > 8.0 * std::numeric_limits<double>::epsilon() * largest) {
-    fail("volume constant and a flow whose trace is " + shown(trace) +
-         ", expected one whose diagonal adds up to 0.");
+    fail("volume constant and a velocity gradient whose trace is " + shown(trace) +
+         ", expected a trace of 0.");
   }
 }
 
@@ -174,7 +174,8 @@ Upper FixOverdampedAffine::read_gradient(char **arg) const
       }
       if (row > column && entry[row][column] != 0.0) {
         fail(std::string("gradient with ") + text +
-             " below the diagonal, expected 0: turn the axes so that the flow keeps the first cell "
+             " below the diagonal, expected 0: rotate the axes so that the flow keeps the first "
+             "cell "
              "vector along x and the second one in the plane of x and y.");
       }
     }
@@ -198,7 +199,7 @@ void FixOverdampedAffine::read_option(const std::string &keyword, const char *te
   } else if (keyword == "flip") {
     largest_tilt = number(text);
     if (!(largest_tilt >= 0.5 && std::isfinite(largest_tilt))) {
-      fail("flip " + value + ", expected a part of an edge of at least 0.5.");
+      fail("flip " + value + ", expected a fraction of an edge, at least 0.5.");
     }
   } else if (keyword == "check") {
     check_every = LAMMPS_NS::utils::bnumeric(FLERR, text, false, lmp);
@@ -269,7 +270,7 @@ void FixOverdampedAffine::require_alone() const
   if (integrate != "verlet") {
     fail("run_style " + integrate +
          ", expected verlet: use 'run_style verlet'; integrators rkc2 and heun/adaptive choose "
-         "substeps by themselves.");
+         "their own substeps.");
   }
   if (force->kspace || force->bond || force->angle || force->dihedral || force->improper) {
     fail(
@@ -282,7 +283,7 @@ void FixOverdampedAffine::require_alone() const
     const std::string named = "fix " + std::string(other.style) + " (" + other.id + ")";
     const std::string cure = std::string(": use 'unfix ") + other.id + "'.";
     if (other.time_integrate) {
-      fail(named + ", which moves particles, too, expected this fix alone to move them" + cure);
+      fail(named + ", which also moves particles, expected only this fix to move them" + cure);
     }
     for (const char *const style : OF_VELOCITIES) {
       if (!begins_with(other.style, style)) continue;
@@ -343,8 +344,9 @@ void FixOverdampedAffine::begin_run(bigint step)
   if (!box->begin_run(step)) {
     flow->set_mean_turn(0.0);
     if (comm->me == 0) {
-      error->warning(FLERR, std::string("fix overdamped/affine found another box than it left, so "
-                                        "that its strain begins again at 0"));
+      error->warning(FLERR,
+                     std::string("fix overdamped/affine found a box other than the one it left, so "
+                                 "that its strain restarts at 0"));
     }
   }
   const bool is_known = flow->begin_run();
@@ -355,7 +357,7 @@ void FixOverdampedAffine::begin_run(bigint step)
   if (flow->stop_particles() && comm->me == 0) {
     error->warning(FLERR,
                    std::string("fix overdamped/affine set velocities to 0: its motion has no "
-                               "inertia, and pressure and temperature would count them"));
+                               "inertia, but pressure and temperature would include them"));
   }
 }
 
@@ -385,7 +387,7 @@ void FixOverdampedAffine::require_timestep() const
   if (!integrator->state()) return require_strain(strain);
   if (strain <= LARGEST_STRAIN) return;
   flow->stop("found timestep " + shown(update->dt) + ", a strain of " + shown(strain) +
-             ", expected a step from 0 to a strain of 1: the integrator divides it.");
+             ", expected a strain of at most 1 per step: the integrator divides the step.");
 }
 
 /// Checks the strain of an undivided step; called before the step, since a box that shrinks to
@@ -407,7 +409,8 @@ void FixOverdampedAffine::tell_what_is_left_out()
   was_told = true;
   std::string text = "energy and virial of stages within steps";
   if (!integrator->state()) text += ", second derivatives";
-  LAMMPS_NS::utils::logmesg(lmp, "fix overdamped/affine leaves out of this scene: " + text + "\n");
+  LAMMPS_NS::utils::logmesg(
+      lmp, "fix overdamped/affine: skipped, because this run does not need it: " + text + "\n");
 }
 
 void FixOverdampedAffine::post_neighbor()
@@ -501,12 +504,12 @@ void FixOverdampedAffine::check_stability(bigint step)
   const std::string largest =
       shown(limit) + " (2 over the largest relaxation rate " + shown(largest_rate) + ")";
   if (update->dt > limit) {
-    error->all(FLERR, found + " past the stability limit " + largest + ": use a timestep below " +
+    error->all(FLERR, found + " above the stability limit " + largest + ": use a timestep below " +
                           shown(NEAR_LIMIT * limit) + ".");
   }
   if (!warned && comm->me == 0) {
     error->warning(FLERR, found + " close to the stability limit " + largest +
-                              ": a denser state may pass it.");
+                              ": a denser state may exceed it.");
   }
   warned = true;
 }
@@ -583,8 +586,8 @@ void FixOverdampedAffine::restart(char *buf)
   Saved saved{};
   std::memcpy(&saved.format, buf, sizeof(saved.format));
   if (saved.format != SAVED_AS && saved.format != WITHOUT_TIME) {
-    fail("a restart file that another version of jamshape wrote, expected one of this version: go "
-         "on with that version, or start from a data file.");
+    fail("a restart file of another version of jamshape, expected one of this version: "
+         "continue with that version, or start from a data file.");
   }
   std::memcpy(&saved, buf, saved.format == SAVED_AS ? sizeof(saved) : offsetof(Saved, time));
   box->restore(saved.box, saved.time);

@@ -124,15 +124,16 @@ double tolerance_of(const IntegratorOptions &options)
 
 void refuse_stages(const IntegratorOptions &options)
 {
-  if (options.stages) throw std::invalid_argument("stages, which belong to integrator rkc2.");
+  if (options.stages)
+    throw std::invalid_argument("stages without integrator rkc2: leave it out or use rkc2.");
 }
 
 std::unique_ptr<Integrator> make_heun(AffineBox &box, const IntegratorOptions &options)
 {
   refuse_stages(options);
   if (options.tolerance) {
-    throw std::invalid_argument(
-        "a tolerance, which belongs to integrators that choose their steps, not to heun.");
+    throw std::invalid_argument("tolerance with integrator heun, expected heun/adaptive or rkc2: "
+                                "leave it out or use these.");
   }
   return std::make_unique<Heun>(box);
 }

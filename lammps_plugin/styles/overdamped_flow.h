@@ -126,7 +126,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   int width() const { return dimension + n_rates + n_turns + n_registers * n_rates; }
   double memory_usage() const;
 
-  /* what the estimate of rates sends to ghosts */
+  /* data that the estimate of rates sends to ghosts */
 
   int pack_direction(int n, const int *list, double *buf) const
   {

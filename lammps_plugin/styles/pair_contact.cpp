@@ -83,8 +83,8 @@ PairContact &PairContact::evaluated(LAMMPS_NS::LAMMPS *lmp, const std::string &w
   if (!pair.has_current_contacts()) {
     lmp->error->all(FLERR, who +
                                " found no contacts of the present atoms, expected those of a run: "
-                               "ask after 'run 0' or another run, and again after one where the "
-                               "pair style or the number of atoms has changed.");
+                               "use it after 'run 0' or another run, and again after a change of "
+                               "the pair style or of the number of atoms.");
   }
   if (!lmp->atom->tag_enable) {
     lmp->error->all(FLERR, who + " found atoms without IDs, expected one for each: leave out "
@@ -239,7 +239,7 @@ void PairContact::require_orientations_of_rerun() const
   if (!any_turns || update->whichflag != 1 || is_run || is_unset) return;
   error->all(
       FLERR,
-      std::string("rerun reads no orientations from a dump, expected particles that cannot turn: "
+      std::string("rerun reads no orientations from a dump, expected particles that cannot rotate: "
                   "read its frames with jamshape.load, or use data or restart files."));
 }
 
@@ -250,11 +250,10 @@ void PairContact::require_held_in_minimisation() const
     const LAMMPS_NS::Fix &fix = *modify->fix[k];
     const bool holds = begins_with(fix.style, "freeze") || begins_with(fix.style, "rigid");
     if (!holds || modify->fmask[k] & LAMMPS_NS::FixConst::MIN_POST_FORCE) continue;
-    error->all(FLERR,
-               std::string("minimize found fix ") + fix.id + " of style " + fix.style +
-                   ", which LAMMPS leaves out of minimisations: hold its particles with 'fix "
-                   "ID group setforce 0 0 0' and use 'unfix " +
-                   fix.id + "'.");
+    error->all(FLERR, std::string("minimize found fix ") + fix.id + " of style " + fix.style +
+                          ", which LAMMPS ignores in minimisations: hold its particles with 'fix "
+                          "ID group setforce 0 0 0' and use 'unfix " +
+                          fix.id + "'.");
   }
 }
 
@@ -273,7 +272,7 @@ void PairContact::require_only_one_turns() const
   error->all(
       FLERR,
       std::string("minimize found several of jamshape's pair styles in a hybrid one, expected one "
-                  "that turns particles: use one of them."));
+                  "that rotates particles: use one of them."));
 }
 
 void PairContact::request_minimiser()
@@ -282,7 +281,7 @@ void PairContact::request_minimiser()
   const std::string style = update->minimize_style;
   if (style != "cg" && style != "sd") {
     error->all(FLERR, "min_style " + style +
-                          " cannot turn particles: use 'min_style cg' or 'min_style "
+                          " cannot rotate particles: use 'min_style cg' or 'min_style "
                           "sd', which relax positions and orientations together.");
   }
   const double max_move = 0.1;  // as min_modify dmax: rotations are lengths here too
@@ -330,7 +329,7 @@ double PairContact::largest_reach() const
 }
 
 /* ----------------------------------------------------------------------
-   what a scene does not need
+   work that the present particles do not need
 ------------------------------------------------------------------------- */
 
 void PairContact::read_general(int narg, char **arg)
@@ -347,8 +346,8 @@ void PairContact::read_general(int narg, char **arg)
   }
   if (is_known) return;
   error->all(FLERR, "pair_style " + style_name() + " found '" + joined(narg, arg) +
-                        "', expected 'general' and any of rotation, pairs, contact: leave it out "
-                        "but for tests and timings.");
+                        "', expected 'general' and any of rotation, pairs, contact: use it only "
+                        "for tests and timings.");
 }
 
 std::vector<std::string> PairContact::spared() const
@@ -356,14 +355,14 @@ std::vector<std::string> PairContact::spared() const
   const bool is_plane = domain->dimension == 2;
   std::vector<std::string> found{"energy and virial of steps without output"};
   if (is_plane) found.emplace_back("the third dimension");
-  if (!any_turns) found.emplace_back("rotation and torque");
+  if (!any_turns) found.emplace_back("rotations and torques");
   if (any_round && !general.contact) {
-    found.emplace_back(is_plane ? "the search for contacts of discs"
-                                : "the search for contacts of spheres");
+    found.emplace_back(is_plane ? "the contact search for discs"
+                                : "the contact search for spheres");
   }
   if (any_ellipsoids && !general.contact) {
-    found.emplace_back(is_plane ? "the search of other exponents for ellipses"
-                                : "the search of other exponents for ellipsoids");
+    found.emplace_back(is_plane ? "the general contact search for ellipses"
+                                : "the general contact search for ellipsoids");
   }
   return found;
 }
@@ -385,7 +384,8 @@ void PairContact::report_left_out(double listed, double close)
   said = text + numbers;
   if (comm->me == 0 && text != told) {
     LAMMPS_NS::utils::logmesg(lmp, "pair_style " + style_name() +
-                                       " leaves out of this scene: " + said + "\n");
+                                       ": skipped, because this run does not need it: " + said +
+                                       "\n");
   }
   told = text;
 }
@@ -404,10 +404,11 @@ void PairContact::require_same_bound(int i, const Vec<3> &semi_axes) const
 
 void PairContact::stop_at_unexpected_turns(int i) const
 {
-  refuse(lmp, FLERR,
-         "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
-             " with a shape that turns, where none did at the start of the run: give shapes before "
-             "it, and do not use 'pre no' in the run after changing them.");
+  refuse(
+      lmp, FLERR,
+      "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+          " with a shape that can rotate, although none could at the start of the run: set shapes "
+          "before it, and do not use 'pre no' in the run after changing them.");
 }
 
 double PairContact::special_weight(int i, int j, int which) const
@@ -446,8 +447,8 @@ void PairContact::require_in_plane(int n) const
     if (!(2.0 * std::hypot(q.i, q.j) <= MOST_TILT)) {
       refuse(lmp, FLERR,
              "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
-                 " turned out of the plane, expected a quaternion (w, 0, 0, k) in dimension "
-                 "2: turn it about z only.");
+                 " rotated out of the plane, expected a quaternion (w, 0, 0, k) in dimension "
+                 "2: rotate it about z only.");
     }
   }
 }

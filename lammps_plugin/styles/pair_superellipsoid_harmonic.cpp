@@ -65,7 +65,7 @@ void PairSuperellipsoidHarmonic::read_exponent(char **arg)
   if (lo[0] != lo[1] || hi[0] != hi[1]) {
     error->all(FLERR, "pair_coeff of superellipsoid/harmonic found p = " + text + " for types " +
                           arg[0] + " and " + arg[1] +
-                          ", expected it where both are the same: an exponent belongs to a type, "
+                          ", expected p only for equal types: an exponent belongs to a type; "
                           "give it with 'pair_coeff I I epsilon p'.");
   }
   const double p = LAMMPS_NS::utils::numeric(FLERR, arg[3], false, lmp);

@@ -82,7 +82,7 @@ double RelaxationRate::largest(PairContact &pair, double tolerance)
 
 /* ----------------------------------------------------------------------
    Lanczos' method in the metric of the drag, in which mobility times stiffness is symmetric. Each
-   direction is the rate of a force; what is left of the next one is in the force arrays.
+   direction is the rate of a force; the remainder of the next one is in the force arrays.
 ------------------------------------------------------------------------- */
 
 double RelaxationRate::largest_eigenvalue_of(const std::function<void()> &add_stiffness_times,

@@ -216,7 +216,7 @@ def test_a_restart_file_of_another_version_is_refused(packings, tmp_path):
     assert content.count(mark) == 1
     path.write_bytes(content.replace(mark, bytes(8)))
     done = run_lmp(f"{load_plugin()}\nread_restart {path}\n{after_restart()}\n{fix()}", tmp_path)
-    assert "found a restart file that another version of jamshape wrote" in error_of(done)
+    assert "found a restart file of another version of jamshape" in error_of(done)
 
 
 def test_a_restart_file_without_the_time_is_read(packings, tmp_path):
