@@ -74,8 +74,8 @@ def test_what_is_not_a_number_is_named(value, sentence_of):
 def test_exponents_belong_to_types(types, sentence_of):
     i, j = types.split()
     assert sentence_of(f"pair_coeff {types} 1.0 1.5") == (
-        f"{FOUND}p = 1.5 for types {i} and {j}, expected it where both are the same: an exponent "
-        "belongs to a type, give it with 'pair_coeff I I epsilon p'."
+        f"{FOUND}p = 1.5 for types {i} and {j}, expected p only for equal types: an exponent "
+        "belongs to a type; give it with 'pair_coeff I I epsilon p'."
     )
 
 
