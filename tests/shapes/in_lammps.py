@@ -22,6 +22,7 @@ THERMO = """
     thermo_modify norm no lost error format float %.17g"""
 
 _FORCES = "id fx fy fz tqx tqy tqz"
+OUTPUT = f"compute forces all property/atom {_FORCES}\n{THERMO}"
 
 
 @contextmanager
@@ -32,7 +33,7 @@ def holding(packing, law, newton="on"):
         session.load(packing)
         session.interact(law)
         session.commands(neighbours_of(packing))
-        session.commands(f"compute forces all property/atom {_FORCES}\n{THERMO}")
+        session.commands(OUTPUT)
         yield session
 
 

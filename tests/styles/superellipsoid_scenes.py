@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+import extreme_superellipsoids
 import lammps_scenes
 import numpy as np
+from extreme_shapes import CROWDS as SCENES
+from extreme_shapes import Relative
+from extreme_superellipsoids import KINDS, far_apart, particles, tiny_box
 from lammps_scenes import after_restart, before_box
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "analysis" / "stability"))
-
-from battery.scenes import superellipsoids
-from battery.scenes.superellipsoids import KINDS, far_apart, particles, tiny_box
-from battery.shapes.shape import RELATIVE
-from battery.shapes.superellipsoids import CROWDS as SCENES
 
 from jamshape.contacts import find_contacts, sum_forces
 from jamshape.files.lammps_text import write_data
@@ -31,7 +27,7 @@ EPSILON = 1.7
 
 
 def crowd(dimension=3, kinds=(0, 1, 2, 3), **named):
-    return superellipsoids.crowd(dimension, [KINDS[k] for k in kinds], **named)
+    return extreme_superellipsoids.crowd(dimension, [KINDS[k] for k in kinds], **named)
 
 
 def exponents_of(packing):
@@ -81,8 +77,8 @@ def sums(packing, epsilon=EPSILON):
 def difference_from_bindings(state, epsilon=EPSILON):
     """Largest difference of forces and of torques, relative to the largest."""
     packing, expected = state.packing, sums(state.packing, epsilon)
-    force = RELATIVE.force(packing, expected["force"], epsilon)
-    torque = RELATIVE.torque(packing, expected["torque"], force)
+    force = Relative.force(packing, expected["force"], epsilon)
+    torque = Relative.torque(packing, expected["torque"], force)
     by_force = np.abs(state.force - expected["force"]).max() / force
     wrong = state.torque.reshape(packing.n, -1) - expected["torque"]
     return max(by_force, np.abs(wrong).max() / torque)
