@@ -1,4 +1,4 @@
-"""Tables of the rows that tests give: `pytest tests/extremes --report FILE.md`."""
+"""Tables of the rows that tests give: `pytest tests/extremes --report FILE.md`, with `-m ""` of all."""
 
 import json
 import platform

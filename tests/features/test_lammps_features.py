@@ -1,7 +1,7 @@
 """Features of LAMMPS beside ours: each works, by a number, or is refused, by a sentence.
 
 The table of docs/results/stability.md is written by
-`python -m pytest tests/features -m "validate or not validate" --report runs/lammps_features.md`.
+`python -m pytest tests/features -m "" --report runs/lammps_features.md`.
 """
 
 import re
