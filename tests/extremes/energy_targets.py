@@ -10,7 +10,7 @@ from jamshape.minima import Outcome
 from jamshape.minima.target import Target, find
 
 ENDED = (Outcome.CONVERGED, Outcome.SLIDING, Outcome.CORNER, Outcome.UNJAMMED)
-STARTS = {name: scene for shape in SHAPES for name, scene in shape.solvers.jammed.items()}
+STARTS = {name: scene for shape in SHAPES for name, scene in shape.jammed.items()}
 
 
 @cache

@@ -125,7 +125,7 @@ def test_implicit_units(length, k_e, k_d):
 
 @extreme("energy at two tolerances, over local errors", [
     case(f"{IMPLICIT}: {name}", scene)
-    for shape in SHAPES for name, scene in shape.compressed.implicit.items()
+    for shape in SHAPES for name, scene in shape.implicit.items()
 ], 1.0)  # fmt: skip
 def test_two_tolerances(scene, kappa=1e-2, strain=1e-3):
     packing = scene()
@@ -244,8 +244,8 @@ def first_jammed(packing, protocol, k_e=1.0):
 
 
 @extreme("residual of the first jammed packing, over the tolerance", [
-    *(case(f"{QUASISTATIC}: {name}", scene, 2e-2, heavy=name not in shape.compressed.quick)
-      for shape in SHAPES for name, scene in shape.compressed.quasistatic.items()),
+    *(case(f"{QUASISTATIC}: {name}", scene, 2e-2, heavy=name not in shape.quick_to_jam)
+      for shape in SHAPES for name, scene in shape.quasistatic.items()),
     *(case(f"{QUASISTATIC}: steps of {step:g}", partial(loose, 2, 1.0, 2.0), step, heavy=step == 1e-4)
       for step in (1e-4, 0.1, 1.0, 10.0)),
 ], 1.0)  # fmt: skip
@@ -286,8 +286,8 @@ SIZES = (1e-12, 1e-6, 1e6)
 
 
 @extreme("pairs that overlap after 40 sweeps", [
-    *(case(f"{THERMAL}: {name}", scene, 0.1, heavy=name in shape.compressed.heavy_sweeps)
-      for shape in SHAPES for name, scene in shape.compressed.hard.items()),
+    *(case(f"{THERMAL}: {name}", scene, 0.1, heavy=name in shape.heavy_sweeps)
+      for shape in SHAPES for name, scene in shape.hard.items()),
     *(case(f"{THERMAL}: touching, moves of {size:g}", DISCS_OF_10, size) for size in SIZES),
 ], 0.0)  # fmt: skip
 def test_overlaps_after_sweeps(scene, size):

@@ -77,7 +77,7 @@ def other_units():
 
 @extreme("change of scaled poses", [
     case(label_of(shape, f"{name}{words}", law), drive, law, constants)
-    for shape, law in LAWS for name, drive in shape.flow.invariant.items()
+    for shape, law in LAWS for name, drive in shape.invariant.items()
     for words, constants in other_units()
 ], 1e-10)  # fmt: skip
 def test_units(drive, law, constants):
@@ -90,7 +90,7 @@ def test_units(drive, law, constants):
 def two(shape, overlap, dt, constants=ONE):
     """Relaxation of two discs or spheres, dt in their unit of time."""
     k_e, k_d, length = constants
-    packing = scaled(shape.flow.touch.scene(overlap), length)
+    packing = scaled(shape.touch.scene(overlap), length)
     t0 = unit_of_time(*constants, packing.dimension)
     return loaded(packing, fix(0.0, dt * t0, k_d), k_e=k_e, skin=SKIN * length)
 
@@ -102,7 +102,7 @@ def two(shape, overlap, dt, constants=ONE):
 ], 1e-8)  # fmt: skip
 def test_stability_limit(shape, constants):
     """2 over the rate; the stiffness at an overlap of 1e-9 is that of the first touch to 1e-8."""
-    limit = 2 / shape.flow.touch.rate
+    limit = 2 / shape.touch.rate
     with two(shape, 1e-9, 1e-3 * limit, constants) as session:
         session.commands("run 1")
         found = fix_value(session, "flow", 4)
@@ -116,7 +116,7 @@ def test_stability_limit(shape, constants):
     for fraction, steps in ((1e-12, 1000), (1e-6, 1000), (1e-3, 1000), (0.1, 50), (0.5, 20), (0.89, 50))
 ], 1.0)  # fmt: skip
 def test_relaxation(shape, fraction, steps):
-    touch = shape.flow.touch
+    touch = shape.touch
     h = 2 * fraction
     with two(shape, touch.overlap, h / touch.rate) as session:
         session.commands(f"run {steps}")
@@ -134,13 +134,13 @@ def test_relaxation(shape, fraction, steps):
     for shape in SHAPES
     for name, factor, length, sentence, heavy in (
         ("dt 1.05 of the limit", 1.05, 1.0, PAST, False),
-        ("dt 10 of the limit", 10.0, 1.0, PAST, shape.flow.few_stops),
-        ("dt 1e+06 of the limit", 1e6, 1.0, PAST, shape.flow.few_stops),
-        ("dt 2 of a tiny limit", 2.0, 1e-2, rf"{PAST} [1-9]", shape is RODS or shape.flow.few_stops),
+        ("dt 10 of the limit", 10.0, 1.0, PAST, shape.few_stops),
+        ("dt 1e+06 of the limit", 1e6, 1.0, PAST, shape.few_stops),
+        ("dt 2 of a tiny limit", 2.0, 1e-2, rf"{PAST} [1-9]", shape is RODS or shape.few_stops),
     )
 ])  # fmt: skip
 def test_past_the_limit(shape, factor, constants):
-    touch = shape.flow.touch
+    touch = shape.touch
     with two(shape, touch.overlap, factor * 2 / touch.rate, constants) as session:
         session.commands("run 10")
 
@@ -161,7 +161,7 @@ def unchecked():
 
 @extreme("", unchecked())
 def test_too_large_steps(shape, kappa, dt, options=""):
-    after(shape.flow.touch.scene(0.1), "run 10", fix(kappa, dt, options=options))
+    after(shape.touch.scene(0.1), "run 10", fix(kappa, dt, options=options))
 
 
 @extreme(
@@ -191,7 +191,7 @@ def test_order_of_the_method():
 ], 1e-14)  # fmt: skip
 def test_lone_particles(shape, kappa, dt, steps=1000):
     """Against the exponential."""
-    packing, strain = shape.flow.lone(), kappa * dt * steps
+    packing, strain = shape.lone(), kappa * dt * steps
     with loaded(packing, fix(kappa, dt)) as session:
         session.commands("run 0")
         before = frame(session, packing)
@@ -204,7 +204,7 @@ def test_lone_particles(shape, kappa, dt, steps=1000):
 
 def changed():
     for shape in SHAPES:
-        for name, drive in shape.flow.changed.items():
+        for name, drive in shape.changed.items():
             for factor in (1e6, 1e-1):
                 kappas = [drive.kappa, drive.kappa / factor]
                 legs = [(kappa, drive.dt, steps) for kappa in (*kappas, kappas[0], -kappas[1], kappas[0])
@@ -266,7 +266,7 @@ def restarted(drive, law, tmp_path, middle, rest):
 
 @extreme("distance from the run without", [
     case(label_of(shape, f"restart within a run, {name}", law), drive, law)
-    for shape, law in LAWS for name, drive in shape.flow.restarted.items()
+    for shape, law in LAWS for name, drive in shape.restarted.items()
 ], 1e-12)  # fmt: skip
 def test_restart(drive, law, tmp_path):
     return restarted(drive, law, tmp_path, drive.steps, drive.steps)
@@ -297,19 +297,19 @@ def test_restart_in_an_event(law, tmp_path):
 
 
 @extreme("forces after a run", [
-    case(label_of(shape, name, law), scene, shape, law, expected=shape.flow.limit * (5 if is_long(name) else 1),
-         measure=f"forces after a run, {shape.units.words}", heavy=name in shape.flow.heavy)
-    for shape, law in LAWS for name, scene in shape.flow.extreme.items()
+    case(label_of(shape, name, law), scene, shape, law, expected=shape.drive_limit * (5 if is_long(name) else 1),
+         measure=f"forces after a run, {shape.units.words}", heavy=name in shape.drive_heavy)
+    for shape, law in LAWS for name, scene in shape.driven.items()
 ])  # fmt: skip
 def test_runs(scene, shape, law):
     """Finite, no contact lost, forces of the bindings."""
-    packing, own = scene(), shape.flow
-    with loaded(packing, own.extreme_drive, sides=law.sides) as session:
+    packing = scene()
+    with loaded(packing, shape.drive, sides=law.sides) as session:
         session.commands("run 0")
         before = measured(session, "energy")
-        session.commands(f"run {own.extreme_steps}")
+        session.commands(f"run {shape.drive_steps}")
         at = frame(session, packing)
-        rose = own.must_relax and not measured(session, "energy") < before
+        rose = shape.must_relax and not measured(session, "energy") < before
     return np.inf if rose else from_bindings(at, shape, law)
 
 

@@ -19,12 +19,12 @@ CROSS = r"(spines|centres) of particles \d+ and \d+ cross"
 SCENES = [
     (shape, f"landscape, {shape.name}: {name}", scene)
     for shape in SHAPES
-    for name, scene in shape.landscape.scenes.items()
+    for name, scene in shape.summed.items()
 ]
 COUNTED = [
     (f"landscape, {shape.name}: {name}", scene, shape.oracle)
     for shape in SHAPES
-    for name, scene in (shape.landscape.scenes | shape.landscape.kinked).items()
+    for name, scene in (shape.summed | shape.kinked).items()
     if shape.oracle or name in shape.counted
 ]
 
@@ -98,7 +98,7 @@ def test_slopes(scene, h=1e-6):
 
 
 @extreme("doubles against long doubles, in overlaps", [
-    case(f"{label}: doubles", scene, expected=shape.landscape.rounding * (100 if is_long(label) else 1))
+    case(f"{label}: doubles", scene, expected=shape.rounding * (100 if is_long(label) else 1))
     for shape, label, scene in SCENES
 ])  # fmt: skip
 def test_doubles(scene):
@@ -142,8 +142,8 @@ def test_units(scene, length, energy):
 
 
 @extreme("Hessian against differences of forces", [
-    case(f"landscape, {shape.name}: {name}: Hessian", shape.landscape.scenes[name], shape.landscape.bend)
-    for shape in SHAPES for name in shape.landscape.bent
+    case(f"landscape, {shape.name}: {name}: Hessian", shape.summed[name], shape.bend)
+    for shape in SHAPES for name in shape.bent
 ], 1e-6)  # fmt: skip
 def test_hessian(scene, h):
     """v.H v, relative: rotations in space do not commute."""
@@ -169,7 +169,7 @@ def test_hessian(scene, h):
 
 
 @extreme("", [
-    case(f"landscape, {shape.name}: {shape.landscape.same_place[0]}", shape.landscape.same_place[1])
+    case(f"landscape, {shape.name}: {shape.same_place[0]}", shape.same_place[1])
     for shape in SHAPES
 ], CROSS)  # fmt: skip
 def test_two_at_one_place(scene):

@@ -22,12 +22,11 @@ TARGET, PART = "energy target", "spectrum"
 
 def targets():
     for shape in SHAPES:
-        own = shape.solvers
-        for name in own.jammed:
+        for name in shape.jammed:
             for u0 in (1e-4, 1e-8, 1e-15, 1e-18):
-                quick = name == "discs" or (u0 == 1e-15 and name in own.quick)
+                quick = name == "discs" or (u0 == 1e-15 and name in shape.quick_targets)
                 yield case(f"{TARGET}: {name}, u0 {u0:g}", name, u0, heavy=not quick)
-        for name in own.in_units:
+        for name in shape.targets_in_units:
             for length, k_e in UNITS:
                 heavy = name != "discs" and length != 1e6
                 label = f"{TARGET}: {name}, length {length:g}, k_e {k_e:g}"
@@ -89,7 +88,7 @@ def rounded(value, bits=300):
 
 @extreme("bounds that do not hold, by exact inertia", [
     *(case(f"{PART}: {name}, u0 {u0:g}", name, u0, "projected", heavy=(name, u0) != ("discs", 1e-15))
-      for shape in SHAPES for name in shape.solvers.spectra for u0 in (1e-4, 1e-15, 1e-18)),
+      for shape in SHAPES for name in shape.spectra for u0 in (1e-4, 1e-15, 1e-18)),
     case(f"{PART}: rods of alpha 4, refined", "rods of alpha 4", 1e-15, "refined", heavy=True),
 ], 0.0)  # fmt: skip
 def test_bounds(name, u0, method):
@@ -108,7 +107,7 @@ def test_bounds(name, u0, method):
 
 @extreme("change over both bounds", [
     case(f"{PART}: {name}, length {length:g}, k_e {k_e:g}", name, length, k_e, heavy=name != "discs")
-    for shape in SHAPES for name in shape.solvers.modes_in_units for length, k_e in UNITS
+    for shape in SHAPES for name in shape.modes_in_units for length, k_e in UNITS
 ], 1.0)  # fmt: skip
 def test_units(name, length, k_e):
     landscape, minimum = led(name, 1e-12)
@@ -124,12 +123,12 @@ def test_units(name, length, k_e):
     return (change / (a.bound + b.bound / unit + of_state)).max()
 
 
-THIRD = RODS.solvers.minimised["overlaps of a third"]
+THIRD = RODS.minimised["overlaps of a third"]
 
 
 @extreme("departure from orthonormal", [
-    *(case(f"{PART}: {name}", partial(at_a_minimum, shape.solvers.minimised[name]))
-      for shape in SHAPES for name in shape.solvers.to_the_end),
+    *(case(f"{PART}: {name}", partial(at_a_minimum, shape.minimised[name]))
+      for shape in SHAPES for name in shape.to_the_end),
     case(f"{PART}: no minimum", THIRD, expected=r"expected|minimis"),
 ], 1e-8)  # fmt: skip
 def test_modes_are_orthonormal(scene):

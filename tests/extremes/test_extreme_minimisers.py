@@ -29,7 +29,7 @@ STOPS = {"auto": Stop(), "newton": Stop(), "lbfgs": Stop(tolerance=1e-5)}
     # The deep one has been minimised before; all others must gain.
     case(f"LAMMPS minimize, {shape.name}: {name}, {style}, line {line}", scene, shape.laws[-1].sides, style, line,
          expected=1.0 if "third" in name else 0.99)
-    for shape in SHAPES for name, scene in shape.minimized.items()
+    for shape in SHAPES for name, scene in shape.minimised_by_lammps.items()
     for style in ("cg", "sd") for line in ("quadratic", "backtrack")
 ])  # fmt: skip
 def test_lammps_minimize(scene, sides, style, line):
@@ -74,8 +74,8 @@ def minimised(packing, method, stop, k_e=1.0):
 
 
 @extreme("residual", [
-    *(case(f"{PART}: {name}, to the end", shape.solvers.minimised[name], "auto", expected=1e-8)
-      for shape in SHAPES for name in shape.solvers.to_the_end),
+    *(case(f"{PART}: {name}, to the end", shape.minimised[name], "auto", expected=1e-8)
+      for shape in SHAPES for name in shape.to_the_end),
     *(case(f"{PART}: discs, overlaps of a third, {method}", partial(deep, 2, 0.0), method, expected=stop.tolerance)
       for method, stop in STOPS.items()),
 ])  # fmt: skip
@@ -93,7 +93,7 @@ def test_residual(scene, method):
 
 @extreme("energy after 300 evaluations over that before", [
     case(f"{PART}: {name}, {method}", scene, method)
-    for shape in SHAPES for name, scene in shape.solvers.minimised.items() for method in STOPS
+    for shape in SHAPES for name, scene in shape.minimised.items() for method in STOPS
 ], 1.0)  # fmt: skip
 def test_never_worse(scene, method):
     """Whatever the outcome."""

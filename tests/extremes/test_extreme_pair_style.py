@@ -19,18 +19,17 @@ def label_of(shape, law, name):
 
 def of_forces():
     for shape, law in LAWS:
-        own = shape.style
         judge = "long double over all images" if law.is_of_oracle else "bindings"
         options = {"measure": f"forces against {judge}, {shape.units.words}"}
-        for name, scene in own.scenes.items():
+        for name, scene in shape.in_style.items():
             # Tips are rounded by the length of a rod times EPS, and one bond's lever arm at 1e-14 by nothing else.
-            options["expected"] = own.limits[0] * (5 if is_long(name) else 1)
+            options["expected"] = shape.limits[0] * (5 if is_long(name) else 1)
             label = label_of(shape, law, name)
             yield case(label, scene, shape, law, **options)
-            if name in own.without_newton:
+            if name in shape.without_newton:
                 yield case(f"{label}, newton off", scene, shape, law, 1.0, "off", **options)
-        options["expected"] = own.limits[2]
-        for name, scene in own.in_units.items():
+        options["expected"] = shape.limits[2]
+        for name, scene in shape.style_in_units.items():
             for k_e in (1e-6, 1e6):
                 label = f"{label_of(shape, law, name)}, k_e {k_e:g}"
                 yield case(label, scene, shape, law, k_e, **options)
@@ -44,8 +43,8 @@ def test_forces(scene, shape, law, k_e=1.0, newton="on"):
 
 @extreme("change of scaled forces", [
     case(f"{label_of(shape, law, name)}, unit of length {length:g}", scene, shape, law, length,
-         expected=shape.style.limits[2], measure=f"change of scaled forces, {shape.units.words}")
-    for shape, law in LAWS for name, scene in shape.style.in_units.items()
+         expected=shape.limits[2], measure=f"change of scaled forces, {shape.units.words}")
+    for shape, law in LAWS for name, scene in shape.style_in_units.items()
     for length in (1e-6, 1e-3, 1e3, 1e6)
 ])  # fmt: skip
 def test_units_of_length(scene, shape, law, length):
@@ -64,13 +63,13 @@ STIFFNESS = {(1, 1): 1e-6, (2, 2): 1e6, (1, 2): 1.0}
 
 
 @extreme("forces against sums by type", [
-    case(label_of(shape, law, "k_e 1e-6, 1 and 1e6 in one box"), shape, law, expected=shape.style.limits[1],
+    case(label_of(shape, law, "k_e 1e-6, 1 and 1e6 in one box"), shape, law, expected=shape.limits[1],
          measure=f"forces against sums by type, {shape.units.words}")
     for shape, law in LAWS
 ])  # fmt: skip
 def test_orders_of_k_e(shape, law):
     """Over the forces of the particle's contacts."""
-    packing = shape.style.mixed()
+    packing = shape.mixed()
     stiffness = "".join(f"\npair_coeff {i} {j} {k!r}" for (i, j), k in STIFFNESS.items())
     at = after(packing, "run 0", stiffness, sides=law.sides)
     network = find_contacts(at.packing, 1.0, law.sides)
@@ -107,8 +106,8 @@ def test_sizes_in_one_box(p):
 
 
 @extreme("", [
-    case(label_of(shape, law, name), scene, law, expected=shape.style.sentence)
-    for shape in SHAPES for name, scene in shape.style.stops.items()
+    case(label_of(shape, law, name), scene, law, expected=shape.sentence)
+    for shape in SHAPES for name, scene in shape.stops.items()
     for law in (shape.laws if "cross" in name else shape.laws[-1:])
 ])  # fmt: skip
 def test_no_force_exists(scene, law):
