@@ -20,7 +20,7 @@ OPEN = {name: x for name, x in CLASSES.items() if not name.startswith("_")}
 
 
 def members(stub):
-    """Of a class with those it inherits: name to definition."""
+    """Members of a class with inherited ones: name to definition."""
     found = {}
     for base in stub.bases:
         found |= members(CLASSES[base.id])

@@ -1,26 +1,28 @@
 """Packings in LAMMPS, in this process, and their forces beside another evaluation."""
 
+import tempfile
 from contextlib import contextmanager
 from typing import NamedTuple
 
+import lammps_runs
 import numpy as np
-from in_lammps import fix_value, forces_of, holding, vector_of
+from lammps_runs import SIDES, fix_vector, global_vector, state_of
 
 from jamshape.contacts import find_contacts, sum_forces
 from jamshape.packing import Packing
-from jamshape.shapes.shape import Interaction
 
 SKIN = 0.3
+
+WORDS = {number: word for word, number in SIDES.items()}
 
 # Elements of `compute packing`, from 0.
 MEASURES = {"energy": 1, "pressure": 2, "deepest": 11}
 
-
-def neighbours(skin=SKIN):
-    return f"""
-        neighbor {skin!r} {"bin" if skin < 30 else "nsq"}
-        neigh_modify every 1 delay 0 check yes one 10000 page 1000000
-        compute contacts all contact/local itag bond"""
+OUTPUT = """
+    compute contacts all contact/local itag bond
+    compute packing all packing
+    thermo_style custom step c_packing[1]
+    thermo_modify norm no lost error"""
 
 
 def fix(kappa=0.0, dt=0.1, drag=1.0, options=""):
@@ -29,10 +31,16 @@ def fix(kappa=0.0, dt=0.1, drag=1.0, options=""):
 
 
 @contextmanager
-def loaded(packing, text="", sides=1, k_e=1.0, skin=SKIN, newton="on"):
+def loaded(packing, text="", sides=1, skin=SKIN, **options):
     """A LAMMPS instance with a packing, its pair style and more input."""
-    with holding(packing, Interaction(k_e, sides), newton) as session:
-        session.commands(f"{neighbours(skin)}\n{text}")
+    options |= {"sides": WORDS[sides], "skin": repr(skin)}
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        lammps_runs.loaded(packing, folder, **options) as session,
+    ):
+        if skin > 30:  # bins of a plane, which is one unit thick, may not be so wide
+            session.commands(f"neighbor {skin!r} nsq")
+        session.commands(f"{OUTPUT}\n{text}")
         yield session
 
 
@@ -48,15 +56,14 @@ class Frame(NamedTuple):
 
 
 def frame(session, packing):
-    force, torque = forces_of(session)
-    has_fix = session.lmp.has_id("fix", "flow")
+    state, has_fix = state_of(session, packing), session.lmp.has_id("fix", "flow")
     local, rows = 2, 4
     return Frame(
-        packing=session.packing(),
-        quaternion=np.array(session.lmp.gather("c_orient", 1, 4)).reshape(-1, 4),
-        force=force,
-        torque=torque.reshape(packing.n, -1),
-        strain=fix_value(session, "flow", 2) if has_fix else 0.0,
+        state.packing,
+        state.quaternion,
+        state.force,
+        state.torque.reshape(packing.n, -1),
+        strain=fix_vector(session, "flow", 2) if has_fix else 0.0,
         n_bonds=session.lmp.extract_compute("contacts", local, rows),
     )
 
@@ -69,7 +76,7 @@ def after(packing, commands, text="", **options):
 
 
 def measured(session, name):
-    return float(vector_of(session, "packing")[MEASURES[name]])
+    return float(global_vector(session, "packing")[MEASURES[name]])
 
 
 # --- beside another evaluation -------------------------------------------------------------------

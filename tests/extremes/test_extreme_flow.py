@@ -5,6 +5,7 @@ from functools import cache, partial
 import numpy as np
 from extreme import case, extreme
 from extreme_in_lammps import (
+    OUTPUT,
     SKIN,
     after,
     fix,
@@ -12,15 +13,13 @@ from extreme_in_lammps import (
     from_bindings,
     loaded,
     measured,
-    neighbours,
 )
 from extreme_rods import jammed, jammed_off_kinks
 from extreme_shapes import RODS, SHAPES, Drive, is_long
-from in_lammps import OUTPUT, fix_value
-from lammps_scenes import nearest_image
+from lammps_runs import after_restart, fix_vector, state_of
+from lammps_runs import restarted as from_restart
+from lammps_scenes import angle_between, nearest_image
 from packings_in_a_box import EPS, scaled
-
-from jamshape.lammps.session import Session
 
 PAST = r"past the stability limit .* use a timestep below"
 TOO_FAR = "one step moves atom .* expected at most half its radius: use a smaller timestep"
@@ -36,8 +35,7 @@ def label_of(shape, name, law=None):
 def apart(a, b, unit=1.0):
     """Largest distance of particles, angle between their orientations and difference of strains of two states."""
     moved = nearest_image(b.packing.position / unit - a.packing.position, a.packing.box)
-    chords = [np.abs(b.quaternion - sign * a.quaternion).max(axis=1) for sign in (1, -1)]
-    turned = 2 * np.minimum(*chords).max()
+    turned = angle_between(a.quaternion, b.quaternion).max()
     return max(np.abs(moved).max(), turned, abs(b.strain - a.strain))
 
 
@@ -105,8 +103,8 @@ def test_stability_limit(shape, constants):
     limit = 2 / shape.touch.rate
     with two(shape, 1e-9, 1e-3 * limit, constants) as session:
         session.commands("run 1")
-        found = fix_value(session, "flow", 4)
-        dimension = session.packing().dimension
+        found = fix_vector(session, "flow", 4)
+        dimension = state_of(session).packing.dimension
     return abs(found / (limit * unit_of_time(*constants, dimension)) - 1)
 
 
@@ -120,7 +118,7 @@ def test_relaxation(shape, fraction, steps):
     h = 2 * fraction
     with two(shape, touch.overlap, h / touch.rate) as session:
         session.commands(f"run {steps}")
-        x = session.packing().position
+        x = state_of(session).packing.position
     # Past half of the limit the first stage parts the spheres, and the second has no force.
     a_step = 1 - h + h**2 / 2 if h < 1 else 1 - h / 2
     overlap = touch.length - abs(float(x[1, 0] - x[0, 0]))
@@ -241,9 +239,9 @@ def test_power_balance(kappa, law):
         session.commands("run 3")
         for _ in range(3):
             session.commands("run 1")
-            volume = float(np.prod(session.packing().box.edges))
+            volume = float(np.prod(state_of(session).packing.box.edges))
             u, p = measured(session, "energy"), measured(session, "pressure")
-            lost = fix_value(session, "flow", 5)
+            lost = fix_vector(session, "flow", 5)
             found.append((u * volume, 2 * kappa * p * volume - lost, lost))
     rate = (found[2][0] - found[0][0]) / (2 * dt)
     return abs(rate - found[1][1]) / found[1][2]
@@ -258,9 +256,8 @@ def restarted(drive, law, tmp_path, middle, rest):
     with loaded(packing, flow, sides=law.sides) as session:
         session.commands(f"run {middle}\nwrite_restart {tmp_path}/middle.restart")
     whole = after(packing, f"run {middle + rest}", flow, sides=law.sides)
-    with Session() as session:
-        session.load_restart(tmp_path / "middle.restart", packing)
-        session.commands(f"{OUTPUT}\n{neighbours()}\n{flow}run {rest}")
+    text = f"{after_restart()}\n{OUTPUT}\n{flow}run {rest}"
+    with from_restart(tmp_path / "middle.restart", text) as session:
         return apart(whole, frame(session, packing))
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 from extreme import case, extreme, judge
-from lammps_scenes import REPOSITORY
+from lammps_runs import REPOSITORY
 from tables import Tables
 
 

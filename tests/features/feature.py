@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from lammps_scenes import command_line, environment, load_plugin
+from lammps_runs import QUIET, load_plugin, start_lmp
 
 LOAD = load_plugin()
 
@@ -106,16 +105,7 @@ def run_deck(text, folder, ranks=1):
     """Exit code and output of `lmp` on a deck, in processes of its own."""
     (folder / "deck.in").write_text(text + "\n")
     partitions = ["-partition", f"{ranks}x1"] if ranks > 1 else []
-    done = subprocess.run(
-        command_line("-in", "deck.in", *partitions, ranks=ranks),
-        env=environment(),
-        cwd=folder,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        timeout=120,
-        check=False,
-    )
+    done = start_lmp(*QUIET, "-in", "deck.in", *partitions, cwd=folder, ranks=ranks)
     of_partitions = [path.read_text() for path in sorted(folder.glob("screen.*"))]
     return done.returncode, "".join([done.stdout, *of_partitions])
 

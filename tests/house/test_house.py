@@ -18,7 +18,7 @@ NAMES = re.compile("|".join(SHAPES), re.IGNORECASE)
 # The places that may know which shapes there are.
 OF_A_SHAPE = re.compile(
     rf"jamshape/shapes/|_contact\.pyi$|contact/({'|'.join(SHAPES)})/|/pair_({'|'.join(SHAPES)})_"
-    r"|styles/register\.cpp$|bindings/(shapes|probes)\.[ch]pp$"
+    r"|styles/register\.cpp$|(contact/shapes\.hpp|bindings/(shapes|probes)\.cpp)$"
 )
 
 LONGEST, MOST_PARAMETERS = 60, 5
@@ -94,7 +94,7 @@ def positional(node):
 
 
 def lines(node):
-    """Of a function, its docstring included."""
+    """Count the lines of a function, its docstring included."""
     return node.end_lineno - node.lineno + 1
 
 

@@ -1,4 +1,4 @@
-"""Shear: at a constant rate, in LAMMPS or by implicit steps, and by quasistatic steps."""
+"""Shear: at a finite rate, in LAMMPS or by implicit steps, or by quasistatic steps."""
 
 from __future__ import annotations
 
@@ -36,13 +36,12 @@ if TYPE_CHECKING:
     from jamshape.front.packing import MeasuredPacking
 
 
-# At such rates and below implicit steps are faster than explicit ones; their errors where nothing else is asked for.
-_SLOW = 3e-7
-_ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
+_SLOW = 3e-7  # rate below which implicit steps are faster than explicit ones
+_ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3  # default tolerances
 
 _FRAMES = 20
 
-# A random start that is as dense as was asked for is so to this part.
+# Relative tolerance of the packing fraction of a random start.
 _ROUNDING = 1e-9
 
 
@@ -68,49 +67,48 @@ def shear(
     again: bool = False,
     progress: bool = True,
 ) -> ShearFile:
-    """Shear particles at a constant rate and packing fraction, as Marschall, Keta, Olsson & Teitel 2019.
+    """Shear particles at a constant rate and packing fraction, as in Marschall, Keta, Olsson & Teitel 2019.
 
     Parameters
     ----------
     particles : Particles
-        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     dimension : {2, 3}, optional
-        2 when left out, or that of the start.
+        2 by default, or that of the start.
     phi : float, optional
-        Packing fraction, to which a random packing is compressed fast; 0.8 when left out, or that of the start.
+        Packing fraction, reached by fast compression of a random packing; 0.8 by default, or that of the start.
     gdot : float, [1/time]
         Rate: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
     strain : float
-        Strain to reach, the rate times the time.
+        Final strain, the rate times the time.
     flow : {"simple", "pure"}
     seed : int, optional
-        Of the random start; 1 when left out.
+        Random seed of the start; 1 by default.
     start : Packing or path, optional
-        What to begin with, at its own packing fraction; of a path, its last frame.
+        Initial packing, at its own packing fraction; the last frame of a file.
     sides : {1, 2}
         Bonds of a side-to-side contact of rods.
     integrator : {"rkc2", "heun/adaptive", "heun", "tr-bdf2", "sdirk2"}, optional
-        The first three are LAMMPS's, as of `compress`; the last two take implicit steps in the plane, without LAMMPS, at a
-        cost that hardly grows as the rate falls. ``heun`` with one bond or where `dt` is given; else ``tr-bdf2`` in
-        the plane at rates of 3e-7 and below, and ``rkc2`` otherwise.
+        The first three are LAMMPS's, as in `compress`; the last two take implicit steps in the plane, without LAMMPS,
+        at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
+        in the plane at rates of 3e-7 and below, and else ``rkc2``.
     dt : float, [time], optional
-        Time step of ``heun``; 0.05 when left out.
+        Time step of ``heun``; 0.05 by default.
     tolerance : float, optional
-        Of the others: local error of a step over the typical overlap; 1e-4 in LAMMPS and 1e-3 of implicit steps
-        when left out.
+        Local error of a step over the typical overlap, for the others; by default 1e-4 in LAMMPS and 1e-3 with implicit
+        steps.
     rows : int
-        How many samples of stress and order to keep; implicit steps are as many, or more.
+        Number of samples of stress and order to keep; at least that many with implicit steps.
     frames : int, optional
-        How many snapshots to keep; 20 when left out. Implicit steps keep one of every 100 steps.
+        Number of snapshots to keep; 20 by default. Implicit runs keep one of every 100 steps.
     file : path, optional
-        H5MD file of the run, as of `compress`: a finished run of these settings is loaded from it, and one
-        that was cut off goes on.
+        H5MD file of the run, as in `compress`.
     again : bool
-        Begin anew, whatever the file holds.
+        Start over, whatever the file holds.
     progress : bool
-        Whether a bar on standard error says how far it is.
+        Whether to show progress on standard error.
 
     Returns
     -------
@@ -127,7 +125,7 @@ def shear(
     Warns
     -----
     UserWarning
-        If the rate is so large that long particles may be driven through each other, which ends the run.
+        If the rate is so large that long particles may pass through each other, which ends the run.
 
     Examples
     --------
@@ -184,33 +182,33 @@ def quasistatic_shear(
     again: bool = False,
     progress: bool = True,
 ) -> QuasistaticShearFile:
-    """Shear particles by small steps of the strain, each followed by a minimisation (AQS); needs no LAMMPS.
+    """Shear particles in small strain steps, each followed by minimisation (AQS); needs no LAMMPS.
 
     Parameters
     ----------
     particles : Particles
-        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     dimension : {2, 3}, optional
-        2 when left out, or that of the start.
+        2 by default, or that of the start.
     phi : float, optional
-        Packing fraction, to which a random packing is compressed by such steps, too; 0.9 when left out, or that of the start.
+        Packing fraction, reached by quasistatic compression of a random packing; 0.9 by default, or that of the start.
     step, strain : float
-        Strain of each step, and the one to reach.
+        Strain of each step, and final strain.
     flow : {"simple", "pure"}
     pressure : float, [energy / length^D]
-        To hold, in place of the volume.
+        Pressure to hold, in place of the volume.
     tolerance : float
         Largest net force and torque of a particle over the mean bond force.
     seed : int, optional
-        Of the random start; 1 when left out.
+        Random seed of the start; 1 by default.
     start : Packing or path, optional
-        What to begin with, at its own packing fraction; of a path, its last frame.
+        Initial packing, at its own packing fraction; the last frame of a file.
     frames : int
-        About how many snapshots to keep.
+        Approximate number of snapshots to keep.
     file, again, progress
-        As of `compress`.
+        See `compress`.
 
     Returns
     -------
@@ -227,7 +225,7 @@ def quasistatic_shear(
     Warns
     -----
     NotReachedWarning
-        If forces do not balance to the tolerance after some of the steps; ``run.at_rest`` says after which they do.
+        If forces do not balance to the tolerance after some steps; ``run.at_rest`` says where they do.
 
     Examples
     --------
@@ -259,7 +257,7 @@ class _How(NamedTuple):
 
 
 class _Asked(NamedTuple):
-    """What was given of a random start."""
+    """Arguments of a random start."""
 
     n: int | None
     phi: float | None
@@ -268,7 +266,7 @@ class _Asked(NamedTuple):
 
 
 class _Numbers(NamedTuple):
-    """What a random start is made with."""
+    """Settings of a random start."""
 
     n: int
     phi: float
@@ -277,7 +275,7 @@ class _Numbers(NamedTuple):
 
     @classmethod
     def of(cls, asked: _Asked, usual_phi: float) -> _Numbers:
-        """Take what is usual for what was left out."""
+        """Fill in defaults."""
         given = {name: value for name, value in asked._asdict().items() if value is not None}
         require_one_of("dimension", given.get("dimension", 2), (2, 3))
         require_stated(**{name: value for name, value in given.items() if name != "dimension"})
@@ -285,7 +283,7 @@ class _Numbers(NamedTuple):
 
 
 class _Start(NamedTuple):
-    """What a run begins with: a packing, or particles with their numbers."""
+    """Initial state of a run: a packing, or particles with their settings."""
 
     known: MeasuredPacking | None
     particles: Particles | None
@@ -301,13 +299,13 @@ class _Start(NamedTuple):
         usual_phi: float,
         sides: int = 2,
     ) -> _Start:
-        """Take a start, beside which nothing else may be given, or particles with what is usual."""
+        """Take a start, which excludes other arguments, or particles with defaults."""
         require_no_effect("start", start, particles=particles, **asked._asdict())
         numbers = _Numbers.of(asked, usual_phi)
         if start is not None:
             return cls(start_of(start, sides), None, numbers)
         if particles is None:
-            msg = "there are neither particles nor a start, expected one of them"
+            msg = "neither particles nor a start are given, expected one of them"
             raise ValueError(msg)
         return cls(None, particles, numbers)
 
@@ -322,7 +320,7 @@ class _Start(NamedTuple):
 
     @property
     def made_from(self) -> dict[str, Any]:
-        """Tell what the run is of."""
+        """Describe the particles and the start."""
         if self.known:
             return told_of(self.known)
         assert self.particles
@@ -334,7 +332,7 @@ class _Start(NamedTuple):
         return start_below(phi, n, seed, self.particles, dimension)
 
     def flowing(self) -> Packing:
-        """Give the start, compressed at a rate."""
+        """Return the start, compressed at a finite rate."""
         if self.known:
             return self.known
         random = self._random()
@@ -343,7 +341,7 @@ class _Start(NamedTuple):
         return compressed_start(random, phi) if is_looser else random
 
     def still(self) -> Packing:
-        """Give the start, compressed by minimisations."""
+        """Return the start, compressed quasistatically."""
         if self.known:
             return self.known
         random = self._random()
@@ -352,7 +350,7 @@ class _Start(NamedTuple):
 
 
 def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
-    """Choose an integrator."""
+    """Choose the default integrator."""
     if not whole:
         return "heun"
     return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
@@ -372,12 +370,12 @@ def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> N
 
 
 def _shear_slowly(settings: SlowShear, of: _Start, path: Path, *, again: bool, sides: int) -> None:
-    """Begin the file of a run by implicit steps, or see that it holds this one."""
+    """Create the file of a run by implicit steps, or check that it holds this run."""
     require_path(path)
     if of.dimension != 2 or sides != 2:
         msg = (
-            f"implicit steps were asked for in {of.dimension} dimensions with {sides} bonds side to side,"
-            " expected 2 and 2; take another integrator"
+            f"implicit steps were requested in {of.dimension} dimensions with {sides} bonds side to side,"
+            " expected 2 and 2; choose another integrator"
         )
         raise ValueError(msg)
     if path.exists() and not again:

@@ -1,4 +1,4 @@
-"""Packings that runs begin with."""
+"""Initial packings of runs."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from jamshape.shapes.shape import Interaction
 
 
 def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
-    """Take the packing to begin with, of a path its last frame, under the law that the run has.
+    """Return the initial packing, or the last frame of a file, under the law of the run.
 
-    Warns where the usual bonds of side-to-side contacts are not those that the start has.
+    Warns if the default number of side-to-side bonds differs from that of the start.
     """
     if isinstance(start, str | Path):
         start = MeasuredPacking.read(Path(start))
     known = start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
     if known.law.sides == sides:
         return known
-    # Other ones than the usual were asked for.
+    # `sides` was given explicitly.
     is_asked = sides != Interaction().sides
     if not is_asked and known.compiled().has_sides and not known.is_round.all():
         said = (
-            f"the start has sides={known.law.sides}, bonds of a side-to-side contact, and the run has"
+            f"the start has sides={known.law.sides} (bonds of a side-to-side contact) and the run"
             f" sides={sides}: energy and forces of the start change"
         )
         warnings.warn(said, stacklevel=4)
@@ -36,10 +36,10 @@ def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
 
 
 def told_of(start: MeasuredPacking) -> dict[str, Any]:
-    """Pick what is said of the particles of a start, and where it is from."""
+    """Return metadata on the particles of a start and on its source."""
     own = [parameter.name for parameter in start.shape.parameters]
     names, results = (*own, "size_ratio", "kinds", "seed"), start.results
     found = {name: results[name] for name in names if name in results}
-    # As UTF-8, whatever the locale: names may hold bytes that it cannot read.
+    # As UTF-8, whatever the locale: names may hold bytes that it cannot decode.
     name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else ""
     return found | {"n": start.n, "start": name}

@@ -1,7 +1,7 @@
-"""Particles by the names of their shapes, as one asks for them in Python: ``Spherocylinders(alpha=4)``.
+"""Constructors of particles by shape: ``Spherocylinders(alpha=4)``.
 
-Each takes numbers, or arrays with an entry for each kind of a mixture. `Particles.given` takes particles one by
-one.
+Each takes numbers, or arrays with an entry for each kind of a mixture. `Particles.given` takes individual
+particles.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ def Spherocylinders(
     alpha : float or (k,) array
         Aspect ratio A/R; 0 for discs, or spheres. An array makes a mixture of k kinds.
     size_ratio : float, optional
-        Big over small of particles that are mixed 1:1, all of one aspect ratio; 1.4 as in the paper
-        when left out, 1 for equal particles.
+        Size ratio of big and small particles, mixed 1:1, with one aspect ratio; 1.4 as in the paper
+        by default, 1 for equal particles.
     **kinds : float or (k,) array
-        ``size``, R of each kind over the unit of length 1/2 (1); ``share`` of the number of
-        particles, over the sum of all shares (1); ``spread``, the standard deviation of the logarithm of
-        the size (0). With any of these there is no size ratio.
+        ``size``, R of each kind over the unit of length 1/2 (1); ``share``, number fraction of the kind
+        up to normalisation (1); ``spread``, standard deviation of the logarithm of the
+        size (0). These exclude `size_ratio`.
 
     Returns
     -------
@@ -68,14 +68,14 @@ def Superellipsoids(
     Parameters
     ----------
     p : float or (k,) array
-        Exponent, above 1/2: 1 for ellipsoids, more towards boxes, less towards octahedra. An array
+        Exponent, above 1/2: 1 for ellipsoids, larger towards boxes, smaller towards octahedra. An array
         makes a mixture of k kinds.
     w1, w2 : float or (k,) array
         Ratios a/b, at most 1, and c/b, at least 1, of the semi-axes.
     size_ratio : float, optional
-        Big over small of particles that are mixed 1:1; 1, equal particles, when left out.
+        Size ratio of big and small particles, mixed 1:1; 1, equal particles, by default.
     **kinds : float or (k,) array
-        As of `Spherocylinders`; the unit of length is the shortest semi-axis.
+        See `Spherocylinders`; the unit of length is the shortest semi-axis.
 
     Returns
     -------
@@ -106,9 +106,9 @@ def Dimers(
     alpha : float or (k,) array
         A/R, above 0; the discs just touch at 1. An array makes a mixture of k kinds.
     size_ratio : float, optional
-        Big over small of particles that are mixed 1:1; 1.4 when left out, 1 for equal particles.
+        Size ratio of big and small particles, mixed 1:1; 1.4 by default, 1 for equal particles.
     **kinds : float or (k,) array
-        As of `Spherocylinders`.
+        See `Spherocylinders`.
 
     Returns
     -------
@@ -137,17 +137,17 @@ def _particles(
     size_ratio: float | None,
     kinds: Mapping[str, ArrayLike],
 ) -> Particles:
-    """Make particles of numbers, or kinds of arrays."""
+    """Make particles from numbers, or kinds from arrays."""
     for name in kinds:
         if name not in _OF_KINDS:
-            msg = f"{name} is no number of {shape}s, expected {', '.join((*parameters, 'size_ratio', *_OF_KINDS))}"
+            msg = f"{name} is unknown for {shape}s, expected {', '.join((*parameters, 'size_ratio', *_OF_KINDS))}"
             raise ValueError(msg)
     values = {name: real_numbers(name, value) for name, value in {**parameters, **kinds}.items()}
     if not kinds and all(np.ndim(value) == 0 for value in values.values()):
         numbers = {name: float(value) for name, value in values.items()}
         return Particles.of(shape, size_ratio, **numbers)
     if size_ratio is not None:
-        msg = "size_ratio and kinds were given, expected the size of each kind in size alone"
+        msg = "size_ratio does not work with kinds, expected the size of each kind in size alone"
         raise ValueError(msg)
     try:
         columns = np.broadcast_arrays(
@@ -155,7 +155,7 @@ def _particles(
         )
     except ValueError:
         lengths = {name: np.size(value) for name, value in values.items()}
-        msg = f"arrays of kinds have lengths {lengths}, expected one entry for each kind"
+        msg = f"arrays have lengths {lengths}, expected one entry for each kind"
         raise ValueError(msg) from None
     rows = [dict(zip(values, row, strict=True)) for row in np.column_stack(columns).tolist()]
     own = [{name: row.pop(name) for name in kinds} for row in rows]
