@@ -134,10 +134,8 @@ def shear(
     """
     require_stated(gdot=gdot, strain=strain, rows=rows)
     require_given(dt=dt, tolerance=tolerance, frames=frames)
-    of = Start.of(
-        particles, Asked(n, phi, seed, dimension), start,
-        usual_phi=0.8, sides=sides, phi_name=_PHI_NAME,
-    )  # fmt: skip
+    asked = Asked(n, phi, seed, dimension)
+    of = Start.of(particles, asked, start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)
     at = place(file, "shear.h5")
     integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
     if integrator in METHODS:
@@ -237,9 +235,8 @@ def quasistatic_shear(
     """
     require_stated(frames=frames, strain_step=step, strain_end=strain)
     require_stated(tolerance=tolerance, hold_pressure=pressure)
-    of = Start.of(
-        particles, Asked(n, phi, seed, dimension), start, usual_phi=0.9, phi_name=_PHI_NAME
-    )
+    asked = Asked(n, phi, seed, dimension)
+    of = Start.of(particles, asked, start, usual_phi=0.9, phi_name=_PHI_NAME)
     how = QuasistaticShear(step, strain, flow, pressure, tolerance)
     at = place(file, "aqs.h5")
     require_path(at.path)

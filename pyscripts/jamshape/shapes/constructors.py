@@ -49,7 +49,14 @@ Examples
 
 
 def constructor(shape: Shape) -> Callable[..., Particles]:
-    """Make the function whose arguments are the parameters of a shape, each a number or an array."""
+    """Make the function whose arguments are the parameters of a shape, each a number or an array.
+
+    Examples
+    --------
+    >>> from jamshape.shapes.table import shape_named
+    >>> constructor(shape_named("dimer"))(alpha=0.5, size_ratio=1)
+    Particles('dimer', alpha=0.5, size_ratio=1)
+    """
     signature = signature_of(shape)
 
     def make(*args: ArrayLike, **kwargs: ArrayLike) -> Particles:
