@@ -19,13 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.exchange.edited import as_edited
-from jamshape.exchange.fields import (
-    alike,
-    box_fields,
-    centered,
-    packing_of,
-    particle_fields,
-)
+from jamshape.exchange.fields import alike, box_fields, centered, packing_of, particle_fields
 from jamshape.exchange.tools import tool
 from jamshape.files.disk import PathLike, replacing
 from jamshape.files.frames import Form, row_of

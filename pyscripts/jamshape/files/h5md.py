@@ -52,11 +52,7 @@ from jamshape.files import layout
 from jamshape.files.disk import PathLike, replacing
 from jamshape.files.frames import Form, row_of
 from jamshape.files.journal import read_journal
-from jamshape.files.layout import (
-    FileFormatError,
-    Report,
-    Series,
-)
+from jamshape.files.layout import FileFormatError, Report, Series
 from jamshape.files.rows import check_after, check_same_particles
 from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, renamed
 from jamshape.packing import Packing

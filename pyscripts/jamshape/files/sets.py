@@ -157,10 +157,7 @@ def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> Syst
 
 
 def read_groups(
-    paths: Iterable[Path],
-    *,
-    needs: Sequence[str] = (),
-    same: Sequence[str] = ("n",),
+    paths: Iterable[Path], *, needs: Sequence[str] = (), same: Sequence[str] = ("n",)
 ) -> Groups:
     """Find the finished packings in folders and files, by system in ascending order, then by seed.
 

@@ -7,12 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from jamshape.arguments import checked
-from jamshape.checks import (
-    require_given,
-    require_no_effect,
-    require_path,
-    require_stated,
-)
+from jamshape.checks import require_given, require_no_effect, require_path, require_stated
 from jamshape.flow import quasistatic_recording, recording, slow_recording
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.quasistatic import QuasistaticShear

@@ -9,10 +9,7 @@ from jamshape.files.vocabulary import read_protocol
 from jamshape.minima import METHODS
 from jamshape.protocols.defaults import PROTOCOLS, SETTINGS, WAYS, recipe_for
 from jamshape.protocols.recipe import SEARCHES, Recipe
-from jamshape.shapes.command_line import (
-    add_particle_options,
-    particles_beside,
-)
+from jamshape.shapes.command_line import add_particle_options, particles_beside
 
 _CHOICES = {"search": tuple(SEARCHES), "minimiser": tuple(METHODS)}
 

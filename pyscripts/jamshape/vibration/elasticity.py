@@ -76,9 +76,7 @@ class Moduli(NamedTuple):
 
 
 def moduli(
-    matrix: DynamicalMatrix,
-    soft: Spectrum | None = None,
-    at: tuple[Landscape, State] | None = None,
+    matrix: DynamicalMatrix, soft: Spectrum | None = None, at: tuple[Landscape, State] | None = None
 ) -> Moduli:
     """Compute bulk and shear moduli with bounds of their errors.
 
@@ -250,10 +248,7 @@ class Response:
 
     def squared(self, along: FloatArray) -> FloatArray:
         """(k,) bound of what such a slope that is left can change E by."""
-        values, bound = (
-            np.abs(self.soft.eigenvalues[self._is_in]),
-            self.soft.bound[self._is_in],
-        )
+        values, bound = (np.abs(self.soft.eigenvalues[self._is_in]), self.soft.bound[self._is_in])
         # All modes that are not known are stiffer than those that are; of a whole spectrum there is none.
         beside = 0.5 * values.max(initial=0.0) if values.size else np.inf
         stiffness = np.append(values - bound, beside)
