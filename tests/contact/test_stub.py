@@ -23,7 +23,7 @@ OPEN |= {shape.compiled_name: CLASSES["_Shape"] for shape in SHAPES.values()}
 
 
 def members(stub):
-    """Of a class with those it inherits: name to definition."""
+    """Members of a class with inherited ones: name to definition."""
     found = {}
     for base in stub.bases:
         found |= members(CLASSES[base.id])

@@ -100,7 +100,7 @@ def positional(node):
 
 
 def lines(node):
-    """Of a function, its docstring included."""
+    """Count the lines of a function, its docstring included."""
     return node.end_lineno - node.lineno + 1
 
 

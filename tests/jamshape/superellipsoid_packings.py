@@ -45,7 +45,7 @@ def pressed_superellipsoids(diameters, exponent, phi=0.25, dimension=3):
 
 
 def ellipsoids():
-    """Of several shapes and sizes, one of them a sphere."""
+    """Ellipsoids of several shapes and sizes, one of them a sphere."""
     n = 12
     diameters = np.column_stack([np.ones(n), 1 + np.arange(n) / n, 1 + 2 * (np.arange(n) % 3)])
     diameters[0] = 1.0

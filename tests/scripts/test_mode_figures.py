@@ -111,7 +111,7 @@ def with_modes(folder, particles, phi):
 
 @pytest.fixture(scope="module")
 def jammed(tmp_path_factory):
-    """Of rods."""
+    """Jammed packing of rods."""
     folder = tmp_path_factory.mktemp("jammed")
     return folder, with_modes(folder, bidisperse(1), 0.84)
 
@@ -311,7 +311,7 @@ def test_user_errors_are_one_sentence(problem, modes, tmp_path, script):
     assert "no modes, expected files" in problem(script, tmp_path / "empty", "--out", out)
     assert "no modes have alpha = 7" in problem(script, modes, "--alpha", 7, "--out", out)
     packing = modes / "packing.h5"
-    assert "packing.h5: is no complete file of modes" in problem(script, packing, "--out", out)
+    assert "packing.h5: is not a complete file of modes" in problem(script, packing, "--out", out)
     more = write(tmp_path, 4.0, U0, 3, n=N + 1)
     assert "expected one ensemble" in problem(script, modes, more, "--out", out)
     assert not out.exists()

@@ -8,13 +8,11 @@ import sys
 
 import numpy as np
 import pytest
-from lammps_scenes import (
+from lammps_runs import (
     REPOSITORY,
     SHOW,
     Session,
     before_box,
-    dense,
-    dense_mixture,
     environment,
     global_vector,
     load_plugin,
@@ -22,6 +20,7 @@ from lammps_scenes import (
     run_lmp_well,
     state_of,
 )
+from lammps_scenes import dense, dense_mixture
 
 sys.path.insert(0, str(REPOSITORY / "analysis" / "stability"))
 from features.contacts import CONTACTS
@@ -80,8 +79,8 @@ def test_a_hybrid_pair_style_has_the_forces_of_the_types_that_are_ours(dimension
             run 0""")
         state, energy = state_of(session), session.lmp.get_thermo("pe")
     ours = state.packing.species == 1
-    arrays = {k: v for k, v in vars(state.exact).items() if np.shape(v)[:1] == ours.shape}
-    alone = state.exact.with_(**{name: values[ours] for name, values in arrays.items()})
+    arrays = {k: v for k, v in vars(state.packing).items() if np.shape(v)[:1] == ours.shape}
+    alone = state.packing.with_(**{name: values[ours] for name, values in arrays.items()})
     expected = contacts.forces(alone, 1.0, 2)
     assert energy == pytest.approx(expected.energy, rel=1e-12)
     scale = np.abs(expected.force).max()

@@ -3,7 +3,8 @@
 import re
 
 import pytest
-from lammps_scenes import REPOSITORY, before_box, dense, load_plugin, run_lmp_well
+from lammps_runs import REPOSITORY, before_box, load_plugin, run_lmp_well
+from lammps_scenes import dense
 
 from jamshape.files.lammps_text import write_data
 from jamshape.flow.motion import Motion
@@ -60,7 +61,9 @@ def test_examples_run(name, text, tmp_path):
 
 
 @pytest.mark.lammps
-@pytest.mark.parametrize("text", part_of("create_random", "Examples").split("```")[1].strip().splitlines())
+@pytest.mark.parametrize(
+    "text", part_of("create_random", "Examples").split("```")[1].strip().splitlines()
+)
 def test_examples_of_the_command_run(text, tmp_path):
     dimension = 2 if "spherocylinder" in text else 3
     said = run_lmp_well(f"{before_box(dimension)}\n{load_plugin()}\n{text}", tmp_path)

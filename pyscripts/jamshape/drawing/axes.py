@@ -17,7 +17,7 @@ from jamshape.measures.averages import Mean
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# On a logarithmic axis of alpha, discs stand this factor left of the smallest other alpha.
+# Distance of discs from the smallest other alpha on a logarithmic axis, as a factor.
 DISCS_LEFT_BY = 4.0
 
 SMALL_TEXT: dict[str, Any] = {"fontsize": 8, "title_fontsize": 8}
@@ -26,12 +26,12 @@ _BETA_TICKS = (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10)
 
 
 def discs_at(alphas: Iterable[float]) -> float:
-    """Find where discs stand on a logarithmic axis of alpha."""
+    """Return the position of discs on a logarithmic axis of alpha."""
     return min((alpha for alpha in alphas if alpha > 0), default=1.0) / DISCS_LEFT_BY
 
 
 def label_alpha_axis(axes: Axes, discs: float | None) -> None:
-    """Make the axis of alpha logarithmic, with a tick for discs where there are any."""
+    """Make the axis of alpha logarithmic, with a tick for discs if there are any."""
     axes.set_xscale("log")
     axes.set_xlabel(r"aspect ratio $\alpha = A/R$")
     low, high = axes.get_xlim()
@@ -48,17 +48,17 @@ def label_alpha_axis(axes: Axes, discs: float | None) -> None:
 
 
 def energy_label(systems: Collection[System]) -> str:
-    """Label an axis of the energy density."""
+    """Return the label of an axis of the energy density."""
     dimensions = {system.dimension for system in systems}
     power = dimensions.pop() if len(dimensions) == 1 else "D"
     return rf"energy density  $u=U/L^{power}\;{pressure_unit(systems)}$"
 
 
 def error_bars(axes: Axes, means: Mapping[float, Mean], discs: float | None, **style: Any) -> None:
-    """Draw means at their alpha, discs where `discs_at` says or not at all, with error bars.
+    """Draw means at their alpha, discs at a given position or not at all, with error bars.
 
-    A line, if the style has one, does not lead to the discs: to be round is not the limit of
-    becoming round.
+    A line, if the style has one, stops before the discs: round particles are not the limit of
+    nearly round ones.
     """
     points = [(alpha, *m[:2]) for alpha, m in sorted(means.items()) if alpha > 0]
     if discs is not None and 0.0 in means:
@@ -85,7 +85,7 @@ def points(axes: Axes, x: Mapping[System, Mean], y: Mapping[System, Mean], **mor
 
 
 def beta_axis(axis: Any) -> None:
-    """Make an x or y axis of matplotlib that of beta: logarithmic, with ticks that can be read."""
+    """Label an x or y axis of matplotlib with beta: logarithmic, with readable ticks."""
     axis.set_label_text(r"reduced aspect ratio $\beta=ac/b^2$")
     getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
     low, high = axis.get_view_interval()

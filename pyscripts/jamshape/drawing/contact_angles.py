@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def contact_angle_figure(curves: Mapping[str, AngleCurve], title: str) -> Figure:
-    """Draw P(phi) of each, by its name, with a band of one standard error on both sides."""
+    """Draw P(phi) of each curve with its name, and a band of one standard error on both sides."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     figure = Figure(figsize=(6, 4.3), dpi=200, layout="constrained")
@@ -49,7 +49,7 @@ def _draw_curve(axes: Axes, found: AngleCurve, tint: str, label: str) -> None:
 
 
 def _draw_particle(axes: Axes) -> None:
-    """Draw what the angle is, on a particle."""
+    """Illustrate the angle on a particle."""
     from matplotlib.patches import Arc, Polygon  # noqa: PLC0415 - not needed for --help
 
     body = shape_named(DEFAULT).outline(np.array([3.6, 2.0, 2.0]), 1.0)

@@ -1,4 +1,4 @@
-"""Families of shapes with three axes, as Yuan et al., Soft Matter (2019), Fig. 4, tell them, and their marks."""
+"""Families of shapes with three axes, as in Yuan et al., Soft Matter (2019), Fig. 4, and their marks."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 NEEDS = ("exponent", "w1", "w2")
-"""Numbers that files of such shapes have."""
+"""Attributes in files of such shapes."""
 
 SPHERES = "spheres"
 
-# beta this near to 1 is that of self-dual ellipsoids.
+# Self-dual ellipsoids have a beta this near to 1.
 _DUAL = 0.02
 
-# With colors that are told apart with any colour vision.
+# Colours distinguishable with any colour vision.
 _FAMILIES: dict[str, tuple[str, str]] = {
     SPHERES: ("*", BLACK),
     "oblate ellipsoids": ("s", BLUE),
@@ -46,25 +46,25 @@ _OTHERS = (
 
 
 def with_three_axes() -> Shape:
-    """Find the shape that has an exponent and two ratios of axes."""
+    """Find the shape with an exponent and two axis ratios."""
     names = (tuple(p.name for p in shape.parameters) for shape in SHAPES.values())
     return next(shape for shape, own in zip(SHAPES.values(), names, strict=True) if own == NEEDS)
 
 
 def shape_of(system: System) -> tuple[float, float, float]:
-    """p, w1 and w2; NaN where the shape has none."""
+    """p, w1 and w2; NaN if the shape has none."""
     p, w1, w2 = (system.number(name) for name in NEEDS)
     return p, w1, w2
 
 
 def beta(system: System) -> float:
-    """Reduced aspect ratio ac/b^2; NaN where the shape has none."""
+    """Reduced aspect ratio ac/b^2; NaN if the shape has none."""
     _, w1, w2 = shape_of(system)
     return w1 * w2
 
 
 def is_axisymmetric(system: System) -> bool:
-    """Whether its z_iso is 10; a sphere is counted in."""
+    """Whether its z_iso is 10, including spheres."""
     p, w1, w2 = shape_of(system)
     return p == 1 and 1 in {w1, w2}
 
@@ -88,14 +88,14 @@ def is_thermal(system: System) -> bool:
 
 
 def label(system: System) -> str:
-    """Name it in a legend by p, w1 and w2, or its parameters, and by protocol 2."""
+    """Label a system in a legend by p, w1 and w2, or its parameters, and by protocol 2."""
     shape = ", ".join(f"{value:g}" for _, value in system.parameters) or system.kinds
     thermal = f", protocol 2, {system.n_sweeps:g} sweeps"
     return f"$({shape})$" + thermal * is_thermal(system)
 
 
 def mark(system: System) -> dict[str, Any]:
-    """Choose how points of a system are drawn: open for protocol 1, filled for protocol 2."""
+    """Return the style of points of a system: open for protocol 1, filled for protocol 2."""
     place = list(SHAPES).index(system.shape)
     of_exponent = [
         _OF_EXPONENTS[p] for p in _OF_EXPONENTS if is_among(system.number(NEEDS[0]), [p])
@@ -106,7 +106,7 @@ def mark(system: System) -> dict[str, Any]:
 
 
 def family_legend(axes: Axes, systems: Iterable[System], title: str, loc: str = "best") -> None:
-    """Explain the marks that were drawn; "outside ..." is beside all axes, and the title above them."""
+    """Add a legend of the marks; "outside ..." is beside all axes, with the title above them."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - not needed for --help and for errors
 
     handles: dict[str, Line2D] = {}

@@ -1,7 +1,7 @@
 """Axes of frequency, and quantities of modes on them.
 
-Modes that lower the energy, of negative eigenvalue, have no frequency. They are drawn apart, left of the
-others, at sqrt(-lambda) on an axis that runs the other way.
+Unstable modes, of negative eigenvalue, have no frequency. They are drawn separately, left of the
+others, at sqrt(-lambda) on a reversed axis.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 PER_DECADE = 8  # bins
 
-# How kinds of motion are drawn, and what they are.
+# Style and label of each kind of motion.
 COMPONENTS = {
     "rotation": ("o-", BLUE, r"$u_\theta^2$, rotation"),
     "parallel": ("s-", RED, r"$u_\parallel^2$, along the axis"),
@@ -56,21 +56,21 @@ COMPONENTS = {
     "of_round": ("^-", ORANGE, r"$u^2$ of particles without such an axis"),
 }
 
-# Least width of the axes of unstable modes, over that of the others.
+# Smallest width of the axes of unstable modes, over that of the others.
 _LEAST_WIDTH = 0.16
 
 # Heights on these axes between which errors are drawn.
 _ERRORS = (0.02, 0.42)
 
-# Fewest rows in that space; so many modes from which on errors are fainter.
-_ROWS, _MANY = 12, 100
+_ROWS = 12  # fewest rows in that space
+_MANY = 100  # modes from which on errors are fainter
 
-# Least width of a gap for a legend, over that of the axes.
+# Smallest gap for a legend, over the width of the axes.
 _ROOM = 0.25
 
 
 def modes_parser(doc: str | None, out: str) -> ArgumentParser:
-    """Make the parser of a figure of modes, of which alpha and u0 are selected."""
+    """Make the parser of a figure of modes, with options for alpha and u0."""
     parser = parser_of(doc, out, "MODES")
     for name in ("alpha", "u0"):
         asked: dict[str, Any] = {
@@ -84,13 +84,13 @@ def modes_parser(doc: str | None, out: str) -> ArgumentParser:
 
 
 def tables_asked(options: Namespace) -> Tables:
-    """Read the modes that a command line names; errors as `read_tables` and `selected`."""
+    """Read the modes named on a command line; errors as `read_tables` and `selected`."""
     tables = selected(read_tables(options.files), "alpha", options.alpha)
     return selected(tables, "u0", options.u0)
 
 
 def key_labels(keys: Collection[Key]) -> dict[Key, str]:
-    """Name what distinguishes curves, for a legend."""
+    """Label curves by their differences, for a legend."""
     systems = {key.system: None for key in keys}
     names, energies = system_labels(systems), {key.u0 for key in keys}
     labels = {}
@@ -102,12 +102,12 @@ def key_labels(keys: Collection[Key]) -> dict[Key, str]:
 
 
 def energy_text(u0: float) -> str:
-    """Name an energy density."""
+    """Format an energy density."""
     return attributes_text({"u0": u0})[0]
 
 
 def legend_title(tables: Tables) -> str:
-    """Say above what the packings are of, and below N, samples, and the energy where all have one."""
+    """Describe the packings on one line, and N, samples, and a common energy on the next."""
     energies = {key.u0 for key in tables}
     told = [samples_text(n_of(tables), tables)]
     told += map(energy_text, energies if len(energies) == 1 else [])
@@ -116,12 +116,12 @@ def legend_title(tables: Tables) -> str:
 
 
 def frequency_unit(keys: Iterable[Key]) -> str:
-    """Write the unit of frequencies in TeX, without dollars."""
+    """Return the unit of frequencies in TeX, without dollars."""
     return rf"[\sqrt{{k_e}}\,/\,{unit_text(key.system for key in keys)}]"
 
 
 def packing_text(file: PackingFile) -> str:
-    """Name one packing by its system, N, energy and seed, as far as its file tells."""
+    """Describe one packing by its system, N, energy and seed, if known."""
     known = file.attributes
     told = [f"$N={known['n']}$"] if "n" in known else []
     told += attributes_text(known)
@@ -130,7 +130,7 @@ def packing_text(file: PackingFile) -> str:
 
 
 def bin_edges(tables: Iterable[ModeTable], per_decade: int = PER_DECADE) -> FloatArray:
-    """Bins of equal relative width around all frequencies, those of unstable modes too."""
+    """Return logarithmic bins around all frequencies, including those of unstable modes."""
     found = pooled(tables, sizes, lambda table: stable(table) | unstable(table))
     if not len(found):
         msg = "no mode has an eigenvalue above its error, expected modes of a jammed packing"
@@ -142,13 +142,13 @@ def bin_edges(tables: Iterable[ModeTable], per_decade: int = PER_DECADE) -> Floa
 
 
 class Sides(NamedTuple):
-    """Axes of a quantity against frequency: of unstable modes, if there are any, and of the others."""
+    """Axes of a quantity against frequency: for unstable modes, if there are any, and for the others."""
 
     unstable: Axes | None
     stable: Axes
 
     def each(self) -> list[Axes]:
-        """Return the axes that are there."""
+        """Return the existing axes."""
         return [axes for axes in self if axes is not None]
 
     @property
@@ -158,7 +158,7 @@ class Sides(NamedTuple):
 
 
 def add_sides(figure: Figure, tables: Tables, n_rows: int = 1) -> list[Sides]:
-    """Make rows of axes that share their frequencies, with labels but those of the quantities."""
+    """Make rows of axes that share their frequencies, with all labels except those of the quantities."""
     limits = [_limits(every(tables), select) for select in (unstable, stable)]
     decades = [0.0 if lim is None else math.log10(lim[1] / lim[0]) for lim in limits]
     if limits[1] is None:
@@ -183,7 +183,7 @@ def add_sides(figure: Figure, tables: Tables, n_rows: int = 1) -> list[Sides]:
 
 
 def _limits(tables: Sequence[ModeTable], select: Any) -> tuple[float, float] | None:
-    """Frequencies of the modes that are selected, with some space."""
+    """Return the range of frequencies of the selected modes, with some margin."""
     found = pooled(tables, sizes, select)
     return (float(found.min()) / 2, float(found.max()) * 2) if len(found) else None
 
@@ -213,15 +213,15 @@ class Binned(NamedTuple):
     """Averages over all modes of all samples in bins of frequency; (bins,) each."""
 
     omega: FloatArray
-    """Geometric middle."""
+    """Geometric bin centres."""
     value: FloatArray
-    """NaN where there is no mode, so that lines end at gaps between bands."""
+    """NaN in empty bins, so that lines end at gaps between bands."""
     error: FloatArray
     """Standard error; 0 for one mode."""
 
 
 def binned(samples: Sequence[ModeTable], name: str, edges: FloatArray, *, below: bool) -> Binned:
-    """Average a column over modes in bins, over unstable modes or over the others."""
+    """Average a column over modes in bins, either unstable modes or the others."""
     select = unstable if below else stable
     omega, values = pooled(samples, sizes, select), pooled(samples, lambda t: t[name], select)
     count = np.histogram(omega, edges)[0]
@@ -247,7 +247,7 @@ class _Unstable(NamedTuple):
     size: float
     """-lambda"""
     error: float
-    """How far the eigenvalue may be from that of the minimum."""
+    """Estimated distance of the eigenvalue from that of the minimum."""
     bound: float
     color: str
 
@@ -255,9 +255,9 @@ class _Unstable(NamedTuple):
 def draw_errors(axes: Axes, tables: Tables) -> None:
     """Draw every unstable mode, one below the other, with the errors of its eigenvalue.
 
-    Black bars are bounds of the eigenvalue of the packing as it is, mostly too short to be seen; light ones
-    estimate how far that is from the eigenvalue where the forces would balance. Bars that leave the
-    axes on the right say that there even the sign may be another one.
+    Black bars are bounds for the packing as it is, mostly too short to be seen; light ones
+    estimate the distance from the eigenvalue at force balance. If a bar leaves the
+    axes on the right, even the sign may differ there.
     """
     rows = sorted(
         _Unstable(size, error, bound, color(k))
@@ -282,13 +282,13 @@ def draw_errors(axes: Axes, tables: Tables) -> None:
 
 
 def _errors(table: ModeTable) -> FloatArray:
-    """(K, 3) sizes of unstable eigenvalues, how far from the minimum's, bounds of their errors."""
+    """(K, 3) magnitudes of unstable eigenvalues, estimated distances from the minimum's, bounds of their errors."""
     columns = (table["eigenvalues"], np.nan_to_num(table["state_error"]), table.bound)
     return np.asarray(np.abs(np.column_stack(columns)[unstable(table)]))
 
 
 def draw_legend(axes: Axes, samples: Iterable[ModeTable], **style: Any) -> None:
-    """Draw a legend where the frequencies of these modes leave the widest gap."""
+    """Draw a legend in the widest gap between the frequencies of these modes."""
     omega = pooled(samples, sizes, stable)
     low, high = axes.get_xlim()
     ends = np.log10(np.concatenate([[low], np.sort(omega), [high]]))
@@ -303,7 +303,7 @@ def draw_legend(axes: Axes, samples: Iterable[ModeTable], **style: Any) -> None:
 
 
 def mode_text(table: ModeTable, mode: int) -> str:
-    """Name a mode by its number and its frequency, or its eigenvalue if that is not positive."""
+    """Label a mode by its number and its frequency, or its eigenvalue if that is not positive."""
     value, bound = table["eigenvalues"][mode], table.bound[mode]
     if table["sign"][mode] > 0:
         return rf"mode {mode}: $\omega={short(np.sqrt(value))}$"

@@ -1,4 +1,4 @@
-"""What shear does, against packing fraction: stress, contacts, order and rotation of several rates."""
+"""Rheology against packing fraction: stress, contacts, order and rotation at several rates."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _MARKERS = "osD^v"
 
 
 class Line(NamedTuple):
-    """What is drawn as one line."""
+    """Key of a line."""
 
     system: System
     gdot: float
@@ -81,9 +81,7 @@ def rheology_figure(runs: Sequence[ShearOf]) -> Figure:
     title = f"{ensemble_text(first.ensemble, ('n',))}, steady {first.ensemble.flow} shear"
     if len(labels) > 1:
         title = f"$N={first.ensemble.n}$, steady {first.ensemble.flow} shear"
-    figure.suptitle(
-        f"{title}; bars: standard errors that know the memory of the packing", fontsize=9
-    )
+    figure.suptitle(f"{title}; bars: standard errors of correlated samples", fontsize=9)
     handles = panels[0, 0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=3, frameon=False, **_small())
     return figure

@@ -11,7 +11,7 @@ then, and at the end, the rows are folded into a copy of the HDF5 file, which re
     TOKEN\n                       32 digits: of the HDF5 file that these rows go on from, its attribute `journal`
     record, record, ...
 
-    record = length (8 bytes), CRC-32 (4 bytes), and so many bytes:
+    record = length (8 bytes), CRC-32 (4 bytes), and its bytes:
         length of the head (4 bytes), the head as JSON, the rows of all tables, bytes of NumPy
         head = {"tables": [[name, dtype, number of rows], ...], "texts": {attribute: text}}
 
@@ -54,15 +54,15 @@ _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP}
 
 
 class Record(NamedTuple):
-    """What one call appends."""
+    """Content of one append."""
 
     tables: dict[str, Table]
     texts: dict[str, str]
-    """Attributes that are text; those that are numbers are a table."""
+    """Attributes that are text; numeric ones are a table."""
 
 
 class Pending(NamedTuple):
-    """What a journal holds."""
+    """Content of a journal."""
 
     token: str
     records: list[Record]
@@ -158,7 +158,7 @@ class Journal:
     Parameters
     ----------
     path : path-like
-        Of the run's HDF5 file.
+        Path of the run's HDF5 file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Appending to the file of a run, which survives whatever ends the process."""
+"""Crash-safe appending to the file of a run."""
 
 from __future__ import annotations
 
@@ -31,21 +31,19 @@ from jamshape.packing import Packing
 if TYPE_CHECKING:
     import h5py
 
-# Rows are folded into the HDF5 file when they are this part of it, so that all folding together writes
-# a few times its final size; and only after so many times the seconds that folding took last.
-_PART = 0.25
-_PAUSE = 200
-_SECONDS = 0.05  # about what it takes, where it was not measured yet
+_PART = 0.25  # of the HDF5 file, at which rows are folded into it: a few times its final size is written in all
+_PAUSE = 200  # time between foldings, over the time of the last one
+_SECONDS = 0.05  # typical time of one, used until measured
 _REPORT = np.dtype(list(layout.REPORT.items()))
 
 
 def fold(path: PathLike) -> None:
-    """Bring into the file of a finished run the rows that a kill left in its journal.
+    """Fold rows left in the journal by a killed process into the file of a finished run.
 
     Raises
     ------
     FileFormatError, OSError
-        As `RunWriter`.
+        As in `RunWriter`.
     """
     if journal_of(path).exists():
         RunWriter.open(path).close()
@@ -61,7 +59,7 @@ class RunWriter:
     Parameters
     ----------
     path : path-like
-        A file that `write_packing` or `RunWriter.create` made.
+        A file made by `write_packing` or `RunWriter.create`.
 
     Raises
     ------
@@ -103,7 +101,7 @@ class RunWriter:
 
     @classmethod
     def open(cls, path: PathLike) -> Self:
-        """Return a writer that appends to an existing file, under today's names."""
+        """Return a writer that appends to an existing file, under current names."""
         return cls(path)
 
     def __enter__(self) -> Self:
@@ -113,7 +111,7 @@ class RunWriter:
         if error is None:
             self.close()
             return
-        with suppress(OSError):  # rows are safe in the journal; the first error is the one to tell
+        with suppress(OSError):  # rows are safe in the journal; report the first error
             self.close()
 
     def close(self) -> None:
@@ -286,7 +284,7 @@ class RunWriter:
         return True
 
     def _begin(self, token: str, seconds: float) -> None:
-        """Begin an empty journal, after so many seconds of writing the file."""
+        """Begin an empty journal, after writing the file in some seconds."""
         self._journal.begin(token)
         self._bytes = self.path.stat().st_size
         self._fold_after = perf_counter() + _PAUSE * seconds

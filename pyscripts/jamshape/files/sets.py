@@ -1,8 +1,8 @@
-"""Sets of finished packings in folders and files, grouped by the systems that they are samples of.
+"""Ensembles of finished packings in folders and files, grouped by system.
 
 A sweep is a folder of files that `make_packing.py` or `sweep.py` wrote; several may be given together. Packings
-are of one system where shape, dimension, the shape's parameters, mixture, protocol and its sweeps agree. Instead of
-files a table may be given, of what files say without their particles, a line for each (`analysis/sample_tables.py`).
+belong to one system if shape, dimension, the shape's parameters, mixture, protocol and its sweeps agree. A table
+of attributes, one packing per line, may replace the files (`analysis/sample_tables.py`).
 """
 
 from __future__ import annotations
@@ -30,43 +30,42 @@ from jamshape.files.vocabulary import protocol_named
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT, shape_named
 
-# Ends of the names of files that may lie beside a packing and are none.
+# Suffixes of other files that may lie beside a packing.
 OTHERS = (".run.h5", ".search.h5", ".path.h5", ".strict.h5", ".modes.h5")
 
-# End of the name of a table of packings, and its columns that are no attributes.
-TABLE = ".csv"
-_STYLE = ("shape", "dimension")
+TABLE = ".csv"  # suffix of a table of packings
+_STYLE = ("shape", "dimension")  # its columns that are not attributes
 
 CONDITIONS = ("n", "size_ratio", "u0", "kappa")
 
-# Parameters that are the same in this many digits are one.
+# Parameters that agree in this many digits are equal.
 _SAME = 1e-9
 
 
 class System(NamedTuple):
-    """What the packings of one point of a figure have in common, but for N and energy."""
+    """Common settings of the packings of one point of a figure, apart from N and energy."""
 
     shape: str
     dimension: int
     parameters: tuple[tuple[str, float], ...]
-    """Those of the shape, by name; none of a mixture, and none where files do not tell all."""
+    """Parameters of the shape by name; empty for a mixture, and if files lack some."""
     kinds: str = ""
-    """The particles of a mixture."""
+    """Particles of a mixture."""
     protocol: str = ""
-    """The published one, by name, or the way to jamming; none of compressions in LAMMPS."""
+    """Name of the published protocol, or the way to jamming; empty for compressions in LAMMPS."""
     n_sweeps: int = 0
-    """Of Monte Carlo."""
+    """Monte Carlo sweeps."""
 
     def number(self, name: str) -> float:
-        """Look up a parameter; NaN where the shape has none of that name."""
+        """Look up a parameter; NaN if the shape does not have it."""
         return dict(self.parameters).get(name, math.nan)
 
     def without(self, name: str) -> System:
-        """Leave out a parameter: what the points of a curve over it have in common."""
+        """Remove a parameter, so that the points of a curve over it compare equal."""
         return self._replace(parameters=tuple(p for p in self.parameters if p[0] != name))
 
     def report(self) -> dict[str, Any]:
-        """Name it in JSON: parameters by their names, the last three where there are any."""
+        """Return a description for JSON: parameters by name, the last three if present."""
         told = {name: getattr(self, name) for name in ("kinds", "protocol", "n_sweeps")}
         told = {name: value for name, value in told.items() if value}
         return {"shape": self.shape, "dimension": self.dimension, **dict(self.parameters), **told}
@@ -74,7 +73,7 @@ class System(NamedTuple):
 
 @dataclass(frozen=True)
 class PackingFile:
-    """One finished packing: its file and what is said of it there."""
+    """A finished packing: its file and attributes."""
 
     path: Path
     attributes: dict[str, Any]
@@ -83,12 +82,12 @@ class PackingFile:
 
     @classmethod
     def read(cls, path: Path) -> PackingFile:
-        """Read what a file says; errors as `read_attributes`."""
+        """Read the attributes of a file; errors as `read_attributes`."""
         return cls(path, read_attributes(path), read_style(path))
 
     @property
     def reached(self) -> bool:
-        """Whether it reached its goal: forces that balance."""
+        """Whether it reached its goal, force balance."""
         return is_reached(self.attributes)
 
     def number(self, name: str) -> float:
@@ -97,7 +96,7 @@ class PackingFile:
         Raises
         ------
         ValueError
-            If there is none.
+            If it does not exist.
         """
         return number(self.attributes, name, f"{self.path}: has", "a packing of make_packing.py")
 
@@ -106,11 +105,11 @@ class PackingFile:
         return read_packing(self.path)
 
     def system(self) -> System:
-        """Tell what it is a sample of."""
+        """Return the system that it is a sample of."""
         return system_of(self.attributes, *self.style)
 
     def contacts(self) -> Contacts:
-        """Read the packing and find its contacts, by its own law, and its rattlers."""
+        """Read the packing and find its contacts, under its own law, and its rattlers."""
         packing = self.packing()
         network = find_contacts(packing)
         observables = read_observables(self.path)
@@ -132,7 +131,7 @@ def number(attributes: Mapping[str, Any], name: str, who: str, expected: str) ->
     attributes : mapping
     name : str
     who, expected : str
-        Begin and end of the sentence, if there is none.
+        Begin and end of the error message.
 
     Raises
     ------
@@ -146,7 +145,7 @@ def number(attributes: Mapping[str, Any], name: str, who: str, expected: str) ->
 
 
 def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> System:
-    """Tell what a packing is a sample of, by its attributes, shape style and dimension."""
+    """Return the system of a packing, from its attributes, shape style and dimension."""
     names = [parameter.name for parameter in shape_named(shape).parameters]
     told = set(names) <= attributes.keys()
     known = tuple((name, float(attributes[name])) for name in names if told)
@@ -161,24 +160,24 @@ def read_groups(
 ) -> Groups:
     """Find the finished packings in folders and files, by system in ascending order, then by seed.
 
-    Those that did not reach their goal are among them: `PackingFile.reached` says so, and averages are given with and
+    They include packings that did not reach their goal (`PackingFile.reached`); averages are given with and
     without them (`measures.averages.mean_over`).
 
     Parameters
     ----------
     paths
-        Folders, of which other files are left out, and files, which must be packings.
+        Folders, in which other files are skipped, and files, which must be packings.
     needs
-        Numbers that every file must have, such as the parameters of the shapes that are drawn.
+        Numbers that every file must have, such as the parameters of the shapes in a figure.
     same
         Attributes in which all must agree.
 
     Raises
     ------
     ValueError
-        If there is none, a file is none, lacks a number, or they are of several ensembles.
+        If there are none, a file is not a packing or lacks a number, or they belong to several ensembles.
     OSError
-        If one cannot be read.
+        If a file cannot be read.
     """
     files = finished(list(paths))
     for file in files:
@@ -203,7 +202,7 @@ def finished(paths: list[Path]) -> list[PackingFile]:
 
 
 def _files(path: Path) -> list[PackingFile]:
-    """Read one file, the lines of a table, or the files of a folder that are packings."""
+    """Read one file, the lines of a table, or the packings of a folder."""
     if path.suffix == TABLE:
         return read_table(path)
     if not path.is_dir():
@@ -212,7 +211,7 @@ def _files(path: Path) -> list[PackingFile]:
             msg = f"{path}: has no attribute 'outcome', expected a packing of make_packing.py"
             raise ValueError(msg)
         return [file]
-    # Runs and searches that lead to a packing may still be written, and are then locked.
+    # Runs and searches for a packing may still be written, and are then locked.
     places = [place for place in sorted(path.glob("*.h5")) if not place.name.endswith(OTHERS)]
     found = []
     for place in places:
@@ -224,12 +223,12 @@ def _files(path: Path) -> list[PackingFile]:
 def read_table(path: Path) -> list[PackingFile]:
     """Read a table of packings, as `analysis/sample_tables.py` writes it.
 
-    The file of a line is named beside the table, and need not be there: only who asks for its particles misses it.
+    The file of a line is named beside the table, and is needed only for its particles.
 
     Raises
     ------
     ValueError
-        If the table lacks a column, or its dimension is no number.
+        If the table lacks a column, or a dimension is not a number.
     OSError
         If it cannot be read.
     """
@@ -247,7 +246,7 @@ def read_table(path: Path) -> list[PackingFile]:
 
 
 def _read(text: str) -> Any:
-    """Read a cell: a number if it is one."""
+    """Read a cell, as a number if possible."""
     for kind in (int, float):
         with contextlib.suppress(ValueError):
             return kind(text)
@@ -255,7 +254,7 @@ def _read(text: str) -> Any:
 
 
 def require_one_ensemble(attributes: Sequence[Mapping[str, Any]], same: Sequence[str]) -> None:
-    """Refuse attributes that differ in one of these.
+    """Raise if attributes differ in one of these.
 
     Raises
     ------
@@ -265,17 +264,17 @@ def require_one_ensemble(attributes: Sequence[Mapping[str, Any]], same: Sequence
         values = sorted({float(known[name]) for known in attributes if name in known})
         if len(values) > 1:
             found = " and ".join(f"{value:g}" for value in values)
-            msg = f"{name} is {found}, expected one ensemble; give the files of one"
+            msg = f"{name} is {found}, expected one ensemble; select its files"
             raise ValueError(msg)
 
 
 def n_of(groups: Mapping[Any, Sequence[PackingFile]]) -> int:
-    """Return the number of particles of the packings, which is that of the first."""
+    """Return the number of particles of the first packing."""
     return int(next(iter(groups.values()))[0].number("n"))
 
 
 def conditions(groups: Mapping[Any, Sequence[PackingFile]]) -> dict[str, Any]:
-    """Return what all files share of N, size ratio, energy and compression rate, and how many did not reach their goal."""
+    """Return the common N, size ratio, energy and compression rate, and the number that did not reach their goal."""
     every = [file.attributes for files in groups.values() for file in files]
     values = {name: {known.get(name) for known in every} for name in CONDITIONS}
     shared = {name: of.pop() for name, of in values.items() if len(of) == 1 and None not in of}
@@ -288,7 +287,7 @@ def n_not_reached(groups: Mapping[Any, Sequence[PackingFile]]) -> int:
 
 
 def of_paper(system: System) -> bool:
-    """Whether it is what Marschall & Teitel, PRE 97, 012905, studied, whatever its parameters."""
+    """Whether Marschall & Teitel, PRE 97, 012905, studied it, whatever its parameters."""
     return system._replace(parameters=(), protocol="", n_sweeps=0) == System(DEFAULT, 2, ())
 
 
@@ -306,7 +305,7 @@ def curves_over(groups: Groups, name: str) -> dict[System, Curve]:
 
 
 def one_curve(groups: Groups, name: str) -> tuple[System, Curve]:
-    """Take the only curve over a parameter, and what its points have in common.
+    """Return the only curve over a parameter, and the common settings of its points.
 
     Raises
     ------
@@ -318,20 +317,22 @@ def one_curve(groups: Groups, name: str) -> tuple[System, Curve]:
         found = " and ".join(
             f"{s.shape}s in {s.dimension}D, protocol {s.protocol or 'none'}" for s in curves
         )
-        msg = f"packings are {found}, expected systems that differ in {name} only; give such files"
+        msg = (
+            f"packings are {found}, expected systems that differ in {name} only; select such files"
+        )
         raise ValueError(msg)
     return next(iter(curves.items()))
 
 
 class Choice(NamedTuple):
-    """Which values of a parameter to draw."""
+    """Selection of values of a parameter to draw."""
 
     asked: Sequence[float]
-    """All that are drawn, if there are any."""
+    """Values to draw, if not empty."""
     usual: Sequence[float]
-    """Else those of these that are there."""
+    """Otherwise those of these that exist."""
     most: int
-    """Else so many, evenly."""
+    """Otherwise this number of values, evenly."""
 
 
 def choose(groups: Groups, name: str, which: Choice) -> Groups:
@@ -340,7 +341,7 @@ def choose(groups: Groups, name: str, which: Choice) -> Groups:
     Raises
     ------
     ValueError
-        If a value that is asked for is not there.
+        If a requested value does not exist.
     """
     values = sorted({system.number(name) for system in groups})
     missing = [value for value in which.asked if not is_among(value, values)]
@@ -356,5 +357,5 @@ def choose(groups: Groups, name: str, which: Choice) -> Groups:
 
 
 def is_among(value: float, others: Iterable[float]) -> bool:
-    """Whether a number is one of others, but for rounding."""
+    """Whether a number is one of others up to rounding."""
     return any(math.isclose(value, other, rel_tol=_SAME) for other in others)

@@ -29,7 +29,7 @@ def begin(
     start = start.with_(law=start.law.but(sides=2))
     stored = dataclasses.asdict(how) | start.law._asdict() | dict(attributes or {})
     stored |= {"phi_start": start.phi, "finished": False} | _counts(Sheared(State.of(start)))
-    # Images would count cell vectors that are not there any more.
+    # Images would count cell vectors that no longer exist.
     first = start.with_(step=0, time=0.0, image=np.zeros_like(start.image))
     RunWriter.create(path, State.of(start).packing(first), stored).close()
 

@@ -1,4 +1,4 @@
-"""How fast the particles of a sheared packing turn at a moment: by the host, and by the torques of their contacts."""
+"""Instantaneous rotation rates of particles in a sheared packing, by the host and by contact torques."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from jamshape.shapes.shape import Interaction
 def rotation_rates(
     packing: Packing, host: Host, law: Interaction | None = None, k_d: float = 1.0
 ) -> FloatArray:
-    """Give the angular velocity of each particle of a packing in the plane.
+    """Return the angular velocity of each particle of a packing in the plane.
 
     Parameters
     ----------
     packing : Packing
     host : Host
     law : Interaction, optional
-        That of the packing when left out.
+        By default that of the packing.
     k_d : float, [energy time / length^4]
 
     Returns
     -------
     (N,) array of float64, [1/time]
-        dtheta/dt = w + tau / (k_d A I), with w of the host (Marschall & Teitel 2019, Phys. Rev. E 100, 032906).
+        dtheta/dt = w + tau / (k_d A I), with host rotation w (Marschall & Teitel 2019, Phys. Rev. E 100, 032906).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Compressions at a rate: in LAMMPS, and implicit ones as slow as one likes."""
+"""Compression at a finite rate: explicit in LAMMPS, or implicit and arbitrarily slow."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
 
 PHI = (0.4, 0.9)
-"""Packing fractions of the random start and of the end of a compression, where nobody says others."""
+"""Default packing fractions of the random start and of the end of a compression."""
 
 _PHI_SLOW_USUAL = (0.8, 0.9)
 _SAME = 1e-9  # of packing fractions, up to rounding
@@ -76,26 +76,26 @@ def compress(
     kappa : float, [1/time]
         Rate: the box shrinks with dL/dt = -kappa L.
     seed : int
-        Of the random start.
+        Random seed of the start.
     sides : {1, 2}
         Bonds of a side-to-side contact of rods. The paper's dynamics has one, on which parallel rods
-        chatter, so that small steps are needed; with two they rest, as in minima and modes.
+        chatter, which needs small steps; with two they come to rest, as in minima and modes.
     integrator : {"rkc2", "heun/adaptive", "heun"}, optional
         The paper's is ``heun``, with equal time steps; the others choose their own. ``rkc2``, the
-        fastest, when left out, and ``heun`` where there is one bond or `dt` is given.
+        fastest, by default, and ``heun`` where there is one bond or `dt` is given.
     dt : float, [time], optional
-        Time step of ``heun``; 0.05 when left out.
+        Time step of ``heun``; 0.05 by default.
     tolerance : float, optional
-        Of the others: local error of a step over the typical overlap; 1e-4 when left out.
+        Local error of a step over the typical overlap, for the other integrators; 1e-4 by default.
     rows, frames : int
-        How many samples of p(phi) and how many snapshots to keep.
+        Numbers of samples of p(phi) and of snapshots to keep.
     file : path, optional
-        H5MD file of the run. A finished run of these settings is loaded from it, one that was cut off
-        goes on, and one of other settings is refused. Without it the run is gone with its result.
+        H5MD file of the run. A finished run with the same settings is loaded, an interrupted one resumed, and one
+        with other settings refused. Without a file, the run is deleted together with its result.
     again : bool
-        Begin anew, whatever the file holds.
+        Start over, whatever the file holds.
     progress : bool
-        Whether a bar on standard error says how far it is.
+        Whether to show progress on standard error.
 
     Returns
     -------
@@ -161,34 +161,34 @@ def slow_compress(
     again: bool = False,
     progress: bool = True,
 ) -> RunFile:
-    """Compress particles in the plane through jamming at any rate, however slow, by implicit steps.
+    """Compress particles in the plane through jamming at any rate, however slow, with implicit time steps.
 
     Parameters
     ----------
     particles : Particles
-        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     phi : (float, float), optional
-        Packing fractions at which a fast compression in LAMMPS ends and this one begins, and to reach; (0.8, 0.9)
-        when left out. A start has its own: the first is then that, or None.
+        Packing fraction at which a fast compression in LAMMPS hands over, and the final one; (0.8, 0.9) by default.
+        With a start, the first must be that of the start, or None.
     kappa : float, [1/time], or sequence of (float, float)
-        Rate: the box shrinks with dL/dt = -kappa L. Or pairs of a packing fraction and the rate from
+        Rate: the box shrinks with dL/dt = -kappa L. Or pairs of a packing fraction and the rate used from
         there on, ascending.
     p_end : float, [energy / length^2]
-        It also ends where this pressure is reached.
+        Stop also when this pressure is reached.
     seed : int, optional
-        Of the random start; 1 when left out.
+        Random seed of the start; 1 by default.
     start : Packing or path, optional
-        What to begin with; of a path, its last frame.
+        Initial packing; the last frame of a file.
     method : {"tr-bdf2", "sdirk2", ...}
         A name of `jamshape.flow.implicit.METHODS`.
     tolerance : float
         Local error of a step over the typical overlap.
     largest_drop : float
-        Part of the elastic energy that one step may lose, so that plastic events are resolved in time.
+        Fraction of the elastic energy that one step may lose, so that plastic events are resolved in time.
     file, again, progress
-        As of `compress`.
+        See `compress`.
 
     Returns
     -------
@@ -243,16 +243,16 @@ def slow_compress(
 
 
 def _require_own(start: Packing | None, phi: float | None) -> None:
-    """Refuse another packing fraction than that of a start that was given."""
+    """Refuse a packing fraction that differs from that of a start."""
     if start and phi is not None and not math.isclose(phi, start.phi, rel_tol=_SAME):
-        said = f"{{phi_start}} is not that of the start, {start.phi:.6g}, which has its own, expected None in its place"
+        said = f"{{phi_start}} differs from that of the start, {start.phi:.6g}, expected no value beside a start; leave it out"
         raise ArgumentError(said, {"phi_start": phi})
 
 
 def _require_end_ahead(first: Packing, protocol: Protocol) -> None:
-    """Refuse a start that is beyond the end."""
+    """Refuse a start beyond the final packing fraction or pressure."""
     if not first.phi < protocol.phi_end:
-        msg = f"the start has phi = {first.phi:.6g}, expected one below phi_end = {protocol.phi_end:g}"
+        msg = f"the start has phi = {first.phi:.6g}, expected less than phi_end = {protocol.phi_end:g}"
         raise ValueError(msg)
     pressure = MeasuredPacking.of(first).pressure
     if pressure >= protocol.p_end:

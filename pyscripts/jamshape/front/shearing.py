@@ -1,4 +1,4 @@
-"""Shear: at a constant rate, in LAMMPS or by implicit steps, and by quasistatic steps."""
+"""Shear: at a finite rate, in LAMMPS or by implicit steps, or by quasistatic steps."""
 
 from __future__ import annotations
 
@@ -24,14 +24,13 @@ from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.quasistatic import compressed_to
 from jamshape.shapes.particles import Particles
 
-# At such rates and below implicit steps are faster than explicit ones; their errors where nothing else is asked for.
-_SLOW = 3e-7
-_ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
+_SLOW = 3e-7  # rate below which implicit steps are faster than explicit ones
+_ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3  # default tolerances
 
 _FRAMES = 20
 _PHI_NAME = "phi_sheared"  # of the start, in files
 
-# A random start that is as dense as was asked for is so to this part.
+# Relative tolerance of the packing fraction of a random start.
 _ROUNDING = 1e-9
 
 
@@ -57,49 +56,48 @@ def shear(
     again: bool = False,
     progress: bool = True,
 ) -> ShearFile:
-    """Shear particles at a constant rate and packing fraction, as Marschall, Keta, Olsson & Teitel 2019.
+    """Shear particles at a constant rate and packing fraction, as in Marschall, Keta, Olsson & Teitel 2019.
 
     Parameters
     ----------
     particles : Particles
-        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     dimension : {2, 3}, optional
-        2 when left out, or that of the start.
+        2 by default, or that of the start.
     phi : float, optional
-        Packing fraction, to which a random packing is compressed fast; 0.8 when left out, or that of the start.
+        Packing fraction, reached by fast compression of a random packing; 0.8 by default, or that of the start.
     gdot : float, [1/time]
         Rate: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
     strain : float
-        Strain to reach, the rate times the time.
+        Final strain, the rate times the time.
     flow : {"simple", "pure"}
     seed : int, optional
-        Of the random start; 1 when left out.
+        Random seed of the start; 1 by default.
     start : Packing or path, optional
-        What to begin with, at its own packing fraction; of a path, its last frame.
+        Initial packing, at its own packing fraction; the last frame of a file.
     sides : {1, 2}
         Bonds of a side-to-side contact of rods.
     integrator : {"rkc2", "heun/adaptive", "heun", "tr-bdf2", "sdirk2"}, optional
-        The first three are LAMMPS's, as of `compress`; the last two take implicit steps in the plane, without LAMMPS, at a
-        cost that hardly grows as the rate falls. ``heun`` with one bond or where `dt` is given; else ``tr-bdf2`` in
-        the plane at rates of 3e-7 and below, and ``rkc2`` otherwise.
+        The first three are LAMMPS's, as in `compress`; the last two take implicit steps in the plane, without LAMMPS,
+        at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
+        in the plane at rates of 3e-7 and below, and else ``rkc2``.
     dt : float, [time], optional
-        Time step of ``heun``; 0.05 when left out.
+        Time step of ``heun``; 0.05 by default.
     tolerance : float, optional
-        Of the others: local error of a step over the typical overlap; 1e-4 in LAMMPS and 1e-3 of implicit steps
-        when left out.
+        Local error of a step over the typical overlap, for the others; by default 1e-4 in LAMMPS and 1e-3 with implicit
+        steps.
     rows : int
-        How many samples of stress and order to keep; implicit steps are as many, or more.
+        Number of samples of stress and order to keep; at least that many with implicit steps.
     frames : int, optional
-        How many snapshots to keep; 20 when left out. Implicit steps keep one of every 100 steps.
+        Number of snapshots to keep; 20 by default. Implicit runs keep one of every 100 steps.
     file : path, optional
-        H5MD file of the run, as of `compress`: a finished run of these settings is loaded from it, and one
-        that was cut off goes on.
+        H5MD file of the run, as in `compress`.
     again : bool
-        Begin anew, whatever the file holds.
+        Start over, whatever the file holds.
     progress : bool
-        Whether a bar on standard error says how far it is.
+        Whether to show progress on standard error.
 
     Returns
     -------
@@ -116,7 +114,7 @@ def shear(
     Warns
     -----
     UserWarning
-        If the rate is so large that long particles may be driven through each other, which ends the run.
+        If the rate is so large that long particles may pass through each other, which ends the run.
 
     Examples
     --------
@@ -174,33 +172,33 @@ def quasistatic_shear(
     again: bool = False,
     progress: bool = True,
 ) -> QuasistaticShearFile:
-    """Shear particles by small steps of the strain, each followed by a minimisation (AQS); needs no LAMMPS.
+    """Shear particles in small strain steps, each followed by minimisation (AQS); needs no LAMMPS.
 
     Parameters
     ----------
     particles : Particles
-        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     dimension : {2, 3}, optional
-        2 when left out, or that of the start.
+        2 by default, or that of the start.
     phi : float, optional
-        Packing fraction, to which a random packing is compressed by such steps, too; 0.9 when left out, or that of the start.
+        Packing fraction, reached by quasistatic compression of a random packing; 0.9 by default, or that of the start.
     step, strain : float
-        Strain of each step, and the one to reach.
+        Strain of each step, and final strain.
     flow : {"simple", "pure"}
     pressure : float, [energy / length^D]
-        To hold, in place of the volume.
+        Pressure to hold, in place of the volume.
     tolerance : float
         Largest net force and torque of a particle over the mean bond force.
     seed : int, optional
-        Of the random start; 1 when left out.
+        Random seed of the start; 1 by default.
     start : Packing or path, optional
-        What to begin with, at its own packing fraction; of a path, its last frame.
+        Initial packing, at its own packing fraction; the last frame of a file.
     frames : int
-        About how many snapshots to keep.
+        Approximate number of snapshots to keep.
     file, again, progress
-        As of `compress`.
+        See `compress`.
 
     Returns
     -------
@@ -217,7 +215,7 @@ def quasistatic_shear(
     Warns
     -----
     NotReachedWarning
-        If forces do not balance to the tolerance after some of the steps; ``run.at_rest`` says after which they do.
+        If forces do not balance to the tolerance after some steps; ``run.at_rest`` says where they do.
 
     Examples
     --------
@@ -250,7 +248,7 @@ class _How(NamedTuple):
 
 
 def _flowing(of: Start) -> Packing:
-    """Give the start, compressed at a rate."""
+    """Return the start, compressed at a finite rate."""
     if of.known:
         return of.known
     random = of.random()
@@ -259,7 +257,7 @@ def _flowing(of: Start) -> Packing:
 
 
 def _still(of: Start) -> Packing:
-    """Give the start, compressed by minimisations."""
+    """Return the start, compressed quasistatically."""
     if of.known:
         return of.known
     random = of.random()
@@ -267,7 +265,7 @@ def _still(of: Start) -> Packing:
 
 
 def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
-    """Choose an integrator."""
+    """Choose the default integrator."""
     if not whole:
         return "heun"
     return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
@@ -287,12 +285,12 @@ def _shear_in_lammps(settings: Shear, of: Start, to: Recording, how: _How) -> No
 
 
 def _shear_slowly(settings: SlowShear, of: Start, path: Path, *, again: bool, sides: int) -> None:
-    """Begin the file of a run by implicit steps, or see that it holds this one."""
+    """Create the file of a run by implicit steps, or check that it holds this run."""
     require_path(path)
     if of.dimension != 2 or sides != 2:
         msg = (
-            f"implicit steps were asked for in {of.dimension} dimensions with {sides} bonds side to side,"
-            " expected 2 and 2; take another integrator"
+            f"implicit steps were requested in {of.dimension} dimensions with {sides} bonds side to side,"
+            " expected 2 and 2; choose another integrator"
         )
         raise ValueError(msg)
     if path.exists() and not again:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray
 
-# Digits after the point that a number is written with, at least and at most.
+# Smallest and largest number of digits after the decimal point.
 _DIGITS = (3, 9)
 
 
@@ -19,7 +19,7 @@ _Group = TypeVar("_Group")
 
 
 class Measured(Protocol):
-    """A sample with numbers by name, such as `jamshape.files.sets.PackingFile`."""
+    """A sample with named numbers, such as `jamshape.files.sets.PackingFile`."""
 
     @property
     def reached(self) -> bool:
@@ -30,10 +30,10 @@ class Measured(Protocol):
 
 
 class Reported(Protocol):
-    """A group that names itself in JSON, such as `jamshape.files.sets.System`."""
+    """A group with a JSON description, such as `jamshape.files.sets.System`."""
 
     def report(self) -> dict[str, Any]:
-        """Name it."""
+        """Return the description."""
 
 
 _Named = TypeVar("_Named", bound=Reported)
@@ -46,22 +46,22 @@ class Mean(NamedTuple):
     error: float = math.nan
     """NaN for one sample."""
     samples: int = 0
-    """0 where that is not known."""
+    """0 if unknown."""
     reached: Mean | None = None
-    """The same without samples that did not reach their goal, where there are some."""
+    """Average over samples that reached their goal, if some did not."""
 
     def as_json(self) -> dict[str, Any]:
-        """Name its numbers for JSON; `reached` only where there are two averages."""
+        """Return the fields for JSON; `reached` only where there are two averages."""
         found = self._asdict()
         return found if self.reached else {k: v for k, v in found.items() if k != "reached"}
 
     @property
     def tex(self) -> str:
-        """Write it in TeX, without dollars."""
+        """Format in TeX, without dollars."""
         return self.text(r"\pm")
 
     def text(self, plus_minus: str = "+-") -> str:
-        """Write the digits that the error leaves; empty for NaN."""
+        """Format to the digits that the error supports; empty for NaN."""
         if not math.isfinite(self.value):
             return ""
         if not math.isfinite(self.error):
@@ -72,7 +72,7 @@ class Mean(NamedTuple):
 
 
 def mean(values: ArrayLike) -> Mean:
-    """Average over samples; NaN are left out, and an average of none is NaN.
+    """Average over samples without NaN; NaN if there are none.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def mean(values: ArrayLike) -> Mean:
 
 
 def mean_over(samples: Sequence[Measured], values: Sequence[float]) -> Mean:
-    """Average a number of each sample, with and without samples that did not reach their goal."""
+    """Average one number per sample, with and without samples that did not reach their goal."""
     found = mean(values)
     of = zip(samples, values, strict=True)
     reached = [value for sample, value in of if sample.reached]
@@ -101,21 +101,21 @@ def standard_error(values: ArrayLike) -> FloatArray:
 
 
 def averages(groups: Mapping[_Group, Sequence[Measured]], name: str) -> dict[_Group, Mean]:
-    """Average one number over the samples of each group, as `mean_over`."""
+    """Average one number over the samples of each group, see `mean_over`."""
     return {group: mean_over(of, [s.number(name) for s in of]) for group, of in groups.items()}
 
 
 def exactly(
     groups: Mapping[_Group, Sequence[Any]], value: Callable[[_Group], float]
 ) -> dict[_Group, Mean]:
-    """Give each group a number that needs no average."""
+    """Return for each group a number that needs no average."""
     return {group: Mean(value(group), math.nan, len(samples)) for group, samples in groups.items()}
 
 
 def rows(
     groups: Mapping[_Named, Any], columns: Mapping[str, Mapping[_Named, Mean]]
 ) -> list[dict[str, Any]]:
-    """Report averages for JSON, a row for each group."""
+    """Return averages for JSON, a row for each group."""
     return [
         group.report() | {name: values[group] for name, values in columns.items()}
         for group in groups

@@ -1,4 +1,4 @@
-"""Pressure and shear stress by the class of contact: which contacts carry them."""
+"""Pressure and shear stress resolved by class of contact."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from jamshape.contacts import Contacts
 
 
 def class_stress(found: Contacts) -> dict[int, FloatArray]:
-    """Give the pressure tensor of the contacts of each class.
+    """Return the pressure tensor of the contacts of each class.
 
     Parameters
     ----------
     found : Contacts
-        Whose classes are 0 tip-to-tip, 1 tip-to-side and 2 side-to-side; shapes without sides have only 0.
+        Contacts of classes 0 tip-to-tip, 1 tip-to-side and 2 side-to-side; shapes without sides have only 0.
 
     Returns
     -------
     dict
-        By class, (D, D) arrays p_kl, the sum of r_l f_k over its contacts and the volume, [energy / length^D]. Their
-        sum is the pressure tensor.
+        (D, D) arrays p_kl by class, the sum of r_l f_k over its contacts, over the volume, [energy / length^D].
+        Their sum is the pressure tensor.
     """
     network, volume = found.network, found.packing.box.volume
     tensors = np.einsum("ck,cl->ckl", network.force, network.separation) / volume

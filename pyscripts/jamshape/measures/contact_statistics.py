@@ -1,8 +1,8 @@
-"""What the contacts of packings are like: classes, places on the surface, forces and torques.
+"""Statistics of the contacts of packings: classes, positions on the surface, forces and torques.
 
-In two dimensions, of spherocylinders. Marschall & Teitel 2018, Sec. III C and Appendix A. Everything
-is of the backbone: contacts of rattlers are left out, and which particles are rattlers is up to the
-caller (`jamshape.contacts.find_rattlers`, or what the file of a packing says).
+For spherocylinders in two dimensions; Marschall & Teitel 2018, Sec. III C and Appendix A. Contacts of
+rattlers are left out; the caller decides which particles are rattlers
+(`jamshape.contacts.find_rattlers`, or the file of a packing).
 """
 
 from __future__ import annotations
@@ -19,12 +19,11 @@ from jamshape.packing import Packing
 
 QUARTER = np.pi / 2  # contact angles are folded to [0, QUARTER]
 
-# A bin with more than this many times the mean number of angles is cut in two.
+# A bin with more than this multiple of the mean number of angles is split in two.
 _CROWDED = 1.5
 
-# The exponents that are tried for a + b alpha^x, and by how much it may be off at the end of them.
-_EXPONENTS = (0.05, 5.0)
-_AT_END = 1e-3
+_EXPONENTS = (0.05, 5.0)  # range of x searched for a + b alpha^x
+_AT_END = 1e-3  # distance from its ends within which a fit has failed
 
 
 class ClassFractions(NamedTuple):
@@ -39,9 +38,9 @@ class FlatFraction(NamedTuple):
     """Fraction of the particles that have a contact on at least one of their two flat sides."""
 
     of_backbone: float
-    """Of the particles that are no rattlers."""
+    """Fraction of the particles without rattlers."""
     of_all: float
-    """Of all particles; rattlers have none."""
+    """Fraction of all particles; rattlers have none."""
 
 
 class AngleDensity(NamedTuple):
@@ -54,7 +53,7 @@ class AngleDensity(NamedTuple):
 
 
 class ContactScale(NamedTuple):
-    """Average over the bonds, to measure what is left of forces and torques against."""
+    """Averages over the bonds, as units of net forces and torques."""
 
     force: float
     """[energy / length]"""
@@ -63,16 +62,16 @@ class ContactScale(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """What is left of force and torque on each particle, over the `ContactScale`."""
+    """Net force and torque on each particle, over the `ContactScale`."""
 
     force: FloatArray
     """(N,); NaN for rattlers."""
     torque: FloatArray
-    """(N,); NaN for rattlers, and for all if the mean contact torque is 0 as it is for discs."""
+    """(N,); NaN for rattlers, and for all if the mean contact torque is 0, as for discs."""
 
 
 class OffsetPowerLaw(NamedTuple):
-    """The curve a + b alpha^x, with standard errors; NaN where nothing tells the errors."""
+    """The curve a + b alpha^x, with standard errors; NaN where they cannot be estimated."""
 
     a: float
     b: float
@@ -88,7 +87,7 @@ class OffsetPowerLaw(NamedTuple):
 
 
 def held_contacts(network: ContactNetwork, rattlers: BoolArray) -> BoolArray:
-    """Flag the contacts that no rattler takes part in.
+    """Flag the contacts that do not involve rattlers.
 
     Parameters
     ----------
@@ -106,22 +105,22 @@ def held_contacts(network: ContactNetwork, rattlers: BoolArray) -> BoolArray:
     """
     held: BoolArray = ~np.logical_or(*rattlers[network.pairs.T])
     if not held.any():
-        found = f"of {len(held)} contacts none is between two particles that are no rattlers"
+        found = f"all {len(held)} contacts involve rattlers"
         msg = f"{found}, expected a jammed packing"
         raise ValueError(msg)
     return held
 
 
 def class_fractions(network: ContactNetwork, rattlers: BoolArray) -> ClassFractions:
-    """Fractions of bonds by class of contact, a side-to-side contact being two bonds.
+    """Fractions of bonds by class of contact; a side-to-side contact is two bonds.
 
-    Marschall & Teitel 2018, Fig. 9. Counted as in `jamshape.contacts.coordination`: two bonds also
-    where `find_contacts` was asked for one.
+    Marschall & Teitel 2018, Fig. 9. Counted as in `jamshape.contacts.coordination`: two bonds even
+    if `find_contacts` was called with sides=1.
 
     Parameters
     ----------
     network : ContactNetwork
-        Of a packing in two dimensions.
+        Contacts of a packing in two dimensions.
     rattlers : (N,) array of bool
 
     Returns
@@ -169,25 +168,25 @@ def flat_fraction(network: ContactNetwork, rattlers: BoolArray) -> FlatFraction:
     """Count the particles of `flat_contacts`; arguments and errors as there.
 
     Marschall & Teitel 2018, Sec. III C: "virtually all the particles (96.3% of them) have a contact
-    on at least one of their two flat sides" at alpha = 0.01, where 3.3 % are rattlers. They do not
-    say of how many.
+    on at least one of their two flat sides" at alpha = 0.01, where 3.3 % are rattlers; the reference number
+    is not given.
     """
     n_flat = np.count_nonzero(flat_contacts(network, rattlers))
     return FlatFraction(float(n_flat / np.count_nonzero(~rattlers)), float(n_flat / len(rattlers)))
 
 
 def contact_angles(packing: Packing, network: ContactNetwork, rattlers: BoolArray) -> FloatArray:
-    """Polar angles of the contacts about the centres of both particles, from the spine.
+    """Polar angles of the contacts from the spine, about the centres of both particles.
 
-    Marschall & Teitel 2018, Fig. 10. A side-to-side contact is one, midway between its two bonds.
-    A particle looks the same from both ends and from both sides, so that angles phi, -phi, pi - phi
-    and pi + phi are one.
+    Marschall & Teitel 2018, Fig. 10. A side-to-side contact counts once, midway between its two bonds.
+    By the symmetry of a particle the angles phi, -phi, pi - phi and pi + phi
+    are equivalent.
 
     Parameters
     ----------
     packing : Packing
     network : ContactNetwork
-        Of that packing, in two dimensions.
+        Its contacts, in two dimensions.
     rattlers : (N,) array of bool
 
     Returns
@@ -212,19 +211,19 @@ def contact_angles(packing: Packing, network: ContactNetwork, rattlers: BoolArra
 
 
 def angle_edges(angles: FloatArray, coarse: int = 30, cuts: int = 6) -> FloatArray:
-    """Limits of bins that are wide where the density is smooth and narrow in its peaks.
+    """Bin edges that are wide where the density is smooth and narrow in its peaks.
 
-    Equal bins are cut in two, and their halves again, for as long as they hold more than 1.5 times
-    what they would if all angles were equally likely.
+    Equal bins are halved repeatedly as long as they hold more than 1.5 times the number
+    expected for a uniform density.
 
     Parameters
     ----------
     angles : (K,) array of float64, rad
-        Folded, from `contact_angles`, of all packings together.
+        Folded angles from `contact_angles`, of all packings together.
     coarse : int
-        Number of bins to begin with.
+        Initial number of bins.
     cuts : int
-        How often a bin is cut at most, which gives 0.05 degrees.
+        Largest number of halvings of a bin; the default resolves 0.05 degrees.
 
     Returns
     -------
@@ -256,9 +255,9 @@ def angle_density(angles: FloatArray, edges: FloatArray) -> AngleDensity:
     Parameters
     ----------
     angles : (K,) array of float64, rad
-        Folded, from `contact_angles`.
+        Folded angles from `contact_angles`.
     edges : (B + 1,) array of float64, rad
-        Ascending from 0 to pi / 2, such as `angle_edges` finds.
+        Ascending from 0 to pi / 2, such as from `angle_edges`.
 
     Returns
     -------
@@ -272,7 +271,7 @@ def angle_density(angles: FloatArray, edges: FloatArray) -> AngleDensity:
     """
     counts, _ = np.histogram(angles, edges)
     if counts.sum() != len(angles) or not len(angles):
-        msg = f"{counts.sum()} of {len(angles)} angles are within the edges, expected all, and some"
+        msg = f"{counts.sum()} of {len(angles)} angles are within the edges, expected all, and at least one"
         raise ValueError(msg)
     half = counts / (2 * len(angles) * np.diff(edges))
     mirrored = np.pi - edges[-2::-1]
@@ -282,14 +281,14 @@ def angle_density(angles: FloatArray, edges: FloatArray) -> AngleDensity:
 def contact_scale(packing: Packing, network: ContactNetwork, rattlers: BoolArray) -> ContactScale:
     """Mean bond force and mean contact torque.
 
-    Marschall & Teitel 2018, Eqs. 36 and 37; a side-to-side contact is two bonds if the network has
-    two, as their z counts it.
+    Marschall & Teitel 2018, Eqs. 36 and 37; a side-to-side contact is two bonds if it is in the
+    network, as in their z.
 
     Parameters
     ----------
     packing : Packing
     network : ContactNetwork
-        Of that packing, in two dimensions.
+        Its contacts, in two dimensions.
     rattlers : (N,) array of bool
 
     Returns
@@ -306,7 +305,7 @@ def contact_scale(packing: Packing, network: ContactNetwork, rattlers: BoolArray
     held = held_contacts(network, rattlers)[bonds.contact]
     force = bonds.force[held]
     torques = np.array([np.abs(_cross(arm[held], force)) for arm in _arms(packing, network)])
-    # A disc's lever arm and force are parallel but for rounding.
+    # The lever arm of a disc is parallel to the force up to rounding.
     torques[packing.half_length[network.pairs[bonds.contact[held]]].T == 0] = 0
     return ContactScale(float(np.linalg.norm(force, axis=1).mean()), float(torques.mean()))
 
@@ -359,8 +358,8 @@ def fit_offset_power_law(
     alpha, values : (K,) array_like
         At least three different alpha above 0.
     errors : (K,) array_like, optional
-        Standard errors of the values, above 0. Without them all values count the same, and the
-        scatter about the curve tells the errors, if there are more than three values.
+        Standard errors of the values, above 0. Without them all values have equal weight, and the
+        scatter about the curve gives the errors, if there are more than three values.
 
     Returns
     -------
@@ -369,8 +368,8 @@ def fit_offset_power_law(
     Raises
     ------
     ValueError
-        If there are fewer than three alpha, a number is out of its range, or no exponent from 0.05
-        to 5 fits best.
+        If there are fewer than three alpha, a number is out of its range, or the best exponent is not between
+        0.05 and 5.
     """
     x, y = np.asarray(alpha, np.float64), np.asarray(values, np.float64)
     sigma = np.ones_like(y) if errors is None else np.asarray(errors, np.float64)

@@ -1,8 +1,8 @@
 """Flow curves: pressure and stress against the shear rate, and the packing fraction at which a flow jams.
 
-Below jamming the pressure is proportional to the rate, p = eta gdot; above, p = p_0 + c gdot^b (Herschel & Bulkley). The
-onset phi_J of shear is where p_0 begins, and where the viscosity eta diverges as (phi_J - phi)^-beta. Marschall, Keta, Olsson
-& Teitel, Phys. Rev. Lett. 122, 188002 (2019).
+Below jamming the pressure is proportional to the rate, p = eta gdot; above, p = p_0 + c gdot^b
+(Herschel-Bulkley). The onset phi_J of shear jamming is where p_0 vanishes, and where the viscosity eta diverges as
+(phi_J - phi)^-beta. Marschall, Keta, Olsson & Teitel, Phys. Rev. Lett. 122, 188002 (2019).
 """
 
 from __future__ import annotations
@@ -16,16 +16,15 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.measures.averages import Mean
 
-# Rates that a curve needs, and powers of the rate that are tried.
-_FEWEST_RATES = 3
-_POWERS = (0.05, 1.2)
+_FEWEST_RATES = 3  # of a curve
+_POWERS = (0.05, 1.2)  # range of b
 
-# A yield pressure counts where it is this many of its errors above zero.
+# A yield pressure is significant this many standard errors above zero.
 _SURE = 2.0
 
 
 class FlowCurve(NamedTuple):
-    """Pressures of one packing fraction at several rates, and the law that fits them."""
+    """Pressures at one packing fraction and several rates, and the fitted law."""
 
     phi: float
     rates: FloatArray
@@ -35,7 +34,7 @@ class FlowCurve(NamedTuple):
     errors: FloatArray
     """(K,)"""
     yields: float
-    """p_0, not below 0; NaN where there are fewer than three rates."""
+    """p_0, not below 0; NaN for fewer than three rates."""
     yields_error: float
     factor: float
     """c"""
@@ -44,7 +43,7 @@ class FlowCurve(NamedTuple):
 
     @property
     def has_yielded(self) -> bool:
-        """Whether p_0 is above zero beyond its error."""
+        """Whether p_0 is significantly above zero."""
         return self.yields > _SURE * self.yields_error
 
     @property
@@ -53,7 +52,7 @@ class FlowCurve(NamedTuple):
         return Mean(self.pressures[0] / self.rates[0], self.errors[0] / self.rates[0], 1)
 
     def at(self, rate: FloatArray) -> FloatArray:
-        """Give the law's pressure."""
+        """Return the pressure of the law."""
         return np.asarray(self.yields + self.factor * rate**self.power)
 
 
@@ -70,7 +69,7 @@ def fit_flow_curve(
     Returns
     -------
     FlowCurve
-        With NaN in its law where there are fewer than three rates. The error of p_0 is that of the linearised fit.
+        Law of NaN for fewer than three rates. The error of p_0 is that of the linearised fit.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 - it takes long to load
 
@@ -101,29 +100,29 @@ def fit_flow_curve(
 
 
 class ShearOnset(NamedTuple):
-    """Where a flow jams."""
+    """Jamming onset of a flow."""
 
     from_yield: Mean
-    """phi at which the line through the yield pressures begins."""
+    """phi at which the line through the yield pressures vanishes."""
     from_viscosity: Mean
     """phi at which the viscosity at the lowest rate diverges."""
     beta: Mean
-    """Its power."""
+    """Exponent of the divergence."""
 
 
 def shear_onset(curves: Sequence[FlowCurve]) -> ShearOnset:
-    """Find phi_J of shear, above from yield pressures and below from viscosities.
+    """Find phi_J of shear, from yield pressures above and from viscosities below.
 
     Parameters
     ----------
     curves
-        Of one system, at several packing fractions.
+        Curves of one system at several packing fractions.
 
     Returns
     -------
     ShearOnset
-        NaN where there are fewer than three packing fractions on that side. For viscosities those count whose pressure is
-        proportional to the rate to a fifth.
+        NaN for fewer than three packing fractions on that side. Viscosities count if the pressure is
+        proportional to the rate to within a fifth.
     """
     above = yielded(curves)
     below = [curve for curve in curves if _is_newtonian(curve)]
@@ -135,7 +134,7 @@ def shear_onset(curves: Sequence[FlowCurve]) -> ShearOnset:
 
 
 def yielded(curves: Sequence[FlowCurve]) -> list[FlowCurve]:
-    """Pick those with a yield pressure that are denser than all whose law tells of none."""
+    """Select curves with a yield pressure that are denser than all those without."""
     known = [curve for curve in curves if math.isfinite(curve.yields)]
     loose = max((curve.phi for curve in known if not curve.has_yielded), default=-math.inf)
     return [curve for curve in known if curve.phi > loose]
@@ -149,7 +148,7 @@ def _is_newtonian(curve: FlowCurve) -> bool:
 
 
 def _zero_of_line(curves: Sequence[FlowCurve]) -> Mean:
-    """Find where a line through yield pressures is zero, of the lowest ones."""
+    """Find the zero of a line through the lowest yield pressures."""
     lowest = sorted(curves, key=lambda curve: curve.phi)[: _FEWEST_RATES + 1]
     phi = np.array([curve.phi for curve in lowest])
     p0 = np.array([curve.yields for curve in lowest])
@@ -161,7 +160,7 @@ def _zero_of_line(curves: Sequence[FlowCurve]) -> Mean:
 
 
 def _divergence(curves: Sequence[FlowCurve]) -> tuple[Mean, Mean]:
-    """Fit eta = c (phi_J - phi)^-beta to logarithms."""
+    """Fit eta = c (phi_J - phi)^-beta in logarithms."""
     from scipy.optimize import curve_fit  # noqa: PLC0415 - it takes long to load
 
     phi = np.array([curve.phi for curve in curves])

@@ -1,4 +1,4 @@
-"""Where on their surface the particles of a set of packings touch, in two dimensions, averaged over samples.
+"""Positions of contacts on particle surfaces in two dimensions, averaged over samples.
 
 Marschall & Teitel 2018, Sec. III C, Figs. 9 and 10.
 """
@@ -25,7 +25,7 @@ from jamshape.measures.contact_statistics import (
 )
 
 NAMES = (*ClassFractions._fields, *(f"flat_{name}" for name in FlatFraction._fields))
-"""Of what `class_numbers` gives."""
+"""Keys of `class_numbers`."""
 
 
 def class_numbers(found: Contacts) -> dict[str, float]:
@@ -54,22 +54,22 @@ class AngleCurve(NamedTuple):
     samples: int
     n_contacts: int
     on_flat: Mean
-    """Fraction of the angles that are on the flat sides."""
+    """Fraction of the angles on the flat sides."""
 
     @property
     def peak_degrees(self) -> float:
-        """Middle of the bin where P is highest."""
+        """Centre of the bin with the highest P."""
         middles = (self.edges[1:] + self.edges[:-1]) / 2
         return float(middles[np.argmax(self.density)])
 
 
 def angle_curve(alpha: float, files: Sequence[PackingFile]) -> AngleCurve:
-    """Average P over samples in the same bins; `alpha` says where flat sides begin."""
+    """Average P over samples in common bins; `alpha` determines where flat sides begin."""
     return curve_of_angles(alpha, [angles_of(file) for file in files])
 
 
 def curve_of_angles(alpha: float, found: Sequence[FloatArray]) -> AngleCurve:
-    """Average P over the angles (K,) of packings, or of frames of a run, in the same bins."""
+    """Average P over the angles (K,) of packings, or of frames of a run, in common bins."""
     edges = angle_edges(np.concatenate(found))
     densities = np.array([angle_density(angles, edges).density for angles in found])
     corner = np.arctan2(1, alpha)

@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from jamshape.landscape import Landscape
     from jamshape.minima.descent import Descent, Outcome
 
-# Iterations between two looks at the residual, and how many looks in a row without a gain end it.
-_ITERATIONS = 100
-_IDLE = 3
+_ITERATIONS = 100  # between two checks of the residual
+_IDLE = 3  # checks in a row without gain that end it
 
 # LAMMPS stops when the energy changes by less than 1e-8 of (the energy + 1e-8): in units of k_e that
 # would be far above the energy of a packing near jamming.
@@ -24,7 +23,7 @@ _ENERGY = 1e3
 
 
 def descend(descent: Descent) -> Outcome | None:
-    """Minimise in a LAMMPS session of its own, in doubles; None if LAMMPS goes on no more."""
+    """Minimise in a LAMMPS session of its own, in doubles; None if LAMMPS stops making progress."""
     landscape = descent.landscape
     idle = 0
     with Session() as session:
@@ -36,7 +35,7 @@ def descend(descent: Descent) -> Outcome | None:
             state = State.of(session.packing())
             before = descent.evaluation.energy
             descent.move_to(state, landscape.evaluate(state, extended=False))
-            # It ends early, or goes to and fro on the spot.
+            # LAMMPS stops early, or oscillates.
             is_idle = session.step - begin < _ITERATIONS or descent.evaluation.energy >= before
             idle = idle + 1 if is_idle else 0
             if idle == _IDLE:

@@ -12,12 +12,13 @@ from jamshape.arrays import FloatArray
 from jamshape.contacts import CrossingError
 from jamshape.minima.descent import Descent, Outcome
 
-# A stall after so many evaluations without a gain; what it needs to unjam a packing grows with it.
+# Evaluations without gain that count as a stall; the number needed to unjam a packing grows with it.
 _PATIENCE = 1000
 _PATIENCE_PER_PARTICLE = 4
 
-# It begins anew when it gives up; not more often than this within so few evaluations.
-_STUCK, _SOON = 3, 30
+# SciPy is restarted when it gives up, unless this number of restarts in a row needed few evaluations.
+_STUCK = 3
+_SOON = 30  # evaluations that count as few
 
 
 class _LeaveError(Exception):
@@ -25,10 +26,10 @@ class _LeaveError(Exception):
 
 
 def lbfgs(descent: Descent, below: float = 0.0) -> Outcome:
-    """SciPy's L-BFGS, in doubles, on displacements from the present state."""
+    """Run SciPy's L-BFGS, in doubles, on displacements from the present state."""
     particles = descent.landscape.particles
     descent.be_patient(max(_PATIENCE, _PATIENCE_PER_PARTICLE * particles.n))
-    # Its first step is of unit length in its own coordinates.
+    # Its first step has unit length in its own coordinates.
     unit = 0.01 * float(descent.landscape.inner_radius.min()) * math.sqrt(particles.n)
     stuck = 0
     while not (outcome := descent.outcome()) and descent.residual > below and stuck < _STUCK:
@@ -41,14 +42,14 @@ def lbfgs(descent: Descent, below: float = 0.0) -> Outcome:
                 method="L-BFGS-B",
                 options={"maxiter": 10**8, "maxfun": 10**8, "maxcor": 20, "ftol": 0.0, "gtol": 0.0},
             )
-        # It gives up where its line search does, at kinks or in rounding: begin again from there.
+        # It gives up when its line search does, at kinks or in rounding: restart from there.
         stuck = stuck + 1 if descent.evaluations - evaluations < _SOON else 0
         unit *= 0.1 if stuck else 1.0
     return outcome or Outcome.STALLED
 
 
 class _Objective:
-    """The energy as SciPy sees it: of displacements in units, over the energy at the start."""
+    """The energy for SciPy: of displacements in units, relative to the energy at the start."""
 
     def __init__(self, descent: Descent, unit: float, below: float) -> None:
         self.descent, self.unit, self.below = descent, unit, below

@@ -1,7 +1,7 @@
 """Minimisers of the energy of a packing: one interface, four methods and an automatic one.
 
-All work on the coordinates of a `Landscape` (positions and, as lengths, rotations), start from a `State`
-and return a `Minimum` that says how it ended and how the residual fell with run time.
+All work on the coordinates of a `Landscape` (positions and, scaled to lengths, rotations), start from a `State`
+and return a `Minimum` with the outcome and the history of the residual.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ def minimise(
         One of `METHODS`: ``auto``, ``near``, ``newton``, ``lbfgs``, ``paper``, ``lammps``.
     stop : Stop, optional
     history : History, optional
-        One to append to.
+        History to append to.
 
     Returns
     -------
     Minimum
-        Look at its outcome. There is no warning: many who call this want no more than a few evaluations.
+        Check its outcome; there is no warning, since many callers want no more than a few evaluations.
 
     Raises
     ------
     ValueError
-        If there is no such method.
+        If the method is unknown.
     CrossingError
         If spines cross at the start.
     """

@@ -1,4 +1,4 @@
-"""Discs and spheres that are given spines."""
+"""Discs and spheres turned into rods."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from jamshape.packing.packing import Packing
 
 
 def with_spines(discs: Packing, alpha: float, seed: int) -> Packing:
-    """Give each disc a spine of random direction, and open the box as far as keeps phi.
+    """Give each disc a spine of random direction, and expand the box so that phi is kept.
 
     Parameters
     ----------
@@ -19,12 +19,12 @@ def with_spines(discs: Packing, alpha: float, seed: int) -> Packing:
     alpha : float
         A / R of all rods; R stays.
     seed : int
-        Of the directions.
+        Random seed of the directions.
 
     Raises
     ------
     ValueError
-        If one has a spine already.
+        If a particle has a spine already.
     """
     if discs.half_length.any():
         msg = f"half lengths up to {discs.half_length.max():g}, expected discs"

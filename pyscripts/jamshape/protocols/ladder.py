@@ -1,7 +1,7 @@
-"""One packing at several energies: led from rung to rung, up and down from the one it is known at.
+"""One packing at several energies, relaxed from one to the next, up and down from its own.
 
-Steps in sqrt(u) are small enough for the particles to follow (`target.direct`); where they rearrange
-all the same, the rung says how many of the contacts are still those of the packing it began with.
+Steps in sqrt(u) are small enough for the particles to follow (`target.direct`); if they rearrange
+nevertheless, each rung reports the fraction of the original contacts.
 """
 
 from __future__ import annotations
@@ -26,17 +26,16 @@ from jamshape.protocols.make import is_done
 from jamshape.protocols.retry import retried
 from jamshape.shapes.shape import in_name
 
-# What must agree in the packing and in a rung that is there already.
+# Attributes that the packing and existing rungs must share.
 _IDENTITY = (
     *("alpha", "exponent", "w1", "w2", "kinds", "n", "seed", "size_ratio", "protocol", "n_sweeps"),
 )
 
-# What a packing's file says of how its own minimum was found, which is not that of a rung.
+# Attributes that describe the search for the packing itself, not for a rung.
 _OF_SOURCE = ("strict", "retry_", "n_negative", "n_kinked", "lowest_eigenvalue")
 
-# A box that was opened has been opened too far below this fraction of u0; how long to look.
-_FALLEN = 1e-2
-_EVALUATIONS = 2000
+_FALLEN = 1e-2  # fraction of u0 below which the box was opened too far
+_EVALUATIONS = 2000  # limit of a minimisation after opening
 
 
 class Rung(NamedTuple):
@@ -45,15 +44,15 @@ class Rung(NamedTuple):
     path: Path
     u0: float
     made: bool
-    """Whether it was made now, and not there before."""
+    """Whether it was made by this call."""
     failure: str
-    """Why it is not there; empty if it is."""
+    """Reason why it is missing; empty if it exists."""
 
 
 def climb(
     source: Path, energies: Iterable[float], folder: Path, target: Target | None = None
 ) -> Iterator[Rung]:
-    """Lead a packing to other energies, going on with what an earlier call has left.
+    """Relax a packing at other energies, resuming an earlier call.
 
     Parameters
     ----------
@@ -62,21 +61,21 @@ def climb(
     energies : iterable of float
         Energy densities u0, in any order, [energy / length^D].
     folder : Path
-        Where rungs are written, named after the source and u0.
+        Folder for the rungs, named after the source and u0.
     target : Target, optional
-        How accurately; its u0 does not matter.
+        Accuracy; its u0 is ignored.
 
     Yields
     ------
     Rung
         Those above the energy of the source in ascending order, then those below in descending
-        order, each led there from the one before. After one that fails, the next is led from the
-        last that did not.
+        order, each relaxed from the one before. After a failure, the next starts from the
+        last success.
 
     Raises
     ------
     ValueError
-        If the source is no finished packing, an energy is not positive, or a rung that is there
+        If the source is not a finished packing, an energy is not positive, or an existing rung
         belongs to another packing.
     """
     if not is_done(source):
@@ -96,12 +95,12 @@ def climb(
 
 
 def rung_path(source: Path, u0: float, folder: Path) -> Path:
-    """Name the file of one rung."""
+    """Return the path of one rung."""
     return folder / f"{source.stem}_u{in_name(u0)}.h5"
 
 
 def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: Target) -> Rung:
-    """Make one rung from the one before, unless it is there."""
+    """Make one rung from the one before, unless it exists."""
     out = rung_path(source, goal.u0, folder)
     if is_done(out):
         identity = {name: stored[name] for name in _IDENTITY if name in stored}
@@ -132,9 +131,9 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
 
 
 def _opened(landscape: Landscape, state: State, goal: Target) -> State:
-    """Open the box until u is about u0, which rods that slide would make slow in small steps.
+    """Open the box until u is about u0; sliding rods would make small steps slow.
 
-    By the law of `measures.minimum.energy_onset`: sqrt(u) is linear in phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
+    Uses `measures.minimum.energy_onset`: sqrt(u) is linear in phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
     """
     evaluation, volume, D = landscape.evaluate(state), state.volume, state.dimension
     u, p = evaluation.energy / volume, -evaluation.strain_gradient / (D * volume)
@@ -147,7 +146,7 @@ def _opened(landscape: Landscape, state: State, goal: Target) -> State:
 
 
 def _shared(first: Packing, other: Packing) -> float:
-    """Fraction of the contacts of one packing, those with rattlers left out, that another one has."""
+    """Fraction of the contacts of one packing, without those of rattlers, that another one has."""
     network = find_contacts(first, sides=2)
     rattlers = find_rattlers(first, network)
     held = network.pairs[~rattlers[network.pairs].any(axis=1)]

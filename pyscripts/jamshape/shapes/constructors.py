@@ -1,4 +1,4 @@
-"""Functions that make particles of a shape, from what its class says of itself: ``Spherocylinders(alpha=4)``."""
+"""Constructors of particles, made from the parameters of a shape: ``Spherocylinders(alpha=4)``."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Parameters
 ----------
 {parameters}
 size_ratio : float, optional
-    Big over small of particles that are mixed 1:1, all of the same parameters; {size_ratio:g} when left out, 1 for
+    Size ratio of big and small particles, mixed 1:1, with the same parameters; {size_ratio:g} by default, 1 for
     equal particles.
 **kinds : float or (k,) array
-    ``size`` of each kind over the unit of length, which is {unit} (1); ``share`` of the number of particles, over the
-    sum of all shares (1); ``spread``, the standard deviation of the logarithm of the size (0). With any of these there
-    is no size ratio. Arrays make a mixture of k kinds.
+    ``size`` over the unit of length, {unit} (1); ``share``, number fraction of the kind up to normalisation (1);
+    ``spread``, standard deviation of the logarithm of the size (0). These exclude `size_ratio`. Arrays make a
+    mixture of k kinds.
 
 Returns
 -------
@@ -73,7 +73,7 @@ def constructor(shape: Shape) -> Callable[..., Particles]:
 
 
 def signature_of(shape: Shape) -> Signature:
-    """Give the arguments of a shape's constructor, their types as text."""
+    """Signature of the constructor of a shape, with types as text."""
     either = inspect.Parameter.POSITIONAL_OR_KEYWORD
     arguments = [
         inspect.Parameter(p.option, either, default=p.default, annotation="ArrayLike")
@@ -86,7 +86,7 @@ def signature_of(shape: Shape) -> Signature:
 
 def _text_of(shape: Shape) -> str:
     parameters = "\n".join(
-        f"{p.option} : float or (k,) array\n    {p.meaning}; {p.default:g} when left out."
+        f"{p.option} : float or (k,) array\n    {p.meaning}; {p.default:g} by default."
         for p in shape.parameters
     )
     first = dict(shape.examples[0])
@@ -107,17 +107,17 @@ def _particles(
     size_ratio: float | None,
     kinds: Mapping[str, ArrayLike],
 ) -> Particles:
-    """Make particles of numbers, or kinds of arrays."""
+    """Make particles from numbers, or kinds from arrays."""
     for name in kinds:
         if name not in _OF_KINDS:
             expected = ", ".join((*parameters, "size_ratio", *_OF_KINDS))
-            msg = f"{name} is no number of {shape.name}s, expected {expected}"
+            msg = f"{name} is unknown for {shape.name}s, expected {expected}"
             raise ValueError(msg)
     values: dict[str, Any] = {k: real_numbers(k, v) for k, v in {**parameters, **kinds}.items()}
     if not kinds and all(np.ndim(value) == 0 for value in values.values()):
         return Particles.of(shape, size_ratio, **{k: float(v) for k, v in values.items()})
     if size_ratio is not None:
-        msg = "size_ratio and kinds were given, expected the size of each kind in size alone"
+        msg = "size_ratio does not work with kinds, expected the size of each kind in size alone"
         raise ValueError(msg)
     try:
         columns = np.broadcast_arrays(
@@ -125,7 +125,7 @@ def _particles(
         )
     except ValueError:
         lengths = {name: np.size(value) for name, value in values.items()}
-        msg = f"arrays of kinds have lengths {lengths}, expected one entry for each kind"
+        msg = f"arrays have lengths {lengths}, expected one entry for each kind"
         raise ValueError(msg) from None
     rows = [dict(zip(values, row, strict=True)) for row in np.column_stack(columns).tolist()]
     own = [{name: row.pop(name) for name in kinds} for row in rows]

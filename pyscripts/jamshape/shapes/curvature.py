@@ -5,9 +5,9 @@ With u, v, w = :math:`|x/a|^{2p}, |y/b|^{2p}, |z/c|^{2p}` at a point of the surf
 .. math:: K_G (abc)^{2/3} = \frac{(2p - 1)^2 (u v w)^{1 - 1/p}}
     {(abc)^{4/3} (u^m / a^2 + v^m / b^2 + w^m / c^2)^2}, \quad m = 2 - 1/p.
 
-It is 1 on a sphere. Where one of u, v, w is 0, at the three planes of symmetry that are square to the
+It is 1 on a sphere. Where one of u, v, w is 0, at the three symmetry planes normal to the
 axes, it is 0 for p > 1 (flat in one direction, at the six points on the axes in both) and infinite for
-p < 1 (an edge, at the axes a tip). Shapes are those of `jamshape.shapes.roundness`.
+p < 1 (an edge, at the axes a tip). Shapes are given as in `jamshape.shapes.roundness`.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from jamshape.shapes.roundness import OCTAHEDRON, checked
 
 
 def curvature_at_normals(semi_axes: ArrayLike, p: ArrayLike, normals: ArrayLike) -> FloatArray:
-    """K_G (abc)^(2/3) where the outward normal is a given one.
+    """K_G (abc)^(2/3) at given outward normals.
 
-    There u is proportional to |a n_x|^(2p/(2p-1)), and so on.
+    There u is proportional to |a n_x|^(2p/(2p-1)), and likewise v and w.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def curvature_at_normals(semi_axes: ArrayLike, p: ArrayLike, normals: ArrayLike)
     p : (...) array_like
         Above 1/2.
     normals : (..., 3) array_like
-        In body coordinates; neither their lengths nor the signs of their components matter.
+        In body coordinates; of any length, signs of components do not matter.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def curvature_at_normals(semi_axes: ArrayLike, p: ArrayLike, normals: ArrayLike)
     ------
     ValueError
         If a normal is zero or not finite, p is 1/2 (an octahedron: flat faces, and edges that have no
-        curvature), or the shape is none (`checked`).
+        curvature), or the shape is invalid (`checked`).
     """
     axes, exponent = _curved(semi_axes, p)
     log_n = _log_of_direction("normals", normals) + np.log(axes)
@@ -57,8 +57,8 @@ def curvature_at_points(semi_axes: ArrayLike, p: ArrayLike, points: ArrayLike) -
     p : (...) array_like
         Above 1/2.
     points : (..., 3) array_like, [length]
-        In body coordinates. One off the surface, such as the point where two scaled bodies touch,
-        stands for that on the same ray from the centre.
+        In body coordinates. A point off the surface, such as the point where two scaled bodies touch,
+        is projected along its ray from the centre.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def curvature_at_points(semi_axes: ArrayLike, p: ArrayLike, points: ArrayLike) -
     Raises
     ------
     ValueError
-        If a point is the centre or not finite, p is 1/2, or the shape is none (`checked`).
+        If a point is the centre or not finite, p is 1/2, or the shape is invalid (`checked`).
     """
     axes, exponent = _curved(semi_axes, p)
     log_x = _log_of_direction("points", points) - np.log(axes)
@@ -88,7 +88,7 @@ def contact_curvatures(
         Unit vectors along the body's axes, from `jamshape.packing.body_axes`.
     pairs : (M, 2) array of int64
     normals : (M, 3) array of float64
-        Of the plane between the two particles, pointing into either.
+        Normals of the plane between the two particles, of either sign.
 
     Returns
     -------
@@ -111,13 +111,13 @@ def contact_curvatures(
 def _curved(semi_axes: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
     axes, exponent = checked(semi_axes, p)
     if (exponent == OCTAHEDRON).any():
-        msg = "exponent p is 1/2, expected more: an octahedron has no curvature at its edges"
+        msg = "exponent p is 1/2, expected more: the curvature of an octahedron is undefined at its edges"
         raise ValueError(msg)
     return axes, exponent
 
 
 def _log_of_direction(name: str, vectors: ArrayLike) -> FloatArray:
-    """Logarithms of the absolute components over the largest, -inf for 0."""
+    """Logarithms of absolute components relative to the largest, -inf for 0."""
     v = np.abs(np.asarray(vectors, np.float64))
     if v.ndim < 1 or v.shape[-1] != 3:
         msg = f"{name} have shape {v.shape}, expected (..., 3)"
@@ -138,7 +138,7 @@ def _scaled_curvature(axes: FloatArray, p: FloatArray, log_u: FloatArray) -> Flo
     log_u = log_u - _log_sum(log_u)[..., None]
     log_volume = np.log(axes).sum(axis=-1)
     slope = _log_sum((2 - 1 / p)[..., None] * log_u - 2 * np.log(axes))
-    # 0 times -inf: for an ellipsoid u v w is of no account.
+    # 0 times -inf: for an ellipsoid u v w does not matter.
     off_planes = np.where((p == 1)[..., None], 0.0, log_u).sum(axis=-1)
     log_k = 2 * np.log(2 * p - 1) + (1 - 1 / p) * off_planes - 4 / 3 * log_volume - 2 * slope
     with np.errstate(over="ignore", under="ignore"):

@@ -1,4 +1,4 @@
-"""Particles by the names of their shapes: a function for each shape of the table, such as `Spherocylinders`.
+"""Constructors of particles by shape: a function for each shape of the table, such as `Spherocylinders`.
 
 >>> Spherocylinders(alpha=4)
 Particles('spherocylinder', alpha=4, size_ratio=1.4)

@@ -1,10 +1,10 @@
 """Energy of a packing along one of its modes: Marschall & Teitel 2018, Figs. 13 and 17.
 
-Also of superellipsoids: Yuan et al. 2019, Fig. 10.
+Also for superellipsoids: Yuan et al. 2019, Fig. 10.
 
-What a soft mode costs at small amplitudes is far below the rounding of the energy. Here it is the integral of
-the force along the mode, in which the rounding of bonds cancels as far as the mode leaves their lengths as
-they are: it resolves eigenvalues of 1e-16 at amplitudes of 1e-11.
+The energy of a soft mode at small amplitudes is far below the rounding of the total energy. Here it is the integral
+of the force along the mode, in which the rounding of bonds cancels as far as the mode keeps their lengths: it
+resolves eigenvalues of 1e-16 at amplitudes of 1e-11.
 """
 
 from __future__ import annotations
@@ -20,45 +20,41 @@ from jamshape.landscape import CrossingError, Landscape, State
 from jamshape.packing import Packing
 from jamshape.vibration.hessian import Coordinates
 
-# A fit of the crossover is the longest that leaves no more than this, relative, of the force; it has at
-# least so many amplitudes, and the quartic force exceeds the other one by this factor at its end.
+# A crossover fit is the longest with a smaller relative deviation of the force.
 _DEVIATION = 0.03
-_FEWEST = 6
-_BEYOND = 10.0
+_FEWEST = 6  # amplitudes
+_BEYOND = 10.0  # quartic force over the quadratic one at its end
 
-# Where the energy is a crossover's factor above its quadratic start, a quartic term is as large as that; bonds that
-# open have taken it below the start when so little of it is left.
-_TWICE = 2.0
-_BELOW = 0.99
+_TWICE = 2.0  # energy over its quadratic start where the quartic term equals it
+_BELOW = 0.99  # fraction of the quadratic start below which bonds have opened
 
-# Differences of energies are taken where they exceed the rounding of the energy by this factor, and
-# called right where so many in a row agree with the integral of the force to this fraction.
+# Energy differences are used where they exceed the rounding of the energy by this factor.
 _CLEAR = 1e6
-_IN_A_ROW = 3
-_AGREE = 0.1
+_IN_A_ROW = 3  # differences that must agree with the integral of the force
+_AGREE = 0.1  # relative deviation that counts as agreement
 
 
 @dataclass(frozen=True, eq=False)
 class EnergyAlong:
-    """Energy along a mode and against it: rows 0 and 1 of all that follows.
+    """Energy along a mode and against it: rows 0 and 1 of all fields.
 
     Parameters
     ----------
     delta : (K,) array of float64, [length]
         Amplitudes, ascending.
     slope : (2, K) array of float64, [energy / length]
-        dU/d(delta), without what it is at 0. NaN here and below from where spines would cross.
+        dU/d(delta), minus its value at 0. NaN, here and below, beyond the amplitude at which spines would cross.
     energy : (2, K) array of float64, [energy]
-        Its integral: Delta U, with the force that was left at 0 balanced. Where differences of
-        energies have more than enough digits, these are taken, which leaves no error at corners.
+        Its integral: Delta U, with the residual force at 0 balanced. Where energy differences have more than
+        enough digits, these are used, which leaves no error at kinks.
     difference : (2, K) array of float64, [energy]
-        The same as a difference of energies, which drowns in rounding at small delta.
+        The same as an energy difference, which drowns in rounding at small delta.
     broken, formed : (2, K) array of float64
-        Number of bonds of the packing that are open, and of those that it did not have.
+        Number of bonds of the packing that have opened, and of new bonds.
     slope_at_0 : float, [energy / length]
-        dU/d(delta) of the packing: the force that its minimiser has left along the mode.
+        dU/d(delta) of the packing: the residual force of the minimiser along the mode.
     n_bonds : int
-        Of the packing.
+        Number of bonds of the packing.
     """
 
     delta: FloatArray
@@ -88,7 +84,7 @@ class EnergyAlong:
 
     @property
     def differences_from(self) -> float:
-        """Smallest delta from which on differences of energies are right to ten percent; NaN if none."""
+        """Smallest delta above which energy differences are accurate to ten percent; NaN if none."""
         off = np.abs(self.difference - self.energy).max(axis=0)
         right = off < _AGREE * np.abs(self.energy).min(axis=0)
         in_a_row = np.convolve(right, np.ones(_IN_A_ROW), "valid") == _IN_A_ROW
@@ -99,10 +95,10 @@ class Crossover(NamedTuple):
     """Delta U = stiffness delta^2 / 2 + quartic delta^4."""
 
     delta: float
-    """[length] where both terms are equal."""
+    """[length] amplitude where both terms are equal."""
     delta_error: float
     stiffness: float
-    """[energy / length^2] omega^2, unless a bond that hardly touched has closed or opened before."""
+    """[energy / length^2] omega^2, unless a bond that barely touched has closed or opened before."""
     quartic: float
     """[energy / length^4]"""
     begin: float
@@ -110,15 +106,15 @@ class Crossover(NamedTuple):
     end: float
     """[length] largest delta of the fit."""
     deviation: float
-    """Root mean square of what the fit leaves of the force, relative."""
+    """Root mean square relative deviation of the force from the fit."""
 
 
 def fit_crossover(along: EnergyAlong) -> Crossover | None:
     """Fit the sum of a quadratic and a quartic energy to the force along a mode.
 
-    To the mean of both directions, in relative deviations, over the longest range of amplitudes where
-    that sum holds and in which the quartic term comes to outweigh the other one. Beyond the range,
-    bonds that the mode only grazed are open, and others that it formed push back: the energy is
+    The fit is to the mean of both directions, in relative deviations, over the longest range of amplitudes in which
+    that sum holds and the quartic term comes to dominate. Beyond it, bonds that grazed have opened and
+    new ones push back: the energy is
     quadratic again, and steeper.
 
     Returns
@@ -149,17 +145,17 @@ def fit_crossover(along: EnergyAlong) -> Crossover | None:
 
 
 def quartic_crossover(along: EnergyAlong) -> float:
-    """Find delta* from which on a mode is quartic (Yuan et al. 2019, Sec. 3.2), whatever follows there.
+    """Find delta* above which a mode is quartic (Yuan et al. 2019, Sec. 3.2), whatever follows there.
 
-    The smallest amplitude where the energy is twice what it would be with the stiffness of the start; of an
-    unstable mode, where it is what it was at 0. Superellipsoids press harder on some neighbours and lose others
-    as they turn, at about delta*, so that `fit_crossover` finds few ranges with one quartic term. Along what
-    bonds constrain to first order some of these open, and the energy falls below its start before it rises.
+    The smallest amplitude at which the energy is twice that of the initial stiffness; for an
+    unstable mode, at which it returns to its value at 0. Superellipsoids press harder on some neighbours and lose
+    others as they rotate, at about delta*, so that `fit_crossover` finds few ranges with one quartic term. Along modes
+    that bonds constrain to first order some of these open, and the energy falls below its start before it rises.
 
     Returns
     -------
     float, [length]
-        NaN if the energy falls below its quadratic start by a percent first, or is never twice as large.
+        NaN if the energy first falls a percent below its quadratic start, or never is twice as large.
     """
     start = along.mean_slope[0] / along.delta[0]
     ratio = along.mean_energy / (0.5 * start * along.delta**2)
@@ -177,14 +173,14 @@ def quartic_crossover(along: EnergyAlong) -> float:
 
 
 class _Fit(NamedTuple):
-    """Least squares of y = a + b u, relative to y, to some points in a row."""
+    """Least squares of y = a + b u, relative to y, over consecutive points."""
 
     a: float
     b: float
     deviation: float
     first: int
     n_points: int
-    """0 if no fit is good."""
+    """0 if there is no good fit."""
     span: float
     """Ratio of the last u to the first."""
 
@@ -199,7 +195,7 @@ def _longest(u: FloatArray, y: FloatArray, first: int) -> _Fit:
     columns = np.column_stack([np.ones_like(y), u, u**2, y, u * y]) / (y**2)[:, None]
     s, su, suu, sy, suy = np.cumsum(columns, axis=0).T
     count = np.arange(1, len(u) + 1)
-    with np.errstate(all="ignore"):  # where there are too few points, or all y are alike
+    with np.errstate(all="ignore"):  # too few points, or equal y
         determinant = s * suu - su**2
         a = (suu * sy - su * suy) / determinant
         b = (s * suy - su * sy) / determinant
@@ -222,18 +218,18 @@ def _relative_error(u: FloatArray, y: FloatArray, fit: _Fit) -> float:
 
 
 class AlongModes:
-    """Moves the particles of a packing that are no rattlers along its modes.
+    """Moves the particles of a packing, without rattlers, along its modes.
 
-    Rattlers are taken out, as in the paper, so that no mode runs into them.
+    Rattlers are removed, as in the paper, so that no mode runs into them.
 
     Parameters
     ----------
     packing : Packing
-        At a minimum.
+        Packing at a minimum.
     coordinates : Coordinates
-        Those of the modes.
+        Coordinates of the modes.
     k_e : float, [energy], optional
-        That of the packing's law when left out.
+        By default that of the packing's law.
     """
 
     def __init__(
@@ -255,16 +251,16 @@ class AlongModes:
         vector : (n,) array of float64
             Unit vector in the coordinates.
         delta : (K,) array_like, [length]
-            Amplitudes, positive and ascending; a dozen a decade or more.
+            Amplitudes, positive and ascending; a dozen per decade or more.
 
         Raises
         ------
         ValueError
-            If amplitudes are not so.
+            If amplitudes are not positive and ascending.
         """
         amplitudes = np.asarray(delta, np.float64)
         if amplitudes.ndim != 1 or not (np.diff(amplitudes, prepend=0.0) > 0).all():
-            msg = "amplitudes are not positive and ascending, expected so"
+            msg = "amplitudes are not positive and ascending, expected sorted positive ones"
             raise ValueError(msg)
         shift, turn = (part[self.coordinates.backbone] for part in self.coordinates.motion(vector))
         walks = [
@@ -286,7 +282,7 @@ class AlongModes:
 
 
 class _At(NamedTuple):
-    """What is evaluated at one amplitude."""
+    """Evaluation at one amplitude."""
 
     slope: float
     energy: float
@@ -302,7 +298,7 @@ class _Walk:
         self._landscape, self._state, self._shift, self._turn = landscape, state, shift, turn
         self.start = self._at(0.0)
         self._bonds = self._network(0.0)
-        # Of the coordinates, in all bonds, each times its force.
+        # Change of the coordinates, in all bonds, each times its force.
         eps = float(np.finfo(np.longdouble).eps) * float(state.edges.max())
         self._rounding = eps * landscape.evaluate(state).bond_force * np.sqrt(self.start.n_bonds)
 
@@ -321,7 +317,7 @@ class _Walk:
             if abs(gain) < _CLEAR * self._rounding:
                 gain = (here - last) / 6 * (before.slope + 4 * middle.slope + at.slope)
             energy += gain
-            # Bonds seldom break and form in one step before their number has ever changed.
+            # Bonds seldom break and form in one step before their number first changes.
             changed = changed or at.n_bonds != self.start.n_bonds
             if changed:
                 changes = self._changes(here)
@@ -329,7 +325,7 @@ class _Walk:
             last, before = here, at
 
     def _forces(self, delta: float) -> _At:
-        """Evaluate without the force and the energy at 0."""
+        """Evaluate relative to the force and the energy at 0."""
         at, start = self._at(delta), self.start
         return _At(
             at.slope - start.slope, at.energy - start.energy - start.slope * delta, at.n_bonds
@@ -347,13 +343,13 @@ class _Walk:
         return _At(float(slope), found.energy, found.n_bonds)
 
     def _network(self, delta: float) -> dict[tuple[int, ...], int]:
-        """Count the bonds of every contact, known by its particles and periodic image."""
+        """Count the bonds of every contact, keyed by its particles and periodic image."""
         found = self._landscape.derivatives(self._displaced(delta), extended=True)
         contacts = np.column_stack([found["particles"], found["shift"]]).tolist()
         return dict(zip(map(tuple, contacts), found["n_bonds"].tolist(), strict=True))
 
     def _changes(self, delta: float) -> tuple[int, int]:
-        """Count bonds that are broken, and bonds that are new."""
+        """Count broken bonds and new ones."""
         now = self._network(delta)
         gains = [now.get(key, 0) - self._bonds.get(key, 0) for key in now.keys() | self._bonds]
         return sum(max(-gain, 0) for gain in gains), sum(max(gain, 0) for gain in gains)

@@ -1,4 +1,4 @@
-"""Quartic modes of packings at first contact (Yuan et al., Soft Matter (2019), Sec. 3.2), spectra kept in files."""
+"""Quartic modes of packings at first contact (Yuan et al., Soft Matter (2019), Sec. 3.2), with cached spectra."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jamshape.vibration.table import ModeTable, read_modes, write_modes
 
 KEPT = "folder to keep spectra in (beside the packings)"
 
-# What tells a packing from others.
+# Attributes that identify a packing.
 _IDENTITY = ("phi", "u", "seed")
 
 AMPLITUDES: FloatArray = np.geomspace(1e-5, 0.3, 37)  # in the unit of length
@@ -29,16 +29,16 @@ class QuarticCount(NamedTuple):
     n_contacts: int
     """N_c, without those of rattlers."""
     n_coordinates: int
-    """d_f (N - N_r), without spins that no contact can drive."""
+    """d_f (N - N_r), without free spins."""
     n_quartic: int
-    """N_q: modes below the gap of the spectrum, translations left out; by rank where there is no gap."""
+    """N_q: modes below the gap of the spectrum, without translations; from the rank if there is no gap."""
     n_quartic_by_rank: int
     """The same from the rank of H: modes that contacts leave free to first order."""
     gap: float
-    """Ratio of the eigenvalues on its two sides; 0 if there is no quartic mode."""
+    """Ratio of the eigenvalues on its two sides; 0 without quartic modes."""
     n_negative: int
     n_translations: int
-    """D: modes that move everything."""
+    """D: rigid translations."""
 
     @property
     def expected(self) -> int:
@@ -47,12 +47,12 @@ class QuarticCount(NamedTuple):
 
     @property
     def missing(self) -> int:
-        """How far N_c is from the unit line; positive for too many contacts."""
+        """Deviation of N_c from the unit line; positive for too many contacts."""
         return self.n_contacts - self.expected
 
 
 def kept_modes(file: PackingFile, folder: Path | None) -> ModeTable:
-    """Read the modes of a packing, or find them and keep them for the next time, without vectors."""
+    """Read the cached modes of a packing, or compute and cache them, without vectors."""
     path = (folder or file.path.parent) / f"{file.path.stem}.modes.h5"
     with contextlib.suppress(FileFormatError, FileNotFoundError):
         table = read_modes(path)
@@ -71,7 +71,7 @@ def found_modes(file: PackingFile) -> ModeTable:
     Raises
     ------
     ValueError
-        If it is at no minimum, or has no modes; the sentence names the file.
+        If it is not at a minimum, or has no modes; the message names the file.
     """
     try:
         return modes_of(file.packing())
@@ -81,7 +81,7 @@ def found_modes(file: PackingFile) -> ModeTable:
 
 
 def by_size(table: ModeTable) -> IntArray:
-    """Modes but translations, by ascending size of their eigenvalues."""
+    """Modes without translations, by ascending magnitude of their eigenvalues."""
     rows = np.flatnonzero(~table["is_translation"])
     return np.asarray(rows[np.argsort(np.abs(table["eigenvalues"][rows]), kind="stable")])
 
@@ -115,7 +115,7 @@ def followed(file: PackingFile, each_side: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        Numbers of modes followed below and above, and of those that are quartic.
+        Numbers of modes followed below and above, and of quartic ones among them.
     """
     table = found_modes(file)
     n = quartic_count(table).n_quartic

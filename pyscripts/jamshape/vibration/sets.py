@@ -1,4 +1,4 @@
-"""Sets of modes: tables of files of analysis/modes.py by system and u0, modes picked from a table."""
+"""Ensembles of modes: tables of files of analysis/modes.py by system and u0, and selection of modes."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.table import ModeTable, read_modes, tabulate
 
-# All packings of a figure agree in these.
+# Common to all packings of a figure.
 ENSEMBLE = ("n", "size_ratio")
 
 TOLD = ("low", "middle", "high")  # bands
 
-_PREFIX = "packing_"  # of what the packing's file said
+_PREFIX = "packing_"  # of attributes copied from the packing's file
 
 
 class Key(NamedTuple):
-    """What the packings of one curve have in common."""
+    """Common attributes of the packings of one curve."""
 
     system: System
     u0: float
@@ -40,7 +40,7 @@ class Key(NamedTuple):
         return self.u0 if name == "u0" else self.system.number(name)
 
     def report(self) -> dict[str, Any]:
-        """Name it in JSON."""
+        """Return a description for JSON."""
         return self.system.report() | {"u0": self.u0}
 
 
@@ -53,14 +53,14 @@ def read_tables(paths: Iterable[Path]) -> Tables:
     Parameters
     ----------
     paths
-        Folders, of which other files are left out, and files, which must be of modes.py.
+        Folders, in which other files are skipped, and files, which must be of modes.py.
 
     Raises
     ------
     ValueError
-        If there is none, a file is none, or they are of several ensembles.
+        If there are none, a file holds no modes, or they belong to several ensembles.
     OSError
-        If one cannot be read.
+        If a file cannot be read.
     """
     paths = list(paths)
     tables = [table for path in paths for table in _tables(path)]
@@ -75,7 +75,7 @@ def read_tables(paths: Iterable[Path]) -> Tables:
 
 
 def _tables(path: Path) -> list[ModeTable]:
-    """Read one file, or those of a folder that are of modes."""
+    """Read one file, or all files of modes in a folder."""
     if not path.is_dir():
         return [read_modes(path)]
     found = []
@@ -83,25 +83,25 @@ def _tables(path: Path) -> list[ModeTable]:
         try:
             found.append(read_modes(file))
         except (FileFormatError, OSError):
-            continue  # packings, and files that are still written
+            continue  # packings, and files still being written
     return found
 
 
 def of_packing(table: ModeTable) -> dict[str, Any]:
-    """Return what the packing's file said."""
+    """Return the attributes of the packing's file."""
     known = table.attributes.items()
     own = {name.removeprefix(_PREFIX): v for name, v in known if name.startswith(_PREFIX)}
     return renamed(own)
 
 
 def to_store(attributes: Mapping[str, Any], packing: Packing) -> dict[str, Any]:
-    """Return what a file of modes keeps of its packing: what that file said, the shape and the law."""
+    """Return the attributes that a file of modes copies from its packing: those of its file, shape and law."""
     known = dict(attributes) | {"shape": packing.shape_style, **packing.law._asdict()}
     return {f"{_PREFIX}{name}": value for name, value in known.items()}
 
 
 def key_of(table: ModeTable) -> Key:
-    """Tell system and u0 of a packing; 0 of the first jammed one, which was led to no energy."""
+    """Return system and u0 of a packing; 0 for a first jammed packing without a target energy."""
     known = of_packing(table)
     shape = known.get("shape") or _shape_with(known)
     u0 = float(known.get("u0", 0.0))
@@ -115,21 +115,21 @@ def seed_of(table: ModeTable) -> int:
 
 
 def _shape_with(known: Mapping[str, Any]) -> str:
-    """Name the first shape of which all parameters are told, as files of old do not name theirs."""
+    """Name the first shape whose parameters are all present, for older files without a shape name."""
     for name, shape in SHAPES.items():
         if all(parameter.name in known for parameter in shape.parameters):
             return name
-    msg = "modes do not tell the shape of their packing, expected modes of a packing of make_packing.py"
+    msg = "modes do not state the shape of their packing, expected modes of a packing of make_packing.py"
     raise ValueError(msg)
 
 
 def selected(tables: Tables, name: str, asked: Sequence[float]) -> Tables:
-    """Select curves by u0 or a parameter of the shape; all where none is asked for.
+    """Select curves by u0 or a parameter of the shape; all if no values are given.
 
     Raises
     ------
     ValueError
-        If one that is asked for is not there.
+        If a value does not occur.
     """
     if not asked:
         return tables
@@ -153,22 +153,22 @@ def every(tables: Tables) -> list[ModeTable]:
 
 
 def stable(table: ModeTable) -> BoolArray:
-    """Select modes of positive eigenvalue, beyond doubt."""
+    """Select modes of definitely positive eigenvalue."""
     return np.asarray(~table["is_translation"] & (table["sign"] > 0))
 
 
 def unstable(table: ModeTable) -> BoolArray:
-    """Select modes of negative eigenvalue, beyond doubt."""
+    """Select modes of definitely negative eigenvalue."""
     return np.asarray(~table["is_translation"] & (table["sign"] < 0))
 
 
 def fraction_of(table: ModeTable, name: str) -> float:
-    """Fraction of all modes but translations that is in a band; NaN where bands are not apart."""
+    """Fraction of all modes but translations in a band; NaN where bands do not separate."""
     return len(table.in_band(name)) / table.n_vibrational if table.has_band(name) else math.nan
 
 
 def count_of(table: ModeTable, name: str) -> int | None:
-    """Count the modes of a band; None where bands are not apart."""
+    """Count the modes of a band; None where bands do not separate."""
     return len(table.in_band(name)) if table.has_band(name) else None
 
 
@@ -182,7 +182,7 @@ def pooled(
     values: Callable[[ModeTable], FloatArray],
     chosen: Callable[[ModeTable], BoolArray],
 ) -> FloatArray:
-    """Values of the chosen modes of all tables, one after the other."""
+    """Values of the chosen modes of all tables, concatenated."""
     return np.concatenate([np.asarray(values(t), np.float64)[chosen(t)] for t in tables])
 
 
@@ -199,31 +199,31 @@ def table_of(packing: Packing, modes: Path | None) -> ModeTable:
     Raises
     ------
     ValueError
-        If the file has no vectors, or is of other particles.
+        If the file has no vectors, or holds other particles.
     """
     if modes is None:
         return modes_of(packing)
     table = read_modes(modes)
     if not table.vectors.size:
-        msg = f"{modes}: holds no vectors, expected a file of modes.py --vectors"
+        msg = f"{modes}: has no vectors, expected a file of modes.py --vectors"
         raise ValueError(msg)
     if table.coordinates.n_all != packing.n:
-        msg = f"{modes}: is of {table.coordinates.n_all} particles, expected {packing.n}"
+        msg = f"{modes}: has {table.coordinates.n_all} particles, expected {packing.n}"
         raise ValueError(msg)
     return table
 
 
 class Wanted(NamedTuple):
-    """Which modes to pick."""
+    """Selection of modes."""
 
     numbers: Sequence[int] = ()
     """Rows of the table."""
     omegas: Sequence[float] = ()
-    """The modes with the nearest frequencies, by ratio; negative ones are sought among modes of
+    """Modes with the nearest frequencies, by ratio; negative ones are sought among modes of
     negative eigenvalue, at -sqrt(-lambda)."""
     per_band: Mapping[str, int] = {}
-    """Where neither is asked for: numbers of modes of each band, evenly by rank. Those of a band that is empty
-    come from the next one, and all from the whole spectrum where bands are not apart."""
+    """Default: numbers of modes of each band, evenly by rank. An empty band takes them
+    from the next one, and all come from the whole spectrum where bands do not separate."""
 
 
 def pick_modes(table: ModeTable, wanted: Wanted) -> list[int]:
@@ -232,7 +232,7 @@ def pick_modes(table: ModeTable, wanted: Wanted) -> list[int]:
     Raises
     ------
     ValueError
-        If there is no such mode.
+        If a mode does not exist.
     """
     n = len(table["omega"])
     wrong = [k for k in wanted.numbers if not 0 <= k < n]
@@ -270,7 +270,7 @@ def _nearest(table: ModeTable, omega: float) -> int:
 
 
 def band_means(samples: Sequence[ModeTable], name: str) -> dict[str, Mean]:
-    """Average a column over the modes of each band, then over samples; those without are left out."""
+    """Average a column over the modes of each band, then over samples, skipping samples without."""
     found = {}
     for band in TOLD:
         parts = [table[name][table.in_band(band)] for table in samples]

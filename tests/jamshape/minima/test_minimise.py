@@ -166,7 +166,7 @@ def many_in_space():
 
 
 def reach_of(landscape, move):
-    """How much of a move pairs hold for, those of a wide skin of which near ones are chosen."""
+    """Largest move for which pairs stay valid, those of a wide skin from which near ones are chosen."""
     state, step = State.of(landscape.particles), 1e-3 * landscape.length
     pairs, factor = Landscape(landscape.particles).wide_pairs(state), 0.0
     while not pairs.outrun_by(
@@ -182,7 +182,7 @@ OF_ANY_AGE = {name: partial(pressed_named, name) for name in PRESSED} | {"many":
 @pytest.mark.parametrize("method", ["newton", "auto"])
 @pytest.mark.parametrize("name", OF_ANY_AGE)
 def test_a_minimum_is_the_same_to_the_bit_whatever_the_age_of_the_pairs(name, method):
-    """What goes on after a kill finds all pairs anew, at another state than what was not killed."""
+    """A resumed run finds all pairs anew, at another state than an uninterrupted one."""
     packing = OF_ANY_AGE[name]()
     state, rng = State.of(packing), np.random.default_rng(7)
     stop = Stop(tolerance=1e-7, evaluations=150)
@@ -214,7 +214,7 @@ def test_lammps_agrees_with_newton_and_lowers_the_energy():
 @pytest.mark.lammps
 @pytest.mark.parametrize("packing_of", [ellipsoids, octahedra_and_boxes, superellipses])
 def test_lammps_minimises_superellipsoids(packing_of):
-    """Of several exponents, which are types in LAMMPS; from a start beside a minimum."""
+    """Particles have several exponents, which are types in LAMMPS; from a start beside a minimum."""
     landscape = Landscape(packing_of())
     start = State.of(landscape.particles)
     expected = minimise(landscape, start, "newton")

@@ -115,6 +115,6 @@ def test_a_run_with_one_bond_side_to_side(tmp_path):
     one, stiff, two = (js.modes(frame.with_(law=law), force=True).eigenvalues[-1] for law in laws)
     assert stiff == pytest.approx(2.5 * one, rel=1e-9)
     assert two != pytest.approx(one, rel=1e-3)
-    with pytest.warns(UserWarning, match="the start has sides=1.* and the run has sides=2: energy"):
+    with pytest.warns(UserWarning, match="the start has sides=1.* and the run sides=2: energy"):
         sheared = js.quasistatic_shear(start=frame, step=1e-3, strain=2e-3, progress=False)
     assert sheared.packing(0).law == js.Interaction(1.0, 2)

@@ -74,9 +74,9 @@ def test_options_name_particles_as_python_does():
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (("--p", "2"), "--p is no option of spherocylinders, expected --alpha"),
-        (("--kind", "beta=2"), "beta is no parameter of spherocylinders, expected alpha"),
-        (("--kind", "alpha=2", "--alpha", "3"), "kinds and other sizes were given, expected"),
+        (("--p", "2"), "--p does not apply to spherocylinders, expected --alpha"),
+        (("--kind", "beta=2"), "beta is not a parameter of spherocylinders, expected alpha"),
+        (("--kind", "alpha=2", "--alpha", "3"), "--kind excludes --size-ratio and a shape"),
         (("--kind", "alpha=2,share=0"), r"share is 0\.0, expected a share from 1e-06 to 1e\+06"),
         (("--kind", "alpha=2,spread=-1"), r"spread is -1\.0, expected a spread from 0 to 1"),
         (("--alpha", "-1"), r"alpha is -1\.0, expected 0 or A / R from 1e-06 to 100"),
@@ -97,5 +97,5 @@ def test_an_empty_mixture_is_refused():
 def test_unknown_shapes_are_refused():
     with pytest.raises(ValueError, match="shape style is 'cube', expected one of spherocylinder"):
         Particles.of("cube")
-    with pytest.raises(ValueError, match="are those of no shape, expected positive lengths"):
+    with pytest.raises(ValueError, match="fit no shape, expected positive lengths"):
         guess_shape_style(np.array([[1.0, -1.0, 2.0]]))

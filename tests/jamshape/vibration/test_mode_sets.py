@@ -59,7 +59,7 @@ def test_system_and_energy_of_modes_old_and_new():
     assert (old.u0, old.system.protocol) == (0.0, "yuan-2019-1")
     assert key_of(table(alpha=1.0, shape="superellipsoid")).system.parameters == ()
     assert seed_of(table(seed=7)) == 7
-    with pytest.raises(ValueError, match="do not tell the shape"):
+    with pytest.raises(ValueError, match="do not state the shape"):
         key_of(table(u0=1.0))
 
 
