@@ -24,9 +24,9 @@ from tqdm import tqdm
 
 from common.averages import mean_over
 from jamshape.command import parser_of, report, run
+from jamshape.files.ensembles import PackingFile
 from jamshape.files.h5md import read_packing
 from jamshape.files.outcomes import is_reached
-from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape, State
 from jamshape.measures.averages import Mean
 from jamshape.minima.target import TargetError

@@ -27,7 +27,7 @@ from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes, read_style
 from jamshape.files.outcomes import is_reached
 from jamshape.measures.runs import rate_of
-from jamshape.vibration.sets import TOLD, count_of, of_packing
+from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import read_modes
 
 SHAPE = ("alpha", "exponent", "w1", "w2", "size_ratio", "n", "seed")

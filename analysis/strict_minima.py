@@ -21,11 +21,11 @@ import numpy as np
 from common.averages import mean
 from common.ensembles import finished
 from jamshape.command import parser_of, report, run
-from jamshape.files.sets import PackingFile
+from jamshape.files.ensembles import PackingFile
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Stop, minimise
-from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
-from jamshape.vibration.sets import TOLD
+from jamshape.vibration.ensembles import TOLD
+from jamshape.vibration.hessian import DynamicalMatrix, DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.spectrum import Spectrum, spectrum
 from jamshape.vibration.statistics import bands, why_no_bands
 
@@ -93,8 +93,10 @@ def numbers_of(file: PackingFile) -> dict[str, float]:
     """Measure one packing; fractions are of all modes but translations, and of all bonds."""
     packing = file.packing()
     landscape, state = Landscape(packing), State.of(packing)
-    matrix = dynamical_matrix(landscape, state, Scope(force=True))
-    strong = dynamical_matrix(landscape, state, Scope(force=True, least_force=WEAK))
+    matrix = dynamical_matrix(landscape, state, DynamicalMatrixOptions(force=True))
+    strong = dynamical_matrix(
+        landscape, state, DynamicalMatrixOptions(force=True, least_force=WEAK)
+    )
     found = spectrum(matrix)
     own = ~found.is_translation
     force = matrix.contacts["bond_force"]

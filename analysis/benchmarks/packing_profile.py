@@ -111,7 +111,9 @@ class Profile:
 def compiled_vicinity() -> Any:
     """Give the class whose minimisations tell of factorisations and products, by an instance of it."""
     some = Landscape(recipe_for(js.Spherocylinders(alpha=1.0), n=4, phi_start=0.1).start())
-    return type(some.bodies.vicinity(some.column, some.rotation_length, some.turning_radius))
+    return type(
+        some.bodies.local_energy_model(some.column, some.rotation_length, some.turning_radius)
+    )
 
 
 def parser() -> ArgumentParser:

@@ -22,8 +22,8 @@ import jamshape as js
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.landscape import Landscape
+from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.landscape.threads import sharing
-from jamshape.landscape.vicinity import Vicinity
 from jamshape.minima import Stop, minimise
 from jamshape.packing import Packing, State
 from jamshape.protocols.defaults import recipe_for
@@ -51,10 +51,10 @@ def main(options: Namespace) -> None:
     """Measure and print the table."""
     packing, state = squeezed(particles_of(options), options)
     numbers = [1, *options.threads]
-    vicinities = [vicinity_of(packing, state, number) for number in numbers]
+    vicinities = [local_model_of(packing, state, number) for number in numbers]
     size = vicinities[0].landscape.size
     x = 1e-4 * np.random.default_rng(options.seed).normal(size=size)
-    works: dict[str, Callable[[Vicinity], Any]] = {
+    works: dict[str, Callable[[LocalEnergyModel], Any]] = {
         "evaluation": lambda about: [about.evaluate(x, 0.0, extended=False) for _ in range(10)],
         "factorisation": lambda about: about.factorise(0.0 * x, 0.0, np.ones(size)),
     }
@@ -91,13 +91,15 @@ def squeezed(particles: Particles, options: Namespace) -> tuple[Packing, State]:
     return packing, state
 
 
-def vicinity_of(packing: Packing, state: State, threads: int) -> Vicinity:
-    """Make a vicinity of its own for so many threads."""
+def local_model_of(packing: Packing, state: State, threads: int) -> LocalEnergyModel:
+    """Make a local energy model of its own for so many threads."""
     with sharing(threads):
-        return Vicinity(Landscape(packing), state)
+        return LocalEnergyModel(Landscape(packing), state)
 
 
-def timed(work: Callable[[Vicinity], Any], vicinities: list[Vicinity], rounds: int) -> FloatArray:
+def timed(
+    work: Callable[[LocalEnergyModel], Any], vicinities: list[LocalEnergyModel], rounds: int
+) -> FloatArray:
     """Give seconds (rounds, vicinities, 2) of each in turns: by the clock, of the asking thread."""
     found = np.zeros((rounds, len(vicinities), 2))
     for about in vicinities:

@@ -16,7 +16,7 @@ _Group = TypeVar("_Group")
 
 
 class Measured(Protocol):
-    """A sample with named numbers, such as `jamshape.files.sets.PackingFile`."""
+    """A sample with named numbers, such as `jamshape.files.ensembles.PackingFile`."""
 
     @property
     def reached(self) -> bool:
@@ -27,7 +27,7 @@ class Measured(Protocol):
 
 
 class Reported(Protocol):
-    """A group with a JSON description, such as `jamshape.files.sets.System`."""
+    """A group with a JSON description, such as `jamshape.files.ensembles.System`."""
 
     def report(self) -> dict[str, Any]:
         """Return the description."""

@@ -11,7 +11,7 @@ import numpy as np
 from common.families import mark
 from jamshape.arrays import FloatArray
 from jamshape.drawing.text import pressure_unit
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.measures.averages import Mean
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from common.styles import COLORS, color
 from common.text import counted
 from jamshape.arrays import BoolArray, FloatArray
 from jamshape.contacts import ContactNetwork
-from jamshape.files.sets import PackingFile
+from jamshape.files.ensembles import PackingFile
 from jamshape.measures.averages import Mean
 from jamshape.measures.contact_statistics import cross, held_contacts, lever_arms, require_plane
 from jamshape.packing import Packing

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.files.h5md import FileFormatError
-from jamshape.files.sets import PackingFile, System
 from jamshape.shapes.table import DEFAULT
 
 # Suffixes of other files that may lie beside a packing.

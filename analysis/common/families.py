@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from common.ensembles import is_among
 from jamshape.drawing.styles import BLACK, BLUE, GREEN, ORANGE, RED, SKY
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.files.vocabulary import THERMAL
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import SHAPES

@@ -18,7 +18,7 @@ import numpy as np
 from jamshape.contacts import find_contacts, find_rattlers
 from jamshape.files.h5md import read_attributes, read_packing, require_attributes
 from jamshape.landscape import Landscape, State
-from jamshape.measures.minimum import write_minimum
+from jamshape.measures.packing_summary import write_minimum
 from jamshape.minima import Minimum, Outcome, Stop, minimise
 from jamshape.minima.target import Search, Target, TargetError, direct
 from jamshape.packing import Packing
@@ -133,7 +133,7 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
 def _opened(landscape: Landscape, state: State, goal: Target) -> State:
     """Open the box until u is about u0; sliding rods would make small steps slow.
 
-    Uses `measures.minimum.energy_onset`: sqrt(u) is linear in phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
+    Uses `measures.packing_summary.energy_onset`: sqrt(u) is linear in phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
     """
     evaluation, volume, D = landscape.evaluate(state), state.volume, state.dimension
     u, p = evaluation.energy / volume, -evaluation.strain_gradient / (D * volume)

@@ -30,7 +30,7 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of
 from jamshape.drawing.modes import frequency_unit
 from jamshape.drawing.text import attributes_text, scientific, systems_text
-from jamshape.vibration.sets import Key
+from jamshape.vibration.ensembles import Key
 from jamshape.vibration.statistics import mean_in_bins
 from jamshape.vibration.table import ModeTable
 

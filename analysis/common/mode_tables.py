@@ -12,13 +12,13 @@ import numpy as np
 from common.averages import mean
 from common.ensembles import is_among, require_one_ensemble
 from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.files.ensembles import number
 from jamshape.files.h5md import FileFormatError
-from jamshape.files.sets import number
 from jamshape.landscape import Landscape, State
 from jamshape.measures.averages import Mean
 from jamshape.packing import Packing
+from jamshape.vibration.ensembles import TOLD, Key, key_of, of_packing
 from jamshape.vibration.hessian import dynamical_matrix
-from jamshape.vibration.sets import TOLD, Key, key_of, of_packing
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.table import ModeTable, read_modes, tabulate
 

@@ -11,9 +11,9 @@ import numpy as np
 from common.energy_along import AlongModes, EnergyAlong, quartic_crossover
 from common.mode_tables import modes_of
 from jamshape.arrays import FloatArray, IntArray
+from jamshape.files.ensembles import PackingFile
 from jamshape.files.h5md import FileFormatError
-from jamshape.files.sets import PackingFile
-from jamshape.vibration.sets import of_packing, to_store
+from jamshape.vibration.ensembles import of_packing, to_store
 from jamshape.vibration.table import ModeTable, read_modes, write_modes
 
 KEPT = "folder to keep spectra in (beside the packings)"

@@ -14,7 +14,7 @@ from jamshape.drawing.text import (
     system_text,
     systems_text,
 )
-from jamshape.files.sets import PackingFile, System
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.measures.runs import Ensemble
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import SHAPES, shape_named

@@ -33,7 +33,7 @@ from jamshape.drawing.saving import save_figure
 from jamshape.files.disk import store
 from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape
-from jamshape.measures.minimum import write_minimum
+from jamshape.measures.packing_summary import write_minimum
 from jamshape.minima import History, Stop, minimise
 from jamshape.minima.minimise import Method
 from jamshape.minima.target import Search, Target, TargetError, direct, find, halving

@@ -27,8 +27,8 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import packing_text
+from jamshape.files.ensembles import PackingFile
 from jamshape.files.h5md import read_packing
-from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape
 from jamshape.packing import Box, Packing, State
 from jamshape.vibration.hessian import DynamicalMatrix, dynamical_matrix

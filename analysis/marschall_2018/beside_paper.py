@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from jamshape.command import parser_of, report, run
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.measures.averages import Mean
 from jamshape.measures.runs import read_run
-from jamshape.vibration.sets import TOLD
+from jamshape.vibration.ensembles import TOLD
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common import published

@@ -19,7 +19,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
-from jamshape.files.sets import PackingFile
+from jamshape.files.ensembles import PackingFile
 from jamshape.measures.averages import Mean
 from jamshape.measures.runs import Ensemble, ensemble_of, observables_of
 

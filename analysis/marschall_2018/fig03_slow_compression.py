@@ -32,8 +32,8 @@ from jamshape.drawing.text import (
     scientific,
     system_text,
 )
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.files.h5md import read_attributes
-from jamshape.files.sets import PackingFile, System
 from jamshape.measures.averages import Mean
 from jamshape.measures.runs import Run, read_run
 

@@ -21,7 +21,7 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import SKY
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.measures.averages import Mean
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

@@ -20,7 +20,7 @@ import numpy as np
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.measures.averages import Mean
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

@@ -21,7 +21,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.command import report, run
 from jamshape.drawing.saving import save_figure
-from jamshape.vibration.sets import TOLD, Key
+from jamshape.vibration.ensembles import TOLD, Key
 from jamshape.vibration.table import ModeTable
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

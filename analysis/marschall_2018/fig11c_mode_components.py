@@ -19,7 +19,7 @@ from jamshape.command import report, run
 from jamshape.drawing.modes import COMPONENTS
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import systems_text
-from jamshape.vibration.sets import TOLD, Key
+from jamshape.vibration.ensembles import TOLD, Key
 from jamshape.vibration.table import ModeTable
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

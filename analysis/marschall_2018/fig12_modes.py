@@ -25,7 +25,7 @@ from jamshape.drawing.plane import draw_bodies, images, show_box
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import RATTLER
 from jamshape.drawing.text import packing_text
-from jamshape.files.sets import PackingFile
+from jamshape.files.ensembles import PackingFile
 from jamshape.landscape import Landscape
 from jamshape.packing import Box, Packing
 from jamshape.vibration.table import ModeTable

@@ -24,7 +24,7 @@ from jamshape.drawing.modes import frequency_unit
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLUE, RED
 from jamshape.drawing.text import systems_text
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.measures.averages import Mean
 from jamshape.vibration.table import ModeTable
 

@@ -21,7 +21,7 @@ import numpy as np
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import systems_text
-from jamshape.files.sets import PackingFile, System
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.measures.averages import Mean
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

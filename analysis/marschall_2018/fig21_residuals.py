@@ -21,8 +21,8 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.files.h5md import read_observables
-from jamshape.files.sets import PackingFile, System
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import standard_error

@@ -27,11 +27,11 @@ from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
+from jamshape.files.ensembles import PackingFile
 from jamshape.files.h5md import require_attributes
 from jamshape.files.outcomes import shortfall
-from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape, State
-from jamshape.measures.minimum import write_minimum
+from jamshape.measures.packing_summary import write_minimum
 from jamshape.minima.target import Target, TargetError, find
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.make import Dynamics, Recipe, is_done, make, require_same

@@ -22,7 +22,7 @@ import numpy as np
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import ensemble_text, scientific
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.measures.shears import ShearOf, read_shear
 from jamshape.measures.steady import SteadyMean
 

@@ -20,7 +20,7 @@ import numpy as np
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLACK
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.files.vocabulary import NUMBERED, read_protocol
 from jamshape.measures.averages import Mean
 

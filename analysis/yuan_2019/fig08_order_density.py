@@ -16,7 +16,7 @@ from typing import Any
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
-from jamshape.files.sets import PackingFile, System
+from jamshape.files.ensembles import PackingFile, System
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.averages import averages, mean, rows

@@ -23,7 +23,7 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import unit_text
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.vibration.table import ModeTable
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

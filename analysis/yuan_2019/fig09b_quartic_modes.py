@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
-from jamshape.files.sets import PackingFile, System
+from jamshape.files.ensembles import PackingFile, System
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.axes import figure_of

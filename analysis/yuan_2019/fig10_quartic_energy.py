@@ -24,7 +24,7 @@ from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import RED
 from jamshape.drawing.text import packing_text, pressure_unit, systems_text, unit_text
-from jamshape.files.sets import PackingFile, System
+from jamshape.files.ensembles import PackingFile, System
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from common.energy_along import EnergyAlong, quartic_crossover

@@ -21,7 +21,7 @@ from jamshape.contacts import find_contacts
 from jamshape.drawing.colors import ORDER
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLACK
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.measures.averages import Mean
 from jamshape.measures.local_order import local_order
 from jamshape.measures.order3d import local_cubatic_order, local_nematic_order

@@ -21,7 +21,7 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import find_contacts
 from jamshape.drawing.saving import save_figure
-from jamshape.files.sets import PackingFile, System
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.packing import body_axes
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

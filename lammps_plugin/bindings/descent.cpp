@@ -1,6 +1,6 @@
 #include "landscape/descent.hpp"
 
-#include "bindings/vicinity.hpp"
+#include "bindings/local_energy_model.hpp"
 
 #include <string>
 
@@ -27,8 +27,8 @@ nb::object tuple_of(const DescentRow &row)
   return nb::make_tuple(row.seconds, row.evaluations, row.residual, row.energy_density);
 }
 
-DescentEnd descend(Vicinity &of, const DescentStop &stop, double shift, const nb::callable &renew,
-                   const nb::callable &tell)
+DescentEnd descend(LocalEnergyModel &of, const DescentStop &stop, double shift,
+                   const nb::callable &renew, const nb::callable &tell)
 {
   require_base(of);
   require(shift > 0.0 && std::isfinite(shift), "the shift is not a positive number.");
@@ -38,7 +38,8 @@ DescentEnd descend(Vicinity &of, const DescentStop &stop, double shift, const nb
   return descent.run();
 }
 
-double part_within(const Vicinity &of, const Array1<double> &x, double longest, double widest)
+double part_within(const LocalEnergyModel &of, const Array1<double> &x, double longest,
+                   double widest)
 {
   require_base(of);
   require(x.shape(0) == of.n(), "x does not have one number per coordinate.");
@@ -47,10 +48,10 @@ double part_within(const Vicinity &of, const Array1<double> &x, double longest, 
   return of.part_within(x.data(), {longest, widest});
 }
 
-/// Newton's equations at the base of a vicinity, which Python keeps alive.
+/// Newton's equations at the base of a local energy model, which Python keeps alive.
 class PosedNewton {
  public:
-  PosedNewton(Vicinity &of, double shift) : about(of), system(of, shift)
+  PosedNewton(LocalEnergyModel &of, double shift) : about(of), system(of, shift)
   {
     require(shift > 0.0 && std::isfinite(shift), "the shift is not a positive number.");
   }
@@ -81,7 +82,7 @@ class PosedNewton {
   double shift() const { return system.shift; }
 
  private:
-  Vicinity &about;
+  LocalEnergyModel &about;
   NewtonSystem system;
   bool is_prepared = false;
 };
@@ -117,9 +118,10 @@ void export_descent(nb::module_ &m)
       .def_ro("products", &DescentEnd::products);
   nb::class_<PosedNewton>(
       m, "NewtonSystem",
-      "The equations (H + shift) x = right at the base of a vicinity, with a shift that\n"
+      "The equations (H + shift) x = right at the base of a local energy model, with a shift that\n"
       "makes the Hessian H positive definite.")
-      .def(nb::init<Vicinity &, double>(), "vicinity"_a, "shift"_a, nb::keep_alive<1, 2>())
+      .def(nb::init<LocalEnergyModel &, double>(), "local_model"_a, "shift"_a,
+           nb::keep_alive<1, 2>())
       .def("prepare", &PosedNewton::prepare, "Take the Hessian at the base.")
       .def_prop_ro("coupling", &PosedNewton::coupling,
                    "(n,) derivative of the gradient with respect to the strain.")
@@ -128,7 +130,7 @@ void export_descent(nb::module_ &m)
       .def("learn", &PosedNewton::learn, "tries"_a,
            "Lower the shift after a step accepted at once, raise it after one that was far off.")
       .def_prop_ro("shift", &PosedNewton::shift);
-  nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
+  nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
       .def("part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,
            "The fraction of a step (n,), at most 1, that keeps every particle within these bounds.")
       .def("descend", &descend, "stop"_a, "shift"_a, "renew"_a, "tell"_a,

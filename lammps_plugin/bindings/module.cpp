@@ -21,7 +21,7 @@ void export_sums();
 void export_derivatives();
 void export_starts();
 void export_sweeps();
-void export_vicinity(nanobind::module_ &m);
+void export_local_energy_model(nanobind::module_ &m);
 void export_stages(nanobind::module_ &m);
 void export_descent(nanobind::module_ &m);
 void export_rattlers(nanobind::module_ &m);
@@ -36,7 +36,7 @@ NB_MODULE(_contact, m)
   jamshape::export_derivatives();
   jamshape::export_starts();
   jamshape::export_sweeps();
-  jamshape::export_vicinity(m);
+  jamshape::export_local_energy_model(m);
   jamshape::export_stages(m);
   jamshape::export_descent(m);
   jamshape::export_rattlers(m);

@@ -25,7 +25,7 @@ template <class Model> typename Model::Law law_of(double k_e, int sides)
 
 /// N particles of one shape, each with its own size, and the law of their contacts: the Python
 /// class of a shape. Its methods are bound in shapes.cpp, sums.cpp, derivatives.cpp, sweeps.cpp and
-/// vicinity.cpp, for every shape of shapes.hpp.
+/// local_energy_model.cpp, for every shape of shapes.hpp.
 template <class Model> class ShapeOf {
  public:
   using Shape = typename Model::Shape;

@@ -1,4 +1,4 @@
-#include "bindings/vicinity.hpp"
+#include "bindings/local_energy_model.hpp"
 #include "landscape/stage.hpp"
 
 #include <nanobind/stl/shared_ptr.h>
@@ -15,8 +15,9 @@ struct PosedStage {
   Eigen::VectorXd guess, other;
 };
 
-StageEnd solve_stage(Vicinity &of, const PosedStage &stage, const std::shared_ptr<Factors> &factors,
-                     std::size_t n_bonds, const nb::callable &renew)
+StageEnd solve_stage(LocalEnergyModel &of, const PosedStage &stage,
+                     const std::shared_ptr<Factors> &factors, std::size_t n_bonds,
+                     const nb::callable &renew)
 {
   for (const auto *part :
        {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
@@ -82,7 +83,7 @@ void export_stages(nb::module_ &m)
       .def_ro("factorisations", &StageEnd::factorisations)
       .def_ro("directions", &StageEnd::directions)
       .def_ro("solved", &StageEnd::solved);
-  nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
+  nb::borrow<nb::class_<LocalEnergyModel>>(nb::type<LocalEnergyModel>())
       .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
            "renew"_a,
            "Solve a Stage, with factors of an earlier one and the number of bonds at the point of\n"

@@ -35,7 +35,7 @@ struct DescentRow {
   double residual, energy_density;
 };
 
-/// The final state, at the base of the vicinity.
+/// The final state, at the base of the local energy model.
 struct DescentEnd {
   DescentOutcome outcome;
   LandscapeSums sums;
@@ -46,7 +46,7 @@ struct DescentEnd {
 
 /// Largest net force or torque of a particle over the mean force of a bond (Marschall & Teitel
 /// 2018, App. A).
-inline double residual_of(const Vicinity &about, const LandscapeSums &sums)
+inline double residual_of(const LocalEnergyModel &about, const LandscapeSums &sums)
 {
   if (sums.n_bonds == 0) return 0.0;
   return about.largest_part(sums.gradient.data()) / (sums.bond_force / sums.n_bonds);
@@ -86,16 +86,16 @@ class Bracket {
 };
 
 /// Minimises the energy at fixed box: by L-BFGS, cheap while contacts open and close, and by
-/// Newton's method once they stay. The base of the vicinity moves along.
+/// Newton's method once they stay. The base of the local energy model moves along.
 class Descent {
  public:
   using Vector = Eigen::VectorXd;
-  /// Gives the vicinity pairs, some of which hold at a displacement.
+  /// Gives the local energy model pairs, some of which hold at a displacement.
   using Renew = std::function<void(const Displacement &)>;
   /// Receives progress reports; may throw to stop.
   using Tell = std::function<void(const DescentRow &)>;
 
-  Descent(Vicinity &landscape, const DescentStop &when, double first_shift) :
+  Descent(LocalEnergyModel &landscape, const DescentStop &when, double first_shift) :
       about(landscape), stop(when), system(landscape, first_shift), by_newton(when.is_near),
       is_near(when.is_near), newton_below(when.newton_below)
   {
@@ -176,13 +176,13 @@ class Descent {
   /// Contacts start from the previous ones, as long as this object lives.
   class Remembering {
    public:
-    explicit Remembering(Vicinity &landscape) : about(landscape) { about.remember(true); }
+    explicit Remembering(LocalEnergyModel &landscape) : about(landscape) { about.remember(true); }
     ~Remembering() { about.remember(false); }
     Remembering(const Remembering &) = delete;
     Remembering &operator=(const Remembering &) = delete;
 
    private:
-    Vicinity &about;
+    LocalEnergyModel &about;
   };
 
   struct Line {
@@ -191,7 +191,7 @@ class Descent {
     int tries;
   };
 
-  Vicinity &about;
+  LocalEnergyModel &about;
   DescentStop stop;
   NewtonSystem system;
   QuasiNewton memory;

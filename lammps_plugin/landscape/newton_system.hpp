@@ -1,6 +1,6 @@
 #pragma once
 
-#include "landscape/vicinity.hpp"
+#include "landscape/local_energy_model.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,15 +14,18 @@
 
 namespace jamshape {
 
-/// The equations of Newton's method at the base of a vicinity, (H + shift) x = right: the shift,
-/// kept from one base to the next, makes the Hessian H positive definite. Solved by factors where
-/// these are cheap, else by conjugate gradients preconditioned with incomplete ones (Nocedal &
-/// Wright, Numerical Optimization, Sec. 7.1).
+/// The equations of Newton's method at the base of a local energy model, (H + shift) x = right: the
+/// shift, kept from one base to the next, makes the Hessian H positive definite. Solved by factors
+/// where these are cheap, else by conjugate gradients preconditioned with incomplete ones (Nocedal
+/// & Wright, Numerical Optimization, Sec. 7.1).
 class NewtonSystem {
  public:
   using Vector = Eigen::VectorXd;
 
-  NewtonSystem(Vicinity &landscape, double first_shift) : shift(first_shift), about(landscape) {}
+  NewtonSystem(LocalEnergyModel &landscape, double first_shift) :
+      shift(first_shift), about(landscape)
+  {
+  }
 
   double shift;
   int factorisations = 0, products = 0;
@@ -92,7 +95,7 @@ class NewtonSystem {
   /// Smallest shift of incomplete factors, over the largest diagonal element, if pivots need one.
   static constexpr double INCOMPLETE = 1e-4;
 
-  Vicinity &about;
+  LocalEnergyModel &about;
   double scale = 1.0;
   std::shared_ptr<Factors> factors;
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "landscape/vicinity.hpp"
+#include "landscape/local_energy_model.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -76,10 +76,10 @@ struct StageEnd {
 class StageSolver {
  public:
   using Vector = Eigen::VectorXd;
-  /// Gives the vicinity pairs, some of which hold at a displacement.
+  /// Gives the local energy model pairs, some of which hold at a displacement.
   using Renew = std::function<void(const Displacement &)>;
 
-  StageSolver(Vicinity &landscape, const Stage &equation, const StageUnits &scales,
+  StageSolver(LocalEnergyModel &landscape, const Stage &equation, const StageUnits &scales,
               const StageLimits &bounds, Renew renew) :
       about(landscape), stage(equation), units(scales), limits(bounds),
       renew_pairs(std::move(renew))
@@ -153,7 +153,7 @@ class StageSolver {
     double inverse;
   };
 
-  Vicinity &about;
+  LocalEnergyModel &about;
   const Stage &stage;
   const StageUnits &units;
   const StageLimits &limits;

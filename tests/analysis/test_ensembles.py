@@ -17,9 +17,9 @@ from common.ensembles import (
 )
 from common.text import conditions_text, system_labels
 from jamshape.command import plain
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.files.h5md import write_packing
 from jamshape.files.run_writer import RunWriter
-from jamshape.files.sets import PackingFile, System
 from jamshape.protocols.random_start import random_packing
 
 ROD, OTHER = "spherocylinder", "superellipsoid"

@@ -13,8 +13,8 @@ from common.mode_tables import (
     stable,
     unstable,
 )
+from jamshape.vibration.ensembles import key_of
 from jamshape.vibration.hessian import Coordinates
-from jamshape.vibration.sets import key_of
 from jamshape.vibration.table import ModeTable, write_modes
 
 N = 4

@@ -5,8 +5,8 @@ from mixtures import bidisperse
 from common.contact_angles import angle_curve, contact_angles
 from common.contact_classes import NAMES, class_fractions, class_numbers, flat_fraction
 from jamshape.contacts import find_contacts
+from jamshape.files.ensembles import PackingFile
 from jamshape.files.h5md import write_packing
-from jamshape.files.sets import PackingFile
 from jamshape.packing import Box
 from jamshape.protocols.random_start import random_packing
 

@@ -156,13 +156,13 @@ def probes(fuzz, dimension):
 
 
 def of_vicinity(fuzz, of, dimension, poses, pairs):
-    """Call the methods of a vicinity in any order, before and after it has a base and pairs."""
+    """Call the methods of a local energy model in any order, before and after it has a base and pairs."""
     n_turns = 1 if dimension == 2 else 3
     column = np.arange(3 * (dimension + n_turns)).reshape(3, -1)
     lengths = {"rotation_length": np.ones(3), "turning_radius": np.ones(3)}
-    about = fuzz.call("vicinity", of.vicinity, column=column, **lengths)
+    about = fuzz.call("local_energy_model", of.local_energy_model, column=column, **lengths)
     if about is None:
-        about = particles(type(of), dimension).vicinity(column, np.ones(3), np.ones(3))
+        about = particles(type(of), dimension).local_energy_model(column, np.ones(3), np.ones(3))
     n, held = column.size, {"factors": None}
     near = {"wide": 1.5, "reach": 30.0, "skin": 0.3}
 
@@ -182,7 +182,7 @@ def of_vicinity(fuzz, of, dimension, poses, pairs):
             fuzz.call("Factors.solve", found.solve, right=np.ones((1, n)))
 
     def newton():
-        system = fuzz.call("NewtonSystem", _contact.NewtonSystem, vicinity=about, shift=1.0)
+        system = fuzz.call("NewtonSystem", _contact.NewtonSystem, local_model=about, shift=1.0)
         if system is not None:
             for name in fuzz.random.permutation(["prepare", "solve", "learn", "coupling"]):
                 if name == "solve":

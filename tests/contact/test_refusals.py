@@ -195,13 +195,13 @@ def test_a_network_of_contacts_that_is_none_is_refused():
 COLUMN = np.arange(9).reshape(N, 3)
 
 
-def vicinity(column=COLUMN, length=1.0):
+def local_model(column=COLUMN, length=1.0):
     lengths = np.full(N, length)
-    return particles(_contact.Spherocylinders, 2).vicinity(column, lengths, lengths)
+    return particles(_contact.Spherocylinders, 2).local_energy_model(column, lengths, lengths)
 
 
 def about_a_base():
-    of, given = vicinity(), arguments(2)
+    of, given = local_model(), arguments(2)
     pairs = given.pop("pairs"), given.pop("shift")
     of.move_to(**given)
     of.take_pairs(**given, pairs=pairs[0], shift=pairs[1], wide=1.0, reach=9.0, skin=0.5)
@@ -211,16 +211,16 @@ def about_a_base():
 def test_coordinates_that_are_not_numbered_once_each_are_refused():
     for wrong in (COLUMN + 1, COLUMN - 2, COLUMN // 2, COLUMN * 1000):
         with pytest.raises(ValueError, match="column does not number the coordinates"):
-            vicinity(wrong)
+            local_model(wrong)
     with pytest.raises(ValueError, match="do not have shapes"):
-        vicinity(COLUMN[:2])
+        local_model(COLUMN[:2])
     for bad in BAD_NUMBERS:
         with pytest.raises(ValueError, match="of rotation_length is"):
-            vicinity(length=bad)
+            local_model(length=bad)
 
 
 def test_a_landscape_without_a_base_has_no_energy():
-    of, x = vicinity(), np.zeros(9)
+    of, x = local_model(), np.zeros(9)
     for ask in (of.move, lambda *at: of.evaluate(*at, False)):
         with pytest.raises(ValueError, match="there is no base yet"):
             ask(x, 0.0)
@@ -268,7 +268,7 @@ def test_stages_and_factors_of_another_size_are_refused():
             of.solve_stage(stage(**{name: np.zeros(8)}), None, 0, lambda *_: None)
         with pytest.raises(ValueError, match="a vector of a stage is nan"):
             of.solve_stage(stage(**{name: np.full(9, np.nan)}), None, 0, lambda *_: None)
-    held = vicinity(np.where(COLUMN < 6, COLUMN, -1))
+    held = local_model(np.where(COLUMN < 6, COLUMN, -1))
     given = arguments(2)
     pairs = {"pairs": given.pop("pairs"), "shift": given.pop("shift")}
     held.move_to(**given)
@@ -285,7 +285,7 @@ def deformation(dimension=2):
 
 
 def test_only_a_base_that_is_held_can_be_deformed():
-    of = vicinity()
+    of = local_model()
     with pytest.raises(ValueError, match="there is no base yet, expected move_to before"):
         of.hold()
     for prepare in (lambda: None, lambda: of.move_to(**split(poses(2)))):
@@ -326,13 +326,13 @@ def test_teams_of_no_size_are_refused(threads):
     with pytest.raises(ValueError, match=f"threads is {threads}, expected from 1 to 1024"):
         _contact.counts_of_team(threads, 1, 1)
     with pytest.raises(ValueError, match=f"threads is {threads}, expected from 1 to 1024"):
-        vicinity().share(threads)
+        local_model().share(threads)
 
 
 def test_particles_without_coordinates_have_an_empty_gradient():
     """Arrays without rows have no place to begin at."""
     of, given, pairs = about_a_base()
-    of = vicinity(np.full_like(COLUMN, -1))
+    of = local_model(np.full_like(COLUMN, -1))
     of.move_to(**given)
     of.take_pairs(**given, **pairs)
     assert of.evaluate(np.zeros(0), 0.0, False)[1].shape == (0,)

@@ -9,7 +9,7 @@ from jamshape.landscape import Landscape, State
 from jamshape.minima import Outcome
 from jamshape.minima.target import Target, find
 
-ENDED = (Outcome.CONVERGED, Outcome.SLIDING, Outcome.CORNER, Outcome.UNJAMMED)
+ENDED = (Outcome.CONVERGED, Outcome.SLIDING, Outcome.KINK, Outcome.UNJAMMED)
 STARTS = {name: scene for shape in SHAPES for name, scene in shape.jammed.items()}
 
 

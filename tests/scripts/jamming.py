@@ -1,7 +1,7 @@
 """Small jammed packings, without LAMMPS, and their files."""
 
 from jamshape.landscape import Landscape, State
-from jamshape.measures.minimum import write_minimum
+from jamshape.measures.packing_summary import write_minimum
 from jamshape.minima import Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.protocols.random_start import random_packing

@@ -20,8 +20,8 @@ from common.mode_tables import read_tables
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
+from jamshape.vibration.ensembles import to_store
 from jamshape.vibration.hessian import Coordinates, dynamical_matrix
-from jamshape.vibration.sets import to_store
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.table import ModeTable, tabulate, write_modes
 

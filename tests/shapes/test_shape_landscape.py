@@ -22,7 +22,7 @@ from slopes import assert_is_slope
 
 from jamshape.contacts import find_contacts, forces, sum_forces
 from jamshape.landscape import CrossingError, Landscape
-from jamshape.landscape.vicinity import Vicinity
+from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.packing import Box, State
 
 
@@ -161,19 +161,22 @@ def assert_same_landscape(packing, other):
     assert there.strain_hessian == close_to(here.strain_hessian, 100 * ROUNDING)
 
 
-def test_a_vicinity_follows_a_box_that_shears(packing):
+def test_a_local_energy_model_follows_a_box_that_shears(packing):
     """Its list of pairs holds as long as it says so: energies and forces are those of new lists."""
     state = State.of(packing)
     shear = np.eye(packing.dimension)
     shear[0, 1] = 4e-3
-    vicinity, still = Vicinity(Landscape(packing), state), np.zeros(Landscape(packing).size)
+    local_model, still = (
+        LocalEnergyModel(Landscape(packing), state),
+        np.zeros(Landscape(packing).size),
+    )
     kept = Landscape(packing)
     for _ in range(12):
         state = sheared(state, shear)
-        vicinity.move_to(state)
+        local_model.move_to(state)
         fresh = Landscape(packing).evaluate(state, extended=False)
         for found in (
-            vicinity.evaluate(still, 0.0, extended=False), kept.evaluate(state, extended=False)
+            local_model.evaluate(still, 0.0, extended=False), kept.evaluate(state, extended=False)
         ):  # fmt: skip
             assert found.n_bonds == fresh.n_bonds
             assert found.energy == close_to(fresh.energy, ROUNDING)
@@ -249,19 +252,19 @@ STRAIN = -2e-4
 
 
 def about(case):
-    """A vicinity, and coordinates in it."""
+    """A local energy model, and coordinates in it."""
     landscape = Landscape(pressed(case))
-    vicinity = Vicinity(landscape, State.of(landscape.particles))
-    return vicinity, 1e-4 * np.random.default_rng(3).normal(size=landscape.size)
+    local_model = LocalEnergyModel(landscape, State.of(landscape.particles))
+    return local_model, 1e-4 * np.random.default_rng(3).normal(size=landscape.size)
 
 
 @EVERYWHERE
 @pytest.mark.parametrize("extended", [False, True])
 def test_the_vicinity_has_the_energy_of_the_landscape(case, extended):
-    vicinity, x = about(case)
-    found = vicinity.evaluate(x, STRAIN, extended=extended)
-    expected = Landscape(pressed(case)).evaluate(vicinity.at(x, STRAIN), extended=extended)
-    off = vicinity.landscape.components(found.gradient - expected.gradient)
+    local_model, x = about(case)
+    found = local_model.evaluate(x, STRAIN, extended=extended)
+    expected = Landscape(pressed(case)).evaluate(local_model.at(x, STRAIN), extended=extended)
+    off = local_model.landscape.components(found.gradient - expected.gradient)
     # In space a torque is not the derivative by the vector that has turned the particle already.
     off = off if case.dimension == 2 else off[:, :3]
     assert np.abs(off).max() <= ROUNDING * expected.bond_force
@@ -271,8 +274,8 @@ def test_the_vicinity_has_the_energy_of_the_landscape(case, extended):
 
 @EVERYWHERE
 def test_the_vicinity_factorises_the_hessian_of_the_landscape(case):
-    vicinity, x = about(case)
-    landscape = vicinity.landscape
+    local_model, x = about(case)
+    landscape = local_model.landscape
     shifts = landscape.components(x)
     if case.dimension == 3:  # second derivatives are for points that turn nothing in space
         shifts[:, 3:] = 0.0
@@ -280,13 +283,13 @@ def test_the_vicinity_factorises_the_hessian_of_the_landscape(case):
     of_particle = np.ones_like(shifts)
     of_particle[:, : case.dimension] += STRAIN
     stretch = landscape.coordinates(of_particle)
-    curvature = landscape.curvature(vicinity.at(x, STRAIN))
+    curvature = landscape.curvature(local_model.at(x, STRAIN))
     hessian = stretch[:, None] * curvature.hessian.toarray() * stretch
     diagonal = 1 + np.arange(landscape.size) / landscape.size
     diagonal = diagonal - min(np.linalg.eigvalsh(hessian)[0], 0.0)
     right = np.random.default_rng(4).normal(size=landscape.size)
-    vicinity.evaluate(x, STRAIN, extended=False)
-    found = vicinity.factorise(x, STRAIN, diagonal).solve(right)
+    local_model.evaluate(x, STRAIN, extended=False)
+    found = local_model.factorise(x, STRAIN, diagonal).solve(right)
     left = hessian + np.diag(diagonal)
     rounding = 100 * EPS * np.linalg.norm(left, 2) * np.linalg.norm(found)
     assert np.linalg.norm(left @ found - right) <= rounding

@@ -30,7 +30,7 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.run_writer import RunWriter
 from jamshape.landscape import Landscape
-from jamshape.measures.minimum import measure
+from jamshape.measures.packing_summary import measure
 from jamshape.minima import METHODS, Outcome, Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.packing import State

@@ -30,8 +30,8 @@ from jamshape.contacts import (
     sum_forces,
 )
 from jamshape.lammps.session import Session
-from jamshape.measures.minimum import order
 from jamshape.measures.order import planar_order
+from jamshape.measures.packing_summary import order
 
 pytestmark = pytest.mark.lammps
 

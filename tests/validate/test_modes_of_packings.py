@@ -15,7 +15,7 @@ from jamshape.landscape import Landscape, State
 from jamshape.minima.target import Target
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.make import Dynamics, Recipe, make
-from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.hessian import DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.statistics import bands, components, count, participation, redundancies
 
@@ -27,7 +27,7 @@ SEEDS = (1, 2)
 PAPER = {0.01: (0.262, 0.0), 1.0: (0.0144, 0.0039), 4.0: (0.0641, 0.0638)}
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(options="module")
 def packings(tmp_path_factory):
     found = {}
     for alpha in PAPER:
@@ -42,8 +42,8 @@ def packings(tmp_path_factory):
 
 
 def analysed(packing, least_force=0.0):
-    scope = Scope(least_force=least_force)
-    matrix = dynamical_matrix(Landscape(packing), State.of(packing), scope)
+    options = DynamicalMatrixOptions(least_force=least_force)
+    matrix = dynamical_matrix(Landscape(packing), State.of(packing), options)
     return matrix, spectrum(matrix)
 
 

@@ -28,7 +28,7 @@ from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
 from jamshape.front.packing import MeasuredPacking, results_of
 from jamshape.packing import Packing
-from jamshape.vibration.sets import TOLD, count_of, of_packing
+from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
 _STATE = ("phi", "pressure", "u", "z", "rattlers")

@@ -21,9 +21,9 @@ from jamshape.command import parser_of, report
 from jamshape.drawing.modes import mode_figure
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import packing_text
-from jamshape.files.sets import PackingFile
+from jamshape.files.ensembles import PackingFile
 from jamshape.front.modes import modes, require_modes_file
-from jamshape.vibration.sets import TOLD
+from jamshape.vibration.ensembles import TOLD
 from jamshape.vibration.spectrum import METHODS
 from jamshape.vibration.statistics import Redundancy, redundancies
 from jamshape.vibration.table import BANDS, MODULI, ModeTable

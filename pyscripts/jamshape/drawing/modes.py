@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED
 from jamshape.drawing.text import unit_text
-from jamshape.vibration.sets import Key, key_of
+from jamshape.vibration.ensembles import Key, key_of
 from jamshape.vibration.statistics import density_of_states, mean_in_bins
 from jamshape.vibration.table import ModeTable
 

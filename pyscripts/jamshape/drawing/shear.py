@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from jamshape.arrays import FloatArray
-    from jamshape.files.sets import System
+    from jamshape.files.ensembles import System
     from jamshape.measures.shears import ShearOf
 
 

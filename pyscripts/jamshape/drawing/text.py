@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from jamshape.files.sets import PackingFile, System
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.shapes.particles import parse_kind
 from jamshape.shapes.table import shape_named
 

@@ -23,7 +23,7 @@ from jamshape.arrays import FloatArray, IntArray, LongArray
 from jamshape.checks import require_one_of, require_positive
 from jamshape.flow.host import Host
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
-from jamshape.landscape.vicinity import Stage, StageFactors, Units, Vicinity
+from jamshape.landscape.local_energy_model import LocalEnergyModel, Stage, StageFactors, Units
 
 # Accuracy of stages, over the allowed local error. A tenfold one would leave velocities on kinks
 # that cause rejections: packings of nearly round rods then cost ten times as much.
@@ -392,7 +392,7 @@ class _Run:
 
     def __init__(self, landscape: Landscape, flow: Flow, protocol: Course) -> None:
         self.landscape, self.flow, self.protocol = landscape, flow, protocol
-        self.vicinity = Vicinity(landscape, flow.state)
+        self.local_model = LocalEnergyModel(landscape, flow.state)
         self.still = np.zeros(landscape.size)
         self.drag = drag_coefficients(landscape, protocol.k_d)
         self._least_drag = float(self.drag.min())
@@ -413,10 +413,10 @@ class _Run:
         flow = self.flow
         if flow._is_fresh:
             flow.state = flow.state.with_least_tilt()
-            self.vicinity.move_to(flow.state)
-            self.vicinity.forget_pairs()
+            self.local_model.move_to(flow.state)
+            self.local_model.forget_pairs()
             flow._is_fresh = False
-        self.vicinity.hold()
+        self.local_model.hold()
         self.angle = flow.state.orientation[:, 0].astype(np.float64)
         self.host, longest = self.protocol.leg(flow, self.phi)
         # Stage accuracy suffices for units and energies.
@@ -495,8 +495,8 @@ class _Run:
 
     def _evaluated(self) -> Evaluation:
         """Evaluate the present state."""
-        self.vicinity.deform(_AT_REST, self.no_turns[:, None])
-        return self.vicinity.evaluate(self.still, 0.0, extended=False)
+        self.local_model.deform(_AT_REST, self.no_turns[:, None])
+        return self.local_model.evaluate(self.still, 0.0, extended=False)
 
     def _refuse_crossing(self, dt: float) -> None:
         if self._crossing is None or dt > _AT_ONCE * min(self._stable, 1 / self.host.rate):
@@ -583,7 +583,7 @@ class _Run:
             path.go_to_stage()
             pushed = centre + own * path.excess_spin(guess)
             stage = Stage(drag, pushed, (guess, last), self._is_extended(unit))
-            found = self.vicinity.solve(stage, flow._factors, units, accuracy)
+            found = self.local_model.solve(stage, flow._factors, units, accuracy)
             flow.factorisations += found.factorisations
             flow._factors, flow._dt_of_factors = found.factors, dt
             if not found.solved:
@@ -616,7 +616,7 @@ class _Run:
         for row in _HEUN_EULER.weights[1:]:
             x = path.combined(row, dt)
             path.go_to_stage()
-            evaluation = self.vicinity.evaluate(x, 0.0, extended=extended)
+            evaluation = self.local_model.evaluate(x, 0.0, extended=extended)
             path.add(-evaluation.gradient / self.drag + path.excess_spin(x))
         error = 0.5 * dt * (path.velocity(1) - path.velocity(0))
         return _Attempt(x, path, self._rms(error) / self._unit(evaluation), evaluation)
@@ -624,8 +624,8 @@ class _Run:
     def _accept(self, attempt: _Attempt, dt: float) -> None:
         flow, path = self.flow, attempt.path
         begun, acceleration = (path.carried(v, 0.0) for v in (flow.velocity, flow.acceleration))
-        self.vicinity.move(attempt.x, 0.0)
-        flow.state, flow._here = self.vicinity.base, attempt.evaluation
+        self.local_model.move(attempt.x, 0.0)
+        flow.state, flow._here = self.local_model.base, attempt.evaluation
         # Velocities jump when contacts open or close: extrapolation is then less accurate.
         jump = path.velocities[-1] - begun
         missed = np.linalg.norm(jump - dt * acceleration)
@@ -707,7 +707,7 @@ class _Path:
             turns = run.host.turns(run.landscape.bodies, angle, after)
             self._turned = angle + turns
         rest = (matrix - double).astype(np.float64)
-        run.vicinity.deform(np.stack([double, rest]), turns[:, None])
+        run.local_model.deform(np.stack([double, rest]), turns[:, None])
 
     def mean_turn(self, x: FloatArray) -> float:
         """Average the rotation of particles by host and forces up to the end."""

@@ -16,8 +16,8 @@ from jamshape.front.packing import MeasuredPacking
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
 from jamshape.vibration.elasticity import Moduli
-from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
-from jamshape.vibration.sets import TOLD, to_store
+from jamshape.vibration.ensembles import TOLD, to_store
+from jamshape.vibration.hessian import DynamicalMatrix, DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.sparse_modes import lowest as lowest_modes
 from jamshape.vibration.sparse_modes import near as modes_near
 from jamshape.vibration.sparse_modes import with_translations
@@ -278,8 +278,8 @@ def modes(
     if not force and not measured.reached:
         warn_unless_reached(measured.results)
     landscape, state = Landscape(measured), State.of(measured)
-    scope = Scope(rotation, least_force, force=force)
-    matrix = dynamical_matrix(landscape, state, scope)
+    options = DynamicalMatrixOptions(rotation, least_force, force=force)
+    matrix = dynamical_matrix(landscape, state, options)
     found = _found(matrix, method or next(iter(METHODS)), lowest, near)
     table = tabulate(landscape, state, matrix, found)
     asked = {"rotation": rotation, "least_force": least_force}

@@ -14,7 +14,7 @@ from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
 from jamshape.drawing.pressure import draw_pressure
 from jamshape.drawing.shear import draw_steps, draw_stress
-from jamshape.files.sets import PackingFile
+from jamshape.files.ensembles import PackingFile
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.run import QuasistaticShearFile, Recorded, RunFile, ShearFile

@@ -30,7 +30,7 @@ _VERDICTS = {
     Outcome.UNJAMMED: False,
     Outcome.CONVERGED: True,
     Outcome.SLIDING: True,
-    Outcome.CORNER: True,
+    Outcome.KINK: True,
 }
 
 _NAMES = {"unjams": "phi_unjams", "jams": "phi_jams", "tried": "frames_minimised"}

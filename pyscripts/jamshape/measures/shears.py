@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.arrays import FloatArray
+from jamshape.files.ensembles import PackingFile, System
 from jamshape.files.h5md import read_observables
-from jamshape.files.sets import PackingFile, System
 from jamshape.measures.steady import SteadyState, steady_state
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jamshape.landscape import Evaluation, Landscape
-from jamshape.landscape.vicinity import DescentEnd
+from jamshape.landscape.local_energy_model import DescentEnd
 from jamshape.packing import State
 
 # A method stalls if residual times energy did not fall by this factor in a number of evaluations.
@@ -25,14 +25,14 @@ class Outcome(Enum):
 
     SLIDING: the remaining forces lie along modes softer than the prestress, rods sliding along flat sides,
     and do not fall any more; all others are below the tolerance.
-    CORNER: at rest on a kink of the energy; a convex combination of the forces around is below the tolerance.
+    KINK: at rest on a kink of the energy; a convex combination of the forces around is below the tolerance.
     STALLED: no progress.
     """
 
     CONVERGED = "converged"
     UNJAMMED = "unjammed"
     SLIDING = "sliding"
-    CORNER = "corner"
+    KINK = "kink"
     STALLED = "stalled"
     EXHAUSTED = "exhausted"
 
@@ -116,7 +116,7 @@ class Minimum:
     @property
     def is_at_rest(self) -> bool:
         """Whether forces balance, possibly on a kink of the energy."""
-        return self.outcome in (Outcome.CONVERGED, Outcome.CORNER)
+        return self.outcome in (Outcome.CONVERGED, Outcome.KINK)
 
 
 def residual_of(landscape: Landscape, evaluation: Evaluation) -> Residual:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
+from jamshape.landscape.local_energy_model import DescentStop, LocalEnergyModel
 from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, least_shift
-from jamshape.landscape.vicinity import DescentStop, Vicinity
-from jamshape.minima.corners import at_rest
 from jamshape.minima.descent import Descent, Outcome, rounding_of_a_bond
+from jamshape.minima.nonsmooth import at_rest
 
 # L-BFGS, cheap while contacts open and close, hands over to Newton's method below this residual.
 _NEWTON_BELOW = 1e-2
@@ -43,9 +43,9 @@ def _descend(descent: Descent, newton_below: float, *, is_near: bool = False) ->
         longest_step=LONGEST_STEP * 0.5 * landscape.length,
         widest_turn=WIDEST_TURN,
     )
-    vicinity = Vicinity(landscape, descent.state)
-    end = vicinity.descend(about, least_shift(landscape, descent.evaluation))
-    descent.take(vicinity.base, end)
+    local_model = LocalEnergyModel(landscape, descent.state)
+    end = local_model.descend(about, least_shift(landscape, descent.evaluation))
+    descent.take(local_model.base, end)
     return _on_a_corner(descent) or Outcome(end.outcome)
 
 
@@ -57,4 +57,4 @@ def _on_a_corner(descent: Descent) -> Outcome | None:
     if found is None:
         return None
     descent.move_to(found.state, found.evaluation)
-    return Outcome.CORNER if found.n_sides > 1 else Outcome.CONVERGED
+    return Outcome.KINK if found.n_sides > 1 else Outcome.CONVERGED

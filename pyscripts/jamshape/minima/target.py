@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 
 from jamshape.checks import require_positive
 from jamshape.landscape import Landscape
+from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.landscape.newton import least_shift
-from jamshape.landscape.vicinity import Vicinity
 from jamshape.minima.descent import History, Minimum, Outcome, Stop, residual_of
 from jamshape.minima.minimise import minimise
 from jamshape.packing import State
@@ -353,12 +353,12 @@ def followed(landscape: Landscape, at: Minimum, strain: float) -> State:
     State
         To be minimised.
     """
-    vicinity = Vicinity(landscape, at.state)
-    newton = vicinity.newton(least_shift(landscape, at.evaluation))
+    local_model = LocalEnergyModel(landscape, at.state)
+    newton = local_model.newton(least_shift(landscape, at.evaluation))
     newton.prepare()
     [x] = newton.solve(-strain * newton.coupling[None], _PREDICTION)
-    vicinity.move(vicinity.part_within(x) * x, strain)
-    return vicinity.base
+    local_model.move(local_model.part_within(x) * x, strain)
+    return local_model.base
 
 
 def _towards(at: Minimum, u0: float, part: float = 1.0) -> float:
@@ -389,23 +389,25 @@ def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
         return at
     if at.residual.largest > _SLIDING:
         return replace(at, outcome=Outcome.STALLED)  # sufficient only for a step on the way
-    vicinity = Vicinity(landscape, at.state)
-    newton = vicinity.newton(_SOFT * landscape.k_e / landscape.length**2)
+    local_model = LocalEnergyModel(landscape, at.state)
+    newton = local_model.newton(_SOFT * landscape.k_e / landscape.length**2)
     evaluation = at.evaluation
     for _ in range(_STIFF_STEPS):
         newton.prepare()
         [relax] = newton.solve(-evaluation.gradient[None], _ACCURACY)
         stiff = evaluation._replace(gradient=evaluation.gradient + newton.shift * relax)
         slides = residual_of(landscape, stiff).largest <= target.tolerance
-        if slides or not target.is_met(evaluation.energy / vicinity.base.volume):
+        if slides or not target.is_met(evaluation.energy / local_model.base.volume):
             break
-        vicinity.move(relax, 0.0)
-        evaluation = vicinity.evaluate(0 * relax, 0.0, extended=True)
+        local_model.move(relax, 0.0)
+        evaluation = local_model.evaluate(0 * relax, 0.0, extended=True)
     if not slides:
         return replace(at, outcome=Outcome.STALLED)
     left = residual_of(landscape, evaluation)
     outcome = Outcome.CONVERGED if left.largest <= target.tolerance else Outcome.SLIDING
-    return replace(at, state=vicinity.base, evaluation=evaluation, outcome=outcome, residual=left)
+    return replace(
+        at, state=local_model.base, evaluation=evaluation, outcome=outcome, residual=left
+    )
 
 
 def halving(

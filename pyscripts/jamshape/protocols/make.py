@@ -14,7 +14,7 @@ from typing import Any
 
 from jamshape.files.h5md import read_attributes, require_attributes
 from jamshape.files.journal import remove_run
-from jamshape.measures.minimum import summary_of, write_minimum
+from jamshape.measures.packing_summary import summary_of, write_minimum
 from jamshape.protocols.by_compression import ByCompression
 from jamshape.protocols.by_dynamics import ByDynamics
 from jamshape.protocols.by_steps import BySteps

@@ -15,7 +15,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.landscape import Landscape
 from jamshape.packing import State
-from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
+from jamshape.vibration.hessian import DynamicalMatrix, DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.kinks import held_at, kinks_across
 from jamshape.vibration.sparse_modes import lowest
 from jamshape.vibration.spectrum import Spectrum, spectrum
@@ -80,7 +80,7 @@ class ModesOffKinks:
     @classmethod
     def of(cls, landscape: Landscape, state: State) -> ModesOffKinks:
         """Find the modes; twice, if modes have negative eigenvalues and kinks remove some."""
-        matrix = dynamical_matrix(landscape, state, Scope(force=True))
+        matrix = dynamical_matrix(landscape, state, DynamicalMatrixOptions(force=True))
         found = _modes(matrix)
         is_falling = (found.sign < 0) & ~found.is_translation
         kinks = kinks_across(landscape, state, matrix, found.vectors[:, is_falling])

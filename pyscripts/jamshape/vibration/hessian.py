@@ -257,7 +257,7 @@ class DynamicalMatrix(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Scope:
+class DynamicalMatrixOptions:
     """Options of `dynamical_matrix`: contacts to include and scale of rotations.
 
     Parameters
@@ -283,7 +283,7 @@ class Scope:
 
 
 def dynamical_matrix(
-    landscape: Landscape, state: State, scope: Scope | None = None
+    landscape: Landscape, state: State, options: DynamicalMatrixOptions | None = None
 ) -> DynamicalMatrix:
     """Assemble the dynamical matrix of a minimum of the energy.
 
@@ -291,7 +291,7 @@ def dynamical_matrix(
     ----------
     landscape : Landscape
     state : State
-    scope : Scope, optional
+    options : DynamicalMatrixOptions, optional
 
     Returns
     -------
@@ -306,9 +306,9 @@ def dynamical_matrix(
     CrossingError
         If two spines cross.
     """
-    scope = scope or Scope()
+    options = options or DynamicalMatrixOptions()
     evaluation = landscape.evaluate(state)
-    taken = ~landscape.rattlers(state) if scope.backbone is None else np.asarray(scope.backbone)
+    taken = ~landscape.rattlers(state) if options.backbone is None else np.asarray(options.backbone)
     if not taken.any():
         msg = (
             f"all {len(taken)} particles are rattlers, so there are no modes,"
@@ -317,15 +317,15 @@ def dynamical_matrix(
         raise ValueError(msg)
     held = np.where(taken[landscape.particle_of_coordinate()], evaluation.gradient, 0.0)
     residual = residual_of(landscape, evaluation._replace(gradient=held))
-    if residual.largest > LARGEST_RESIDUAL and not scope.force:
+    if residual.largest > LARGEST_RESIDUAL and not options.force:
         msg = (
             f"the state is not at a minimum: its largest net force is {residual.largest:.2g} of the"
             f" mean bond force, expected at most {LARGEST_RESIDUAL:g}; minimise it first (a state at rest on a"
             " kink of the energy has no modes), or use force (--force)"
         )
         raise NotAtMinimumError(msg)
-    coordinates = _coordinates(landscape, state, taken, _lengths(landscape, scope.rotation))
-    weakest = scope.least_force * evaluation.bond_force
+    coordinates = _coordinates(landscape, state, taken, _lengths(landscape, options.rotation))
+    weakest = options.least_force * evaluation.bond_force
     parts = _parts(landscape, state, coordinates, weakest)
     return _matrix(landscape, state, evaluation, parts | {"residual": residual})
 

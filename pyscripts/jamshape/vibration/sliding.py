@@ -17,7 +17,12 @@ from scipy.optimize import linprog
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.landscape import Landscape, State
-from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix, lengths_of_bonds
+from jamshape.vibration.hessian import (
+    DynamicalMatrix,
+    DynamicalMatrixOptions,
+    dynamical_matrix,
+    lengths_of_bonds,
+)
 from jamshape.vibration.sparse_modes import lowest, typical_prestress
 
 # Modes softer than this fraction of the prestress vanish at first order in it.
@@ -82,10 +87,10 @@ class Sliding:
         keeping : bool
             Whether to keep weak contacts, rather than treat them as walls: for states in force balance.
         """
-        every = dynamical_matrix(landscape, state, Scope(force=True))
+        every = dynamical_matrix(landscape, state, DynamicalMatrixOptions(force=True))
         stiffest = float(every.bonds.stiffness.max())
         weakest = _WEAK * math.sqrt(typical_prestress(every) / stiffest)
-        strong = Scope(force=True, least_force=weakest)
+        strong = DynamicalMatrixOptions(force=True, least_force=weakest)
         matrix = every if keeping else dynamical_matrix(landscape, state, strong)
         values, modes = _softest(matrix)
         slope = -((matrix.compatibility @ modes).T @ matrix.bonds.pull)

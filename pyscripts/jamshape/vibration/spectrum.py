@@ -1,7 +1,7 @@
 """Modes of a dynamical matrix M = C^T C - S, each eigenvalue with an error bound.
 
 The low bands lie ten to twenty orders of magnitude below the high one, where eigenvalues of M in doubles
-are noise; `jamshape.vibration.two_levels` resolves them, and `jamshape.vibration.sparse_modes` those of large packings.
+are noise; `jamshape.vibration.dense_modes` resolves them, and `jamshape.vibration.sparse_modes` those of large packings.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from jamshape.arrays import FloatArray
 from jamshape.landscape import Landscape, State
+from jamshape.vibration.dense_modes import Found, rank_of, two_levels
 from jamshape.vibration.hessian import DynamicalMatrix, matrix_at
 from jamshape.vibration.quotients import Products
-from jamshape.vibration.two_levels import Found, rank_of, two_levels
 
 # To estimate the error of a state, no coordinate moves by more than this fraction of a radius.
 _SHORT = 1e-3

@@ -13,9 +13,9 @@ from scipy.sparse.csgraph import connected_components
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import Packing
+from jamshape.vibration.dense_modes import rank_of
 from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum
-from jamshape.vibration.two_levels import rank_of
 
 # The gap below the high band is the widest within this fraction of all modes around the rank of H.
 _NEAR_RANK = 0.002
@@ -25,7 +25,7 @@ _NEAR_RANK_MODES = 3  # that fraction in modes, at least
 _EXCESS = 0.02
 
 # Bands separate if eigenvalues on both sides of their gap differ by this factor, the same that
-# `jamshape.vibration.two_levels` requires of modes held by stiffness alone.
+# `jamshape.vibration.dense_modes` requires of modes held by stiffness alone.
 _GAP = 3.0
 
 # Bonds with a larger share than this in further states of self stress belong to them.

@@ -9,7 +9,7 @@ from common.text import (
     system_labels,
 )
 from jamshape.drawing.text import attributes_text, scientific, system_text, systems_text, unit_text
-from jamshape.files.sets import System
+from jamshape.files.ensembles import System
 from jamshape.measures.runs import Ensemble
 from jamshape.shapes.particles import Kind, Particles
 

@@ -5,7 +5,7 @@ from squeezed import squeezed
 
 from jamshape.flow.implicit import drag_coefficients
 from jamshape.landscape import Landscape, State
-from jamshape.landscape.vicinity import Stage, Units, Vicinity
+from jamshape.landscape.local_energy_model import LocalEnergyModel, Stage, Units
 from jamshape.minima import minimise
 
 STRAIN, ACCURACY = -1e-3, 1e-5
@@ -15,7 +15,10 @@ class Posed:
     """A stage of h in time about a state, and what is minimised."""
 
     def __init__(self, landscape, state, h, extended=False, strain=STRAIN):
-        self.vicinity, self.n = Vicinity(landscape, state.strained(strain)), landscape.size
+        self.local_model, self.n = (
+            LocalEnergyModel(landscape, state.strained(strain)),
+            landscape.size,
+        )
         self.drag, self.extended = drag_coefficients(landscape) / h, extended
         found = landscape.evaluate(state)
         overlap = found.bond_force
@@ -25,10 +28,10 @@ class Posed:
 
     def solve(self, *guesses, factors=None, accuracy=ACCURACY):
         stage = Stage(self.drag, np.zeros(self.n), guesses, self.extended)
-        return self.vicinity.solve(stage, factors, self.units, accuracy)
+        return self.local_model.solve(stage, factors, self.units, accuracy)
 
     def evaluate(self, x):
-        found = self.vicinity.evaluate(x, 0.0, extended=self.extended)
+        found = self.local_model.evaluate(x, 0.0, extended=self.extended)
         return found, found.gradient + self.drag * x
 
     def size(self, x, force):
@@ -60,9 +63,9 @@ def test_stages_are_solved_in_few_evaluations_while_bonds_open_and_close(packing
         posed = Posed(*one, h, strain=4 * STRAIN)
         start = np.zeros(posed.n)
         bonds = posed.evaluate(start)[0].n_bonds
-        before = posed.vicinity.landscape.evaluations
+        before = posed.local_model.landscape.evaluations
         found = posed.solve(start, start)
-        quick = found.solved and posed.vicinity.landscape.evaluations - before <= 9
+        quick = found.solved and posed.local_model.landscape.evaluations - before <= 9
         evaluation, gradient = posed.evaluate(found.x)
         assert not found.solved or np.abs(gradient).max() < 1e-3 * posed.units.force
         solved += quick
@@ -133,7 +136,7 @@ def test_solutions_on_kinks_are_found_by_bisection(overlap_of_spines):
     found = posed.solve(still, still)
     assert found.solved
     assert landscape.evaluations > found.directions + 1
-    angle = posed.vicinity.at(found.x, STRAIN).orientation[:, 0]
+    angle = posed.local_model.at(found.x, STRAIN).orientation[:, 0]
     assert abs(angle[0] - angle[1]) < 0.1 * tilt
     # No place beside it is lower.
     turn = still.copy()
@@ -146,7 +149,7 @@ def test_solutions_on_kinks_are_found_by_bisection(overlap_of_spines):
 def test_factors_of_what_is_not_finite_are_refused(jammed):
     posed = Posed(*jammed, 1.0)
     with pytest.raises(ValueError, match="not a number"):
-        posed.vicinity.factorise(np.zeros(posed.n), 0.0, np.full(posed.n, np.nan))
+        posed.local_model.factorise(np.zeros(posed.n), 0.0, np.full(posed.n, np.nan))
     for guesses in ((np.nan, 0.0), (0.0, np.nan)):
         with pytest.raises(ValueError, match="a vector of a stage is nan"):
             posed.solve(*(np.full(posed.n, guess) for guess in guesses))

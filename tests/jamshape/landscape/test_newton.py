@@ -10,8 +10,8 @@ from squeezed import squeezed
 
 from jamshape import _contact
 from jamshape.landscape import Landscape, State
+from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.landscape.newton import least_shift
-from jamshape.landscape.vicinity import Vicinity
 from jamshape.protocols.random_start import random_packing
 
 # In space, so many particles or fewer are left to factors; more, to iterations.
@@ -26,7 +26,7 @@ def packing_named(name):
 def equations(packing, shift):
     """Newton's equations of a packing, the Hessian, and whether factors are of all of it."""
     landscape, state = Landscape(packing), State.of(packing)
-    newton = Vicinity(landscape, state).newton(shift)
+    newton = LocalEnergyModel(landscape, state).newton(shift)
     newton.prepare()
     return newton, landscape.curvature(state)
 
@@ -89,7 +89,7 @@ def test_hessians_of_minima_keep_their_shift():
     values = np.linalg.eigvalsh(landscape.curvature(state).hessian.toarray())
     shift = 1e-6
     assert values[0] > -0.5 * shift
-    newton = Vicinity(landscape, state).newton(shift)
+    newton = LocalEnergyModel(landscape, state).newton(shift)
     newton.prepare()
     assert newton.shift == shift
 
@@ -121,7 +121,7 @@ def test_first_shift_falls_with_the_forces():
 def test_equations_are_refused_before_they_are_prepared_and_of_another_size():
     packing = pressed_named("discs")
     landscape = Landscape(packing)
-    newton = Vicinity(landscape, State.of(packing)).newton(1e-3)
+    newton = LocalEnergyModel(landscape, State.of(packing)).newton(1e-3)
     right = np.ones((1, landscape.size))
     with pytest.raises(ValueError, match="not prepared, expected prepare before"):
         newton.solve(right, 1e-3)
@@ -135,4 +135,4 @@ def test_equations_are_refused_before_they_are_prepared_and_of_another_size():
         newton.solve(right, 1e-3)
     for shift in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match="the shift is not a positive number"):
-            Vicinity(landscape, State.of(packing)).newton(shift)
+            LocalEnergyModel(landscape, State.of(packing)).newton(shift)

@@ -9,8 +9,8 @@ from mixtures import bidisperse
 from jamshape import _contact
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape, State
+from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.landscape.threads import sharing, threads
-from jamshape.landscape.vicinity import Vicinity
 from jamshape.protocols.random_start import dilute_packing, random_packing
 from jamshape.shapes.particles import Particles
 
@@ -35,10 +35,10 @@ def evaluated(name, number, extended=False):
     """Evaluate, and factorise, near the state by so many threads."""
     packing, state = crowd(name)
     with sharing(number):
-        vicinity = Vicinity(Landscape(packing), state)
-    x = 1e-3 * np.random.default_rng(2).normal(size=vicinity.landscape.size)
-    found = vicinity.evaluate(x, 1e-4, extended=extended)
-    factors = vicinity.factorise(0.0 * x, 0.0, np.full(len(x), 10.0))
+        local_model = LocalEnergyModel(Landscape(packing), state)
+    x = 1e-3 * np.random.default_rng(2).normal(size=local_model.landscape.size)
+    found = local_model.evaluate(x, 1e-4, extended=extended)
+    factors = local_model.factorise(0.0 * x, 0.0, np.full(len(x), 10.0))
     return found, factors.solve(found.gradient)
 
 
@@ -66,9 +66,9 @@ def test_sums_are_the_same_by_any_number_of_threads(name, extended):
 def test_of_pairs_that_cross_the_first_is_named(number):
     packing, state = crowd("rods")
     with sharing(number):
-        vicinity = Vicinity(Landscape(packing), state)
+        local_model = LocalEnergyModel(Landscape(packing), state)
     with pytest.raises(CrossingError) as crossing:
-        vicinity.evaluate(np.zeros(vicinity.landscape.size), 0.0, extended=False)
+        local_model.evaluate(np.zeros(local_model.landscape.size), 0.0, extended=False)
     with pytest.raises(CrossingError) as expected:
         Landscape(packing).evaluate(state)
     assert str(crossing.value) == str(expected.value)
@@ -88,4 +88,4 @@ def test_what_is_no_number_of_threads_is_refused(number):
     assert threads() == 1
     packing, state = crowd("discs")
     with pytest.raises(ValueError, match="expected from 1 to 1024"):
-        Vicinity(Landscape(packing), state)._compiled.share(0)
+        LocalEnergyModel(Landscape(packing), state)._compiled.share(0)

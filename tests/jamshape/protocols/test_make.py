@@ -12,7 +12,7 @@ from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_fo
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.files.run_writer import RunWriter
 from jamshape.landscape import Landscape, State
-from jamshape.measures.minimum import measure, summary_of, write_minimum
+from jamshape.measures.packing_summary import measure, summary_of, write_minimum
 from jamshape.minima import residual_of
 from jamshape.minima.target import Target, find
 from jamshape.protocols.approach import Approach

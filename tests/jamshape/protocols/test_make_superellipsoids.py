@@ -5,7 +5,7 @@ from mixtures import superellipsoids
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
 from jamshape.landscape import Landscape, State
-from jamshape.measures.minimum import summary_of
+from jamshape.measures.packing_summary import summary_of
 from jamshape.minima import residual_of
 from jamshape.minima.target import Target, find
 from jamshape.protocols.make import Recipe, Steps, Thermalisation, make, require_same

@@ -18,7 +18,7 @@ from jamshape.protocols.make import make
 from jamshape.protocols.strict import descend, start
 from jamshape.protocols.strict_proof import Proof
 from jamshape.shapes.particles import Particles
-from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.hessian import DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.kinks import held_at
 from jamshape.vibration.sliding import Sliding
 from jamshape.vibration.spectrum import spectrum
@@ -83,7 +83,7 @@ def test_steps_end_at_walls():
     assert along > 0  # on, away from the middle
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(options="module")
 def strict(tmp_path_factory):
     out = tmp_path_factory.mktemp("strict") / "packing.h5"
     recipe = recipe_for(bidisperse(4.0), n=32, seed=5, strict=True)
@@ -94,7 +94,7 @@ def strict(tmp_path_factory):
 
 def exact_eigenvalues(landscape, state):
     """All of M = C^T C - S, each entry as it is stored, in sixty digits."""
-    matrix = dynamical_matrix(landscape, state, Scope(force=True))
+    matrix = dynamical_matrix(landscape, state, DynamicalMatrixOptions(force=True))
     with mpmath.workdps(60):
         C = mpmath.matrix(matrix.compatibility.toarray().tolist())
         S = mpmath.matrix(matrix.prestress.toarray().tolist())
@@ -132,7 +132,7 @@ def test_what_is_pushed_by_next_to_nothing_meets_its_wall(n, seed, tmp_path):
 
 def energies_beside(landscape, minimum, size):
     """Energies to both sides along the mode of the lowest eigenvalue, what is stiff relaxed, over that of a state."""
-    matrix = dynamical_matrix(landscape, minimum, Scope(force=True))
+    matrix = dynamical_matrix(landscape, minimum, DynamicalMatrixOptions(force=True))
     found = spectrum(matrix)
     own = np.flatnonzero(~found.is_translation)
     assert found.sign[own[0]] < 0
@@ -170,7 +170,7 @@ def test_a_saddle_is_no_kink():
 
 def test_a_kink_takes_the_eigenvalue_of_what_crosses_it_and_no_other():
     landscape, minimum = between_flat_sides()
-    matrix = dynamical_matrix(landscape, minimum.state, Scope(force=True))
+    matrix = dynamical_matrix(landscape, minimum.state, DynamicalMatrixOptions(force=True))
     found = spectrum(matrix)
     falling, stiffest = found.vectors[:, [0]], found.vectors[:, [-1]]
     assert spectrum(held_at(matrix, falling)).eigenvalues[0] > 1e-8 * found.eigenvalues[0]

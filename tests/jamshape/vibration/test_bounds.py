@@ -13,7 +13,7 @@ from squeezed import squeezed
 
 from jamshape.landscape import Landscape
 from jamshape.minima.target import Target, find
-from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.hessian import DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 
 DIGITS, STEP = 80, "1e-22"
@@ -105,8 +105,8 @@ def test_eigenvalues_lie_within_their_bounds_of_80_digits(alpha, seed, measured)
     minimum = find(two, start, Target(1e-13)).state
     turns = 1e-7 * np.random.default_rng(seed).normal(size=(packing.n, 1))
     state = minimum.displaced(np.zeros_like(packing.position), turns)
-    scope = Scope(force=True, backbone=~two.rattlers(state))
-    matrix = dynamical_matrix(Landscape(packing, sides=1), state, scope)
+    options = DynamicalMatrixOptions(force=True, backbone=~two.rattlers(state))
+    matrix = dynamical_matrix(Landscape(packing, sides=1), state, options)
     found = spectrum(matrix)
     with mpmath.workdps(DIGITS):
         exact = sorted(exact_spectrum(packing, state, matrix))

@@ -13,7 +13,7 @@ import jamshape as js
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Stop, minimise
 from jamshape.vibration.elasticity import moduli
-from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.hessian import DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.table import MODULI
 
@@ -97,7 +97,7 @@ def floppy():
             js.Spherocylinders(alpha=4), n=8, u0=1e-6, seed=seed, progress=False
         )
         landscape, state = Landscape(packing), State.of(packing)
-        matrix = dynamical_matrix(landscape, state, Scope(force=True))
+        matrix = dynamical_matrix(landscape, state, DynamicalMatrixOptions(force=True))
         whole = spectrum(matrix)
         if whole.is_floppy.any() and matrix.residual.largest < 1e-8:
             return landscape, state, matrix, whole
@@ -190,7 +190,11 @@ def test_a_state_that_is_no_minimum_has_no_moduli():
     landscape, minimum = jammed("rods of alpha 1", U0)
     noise = np.random.default_rng(0).normal(size=landscape.size)
     moved = landscape.displaced(minimum.state, 1e-5 * noise)
-    found = moduli(dynamical_matrix(landscape, moved, Scope(force=True)), None, (landscape, moved))
+    found = moduli(
+        dynamical_matrix(landscape, moved, DynamicalMatrixOptions(force=True)),
+        None,
+        (landscape, moved),
+    )
     for modulus in found[:3]:
         assert np.isnan(modulus.relaxed)
         assert "the state is not at a minimum: its largest net force is" in modulus.reason

@@ -14,8 +14,8 @@ from jamshape.landscape import Landscape, State
 from jamshape.packing import Box
 from jamshape.vibration.hessian import (
     LARGEST_RESIDUAL,
+    DynamicalMatrixOptions,
     NotAtMinimumError,
-    Scope,
     dynamical_matrix,
     matrix_at,
 )
@@ -48,7 +48,9 @@ def forced(packing, sides=2, **options):
     return (
         landscape,
         state,
-        dynamical_matrix(landscape, state, Scope(backbone=everyone, force=True, **options)),
+        dynamical_matrix(
+            landscape, state, DynamicalMatrixOptions(backbone=everyone, force=True, **options)
+        ),
     )
 
 
@@ -259,7 +261,9 @@ def test_three_discs():
     landscape, state = Landscape(packing), State.of(packing)
     with pytest.raises(ValueError, match="all 3 particles are rattlers"):
         dynamical_matrix(landscape, state)
-    matrix = dynamical_matrix(landscape, state, Scope(backbone=np.ones(3, bool), force=True))
+    matrix = dynamical_matrix(
+        landscape, state, DynamicalMatrixOptions(backbone=np.ones(3, bool), force=True)
+    )
     values = np.linalg.eigvalsh(matrix.stiffness.toarray())
     np.testing.assert_allclose(values, [0, 0, 0, 1.5, 1.5, 3], rtol=1e-11, atol=1e-15)
     found = spectrum(matrix)
@@ -280,7 +284,9 @@ def test_clusters_move_apart_from_each_other():
     )
     packing = discs(np.concatenate([triangle + 5, triangle + 12]), (20.0, 20.0))
     matrix = dynamical_matrix(
-        Landscape(packing), State.of(packing), Scope(backbone=np.ones(6, bool), force=True)
+        Landscape(packing),
+        State.of(packing),
+        DynamicalMatrixOptions(backbone=np.ones(6, bool), force=True),
     )
     assert matrix.translations.shape == (12, 4)
     assert spectrum(matrix).is_translation.sum() == 4
@@ -296,7 +302,7 @@ def test_one_particle_that_holds_itself_by_its_images():
     box = (4.0 - overlap, 1.0 - overlap)
     packing = make([[1.0, 0.5]], 0.0, half_length=1.5, edges=box)
     matrix = dynamical_matrix(
-        Landscape(packing), State.of(packing), Scope(backbone=np.ones(1, bool))
+        Landscape(packing), State.of(packing), DynamicalMatrixOptions(backbone=np.ones(1, bool))
     )
     assert matrix.size == 3
     found = spectrum(matrix)
@@ -360,7 +366,7 @@ def test_weak_contacts_can_be_left_out():
     matrix = matrix_of("rods of alpha 4")
     force = matrix.contacts["bond_force"].sum(axis=1)
     limit = np.sort(force)[3] / matrix.bond_force * 1.0001
-    fewer = dynamical_matrix(landscape, minimum.state, Scope(least_force=limit))
+    fewer = dynamical_matrix(landscape, minimum.state, DynamicalMatrixOptions(least_force=limit))
     assert fewer.n_left_out == 4
     assert len(fewer.contacts["kind"]) == len(force) - 4
     assert fewer.size == matrix.size
@@ -385,7 +391,7 @@ def test_a_state_that_is_no_minimum_is_refused_unless_forced():
     ) as e:
         dynamical_matrix(landscape, state)
     assert "--force" in str(e.value)
-    matrix = dynamical_matrix(landscape, state, Scope(force=True))
+    matrix = dynamical_matrix(landscape, state, DynamicalMatrixOptions(force=True))
     assert matrix.residual.largest > LARGEST_RESIDUAL
 
 
@@ -394,7 +400,9 @@ def test_boxes_may_lie_anywhere():
     packing = minimum.state.packing(landscape.particles)
     moved = packing.with_(box=Box(packing.box.lo - 1.7, packing.box.edges))
     one, other = (
-        dynamical_matrix(Landscape(p), State.of(p), Scope(force=True)).matrix.toarray()
+        dynamical_matrix(
+            Landscape(p), State.of(p), DynamicalMatrixOptions(force=True)
+        ).matrix.toarray()
         for p in (packing.with_(box=packing.box), moved)
     )
     assert_close(other, one, 1e-9)

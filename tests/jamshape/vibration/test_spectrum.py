@@ -18,7 +18,7 @@ from small_packings import (
 )
 
 from jamshape.vibration.extended import EPS, SparseRows, dense_product
-from jamshape.vibration.hessian import Scope, dynamical_matrix
+from jamshape.vibration.hessian import DynamicalMatrixOptions, dynamical_matrix
 from jamshape.vibration.quotients import grouped_error, isolated_error
 from jamshape.vibration.sparse_modes import ShiftedInverse, lowest, near
 from jamshape.vibration.spectrum import METHODS, spectrum, state_error
@@ -158,10 +158,14 @@ def test_a_sliding_mode_is_the_slope_of_the_force_along_it():
     for step in (1e-5, -1e-5):
         state = minimum.state.displaced(*matrix.coordinates.motion(step * mode))
         for _ in range(3):  # what is stiff follows
-            gradient = dynamical_matrix(landscape, state, Scope(force=True)).gradient
+            gradient = dynamical_matrix(
+                landscape, state, DynamicalMatrixOptions(force=True)
+            ).gradient
             right = found.vectors[:, stiff].T @ gradient / found.eigenvalues[stiff]
             state = state.displaced(*matrix.coordinates.motion(-found.vectors[:, stiff] @ right))
-        gradients.append(dynamical_matrix(landscape, state, Scope(force=True)).gradient)
+        gradients.append(
+            dynamical_matrix(landscape, state, DynamicalMatrixOptions(force=True)).gradient
+        )
     slope = float(mode @ (gradients[0] - gradients[1])) / 2e-5
     assert slope == pytest.approx(value, rel=1e-3)
 
@@ -170,7 +174,7 @@ def test_a_sliding_mode_is_the_slope_of_the_force_along_it():
 def test_rotation_length_changes_neither_signs_nor_zeros(name):
     landscape, minimum = jammed(name)
     one, other = (
-        spectrum(dynamical_matrix(landscape, minimum.state, Scope(rotation=r)))
+        spectrum(dynamical_matrix(landscape, minimum.state, DynamicalMatrixOptions(rotation=r)))
         for r in ("half_length", "radius")
     )
     assert sorted(one.sign) == sorted(other.sign)
@@ -187,7 +191,7 @@ def test_state_error_covers_the_way_to_the_minimum():
     away = np.random.default_rng(2).normal(size=matrix.size)
     away -= matrix.translations @ (matrix.translations.T @ away)
     state = minimum.state.displaced(*matrix.coordinates.motion(1e-11 * away))
-    shaken = dynamical_matrix(landscape, state, Scope(force=True))
+    shaken = dynamical_matrix(landscape, state, DynamicalMatrixOptions(force=True))
     found = spectrum(shaken)
     estimate = state_error(landscape, state, shaken, found)
     change = np.abs(found.eigenvalues - best.eigenvalues)

@@ -5,7 +5,7 @@ from squeezed import squeezed
 
 from jamshape.contacts import find_contacts
 from jamshape.landscape import CrossingError, Landscape, State
-from jamshape.landscape.vicinity import Vicinity
+from jamshape.landscape.local_energy_model import LocalEnergyModel
 
 STRAIN = -2e-4
 RODS = "rods of alpha 4"
@@ -17,11 +17,11 @@ def packing(request):
 
 
 def about(packing, size=1e-4):
-    """Give a vicinity, coordinates near it, and the state there."""
+    """Give a local energy model, coordinates near it, and the state there."""
     landscape, state = Landscape(packing), State.of(packing)
     x = size * np.random.default_rng(3).normal(size=landscape.size)
-    vicinity = Vicinity(landscape, state)
-    return vicinity, x, landscape.displaced(state, x).strained(STRAIN)
+    local_model = LocalEnergyModel(landscape, state)
+    return local_model, x, landscape.displaced(state, x).strained(STRAIN)
 
 
 def shifts_only(landscape, x):
@@ -33,21 +33,23 @@ def shifts_only(landscape, x):
 
 
 def test_gradient_is_the_slope_of_the_energy_where_particles_have_turned(packing):
-    vicinity, x, _ = about(packing, size=2e-2)
+    local_model, x, _ = about(packing, size=2e-2)
     rng, step = np.random.default_rng(8), 1e-7
-    slope = stretch_of(vicinity.landscape) * vicinity.evaluate(x, STRAIN, extended=True).gradient
+    slope = (
+        stretch_of(local_model.landscape) * local_model.evaluate(x, STRAIN, extended=True).gradient
+    )
     for along in rng.normal(size=(5, len(x))):
-        up, down = (vicinity.evaluate(x + k * step * along, STRAIN, extended=True).energy
+        up, down = (local_model.evaluate(x + k * step * along, STRAIN, extended=True).energy
                     for k in (1, -1))  # fmt: skip
         size = np.abs(slope).max() * np.linalg.norm(along)
         assert (up - down) / (2 * step) == pytest.approx(slope @ along, rel=0, abs=1e-7 * size)
 
 
 def test_where_nothing_has_turned_torques_are_those_of_the_landscape(packing):
-    vicinity, x, _ = about(packing)
-    x = shifts_only(vicinity.landscape, x)
-    found = vicinity.evaluate(x, STRAIN, extended=True)
-    expected = Landscape(packing).evaluate(vicinity.at(x, STRAIN))
+    local_model, x, _ = about(packing)
+    x = shifts_only(local_model.landscape, x)
+    found = local_model.evaluate(x, STRAIN, extended=True)
+    expected = Landscape(packing).evaluate(local_model.at(x, STRAIN))
     scale = np.abs(expected.gradient).max()
     assert found.gradient == pytest.approx(expected.gradient, rel=0, abs=1e-14 * scale)
 
@@ -67,28 +69,28 @@ def stretch_of(landscape):
 
 
 def require_factors_of_the_hessian(packing):
-    vicinity, x, _ = about(packing)
-    landscape = vicinity.landscape
+    local_model, x, _ = about(packing)
+    landscape = local_model.landscape
     x = shifts_only(landscape, x)
-    state, stretch = vicinity.at(x, STRAIN), stretch_of(landscape)
+    state, stretch = local_model.at(x, STRAIN), stretch_of(landscape)
     hessian = stretch[:, None] * landscape.curvature(state).hessian.toarray() * stretch
     least = min(np.linalg.eigvalsh(hessian)[0], 0.0)
     diagonal = 1.0 + np.arange(landscape.size) / landscape.size - least
     right = np.random.default_rng(4).normal(size=landscape.size)
-    vicinity.evaluate(x, STRAIN, extended=False)
-    found = vicinity.factorise(x, STRAIN, diagonal).solve(right)
+    local_model.evaluate(x, STRAIN, extended=False)
+    found = local_model.factorise(x, STRAIN, diagonal).solve(right)
     expected = np.linalg.solve(hessian + np.diag(diagonal), right)
     assert found == pytest.approx(expected, rel=0, abs=1e-11 * np.abs(expected).max())
 
 
 def test_what_is_not_positive_definite_is_shifted_no_more_than_tenfold():
-    vicinity, x, _ = about(pressed_named(RODS))
-    hessian = vicinity.landscape.curvature(vicinity.at(x, 0.0)).hessian.toarray()
+    local_model, x, _ = about(pressed_named(RODS))
+    hessian = local_model.landscape.curvature(local_model.at(x, 0.0)).hessian.toarray()
     least = np.linalg.eigvalsh(hessian)[0]
     assert least < -1e-3
     diagonal = np.full(len(x), -0.01 * least)
-    vicinity.evaluate(x, 0.0, extended=False)
-    factors = vicinity.factorise(x, 0.0, diagonal)
+    local_model.evaluate(x, 0.0, extended=False)
+    factors = local_model.factorise(x, 0.0, diagonal)
     right = np.random.default_rng(6).normal(size=len(x))
     solution = factors.solve(right)
     rest = right - hessian @ solution - diagonal * solution
@@ -100,17 +102,17 @@ def test_what_is_not_positive_definite_is_shifted_no_more_than_tenfold():
 @pytest.mark.parametrize("moves", [1, 30])
 def test_pairs_are_found_anew_where_they_no_longer_hold(packing, moves):
     landscape, state = Landscape(packing), State.of(packing)
-    vicinity, rng = Vicinity(landscape, state), np.random.default_rng(5)
+    local_model, rng = LocalEnergyModel(landscape, state), np.random.default_rng(5)
     still = np.zeros(landscape.size)
     for _ in range(moves):
         x = 0.05 * landscape.length / np.sqrt(moves) * rng.normal(size=landscape.size)
         try:
-            there = vicinity.evaluate(x, STRAIN, extended=True)
+            there = local_model.evaluate(x, STRAIN, extended=True)
         except CrossingError:
             continue
-        vicinity.move_to(vicinity.at(x, STRAIN))
-        here = vicinity.evaluate(still, 0.0, extended=True)
-    expected = Landscape(packing).evaluate(vicinity.base)
+        local_model.move_to(local_model.at(x, STRAIN))
+        here = local_model.evaluate(still, 0.0, extended=True)
+    expected = Landscape(packing).evaluate(local_model.base)
     assert there.energy == pytest.approx(expected.energy, rel=1e-12)
     assert here.energy == pytest.approx(expected.energy, rel=1e-12)
     assert here.gradient == pytest.approx(expected.gradient, rel=0, abs=1e-12)
@@ -119,7 +121,7 @@ def test_pairs_are_found_anew_where_they_no_longer_hold(packing, moves):
 def test_wide_turns_find_all_pairs(packing):
     """All particles turn by up to nearly half a rotation, from one base."""
     landscape, state = Landscape(packing), State.of(packing)
-    vicinity, rng = Vicinity(landscape, state), np.random.default_rng(9)
+    local_model, rng = LocalEnergyModel(landscape, state), np.random.default_rng(9)
     D, compared = packing.dimension, 0
     for angle in (0.3, -0.3, 1.0, -1.0, 3.0):
         components = np.zeros((packing.n, D + (1 if D == 2 else 3)))
@@ -128,12 +130,12 @@ def test_wide_turns_find_all_pairs(packing):
         components[:, D:] = angle * axis * landscape.rotation_length[:, None]
         x = landscape.coordinates(components)
         try:
-            expected = Landscape(packing).evaluate(vicinity.at(x, 0.0))
+            expected = Landscape(packing).evaluate(local_model.at(x, 0.0))
         except CrossingError:
             with pytest.raises(CrossingError):
-                vicinity.evaluate(x, 0.0, extended=True)
+                local_model.evaluate(x, 0.0, extended=True)
             continue
-        found = vicinity.evaluate(x, 0.0, extended=True)
+        found = local_model.evaluate(x, 0.0, extended=True)
         assert found.n_bonds == expected.n_bonds
         assert found.energy == pytest.approx(expected.energy, rel=1e-12)
         compared += 1
@@ -141,51 +143,51 @@ def test_wide_turns_find_all_pairs(packing):
 
 
 def test_factors_that_are_held_outlive_later_ones(packing):
-    vicinity, x, _ = about(packing)
+    local_model, x, _ = about(packing)
     right = np.ones(len(x))
-    held = vicinity.factorise(x, 0.0, np.full(len(x), 1e2))
+    held = local_model.factorise(x, 0.0, np.full(len(x), 1e2))
     before = held.solve(right)
     for diagonal in (1e3, 1e4, 1e5):
-        vicinity.factorise(x, 0.0, np.full(len(x), diagonal))
+        local_model.factorise(x, 0.0, np.full(len(x), diagonal))
     assert (held.solve(right) == before).all()
 
 
 def test_a_whole_turn_changes_nothing_and_needs_no_new_pairs():
-    vicinity, x, _ = about(pressed_named(RODS))
-    landscape = vicinity.landscape
+    local_model, x, _ = about(pressed_named(RODS))
+    landscape = local_model.landscape
     turns = np.zeros((landscape.particles.n, 3))
     turns[:, 2] = 2 * np.pi * landscape.rotation_length
-    pairs = landscape.pairs_at(vicinity.base)
-    expected = vicinity.evaluate(x, 0.0, extended=True).energy
-    vicinity.move_to(vicinity.at(landscape.coordinates(turns), 0.0))
-    assert vicinity.evaluate(x, 0.0, extended=True).energy == pytest.approx(expected, rel=1e-13)
-    assert landscape.pairs_at(vicinity.base) is pairs
+    pairs = landscape.pairs_at(local_model.base)
+    expected = local_model.evaluate(x, 0.0, extended=True).energy
+    local_model.move_to(local_model.at(landscape.coordinates(turns), 0.0))
+    assert local_model.evaluate(x, 0.0, extended=True).energy == pytest.approx(expected, rel=1e-13)
+    assert landscape.pairs_at(local_model.base) is pairs
 
 
 def test_spines_that_cross_are_named():
-    vicinity, _, _ = about(pressed_named(RODS))
-    landscape = vicinity.landscape
-    i, j = landscape.pairs_at(vicinity.base).particles[0]
-    shift = landscape.pairs_at(vicinity.base).shift[0]
+    local_model, _, _ = about(pressed_named(RODS))
+    landscape = local_model.landscape
+    i, j = landscape.pairs_at(local_model.base).particles[0]
+    shift = landscape.pairs_at(local_model.base).shift[0]
     moves = np.zeros((landscape.particles.n, 3))
-    base = vicinity.base
+    base = local_model.base
     moves[i, :2] = base.position[j] + shift * base.edges - base.position[i]
     moves[i, 2] = 0.3 * landscape.rotation_length[i]
     with pytest.raises(CrossingError, match="cross"):
-        vicinity.evaluate(landscape.coordinates(moves), 0.0, extended=False)
+        local_model.evaluate(landscape.coordinates(moves), 0.0, extended=False)
 
 
 def test_coordinates_of_another_length_are_refused():
-    vicinity, x, _ = about(pressed_named(RODS))
+    local_model, x, _ = about(pressed_named(RODS))
     with pytest.raises(ValueError, match=f"has {len(x) - 1} components, expected one for each of"):
-        vicinity.evaluate(x[1:], 0.0, extended=False)
+        local_model.evaluate(x[1:], 0.0, extended=False)
     with pytest.raises(ValueError, match="diagonal"):
-        vicinity.factorise(x, 0.0, x[1:])
+        local_model.factorise(x, 0.0, x[1:])
 
 
 def test_a_law_that_does_not_exist_is_refused():
     packing = pressed_named(RODS)
     with pytest.raises(ValueError, match="sides is 3, expected 1 or 2"):
-        Vicinity(Landscape(packing, sides=3), State.of(packing))
+        LocalEnergyModel(Landscape(packing, sides=3), State.of(packing))
     with pytest.raises(ValueError, match="k_e is -1e-07, expected a positive energy"):
-        Vicinity(Landscape(packing, k_e=-1e-7), State.of(packing))
+        LocalEnergyModel(Landscape(packing, k_e=-1e-7), State.of(packing))

@@ -1,4 +1,4 @@
-#include "bindings/vicinity.hpp"
+#include "bindings/local_energy_model.hpp"
 
 #include "contact/shapes.hpp"
 
@@ -73,7 +73,7 @@ struct CoordinateArrays {
   }
 };
 
-void check_poses(const PoseArrays &poses, const Vicinity &about)
+void check_poses(const PoseArrays &poses, const LocalEnergyModel &about)
 {
   const std::size_t N = about.n_particles(), D = about.dimension();
   const auto has_shape = [&](const Array3<double> &of, std::size_t columns) {
@@ -87,8 +87,8 @@ void check_poses(const PoseArrays &poses, const Vicinity &about)
   require_cell(poses.cell, D);
 }
 
-void take(Vicinity &of, const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift,
-          const PoseArrays &then, const Vec<3> &hold)
+void take(LocalEnergyModel &of, const Array2<std::int64_t> &pairs,
+          const Array2<std::int64_t> &shift, const PoseArrays &then, const Vec<3> &hold)
 {
   check_poses(then, of);
   require_base(of);
@@ -102,7 +102,7 @@ void take(Vicinity &of, const Array2<std::int64_t> &pairs, const Array2<std::int
           hold[2]);
 }
 
-Displacement checked(const Vicinity &of, const Array1<double> &x, double strain)
+Displacement checked(const LocalEnergyModel &of, const Array1<double> &x, double strain)
 {
   require(x.shape(0) == of.n(), "x has " + std::to_string(x.shape(0)) +
                                     " components, expected one for each of " +
@@ -113,13 +113,13 @@ Displacement checked(const Vicinity &of, const Array1<double> &x, double strain)
   return {x.data(), strain};
 }
 
-nb::object evaluate(Vicinity &of, const Array1<double> &x, double strain, bool extended)
+nb::object evaluate(LocalEnergyModel &of, const Array1<double> &x, double strain, bool extended)
 {
   const Displacement at = checked(of, x, strain);
   return of.holds(at) ? tuple_of(of.evaluate(at, extended)) : nb::none();
 }
 
-std::shared_ptr<Factors> factorise(Vicinity &of, const Array1<double> &x, double strain,
+std::shared_ptr<Factors> factorise(LocalEnergyModel &of, const Array1<double> &x, double strain,
                                    const Array1<double> &diagonal)
 {
   require(diagonal.shape(0) == of.n(), "diagonal does not have one number per coordinate.");
@@ -129,21 +129,21 @@ std::shared_ptr<Factors> factorise(Vicinity &of, const Array1<double> &x, double
   return found;
 }
 
-void move_to(Vicinity &of, const Array3<double> &position, const Array3<double> &orientation,
-             const Array3<double> &cell)
+void move_to(LocalEnergyModel &of, const Array3<double> &position,
+             const Array3<double> &orientation, const Array3<double> &cell)
 {
   const PoseArrays poses{position, orientation, cell};
   check_poses(poses, of);
   of.move_to(poses.read());
 }
 
-void hold(Vicinity &of)
+void hold(LocalEnergyModel &of)
 {
   require_base(of);
   of.hold();
 }
 
-void deform(Vicinity &of, const Array3<double> &matrix, const Array2<double> &turns)
+void deform(LocalEnergyModel &of, const Array3<double> &matrix, const Array2<double> &turns)
 {
   const std::size_t D = of.dimension();
   require_upper(matrix, D, "matrix");
@@ -158,7 +158,7 @@ void deform(Vicinity &of, const Array3<double> &matrix, const Array2<double> &tu
   of.deform(rows, turns.data());
 }
 
-nb::object poses_of(const Vicinity &about)
+nb::object poses_of(const LocalEnergyModel &about)
 {
   const std::size_t D = about.dimension(), N = about.n_particles();
   const Poses &poses = about.poses();
@@ -173,7 +173,7 @@ nb::object poses_of(const Vicinity &about)
   return nb::make_tuple(position.release(), orientation.release(), cell.release());
 }
 
-nb::object move(Vicinity &of, const Array1<double> &x, double strain)
+nb::object move(LocalEnergyModel &of, const Array1<double> &x, double strain)
 {
   of.move(checked(of, x, strain));
   return poses_of(of);
@@ -187,21 +187,22 @@ nb::object solve(const Factors &factors, const Array2<double> &right)
 
 /// Kept as a separate function: compilers limit inlining by the size of a function.
 template <class Model, int D>
-[[gnu::noinline]] std::unique_ptr<Vicinity> vicinity_of(const ShapeOf<Model> &of, Coordinates names)
+[[gnu::noinline]] std::unique_ptr<LocalEnergyModel> local_model_of(const ShapeOf<Model> &of,
+                                                                   Coordinates names)
 {
   return std::make_unique<VicinityOf<Model, D>>(of.shapes(), std::move(names), of.law());
 }
 
 }  // namespace
 
-void export_vicinity(nb::module_ &m)
+void export_local_energy_model(nb::module_ &m)
 {
   using namespace nb::literals;
   nb::class_<Factors>(m, "Factors", "Factors of a positive definite matrix.")
       .def("solve", &solve, "right"_a, "Solve for each row of right (k, n).");
   m.attr("LEAST_SHIFT") = LEAST_SHIFT;
 
-  nb::class_<Vicinity>(m, "Vicinity", "The energy of a packing about a base.")
+  nb::class_<LocalEnergyModel>(m, "LocalEnergyModel", "The energy of a packing about a base.")
       .def("move_to", &move_to, "position"_a, "orientation"_a, "cell"_a,
            "Set the base to these poses, in double-double.")
       .def("move", &move, "x"_a, "strain"_a,
@@ -212,11 +213,11 @@ void export_vicinity(nb::module_ &m)
            "D),\n"
            "in double-double, and its particles by rotation vectors (N, 1 or 3).")
       .def_prop_ro(
-          "poses", [](const Vicinity &of) { return poses_of(of); },
+          "poses", [](const LocalEnergyModel &of) { return poses_of(of); },
           "Poses of the base, in the format of move_to.")
       .def(
           "share",
-          [](Vicinity &of, std::int64_t threads) {
+          [](LocalEnergyModel &of, std::int64_t threads) {
             require_threads(threads);
             of.share(static_cast<std::size_t>(threads));
           },
@@ -231,9 +232,10 @@ void export_vicinity(nb::module_ &m)
            "not positive definite.")
       .def(
           "take_pairs",
-          [](Vicinity &of, const Array3<double> &position, const Array3<double> &orientation,
-             const Array3<double> &cell, const Array2<std::int64_t> &pairs,
-             const Array2<std::int64_t> &shift, double wide, double reach, double skin) {
+          [](LocalEnergyModel &of, const Array3<double> &position,
+             const Array3<double> &orientation, const Array3<double> &cell,
+             const Array2<std::int64_t> &pairs, const Array2<std::int64_t> &shift, double wide,
+             double reach, double skin) {
             take(of, pairs, shift, {position, orientation, cell}, {{wide, reach, skin}});
           },
           "position"_a, "orientation"_a, "cell"_a, "pairs"_a, "shift"_a, "wide"_a, "reach"_a,
@@ -244,12 +246,12 @@ void export_vicinity(nb::module_ &m)
   Shapes::each([](auto model) {
     using Model = decltype(model);
     class_of<Model>().def(
-        "vicinity",
+        "local_energy_model",
         [](const ShapeOf<Model> &of, const Array2<std::int64_t> &column,
            const Array1<double> &rotation_length, const Array1<double> &turning_radius) {
           const CoordinateArrays names{column, rotation_length, turning_radius};
           return of.in_space(
-              [&](auto D) { return vicinity_of<Model, D>(of, names.read(of.n(), D)); });
+              [&](auto D) { return local_model_of<Model, D>(of, names.read(of.n(), D)); });
         },
         "column"_a, "rotation_length"_a, "turning_radius"_a,
         "The energy about a base; column (N, 3), in space (N, 6), numbers of the coordinates\n"

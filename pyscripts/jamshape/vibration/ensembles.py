@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from jamshape.files.sets import System, system_of
+from jamshape.files.ensembles import System, system_of
 from jamshape.files.vocabulary import renamed
 from jamshape.packing import Packing
 from jamshape.shapes.table import SHAPES

@@ -20,8 +20,8 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
+from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.landscape.newton import least_shift
-from jamshape.landscape.vicinity import Vicinity
 from jamshape.minima.descent import residual_of
 
 # Largest number of steps: a handful suffice near jamming, some forty where overlaps are a third of a particle.
@@ -104,8 +104,8 @@ class Corner:
         return _NEAR * self.tolerance * self.overlap
 
     def _differentiate(self, here: Evaluation) -> None:
-        vicinity = Vicinity(self.landscape, self.base)
-        self._newton = vicinity.newton(least_shift(self.landscape, here))
+        local_model = LocalEnergyModel(self.landscape, self.base)
+        self._newton = local_model.newton(least_shift(self.landscape, here))
         self._newton.prepare()
         self._hessian: Any = self.landscape.curvature(self.base).hessian
 

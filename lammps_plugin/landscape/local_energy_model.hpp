@@ -84,9 +84,9 @@ struct LandscapeSums {
 /// Energy of a packing and its derivatives as functions of n coordinates about a base, valid as
 /// long as a list of pairs holds: the interface of integrators and minimisers, which evaluate it
 /// thousands of times, for any shape. First of all, `move_to` a base and `take` pairs.
-class Vicinity {
+class LocalEnergyModel {
  public:
-  virtual ~Vicinity() = default;
+  virtual ~LocalEnergyModel() = default;
   virtual int dimension() const = 0;
   virtual std::size_t n() const = 0;
   virtual std::size_t n_particles() const = 0;
@@ -163,8 +163,8 @@ class Vicinity {
   }
 };
 
-/// Vicinity of one shape in D dimensions.
-template <class Model, int D> class VicinityOf : public Vicinity {
+/// LocalEnergyModel of one shape in D dimensions.
+template <class Model, int D> class VicinityOf : public LocalEnergyModel {
  public:
   using Shape = typename Model::Shape;
   using Law = typename Model::Law;

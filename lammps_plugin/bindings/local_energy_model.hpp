@@ -1,7 +1,7 @@
 #pragma once
 
 #include "bindings/arrays.hpp"
-#include "landscape/vicinity.hpp"
+#include "landscape/local_energy_model.hpp"
 
 #include <algorithm>
 
@@ -26,13 +26,13 @@ inline nb::object tuple_of(const LandscapeSums &sums)
                         sums.unconverged);
 }
 
-/// Callback that gives a vicinity new pairs: a Python function of x and the strain.
-inline auto renewing(const Vicinity &of, const nb::callable &renew)
+/// Callback that gives a local energy model new pairs: a Python function of x and the strain.
+inline auto renewing(const LocalEnergyModel &of, const nb::callable &renew)
 {
   return [&of, renew](const Displacement &at) { renew(array_of(at.x, of.n()), at.strain); };
 }
 
-inline void require_base(const Vicinity &of)
+inline void require_base(const LocalEnergyModel &of)
 {
   require(of.has_base(), "there is no base yet, expected move_to before.");
 }

@@ -27,7 +27,7 @@ NewtonSystem = _contact.NewtonSystem
 
 
 class DescentEnd(NamedTuple):
-    """End of a minimisation, at the base of its vicinity."""
+    """End of a minimisation, at the base of its local energy model."""
 
     outcome: str
     evaluation: Evaluation
@@ -77,7 +77,7 @@ class Solution(NamedTuple):
     solved: bool
 
 
-class Vicinity:
+class LocalEnergyModel:
     """Energy, gradient and Hessian of a landscape around a movable base.
 
     Parameters
@@ -94,7 +94,7 @@ class Vicinity:
 
     def __init__(self, landscape: Landscape, base: State) -> None:
         self.landscape = landscape
-        self._compiled = landscape.bodies.vicinity(
+        self._compiled = landscape.bodies.local_energy_model(
             landscape.column, landscape.rotation_length, landscape.turning_radius
         )
         self._compiled.share(threads())
