@@ -4,7 +4,7 @@
     python analysis/benchmarks/scene_savings.py --quick
 
 Two instances of LAMMPS hold the same state, one as it is, one with something turned back on that the scene
-does not need (`pair_style ... general WHAT`, a fix that asks for energy and virial every step, the plane in
+does not need (`pair_style ... disable_shortcuts WHAT`, a fix that asks for energy and virial every step, the plane in
 a box of three dimensions). They take turns in one process; the cost is the median over the turns of the
 ratio of their processor times, with its quartiles. Differences are of the forces, after as many steps,
 over the largest force. A `step` is one of fix overdamped/affine with heun, a `force` an evaluation on a
@@ -160,7 +160,7 @@ def opened(stack: ExitStack, packing: Packing, case: Case, *, is_general: bool) 
         packing = lifted(packing)
     session = stack.enter_context(Session())
     session.load(packing)
-    general = f" general {case.general}" if is_general and case.general else ""
+    general = f" disable_shortcuts {case.general}" if is_general and case.general else ""
     style = packing.shape.style(packing, Interaction(1.0, 1)).commands.replace(
         "\n", f"{general}\n", 1
     )

@@ -1,6 +1,6 @@
 """One packing at several energies, relaxed from one to the next, up and down from its own.
 
-Steps in sqrt(u) are small enough for the particles to follow (`target.direct`); if they rearrange
+Steps in sqrt(u) are small enough for the particles to follow (`target.extrapolation`); if they rearrange
 nevertheless, each rung reports the fraction of the original contacts.
 """
 
@@ -20,7 +20,7 @@ from jamshape.files.h5md import read_attributes, read_packing, require_attribute
 from jamshape.landscape import Landscape, State
 from jamshape.measures.packing_summary import write_minimum
 from jamshape.minima import Minimum, Outcome, Stop, minimise
-from jamshape.minima.target import Search, Target, TargetError, direct
+from jamshape.minima.target import Search, Target, TargetError, extrapolation
 from jamshape.packing import Packing
 from jamshape.protocols.make import is_done
 from jamshape.protocols.retry import Retry, go_on
@@ -110,7 +110,7 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
     landscape = Landscape(start)
     search = Search(_opened(landscape, State.of(start), goal), goal.step)
     try:
-        for _ in direct(landscape, search, goal):
+        for _ in extrapolation(landscape, search, goal):
             pass
     except TargetError as error:
         return Rung(out, goal.u0, made=False, failure=str(error))

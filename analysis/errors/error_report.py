@@ -50,7 +50,7 @@ class Study(NamedTuple):
 
 def rods(n: int, alpha: float = 1.0) -> str:
     """Command line that makes a packing of rods."""
-    return f"pyscripts/make_packing.py --alpha {alpha:g} --n {n} --way dynamics --kappa 1e-6 --out rods_{n}.h5"
+    return f"pyscripts/make_packing.py --alpha {alpha:g} --n {n} --protocol dynamics --kappa 1e-6 --out rods_{n}.h5"
 
 
 def spheroids(n: int) -> str:

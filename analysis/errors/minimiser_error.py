@@ -8,7 +8,7 @@ is made first, by the usual way (kept in the folder, and taken from there the ne
 jammed discs, given spines of random directions. All minimisers then start from it, each particle displaced at random by
 1e-6 of its radius, which is many overlaps; the two energy targets start from it compressed by a strain of 1e-6. A curve
 is the best residual so far; the table gives the seconds to residuals of 1e-4, 1e-6 and 1e-8, or what was reached, and how
-many times as long as the direct search the paper's takes, with our minimiser and as published. Seconds are those in
+many times as long as extrapolation the paper's takes, with our minimiser and as published. Seconds are those in
 which the processor was busy; --seconds, after which a run ends, are those of the clock. Searches (--targets) that are left
 out are missing in the table, unless the folder has them.
 """
@@ -36,7 +36,7 @@ from jamshape.landscape import Landscape
 from jamshape.measures.packing_summary import write_minimum
 from jamshape.minima import History, Stop, minimise
 from jamshape.minima.minimise import Method
-from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
+from jamshape.minima.target import Search, Target, TargetError, bisection, extrapolation, find
 from jamshape.packing import Packing, State
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Recipe, is_done, make
@@ -56,13 +56,13 @@ DISPLACEMENT = 1e-6
 STRAIN = 1e-6
 NEARLY_ROUND = 0.1
 
-# Searches for u0 by method and tolerance: the direct one, to the end and to a residual that the published
+# Searches for u0 by method and tolerance: extrapolation, to the end and to a residual that the published
 # algorithm can reach; the paper's; and the paper's with the paper's minimiser. All get this much more time.
 TARGETS: dict[str, tuple[Callable[..., Any], str, float]] = {
-    "direct": (direct, "auto", 1e-7),
-    "direct to 1e-4": (direct, "auto", 1e-4),
-    "halving": (halving, "auto", 1e-7),
-    "as published": (halving, "cg_marschall", 1e-7),
+    "extrapolation": (extrapolation, "auto", 1e-7),
+    "extrapolation to 1e-4": (extrapolation, "auto", 1e-4),
+    "bisection": (bisection, "auto", 1e-7),
+    "as published": (bisection, "cg_marschall", 1e-7),
 }
 LONGER = 20.0
 
@@ -215,9 +215,9 @@ def cells(name: str, result: Row) -> Iterator[tuple[str, ...]]:
     for method, row in result["minimisers"].items():
         times = [f"{t:.3g} s" if t is not None else "-" for t in row["to"].values()]
         yield (name, method, *times, f"{row['reached']:.1e}")
-    shortest = result["targets"].get("direct to 1e-4", {"seconds": math.nan})["seconds"]
+    shortest = result["targets"].get("extrapolation to 1e-4", {"seconds": math.nan})["seconds"]
     for method, row in result["targets"].items():
-        ratio = f"{row['seconds'] / shortest:.3g} times direct to 1e-4"
+        ratio = f"{row['seconds'] / shortest:.3g} times extrapolation to 1e-4"
         outcome = f"{row['outcome']}, u off by {row['off']:.1e}"
         numbers = (f"{row['seconds']:.3g} s", ratio, outcome, f"{row['residual']:.1e}")
         yield (name, f"target, {method}", *numbers)

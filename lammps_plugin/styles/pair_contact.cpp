@@ -114,7 +114,7 @@ void PairContact::allocate()
 
 void PairContact::settings(int narg, char **arg)
 {
-  if (narg == 0 || std::string(arg[0]) == "general") return read_general(narg, arg);
+  if (narg == 0 || begins_shortcuts(arg[0])) return read_disabled_shortcuts(narg, arg);
   error->all(FLERR, "pair_style " + style_name() + " found '" + joined(narg, arg) + "', expected " +
                         settings_rule() + ".");
 }
@@ -194,7 +194,7 @@ void PairContact::measure_particles()
     }
     mine[type] = std::max(mine[type], bounding_radius(semi_axes, type));
     const Shortcut its = shortcut(semi_axes, type);
-    found[0] |= general.rotation || turns(semi_axes, type);
+    found[0] |= disabled.rotation || turns(semi_axes, type);
     found[1] |= its == Shortcut::ROUND;
     found[2] |= its == Shortcut::ELLIPSOIDS;
   }
@@ -338,22 +338,33 @@ double PairContact::largest_reach() const
    work that the present particles do not need
 ------------------------------------------------------------------------- */
 
-void PairContact::read_general(int narg, char **arg)
+bool PairContact::begins_shortcuts(const std::string &word)
 {
-  general = General();
+  return word == "disable_shortcuts" || word == "general";
+}
+
+void PairContact::read_disabled_shortcuts(int narg, char **arg)
+{
+  disabled = DisabledShortcuts();
   if (narg == 0) return;
-  bool is_known = std::string(arg[0]) == "general" && narg > 1;
+  bool is_known = begins_shortcuts(arg[0]) && narg > 1;
   for (int k = 1; k < narg; ++k) {
     const std::string what = arg[k];
-    general.rotation |= what == "rotation";
-    general.pairs |= what == "pairs";
-    general.contact |= what == "contact";
+    disabled.rotation |= what == "rotation";
+    disabled.pairs |= what == "pairs";
+    disabled.contact |= what == "contact";
     is_known = is_known && (what == "rotation" || what == "pairs" || what == "contact");
   }
-  if (is_known) return;
-  error->all(FLERR, "pair_style " + style_name() + " found '" + joined(narg, arg) +
-                        "', expected 'general' and any of rotation, pairs, contact: use it only "
-                        "for tests and timings.");
+  if (!is_known) {
+    error->all(FLERR, "pair_style " + style_name() + " found '" + joined(narg, arg) +
+                          "', expected 'disable_shortcuts' and any of rotation, pairs, contact: "
+                          "use it only for tests and timings.");
+  }
+  if (std::string(arg[0]) == "general" && comm->me == 0) {
+    error->warning(FLERR, "The keyword 'general' of pair_style " + style_name() +
+                              " is called 'disable_shortcuts' now; the old name goes with the next "
+                              "release.");
+  }
 }
 
 std::vector<std::string> PairContact::spared() const
@@ -362,11 +373,11 @@ std::vector<std::string> PairContact::spared() const
   std::vector<std::string> found{"energy and virial of steps without output"};
   if (is_plane) found.emplace_back("the third dimension");
   if (!any_turns) found.emplace_back("rotations and torques");
-  if (any_round && !general.contact) {
+  if (any_round && !disabled.contact) {
     found.emplace_back(is_plane ? "the contact search for discs"
                                 : "the contact search for spheres");
   }
-  if (any_ellipsoids && !general.contact) {
+  if (any_ellipsoids && !disabled.contact) {
     found.emplace_back(is_plane ? "the general contact search for ellipses"
                                 : "the general contact search for ellipsoids");
   }

@@ -107,12 +107,14 @@ class PairContact : public LAMMPS_NS::Pair {
   InstructionSet instructions;
   /// Shortcuts disabled although the present particles do not need the general path: for tests and
   /// timings.
-  struct General {
+  struct DisabledShortcuts {
     bool rotation = false, pairs = false, contact = false;
-  } general;
+  } disabled;
 
-  /// Reads 'general WHAT ...' from the first of these arguments on; nothing if absent.
-  void read_general(int narg, char **arg);
+  /// Reads 'disable_shortcuts WHAT ...', or nothing without arguments.
+  void read_disabled_shortcuts(int narg, char **arg);
+  /// Whether a word begins them: 'general' is the name of jamshape 0.1.
+  static bool begins_shortcuts(const std::string &word);
 
   /// Names of the style, of its energy and of the objects without a contact force, in messages.
   virtual std::string style_name() const = 0;

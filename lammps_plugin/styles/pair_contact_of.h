@@ -161,7 +161,7 @@ template <class Model> class PairContactOf : public PairContact {
 
   typename Model::Law law_of(int i, int j) const
   {
-    return Model::law(k_e[atom->type[i]][atom->type[j]], sides, !general.contact);
+    return Model::law(k_e[atom->type[i]][atom->type[j]], sides, !disabled.contact);
   }
 
   template <int D> struct Bodies {
@@ -427,7 +427,7 @@ template <class Model> class PairContactOf : public PairContact {
   {
     BodiesOf<Model, D> &bodies = all<D>().now;
     bodies.begin_shapes(static_cast<std::size_t>(n_all()));
-    packs_take_all = !general.contact;
+    packs_take_all = !disabled.contact;
     std::optional<typename Model::Shape> of_first;
     std::uint64_t checksum = 0;
     for (int i = 0; i < n_all(); ++i) {
@@ -482,7 +482,7 @@ template <class Model> class PairContactOf : public PairContact {
       const int *const neighbours = list->firstneigh[i];
       for (int k = 0; k < list->numneigh[i]; ++k) {
         const int j = neighbours[k] & NEIGHMASK;
-        if ((general.pairs || Model::template closer_than<D>(margin, body, bodies.now[j])) &&
+        if ((disabled.pairs || Model::template closer_than<D>(margin, body, bodies.now[j])) &&
             has_full_weight(i, neighbours[k])) {
           partner.push_back(j);
         }

@@ -35,14 +35,14 @@ const PairStyle<PairSpherocylinderHarmonic> listed;
 void PairSpherocylinderHarmonic::settings(int narg, char **arg)
 {
   const std::string keyword = narg >= 2 ? arg[0] : "", value = narg >= 2 ? arg[1] : "";
-  const bool is_longer = narg > 2 && std::string(arg[2]) != "general";
+  const bool is_longer = narg > 2 && !begins_shortcuts(arg[2]);
   if (keyword != "sides" || (value != "one" && value != "two") || is_longer) {
     error->all(FLERR, "pair_style spherocylinder/harmonic found '" + joined(narg, arg) +
                           "', expected 'sides one' (the dynamics' single bond) or 'sides two' (two "
                           "bonds for side-to-side contacts).");
   }
   sides = value == "one" ? Sides::ONE : Sides::TWO;
-  read_general(narg - 2, arg + 2);
+  read_disabled_shortcuts(narg - 2, arg + 2);
 }
 
 void PairSpherocylinderHarmonic::write_restart(FILE *fp)

@@ -171,6 +171,7 @@ RANGES = {
     "phi_end": Range(1e-6, 2.0, "a packing fraction"),
     "p_end": Range(1e-12, 1.0, "a pressure"),
     "tolerance": Range(1e-14, 1.0, "an error"),
+    "integration_tolerance": Range(1e-14, 1.0, "an error"),
     "accuracy": Range(1e-15, 0.5, "an error"),
     "u0": Range(1e-20, 0.01, "an energy density", also=(0.0,)),
     "largest_drop": Range(1e-6, 1.0, "a fraction of the energy", also=(math.inf,)),

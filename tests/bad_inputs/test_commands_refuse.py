@@ -20,8 +20,8 @@ NO_COUNTS = ("-1", "0", "1.5", "99999999999")
 
 COMPRESS = "compress --n 8 --kappa 1e-2 --phi-start 0.3 --phi-end 0.32 --out new.h5"
 PACK = "pack --n 8 --out new.h5"
-DYNAMICS = "pack --way dynamics --n 8 --out new.h5"
-STEPS = "pack --way steps --n 8 --out new.h5"
+DYNAMICS = "pack --protocol dynamics --n 8 --out new.h5"
+STEPS = "pack --protocol steps --n 8 --out new.h5"
 PUBLISHED = "pack --n 8 --protocol marschall-2018 --out new.h5"
 SLOW = "slow --n 8 --phi-end 0.85 --out new.h5"
 INITIAL = "initial --n 8 --phi 0.2 --out new.data"
@@ -45,7 +45,7 @@ STARTS = {
 }
 
 CASES = [
-    *each(COMPRESS, ["--kappa", "--phi-start", "--phi-end", "--dt", "--tolerance", "--alpha", "--size-ratio"],
+    *each(COMPRESS, ["--kappa", "--phi-start", "--phi-end", "--dt", "--integration-tolerance", "--alpha", "--size-ratio"],
           [*NO_NUMBERS, "inf"]),
     *each(COMPRESS, ["--n", "--rows", "--frames"], NO_COUNTS),
     *each(COMPRESS, ["--kappa", "--dt"], ["0", "1e-300", "1e3"]),
@@ -78,7 +78,7 @@ CASES = [
     (f"{COMPRESS} --again --resume", "not allowed with"),
     ("compress --n 8", "required: --out"),
     (f"{COMPRESS} --integrator rkc2 --dt 0.1", "--dt 0.1 has no effect with --integrator rkc2"),
-    (f"{COMPRESS} --dt 0.1 --tolerance 1e-4", "--tolerance 0.0001 has no effect with --integrator heun"),
+    (f"{COMPRESS} --dt 0.1 --integration-tolerance 1e-4", "--integration-tolerance 0.0001 has no effect with --integrator heun"),
     ("compress --resume --out typo.h5", "--out typo.h5 does not exist, expected the file of a run; leave --resume out"),
     *((f"compress --resume {option} --out run.h5", f"{option} differs from that of the run in --out run.h5, {own}, expected the same")
       for option, own in (("--kappa 1e-05", "0.01"), ("--n 9", "8"), ("--phi-end 0.9", "0.32"), ("--dimension 3", "2"),
@@ -106,7 +106,7 @@ CASES = [
     (f"{STEPS} --protocol yuan", "invalid choice"),
     (f"{STEPS} --protocol marschall-2018", "has no effect with --protocol marschall-2018, expected one of them"),
     (f"{STEPS} --protocol 1 --n-sweeps 5", "does not apply to the protocol yuan-2019-1"),
-    (f"{STEPS} --start run.h5", "does not apply to the way"),
+    (f"{STEPS} --start run.h5", "does not apply to the protocol"),
     (f"{DYNAMICS} --kappa 1e-14", "use jamshape slow, whose steps are implicit"),
     *each(PUBLISHED, ["--kappa", "--phi-start", "--phi-end", "--u0", "--tolerance"], NO_NUMBERS),
     (f"{PUBLISHED} --kappa 1e-12", "at least 1e-10"),
@@ -114,8 +114,8 @@ CASES = [
     (f"{PUBLISHED} --p-end 1e-3", "does not apply to the protocol marschall-2018"),
     (f"{PUBLISHED} --u0 0", "--u0 0 does not work with the protocol marschall-2018"),
     (f"{PUBLISHED} --search blind", "invalid choice"),
-    (f"{PUBLISHED} --search halving --minimiser none", "invalid choice"),
-    (f"{PUBLISHED} --minimiser cg_marschall", "--minimiser cg_marschall has no effect with the search direct"),
+    (f"{PUBLISHED} --search bisection --minimiser none", "invalid choice"),
+    (f"{PUBLISHED} --minimiser cg_marschall", "--minimiser cg_marschall has no effect with the search extrapolation"),
     *((f"{PUBLISHED} --start {name}", sentence) for name, sentence in STARTS.items()),
     (f"{PUBLISHED} --start run.h5 --n 9", "--n 9 differs from 8 of --start run.h5; leave it out"),
     (f"{PUBLISHED} --start run.h5 --alpha 3", "requested, Particles\\('spherocylinder', alpha=3"),
@@ -123,18 +123,18 @@ CASES = [
     (f"{PUBLISHED} --start run.h5 --kappa 1e-6", "--kappa 1e-06 has no effect on a start that is already compressed"),
     ("sweep --alpha 1 --protocol marschall-2018 --start run.h5 --out new", "--start is run.h5, which has no effect"),
     (f"{STEPS} --protocol 2 --phi-thermal 0.2", "a start at a smaller packing fraction"),
-    (f"{STEPS} --kappa 1e-6", "does not apply to the way"),
-    (f"{PACK} --kappa 1e-6", "--kappa does not apply to the way by quasistatic, expected another way or setting"),
+    (f"{STEPS} --kappa 1e-6", "does not apply to the protocol"),
+    (f"{PACK} --kappa 1e-6", "--kappa does not apply to the protocol by quasistatic, expected another way or setting"),
     (f"{STEPS} --accuracy 1e-6", "--accuracy 1e-06 has no effect without --u0, expected both or neither"),
-    (f"{DYNAMICS} --delta-phi 1e-3", "does not apply to the way"),
-    (f"{PACK} --way walking", "invalid choice"),
-    (f"{DYNAMICS} --u0 0", "--u0 0 does not work with the way by dynamics"),
+    (f"{DYNAMICS} --delta-phi 1e-3", "does not apply to the protocol"),
+    (f"{PACK} --protocol walking", "invalid choice"),
+    (f"{DYNAMICS} --u0 0", "--u0 0 does not work with the protocol dynamics"),
     *((f"{way} --u0 0.01", "take another u0") for way in (PACK, DYNAMICS, STEPS)),
     (f"{DYNAMICS} --kappa 1e-2", "at most kappa_start"),
     *((f"pack --n 8 --out {name}", "expected") for name in ("start.h5", "run.h5", "text.h5", "empty.h5")),
     ("pack --n 8 --out 'a folder'", "folder"),
-    ("pack --way steps --n 8 --out 'a\nb.h5'", "control character"),
-    *each(SLOW, ["--kappa", "--phi-start", "--phi-end", "--tolerance", "--largest-drop", "--p-end", "--alpha"],
+    ("pack --protocol steps --n 8 --out 'a\nb.h5'", "control character"),
+    *each(SLOW, ["--kappa", "--phi-start", "--phi-end", "--integration-tolerance", "--largest-drop", "--p-end", "--alpha"],
           NO_NUMBERS),
     *each(f"{SLOW} --phi-slow 0.82", ["--kappa-before"], ["0", *NO_NUMBERS]),
     *each(SLOW, ["--n"], NO_COUNTS),
@@ -156,7 +156,7 @@ CASES = [
       for command in ("shear", "aqs") for option in ("--phi 0.7", "--n 8", "--seed 1", "--dimension 2")),
     ("shear --start start.h5 --alpha 4 --out new.h5", "has no effect with --start start.h5"),
     ("shear --n 8 --integrator rkc2 --dt 0.1 --out new.h5", "--dt 0.1 has no effect with --integrator rkc2"),
-    ("shear --n 8 --dt 0.1 --tolerance 1e-4 --out new.h5", "--tolerance 0.0001 has no effect with --integrator heun"),
+    ("shear --n 8 --dt 0.1 --integration-tolerance 1e-4 --out new.h5", "--integration-tolerance 0.0001 has no effect with --integrator heun"),
     ("shear --n 8 --gdot 1e-8 --frames 3 --out new.h5", "--frames 3 has no effect with --integrator tr-bdf2"),
     ("slow --start start.h5 --phi-end 0.2 --out new.h5", "expected less than phi_end"),
     *((f"slow --n 8 --out {name}", "expected") for name in ("start.h5", "text.h5", "empty.h5")),

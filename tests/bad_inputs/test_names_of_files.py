@@ -44,7 +44,7 @@ def test_commands_write_where_they_are_told(tmp_path, monkeypatch):
     run("pack", *few, "--u0", 1e-8, "--out", packing)
     slow = folder / f"{STRANGE} compressed.h5"
     quick = ("--phi-start", 0.55, "--kappa", 1e-5, "--p-end", 3e-3)
-    run("pack", *few, "--u0", 1e-8, "--way", "dynamics", *quick, "--out", slow)
+    run("pack", *few, "--u0", 1e-8, "--protocol", "dynamics", *quick, "--out", slow)
     # The run of a packing stays, other energies may be looked for from it.
     assert {path.name for path in folder.iterdir()} == {
         *(path.name for path in paths.values()), packing.name, slow.name, f"{slow.name}.run.h5",

@@ -146,7 +146,7 @@ def cases():
         "shear frames": shear(gdot=1e-8, frames=3),
         "aqs start and seed": lambda: js.quasistatic_shear(start="start.h5", seed=2, file="new.h5"),
         "compress dt": compress(integrator="rkc2", dt=0.1),
-        "compress tolerance": compress(dt=0.1, tolerance=1e-3),
+        "compress tolerance": compress(dt=0.1, integration_tolerance=1e-3),
         "make accuracy": make(way="steps", accuracy=1e-6),
         "modes method and lowest": modes(method="refined", lowest=4),
         "plot color of a run": lambda: js.plot(js.load("run.h5"), color="nematic"),

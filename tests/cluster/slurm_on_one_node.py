@@ -71,7 +71,7 @@ PartitionName=short Nodes={node} Default=YES MaxTime=60 State=UP
 """
 
 # A packing takes seconds, long enough to be cut off on its way, which LAMMPS goes in steps of srun.
-PACKING = "--n 32 --way dynamics --kappa 1e-6"
+PACKING = "--n 32 --protocol dynamics --kappa 1e-6"
 SAMPLES, CHUNK = 8, 2
 SWEEP = {"out": "sweep", "sweep": f"--alpha 4 --samples {SAMPLES} {PACKING}", "chunk": str(CHUNK)}
 JOBS = SAMPLES // CHUNK

@@ -53,7 +53,7 @@ def test_a_run_reaches_its_end_and_reports_it(whole):
 
 def test_integrators_that_choose_their_steps_take_rows_as_steps(tmp_path):
     out, tolerance = tmp_path / "rkc2.h5", 1e-3
-    options = ("--sides", "2", "--integrator", "rkc2", "--tolerance", str(tolerance))
+    options = ("--sides", "2", "--integrator", "rkc2", "--integration-tolerance", str(tolerance))
     chosen = {"settings": [word for word in SMALL if word not in {"--dt", "0.1"}]}
     finished = run(out, *options, **chosen)
     assert finished.returncode == 0, finished.stderr

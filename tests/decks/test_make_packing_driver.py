@@ -17,7 +17,7 @@ pytestmark = pytest.mark.lammps
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "make_packing.py"
 USUAL = ("--n", "16", "--alpha", "1", "--phi-start", "0.6", "--u0", "1e-9")
-SMALL = (*USUAL, "--way", "dynamics", "--kappa", "1e-5", "--p-end", "3e-3")
+SMALL = (*USUAL, "--protocol", "dynamics", "--kappa", "1e-5", "--p-end", "3e-3")
 
 
 def run(*options):
@@ -47,7 +47,7 @@ def test_a_run_ends_with_one_json_line_and_says_whether_it_got_there(made):
     assert report["out"] == str(out)
     assert (report["n"], report["alpha"], report["seed"]) == (16, 1.0, 1)
     assert report["reached"] is (finished.returncode == 0)
-    assert report["reached"] is (report["outcome"] in {"converged", "corner"})
+    assert report["reached"] is (report["outcome"] in {"converged", "kink"})
     assert report["u"] == pytest.approx(1e-9, rel=1e-7, abs=0)
     assert report["phi"] > report["phi_J"]
 
@@ -89,12 +89,12 @@ def test_the_usual_way_leaves_the_packing_and_nothing_else(tmp_path):
     report, stored = json.loads(finished.stdout), read_attributes(out)
     assert report["reached"] is True
     assert report["u"] == pytest.approx(1e-9, rel=1e-7, abs=0)
-    assert stored["way"] == "quasistatic"
+    assert stored["protocol"] == "quasistatic"
     assert not {"kappa", "protocol"} & stored.keys()
     for path in (out, tmp_path / "none.h5"):
         refused = run(*USUAL, "--kappa", "1e-5", "--out", path)
         assert refused.returncode == 1
-        assert "kappa does not apply to the way by quasistatic" in refused.stderr
+        assert "kappa does not apply to the protocol quasistatic" in refused.stderr
 
 
 def test_a_finished_file_is_left_alone(made):
@@ -121,7 +121,7 @@ def assert_one_sentence(failed, words):
         (("--u0", "-1"), "u0 is -1.0, expected 0 or an energy density from 1e-20 to 0.01"),
         (
             ("--u0", "0"),
-            "--u0 0 does not work with the way by dynamics, expected a positive one",
+            "--u0 0 does not work with the protocol dynamics, expected a positive one",
         ),
         (("--u0", "nan"), "u0 is nan, expected 0 or an energy density"),
         (("--n", "0"), "n is 0, expected a whole number of particles from 1"),

@@ -15,7 +15,7 @@ from jamshape.files.h5md import read_attributes, read_packing
 pytestmark = pytest.mark.lammps
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "sweep.py"
-DYNAMICS = ("--way", "dynamics", "--kappa", "1e-5", "--p-end", "3e-3")
+DYNAMICS = ("--protocol", "dynamics", "--kappa", "1e-5", "--p-end", "3e-3")
 FAST = ("--n", "16", *DYNAMICS, "--phi-start", "0.55", "--u0", "1e-6")
 IMPOSSIBLE = "1e6"  # so long that it meets its own images in any direction
 

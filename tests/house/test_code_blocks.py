@@ -67,7 +67,7 @@ SMALL = "--n 16 --phi-start 0.55 --u0 1e-6"
 # Few steps: each waits for the other rank, which takes long where all cores are busy.
 DECK = "-var n 16 -var kappa 1e-2 -var dt 0.1 -var phi_end 0.42 -var rows 4 -var frames 2"
 QUICK = [
-    Told("*", "--search halving", "--u0 1e-5 --accuracy 0.2 --tolerance 1e-2"),
+    Told("*", "--search bisection", "--u0 1e-5 --accuracy 0.2 --tolerance 1e-2"),
     Told("*/protocols.md", "--start", "--u0 1e-6"),
     Told("*", "--protocol marschall-2018", "--n 16 --alpha 1 --phi-start 0.55 --kappa 1e-4 --u0 1e-6"),
     Told("*", "--protocol yuan-2019-1", "--n 16 --delta-phi 0.02 --tolerance 1e-1 --phi-start 0.3"),

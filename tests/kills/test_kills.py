@@ -21,8 +21,8 @@ pytestmark = pytest.mark.lammps
 
 RODS = ("--alpha", 1, "--n", 16)
 PACK = (*RODS, "--phi-start", 0.55, "--u0", 1e-6)
-DYNAMICS = (*PACK, "--way", "dynamics", "--kappa", 1e-5, "--p-end", 3e-3)
-STEPS = (*PACK, "--way", "steps", "--delta-phi", 5e-3)
+DYNAMICS = (*PACK, "--protocol", "dynamics", "--kappa", 1e-5, "--p-end", 3e-3)
+STEPS = (*PACK, "--protocol", "steps", "--delta-phi", 5e-3)
 # From the 1.6e-6 of its first jammed frame the search takes tens of steps, not hundreds.
 PUBLISHED = (*RODS, "--phi-start", 0.55, "--u0", 1.5e-6, "--protocol", "marschall-2018")
 
@@ -112,7 +112,7 @@ CASES = {
         patches=(("jamshape.protocols.by_steps._STORE_SECONDS", 0.0),),
     ),
     "pack as published": Case(
-        ("pack", *PUBLISHED, "--kappa", 1e-4, "--search", "halving"),
+        ("pack", *PUBLISHED, "--kappa", 1e-4, "--search", "bisection"),
         ("packing.h5",),
     ),
     "slow": Case(

@@ -19,7 +19,7 @@ def runs(tmp_path_factory):
     for phi in (0.85, 0.95):
         for gdot, how in (
             (1e-2, {"frames": 10}),
-            (3e-3, {"integrator": "tr-bdf2", "tolerance": 1e-1}),
+            (3e-3, {"integrator": "tr-bdf2", "integration_tolerance": 1e-1}),
         ):
             path = folder / f"phi{phi}_g{gdot}.h5"
             js.shear(js.Spherocylinders(alpha=2), n=12, phi=phi, gdot=gdot, strain=0.5, rows=60,

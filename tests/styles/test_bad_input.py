@@ -111,10 +111,12 @@ def test_sides_are_one_or_two(words, sentence_of):
     )
 
 
-@pytest.mark.parametrize("words", ["general", "general turns", "general pairs contacts"])
+@pytest.mark.parametrize(
+    "words", ["disable_shortcuts", "general turns", "disable_shortcuts pairs contacts"]
+)
 def test_general_names_what_is_turned_back_on(words, sentence_of):
     assert sentence_of(f"pair_style spherocylinder/harmonic sides one {words}") == (
-        f"pair_style spherocylinder/harmonic found '{words}', expected 'general' and any of "
+        f"pair_style spherocylinder/harmonic found '{words}', expected 'disable_shortcuts' and any of "
         "rotation, pairs, contact: use it only for tests and timings."
     )
 
@@ -239,7 +241,7 @@ def test_exponents_are_convex_and_belong_to_types(command, sentence, sentence_of
     assert sentence_of(command, two_bodies()) in refusals(command.split()[-1], sentence)
 
 
-@pytest.mark.parametrize("words", ["p 1.5", "general", "general turns"])
+@pytest.mark.parametrize("words", ["p 1.5", "general", "disable_shortcuts turns"])
 def test_words_that_no_dimer_style_knows(words, sentence_of):
     found = sentence_of(f"pair_style dimer/harmonic {words}")
     assert found.startswith(f"pair_style dimer/harmonic found '{words}', expected ")

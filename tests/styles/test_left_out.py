@@ -11,7 +11,7 @@ from jamshape.lammps.session import Session
 
 pytestmark = pytest.mark.lammps
 
-EVERYTHING = "general rotation pairs contact"
+EVERYTHING = "disable_shortcuts rotation pairs contact"
 RODS = "pair_style spherocylinder/harmonic sides one"
 FLOW = "fix move all overdamped/affine drag 1.0 compress 1e-4"
 STEP = "timestep 0.01"

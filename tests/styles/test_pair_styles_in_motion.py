@@ -81,7 +81,7 @@ ALL_OF_IT = "rotation pairs contact"
 def test_what_is_left_out_changes_nothing(name, what, tmp_path):
     """Forces at the start, and where the dynamics lead in fifty steps."""
     packing, ends = packing_of(name), []
-    for general in ("", f"general {what}"):
+    for general in ("", f"disable_shortcuts {what}"):
         with loaded(packing, tmp_path, sides="one", general=general) as session:
             session.commands(f"{drive(1e-4, 0.005)}\nrun 0")
             start = state_of(session, packing)

@@ -110,7 +110,7 @@ BENCHES = {
             for p, phi in ((1, 0.70), (2, 0.72))
         ),
         n=(1000,),
-        compress="--kappa 1e-2 --integrator rkc2 --tolerance 1e-2 --phi-start 0.15 --frames 1",
+        compress="--kappa 1e-2 --integrator rkc2 --integration-tolerance 1e-2 --phi-start 0.15 --frames 1",
         step="fix flow all overdamped/affine drag 1 compress 1e-5 integrator heun\ntimestep 0.01",
         most_steps={"nve": 200, "step": 2000},
         styles={

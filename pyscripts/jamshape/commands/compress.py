@@ -22,6 +22,7 @@ from jamshape.files.h5md import read_attributes, read_style
 from jamshape.flow.recording import summary_of
 from jamshape.front.compressing import PHI, compress
 from jamshape.front.recorded import resume
+from jamshape.old_names import add_old_option
 from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
 
 GO_ON = "the same command with --resume resumes from the last restart file"
@@ -33,7 +34,7 @@ _SETTINGS = (
     "seed",
     "integrator",
     "dt",
-    "tolerance",
+    "integration_tolerance",
     "sides",
     "rows",
     "frames",
@@ -54,11 +55,16 @@ def options_of() -> ArgumentParser:
         ("--phi-start", 0.4, "packing fraction of the random start"),
         ("--phi-end", 0.9, "final packing fraction"),
         ("--sides", 2, "bonds of a side-to-side contact; 1 in the dynamics of Marschall & Teitel"),
-        ("--tolerance", 1e-4, "local error over the typical overlap, of rkc2 and heun/adaptive"),
+        (
+            "--integration-tolerance",
+            1e-4,
+            "local error over the typical overlap, of rkc2 and heun/adaptive",
+        ),
         ("--seed", 1, "random seed of the start"),
         ("--rows", 400, "samples of p(phi)"),
         ("--frames", 20, "snapshots"),
     )
+    add_old_option(parser, "--tolerance", "--integration-tolerance", type=float)
     usual = "rkc2; heun with --dt or --sides 1"
     parser.add_argument("--integrator", help=f"heun, heun/adaptive or rkc2 ({usual})")
     parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
@@ -100,7 +106,11 @@ def _require_same(options: Namespace) -> None:
     if are_particles_given(options):
         asked |= particles_of(options).told
     for name, value in asked.items():
-        own = read_style(options.out)[1] if name == "dimension" else stored.get(name, value)
+        own = (
+            read_style(options.out)[1]
+            if name == "dimension"
+            else stored.get(name.removeprefix("integration_"), value)
+        )
         same = math.isclose(own, value, rel_tol=_SAME) if isinstance(value, float) else own == value
         if not same:
             said = f"{{{name}}} differs from that of the run in {{file}}, {own}, expected the same; leave it out"

@@ -21,6 +21,7 @@ from jamshape.flow.motion import INTEGRATORS
 from jamshape.flow.shear import FLOWS
 from jamshape.front.shearing import shear
 from jamshape.measures.shears import shear_report
+from jamshape.old_names import add_old_option
 from jamshape.shapes.command_line import add_particle_options, particles_beside
 
 GO_ON = "the same command resumes from the last restart file"
@@ -47,7 +48,8 @@ def options_of() -> ArgumentParser:
     names = f"{', '.join(INTEGRATORS)}; implicit: {', '.join(METHODS)}"
     parser.add_argument("--integrator", help=f"{names} ({usual})")
     error = "local error over the typical overlap, except heun (1e-4; implicit steps 1e-3)"
-    parser.add_argument("--tolerance", type=float, help=error)
+    parser.add_argument("--integration-tolerance", type=float, help=error)
+    add_old_option(parser, "--tolerance", "--integration-tolerance", type=float)
     parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
     parser.add_argument("--after", type=float, help="strain at which averaging begins (automatic)")
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
@@ -61,7 +63,7 @@ def main(options: Namespace) -> None:
     if options.after is not None:
         require_in("--after", options.after, RANGES["strain"]._replace(also=(0.0,)))
     names = ("n", "dimension", "phi", "gdot", "strain", "flow", "seed", "start", "sides",
-             "integrator", "dt", "tolerance", "rows", "frames", "again")  # fmt: skip
+             "integrator", "dt", "integration_tolerance", "rows", "frames", "again")  # fmt: skip
     given = typed(options, *names)
     shear(particles_beside(options), **given, file=options.out)
     report(shear_report(options.out, options.after))

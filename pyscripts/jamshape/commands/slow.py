@@ -21,6 +21,7 @@ from jamshape.commands.onset import add_onset_options, tell_onset
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.slow_recording import summary_of
 from jamshape.front.compressing import slow_compress
+from jamshape.old_names import add_old_option
 from jamshape.shapes.command_line import add_particle_options, particles_beside
 
 GO_ON = "the same command resumes from the last frame"
@@ -47,13 +48,14 @@ def options_of() -> ArgumentParser:
         ("--phi-end", _PHI_END, "final packing fraction"),
         ("--p-end", math.inf, "final pressure"),
         ("--seed", 1, "random seed of the start"),
-        ("--tolerance", 1e-3, "local error of a step over the typical overlap"),
+        ("--integration-tolerance", 1e-3, "local error of a step over the typical overlap"),
         (
             "--largest-drop",
             math.inf,
             "fraction of the energy that a step may lose (plastic events)",
         ),
     )
+    add_old_option(parser, "--tolerance", "--integration-tolerance", type=float)
     parser.add_argument("--method", choices=METHODS, default="tr-bdf2")
     add_onset_options(parser)
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
@@ -80,7 +82,7 @@ def _rates(options: Namespace) -> dict[str, Any]:
 def main(options: Namespace) -> None:
     """Begin or resume; a finished run is left alone."""
     require_no_effect("start", options.start, phi_start=options.phi_start)
-    names = ("n", "p_end", "seed", "start", "method", "tolerance", "largest_drop")
+    names = ("n", "p_end", "seed", "start", "method", "integration_tolerance", "largest_drop")
     given = typed(options, *names) | _rates(options)
     phi_end = _PHI_END if options.phi_end is None else options.phi_end
     phi = (options.phi_start, phi_end)

@@ -129,6 +129,6 @@ def system_of(attributes: Mapping[str, Any], shape: str, dimension: int) -> Syst
     told = set(names) <= attributes.keys()
     known = tuple((name, float(attributes[name])) for name in names if told)
     kinds = str(attributes.get("kinds", ""))
-    protocol = str(protocol_named(attributes.get("protocol", attributes.get("way", ""))))
+    protocol = str(protocol_named(attributes.get("protocol", "")))
     sweeps = int(attributes.get("n_sweeps", 0))
     return System(shape, dimension, known, kinds, protocol, sweeps)

@@ -13,7 +13,7 @@ from typing import Any
 
 from jamshape.checks import NotReachedWarning
 
-AT_REST = ("converged", "corner")
+AT_REST = ("converged", "kink")
 """Outcomes of minimisations after which forces balance."""
 
 _SLIDING = "sliding"  # remaining forces lie along sliding modes; they may be below the tolerance
@@ -33,7 +33,7 @@ def is_reached(known: Mapping[str, Any]) -> bool:
 
     Examples
     --------
-    >>> is_reached({"outcome": "corner"}), is_reached({"outcome": "stalled"})
+    >>> is_reached({"outcome": "kink"}), is_reached({"outcome": "stalled"})
     (True, False)
     >>> is_reached({"outcome": "sliding", "residual": 2e-7, "tolerance": 1e-8})
     False

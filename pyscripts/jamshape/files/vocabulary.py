@@ -1,13 +1,15 @@
 """Names of attributes and observables, and their translation from earlier versions.
 
 Earlier, `p` was the pressure, and in files of bodies with axis ratios `w1` and `w2` the exponent; the
-protocols of Yuan et al. 2019 were numbered 1 and 2.
+protocols of Yuan et al. 2019 were numbered 1 and 2. Values that were renamed are in `jamshape.old_names`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
 from typing import Any, TypeVar
+
+from jamshape.old_names import stored
 
 _Value = TypeVar("_Value")
 
@@ -39,9 +41,12 @@ def renamed(found: Mapping[str, _Value]) -> dict[str, _Value]:
     {'alpha': 4.0, 'pressure': 1e-08}
     >>> renamed({"p": 1.5, "w1": 1.0, "pressure": 1e-6})
     {'exponent': 1.5, 'w1': 1.0, 'pressure': 1e-06}
+    >>> renamed({"way": "quasistatic", "outcome": "corner"})
+    {'protocol': 'quasistatic', 'outcome': 'kink'}
     """
-    new = "exponent" if _RATIO in found else _PRESSURE
-    return {new if name == _OLD else name: value for name, value in found.items()}
+    names = {_OLD: "exponent" if _RATIO in found else _PRESSURE, "way": "protocol"}
+    now = {names.get(name, name): value for name, value in found.items()}
+    return {name: stored(name, value) for name, value in now.items()}
 
 
 def protocol_named(value: Any) -> Any:

@@ -27,6 +27,7 @@ from jamshape.front.progress import place
 from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import RunFile
 from jamshape.front.starts import Asked, Start
+from jamshape.old_names import accepts_old
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.random_start import random_packing
@@ -43,6 +44,7 @@ _PHI_RANDOM = 0.4  # of the random start of a slow compression
 _PHI_SLOW = Range(0.41, 2.0, "a packing fraction above that of the random start, which is 0.4,")
 
 
+@accepts_old(tolerance="integration_tolerance")
 @checked
 def compress(
     particles: Particles,
@@ -55,7 +57,7 @@ def compress(
     sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
-    tolerance: float | None = None,
+    integration_tolerance: float | None = None,
     rows: int = 400,
     frames: int = 20,
     file: str | Path | None = None,
@@ -85,7 +87,7 @@ def compress(
         fastest, by default, and ``heun`` where there is one bond or `dt` is given.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 by default.
-    tolerance : float, optional
+    integration_tolerance : float, optional
         Local error of a step over the typical overlap, for the other integrators; 1e-4 by default.
     rows, frames : int
         Numbers of samples of p(phi) and of snapshots to keep.
@@ -119,17 +121,18 @@ def compress(
     require_rising(*phi)
     require_stated(n=n, seed=seed, kappa=kappa, rows=rows, frames=frames)
     require_one_of("dimension", dimension, (2, 3))
-    require_given(dt=dt, tolerance=tolerance)
+    require_given(dt=dt, integration_tolerance=integration_tolerance)
     integrator = integrator or ("rkc2" if dt is None and sides == 2 else "heun")
     settings = Compression(
         kappa=kappa, phi_end=phi[1], dt=_DT if dt is None else dt,
-        sides=sides, integrator=integrator, tolerance=_ERROR if tolerance is None else tolerance,
+        sides=sides, integrator=integrator,
+        tolerance=_ERROR if integration_tolerance is None else integration_tolerance,
     )  # fmt: skip
     if settings.chooses_steps:
         require_no_effect("integrator", integrator, dt=dt)
         settings = settings.in_steps(phi[0], rows, dimension)
     else:
-        require_no_effect("integrator", integrator, tolerance=tolerance)
+        require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
     settings.steps(phi[0], dimension)  # refuses what does not end
     at = place(file, "run.h5")
     require_path(at.path)
@@ -144,6 +147,7 @@ def compress(
     return RunFile(*at)
 
 
+@accepts_old(tolerance="integration_tolerance")
 @checked
 def slow_compress(
     particles: Particles | None = None,
@@ -155,7 +159,7 @@ def slow_compress(
     seed: int | None = None,
     start: Packing | str | Path | None = None,
     method: str = "tr-bdf2",
-    tolerance: float = 1e-3,
+    integration_tolerance: float = 1e-3,
     largest_drop: float = math.inf,
     file: str | Path | None = None,
     again: bool = False,
@@ -183,7 +187,7 @@ def slow_compress(
         Initial packing; the last frame of a file.
     method : {"tr-bdf2", "sdirk2", ...}
         A name of `jamshape.flow.implicit.METHODS`.
-    tolerance : float
+    integration_tolerance : float
         Local error of a step over the typical overlap.
     largest_drop : float
         Fraction of the elastic energy that one step may lose, so that plastic events are resolved in time.
@@ -217,11 +221,15 @@ def slow_compress(
     """
     require_no_effect("start", start, particles=particles, n=n, seed=seed)
     phi_start, phi_end = phi or (None, _PHI_SLOW_USUAL[1])
-    require_stated(phi_end=phi_end, tolerance=tolerance, largest_drop=largest_drop)
+    require_stated(
+        phi_end=phi_end, integration_tolerance=integration_tolerance, largest_drop=largest_drop
+    )
     if p_end != math.inf:
         require_stated(p_end=p_end)
     rates = tuple(kappa) if isinstance(kappa, Iterable) else float(kappa)
-    protocol = Protocol(rates, phi_end, p_end, tolerance, largest_drop=largest_drop, method=method)
+    protocol = Protocol(
+        rates, phi_end, p_end, integration_tolerance, largest_drop=largest_drop, method=method
+    )
     for _, rate in protocol.rates:
         require_stated(kappa=rate)
     at = place(file, "slow.h5")

@@ -10,11 +10,13 @@ from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import Told, follow, place
 from jamshape.landscape.threads import sharing
+from jamshape.old_names import accepts_old
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Progress, is_done, make, require_same, tidy
 from jamshape.shapes.particles import Particles
 
 
+@accepts_old(way="protocol")
 @checked
 def make_packing(
     particles: Particles | None = None,
@@ -25,7 +27,6 @@ def make_packing(
     u0: float | None = None,
     accuracy: float | None = None,
     tolerance: float | None = None,
-    way: str | None = None,
     phi_start: float | None = None,
     kappa: float | None = None,
     p_end: float | None = None,
@@ -64,10 +65,6 @@ def make_packing(
     tolerance : float, optional
         Largest net force and torque on a particle over the mean force of a bond; 1e-8 by default, or
         1e-4 for equal steps.
-    way : {"quasistatic", "dynamics", "steps"}, optional
-        Route to jamming: quasistatic steps that are large far from jamming (default, fastest),
-        slow compression in LAMMPS (Marschall & Teitel 2018, Sec. III B), or equal quasistatic steps
-        (Yuan et al. 2019, Sec. 2.2).
     phi_start : float, optional
         Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D by default.
     kappa : float, [1/time], optional
@@ -77,10 +74,12 @@ def make_packing(
         Pressure at which compression at that rate ends, for ``dynamics``; 1e-3 by default.
     phi_end : float, optional
         Final packing fraction of marschall-2018, beyond jamming; 0.95 in 2D, 0.8 in 3D by default.
-    protocol : {"marschall-2018", "yuan-2019-1", "yuan-2019-2"}, optional
-        Published protocol, in place of `way`, with the paper's values as defaults (Marschall & Teitel
-        2018, Sec. II and III B-C; Yuan et al. 2019, Sec. 2.2, where 2 adds Monte Carlo of hard particles,
-        which orders them). 1 and 2 are short for the last two.
+    protocol : {"quasistatic", "dynamics", "steps", "marschall-2018", "yuan-2019-1", "yuan-2019-2"}, optional
+        Route to jamming: quasistatic steps that are large far from jamming (default, fastest), slow compression in
+        LAMMPS (Marschall & Teitel 2018, Sec. III B), equal quasistatic steps (Yuan et al. 2019, Sec. 2.2), or a
+        published protocol, with the paper's values as defaults (Marschall & Teitel 2018, Sec. II and III B-C; Yuan et
+        al. 2019, Sec. 2.2, where 2 adds Monte Carlo of hard particles, which orders them). 1 and 2 are short for the
+        last two.
     phi_thermal, n_sweeps : float, int, optional
         Packing fraction and sweeps of the Monte Carlo of yuan-2019-2; 0.55 and 100000 by default.
     delta_phi : float, optional
@@ -88,11 +87,11 @@ def make_packing(
     start : path, optional
         File of `compress` or `slow_compress` that replaces the compression of marschall-2018. The search begins at
         its first frame that stays jammed when minimised; particles, n and seed are those of the file.
-    search : {"direct", "halving"}, optional
-        Search for u0 in marschall-2018: on box and particles at once (default), or with the paper's
+    search : {"extrapolation", "bisection"}, optional
+        Search for u0 in marschall-2018: extrapolation of box and particles together (default), or the paper's
         steps of the box, 1e-6 at first and halved where u crosses u0 (Sec. III C, Eq. 20).
     minimiser : {"auto", "near", "newton", "cg_marschall"}, optional
-        Minimiser of the halving search: "cg_marschall" is the conjugate gradients of its App. A; "auto" by default.
+        Minimiser of bisection: "cg_marschall" is the conjugate gradients of its App. A; "auto" by default.
     strict : bool
         Continue at fixed u, along floppy modes, until no mode has an eigenvalue below minus its error bound;
         ``results["n_negative"]`` counts those that do. Rods of alpha = 4 end at saddles otherwise.
@@ -136,7 +135,7 @@ def make_packing(
     True
     """
     recipe = recipe_for(
-        particles, dimension, way, seed, n=n, u0=u0, accuracy=accuracy, tolerance=tolerance,
+        particles, dimension, seed, n=n, u0=u0, accuracy=accuracy, tolerance=tolerance,
         protocol=protocol, phi_start=phi_start, kappa=kappa, p_end=p_end, phi_end=phi_end,
         phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi, start=start,
         search=search, minimiser=minimiser, strict=strict,

@@ -19,6 +19,7 @@ from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import QuasistaticShearFile, ShearFile
 from jamshape.front.starts import Asked, Start
 from jamshape.landscape import Landscape, State
+from jamshape.old_names import accepts_old
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.quasistatic import compressed_to
@@ -34,6 +35,7 @@ _PHI_NAME = "phi_sheared"  # of the start, in files
 _ROUNDING = 1e-9
 
 
+@accepts_old(tolerance="integration_tolerance")
 @checked
 def shear(
     particles: Particles | None = None,
@@ -49,7 +51,7 @@ def shear(
     sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
-    tolerance: float | None = None,
+    integration_tolerance: float | None = None,
     rows: int = 1000,
     frames: int | None = None,
     file: str | Path | None = None,
@@ -85,7 +87,7 @@ def shear(
         in the plane at rates of 3e-7 and below, and else ``rkc2``.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 by default.
-    tolerance : float, optional
+    integration_tolerance : float, optional
         Local error of a step over the typical overlap, for the others; by default 1e-4 in LAMMPS and 1e-3 with implicit
         steps.
     rows : int
@@ -126,7 +128,7 @@ def shear(
     True
     """
     require_stated(gdot=gdot, strain=strain, rows=rows)
-    require_given(dt=dt, tolerance=tolerance, frames=frames)
+    require_given(dt=dt, integration_tolerance=integration_tolerance, frames=frames)
     asked = Asked(n, phi, seed, dimension)
     of = Start.of(particles, asked, start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)
     at = place(file, "shear.h5")
@@ -134,20 +136,21 @@ def shear(
     if integrator in METHODS:
         require_no_effect("integrator", integrator, dt=dt, frames=frames)
         longest = min(SlowShear.largest_strain, strain / rows)
-        error = tolerance or _IMPLICIT_ERROR
+        error = integration_tolerance or _IMPLICIT_ERROR
         slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
         _shear_slowly(slow, of, at.path, again=again, sides=sides)
         resume(at.path, progress=progress)
         return ShearFile(*at)
     settings = Shear(
         gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
-        sides=sides, k_e=of.k_e, integrator=integrator, tolerance=tolerance or _ERROR,
+        sides=sides, k_e=of.k_e, integrator=integrator,
+        tolerance=integration_tolerance or _ERROR,
     )  # fmt: skip
     if settings.chooses_steps:
         require_no_effect("integrator", integrator, dt=dt)
         settings = settings.in_steps(rows)
     else:
-        require_no_effect("integrator", integrator, tolerance=tolerance)
+        require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
     to = Recording(at.path, rows, _FRAMES if frames is None else frames, of.made_from)
     _shear_in_lammps(settings, of, to, _How(again, progress))
     return ShearFile(*at)

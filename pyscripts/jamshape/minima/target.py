@@ -76,7 +76,7 @@ class Target:
     step
         Initial strain of the box by which unjammed states are compressed.
     method
-        Minimiser of the halving search.
+        Minimiser of bisection.
 
     Raises
     ------
@@ -167,7 +167,7 @@ class Search:
         self.state = jammed.strained(self.step)
 
 
-def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Search]:
+def extrapolation(landscape: Landscape, search: Search, target: Target) -> Iterator[Search]:
     """Find the packing by straining the box to where the energy is u0, and minimising.
 
     Unjammed states are compressed by small strains and minimised, until one stays jammed. From
@@ -410,15 +410,15 @@ def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
     )
 
 
-def halving(
+def bisection(
     landscape: Landscape, search: Search, target: Target, shortest: float = 1e-16
 ) -> Iterator[Search]:
-    """Find the packing by the halving search of Marschall & Teitel 2018, Sec. III C, as written.
+    """Find the packing by bisection of Marschall & Teitel 2018, Sec. III C, as written.
 
     L and r are scaled by 1 -+ lambda and minimised until U crosses U0; then lambda is halved and
     the direction reversed. `Search.step` is lambda, initially 1e-6 in the paper.
 
-    Arguments and results as in `direct`.
+    Arguments and results as in `extrapolation`.
 
     Raises
     ------
@@ -439,7 +439,7 @@ def halving(
         if search.step < shortest:
             msg = (
                 f"lambda fell below {shortest:g} at u = {u:.9g}, expected u = {target.u0:.9g};"
-                " use the direct search"
+                " use extrapolation"
             )
             raise TargetError(msg)
         search.opening = opens
@@ -448,8 +448,8 @@ def halving(
 
 
 def find(landscape: Landscape, start: State, target: Target) -> Minimum:
-    """Run the direct search to its end; errors as `direct`."""
+    """Run `extrapolation` to its end, with its errors."""
     search = Search(start, target.step)
-    collections.deque(direct(landscape, search, target), maxlen=0)
+    collections.deque(extrapolation(landscape, search, target), maxlen=0)
     assert search.minimum is not None
     return search.minimum

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -35,21 +34,12 @@ Values = Mapping[str, Any]
 
 
 class Setting(NamedTuple):
-    """A setting of a recipe; it belongs to the ways and protocols with a default for it."""
+    """A setting of a recipe; it belongs to the protocols with a default for it."""
 
     name: str
     kind: Callable[[str], Any]
     """Parses it from the command line."""
     meaning: str
-
-
-def minimiser_named(name: str) -> str:
-    """Return the present name of a minimiser; warn of a former one."""
-    if name != "paper":
-        return name
-    msg = "the minimiser 'paper' is called 'cg_marschall'; the former name will be refused"
-    warnings.warn(msg, FutureWarning, stacklevel=2)
-    return "cg_marschall"
 
 
 SETTINGS = (
@@ -65,8 +55,8 @@ SETTINGS = (
     Setting("n_sweeps", int, "Monte Carlo sweeps"),
     Setting("delta_phi", float, "step of the packing fraction"),
     Setting("start", Path, "file of compress or slow, through jamming, instead of a compression"),
-    Setting("search", str, "search for u0; halving is the paper's"),
-    Setting("minimiser", minimiser_named, "minimiser of the halving search; auto by default"),
+    Setting("search", str, "search for u0; bisection is the paper's"),
+    Setting("minimiser", str, "minimiser of bisection; auto by default"),
 )
 
 _COARSE = 1e-2  # largest step of the packing fraction, far below jamming
@@ -75,11 +65,11 @@ _ROUGH = 1e-2  # residual that suffices before the search for an energy
 # Energy tolerance over the squared step, [energy]: a step adds ten to a hundred times as much to a jammed packing.
 _LOOSE = 2.5e-3
 
-_LAMBDA = 1e-6  # initial one of the halving search (Marschall & Teitel 2018, Sec. III C)
+_LAMBDA = 1e-6  # initial one of bisection (Marschall & Teitel 2018, Sec. III C)
 
 
-class UsualWay(NamedTuple):
-    """A way to jamming, or a protocol: its settings with defaults, and its construction from them.
+class UsualProtocol(NamedTuple):
+    """A protocol: its settings with defaults, and its construction from them.
 
     Settings without a default are refused.
     """
@@ -117,10 +107,10 @@ def _by_adaptive_steps(get: Values) -> tuple[Way, Target | None]:
 
 def _by_compression(get: Values) -> tuple[Way, Target | None]:
     way = Compressed(get["kappa"], get["phi_end"], get["search"], get["start"])
-    target, minimiser = _target(get, get["tolerance"]), minimiser_named(get["minimiser"] or "auto")
-    if way.search == "direct":
+    target, minimiser = _target(get, get["tolerance"]), get["minimiser"] or "auto"
+    if way.search == "extrapolation":
         if get["minimiser"] is not None:
-            said = "{minimiser} has no effect with the search direct, expected the search halving"
+            said = "{minimiser} has no effect with the search extrapolation, expected the search bisection"
             raise ArgumentError(said, {"minimiser": minimiser})
         return way, target
     require_one_of("minimiser", minimiser, METHODS)
@@ -131,14 +121,14 @@ def _target(get: Values, tolerance: float) -> Target | None:
     return Target(get["u0"], get["accuracy"], tolerance) if get["u0"] else None
 
 
-_ATHERMAL = UsualWay(
+_ATHERMAL = UsualProtocol(
     _by_steps,
     {"n": 400, "phi_start": 0.1, "tolerance": 1e-4, "u0": 0.0, "accuracy": 1e-7, "delta_phi": 1e-3},
     {"n": 256, "phi_start": 0.4},
 )
 
-WAYS: dict[str, UsualWay] = {
-    "quasistatic": UsualWay(
+PROTOCOLS: dict[str, UsualProtocol] = {
+    "quasistatic": UsualProtocol(
         _by_adaptive_steps,
         {
             "n": 400, "phi_start": 0.1, "tolerance": 1e-8, "u0": 1e-12, "accuracy": 1e-7,
@@ -146,7 +136,7 @@ WAYS: dict[str, UsualWay] = {
         },
         {"n": 256, "phi_start": 0.4, "u0": 1e-15},
     ),
-    "dynamics": UsualWay(
+    "dynamics": UsualProtocol(
         _by_dynamics,
         {
             "n": 256, "phi_start": 0.4, "tolerance": 1e-8, "u0": 1e-15, "accuracy": 1e-7,
@@ -154,15 +144,11 @@ WAYS: dict[str, UsualWay] = {
         },
     ),
     "steps": _ATHERMAL,
-}  # fmt: skip
-"""Adaptive quasistatic steps, the default; slow compression in LAMMPS; equal quasistatic steps."""
-
-PROTOCOLS: dict[str, UsualWay] = {
-    COMPRESSED: UsualWay(
+    COMPRESSED: UsualProtocol(
         _by_compression,
         {
             "n": 1024, "phi_start": 0.1, "tolerance": 1e-8, "u0": 1e-15, "accuracy": 1e-7,
-            "kappa": 1e-6, "phi_end": 0.8, "start": None, "search": "direct", "minimiser": None,
+            "kappa": 1e-6, "phi_end": 0.8, "start": None, "search": "extrapolation", "minimiser": None,
         },
         {"phi_start": 0.4, "phi_end": 0.95},
     ),
@@ -171,7 +157,8 @@ PROTOCOLS: dict[str, UsualWay] = {
         usual=dict(_ATHERMAL.usual) | {"phi_thermal": 0.55, "n_sweeps": 100_000}
     ),
 }  # fmt: skip
-"""Published protocols, with the values of the papers where given.
+"""Adaptive quasistatic steps, the default; slow compression in LAMMPS; equal quasistatic steps; and published protocols,
+with the values of the papers where given.
 
 marschall-2018: N = 1024 and phi_init = 0.4 (Marschall & Teitel 2018, Sec. III B), a fixed rate, theirs being
 1e-6 to 1e-10; U_0/L^2 = 1e-15 to 1e-7 of itself (Sec. III C, Eq. 20). Their final packing fraction is not given.
@@ -184,7 +171,6 @@ Each paper has one dimension; in the other, N is that of the paper or the defaul
 def recipe_for(
     particles: Particles | None = None,
     dimension: int | None = None,
-    way: str | None = None,
     seed: int | None = None,
     protocol: int | str | None = None,
     **given: Any,
@@ -197,13 +183,10 @@ def recipe_for(
         Required without a start.
     dimension : {2, 3}, optional
         By default that of the shape's paper.
-    way : str, optional
-        One of `WAYS`: adaptive quasistatic steps ("quasistatic", default), slow compression in LAMMPS
-        ("dynamics"), or equal quasistatic steps ("steps").
     seed : int, optional
         Random seed; 1 by default.
     protocol : str or int, optional
-        One of `PROTOCOLS`, a way with the published values; 1 and 2 are those of Yuan et al. 2019.
+        One of `PROTOCOLS`, "quasistatic" by default; 1 and 2 are those of Yuan et al. 2019.
     **given
         `SETTINGS` by name, None for defaults; and `strict`, whether to continue to a minimum
         without negative eigenvalues.
@@ -215,7 +198,7 @@ def recipe_for(
     Raises
     ------
     ValueError
-        If a setting does not belong to the way or the protocol, contradicts the start, or is out of its range.
+        If a setting does not belong to the protocol, contradicts the start, or is out of its range.
 
     Examples
     --------
@@ -232,8 +215,10 @@ def recipe_for(
         source.require(particles, n=given.get("n"), dimension=dimension, seed=seed)
         particles, dimension, seed = source.particles, source.dimension, source.seed
     particles, dimension = _placed(particles, dimension)
-    usual, called = _chosen(way, protocol)
-    get = usual.defaults(dimension) | _allowed(given, usual, called)
+    name = "quasistatic" if protocol is None else protocol_named(protocol)
+    require_one_of("protocol", name, PROTOCOLS)
+    usual = PROTOCOLS[name]
+    get = usual.defaults(dimension) | _allowed(given, usual, name)
     require_with("u0", get["u0"] or None, accuracy=given.get("accuracy"))
     if source is not None:
         get |= _of_source(source, given)
@@ -252,24 +237,7 @@ def _placed(particles: Particles | None, dimension: int | None) -> tuple[Particl
     return particles, dimension
 
 
-def _chosen(way: str | None, protocol: int | str | None) -> tuple[UsualWay, str]:
-    """Return the way or the protocol, with its name for messages."""
-    if protocol is None:
-        way = way or "quasistatic"
-        require_one_of("the way", way, WAYS)
-        return WAYS[way], f"the way by {way}"
-    name = protocol_named(protocol)
-    require_one_of("protocol", name, PROTOCOLS)
-    chosen = PROTOCOLS[name]
-    if way is not None:
-        require_one_of("the way", way, WAYS)
-        if WAYS[way].compose is not chosen.compose:
-            said = "{way} has no effect with {protocol}, expected one of them; leave the other out"
-            raise ArgumentError(said, {"way": way, "protocol": name})
-    return chosen, f"the protocol {name}"
-
-
-def _allowed(given: dict[str, Any], usual: UsualWay, called: str) -> dict[str, Any]:
+def _allowed(given: dict[str, Any], usual: UsualProtocol, protocol: str) -> dict[str, Any]:
     """Drop settings that are None, and refuse invalid ones."""
     known = [setting.name for setting in SETTINGS]
     for name, value in given.items():
@@ -277,7 +245,7 @@ def _allowed(given: dict[str, Any], usual: UsualWay, called: str) -> dict[str, A
             msg = f"{name} is not a setting of a recipe, expected one of {', '.join(known)}"
             raise ValueError(msg)
         if value is not None and name not in usual.usual:
-            said = f"{{{name}:name}} does not apply to {called}, expected another way or setting"
+            said = f"{{{name}:name}} does not apply to the protocol {protocol}, expected another protocol or setting"
             raise ArgumentError(said, {name: value})
     kept = {name: value for name, value in given.items() if value is not None}
     require_stated(**{name: value for name, value in kept.items() if name in RANGES})

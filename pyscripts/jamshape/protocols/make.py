@@ -80,9 +80,9 @@ def make(
     Raises
     ------
     TargetError
-        See `target.direct`.
+        See `target.extrapolation`.
     ValueError
-        As `Recipe.start` and `target.direct`, or if another packing was being made there.
+        As `Recipe.start` and `target.extrapolation`, or if another packing was being made there.
     """
     began = time.perf_counter()
     way = _way(recipe, out)

@@ -18,7 +18,7 @@ from jamshape.packing import Packing, State
 from jamshape.protocols.recipe import SEARCHES, Recipe
 
 MOST_MINIMISATIONS = 20_000
-"""Limit of a search: with the steps of 1e-6 of the halving search they change phi by 0.04."""
+"""Limit of a search: with the steps of 1e-6 of bisection they change phi by 0.04."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class SearchFile:
 def lead(
     landscape: Landscape, start: State, target: Target, file: SearchFile
 ) -> Generator[Progress, None, Minimum]:
-    """Relax a state at an energy, resuming from the file; errors as in `target.direct`.
+    """Relax a state at an energy, resuming from the file; errors as in `target.extrapolation`.
 
     The search is that of the recipe's way (`SEARCHES`). It ends when its steps become too
     small, and after `MOST_MINIMISATIONS` at the latest.
@@ -166,7 +166,7 @@ def _require_few(file: SearchFile, search: Search, target: Target) -> None:
         msg = (
             f"after {file.minimisations} minimisations the search is at u ="
             f" {search.history.energy_density[-1]:.3g}, expected u = {target.u0:.3g}; use a"
-            " start nearer to jamming, or the direct search"
+            " start nearer to jamming, or extrapolation"
         )
         raise TargetError(msg)
 

@@ -13,7 +13,7 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import ArgumentError, require_one_of, require_rising, require_stated
 from jamshape.files.h5md import read_packing
 from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL
-from jamshape.minima.target import Target, direct, halving
+from jamshape.minima.target import Target, bisection, extrapolation
 from jamshape.packing import Packing
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
@@ -21,7 +21,7 @@ from jamshape.protocols.random_start import dilute_packing, random_packing
 from jamshape.shapes.particles import Particles
 from jamshape.shapes.shape import Interaction
 
-SEARCHES = {"direct": direct, "halving": halving}
+SEARCHES = {"extrapolation": extrapolation, "bisection": bisection}
 """Searches for a target energy: ours, and that of Marschall & Teitel 2018, Sec. III C, as written."""
 
 # The paper's slowest rate; slower ones would not end in LAMMPS in reasonable time.
@@ -83,7 +83,7 @@ class Steps:
         Monte Carlo before its last part; None for protocol 1.
     """
 
-    search: ClassVar[str] = "direct"
+    search: ClassVar[str] = "extrapolation"
 
     quasistatic: Quasistatic = field(default_factory=Quasistatic)
     thermal: Thermalisation | None = None
@@ -131,7 +131,7 @@ class Adaptive(Steps):
 
     def attributes(self, target: Target | None) -> dict[str, Any]:
         """Return its identifying attributes."""
-        return {"way": "quasistatic"} | self.steps(target)
+        return {"protocol": "quasistatic"} | self.steps(target)
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class Dynamics:
         Settings of the compression.
     """
 
-    search: ClassVar[str] = "direct"
+    search: ClassVar[str] = "extrapolation"
 
     approach: Approach = field(default_factory=Approach)
 
@@ -163,7 +163,7 @@ class Dynamics:
     def require(self, recipe: Recipe) -> None:
         """Refuse a recipe without a target energy."""
         if recipe.target is None:
-            said = "{u0} does not work with the way by dynamics, expected a positive one"
+            said = "{u0} does not work with the protocol dynamics, expected a positive one"
             raise ArgumentError(said, {"u0": 0})
 
 
@@ -193,7 +193,7 @@ class Compressed:
 
     kappa: float = 1e-6
     phi_end: float = 0.95
-    search: str = "direct"
+    search: str = "extrapolation"
     source: Path | None = None
 
     def __post_init__(self) -> None:
@@ -289,7 +289,7 @@ class Recipe:
     @property
     def is_searched(self) -> bool:
         """Whether the search for the energy is ours, not a published one."""
-        return self.target is not None and self.way.search == "direct"
+        return self.target is not None and self.way.search == "extrapolation"
 
     def attributes(self) -> dict[str, Any]:
         """Return its identifying attributes."""

@@ -18,7 +18,7 @@ import numpy as np
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum, Outcome, Stop, minimise
-from jamshape.minima.target import Search, Target, TargetError, direct
+from jamshape.minima.target import Search, Target, TargetError, extrapolation
 from jamshape.packing import State
 from jamshape.vibration.sliding import Sliding
 
@@ -155,7 +155,7 @@ def _lead(landscape: Landscape, retry: Retry, start: State, target: Target) -> N
     most = landscape.evaluations + retry.budget - retry.work
     search = Search(start, target.step)
     with suppress(TargetError):
-        for _ in direct(landscape, search, target):
+        for _ in extrapolation(landscape, search, target):
             if landscape.evaluations > most:
                 break
     found = search.minimum

@@ -124,7 +124,7 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
     Raises
     ------
     TargetError
-        As `target.direct`, if the packing unjams on the way and is relaxed again.
+        As `target.extrapolation`, if the packing unjams on the way and is relaxed again.
     """
     radius = 0.5 * landscape.length
     while not search.done:

@@ -12,7 +12,7 @@ from jamshape.commands import main
 FAST = ("--alpha", 1, "--n", 16)
 RUN = (*FAST, "--kappa", 1e-3, "--phi-start", 0.5, "--phi-end", 0.88, "--rows", 20, "--frames", 4)
 PACK = (*FAST, "--phi-start", 0.55, "--u0", 1e-6)
-DYNAMICS = ("--way", "dynamics", "--kappa", 1e-5, "--p-end", 3e-3)
+DYNAMICS = ("--protocol", "dynamics", "--kappa", 1e-5, "--p-end", 3e-3)
 SLOW = ("--kappa", 1e-4, "--phi-end", 0.64)
 
 

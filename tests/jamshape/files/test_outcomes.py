@@ -18,7 +18,7 @@ STALLED = {"outcome": "stalled", "residual": 3e-6, "tolerance": 1e-8}
     ("known", "expected"),
     [
         ({"outcome": "converged"}, True),
-        ({"outcome": "corner"}, True),
+        ({"outcome": "kink"}, True),
         ({"outcome": "stalled"}, False),
         ({"outcome": "exhausted"}, False),
         ({"outcome": "unjammed"}, False),
@@ -53,7 +53,7 @@ def test_what_falls_short_is_a_warning_with_what_to_try():
         warn_unless_reached({"outcome": "converged", "strict": True, "n_negative": 2})
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warn_unless_reached({"outcome": "corner"})
+        warn_unless_reached({"outcome": "kink"})
 
 
 @pytest.mark.parametrize("code", [None, 0, 1, "text"])

@@ -90,7 +90,7 @@ def test_it_is_the_motion_that_lammps_integrates(particles, tmp_path, measured):
     """At the rate where both are fast; before the first rearrangement both are within their errors."""
     start = dense(particles)
     strain = 5e-3
-    exact = js.shear(start=start, gdot=1e-4, strain=strain, integrator="rkc2", tolerance=1e-8, rows=10,
+    exact = js.shear(start=start, gdot=1e-4, strain=strain, integrator="rkc2", integration_tolerance=1e-8, rows=10,
                      file=tmp_path / "a.h5", progress=False)  # fmt: skip
     _, rows = flowed(start, gdot=1e-4, strain_end=strain, tolerance=1e-5)
     step, more = rows[-1]

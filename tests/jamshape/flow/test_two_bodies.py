@@ -75,7 +75,7 @@ def test_both_follow_the_orbit_of_two_particles(name, tmp_path, measured):
     lonely = start.position[0] - start.position[1]
     lonely[0] += STRAIN * lonely[1]
     assert abs(separation[1] - lonely[1]) > 0.05
-    run = js.shear(start=start, gdot=GDOT, strain=STRAIN, integrator="rkc2", tolerance=1e-8, rows=50,
+    run = js.shear(start=start, gdot=GDOT, strain=STRAIN, integrator="rkc2", integration_tolerance=1e-8, rows=50,
                    file=tmp_path / "a.h5", progress=False)  # fmt: skip
     flow = Flow(State.of(start))
     list(

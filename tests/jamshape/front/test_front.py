@@ -237,7 +237,7 @@ def test_a_packing_whose_forces_do_not_balance_says_so(run):
     stalled = js.MeasuredPacking.of(packing, {"outcome": "stalled"})
     assert "stalled: forces do not balance" in repr(stalled)
     assert not stalled.reached
-    assert "balance" not in repr(js.MeasuredPacking.of(packing, {"outcome": "corner"}))
+    assert "balance" not in repr(js.MeasuredPacking.of(packing, {"outcome": "kink"}))
     saddle = {"outcome": "converged", "strict": True, "n_negative": 2}
     said = "2 of its modes have a negative eigenvalue, expected none"
     assert said in repr(js.MeasuredPacking.of(packing, saddle))

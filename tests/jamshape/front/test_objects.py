@@ -78,7 +78,7 @@ def made(folder):
         "ContactNetwork": Contacts.of(packing).network,
         "State": State.of(packing),
         "Landscape": Landscape(packing),
-        "Recipe": recipe_for(js.Dimers(), None, "dynamics", 1),
+        "Recipe": recipe_for(js.Dimers(), None, 1, "dynamics"),
         "RunFile": run,
         "RunFile of a file": compressed(file=folder / "run.h5"),
         "OnsetFit": run.onset(),

@@ -56,7 +56,7 @@ def test_slow_compressions_of_a_packing_need_none(tmp_path):
     assert run.phi[-1] == pytest.approx(0.42, rel=1e-9)
 
 
-@pytest.mark.parametrize("words", [("compress",), ("slow",), ("pack", "--way", "dynamics")])
+@pytest.mark.parametrize("words", [("compress",), ("slow",), ("pack", "--protocol", "dynamics")])
 def test_what_needs_one_says_what_to_install_and_leaves_nothing(words, tmp_path):
     command, *more = words
     rods = ("--alpha", 4, "--n", 16)

@@ -9,7 +9,7 @@ from squeezed import squeezed
 from jamshape.contacts import coordination, find_contacts
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Outcome, minimise, residual_of
-from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
+from jamshape.minima.target import Search, Target, TargetError, bisection, extrapolation, find
 
 # n, alpha, and the packing fraction just below jamming where the search begins
 STARTS = {"16 discs": (16, 0, 0.77), "32 discs": (32, 0, 0.815), "16 rods": (16, 1, 0.86)}
@@ -68,7 +68,7 @@ def test_a_packing_is_no_unjammed_start(name, u0):
     shrunk = 1 - minimum.state.volume / start.state.volume
     assert abs(shrunk) < 1e-5
     far = Search(start.state, 5e-4)
-    first = next(iter(direct(landscape, far, Target(u0))))
+    first = next(iter(extrapolation(landscape, far, Target(u0))))
     assert first.loose is None
 
 
@@ -112,7 +112,7 @@ def test_halving_comes_back_to_the_packing_of_the_direct_search(name):
     landscape, _ = start_of(name)
     expected, target = found(name, 1e-9), Target(1e-9)
     search = Search(expected.state.strained(1.03e-7), step=1e-8)
-    for _ in halving(landscape, search, target):
+    for _ in bisection(landscape, search, target):
         pass
     assert search.minimum.energy_density == pytest.approx(1e-9, rel=1e-7, abs=0)
     assert search.minimum.residual.largest <= 1e-8
@@ -129,7 +129,7 @@ def test_halving_reverses_where_it_passes_the_energy():
     landscape, _ = start_of("16 discs")
     state = found("16 discs", 1e-9).state.strained(1e-6)
     steps, opens = [], []
-    for search in halving(landscape, Search(state, step=4e-7), Target(1e-9)):
+    for search in bisection(landscape, Search(state, step=4e-7), Target(1e-9)):
         steps.append(search.step)
         opens.append(search.opening)
     assert opens[0] is False  # below u0: the box is compressed
@@ -142,9 +142,9 @@ def test_halving_reverses_where_it_passes_the_energy():
 def test_halving_ends_with_a_sentence_where_lambda_is_too_short():
     landscape, _ = start_of("16 discs")
     search = Search(found("16 discs", 1e-9).state.strained(1.03e-7), step=1e-8)
-    sentence = r"lambda fell below 1e-09 at u = .*, expected u = 1e-09; use the direct search$"
+    sentence = r"lambda fell below 1e-09 at u = .*, expected u = 1e-09; use extrapolation$"
     with pytest.raises(TargetError, match=sentence):
-        for _ in halving(landscape, search, Target(1e-9), shortest=1e-9):
+        for _ in bisection(landscape, search, Target(1e-9), shortest=1e-9):
             pass
 
 
@@ -157,12 +157,12 @@ def test_resumed_from_any_point_it_gives_the_same_bits(name):
     landscape, state = start_of(name)
     target = Target(1e-12)
     halfway = [Search(state, target.step)]
-    halfway += [copied(s) for s in direct(landscape, copied(halfway[0]), target)]
+    halfway += [copied(s) for s in extrapolation(landscape, copied(halfway[0]), target)]
     whole = halfway.pop().minimum
     assert len(halfway) > 4
     for point in (halfway[0], halfway[len(halfway) // 2], halfway[-1]):
         search = copied(point)
-        for _ in direct(Landscape(landscape.particles), search, target):
+        for _ in extrapolation(Landscape(landscape.particles), search, target):
             pass
         for part in ("position", "orientation", "edges"):
             np.testing.assert_array_equal(
@@ -175,14 +175,14 @@ def test_resumed_from_any_point_it_gives_the_same_bits(name):
 def test_search_yields_after_every_minimisation_and_has_its_minimum_in_the_end_only():
     landscape, state = start_of("16 discs")
     minima, rows = [], []
-    for search in direct(landscape, Search(state, 5e-4), Target(1e-9)):
+    for search in extrapolation(landscape, Search(state, 5e-4), Target(1e-9)):
         minima.append(search.minimum)
         rows.append(len(search.history.residual))
     assert minima[-1] is not None
     assert all(m is None for m in minima[:-1])
     assert search.state is minima[-1].state
     assert np.all(np.diff(rows) > 0)
-    assert not list(direct(landscape, search, Target(1e-9)))  # nothing is left to do
+    assert not list(extrapolation(landscape, search, Target(1e-9)))  # nothing is left to do
 
 
 @pytest.mark.parametrize("strain", [-0.01, 0.01])
@@ -210,7 +210,7 @@ def test_steps_finer_than_the_strain_above_jamming_grow_at_once():
     assert 0.1 < fine / math.sqrt(1e-9) < 10
     below = found("16 discs", 1e-9).state.strained(20 * fine)
     search = Search(below, fine / 100)
-    steps = [s.step for s in direct(landscape, search, target)]
+    steps = [s.step for s in extrapolation(landscape, search, target)]
     growing = steps[: steps.index(max(steps))]
     assert max(steps) > fine
     assert len(growing) < 20

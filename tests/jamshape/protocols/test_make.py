@@ -372,7 +372,10 @@ def test_a_start_that_cannot_be_placed_leaves_no_file(tmp_path):
 
 def test_what_a_kill_after_the_last_write_leaves_goes_with_the_next_call(tmp_path):
     out = tmp_path / "packing.h5"
-    rods, tiny = js.Spherocylinders(alpha=1), {"n": 12, "u0": 1e-6, "way": "steps", "file": out}
+    rods, tiny = (
+        js.Spherocylinders(alpha=1),
+        {"n": 12, "u0": 1e-6, "protocol": "steps", "file": out},
+    )
     made = js.make_packing(rods, **tiny, phi_start=0.5, delta_phi=0.02, progress=False)
     search_of(out).touch()
     again = js.make_packing(rods, **tiny, phi_start=0.5, delta_phi=0.02, progress=False)

@@ -64,8 +64,8 @@ def test_numbers_are_short_for_names():
         short, full = (recipe_for(BALLS, protocol=which) for which in (number, name))
         assert short == full
         assert full.attributes()["protocol"] == name
-    assert recipe_for(BALLS, way="steps") == recipe_for(BALLS, protocol="yuan-2019-1")
-    assert recipe_for(BALLS, way="steps", protocol=2).way.thermal.n_sweeps == 100_000
+    assert recipe_for(BALLS, protocol="steps") == recipe_for(BALLS, protocol="yuan-2019-1")
+    assert recipe_for(BALLS, protocol=2).way.thermal.n_sweeps == 100_000
 
 
 def test_names_give_the_published_numbers():
@@ -76,11 +76,11 @@ def test_names_give_the_published_numbers():
         1e-15,
         1e-7,
     )
-    assert ours.way == Compressed(kappa=1e-6, phi_end=0.95, search="direct")
-    halving = recipe_for(
-        RODS, protocol="marschall-2018", search="halving", minimiser="cg_marschall"
+    assert ours.way == Compressed(kappa=1e-6, phi_end=0.95, search="extrapolation")
+    published = recipe_for(
+        RODS, protocol="marschall-2018", search="bisection", minimiser="cg_marschall"
     )
-    assert (halving.target.step, halving.target.method) == (1e-6, "cg_marschall")
+    assert (published.target.step, published.target.method) == (1e-6, "cg_marschall")
     yuan = recipe_for(BALLS, protocol="yuan-2019-1")
     steps = yuan.way.quasistatic
     assert (yuan.n, steps.step, steps.tolerance, steps.energy) == (400, 1e-3, 1e-4, 1e-10)
@@ -88,25 +88,18 @@ def test_names_give_the_published_numbers():
     assert recipe_for(RODS, protocol="marschall-2018", n=32, kappa=1e-5).way.kappa == 1e-5
 
 
-def test_the_former_name_of_a_minimiser_is_warned_of():
-    with pytest.warns(FutureWarning, match="'paper' is called 'cg_marschall'"):
-        recipe = recipe_for(RODS, protocol="marschall-2018", search="halving", minimiser="paper")
-    assert recipe.target.method == "cg_marschall"
-
-
 REFUSED = {
     "p_end does not apply to the protocol marschall-2018": {"protocol": "marschall-2018", "p_end": 1e-3},
     "n_sweeps does not apply to the protocol yuan-2019-1": {"protocol": 1, "n_sweeps": 5},
     "kappa does not apply to the protocol yuan-2019-2": {"protocol": 2, "kappa": 1e-6},
-    "start does not apply to the way by dynamics": {"way": "dynamics", "search": None, "start": "a.h5"},
-    "protocol is 'yuan', expected one of marschall-2018": {"protocol": "yuan"},
+    "start does not apply to the protocol dynamics": {"protocol": "dynamics", "search": None, "start": "a.h5"},
+    "protocol is 'yuan', expected one of quasistatic, dynamics, steps, marschall-2018": {"protocol": "yuan"},
     "protocol is True, expected one of": {"protocol": True},
-    "way='steps' has no effect with protocol='marschall-2018'": {"way": "steps", "protocol": "marschall-2018"},
-    "search is 'blind', expected one of direct, halving": {"protocol": "marschall-2018", "search": "blind"},
+    "search is 'blind', expected one of extrapolation, bisection": {"protocol": "marschall-2018", "search": "blind"},
     "minimiser is 'none', expected one of": {
-        "protocol": "marschall-2018", "search": "halving", "minimiser": "none",
+        "protocol": "marschall-2018", "search": "bisection", "minimiser": "none",
     },
-    "minimiser='cg_marschall' has no effect with the search direct": {
+    "minimiser='cg_marschall' has no effect with the search extrapolation": {
         "protocol": "marschall-2018", "minimiser": "cg_marschall",
     },
     "u0=0 does not work with the protocol": {"protocol": "marschall-2018", "u0": 0.0},
@@ -128,14 +121,14 @@ def test_what_is_none_of_a_protocol_is_refused(words, run, monkeypatch):
 
 
 def test_files_with_numbered_protocols_are_those_of_the_names(tmp_path):
-    recipe = recipe_for(RODS, way="steps", n=16)
+    recipe = recipe_for(RODS, protocol="steps", n=16)
     old = recipe.attributes() | {"protocol": 1, "outcome": "converged"}
     out, sizes = tmp_path / "old.h5", recipe.particles.sample(16, np.random.default_rng(1))
     write_packing(out, frames()[0].with_(diameters=sizes.diameters), old)
     assert read_attributes(out)["protocol"] == "yuan-2019-1"
     require_same(out, recipe)
     with pytest.raises(ValueError, match="protocol = yuan-2019-1, expected yuan-2019-2"):
-        require_same(out, recipe_for(RODS, way="steps", protocol=2, n=16, phi_thermal=0.5))
+        require_same(out, recipe_for(RODS, protocol=2, n=16, phi_thermal=0.5))
 
 
 def u_of(packing):
@@ -151,7 +144,7 @@ def test_a_start_is_taken_where_it_is_first_jammed(run, tmp_path):
     assert u_of(frames()[step - 1]) <= U0 < u_of(frames()[step])
     assert (told["protocol"], told["search"], told["start"]) == (
         "marschall-2018",
-        "direct",
+        "extrapolation",
         run.name,
     )
     assert told["start_phi"] == pytest.approx(frames()[step].phi, rel=1e-14)
@@ -168,19 +161,19 @@ def test_a_start_is_taken_where_it_is_first_jammed(run, tmp_path):
 
 
 def test_both_searches_end_at_one_packing(run, tmp_path):
-    ours = packed(tmp_path / "direct.h5", start=run)
-    papers = packed(tmp_path / "halving.h5", start=run, search="halving")
-    assert papers.results["search"] == "halving"
+    ours = packed(tmp_path / "extrapolation.h5", start=run)
+    papers = packed(tmp_path / "bisection.h5", start=run, search="bisection")
+    assert papers.results["search"] == "bisection"
     assert papers.results["search_minimisations"] > 40
     assert papers.u == pytest.approx(U0, rel=1e-7)
     assert papers.results["phi_J"] == pytest.approx(ours.results["phi_J"], abs=1e-6)
     assert papers.z == ours.z
-    with pytest.raises(ValueError, match="search = halving, expected direct"):
-        packed(tmp_path / "halving.h5", start=run)
+    with pytest.raises(ValueError, match="search = bisection, expected extrapolation"):
+        packed(tmp_path / "bisection.h5", start=run)
 
 
 def test_a_halving_search_that_was_killed_goes_on_to_the_same_bits(run, tmp_path):
-    recipe = recipe_for(protocol="marschall-2018", start=run, search="halving", u0=U0)
+    recipe = recipe_for(protocol="marschall-2018", start=run, search="bisection", u0=U0)
     whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
     steps = list(make(recipe, whole))
     searched = [at for at in steps if at.stage == "search"]
@@ -201,7 +194,7 @@ def test_a_halving_search_that_was_killed_goes_on_to_the_same_bits(run, tmp_path
 
 
 def test_progress_says_how_many_steps_are_left(run, tmp_path):
-    recipe = recipe_for(protocol="marschall-2018", start=run, search="halving", u0=U0)
+    recipe = recipe_for(protocol="marschall-2018", start=run, search="bisection", u0=U0)
     texts = [at.text for at in make(recipe, tmp_path / "a.h5") if at.stage == "search"]
     first = next(k for k, text in enumerate(texts) if "more of it" in text)
     left = int(texts[first].split("about ")[1].split()[0])
@@ -214,9 +207,11 @@ def test_a_search_ends_after_so_many_minimisations(run, tmp_path, monkeypatch):
     with pytest.raises(
         TargetError, match=r"after 5 minimisations the search is at u = .* expected u"
     ):
-        packed(tmp_path / "a.h5", start=run, search="halving")
+        packed(tmp_path / "a.h5", start=run, search="bisection")
     monkeypatch.undo()
-    assert packed(tmp_path / "a.h5", start=run, search="halving").results["outcome"] == "converged"
+    assert (
+        packed(tmp_path / "a.h5", start=run, search="bisection").results["outcome"] == "converged"
+    )
 
 
 OTHERS = {
@@ -292,7 +287,7 @@ def test_an_approach_to_jamming_ends_after_so_many_steps(tmp_path, monkeypatch):
 
 def test_a_rate_whose_approach_would_not_end_is_refused():
     with pytest.raises(ValueError, match=r"kappa is 1e-14, expected at least 4e-12.*jamshape slow"):
-        recipe_for(RODS, way="dynamics", kappa=1e-14)
+        recipe_for(RODS, protocol="dynamics", kappa=1e-14)
 
 
 def test_every_protocol_has_its_defaults_in_both_dimensions():

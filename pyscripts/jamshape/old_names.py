@@ -1,0 +1,106 @@
+"""Old names of arguments, options and values, accepted for one release with a warning that gives the new one."""
+
+from __future__ import annotations
+
+import functools
+import sys
+import warnings
+from argparse import SUPPRESS, Action, ArgumentParser
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+VALUES = {
+    "search": {"direct": "extrapolation", "halving": "bisection"},
+    "minimiser": {"paper": "cg_marschall"},
+    "method": {"paper": "cg_marschall"},
+    "outcome": {"corner": "kink"},
+}
+"""New values by name and old value."""
+
+
+def accepts_old(**names: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
+    """Let a function accept old names of arguments, given as ``old="new"``, and old values of all arguments.
+
+    Examples
+    --------
+    >>> @accepts_old(way="protocol")
+    ... def make(protocol="quasistatic"):
+    ...     return protocol
+    >>> with warnings.catch_warnings(action="ignore"):
+    ...     make(way="steps")
+    'steps'
+    """
+
+    def decorated(function: Callable[_P, _R]) -> Callable[_P, _R]:
+        @functools.wraps(function)
+        def call(*args: _P.args, **given: _P.kwargs) -> _R:
+            for old, new in names.items():
+                if old not in given:
+                    continue
+                if given.get(new) is not None:
+                    msg = f"{old} is an old name of {new}, which is given as well; leave {old} out"
+                    raise ValueError(msg)
+                _warn(f"{old} is called {new} now; the old name goes with the next release")
+                given[new] = given.pop(old)
+            return function(*args, **{k: current(k, v) for k, v in given.items()})  # type: ignore[arg-type]
+
+        return call
+
+    return decorated
+
+
+def current(name: str, value: Any) -> Any:
+    """Return today's value for an old one, with a warning; others as they are."""
+    new = VALUES.get(name, {}).get(value) if isinstance(value, str) else None
+    if new is None:
+        return value
+    _warn(f"{name} {value!r} is called {new!r} now; the old name goes with the next release")
+    return new
+
+
+def stored(name: str, value: Any) -> Any:
+    """Return today's value for an old one in a file, without a warning; others as they are.
+
+    Examples
+    --------
+    >>> stored("outcome", "corner"), stored("outcome", "stalled")
+    ('kink', 'stalled')
+    """
+    return VALUES.get(name, {}).get(value, value) if isinstance(value, str) else value
+
+
+def add_old_option(parser: ArgumentParser, old: str, new: str, **keywords: Any) -> None:
+    """Let a command accept the old name of an option, which its help does not show.
+
+    Parameters
+    ----------
+    parser
+    old, new : str
+        Such as ``--way`` and ``--protocol``.
+    **keywords
+        As of the new option: `type`, `choices`.
+    """
+    parser.add_argument(
+        old,
+        dest=new[2:].replace("-", "_"),
+        action=_OldOption,
+        help=SUPPRESS,
+        metavar=new,
+        **keywords,
+    )
+
+
+class _OldOption(Action):
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
+        said = (
+            f"{option_string} is called {self.metavar} now; the old name goes with the next release"
+        )
+        print(f"{parser.prog}: warning: {said}", file=sys.stderr)
+        setattr(namespace, self.dest, values)
+
+
+def _warn(said: str) -> None:
+    warnings.warn(said, FutureWarning, stacklevel=4)
