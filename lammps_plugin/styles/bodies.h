@@ -6,16 +6,19 @@
 #include "particle_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <map>
-#include <tuple>
 #include <type_traits>
 #include <vector>
 
 namespace jamshape {
 
-/// Own and ghost particles as bodies of a model, all kept: for bodies of a few numbers, whose
-/// contacts take so little time that putting bodies together would show.
+/// Semi-axes and exponent, the numbers that LAMMPS holds of a shape.
+using ShapeNumbers = std::array<double, 4>;
+
+/// Own and ghost particles as bodies of a model, all stored: for small bodies, whose contacts take
+/// so little time that assembling bodies would matter.
 template <class Model, int D> class StoredBodies {
  public:
   using Body = typename Model::template Body<D>;
@@ -24,7 +27,7 @@ template <class Model, int D> class StoredBodies {
   std::size_t size() const { return now.size(); }
   const Body &operator[](std::size_t i) const { return now[i]; }
 
-  /// Bodies of a block of contacts, put there for packs to find them.
+  /// Bodies of a block of contacts, placed for use by packs.
   class Block {
    public:
     explicit Block(const StoredBodies &of) : bodies(of.now.data()) {}
@@ -38,7 +41,11 @@ template <class Model, int D> class StoredBodies {
   };
 
   void begin_shapes(std::size_t n) { resize_closely(now, n); }
-  void set_shape(std::size_t i, const Shape &shape) { now[i] = Model::template body<D>(shape); }
+  /// A shape, and the numbers that it was made of.
+  void set_shape(std::size_t i, const Shape &shape, const ShapeNumbers &)
+  {
+    now[i] = Model::template body<D>(shape);
+  }
 
   void read_centres(const double *const *x)
   {
@@ -51,7 +58,7 @@ template <class Model, int D> class StoredBodies {
     });
   }
 
-  /// Poses kept for later, exactly.
+  /// Poses are stored exactly.
   static constexpr double POSE_ERROR = 0.0;
   struct Pose {
     typename Model::template Pose<D> of_model;
@@ -68,8 +75,8 @@ template <class Model, int D> class StoredBodies {
   std::vector<Body> now;
 };
 
-/// The same for large bodies: each kind of shape (semi-axes and p) is kept once, and a body put
-/// together where it is asked for, from LAMMPS's positions and the orientations read last.
+/// The same for large bodies: each kind of shape (semi-axes and p) is stored once, and bodies are
+/// assembled on demand, from LAMMPS's positions and the last orientations read.
 template <class Model, int D> class AssembledBodies {
  public:
   using Body = typename Model::template Body<D>;
@@ -115,10 +122,9 @@ template <class Model, int D> class AssembledBodies {
     number_of.clear();
     orientations.clear();
   }
-  void set_shape(std::size_t i, const Shape &shape)
+  void set_shape(std::size_t i, const Shape &shape, const ShapeNumbers &numbers)
   {
-    const Vec<3> &a = shape.semi_axes;
-    const auto found = number_of.emplace(std::make_tuple(a[0], a[1], a[2], shape.p), kinds.size());
+    const auto found = number_of.emplace(numbers, kinds.size());
     if (found.second) kinds.push_back(Model::template body<D>(shape));
     kind[i] = static_cast<int>(found.first->second);
   }
@@ -148,7 +154,7 @@ template <class Model, int D> class AssembledBodies {
     }
     return pose;
   }
-  /// By how far a point of a body at most is off in a pose, over the body's bounding radius.
+  /// Largest error of a point of a body in a stored pose, over the body's bounding radius.
   static constexpr double POSE_ERROR = 1e-6;
   typename Model::template Pose<D> pose_of(std::size_t i, const Pose &pose) const
   {
@@ -166,16 +172,16 @@ template <class Model, int D> class AssembledBodies {
   }
 
  private:
-  static constexpr std::size_t PER_ENTRY = 96;  // of the map, about
+  static constexpr std::size_t PER_ENTRY = 96;  // approximate, of the map
 
   std::vector<int> kind;
   std::vector<Body> kinds;
-  std::map<std::tuple<double, double, double, double>, std::size_t> number_of;
+  std::map<ShapeNumbers, std::size_t> number_of;
   const double *const *centres = nullptr;
-  std::vector<Quaternion> orientations;  // none where no particle turns
+  std::vector<Quaternion> orientations;  // empty if no particle can rotate
 };
 
-/// Bodies larger than this are put together when needed.
+/// Bodies larger than this are assembled on demand.
 inline constexpr std::size_t LARGEST_STORED_BODY = 64;
 
 template <class Model, int D>

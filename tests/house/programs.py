@@ -9,14 +9,13 @@ import io
 import re
 import runpy
 import shlex
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
 from unittest import mock
 
 from code_blocks import ROOT
-from lammps_scenes import MPIRUN, environment
+from lammps_runs import MPIRUN, run_program
 from sessions import make_clone, make_programs
 
 from jamshape.commands import COMMANDS, main, options_of
@@ -65,10 +64,7 @@ def run_script(place, words):
 
 def run_lammps(place, program, words):
     line = [*MPIRUN, *words] if program == "mpirun" else [program, *words]
-    done = subprocess.run(
-        line, cwd=place, env=environment(), text=True, stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, timeout=300, check=False,
-    )  # fmt: skip
+    done = run_program(line, place)
     assert done.returncode == 0, done.stdout[-3000:]
     return 0
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from jamshape.measures import published
+from common import published
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 SCRIPT = "agreement.py"
@@ -179,7 +179,7 @@ def test_a_paper_that_cannot_be_read_is_refused(tmp_path, line, words):
 
 
 def test_numbers_are_those_that_figures_draw():
-    """The table has the values of jamshape.measures.published."""
+    """The table has the values of common/published.py."""
     script = runpy.run_path(str(ANALYSIS / SCRIPT))
     rows = {p.result: p for p in script["read_paper"](ANALYSIS / PAPER / "paper.csv")}
     usual = "[protocol=quasistatic]"

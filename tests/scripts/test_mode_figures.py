@@ -15,12 +15,13 @@ from mixtures import bidisperse, superellipsoids
 from numpy.testing import assert_allclose
 from pictures import image
 
-from jamshape.drawing.mode_axes import bin_edges
+from common.mode_axes import bin_edges
+from common.mode_tables import read_tables
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
 from jamshape.vibration.hessian import Coordinates, dynamical_matrix
-from jamshape.vibration.sets import read_tables, to_store
+from jamshape.vibration.sets import to_store
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.table import ModeTable, tabulate, write_modes
 

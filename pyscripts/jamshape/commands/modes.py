@@ -18,9 +18,9 @@ import numpy as np
 
 from jamshape.checks import require_other_file
 from jamshape.command import parser_of, report
-from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.modes import mode_figure
 from jamshape.drawing.saving import save_figure
+from jamshape.drawing.text import packing_text
 from jamshape.files.sets import PackingFile
 from jamshape.front.modes import modes, require_modes_file
 from jamshape.vibration.sets import TOLD

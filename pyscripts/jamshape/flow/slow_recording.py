@@ -65,11 +65,6 @@ def require_same(
     require_attributes(path, _as_attributes(protocol) | dict(attributes or {}), what)
 
 
-def is_finished(path: Path) -> bool:
-    """Whether the file holds a run that reached its end."""
-    return path.exists() and bool(read_attributes(path).get("finished"))
-
-
 def summary_of(path: Path) -> dict[str, object]:
     """Summarise a run: its end, its cost, phi_J(kappa) where p rises, and where frames stay jammed."""
     observables, stored = read_observables(path), read_attributes(path)

@@ -91,8 +91,8 @@ def make_packing(
     search : {"direct", "halving"}, optional
         Search for u0 in marschall-2018: on box and particles at once (default), or with the paper's
         steps of the box, 1e-6 at first and halved where u crosses u0 (Sec. III C, Eq. 20).
-    minimiser : {"auto", "paper", "newton", "lbfgs", "lammps"}, optional
-        Minimiser of the halving search: "paper" is the conjugate gradients of its App. A; "auto" by default.
+    minimiser : {"auto", "near", "newton", "cg_marschall"}, optional
+        Minimiser of the halving search: "cg_marschall" is the conjugate gradients of its App. A; "auto" by default.
     strict : bool
         Continue at fixed u, along floppy modes, until no mode has an eigenvalue below minus its error bound;
         ``results["n_negative"]`` counts those that do. Rods of alpha = 4 end at saddles otherwise.

@@ -7,12 +7,9 @@ from typing import Any
 
 from jamshape.files.vocabulary import read_protocol
 from jamshape.minima import METHODS
-from jamshape.protocols.defaults import PROTOCOLS, SETTINGS, WAYS, recipe_for
-from jamshape.protocols.recipe import SEARCHES, Recipe
-from jamshape.shapes.command_line import (
-    add_particle_options,
-    particles_beside,
-)
+from jamshape.protocols.defaults import PROTOCOLS, SETTINGS, WAYS
+from jamshape.protocols.recipe import SEARCHES
+from jamshape.shapes.command_line import add_particle_options
 
 _CHOICES = {"search": tuple(SEARCHES), "minimiser": tuple(METHODS)}
 
@@ -65,14 +62,3 @@ def settings_of(options: Namespace) -> dict[str, Any]:
     """Read the given settings of a recipe, except its particles, by the names of `recipe_for`."""
     names = ("dimension", "way", "seed", "protocol", "strict", *(one.name for one in SETTINGS))
     return {name: getattr(options, name) for name in names}
-
-
-def recipe_of(options: Namespace) -> Recipe:
-    """Read a recipe from the options.
-
-    Raises
-    ------
-    ValueError
-        If an option does not belong to the shape or the way, or is out of its range.
-    """
-    return recipe_for(particles_beside(options), **settings_of(options))

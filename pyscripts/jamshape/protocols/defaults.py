@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -42,6 +43,15 @@ class Setting(NamedTuple):
     meaning: str
 
 
+def minimiser_named(name: str) -> str:
+    """Return the present name of a minimiser; warn of a former one."""
+    if name != "paper":
+        return name
+    msg = "the minimiser 'paper' is called 'cg_marschall'; the former name will be refused"
+    warnings.warn(msg, FutureWarning, stacklevel=2)
+    return "cg_marschall"
+
+
 SETTINGS = (
     Setting("n", int, "particles"),
     Setting("phi_start", float, "packing fraction of the random start"),
@@ -56,7 +66,7 @@ SETTINGS = (
     Setting("delta_phi", float, "step of the packing fraction"),
     Setting("start", Path, "file of compress or slow, through jamming, instead of a compression"),
     Setting("search", str, "search for u0; halving is the paper's"),
-    Setting("minimiser", str, "minimiser of the halving search; auto by default"),
+    Setting("minimiser", minimiser_named, "minimiser of the halving search; auto by default"),
 )
 
 _COARSE = 1e-2  # largest step of the packing fraction, far below jamming
@@ -107,15 +117,14 @@ def _by_adaptive_steps(get: Values) -> tuple[Way, Target | None]:
 
 def _by_compression(get: Values) -> tuple[Way, Target | None]:
     way = Compressed(get["kappa"], get["phi_end"], get["search"], get["start"])
-    target, minimiser = _target(get, get["tolerance"]), get["minimiser"]
+    target, minimiser = _target(get, get["tolerance"]), minimiser_named(get["minimiser"] or "auto")
     if way.search == "direct":
-        if minimiser is not None:
+        if get["minimiser"] is not None:
             said = "{minimiser} has no effect with the search direct, expected the search halving"
             raise ArgumentError(said, {"minimiser": minimiser})
         return way, target
-    require_one_of("minimiser", minimiser or "auto", METHODS)
-    method = minimiser or "auto"
-    return way, target and dataclasses.replace(target, step=_LAMBDA, method=method)
+    require_one_of("minimiser", minimiser, METHODS)
+    return way, target and dataclasses.replace(target, step=_LAMBDA, method=minimiser)
 
 
 def _target(get: Values, tolerance: float) -> Target | None:

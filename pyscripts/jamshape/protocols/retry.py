@@ -114,14 +114,6 @@ def go_on(landscape: Landscape, retry: Retry, target: Target) -> Iterator[Retry]
         yield retry
 
 
-def retried(landscape: Landscape, minimum: Minimum, target: Target, budget: int) -> Minimum:
-    """Repeat the search from an unbalanced minimum; return the minimum itself if that does not help."""
-    retry = Retry(minimum.state, budget)
-    for _ in go_on(landscape, retry, target):
-        pass
-    return retry.minimum or minimum
-
-
 def _slide(landscape: Landscape, retry: Retry, target: Target) -> None:
     """Take a step along sliding modes, if the energy falls, and check whether forces balance."""
     radius = 0.5 * landscape.length

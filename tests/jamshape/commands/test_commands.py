@@ -1,6 +1,5 @@
 """Every subcommand, tried once on something tiny."""
 
-import shutil
 import signal
 import subprocess
 import sys
@@ -8,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from lammps_runs import QUIET, bare_environment, start_lmp
 
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.files.lammps_text import read_data
@@ -162,20 +162,10 @@ def test_another_lammps_is_told(jamshape, tmp_path, monkeypatch):
 
 
 def test_the_lines_of_plugin_load_it_into_lmp(jamshape, tmp_path):
-    if not shutil.which("lmp"):
-        pytest.skip("lmp is not installed")
     said = jamshape("plugin").out.split("before the first pair style:")[1]
     lines = [line.strip() for line in said.splitlines() if line.startswith("    ")]
     box = ["region box block 0 9 0 9 -0.5 0.5", "create_box 1 box"]
-    deck = tmp_path / "own.in"
-    deck.write_text(
-        "\n".join(["dimension 2", lines[0], *box, *lines[1:], "pair_style dimer/harmonic"]) + "\n"
-    )
-    done = subprocess.run(
-        ["lmp", "-in", deck.name, "-log", "none"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    deck = ["dimension 2", lines[0], *box, *lines[1:], "pair_style dimer/harmonic"]
+    (tmp_path / "own.in").write_text("\n".join(deck) + "\n")
+    done = start_lmp(*QUIET, "-in", "own.in", cwd=tmp_path, env=bare_environment())
     assert done.returncode == 0, done.stdout

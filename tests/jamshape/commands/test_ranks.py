@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from lammps_scenes import ENVIRONMENT, MPIRUN
+from lammps_runs import ENVIRONMENT, MPIRUN
 
 import jamshape as js
 from jamshape.checks import RANKS

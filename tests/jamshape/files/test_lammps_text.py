@@ -1,8 +1,6 @@
-import shutil
-import subprocess
-
 import numpy as np
 import pytest
+from lammps_runs import run_lmp_well
 from nasty import NASTY, assert_identical, nasty_packing, tilted_box
 
 from jamshape.files.h5md import FileFormatError
@@ -336,7 +334,6 @@ def test_read_any_refuses_other_files(path):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("tilted", [False, True])
 def test_lammps_reads_our_data_file_and_we_read_its_files(tmp_path, dimension, tilted):
-    lmp = shutil.which("lmp") or pytest.skip("lmp is not installed")
     rng = np.random.default_rng(3)
     edges = np.full(dimension, 7.1)
     tilt = np.array([3.1, -2.2, 1.3])[: 2 * dimension - 3]
@@ -350,13 +347,13 @@ def test_lammps_reads_our_data_file_and_we_read_its_files(tmp_path, dimension, t
     )
     write_data(tmp_path / "data.in", packing)
     computes = "".join(f"compute {name} all property/atom {name}\n" for name in COLUMNS[5:])
-    (tmp_path / "in.deck").write_text(
+    run_lmp_well(
         f"units lj\ndimension {dimension}\natom_style ellipsoid\nread_data data.in\n{computes}"
         f"dump 1 all custom 1 dump.out id type x y z ix iy iz c_{' c_'.join(COLUMNS[5:])}\n"
         "dump_modify 1 format float %.17g\n"
-        "pair_style zero 1.0\npair_coeff * *\nrun 0\nwrite_data data.out\n"
+        "pair_style zero 1.0\npair_coeff * *\nrun 0\nwrite_data data.out\n",
+        tmp_path,
     )
-    subprocess.run([lmp, "-in", "in.deck", "-log", "none"], cwd=tmp_path, check=True)
     expected = packing.sorted_by_id()
     for name in ("dump.out", "data.out"):
         found = read_any(tmp_path / name, dimension=dimension, shape=RODS)

@@ -2,11 +2,10 @@
 
 import gzip
 import re
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
+from lammps_runs import run_lmp_well
 
 import jamshape as js
 from jamshape.contacts import find_contacts
@@ -278,7 +277,6 @@ def test_what_we_write_says_what_it_holds(path, name, dimension):
 
 @pytest.mark.lammps
 def test_lammps_reads_what_we_write_with_its_comments(tmp_path):
-    lmp = shutil.which("lmp") or pytest.skip("lmp is not installed")
     packing = Packing(
         position=[[1, 1, 1], [2.9, 1, 1]],
         orientation=[[1, 0, 0, 0], [0.6, 0, 0, 0.8]],
@@ -290,12 +288,10 @@ def test_lammps_reads_what_we_write_with_its_comments(tmp_path):
         exponent=[2.25, 10 / 3],
     )
     write_data(tmp_path / "ours.data", packing)
-    (tmp_path / "deck").write_text(
+    run_lmp_well(
         "units lj\natom_style ellipsoid\nread_data ours.data\npair_style zero 1.0\npair_coeff * *\n"
-        "run 0\nwrite_data theirs.data nocoeff\n"
-    )
-    subprocess.run(
-        [lmp, "-in", "deck", "-log", "none", "-screen", "none"], cwd=tmp_path, check=True
+        "run 0\nwrite_data theirs.data nocoeff\n",
+        tmp_path,
     )
     with pytest.warns(UserWarning, match="does not state the exponents"):
         theirs = read_data(tmp_path / "theirs.data", 3, "superellipsoid")
@@ -306,19 +302,16 @@ def test_lammps_reads_what_we_write_with_its_comments(tmp_path):
 @pytest.mark.lammps
 def test_a_dump_of_fix_rigid_in_the_plane_reads_back(tmp_path):
     """Its quaternions leave the plane by rounding."""
-    lmp = shutil.which("lmp") or pytest.skip("lmp is not installed")
     (tmp_path / "rods.data").write_text(changed(("10.5 10.8", "11.5 10.8")))
-    (tmp_path / "deck").write_text(
+    run_lmp_well(
         "units lj\ndimension 2\natom_style ellipsoid\natom_modify map array\nread_data rods.data\n"
         "set atom 1 quat 0 0 1 35\nset atom 2 quat 0 0 1 80\npair_style zero 1\npair_coeff * *\n"
         "neigh_modify exclude group all all\nfix r all rigid single torque * off off on force * on on off\n"
         "velocity all set 0.3 0.2 0\nvariable f atom 0.05*(y-10)\nfix a all addforce 0.1 v_f 0\n"
         "fix e all enforce2d\ncompute q all property/atom quatw quati quatj quatk shapex shapey shapez\n"
         "dump d all custom 100 rods.dump id type x y z c_q[*]\n"
-        "dump_modify d sort id format float %.17g\nthermo_style custom step pe\ntimestep 0.01\nrun 200\n"
-    )
-    subprocess.run(
-        [lmp, "-in", "deck", "-log", "none", "-screen", "none"], cwd=tmp_path, check=True
+        "dump_modify d sort id format float %.17g\nthermo_style custom step pe\ntimestep 0.01\nrun 200\n",
+        tmp_path,
     )
     names = ["quatw", "quati", "quatj", "quatk", "shapex", "shapey", "shapez"]
     text = (tmp_path / "rods.dump").read_text()

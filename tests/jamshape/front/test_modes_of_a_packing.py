@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import jamshape as js
+from common.mode_tables import Wanted, pick_modes
 from jamshape.command import plain
 from jamshape.commands.modes import summary_of
 from jamshape.drawing.modes import mode_figure
-from jamshape.vibration.sets import TOLD, Wanted, pick_modes
+from jamshape.vibration.sets import TOLD
 from jamshape.vibration.statistics import density_of_states
 
 

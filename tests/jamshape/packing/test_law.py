@@ -6,11 +6,11 @@ import pytest
 from scenes import make
 
 import jamshape as js
+from common.spines import with_spines
 from jamshape.contacts import Contacts, find_contacts, forces
 from jamshape.exchange.gsd import read_gsd, write_gsd
 from jamshape.files.h5md import read_packing, write_packing, write_run
 from jamshape.landscape import Landscape, State
-from jamshape.packing.spines import with_spines
 
 LAW = js.Interaction(k_e=2.5, sides=1)
 

@@ -77,13 +77,21 @@ def test_names_give_the_published_numbers():
         1e-7,
     )
     assert ours.way == Compressed(kappa=1e-6, phi_end=0.95, search="direct")
-    halving = recipe_for(RODS, protocol="marschall-2018", search="halving", minimiser="paper")
-    assert (halving.target.step, halving.target.method) == (1e-6, "paper")
+    halving = recipe_for(
+        RODS, protocol="marschall-2018", search="halving", minimiser="cg_marschall"
+    )
+    assert (halving.target.step, halving.target.method) == (1e-6, "cg_marschall")
     yuan = recipe_for(BALLS, protocol="yuan-2019-1")
     steps = yuan.way.quasistatic
     assert (yuan.n, steps.step, steps.tolerance, steps.energy) == (400, 1e-3, 1e-4, 1e-10)
     assert recipe_for(BALLS, protocol="yuan-2019-2").way.thermal.phi == 0.55
     assert recipe_for(RODS, protocol="marschall-2018", n=32, kappa=1e-5).way.kappa == 1e-5
+
+
+def test_the_former_name_of_a_minimiser_is_warned_of():
+    with pytest.warns(FutureWarning, match="'paper' is called 'cg_marschall'"):
+        recipe = recipe_for(RODS, protocol="marschall-2018", search="halving", minimiser="paper")
+    assert recipe.target.method == "cg_marschall"
 
 
 REFUSED = {
@@ -98,7 +106,9 @@ REFUSED = {
     "minimiser is 'none', expected one of": {
         "protocol": "marschall-2018", "search": "halving", "minimiser": "none",
     },
-    "minimiser='paper' has no effect with the search direct": {"protocol": "marschall-2018", "minimiser": "paper"},
+    "minimiser='cg_marschall' has no effect with the search direct": {
+        "protocol": "marschall-2018", "minimiser": "cg_marschall",
+    },
     "u0=0 does not work with the protocol": {"protocol": "marschall-2018", "u0": 0.0},
     "kappa is 1e-12, expected at least 1e-10": {"protocol": "marschall-2018", "kappa": 1e-12},
     "phi_start is 0.97 and phi_end 0.95": {"protocol": "marschall-2018", "phi_start": 0.97},
