@@ -25,8 +25,8 @@ template <int D> struct ContactBlock {
   alignas(64) double torque_j[ROTATIONS<D>][MOST];
   alignas(64) double bond_force[MOST];  // sum of the magnitudes
 
-  /// For shapes whose contacts need a search: where the searches of all pairs begin, if a start is
-  /// given, and where they ended.
+  /// Starts of the searches of all pairs, if given, and their ends, for shapes whose contacts need
+  /// a search.
   bool has_starts = false;
   alignas(64) double start[D][MOST];
 

@@ -36,8 +36,8 @@ class AtomVecEllipsoid {
   /// Quaternions (w, i, j, k) of the listed atoms, except those without an ellipsoid.
   int pack_comm_bonus(int n, int *list, double *buf);
   void unpack_comm_bonus(int n, int first, double *buf);
-  /// For an atom with an ellipsoid: 1, three semi-axes, quaternion, and any version-specific data;
-  /// without one: 0. Returns the number of values.
+  /// Packs 1, three semi-axes, quaternion and any version-specific data of an atom with an
+  /// ellipsoid, 0 of one without. Returns the number of values.
   int pack_border_bonus(int n, int *list, double *buf);
   /// Sets three semi-axes, for an atom with an ellipsoid or without.
   void set_shape(int i, double a, double b, double c);

@@ -229,7 +229,7 @@ def test_modes_of_a_packing(report, problem, jammed, tmp_path):
     assert_allclose(stiff["eigenvalue"], table["eigenvalues"][last], rtol=1e-9)
     assert abs(np.log(near["omega"])) <= np.abs(np.log(np.abs(table["omega"][-5:]))).min() + 1e-12
     bare = folder / "bare.h5"
-    assert "holds no vectors" in problem(MODES, packing, "--modes", bare, "--out", out)
+    assert "has no vectors" in problem(MODES, packing, "--modes", bare, "--out", out)
     assert "no mode 999" in problem(MODES, packing, "--mode", 999, "--out", out)
 
 

@@ -44,7 +44,7 @@ def in_a_folder(tmp_path_factory):
         yield
 
 
-@pytest.mark.parametrize("name", with_examples())
+@pytest.mark.parametrize("name", list(with_examples()))
 @pytest.mark.usefixtures("in_a_folder")
 def test_examples_run(name):
     if name in TOOLS:
