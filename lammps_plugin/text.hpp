@@ -7,8 +7,7 @@
 
 namespace jamshape {
 
-/// A number for a sentence, with six digits wherever they are: std::to_string says 0.000000 of
-/// 1e-7.
+/// A number for a message, with six significant digits; std::to_string gives 0.000000 for 1e-7.
 inline std::string shown(double number)
 {
   std::ostringstream text;
@@ -27,7 +26,7 @@ inline std::string exactly(double number)
   return text;
 }
 
-/// The words of a command, as they were given.
+/// The arguments of a command, as given.
 inline std::string joined(int n_words, const char *const *words)
 {
   std::string text;

@@ -125,7 +125,7 @@ def table(rows: list[Row], refused: list[tuple[float, int]]) -> str:
          f"{r.median:.1e}", f"{r.largest:.1e}", f"{r.position:.1e}")
         for r in rows
     ]  # fmt: skip
-    past = "refused: past the stability limit"
+    past = "refused: above the stability limit"
     cells += [(SIDES[sides], f"{dt:g}", past, "", "", "", "") for dt, sides in refused]
     return markdown(heads, cells)
 

@@ -52,7 +52,7 @@ template <typename T> class NewArray {
 
   std::size_t size() const { return product(shape.begin()); }
 
-  /// Of the extents from one on.
+  /// Product of the extents from this one on.
   std::size_t product(std::vector<std::size_t>::const_iterator from) const
   {
     return std::accumulate(from, shape.end(), std::size_t{1}, std::multiplies<>());
@@ -81,7 +81,7 @@ inline bool are_finite(const double *from, std::size_t n)
   return std::all_of(from, from + n, [](double x) { return std::isfinite(x); });
 }
 
-/// Whether an angle or a quaternion, of any length, turns a particle somewhere.
+/// Whether an angle or a quaternion of any length specifies a rotation.
 template <int D> bool is_turn(const double *from)
 {
   if (D == 2) return std::isfinite(from[0]);
@@ -89,7 +89,7 @@ template <int D> bool is_turn(const double *from)
   return size > 0.0 && std::isfinite(size);
 }
 
-/// Throws where any of n numbers is none: contacts of such particles would be dropped in silence.
+/// Throws if any of n numbers is not finite: contacts of such particles would be dropped silently.
 inline void require_finite(const double *from, std::size_t n, const char *name)
 {
   const double *const end = from + n;
@@ -109,35 +109,34 @@ inline void require_finite(double number, const char *name)
   require(std::isfinite(number), name + (" is " + shown(number)) + ", expected a finite number.");
 }
 
-/// Throws unless so many threads may be made.
+/// Throws unless the number of threads is allowed.
 inline void require_threads(std::int64_t threads)
 {
   require(threads >= 1 && threads <= 1024,
           "threads is " + std::to_string(threads) + ", expected from 1 to 1024.");
 }
 
-/// Throws unless all of D edges of a box are lengths.
+/// Throws unless all D edges of a box are positive lengths.
 inline void require_edges(const double *edges, std::size_t D)
 {
   const double *const end = edges + D;
   require(std::all_of(edges, end, [](double x) { return x > 0.0 && std::isfinite(x); }),
-          "edges hold what is no length, expected positive ones.");
+          "edges hold a number that is not a positive length.");
 }
 
-/// Throws unless (2, D, D) are an upper triangular matrix with a positive diagonal, as doubles and
-/// their small rests.
+/// Throws unless (2, D, D), double-doubles, are an upper triangular matrix with a positive
+/// diagonal.
 inline void require_upper(const Array3<double> &of, std::size_t D, const std::string &name)
 {
   require(of.shape(0) == 2 && of.shape(1) == D && of.shape(2) == D,
-          name + " has no shape (2, D, D).");
+          name + " does not have the shape (2, D, D).");
   require_finite(of, name.c_str());
   for (std::size_t part = 0; part < 2; ++part) {
     for (std::size_t k = 0; k < D; ++k) {
       const double *const row = of.data() + (part * D + k) * D;
       require(std::all_of(row, row + k, [](double x) { return x == 0.0; }),
               name + " is not upper triangular, expected vectors as columns, the first along x.");
-      require(part == 1 || row[k] > 0.0,
-              name + " holds an edge that is no length, expected positive ones.");
+      require(part == 1 || row[k] > 0.0, name + " has an edge that is not a positive length.");
     }
   }
 }
@@ -148,7 +147,7 @@ inline void require_cell(const Array3<double> &cell, std::size_t D)
   require_upper(cell, D, "cell");
 }
 
-/// Throws unless n orientations, angles or quaternions, turn a particle somewhere.
+/// Throws unless n orientations, angles or quaternions, specify rotations.
 inline void require_orientations(const double *from, std::size_t n, std::size_t D)
 {
   require_finite(from, D == 2 ? n : 4 * n, "orientation");

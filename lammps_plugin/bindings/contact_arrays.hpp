@@ -9,7 +9,7 @@
 
 namespace jamshape {
 
-/// What Python sees of n contacts: arrays (n, ...), of their bonds (n, BONDS, ...).
+/// The contacts of n pairs as NumPy arrays (n, ...), their bonds as (n, BONDS, ...).
 template <class Model, int D> class ContactArrays {
  public:
   explicit ContactArrays(std::size_t n) :
@@ -83,8 +83,7 @@ template <class Model, int D> class ContactArrays {
   }
 };
 
-/// Bounds of the errors of n contacts, where they are asked for: they take longer than the
-/// contacts.
+/// Bounds of the errors of n contacts, computed on request: they take longer than the contacts.
 class ErrorArrays {
  public:
   ErrorArrays(std::size_t n, bool wanted)

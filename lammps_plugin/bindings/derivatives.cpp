@@ -1,7 +1,7 @@
 #include "contact/pair_derivatives.hpp"
+#include "contact/shapes.hpp"
 
 #include "bindings/shape.hpp"
-#include "contact/shapes.hpp"
 
 #include <vector>
 
@@ -9,7 +9,7 @@ namespace jamshape {
 
 namespace {
 
-/// What Python sees of the second derivatives of n contacts, of their bonds (n, BONDS, ...).
+/// The second derivatives of n contacts as NumPy arrays (n, ...), of their bonds (n, BONDS, ...).
 template <class Model, int D, class S> class DerivativeArrays {
  public:
   explicit DerivativeArrays(std::size_t n) :
@@ -80,7 +80,7 @@ template <class Model, int D, class S> class DerivativeArrays {
   NewArray<bool> on_side, on_face;
 };
 
-/// A function of its own: how much is inlined into one is limited by its size.
+/// Kept as a separate function: compilers limit inlining by the size of a function.
 template <class Model, int D, class S>
 [[gnu::noinline]] nb::dict derivatives_in(const ShapeOf<Model> &of, const PairArrays &arrays)
 {

@@ -31,7 +31,7 @@ DescentEnd descend(Vicinity &of, const DescentStop &stop, double shift, const nb
                    const nb::callable &tell)
 {
   require_base(of);
-  require(shift > 0.0 && std::isfinite(shift), "the shift is no positive number.");
+  require(shift > 0.0 && std::isfinite(shift), "the shift is not a positive number.");
   Descent descent(of, stop, shift);
   descent.renew = renewing(of, renew);
   descent.tell = [&](const DescentRow &row) { tell(tuple_of(row)); };
@@ -41,9 +41,9 @@ DescentEnd descend(Vicinity &of, const DescentStop &stop, double shift, const nb
 double part_within(const Vicinity &of, const Array1<double> &x, double longest, double widest)
 {
   require_base(of);
-  require(x.shape(0) == of.n(), "x has another length than there are coordinates.");
+  require(x.shape(0) == of.n(), "x does not have one number per coordinate.");
   require_finite(x, "x");
-  require(longest > 0.0 && widest > 0.0, "the longest step or the widest turn is not positive.");
+  require(longest > 0.0 && widest > 0.0, "longest_step or widest_turn is not positive.");
   return of.part_within(x.data(), {longest, widest});
 }
 
@@ -52,7 +52,7 @@ class PosedNewton {
  public:
   PosedNewton(Vicinity &of, double shift) : about(of), system(of, shift)
   {
-    require(shift > 0.0 && std::isfinite(shift), "the shift is no positive number.");
+    require(shift > 0.0 && std::isfinite(shift), "the shift is not a positive number.");
   }
 
   void prepare()
@@ -72,7 +72,7 @@ class PosedNewton {
   nb::object solve(const Array2<double> &right, double accuracy)
   {
     require(is_prepared, "the equations are not prepared, expected prepare before.");
-    require(right.shape(1) == about.n(), "right has another length than there are coordinates.");
+    require(right.shape(1) == about.n(), "right does not have one number per coordinate.");
     require_finite(right, "right");
     return solutions(right, [&](const auto &side) { return system.solve(side, accuracy); });
   }
@@ -117,27 +117,26 @@ void export_descent(nb::module_ &m)
       .def_ro("products", &DescentEnd::products);
   nb::class_<PosedNewton>(
       m, "NewtonSystem",
-      "(H + shift) x = right at the base of a vicinity, with a shift that makes\n"
-      "the Hessian H positive definite.")
+      "The equations (H + shift) x = right at the base of a vicinity, with a shift that\n"
+      "makes the Hessian H positive definite.")
       .def(nb::init<Vicinity &, double>(), "vicinity"_a, "shift"_a, nb::keep_alive<1, 2>())
-      .def("prepare", &PosedNewton::prepare, "Takes the Hessian at the base.")
+      .def("prepare", &PosedNewton::prepare, "Take the Hessian at the base.")
       .def_prop_ro("coupling", &PosedNewton::coupling,
-                   "(n,) derivative of the gradient by the strain.")
+                   "(n,) derivative of the gradient with respect to the strain.")
       .def("solve", &PosedNewton::solve, "right"_a, "accuracy"_a,
-           "For the rows of right (k, n), to this part of them.")
+           "Solve for each row of right (k, n), to this relative accuracy.")
       .def("learn", &PosedNewton::learn, "tries"_a,
-           "Shifts less after a step that was right at once, more after one that was far off.")
+           "Lower the shift after a step accepted at once, raise it after one that was far off.")
       .def_prop_ro("shift", &PosedNewton::shift);
   nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
-      .def(
-          "part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,
-          "At most 1: the part of a step (n,) that moves no particle further and turns none wider.")
+      .def("part_within", &part_within, "x"_a, "longest_step"_a, "widest_turn"_a,
+           "The fraction of a step (n,), at most 1, that keeps every particle within these bounds.")
       .def("descend", &descend, "stop"_a, "shift"_a, "renew"_a, "tell"_a,
-           "Minimises the energy at fixed box by L-BFGS and Newton's method, with a first shift of "
-           "the\n"
-           "Hessian, the base moving along; renew(x, strain) takes pairs that hold there, and\n"
-           "tell(row) hears of a row (seconds, evaluations, residual, energy density) now and\n"
-           "then. Returns a DescentEnd.");
+           "Minimise the energy at fixed box by L-BFGS and Newton's method, with this initial "
+           "shift\n"
+           "of the Hessian; the base moves along. renew(x, strain) takes pairs that hold there;\n"
+           "tell(row) is called from time to time with (seconds, evaluations, residual, energy\n"
+           "density). Returns a DescentEnd.");
 }
 
 }  // namespace jamshape

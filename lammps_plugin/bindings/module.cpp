@@ -42,7 +42,7 @@ NB_MODULE(_contact, m)
   jamshape::export_rattlers(m);
   jamshape::export_probes(m);
   m.def("instruction_sets", &jamshape::instruction_sets,
-        "Sets of instructions of this machine that contacts in packs are compiled for, as the\n"
+        "Instruction sets of this machine that contacts in packs are compiled for, as the\n"
         "environment variable JAMSHAPE_SIMD names them, best last; with 'scalar' pairs go one by\n"
         "one.");
 }

@@ -13,7 +13,7 @@ inline void require_pairs(const Array2<std::int64_t> &pairs, const Array2<std::i
                           std::size_t D, std::size_t N)
 {
   require(pairs.shape(1) == 2 && shift.shape(1) == D && shift.shape(0) == pairs.shape(0),
-          "pairs and shift have no shapes (M, 2) and (M, D).");
+          "pairs and shift do not have shapes (M, 2) and (M, D).");
   const std::int64_t *const first = pairs.data(), *const last = first + pairs.size();
   require(std::all_of(first, last,
                       [&](std::int64_t i) { return i >= 0 && static_cast<std::size_t>(i) < N; }),
@@ -31,10 +31,10 @@ struct PairArrays {
   void check(std::size_t N, std::size_t D) const
   {
     require(position.shape(0) == 2 && position.shape(1) == N && position.shape(2) == D,
-            "position has no shape (2, N, D).");
+            "position does not have the shape (2, N, D).");
     require(orientation.shape(0) == 2 && orientation.shape(1) == N &&
                 orientation.shape(2) == (D == 2 ? 1 : 4),
-            "orientation has no shape (2, N, 1) in 2D or (2, N, 4) in 3D.");
+            "orientation does not have the shape (2, N, 1) in 2D or (2, N, 4) in 3D.");
     require_finite(position, "position");
     require_finite(orientation, "orientation");
     require_orientations(orientation.data(), N, D);

@@ -1,4 +1,4 @@
-// Contact geometry of single pairs, row by row: what only tests and measurements of errors call.
+// Contact geometry of single pairs, row by row, called only by tests and measurements of errors.
 
 #include "contact/extended.hpp"
 #include "contact/spherocylinder/spherocylinder.hpp"
@@ -25,7 +25,7 @@ void require_body(bool condition, std::size_t n, const char *otherwise)
   if (!condition) throw std::invalid_argument("body " + std::to_string(n) + " " + otherwise);
 }
 
-/// Rows of spherocylinders: shape and pose as they are, also where no quaternion gives such an
+/// Rows of spherocylinders: shape and pose unchanged, even if no quaternion gives exactly this
 /// axis.
 struct SpherocylinderRows {
   using Model = SpherocylinderModel;
@@ -37,8 +37,9 @@ struct SpherocylinderRows {
     const double half_length = row[2 * D], radius = row[2 * D + 1];
     require_body(half_length >= 0.0 && std::isfinite(half_length) && radius > 0.0 &&
                      std::isfinite(radius),
-                 n, "is no such shape: a rod has a half length of at least 0 and a radius.");
-    require_body(are_finite(row, 2 * D), n, "is nowhere: its centre or axis is not finite.");
+                 n, "is not a valid shape: a rod has a half length of at least 0 and a radius.");
+    require_body(are_finite(row, 2 * D), n,
+                 "is without a finite pose: its centre or axis is not finite.");
     return {read_vec<D>(row), read_vec<D>(row + D), row[2 * D], row[2 * D + 1]};
   }
 };
@@ -49,7 +50,7 @@ struct SuperellipsoidRows {
   static constexpr const char *RULE =
       "6 (2D: centre, angle, semi-axes, p) or 11 (3D: centre, quaternion, semi-axes, p).";
 
-  /// The two of a pair to all digits of their numbers.
+  /// The two bodies of a pair in extended precision.
   template <int D>
   static PosedPair<Model, D, long double> in_long(const double *row_i, const double *row_j,
                                                   const Model::Law &law)
@@ -70,10 +71,11 @@ struct SuperellipsoidRows {
     const auto shape = SuperellipsoidRows::shape<D>(row);
     require_body(
         shape.has_value(), n,
-        "is no such shape: a superellipsoid has positive semi-axes and an exponent p above "
+        "is not a valid shape: a superellipsoid has positive semi-axes and an exponent p above "
         "0.5.");
     require_body(are_finite(row, D) && is_turn<D>(turn), n,
-                 "is nowhere: its centre or orientation is not finite, or the quaternion zero.");
+                 "is without a finite pose: its centre or orientation is not finite, or the "
+                 "quaternion zero.");
     auto body = Model::body<D>(*shape);
     body.centre = read_vec<D>(row);
     Model::turn_to<D>(body, orientation<D>(turn));
@@ -123,7 +125,7 @@ template <class Rows> class BodyPairs {
   }
 };
 
-/// (M,) of what `ask(i, j)` gives for each pair.
+/// (M,) results of `ask(i, j)` for each pair.
 template <class T, class Rows, class Ask>
 nb::object each(const BodyPairs<Rows> &pairs, const Ask &ask)
 {
@@ -262,7 +264,7 @@ nb::dict superellipsoid_scales(const Bodies &bodies_i, const Bodies &bodies_j,
   require(!normals.has_value() ||
               (normals->shape(0) == pairs.size() &&
                normals->shape(1) == static_cast<std::size_t>(pairs.dimension())),
-          "normals have no shape (M, D).");
+          "normals do not have the shape (M, D).");
   if (normals.has_value()) require_finite(*normals, "normals");
   return in_dimension(pairs.dimension(), [&](auto D) { return scales<D>(pairs, normals); });
 }
@@ -289,7 +291,7 @@ nb::object superellipsoid_overlap(const Bodies &bodies_i, const Bodies &bodies_j
                     [](const auto &i, const auto &j) { return are_overlapping(i, j); });
 }
 
-/// Lets a team count its parts again and again, each time but the last with some that fail.
+/// Lets a team count its parts repeatedly; in each round but the last, some of them fail.
 nb::object counts_of_team(std::int64_t asked, std::size_t first_that_fails, int rounds)
 {
   require_threads(asked);
@@ -333,21 +335,22 @@ void export_probes(nb::module_ &m)
         "distance/reach is 1 - eta^2.");
   m.def("superellipsoid_scales", &superellipsoid_scales, "bodies_i"_a, "bodies_j"_a,
         "normals"_a.none() = nb::none(),
-        "The scale at which both bodies of M pairs touch, whether above 1 or below, begun at\n"
-        "`normals` (M, D) where given. Returns a dict: eta, gap (relative bound of its error),\n"
+        "The scale at which both bodies of M pairs touch, whether above 1 or below, starting from\n"
+        "`normals` (M, D) if given. Returns a dict: eta, gap (relative bound of its error),\n"
         "iterations, fallback (the first attempt failed), extended (in long doubles, as doubles "
         "were\n"
         "too short), normal (into i, unit), point_i (from the\n"
         "centre of i to the tangency of the scaled bodies).");
   m.def("superellipsoid_near", &superellipsoid_near, "bodies_i"_a, "bodies_j"_a, "margin"_a,
-        "Whether surfaces may be closer than `margin` (M,): false only where they are not.");
+        "Whether surfaces may be closer than `margin` (M,): false only if they are not.");
   m.def("superellipsoid_motion_sq", &superellipsoid_motion_sq, "then"_a, "now"_a,
-        "Upper bound of the squared distance that any point of a body moved (M,).");
+        "Upper bounds of the squared displacement of any point of a body (M,).");
   m.def("superellipsoid_overlap", &superellipsoid_overlap, "bodies_i"_a, "bodies_j"_a,
         "Whether bodies share more than a point (M,).");
   m.def("counts_of_team", &counts_of_team, "threads"_a, "first_that_fails"_a, "rounds"_a,
-        "How often each of so many threads did its part (threads,), of which those from a number\n"
-        "on fail but in the last round, and what was thrown last.");
+        "Rounds in which each thread did its part (threads,), if those from first_that_fails on "
+        "fail\n"
+        "in all rounds but the last, and the last exception.");
 }
 
 }  // namespace jamshape

@@ -43,8 +43,8 @@ void export_rattlers(nb::module_ &m)
       "find_rattlers", &find_rattlers, "n_particles"_a, "dimension"_a, "pairs"_a, "normals"_a,
       "flat"_a,
       "Rattler flags (N,) of a contact network: pairs (M, 2) of indices, normals (M, 3) into the\n"
-      "first, flat (M, 2) whether the contact lies on a face of each. One row a contact, or one a\n"
-      "bond where those are contacts of their own.");
+      "first, flat (M, 2) whether the contact lies on a face of each. One row per contact, or\n"
+      "per bond if bonds are contacts of their own.");
 }
 
 }  // namespace jamshape

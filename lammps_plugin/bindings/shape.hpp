@@ -14,7 +14,7 @@
 
 namespace jamshape {
 
-/// The law of contacts from what Python gives.
+/// The law of contacts from its Python arguments.
 template <class Model> typename Model::Law law_of(double k_e, int sides)
 {
   require(k_e > 0.0 && std::isfinite(k_e),
@@ -23,9 +23,9 @@ template <class Model> typename Model::Law law_of(double k_e, int sides)
   return Model::law(k_e, static_cast<Sides>(sides));
 }
 
-/// N particles of one shape, each of its own size, with the law of their contacts: the class that
-/// Python knows a shape by. Its methods are bound where they are written, in shapes.cpp, sums.cpp,
-/// derivatives.cpp, sweeps.cpp and vicinity.cpp, for every shape of shapes.hpp.
+/// N particles of one shape, each with its own size, and the law of their contacts: the Python
+/// class of a shape. Its methods are bound in shapes.cpp, sums.cpp, derivatives.cpp, sweeps.cpp and
+/// vicinity.cpp, for every shape of shapes.hpp.
 template <class Model> class ShapeOf {
  public:
   using Shape = typename Model::Shape;
@@ -37,13 +37,13 @@ template <class Model> class ShapeOf {
     require(dimension == 2 || dimension == 3,
             "dimension is " + std::to_string(dimension) + ", expected 2 or 3.");
     require(diameters.shape(1) == 3 && exponent.shape(0) == diameters.shape(0),
-            "diameters and exponent have no shapes (N, 3) and (N,).");
+            "diameters and exponent do not have shapes (N, 3) and (N,).");
     particles.reserve(diameters.shape(0));
     for (std::size_t i = 0; i < diameters.shape(0); ++i) {
       const auto shape =
           Model::shape_from(0.5 * read_vec<3>(diameters.data() + 3 * i), exponent.data()[i]);
-      require(shape.has_value(),
-              "particle " + std::to_string(i) + " is no such shape: " + Model::SHAPE_RULE + ".");
+      require(shape.has_value(), "particle " + std::to_string(i) +
+                                     " is not a valid shape: " + Model::SHAPE_RULE + ".");
       particles.push_back(*shape);
     }
   }
@@ -71,7 +71,7 @@ template <class Model> class ShapeOf {
   std::vector<Shape> particles;
 };
 
-/// The name of a shape's class: its own, in the plural.
+/// Name of a shape's class: that of the shape, in the plural.
 template <class Model> std::string class_name()
 {
   std::string name = std::string(Model::NAME) + "s";
@@ -86,7 +86,7 @@ template <class Model> nb::class_<ShapeOf<Model>> class_of()
 }
 
 /// Binds `function(shape, arrays, more...)` as a method of a shape's class that takes poses and
-/// pairs; `extra` are the names of more arguments and the text.
+/// pairs; `extra` holds the names of the additional arguments and the docstring.
 template <class... More, class Model, class Function, class... Extra>
 void def_over_pairs(nb::class_<ShapeOf<Model>> of, const char *name, const Function &function,
                     const Extra &...extra)
@@ -103,8 +103,8 @@ void def_over_pairs(nb::class_<ShapeOf<Model>> of, const char *name, const Funct
       "position"_a, "orientation"_a, "cell"_a, "pairs"_a, "shift"_a, extra...);
 }
 
-/// Binds `function(D, S(), shape, arrays)` as such a method that is asked for doubles or for long
-/// doubles S.
+/// Binds `function(D, S(), shape, arrays)` as such a method, evaluated in double or long double
+/// precision S.
 template <class Model, class Function>
 void def_in_precision(nb::class_<ShapeOf<Model>> of, const char *name, const Function &function,
                       const char *text)

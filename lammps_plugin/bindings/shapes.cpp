@@ -14,7 +14,7 @@ namespace jamshape {
 
 namespace {
 
-/// (N,) of what `value(D, shape)` gives for each particle.
+/// (N,) results of `value(D, shape)` for each particle.
 template <class T, class Model, class Value>
 nb::object each(const ShapeOf<Model> &of, const Value &value)
 {
@@ -54,7 +54,7 @@ nb::object host_spins(const ShapeOf<Model> &of, const Array2<double> &orientatio
   return of.in_space([&](auto D) {
     require(orientation.shape(0) == of.n() && orientation.shape(1) == (D == 2 ? 1 : 4) &&
                 gradient.shape(0) == D && gradient.shape(1) == D,
-            "orientation and gradient have no shapes (N, 1 or 4) and (D, D).");
+            "orientation and gradient do not have shapes (N, 1 or 4) and (D, D).");
     const Upper g = upper_from<D>(gradient.data());
     NewArray<double> spin({of.n(), ROTATIONS<D>});
     for (std::size_t i = 0; i < of.n(); ++i) {
@@ -83,29 +83,29 @@ template <class Model> void export_sizes(nb::class_<ShapeOf<Model>> &of)
   of.def_prop_ro("moment", &moments<Model>, "(N, 3) mean squared distances from the body's axes.");
   of.def(
       "host_spin", &host_spins<Model>, "orientation"_a, "gradient"_a,
-      "Angular velocities (N, 1 or 3) of particles on which no torque acts, in a host with a\n"
+      "Angular velocities (N, 1 or 3) of torque-free particles in a host with a\n"
       "constant upper triangular velocity gradient (D, D); angles (N, 1) or quaternions (N, 4).");
   length(
       "outer_radius", [](auto D, Shape s) { return Model::template outer_radius<D>(s); },
-      "(N,) radii of the spheres around the particles.");
+      "(N,) radii of the bounding spheres.");
   length(
       "inner_radius", [](auto D, Shape s) { return Model::template inner_radius<D>(s); },
       "(N,) smallest lengths of the particles.");
   length(
       "rotation_length", [](auto D, Shape s) { return Model::template rotation_length<D>(s); },
-      "(N,) lengths that a radian counts for; 0 where no contact can turn a particle.");
+      "(N,) lengths that one radian stands for; 0 if no contact can rotate a particle.");
   length(
       "turning_radius", [](auto D, Shape s) { return Model::template turning_radius<D>(s); },
-      "(N,) how far a radian moves a surface towards others at most.");
+      "(N,) bounds of the motion of a surface towards others per radian.");
   axis(
       "symmetry_axis", [](auto, Shape s) { return axis_or_none(Model::symmetry_axis(s)); },
-      "(N,) body axis (0, 1, 2) about which a turn changes nothing in space, or -1.");
+      "(N,) body axis (0, 1, 2) of rotational symmetry in space, or -1.");
   axis(
       "director", [](auto D, Shape s) { return axis_or_none(Model::template director<D>(s)); },
-      "(N,) body axis (0, 1, 2) that tells the direction, or -1.");
+      "(N,) body axis (0, 1, 2) that gives the direction, or -1.");
 }
 
-/// (M,) of what is asked of each pair.
+/// (M,) results of `ask` for each pair.
 template <class Model, class Ask>
 nb::object each_pair(const ShapeOf<Model> &of, const PairArrays &arrays, const Ask &ask)
 {
@@ -117,7 +117,7 @@ nb::object each_pair(const ShapeOf<Model> &of, const PairArrays &arrays, const A
   return answer.release();
 }
 
-/// A contact as Python sees it.
+/// A contact as a Python object.
 template <int D, int BONDS>
 const Contact<D, double, BONDS> &in_doubles(const Contact<D, double, BONDS> &contact)
 {
@@ -173,8 +173,8 @@ template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
                          [&](const auto &of, std::size_t p) { return of.are_closer(p, margin); });
       },
       "margin"_a,
-      "Whether surfaces of M pairs may be closer than `margin` (M,): false only where they are\n"
-      "not. Poses and pairs as `sums` takes them.");
+      "Whether surfaces of M pairs may be closer than `margin` (M,): false only if they are\n"
+      "not. Poses and pairs in the format of `sums`.");
   def_over_pairs(
       of, "overlaps",
       [](Self self, const PairArrays &arrays) {
@@ -196,9 +196,9 @@ template <class Model> void export_pairs(nb::class_<ShapeOf<Model>> &of)
       "most_bonds bonds B, bond_normal (into i), bond_force, bond_arm_i (C, B, D),\n"
       "bond_distance, bond_reach, bond_energy, bond_stiffness (C, B), bond_on_side and\n"
       "bond_on_face (flat in all D - 1 directions) of i and j (C, B, 2). With errors, which takes\n"
-      "longer, also bounds (C,) of how far energy, force and torques are from those of exactly\n"
-      "these particles, in their units: energy_error, by the overlap; force_error, by overlap and\n"
-      "normal; torque_error, by these and the point of contact; NaN where nothing touches.");
+      "longer, also bounds (C,) of the errors of energy, force and torques for exactly these\n"
+      "particles, in their units: energy_error, due to the overlap; force_error, to overlap and\n"
+      "normal; torque_error, to these and the point of contact; NaN without a contact.");
 }
 
 template <class Model> void export_shape(nb::module_ &m)
@@ -206,10 +206,11 @@ template <class Model> void export_shape(nb::module_ &m)
   using namespace nb::literals;
   using Self = ShapeOf<Model>;
   nb::class_<Self> of(m, class_name<Model>().c_str(), Model::SHAPE_RULE);
-  of.def(nb::init<const Array2<double> &, const Array1<double> &, int, double, int>(),
-         "diameters"_a, "exponent"_a, "dimension"_a, "k_e"_a, "sides"_a,
-         "Of diameters (N, 3) and exponents (N,), which not all shapes have; sides 1 or 2 bonds\n"
-         "where sides lie on each other, of shapes whose law knows both.");
+  of.def(
+      nb::init<const Array2<double> &, const Array1<double> &, int, double, int>(), "diameters"_a,
+      "exponent"_a, "dimension"_a, "k_e"_a, "sides"_a,
+      "Particles of diameters (N, 3) and exponents (N,), ignored by shapes without them; sides is\n"
+      "1 or 2, the bonds of a side-to-side contact, for shapes whose law supports both.");
   of.attr("name") = Model::NAME;
   of.attr("core") = Model::CORE;
   of.attr("most_bonds") = Model::MOST_BONDS;

@@ -7,7 +7,7 @@ namespace jamshape {
 
 namespace {
 
-/// A stage with its scales, and the guesses that it starts from.
+/// A stage with its scales and initial guesses.
 struct PosedStage {
   Stage equation;
   StageUnits units;
@@ -21,12 +21,11 @@ StageEnd solve_stage(Vicinity &of, const PosedStage &stage, const std::shared_pt
   for (const auto *part :
        {&stage.equation.drag, &stage.equation.centre, &stage.guess, &stage.other}) {
     require(static_cast<std::size_t>(part->size()) == of.n(),
-            "a part of a stage has another length than there are coordinates.");
-    require_finite(*part, "a part of a stage");
+            "a vector of a stage does not have one number per coordinate.");
+    require_finite(*part, "a vector of a stage");
   }
   require_base(of);
-  require(!factors || factors->size() == of.n(),
-          "the factors are of another number of coordinates.");
+  require(!factors || factors->size() == of.n(), "the factors have another number of coordinates.");
   return StageSolver(of, stage.equation, stage.units, stage.limits, renewing(of, renew))
       .solve(stage.guess, stage.other, {factors, n_bonds});
 }
@@ -44,14 +43,15 @@ double size_of(const StageUnits &units, const Array1<double> &shift, const Array
 void export_stages(nb::module_ &m)
 {
   using namespace nb::literals;
-  nb::class_<StageUnits>(m, "StageUnits", "What errors of displacements are measured in.")
+  nb::class_<StageUnits>(m, "StageUnits", "Units of the errors of displacements.")
       .def(nb::init<double, double, double, double>(), "force"_a, "energy"_a, "length"_a,
            "n_particles"_a)
       .def_ro("force", &StageUnits::force)
       .def_ro("energy", &StageUnits::energy)
       .def_ro("length", &StageUnits::length)
       .def("size", &size_of, "shift"_a, "force"_a, "drag"_a,
-           "Of a displacement (n,), the force that makes it and the drag over the time.");
+           "Magnitude of a displacement (n,), from the force that causes it and the drag over the\n"
+           "time step.");
   nb::class_<StageLimits>(m, "StageLimits")
       .def(
           "__init__",
@@ -59,7 +59,8 @@ void export_stages(nb::module_ &m)
             new (place) StageLimits{accuracy, {longest_step, widest_turn}};
           },
           "accuracy"_a, "longest_step"_a, "widest_turn"_a);
-  nb::class_<PosedStage>(m, "Stage", "drag (x - centre) + dU/dx = 0, with x from the base.")
+  nb::class_<PosedStage>(m, "Stage",
+                         "The equation drag (x - centre) + dU/dx = 0, with x relative to the base.")
       .def(
           "__init__",
           [](PosedStage *place, const Array1<double> &drag, const Array1<double> &centre,
@@ -84,8 +85,8 @@ void export_stages(nb::module_ &m)
   nb::borrow<nb::class_<Vicinity>>(nb::type<Vicinity>())
       .def("solve_stage", &solve_stage, "stage"_a, "factors"_a.none(), "bonds_of_factors"_a,
            "renew"_a,
-           "The StageEnd of a Stage, with factors of an earlier one and how many bonds there were\n"
-           "where they are those of the Hessian; renew(x, strain) takes pairs that hold there.");
+           "Solve a Stage, with factors of an earlier one and the number of bonds at the point of\n"
+           "their Hessian; renew(x, strain) takes pairs that hold there. Returns a StageEnd.");
 }
 
 }  // namespace jamshape

@@ -10,7 +10,7 @@ namespace jamshape {
 
 namespace {
 
-/// Random numbers from functions of Python, so that a seed of NumPy's stands for the whole start.
+/// Random numbers drawn by Python functions, so that one NumPy seed determines the whole start.
 class DrawnInPython {
  public:
   DrawnInPython(const nb::callable &positions_in_box, const nb::callable &directions) :
@@ -26,7 +26,7 @@ class DrawnInPython {
   static void draw(const nb::callable &numbers, std::size_t n, double *out)
   {
     const auto drawn = nb::cast<Array2<double>>(numbers(n));
-    require(drawn.shape(0) == n, "random numbers have no shape (n, D) or (n, 1 or 4).");
+    require(drawn.shape(0) == n, "random numbers do not have the shape (n, D) or (n, 1 or 4).");
     std::copy_n(drawn.data(), drawn.size(), out);
   }
 };
@@ -82,7 +82,7 @@ void export_starts()
            const nb::callable &orientations, std::size_t most_attempts) {
           return of.in_space([&](auto D) {
             require(of.n() > 0 && edges.shape(0) == D,
-                    "edges have no shape (D,), or no particles.");
+                    "edges do not have the shape (D,), or there are no particles.");
             require_edges(edges.data(), D);
             return inserted<Model, D>(of, read_vec<D>(edges.data()), {positions, orientations},
                                       most_attempts);

@@ -1,11 +1,12 @@
-#include "bindings/shape.hpp"
 #include "contact/shapes.hpp"
+
+#include "bindings/shape.hpp"
 
 namespace jamshape {
 
 namespace {
 
-/// A function of its own: how much is inlined into one is limited by its size.
+/// Kept as a separate function: compilers limit inlining by the size of a function.
 template <class Model, int D, class S>
 [[gnu::noinline]] nb::dict sums_in(const ShapeOf<Model> &of, const PairArrays &arrays)
 {
@@ -41,8 +42,8 @@ void export_sums()
           return sums_in<Model, D, decltype(s)>(of, arrays);
         },
         "Sums over M pairs. Position (2, N, D), orientation (2, N, 1) angles or (2, N, 4)\n"
-        "quaternions and cell (2, D, D), the box's cell vectors as columns, as doubles and their\n"
-        "small rests; pairs (M, 2), shift (M, D) cell vectors to add to the second; extended: in\n"
+        "quaternions and cell (2, D, D), the box's cell vectors as columns, in double-double;\n"
+        "pairs (M, 2), shift (M, D) cell vectors to add to the second; extended: in\n"
         "long double. Returns a dict: energy, force (N, D), torque (N, 1 or 3), virial (D, D),\n"
         "bond_force (sum of magnitudes), n_bonds, crossing and unconverged (a pair of this "
         "status,\n"

@@ -10,7 +10,7 @@ namespace jamshape {
 
 namespace {
 
-/// Poses as they come from Python.
+/// Poses as Python passes them.
 struct HardPoses {
   const Array2<double> &position;     // (N, D)
   const Array2<double> &orientation;  // (N, 1) or (N, 4)
@@ -18,10 +18,11 @@ struct HardPoses {
 
   void check(std::size_t N, std::size_t D) const
   {
-    require(edges.shape(0) == D, "edges have no shape (D,).");
-    require(position.shape(0) == N && position.shape(1) == D, "position has no shape (N, D).");
+    require(edges.shape(0) == D, "edges do not have the shape (D,).");
+    require(position.shape(0) == N && position.shape(1) == D,
+            "position does not have the shape (N, D).");
     require(orientation.shape(0) == N && orientation.shape(1) == (D == 2 ? 1 : 4),
-            "orientation has no shape (N, 1) in 2D or (N, 4) in 3D.");
+            "orientation does not have the shape (N, 1) in 2D or (N, 4) in 3D.");
     require_finite(position, "position");
     require_orientations(orientation.data(), N, D);
     require_edges(edges.data(), D);
@@ -47,7 +48,7 @@ HardParticles<Model, D> placed(const ShapeOf<Model> &of, const HardPoses &poses,
   return particles;
 }
 
-/// Throws unless moves go no farther than the shortest edge of the box.
+/// Throws unless moves are at most as long as the shortest edge of the box.
 template <int D> void require_moves(const Moves &moves, const Vec<D> &edges)
 {
   const double shortest = *std::min_element(edges.c, edges.c + D);

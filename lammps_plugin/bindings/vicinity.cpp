@@ -1,7 +1,8 @@
 #include "bindings/vicinity.hpp"
 
-#include "bindings/shape.hpp"
 #include "contact/shapes.hpp"
+
+#include "bindings/shape.hpp"
 
 #include <memory>
 #include <nanobind/stl/shared_ptr.h>
@@ -12,7 +13,7 @@ namespace jamshape {
 
 namespace {
 
-/// Poses, each number a double and its small rest.
+/// Poses as double-doubles.
 struct PoseArrays {
   const Array3<double> &position;     // (2, N, D)
   const Array3<double> &orientation;  // (2, N, 1) or (2, N, 4)
@@ -33,7 +34,7 @@ struct PoseArrays {
   }
 };
 
-/// What coordinates are, as they come from Python.
+/// Description of the coordinates, as Python passes it.
 struct CoordinateArrays {
   const Array2<std::int64_t> &column;     // (N, D + rotations)
   const Array1<double> &rotation_length;  // (N,)
@@ -43,7 +44,7 @@ struct CoordinateArrays {
   {
     require(column.shape(0) == N && column.shape(1) == (D == 2 ? 3 : 6) &&
                 rotation_length.shape(0) == N && turning_radius.shape(0) == N,
-            "column, rotation_length and turning_radius have no shapes (N, 3) or in space (N, 6),"
+            "column, rotation_length and turning_radius do not have shapes (N, 3), in space (N, 6),"
             " (N,) and (N,).");
     require_finite(rotation_length, "rotation_length");
     require_finite(turning_radius, "turning_radius");
@@ -58,7 +59,7 @@ struct CoordinateArrays {
   }
 
  private:
-  /// Throws unless each of so many coordinates is a column of one particle.
+  /// Throws unless each coordinate in 0 ... n - 1 is a column of one particle.
   static std::size_t number_of_columns(const std::int64_t *first, const std::int64_t *last)
   {
     std::vector<std::int64_t> numbers;
@@ -79,8 +80,8 @@ void check_poses(const PoseArrays &poses, const Vicinity &about)
     return of.shape(0) == 2 && of.shape(1) == N && of.shape(2) == columns;
   };
   require(has_shape(poses.position, D) && has_shape(poses.orientation, D == 2 ? 1 : 4),
-          D == 2 ? "position and orientation have no shapes (2, N, 2) and (2, N, 1)."
-                 : "position and orientation have no shapes (2, N, 3) and (2, N, 4).");
+          D == 2 ? "position and orientation do not have shapes (2, N, 2) and (2, N, 1)."
+                 : "position and orientation do not have shapes (2, N, 3) and (2, N, 4).");
   require_finite(poses.position, "position");
   require_orientations(poses.orientation.data(), N, D);
   require_cell(poses.cell, D);
@@ -121,10 +122,10 @@ nb::object evaluate(Vicinity &of, const Array1<double> &x, double strain, bool e
 std::shared_ptr<Factors> factorise(Vicinity &of, const Array1<double> &x, double strain,
                                    const Array1<double> &diagonal)
 {
-  require(diagonal.shape(0) == of.n(), "diagonal has another length than there are coordinates.");
+  require(diagonal.shape(0) == of.n(), "diagonal does not have one number per coordinate.");
   require(of.has_pairs(), "there are no pairs yet, expected take_pairs before.");
   const auto found = of.factorise(checked(of, x, strain), vector(diagonal));
-  require(found != nullptr, "the Hessian holds what is not a number.");
+  require(found != nullptr, "the Hessian has elements that are not finite.");
   return found;
 }
 
@@ -147,7 +148,7 @@ void deform(Vicinity &of, const Array3<double> &matrix, const Array2<double> &tu
   const std::size_t D = of.dimension();
   require_upper(matrix, D, "matrix");
   require(turns.shape(0) == of.n_particles() && turns.shape(1) == (D == 2 ? 1 : 3),
-          "turns have no shape (N, 1) in 2D or (N, 3) in 3D.");
+          "turns do not have the shape (N, 1) in 2D or (N, 3) in 3D.");
   require_finite(turns, "turns");
   require(of.has_held(), "no base is held, expected move_to and hold before.");
   std::vector<long double> rows(D * D);
@@ -180,11 +181,11 @@ nb::object move(Vicinity &of, const Array1<double> &x, double strain)
 
 nb::object solve(const Factors &factors, const Array2<double> &right)
 {
-  require(right.shape(1) == factors.size(), "right has another length than the matrix.");
+  require(right.shape(1) == factors.size(), "right does not have the length of the matrix.");
   return solutions(right, [&](const auto &side) { return factors.solve(side); });
 }
 
-/// A function of its own: how much is inlined into one is limited by its size.
+/// Kept as a separate function: compilers limit inlining by the size of a function.
 template <class Model, int D>
 [[gnu::noinline]] std::unique_ptr<Vicinity> vicinity_of(const ShapeOf<Model> &of, Coordinates names)
 {
@@ -196,37 +197,37 @@ template <class Model, int D>
 void export_vicinity(nb::module_ &m)
 {
   using namespace nb::literals;
-  nb::class_<Factors>(m, "Factors", "Of a positive definite matrix.")
-      .def("solve", &solve, "right"_a, "For the rows of right (k, n).");
+  nb::class_<Factors>(m, "Factors", "Factors of a positive definite matrix.")
+      .def("solve", &solve, "right"_a, "Solve for each row of right (k, n).");
   m.attr("LEAST_SHIFT") = LEAST_SHIFT;
 
   nb::class_<Vicinity>(m, "Vicinity", "The energy of a packing about a base.")
       .def("move_to", &move_to, "position"_a, "orientation"_a, "cell"_a,
-           "Count coordinates from these poses, doubles and their small rests.")
+           "Set the base to these poses, in double-double.")
       .def("move", &move, "x"_a, "strain"_a,
-           "Count coordinates from a point near the base; gives its poses as move_to takes them.")
-      .def("hold", &hold, "Keep the base, from which deform begins.")
+           "Move the base to a nearby point; return its poses in the format of move_to.")
+      .def("hold", &hold, "Store the base, from which deform begins.")
       .def("deform", &deform, "matrix"_a, "turns"_a,
-           "Count coordinates from where an upper triangular matrix (2, D, D), doubles and their\n"
-           "small rests, takes the base that was kept, and rotation vectors (N, 1 or 3) its\n"
-           "particles.")
+           "Move the base to the image of the stored one under an upper triangular matrix (2, D, "
+           "D),\n"
+           "in double-double, and its particles by rotation vectors (N, 1 or 3).")
       .def_prop_ro(
           "poses", [](const Vicinity &of) { return poses_of(of); },
-          "Of the base, as move_to takes them.")
+          "Poses of the base, in the format of move_to.")
       .def(
           "share",
           [](Vicinity &of, std::int64_t threads) {
             require_threads(threads);
             of.share(static_cast<std::size_t>(threads));
           },
-          "threads"_a, "By how many threads sums over contacts are taken; 1 if nobody says so.")
-      .def(
-          "evaluate", &evaluate, "x"_a, "strain"_a, "extended"_a,
-          "None where the pairs no longer hold, or energy, gradient (n,), derivative by the\n"
-          "strain, sum of the magnitudes of bond forces, number of bonds, and a pair that crosses\n"
-          "and one that is unconverged, or -1.")
+          "threads"_a, "Set the number of threads of sums over contacts, 1 at first.")
+      .def("evaluate", &evaluate, "x"_a, "strain"_a, "extended"_a,
+           "Return energy, gradient (n,), derivative with respect to the strain, sum of the\n"
+           "magnitudes of bond forces, number of bonds, and the index of a pair that crosses and "
+           "of\n"
+           "one that is unconverged, or -1; None if the pairs no longer hold.")
       .def("factorise", &factorise, "x"_a, "strain"_a, "diagonal"_a,
-           "Factors of the Hessian by these coordinates plus a diagonal (n,), shifted if it is\n"
+           "Factors of the Hessian in these coordinates plus a diagonal (n,), shifted if it is\n"
            "not positive definite.")
       .def(
           "take_pairs",
@@ -237,9 +238,8 @@ void export_vicinity(nb::module_ &m)
           },
           "position"_a, "orientation"_a, "cell"_a, "pairs"_a, "shift"_a, "wide"_a, "reach"_a,
           "skin"_a,
-          "All pairs of surfaces that are closer than a wide skin at these poses, and centres "
-          "than\n"
-          "reach; from them those within skin are chosen anew as particles move.");
+          "Take all pairs of surfaces closer than a wide skin at these poses, and of centres\n"
+          "closer than reach; those within skin are chosen among them as particles move.");
 
   Shapes::each([](auto model) {
     using Model = decltype(model);
@@ -253,8 +253,8 @@ void export_vicinity(nb::module_ &m)
         },
         "column"_a, "rotation_length"_a, "turning_radius"_a,
         "The energy about a base; column (N, 3), in space (N, 6), numbers of the coordinates\n"
-        "displacement, rotation, or -1. Before anything else, move_to a base; pairs are asked\n"
-        "for by what evaluate gives.");
+        "displacement, rotation, or -1. First of all, move_to a base; evaluate returns None if it\n"
+        "needs pairs.");
   });
 }
 

@@ -26,7 +26,7 @@ inline nb::object tuple_of(const LandscapeSums &sums)
                         sums.unconverged);
 }
 
-/// What lets a vicinity take other pairs: a function of Python, of x and the strain.
+/// Callback that gives a vicinity new pairs: a Python function of x and the strain.
 inline auto renewing(const Vicinity &of, const nb::callable &renew)
 {
   return [&of, renew](const Displacement &at) { renew(array_of(at.x, of.n()), at.strain); };
@@ -37,7 +37,7 @@ inline void require_base(const Vicinity &of)
   require(of.has_base(), "there is no base yet, expected move_to before.");
 }
 
-/// For the rows of right (k, n).
+/// Solutions for the rows of right (k, n).
 template <class Solve> nb::object solutions(const Array2<double> &right, const Solve &solve)
 {
   const std::size_t n = right.shape(1);

@@ -9,7 +9,7 @@
 
 namespace jamshape {
 
-/// Shape and pose of a particle that its long axis tells, as the pair loops read it.
+/// Shape and pose of a particle given by its long axis, as the pair loops read it.
 template <class Shape, int D, class S = double> struct BodyAlongX {
   Vec<D, S> centre;
   Vec<D, S> axis;
@@ -17,14 +17,15 @@ template <class Shape, int D, class S = double> struct BodyAlongX {
   Plain<S> radius;
 };
 
-/// What models share whose shape is a half length A >= 0 along the body's x and a radius R, of
-/// which LAMMPS stores the semi-axes (A + R, R, R). A = 0 is a disc (a sphere).
+/// Common base of models whose shape is a half length A >= 0 along the body's x and a radius R;
+/// LAMMPS stores the semi-axes (A + R, R, R). A = 0 is a disc (a sphere).
 template <class ShapeAlongX> struct AlongX {
   using Shape = ShapeAlongX;
   template <int D, class S = double> using Body = BodyAlongX<Shape, D, S>;
   template <int D> using Start = NoStart;
 
-  /// Nothing when the semi-axes are of another shape. Other shapes have an exponent.
+  /// Returns nothing if the semi-axes do not describe this shape. The second argument is the
+  /// exponent of other shapes.
   static std::optional<Shape> shape_from(const Vec<3> &semi_axes, double)
   {
     const bool is_one = semi_axes[1] == semi_axes[2] && semi_axes[0] >= semi_axes[1] &&
@@ -33,23 +34,23 @@ template <class ShapeAlongX> struct AlongX {
     return Shape{semi_axes[0] - semi_axes[1], semi_axes[1]};
   }
 
-  /// Particles that no contact can turn need no orientation.
+  /// Particles that no contact can rotate need no orientation.
   template <int D> static bool turns(const Shape &shape) { return shape.half_length > 0.0; }
 
-  /// Of the sphere around a particle, and its smallest length.
+  /// Radius of the bounding sphere, and the smallest length of a particle.
   template <int D> static double outer_radius(const Shape &shape)
   {
     return shape.half_length + shape.radius;
   }
   template <int D> static double inner_radius(const Shape &shape) { return shape.radius; }
 
-  /// The length that a radian counts for, 0 where no contact can turn the particle; and how much
-  /// closer to others a radian brings its surface at most.
+  /// The length that one radian stands for, 0 if no contact can rotate the particle; and an upper
+  /// bound of how far one radian moves its surface towards others.
   template <int D> static double rotation_length(const Shape &shape) { return shape.half_length; }
   template <int D> static double turning_radius(const Shape &shape) { return shape.half_length; }
 
-  /// The body axis (0, 1, 2) about which a turn changes nothing, and the one that tells a
-  /// particle's direction; nothing for particles that have none.
+  /// The body axis (0, 1, 2) of rotational symmetry, and the one that gives a particle's direction;
+  /// nothing for particles without one.
   static std::optional<int> symmetry_axis(const Shape &shape) { return director<3>(shape); }
   template <int D> static std::optional<int> director(const Shape &shape)
   {
@@ -68,14 +69,14 @@ template <class ShapeAlongX> struct AlongX {
     body.axis = long_axis<D, S>(q);
   }
 
-  /// Where a particle was when the pairs were last chosen.
+  /// Pose of a particle when the pairs were last chosen.
   template <int D> struct Pose {
     Vec<D> centre, axis;
   };
   template <int D> static Pose<D> pose(const Body<D> &body) { return {body.centre, body.axis}; }
 
-  /// The larger of the squared distances |dx +- A du| that the ends of the axis moved: no point
-  /// between them moved farther.
+  /// The larger of the squared displacements |dx +- A du| of the ends of the axis; no point between
+  /// them moved farther.
   template <int D>
   static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
   {
@@ -84,7 +85,7 @@ template <class ShapeAlongX> struct AlongX {
   }
 
  protected:
-  /// Whether the spheres around two bodies are closer than a margin.
+  /// Whether the gap between two bounding spheres is smaller than a margin.
   template <int D> static bool spheres_are_closer(double margin, const Body<D> &i, const Body<D> &j)
   {
     const double bounding = i.radius + j.radius + margin + i.half_length + j.half_length;

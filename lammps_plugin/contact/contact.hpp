@@ -6,59 +6,59 @@
 
 namespace jamshape {
 
-/// What a pair of particles is to each other. Two have no contact: CROSSING, where spines (or
-/// centres) lie on each other and no normal exists, and UNCONVERGED, where an iteration ended
-/// without usable bounds.
+/// Status of a pair. Two of these mean that no contact could be computed: CROSSING, where spines
+/// (or centres) intersect and no normal exists, and UNCONVERGED, where an iteration ended without
+/// usable bounds.
 enum class ContactStatus { APART, TOUCHING, CROSSING, UNCONVERGED };
 
 /// Classes of contact (Marschall & Teitel 2018, Fig. 1). The numbers are the column `kind` of
 /// `compute contact/local` and of the Python bindings.
 enum class ContactKind { TIP_TO_TIP = 0, TIP_TO_SIDE = 1, SIDE_TO_SIDE = 2 };
 
-/// Whether sides that lie on each other touch at one bond or at two, of shapes whose law knows both
+/// Number of bonds of a side-to-side contact, one or two, for shapes whose law supports both
 /// (Marschall & Teitel 2018: one in the dynamics, Fig. 1d; two for minima and the dynamical matrix,
-/// Fig. 6). Others take either.
+/// Fig. 6). Others ignore it.
 enum class Sides { ONE = 1, TWO = 2 };
 
-/// Shapes that are spared the search that contacts of others need, among themselves.
+/// Shapes whose contacts among themselves have a closed form and need no search.
 enum class Shortcut { NONE, ROUND, ELLIPSOIDS };
 
-/// Points closer than this times the distance at which they begin to touch are one: no direction is
-/// left to push along.
+/// Points closer than this times the distance of first touch coincide: no direction is left to push
+/// along.
 inline constexpr double COINCIDENT = 1e-14;
 
 /// One point of contact that carries one force. Vectors are in space coordinates.
 template <int D, class S = double> struct Bond {
   Vec<D, S> normal;      // unit, into i
-  Vec<D, S> force;       // on i; j carries the opposite
+  Vec<D, S> force;       // on i; j carries the opposite one
   Vec<D, S> arm_i;       // from the centre of i to the point of contact
   Torque<D, S> lever_i;  // derivative of the distance by a rotation of i
-  Torque<D, S> lever_j;  // and of j
+  Torque<D, S> lever_j;  // the same for a rotation of j
   S distance;            // the r of the overlap 1 - r/d
-  S reach;               // the d of it
+  S reach;               // the d of the overlap
   S energy;              // this bond's share of the contact's energy
-  S stiffness;           // of the energy along the bond, without what couples it to others
-  S own_stiffness;       // what of it comes from this bond's overlap alone
-  S coupling;            // with the contact's other bonds: `SecondDerivatives`
+  S stiffness;           // of the energy along the bond, without its coupling to other bonds
+  S own_stiffness;       // contribution of this bond's overlap alone
+  S coupling;            // to the contact's other bonds: `SecondDerivatives`
   bool on_side_i;        // the foot lies strictly inside the straight part of i
   bool on_side_j;
 };
 
-/// Whether a bond lies on a face of i, of j: a part of the surface that is flat in all D - 1
+/// Whether a bond lies on a face of i, of j: a region of the surface that is flat in all D - 1
 /// directions, so that a particle cannot roll over it (the side of a rod is one in 2D only).
 struct OnFaces {
   bool i, j;
 };
 
-/// Energy of one pair with its exact derivatives: force on i (j carries the opposite) and the
-/// torques about the two centres. How many bonds it has at most is the model's.
+/// Energy of one pair with its exact derivatives: the force on i (j carries the opposite) and the
+/// torques about the two centres. The model sets the maximum number of bonds.
 template <int D, class S, int BONDS> struct Contact {
   static constexpr int MOST_BONDS = BONDS;
   ContactStatus status;
   ContactKind kind;
   int n_bonds;
-  double gap;  // relative, between bounds of the distance that an iteration ended with; else 0
-  bool needs_digits;  // doubles are too short for it: see to_its_digits
+  double gap;  // relative, between the bounds of the distance at the end of an iteration; else 0
+  bool needs_digits;  // doubles are not precise enough: see to_its_digits
   Bond<D, S> bond[BONDS];
   S energy;
   Vec<D, S> force;
@@ -66,7 +66,7 @@ template <int D, class S, int BONDS> struct Contact {
   Torque<D, S> torque_j;
 };
 
-/// No bond yet; the bonds themselves stay unset, most pairs of a list being apart.
+/// A contact without bonds; the bonds stay uninitialised, since most pairs of a list are apart.
 template <int D, class S, int BONDS> Contact<D, S, BONDS> without_bonds(ContactStatus status)
 {
   Contact<D, S, BONDS> contact;
@@ -85,9 +85,8 @@ template <int D, class S, int BONDS> Contact<D, S, BONDS> without_bonds(ContactS
 template <class Model, int D, class S = double> using ContactOf = Contact<D, S, Model::MOST_BONDS>;
 
 /// The contacts of as many pairs as a pack has lanes, without bonds: energies and their derivatives
-/// of those that touch. A lane that is `alone` is one of a rare kind, for the code of one pair;
-/// lanes that are `shared`, whose bonds share an energy, take longer and go into packs of their
-/// own.
+/// of those that touch. A lane marked `alone` is of a rare kind and left to the code for single
+/// pairs; `shared` lanes, whose bonds share an energy, take longer and go into packs of their own.
 template <int D, class S> struct ContactLanes {
   S energy{0.0};
   Vec<D, S> force{};
@@ -96,18 +95,17 @@ template <int D, class S> struct ContactLanes {
   Truth<S> touching, alone{}, shared{}, two_bonds{};
 };
 
-/// What a pair remembers of one contact to begin the search for the next one at, a moment later: a
+/// Starting point of the search for a pair's next contact, remembered from the previous one: a
 /// model's Start<D>. Shapes whose contacts need no search remember nothing.
 struct NoStart {};
 
-/// Whether a model's contacts need a search, which doubles may be too short for.
+/// Whether a model's contacts need a search, for which doubles may not be precise enough.
 template <class Model, int D>
 inline constexpr bool IS_SEARCHED = !std::is_same_v<typename Model::template Start<D>, NoStart>;
 
-/// What the drag on the substrate needs of a particle (Marschall & Teitel 2018, Eqs. 8-12): its
-/// area (volume in 3D) and, per body axis, the integral of the squared distance from that axis over
-/// it, divided by it (their I, Eq. 10, about z; in the plane those about x and y are of its
-/// own flat body).
+/// Quantities that the drag on the substrate depends on (Marschall & Teitel 2018, Eqs. 8-12): a
+/// particle's area (volume in 3D) and, for each body axis, the mean squared distance from that axis
+/// over it (their I, Eq. 10, about z; in 2D those about x and y are of the flat body itself).
 struct SubstrateDrag {
   double measure;
   Vec<3> moment;

@@ -6,7 +6,7 @@
 
 namespace jamshape {
 
-/// Pairs of bodies of which the contacts are found at once, in packs.
+/// Pairs of bodies whose contacts are computed together, in packs.
 template <int D> struct ContactBlock {
   static constexpr int MOST = 64;
 
@@ -15,8 +15,8 @@ template <int D> struct ContactBlock {
   alignas(64) double separation[D][MOST];
   alignas(64) double k_e[MOST];
 
-  /// A bit for each pair: whether it touches, whether it is also `alone`, of a rare kind that is
-  /// left to the code of one pair, and whether it has two bonds. What follows is set for pairs that
+  /// One bit per pair: whether it touches, whether it is also `alone`, of a rare kind left to the
+  /// code for single pairs, and whether it has two bonds. The members below are set for pairs that
   /// touch and are not alone.
   std::uint64_t touching, alone, two_bonds;
   alignas(64) double energy[MOST];
@@ -25,8 +25,8 @@ template <int D> struct ContactBlock {
   alignas(64) double torque_j[ROTATIONS<D>][MOST];
   alignas(64) double bond_force[MOST];  // sum of the magnitudes
 
-  /// Of shapes whose contacts are searched: where the searches of all pairs begin, if they are to
-  /// begin anywhere, and where they ended.
+  /// For shapes whose contacts need a search: where the searches of all pairs begin, if a start is
+  /// given, and where they ended.
   bool has_starts = false;
   alignas(64) double start[D][MOST];
 
@@ -38,14 +38,14 @@ template <int D> struct ContactBlock {
     k_e[n++] = stiffness;
   }
 
-  /// Of a shape no contacts of which are shared.
+  /// Finds the contacts of a shape without shared lanes.
   template <class ContactsOf> void find(int lanes, const ContactsOf &contacts_of)
   {
     set_all(lanes, contacts_of);
   }
 
-  /// Finds them in packs of so many lanes: `contacts_of(block, first)` and `shared_of(block,
-  /// first)` give ContactLanes of the pairs of a block from `first` on.
+  /// Finds them in packs of this many lanes: `contacts_of(block, first)` and `shared_of(block,
+  /// first)` return the ContactLanes of the pairs of a block from `first` on.
   template <class ContactsOf, class SharedOf>
   void find(int lanes, const ContactsOf &contacts_of, const SharedOf &shared_of)
   {
@@ -70,14 +70,14 @@ template <int D> struct ContactBlock {
   Torque<D> torque_i_of(int k) const { return of_pair<ROTATIONS<D>>(torque_i, k); }
   Torque<D> torque_j_of(int k) const { return of_pair<ROTATIONS<D>>(torque_j, k); }
 
-  /// Calls `visit(k)` for the pairs of these bits, in their order.
+  /// Calls `visit(k)` for the pairs whose bits are set, in order.
   template <class Visit> static void for_each(std::uint64_t bits, const Visit &visit)
   {
     for (; bits != 0; bits &= bits - 1) visit(__builtin_ctzll(bits));
   }
 
  private:
-  /// Returns those that are shared.
+  /// Returns the shared pairs.
   template <class LanesOf> std::uint64_t set_all(int lanes, const LanesOf &lanes_of)
   {
     fill_up(lanes);
@@ -93,7 +93,7 @@ template <int D> struct ContactBlock {
     return shared & asked;
   }
 
-  /// The last pair fills what packs take beyond it.
+  /// Repeats the last pair to fill the remaining lanes of a pack.
   void fill_up(int lanes)
   {
     for (int k = n; k % lanes != 0; ++k) {

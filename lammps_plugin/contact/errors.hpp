@@ -8,19 +8,20 @@
 
 namespace jamshape {
 
-/// Bounds of |value - exact value| of a contact: of its energy, which errs with its overlap; of its
-/// force, which errs with its normal as well; and of its torques, which err with its points, too.
+/// Bounds of |value - exact value| of a contact: of its energy, through the error of the overlap;
+/// of its force, also through that of the normal; and of its torques, also through that of the
+/// points.
 struct ContactErrors {
   double energy, force, torque;
 };
 
-/// The relative error of the overlap, that of the force by its direction and length alone, and how
-/// far off the point of contact is: what ContactErrors follow from.
+/// Relative error of the overlap, that of the force due to its direction and magnitude alone, and
+/// the distance of the point of contact from the exact one: the input of ContactErrors.
 template <class T> struct ErrorsOfGeometry {
   T overlap, normal, point;
 };
 
-/// Of a shape in closed form: rounding.
+/// Rounding errors of a shape with closed-form contacts.
 template <int D, class Body, class T, int BONDS>
 ErrorsOfGeometry<T> errors_of_geometry(const Body &, const Body &,
                                        const Contact<D, T, BONDS> &contact)
@@ -35,9 +36,9 @@ ErrorsOfGeometry<T> errors_of_geometry(const Body &, const Body &,
   return errors;
 }
 
-/// Errors of a contact that touches, whatever its scalar S: how far it is from the one in the wider
-/// scalar T, and what that one may be off itself by the residual and the conditioning of the
-/// equations that it solves. The bodies are those of the contact to all digits of T.
+/// Errors of a touching contact in its scalar S: its difference from the one in the wider scalar T,
+/// plus the error of the latter from the residual and the conditioning of the equations solved. The
+/// bodies are those of the contact in full precision T.
 template <int D, class Body, class S, class T, int BONDS>
 ContactErrors errors_of(const Body &i, const Body &j, const Contact<D, S, BONDS> &contact,
                         const Contact<D, T, BONDS> &wide)

@@ -11,7 +11,7 @@
 
 namespace jamshape {
 
-/// A number of long doubles in doubles.
+/// A long double rounded to a double.
 inline double rounded(long double x) { return static_cast<double>(x); }
 template <int N> Dual<N> rounded(const Dual<N, long double> &x)
 {
@@ -52,8 +52,8 @@ template <int D, class Long, int BONDS> auto rounded(const Contact<D, Long, BOND
   return contact;
 }
 
-/// The same pair to more digits: exactly that of the doubles, but for quaternions, which rounding
-/// leaves not quite of length 1.
+/// The same pair in higher precision: exactly that of the doubles, except for quaternions, whose
+/// length rounding leaves slightly off 1.
 template <class Model, int D>
 PosedPair<Model, D, long double> in_long(const PosedPair<Model, D, double> &pair)
 {
@@ -68,8 +68,8 @@ PosedPair<Model, D, long double> in_long(const PosedPair<Model, D, double> &pair
           pair.law};
 }
 
-/// The contact of a pair in long doubles, and the one in dual numbers: apart from the code of the
-/// many pairs that need neither, into which it would be copied.
+/// The contact of a pair in long doubles, and the one in dual numbers: kept out of the code of the
+/// many pairs that need neither, so that it is not inlined there.
 template <class Model, int D>
 [[gnu::noinline, gnu::cold]] ContactOf<Model, D>
 contact_in_long(const PosedPair<Model, D, long double> &pair)
@@ -83,8 +83,8 @@ turned_contact_in_long(const PosedPair<Model, D, long double> &pair)
   return rounded(turned_contact_at(pair));
 }
 
-/// A contact that may be of few digits; where it is (rarely), that of `pair()` in long doubles
-/// instead, which alone is asked for then.
+/// Returns a contact, recomputed from `pair()` in long doubles in the rare case that its precision
+/// is not sufficient; `pair()` is called only then.
 template <class Model, int D, class PairInLong>
 ContactOf<Model, D> to_its_digits(const ContactOf<Model, D> &found, const PairInLong &pair)
 {
@@ -105,7 +105,7 @@ to_its_digits(const ContactOf<Model, D, Dual<PAIR_VARIABLES<D>>> &found, const P
   return found;
 }
 
-/// A contact with its second derivatives; of what couples bonds as much as counts in rates.
+/// A contact with its second derivatives; the coupling of bonds is limited as in relaxation rates.
 template <class Model, int D>
 ContactDerivatives<Model, D, double> derivatives_at(const PosedPair<Model, D, double> &pair)
 {
@@ -118,7 +118,7 @@ ContactDerivatives<Model, D, double> derivatives_at(const PosedPair<Model, D, do
   return result;
 }
 
-/// Bounds of the errors of a contact, from the same pair in long doubles; NaN where one of both
+/// Bounds of the errors of a contact, from the same pair in long doubles; NaN if either of the two
 /// does not touch.
 template <class Model, int D>
 ContactErrors errors_at(const ContactOf<Model, D> &contact,

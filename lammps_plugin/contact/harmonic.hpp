@@ -2,8 +2,8 @@
 
 namespace jamshape {
 
-/// One-sided harmonic law of the overlap x = 1 - r/d: V = k_e/2 x^2 for x > 0
-/// (Marschall & Teitel 2018, Eq. 22). Overlaps are without unit; k_e is an energy.
+/// One-sided harmonic law of the overlap x = 1 - r/d: V = k_e/2 x^2 for x > 0 (Marschall & Teitel
+/// 2018, Eq. 22). Overlaps are dimensionless; k_e is an energy.
 template <class K> struct HarmonicOf {
   K k_e;
 

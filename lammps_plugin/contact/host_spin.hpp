@@ -6,9 +6,9 @@
 
 namespace jamshape {
 
-/// Per body axis how far the host's strain turns a particle about it, from its mean squared
-/// distances from these axes (the moments over its area or volume): 0 of what is round about the
-/// axis, and of an axis about which nothing turns.
+/// Bretherton parameter for each body axis, how strongly the host's strain rotates a particle about
+/// it, from the mean squared distances from the axes (moments over area or volume): 0 for shapes
+/// that are round about the axis, and for axes without rotation.
 inline Vec<3> bretherton_parameters(const Vec<3> &moment)
 {
   Vec<3> found{};
@@ -21,10 +21,10 @@ inline Vec<3> bretherton_parameters(const Vec<3> &moment)
   return found;
 }
 
-/// How a host of velocity gradient G turns a particle on which no torque acts: the drag on its
+/// Angular velocity of a torque-free particle in a host of velocity gradient G: the drag on its
 /// surface elements balances for <s x G s> over <s^2 - (s.e)^2> about each body axis e, s from its
-/// centre. That is Jeffery's equation, half the vorticity and a part B of the strain rate, with B =
-/// (M_2 - M_3) / (M_2 + M_3) about axis 1 the Bretherton parameter, M_k the mean of s_k^2.
+/// centre. This is Jeffery's equation, half the vorticity plus a fraction B of the strain rate,
+/// with the Bretherton parameter B = (M_2 - M_3) / (M_2 + M_3) about axis 1, M_k the mean of s_k^2.
 template <int D>
 Torque<D> host_spin(const Upper &gradient, const Vec<3> &bretherton, const Quaternion &q)
 {

@@ -8,7 +8,7 @@
 
 namespace jamshape {
 
-/// Sets of instructions that packs are compiled for, and `scalar`, no packs at all.
+/// Instruction sets that packs are compiled for; `scalar` uses no packs.
 enum class InstructionSet { scalar, baseline, avx2 };
 
 struct NamedSet {
@@ -28,8 +28,8 @@ inline bool machine_has(InstructionSet set)
   return set != InstructionSet::avx2;
 }
 
-/// The set that the environment variable JAMSHAPE_SIMD names, the best of this machine if there is
-/// none; nothing where it names no set of this machine.
+/// The set that the environment variable JAMSHAPE_SIMD names, or the best of this machine if it is
+/// unset; nothing if the name is unknown or not supported here.
 inline std::optional<InstructionSet> instruction_set()
 {
   const char *const wish = std::getenv("JAMSHAPE_SIMD");
@@ -52,7 +52,7 @@ inline std::string known_sets()
   return names;
 }
 
-/// The set to use; throws std::invalid_argument where none of this machine is named.
+/// The set to use; throws std::invalid_argument if JAMSHAPE_SIMD names none of this machine.
 inline InstructionSet required_instruction_set()
 {
   const auto chosen = instruction_set();
@@ -61,8 +61,8 @@ inline InstructionSet required_instruction_set()
                               ", expected " + known_sets() + ".");
 }
 
-/// Of functions that are compiled once for each set, `of_set(set)`, the one for a set that this
-/// machine has; none for pairs one by one.
+/// Selects from functions compiled once per set, `of_set(set)`, the one that this machine supports;
+/// none if pairs are evaluated one by one.
 template <class OfSet>
 auto compiled_for(InstructionSet set, const OfSet &of_set)
     -> decltype(of_set(std::integral_constant<InstructionSet, InstructionSet::baseline>()))

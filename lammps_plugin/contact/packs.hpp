@@ -5,14 +5,14 @@
 
 namespace jamshape {
 
-/// Finds the contacts of a block. Of the bodies centres do not count, and of the law k_e does not,
-/// which are the block's.
+/// Finds the contacts of a block. The centres of the bodies and the k_e of the law are ignored in
+/// favour of those of the block.
 template <class Model, int D>
 using FindContacts = void(const typename Model::template Body<D> *bodies,
                           const typename Model::Law &law, ContactBlock<D> &block);
 
-/// The function of a shape that has packs, `of` a set, for particles each of which they `take`
-/// beside the first one; none where pairs go one by one.
+/// The function of a shape that has packs, for an instruction set `of`, if the packs `take` each of
+/// the particles beside the first one; none where pairs are evaluated one by one.
 template <class Model, int D> struct PacksOf {
   static constexpr bool EXIST = false;
 };

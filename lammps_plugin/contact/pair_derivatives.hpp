@@ -22,18 +22,18 @@ template <class Model, int D, class S> struct PosedPair {
   typename Model::Law law;
 };
 
-/// The second derivatives of a contact's energy, in two parts: the sum over bonds of own_stiffness
-/// * gradient (x) gradient, and `curvature`, all that comes from the forces themselves (Marschall &
-/// Teitel 2018, Eqs. 38-40: H and -S). Kept apart since the second is smaller by the overlap and
-/// would drown in their sum. Where bonds share an energy that is not the sum of theirs, v (x) v
-/// comes on top, v the sum over bonds of coupling * gradient.
+/// Second derivatives of a contact's energy, in two parts: the sum over bonds of own_stiffness *
+/// gradient (x) gradient, and `curvature`, all that comes from the forces themselves (Marschall &
+/// Teitel 2018, Eqs. 38-40: H and -S). They are kept apart because the second is smaller by a
+/// factor of the overlap and would be lost in their sum. If bonds share an energy that is not the
+/// sum of theirs, v (x) v is added, v being the sum over bonds of coupling * gradient.
 template <int D, class S, int BONDS> struct SecondDerivatives {
   static constexpr int N = PAIR_VARIABLES<D>;
-  S gradient[BONDS][N];  // of the distance of each bond
+  S gradient[BONDS][N];  // of each bond's distance
   S curvature[N][N];
 };
 
-/// With the contact.
+/// Sets the derivatives together with the contact.
 template <class Model, int D, class S>
 struct ContactDerivatives : SecondDerivatives<D, S, Model::MOST_BONDS> {
   ContactOf<Model, D, S> contact;
@@ -41,7 +41,7 @@ struct ContactDerivatives : SecondDerivatives<D, S, Model::MOST_BONDS> {
 
 namespace detail {
 
-/// In the plane, where q.i = q.j = 0.
+/// In 2D, where q.i = q.j = 0.
 template <int N, class S>
 QuaternionOf<Dual<N, S>> turned_by_variables(const QuaternionOf<S> &q, const Vec<1, int> &first)
 {
@@ -89,7 +89,7 @@ template <class Model, int D, class S> struct PosedBodies {
   }
 };
 
-/// The contact of a pair as its energy and forces alone.
+/// The contact of a pair, with energy and forces only.
 template <class Model, int D, class S>
 ContactOf<Model, D, S> contact_at(const PosedPair<Model, D, S> &pair)
 {
@@ -97,8 +97,8 @@ ContactOf<Model, D, S> contact_at(const PosedPair<Model, D, S> &pair)
   return contact_of(bodies.i, bodies.j, pair.law);
 }
 
-/// A body that its own rotation variables, from `first` on, turn: for the code of the forces to run
-/// on dual numbers.
+/// A body rotated by its own rotation variables, from `first` on, so that the force code can run on
+/// dual numbers.
 template <class Model, int D, class S>
 typename Model::template Body<D, Dual<PAIR_VARIABLES<D>, S>>
 turned_body(const typename Model::Shape &shape, const QuaternionOf<S> &orientation, int first)
@@ -111,7 +111,7 @@ turned_body(const typename Model::Shape &shape, const QuaternionOf<S> &orientati
   return body;
 }
 
-/// Where the rotation variables of i and of j begin.
+/// Index of the first rotation variable of i and of j.
 template <int D> inline constexpr int FIRST_OF_I = D;
 template <int D> inline constexpr int FIRST_OF_J = D + ROTATIONS<D>;
 
@@ -123,7 +123,7 @@ template <int D, class S> Vec<D, Dual<PAIR_VARIABLES<D>, S>> as_variables(const 
   return variables;
 }
 
-/// Reads the second derivatives out of a contact that touches, but for what couples its bonds.
+/// Extracts the second derivatives from a touching contact, without the coupling of its bonds.
 template <int D, class S, int BONDS>
 void read_uncoupled(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
                     SecondDerivatives<D, S, BONDS> &result)
@@ -140,8 +140,8 @@ void read_uncoupled(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
     for (int k = 0; k < M; ++k) result.curvature[D + k][col] = -dual.torque_i[k].d[col];
     for (int k = 0; k < M; ++k) result.curvature[D + M + k][col] = -dual.torque_j[k].d[col];
   }
-  // Rotations in space do not commute: the torque's derivative by a rotation vector is that of the
-  // energy and an antisymmetric part.
+  // Rotations in space do not commute: the derivative of the torque with respect to a rotation
+  // vector is that of the energy plus an antisymmetric part.
   for (int row = 0; row < N; ++row) {
     for (int col = 0; col < row; ++col) {
       const S mean = 0.5 * (result.curvature[row][col] + result.curvature[col][row]);
@@ -150,7 +150,8 @@ void read_uncoupled(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
   }
 }
 
-/// All of them: what couples the bonds is part of the curvature, at most `most` times their own.
+/// All second derivatives: the coupling of bonds is included in the curvature, limited to `most`
+/// times their own stiffness.
 template <int D, class S, int BONDS>
 void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
                       SecondDerivatives<D, S, BONDS> &result, S most = INFINITY)
@@ -171,12 +172,12 @@ void read_derivatives(const Contact<D, Dual<PAIR_VARIABLES<D>, S>, BONDS> &dual,
   }
 }
 
-/// How stiff bonds count in rates of relaxation that are coupled, over their own stiffness. The two
-/// of rods that are about to have one may be coupled without limit; what is more is a kink to an
-/// integrator, which jumps over it, not a spring.
+/// Largest stiffness of coupled bonds in relaxation rates, over their own. The coupling of two
+/// bonds about to appear on rods is unbounded; beyond this limit an integrator sees a kink, which
+/// it jumps over, not a spring.
 inline constexpr double STIFFEST_COUPLING = 4.0;
 
-/// The contact in dual numbers: the code of the forces, run on these, gives second derivatives.
+/// The contact in dual numbers: the force code, run on them, gives second derivatives.
 template <class Model, int D, class S>
 ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>>
 turned_contact_at(const PosedPair<Model, D, S> &pair)

@@ -7,11 +7,11 @@
 namespace jamshape {
 
 template <class... Models> struct ShapeList {
-  /// Shows each model, as an empty object of its type.
+  /// Calls `visit` with an empty object of each model's type.
   template <class Visit> static void each(const Visit &visit) { (visit(Models{}), ...); }
 };
 
-/// Every shape that Python and the command `create_random` know.
+/// All shapes available in Python and the command `create_random`.
 using Shapes = ShapeList<SpherocylinderModel, SuperellipsoidModel, DimerModel>;
 
 }  // namespace jamshape

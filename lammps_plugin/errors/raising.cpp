@@ -1,8 +1,8 @@
-// Errors of a LAMMPS that was compiled without exceptions, as of Debian 12, which ends its process
-// where it meets one. Python loads this library before LAMMPS's, so that calls of `Error::all` and
-// `Error::one`, in LAMMPS as in the plugin, come here: within a command that Python gave they
-// throw, and `jamshape_command` returns their sentence. Everywhere else, as in decks and on several
-// ranks, LAMMPS's own functions do what they do.
+// Errors of a LAMMPS compiled without exceptions, as on Debian 12, which ends its process at an
+// error. Python loads this library before LAMMPS's, so that calls of `Error::all` and `Error::one`,
+// in LAMMPS and in the plugin, arrive here: within a command given by Python they throw, and
+// `jamshape_command` returns their message. In all other cases, as in decks and on several ranks,
+// LAMMPS's own functions are called.
 
 #include "comm.h"
 #include "error.h"
@@ -20,7 +20,7 @@ struct Refusal {
   std::string sentence;
 };
 
-/// Whether this thread is within a command that Python gave.
+/// Whether this thread is within a command given by Python.
 thread_local bool is_within = false;
 
 constexpr char ALL[] =
@@ -28,8 +28,7 @@ constexpr char ALL[] =
 constexpr char ONE[] =
     "_ZN9LAMMPS_NS5Error3oneERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEEiS8_";
 
-/// A function of LAMMPS's library, which is found by the table of virtual functions of one of its
-/// objects.
+/// A function of LAMMPS's library, located through the virtual table of one of its objects.
 void *of_lammps(const LAMMPS_NS::Error *object, const char *name)
 {
   Dl_info found;
@@ -56,7 +55,7 @@ void Error::all(const std::string &file, int line, const std::string &sentence)
 {
   if (!is_within || comm->nprocs > 1) leave_to_lammps(ALL, this, file, line, sentence);
   if (logfile) std::fprintf(logfile, "ERROR: %s\n", sentence.c_str());
-  update->whichflag = 0;  // no run and no minimisation goes on: the next command may begin one
+  update->whichflag = 0;  // the run or minimisation is over: the next command may begin one
   throw Refusal{sentence};
 }
 
@@ -70,7 +69,7 @@ void Error::one(const std::string &file, int line, const std::string &sentence)
 
 extern "C" {
 
-/// Whether LAMMPS's calls come here: not where its library was loaded before this one.
+/// Whether LAMMPS's calls arrive here: not if its library was loaded before this one.
 int jamshape_is_asked()
 {
   Dl_info found;
@@ -80,8 +79,8 @@ int jamshape_is_asked()
          found.dli_fbase == own.dli_fbase;
 }
 
-/// Gives LAMMPS a command by its function `lammps_command`; writes the sentence of an error, cut to
-/// `room` bytes with a closing 0, or nothing, and returns whether there was one.
+/// Passes a command to LAMMPS by its function `lammps_command`; writes the message of an error,
+/// truncated to `room` bytes including the final 0, or nothing, and returns whether there was one.
 int jamshape_command(char *(*lammps_command)(void *, const char *), void *lammps, const char *line,
                      char *sentence, std::size_t room)
 {

@@ -14,29 +14,28 @@
 
 namespace jamshape {
 
-/// The smallest shift of a diagonal, over its largest element: rounding in the factorisation is
-/// just below it, and so is what it does to modes that are stiff at all.
+/// Smallest shift of a diagonal, over its largest element: just above the rounding of the
+/// factorisation and its effect on stiff modes.
 inline constexpr double LEAST_SHIFT = 1e-13;
 
-/// Factors of a symmetric matrix, or of one that is nearly it.
+/// Factors of a symmetric matrix, or of an approximation to it.
 class Factors {
  public:
   virtual ~Factors() = default;
   virtual std::size_t size() const = 0;
-  /// For a right-hand side (n,) in the coordinates.
+  /// Solution for a right-hand side (n,) in the coordinates.
   virtual Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd> &right) const = 0;
 };
 
-/// Whether factors hold all that elimination adds to a matrix, or only blocks where it has some
-/// itself: then they are those of a matrix nearby, in a small part of the memory and time.
+/// Whether factors include all fill-in of the elimination, or only blocks that the matrix itself
+/// has: then they approximate it, in a small fraction of the memory and time.
 enum class Fill { COMPLETE, NONE };
 
-/// Where a symmetric matrix of blocks, one row for each particle of so many coordinates, and its
-/// factor L hold blocks: the graph of the particles' contacts and what elimination adds to it. Made
-/// once for all matrices of a list of pairs.
+/// Sparsity pattern of a symmetric matrix of blocks, one row per particle, and of its factor L: the
+/// graph of the particles' contacts and the fill-in. Made once for all matrices of a list of pairs.
 struct BlockPattern {
-  /// Of N particles, whose coordinates have these numbers (N, block), -1 for none, and the pairs of
-  /// them (M, 2) that share a block.
+  /// Pattern for N particles, whose coordinates have these numbers (N, block), -1 for none, and the
+  /// pairs of them (M, 2) that share a block.
   BlockPattern(std::vector<std::int64_t> numbers, const std::vector<std::int64_t> &pairs,
                std::size_t N, Fill what_fill) :
       n(numbers.size() - std::count(numbers.begin(), numbers.end(), -1)),
@@ -47,9 +46,9 @@ struct BlockPattern {
       const auto [low, high] = std::minmax(place[pairs[p]], place[pairs[p + 1]]);
       if (low < high) below[low].push_back(high);
     }
-    // A column's rows couple to each other once it is eliminated: the first of them takes the rest,
-    // which suffices, as it will hand them on (elimination tree: Liu, SIAM J. Matrix Anal. Appl.
-    // 11, 134 (1990)).
+    // The rows of a column couple to each other once it is eliminated: handing the rest to the
+    // first of them suffices, as it will hand them on (elimination tree: Liu, SIAM J. Matrix Anal.
+    // Appl. 11, 134 (1990)).
     first.push_back(0);
     for (std::vector<int> &rows : below) {
       std::sort(rows.begin(), rows.end());
@@ -75,14 +74,14 @@ struct BlockPattern {
   std::size_t n;                     // coordinates
   std::vector<std::int64_t> column;  // (N, block)
   Fill fill;
-  std::vector<int> place;       // (N,) of each particle in the order of elimination
-  std::vector<int> first;       // (N + 1,) of the blocks below the diagonal, column by column
-  std::vector<int> row;         // of each block, ascending within a column
-  std::vector<int> first_left;  // (N + 1,) of the same blocks, row by row
+  std::vector<int> place;       // (N,) place of each particle in the order of elimination
+  std::vector<int> first;       // (N + 1,) first block below the diagonal, column by column
+  std::vector<int> row;         // row of each block, ascending within a column
+  std::vector<int> first_left;  // (N + 1,) first of the same blocks, row by row
   std::vector<LeftBlock> left;  // ascending within a row
 
  private:
-  /// In an order in which few blocks are added (approximate minimum degree).
+  /// An order of elimination with little fill-in (approximate minimum degree).
   static std::vector<int> ordered(std::size_t N, const std::vector<std::int64_t> &pairs)
   {
     std::vector<Eigen::Triplet<double>> entries;
@@ -119,7 +118,7 @@ template <int BLOCK> using BlockOf = Eigen::Matrix<double, BLOCK, BLOCK>;
 template <int BLOCK> struct BlockMatrix {
   std::vector<BlockOf<BLOCK>> diagonal, below;
 
-  /// Where its numbers are; nothing is changed by kernels that only read.
+  /// View of its numbers; kernels that only read change nothing.
   BlockView view(const BlockPattern &of) const
   {
     BlockView at{};
@@ -134,8 +133,8 @@ template <int BLOCK> struct BlockMatrix {
   }
 };
 
-/// A vector in the coordinates and the same by blocks, in the order of elimination; zero for
-/// coordinates that a particle does not have.
+/// A vector in the coordinates and its blocks, in the order of elimination; zero for coordinates
+/// that a particle does not have.
 template <int BLOCK> class BlockRows {
  public:
   explicit BlockRows(const BlockPattern &of) : pattern(of), x(STRIDE * of.size()) {}
@@ -171,9 +170,9 @@ template <int BLOCK> class BlockRows {
 };
 
 /// Factors L D L^T of symmetric positive definite matrices of one pattern, block by block: three
-/// times faster than number by number. Pivots are single numbers, as without blocks, so that a
-/// particle that is held in one direction only costs no digits. Coordinates that a particle does
-/// not have are to have zeros in its blocks and 1 on the diagonal.
+/// times faster than element by element. Pivots are single numbers, as without blocks, so that a
+/// particle constrained in one direction only costs no digits. Coordinates that a particle does not
+/// have need zeros in its blocks and 1 on the diagonal.
 template <int BLOCK> class BlockFactors : public Factors {
  public:
   BlockFactors(std::shared_ptr<const BlockPattern> of, const BlockKernels &compiled) :
@@ -182,9 +181,9 @@ template <int BLOCK> class BlockFactors : public Factors {
   {
   }
 
-  /// Of a matrix with a diagonal added, its rows in the order of elimination. False, and no
-  /// factors, where a pivot is not positive: then the matrix is not positive definite (Sylvester's
-  /// law of inertia), if fill is complete.
+  /// Factors of a matrix plus a diagonal, its rows in the order of elimination. False, and no
+  /// factors, if a pivot is not positive: then the matrix is not positive definite (Sylvester's law
+  /// of inertia), if the fill is complete.
   bool factorise(const BlockMatrix<BLOCK> &matrix, const BlockRows<BLOCK> &added)
   {
     factors = matrix;
@@ -214,7 +213,7 @@ template <int BLOCK> class BlockFactors : public Factors {
   BlockKernels kernels;
   BlockMatrix<BLOCK> factors;  // L below the pivots, which its diagonal holds
   std::vector<double> inverse_pivots;
-  std::vector<int> block_of_row, column_of_row;  // space to work in
+  std::vector<int> block_of_row, column_of_row;  // work space
 };
 
 }  // namespace jamshape

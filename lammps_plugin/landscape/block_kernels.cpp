@@ -1,4 +1,4 @@
-// Compiled once for each set of instructions, JAMSHAPE_SET.
+// Compiled once for each instruction set, JAMSHAPE_SET.
 
 #include "landscape/block_kernels.hpp"
 
@@ -10,7 +10,7 @@ namespace {
 using Two = double __attribute__((vector_size(16)));
 using Four = double __attribute__((vector_size(32)));
 
-/// N numbers in a register; it may hold more, which are whatever comes next.
+/// N numbers in a register, which may hold more; the content of the others is arbitrary.
 template <class V, int N> struct Register {
   V v;
 
@@ -92,7 +92,7 @@ template <int BLOCK> struct Square {
   }
 };
 
-// Nothing is read nor written beyond the block.
+// Nothing is read or written beyond the block.
 template <> void Square<3>::load(const double *block)
 {
   for (int c = 0; c < 2; ++c) column[c].load(block + 3 * c);
@@ -105,8 +105,8 @@ template <> void Square<3>::put(double *block) const
   std::memcpy(block + 6, &column[2], 3 * sizeof(double));
 }
 
-/// Takes the product of a block and another one, (k, c) of which is part[BLOCK * k + c], off a
-/// third.
+/// Subtracts from a third block the product of a block and another one, whose (k, c) is part[BLOCK
+/// * k + c].
 template <int BLOCK> void take_product(const double *a, const double *part, double *from)
 {
   Square<BLOCK> left, rest;
@@ -118,8 +118,8 @@ template <int BLOCK> void take_product(const double *a, const double *part, doub
   rest.put(from);
 }
 
-/// Takes off a column what the eliminated ones on its left add to it (left-looking), but for blocks
-/// that the pattern does not have.
+/// Subtracts from a column the contributions of the eliminated ones on its left (left-looking),
+/// except for blocks outside the pattern.
 template <int BLOCK> void gather(const BlockView &at, int j)
 {
   constexpr int SIZE = BLOCK * BLOCK;
@@ -145,7 +145,7 @@ template <int BLOCK> void gather(const BlockView &at, int j)
   }
 }
 
-/// Splits the diagonal block into l d l^T, and divides those below it by d l^T.
+/// Factorises the diagonal block into l d l^T, and divides those below it by d l^T.
 template <int BLOCK> bool eliminate(const BlockView &at, int j)
 {
   constexpr int SIZE = BLOCK * BLOCK;

@@ -16,17 +16,17 @@ class BlockSystem {
  public:
   virtual ~BlockSystem() = default;
   virtual void clear() = 0;
-  /// Adds the second derivatives of a pair by the coordinates of its first particle and of its
-  /// second one, a square matrix in columns.
+  /// Adds the second derivatives of a pair with respect to the coordinates of its first and its
+  /// second particle, a square matrix in columns.
   virtual void add(std::size_t pair, const double *by) = 0;
   virtual Eigen::VectorXd diagonal() const = 0;
   virtual Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const = 0;
-  /// Of the matrix plus a diagonal (n,); nothing where a pivot is not positive.
+  /// Factors of the matrix plus a diagonal (n,); null if a pivot is not positive.
   virtual std::shared_ptr<Factors> factors(const Eigen::VectorXd &added) = 0;
 };
 
-/// What a block system is made for: N particles whose coordinates, `most` of each, have the numbers
-/// column (N, most), -1 for none, and pairs of them (M, 2).
+/// Layout of a block system: N particles, whose at most `most` coordinates have the numbers column
+/// (N, most), -1 for none, and pairs of them (M, 2).
 struct BlockPlan {
   const std::vector<std::int64_t> &column;
   const std::vector<std::int64_t> &pairs;
@@ -35,7 +35,7 @@ struct BlockPlan {
   Fill fill;
 };
 
-/// That of particles of which only the first BLOCK coordinates are there.
+/// Block system of particles with only their first BLOCK coordinates.
 template <int BLOCK> class BlockSystemOf : public BlockSystem {
  public:
   explicit BlockSystemOf(const BlockPlan &plan) : most(plan.most), pairs(plan.pairs)
@@ -52,7 +52,7 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
     }
   }
 
-  /// Zero, with 1 for each coordinate that a particle does not have.
+  /// Sets the matrix to zero, with 1 for each coordinate that a particle does not have.
   void clear() override
   {
     hessian.diagonal.assign(pattern->size(), Block::Zero());
@@ -106,7 +106,7 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
   int most;
   std::vector<std::int64_t> pairs;
   std::shared_ptr<const BlockPattern> pattern;
-  std::vector<int> block;  // (M,) of each pair below the diagonal
+  std::vector<int> block;  // (M,) block of each pair below the diagonal
   BlockMatrix<BLOCK> hessian;
   std::vector<std::shared_ptr<BlockFactors<BLOCK>>> made;
   BlockKernels kernels = block_kernels<BLOCK>();
@@ -114,7 +114,7 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
   /// Row of a pair's first or second particle.
   int place(std::size_t p, int side) const { return pattern->place[pairs[2 * p + side]]; }
 
-  /// Each coordinate with its element on the diagonal.
+  /// Calls `then` for each coordinate with its element on the diagonal.
   template <class Matrix, class Then>
   static void each_of(const BlockPattern &at, Matrix &matrix, const Then &then)
   {
@@ -126,7 +126,7 @@ template <int BLOCK> class BlockSystemOf : public BlockSystem {
   template <class Then> void each(const Then &then) { each_of(*pattern, hessian, then); }
   template <class Then> void each(const Then &then) const { each_of(*pattern, hessian, then); }
 
-  /// Factors that nobody else holds.
+  /// Factors in use nowhere else.
   std::shared_ptr<BlockFactors<BLOCK>> spare()
   {
     for (const auto &one : made) {

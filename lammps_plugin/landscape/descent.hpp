@@ -14,28 +14,28 @@
 
 namespace jamshape {
 
-/// When a minimisation ends, and what it may do.
+/// Stopping criteria of a minimisation, and its options.
 struct DescentStop {
   double tolerance;          // converged below this residual
   double lowest;             // unjammed below this energy
-  std::int64_t evaluations;  // exhausted after so many
-  double seconds;            // or so much time
-  double rounding;           // residual that doubles leave, times the mean force of a bond
-  double newton_below;       // residual from which on Newton's method takes over from L-BFGS
-  bool is_near;              // it begins with Newton's method, too, as long as that gains
+  std::int64_t evaluations;  // exhausted after this many
+  double seconds;            // or after this time
+  double rounding;           // residual due to rounding of doubles, times the mean force of a bond
+  double newton_below;       // residual below which Newton's method replaces L-BFGS
+  bool is_near;              // also starts with Newton's method, as long as that gains
   StepBounds step;
 };
 
 enum class DescentOutcome { CONVERGED, UNJAMMED, STALLED, EXHAUSTED };
 
-/// One row for each state on the way.
+/// One row for each reported state.
 struct DescentRow {
   double seconds;
   std::int64_t evaluations;
   double residual, energy_density;
 };
 
-/// Where it ended: at the base of the vicinity.
+/// The final state, at the base of the vicinity.
 struct DescentEnd {
   DescentOutcome outcome;
   LandscapeSums sums;
@@ -71,7 +71,7 @@ class Bracket {
       low = at;
       low_slope = slope;
     }
-    if (low < corner && corner < high) {  // a little beyond, so that the contact is closed
+    if (low < corner && corner < high) {  // slightly beyond, so that the contact is closed
       return corner + 1e-3 * (high - corner);
     }
     const double part = -low_slope / (high_slope - low_slope);
@@ -79,20 +79,20 @@ class Bracket {
   }
 
  private:
-  /// A slope that rises by more than the inverse of this does so at a corner, wherever that is.
+  /// A slope that rises by more than the inverse of this does so at a kink, wherever that is.
   static constexpr double CORNER = 0.1;
 
   double low = 0.0, low_slope, high = INFINITY, high_slope = INFINITY;
 };
 
-/// Minimises the energy at fixed box: by L-BFGS, cheap where contacts come and go, and by Newton's
-/// method where they stay. The base of the vicinity moves along.
+/// Minimises the energy at fixed box: by L-BFGS, cheap while contacts open and close, and by
+/// Newton's method once they stay. The base of the vicinity moves along.
 class Descent {
  public:
   using Vector = Eigen::VectorXd;
-  /// Lets the vicinity take pairs of which some hold at a displacement.
+  /// Gives the vicinity pairs, some of which hold at a displacement.
   using Renew = std::function<void(const Displacement &)>;
-  /// Hears now and then where it is; may throw to end it.
+  /// Receives progress reports; may throw to stop.
   using Tell = std::function<void(const DescentRow &)>;
 
   Descent(Vicinity &landscape, const DescentStop &when, double first_shift) :
@@ -131,46 +131,49 @@ class Descent {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// A method no longer gains if in so many evaluations neither the energy nor the residual fell
-  /// below such a part of the lowest one; either may fall for long while the other does not.
+  /// A method no longer gains if, within a number of evaluations, neither the energy nor the
+  /// residual fell below these fractions of its lowest value; either may fall for long while the
+  /// other does not.
   static constexpr double LESS_ENERGY = 0.98, LESS_RESIDUAL = 0.7;
   static constexpr std::int64_t PATIENCE = 500;
 
-  /// L-BFGS gains in waves: Newton's method takes over only after so many without a gain.
+  /// L-BFGS gains in waves: Newton's method takes over only after this many evaluations without a
+  /// gain.
   static constexpr std::int64_t SLOW = 2000;
 
-  /// It comes back where Newton's method has led to another part of the landscape: above so many
-  /// times the residual from which on that is used. With complete factors a few times; without
-  /// them, where a step takes as long as tens of L-BFGS, again and again, from ever smaller
-  /// residuals on.
+  /// L-BFGS resumes if Newton's method has moved to another region of the landscape: above this
+  /// multiple of the residual at which Newton's method starts. With complete factors this happens a
+  /// few times; without them, where a step costs as much as tens of L-BFGS steps, repeatedly, at
+  /// ever smaller residuals.
   static constexpr double AWAY = 30.0, LATER = 0.3;
   static constexpr int MOST_RETURNS = 5;
 
-  /// And where it did not gain in so many evaluations from a start that was said to be near a
-  /// minimum, with complete factors and without.
+  /// L-BFGS also resumes if Newton's method did not gain in this many evaluations from a start
+  /// declared near a minimum, with complete factors and without.
   static constexpr std::int64_t NO_GAIN = 250, NO_CHEAP_GAIN = 35;
 
-  /// Saddles are left so often, along directions that curve down by more than this part of the
-  /// mean force of a bond over the longest step, by this part of the overlaps.
+  /// Saddles are left this often, along directions of negative curvature beyond this fraction of
+  /// the mean force of a bond over the longest step, by this fraction of the overlaps.
   static constexpr int MOST_SADDLES = 5;
   static constexpr double CURVED = 1e-3, OFF_SADDLE = 0.3;
 
-  /// It begins with factors of a Hessian with such a shift, over the largest diagonal element of
-  /// displacements or of rotations, or more; they are made anew after so many steps.
+  /// L-BFGS starts from factors of a Hessian shifted by at least this fraction of the largest
+  /// diagonal element of displacements or of rotations; they are recomputed after this many steps.
   static constexpr double SOFT = 0.1, STIFFEN = 3.0;
   static constexpr int REFRESH = 30;
 
-  /// Doubles are given up where rounding leaves more than this part of what there is, and of what
-  /// is to be reached.
+  /// Extended precision takes over if rounding exceeds this fraction of the residual, and of the
+  /// tolerance.
   static constexpr double OF_RESIDUAL = 0.01, OF_TOLERANCE = 0.1;
 
-  /// Newton's equations are solved to this part, or to the root of the residual.
+  /// Newton's equations are solved to this relative accuracy, or to the square root of the
+  /// residual.
   static constexpr double COARSE = 0.1;
 
   static constexpr int TRIES = 25;
   static constexpr double TELL_SECONDS = 0.2;
 
-  /// Contacts begin where the last ones were, as long as this lives.
+  /// Contacts start from the previous ones, as long as this object lives.
   class Remembering {
    public:
     explicit Remembering(Vicinity &landscape) : about(landscape) { about.remember(true); }
@@ -200,7 +203,7 @@ class Descent {
   std::int64_t evaluations = 0;
   double least_energy = INFINITY, least_residual = INFINITY;
   std::int64_t best = 0;       // when the present method gained
-  std::int64_t last_gain = 0;  // or any
+  std::int64_t last_gain = 0;  // when any method gained
   bool extended = false;
   Clock::time_point began = Clock::now(), told = began;
 
@@ -232,7 +235,7 @@ class Descent {
     best = evaluations;
   }
 
-  /// Whether Newton's method, where contacts still come and go, is better left.
+  /// Whether Newton's method should be left while contacts still open and close.
   bool is_astray() const
   {
     if (is_near) {
@@ -261,26 +264,26 @@ class Descent {
     return about.part_within(step.data(), stop.step) * step;
   }
 
-  /// Takes a matrix near the Hessian for L-BFGS to begin with.
+  /// Takes a matrix near the Hessian as the initial one of L-BFGS.
   void precondition()
   {
     const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
     about.differentiate({origin.data(), 0.0});
     Vector shift = SOFT * about.largest_of_kind();
-    // What incomplete factors leave out is as large for all.
+    // The error of incomplete factors is of the same size for all coordinates.
     if (!about.has_complete_factors()) shift.setConstant(shift.maxCoeff());
     const double least = LEAST_SHIFT * shift.maxCoeff();
     shift = shift.cwiseMax(least > 0.0 ? least : 1.0);
     while (!(near = about.factors(shift))) {
       shift *= STIFFEN;
-      if (!shift.allFinite()) throw std::runtime_error("The Hessian has no factors.");
+      if (!shift.allFinite()) throw std::runtime_error("The Hessian cannot be factorised.");
     }
     ++preconditioned;
   }
 
-  /// Steps off a saddle that has balanced forces, such as one of a symmetric arrangement, to where
-  /// the energy falls: by a part of the overlaps along a direction that curves down by more than a
-  /// small part of the prestress.
+  /// Steps off a saddle with balanced forces, such as one of a symmetric arrangement, to lower
+  /// energy: by a fraction of the overlaps along a direction whose negative curvature exceeds a
+  /// small fraction of the prestress.
   bool leave_saddle(LandscapeSums &sums)
   {
     if (!by_newton || saddles == MOST_SADDLES || sums.n_bonds == 0) return false;
@@ -375,11 +378,11 @@ class Descent {
     return true;
   }
 
-  /// Finds a point along a descent direction where the projected force has fallen to half.
+  /// Line search for a point where the projected force has fallen to half.
   ///
-  /// On forces, not energies, whose differences drown in rounding long before forces vanish. The
-  /// projected force is close to piecewise linear, with a corner where a contact closes that may be
-  /// ten orders of magnitude stiffer than what came before: two points beyond the corner give it.
+  /// It uses forces, not energies, whose differences drown in rounding long before forces vanish.
+  /// The projected force is close to piecewise linear, with a kink where a contact closes that may
+  /// be ten orders of magnitude stiffer than before: two points beyond the kink determine it.
   Line search_along(const Vector &step, const LandscapeSums &from)
   {
     const double slope = from.gradient.dot(step);

@@ -15,9 +15,9 @@
 namespace jamshape {
 
 /// The equations of Newton's method at the base of a vicinity, (H + shift) x = right: the shift,
-/// which is kept from one base to the next, makes the Hessian H positive definite. Solved by
-/// factors where these are cheap, else by conjugate gradients preconditioned with incomplete ones
-/// (Nocedal & Wright, Numerical Optimization, Sec. 7.1).
+/// kept from one base to the next, makes the Hessian H positive definite. Solved by factors where
+/// these are cheap, else by conjugate gradients preconditioned with incomplete ones (Nocedal &
+/// Wright, Numerical Optimization, Sec. 7.1).
 class NewtonSystem {
  public:
   using Vector = Eigen::VectorXd;
@@ -27,19 +27,20 @@ class NewtonSystem {
   double shift;
   int factorisations = 0, products = 0;
 
-  /// Takes the Hessian at the base; raises the shift until pivots are positive.
+  /// Takes the Hessian at the base; raises the shift until all pivots are positive.
   void prepare()
   {
     const Vector origin = Vector::Zero(static_cast<Eigen::Index>(about.n()));
     about.differentiate({origin.data(), 0.0});
     const double largest = about.n() > 0 ? about.diagonal().cwiseAbs().maxCoeff() : 0.0;
-    if (!std::isfinite(largest)) throw std::runtime_error("The Hessian holds what is no number.");
+    if (!std::isfinite(largest))
+      throw std::runtime_error("The Hessian has elements that are not finite.");
     scale = largest > 0.0 ? largest : 1.0;
     shift = std::max(shift, LEAST_SHIFT * scale);
     factorise();
   }
 
-  /// To an accuracy over the right-hand side, of iterations; factors know no such thing.
+  /// Solves to a relative accuracy, used by iterations only.
   Vector solve(const Vector &right, double accuracy)
   {
     if (about.has_complete_factors()) return factors->solve(right);
@@ -51,28 +52,28 @@ class NewtonSystem {
     }
   }
 
-  /// Downhill from a gradient: the solution, or where iterations met a direction along which the
-  /// matrix curves down (Alg. 7.1 there).
+  /// A descent direction from a gradient: the solution, or a direction of negative curvature that
+  /// the iterations met (Alg. 7.1 there).
   Vector direction(const Vector &gradient, double accuracy)
   {
     if (about.has_complete_factors()) return -factors->solve(gradient);
     return -iterate(gradient, accuracy * gradient.norm()).x;
   }
 
-  /// A direction along which the Hessian, as last prepared, curves down by more than this; nothing
-  /// where there is none.
+  /// A direction in which the negative curvature of the Hessian, as last prepared, exceeds this;
+  /// nothing if there is none.
   std::optional<Vector> falling(double curvature)
   {
     const double before = std::exchange(shift, curvature);
     factorise();
-    shift = curvature;  // the factors may be of more
+    shift = curvature;  // the factors may have a larger shift
     const Iterated found = iterate(some_vector(), FALLING);
     shift = before;
     if (found.is_solution) return {};
     return found.last;
   }
 
-  /// Shifts less after a step that was right at once, more after one that was far off.
+  /// Lowers the shift after a step that was accepted at once, raises it after one that was far off.
   void learn(int tries)
   {
     if (tries == 1) shift /= DECAY;
@@ -82,14 +83,13 @@ class NewtonSystem {
  private:
   static constexpr double GROWTH = 10.0, DECAY = 3.0;
 
-  /// What remains of a unit vector after iterations that met no direction that curves down.
+  /// Relative remainder of a unit vector after iterations that met no negative curvature.
   static constexpr double FALLING = 1e-3;
 
-  /// A step that needed more evaluations to find its length was in a wrong direction.
+  /// A step that needed more evaluations of the line search had a wrong direction.
   static constexpr int FAR_OFF = 6;
 
-  /// Incomplete factors are of a matrix with a shift, by the largest diagonal element, of at least
-  /// so much where pivots need one.
+  /// Smallest shift of incomplete factors, over the largest diagonal element, if pivots need one.
   static constexpr double INCOMPLETE = 1e-4;
 
   Vicinity &about;
@@ -102,7 +102,7 @@ class NewtonSystem {
     double added = shift;
     while (!(factors = factors_with(added))) {
       added = complete ? GROWTH * added : std::max(GROWTH * added, INCOMPLETE * scale);
-      if (!std::isfinite(added)) throw std::runtime_error("The Hessian has no factors.");
+      if (!std::isfinite(added)) throw std::runtime_error("The Hessian cannot be factorised.");
     }
     if (complete) shift = added;
   }
@@ -114,11 +114,11 @@ class NewtonSystem {
   }
 
   struct Iterated {
-    Vector x, last;  // and the last direction
+    Vector x, last;  // x and the last direction
     bool is_solution;
   };
 
-  /// Of length 1, always the same, with a part along every mode.
+  /// A fixed unit vector with a component along every mode.
   Vector some_vector() const
   {
     std::mt19937_64 numbers(1);
@@ -127,8 +127,8 @@ class NewtonSystem {
     return found.normalized();
   }
 
-  /// Preconditioned conjugate gradients, which without rounding end after as many steps as there
-  /// are coordinates; or where the matrix is not positive definite.
+  /// Preconditioned conjugate gradients, which in exact arithmetic end after as many steps as there
+  /// are coordinates; or stop where the matrix is not positive definite.
   Iterated iterate(const Vector &right, double remainder)
   {
     Vector x = Vector::Zero(right.size());

@@ -18,7 +18,7 @@ class QuasiNewton {
 
   bool is_empty() const { return pairs.empty(); }
 
-  /// Where a step has led to: by how much the gradient changed along it.
+  /// Adds a step and the change of the gradient along it.
   void learn(Vector step, Vector change)
   {
     const double curvature = step.dot(change);
@@ -29,7 +29,7 @@ class QuasiNewton {
 
   void forget() { pairs.clear(); }
 
-  /// Where to go from a gradient, with the inverse of a matrix near the Hessian to begin with.
+  /// The direction from a gradient, starting from the inverse of a matrix near the Hessian.
   Vector direction(const Vector &gradient, const Factors &near) const
   {
     Vector q = -gradient;

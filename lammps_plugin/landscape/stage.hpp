@@ -13,24 +13,26 @@
 
 namespace jamshape {
 
-/// The equation of one stage of an implicit step: the displacement x from the base obeys
+/// The equation of one stage of an implicit step: the displacement x from the base satisfies
 ///     drag (x - centre) + dU/dx = 0,
-/// the minimum of U + (x - centre).drag (x - centre) / 2. Drag coefficients (n,) are over the time.
+/// the minimum of U + (x - centre).drag (x - centre) / 2. Drag coefficients (n,) are divided by the
+/// time step.
 struct Stage {
   Eigen::VectorXd drag, centre;
-  bool extended;  // whether doubles are too short
+  bool extended;  // whether extended precision is needed
 };
 
-/// What errors are measured in. A displacement that changes overlaps counts by their change: in the
-/// energy norm, over that of the overlaps that are there. One that slides along contacts counts
-/// where it has changed the overlaps in second order: over the square root of overlap times size.
+/// Units of errors. A displacement that changes overlaps is measured by their change: in the energy
+/// norm, over that of the present overlaps. One that slides along contacts is measured by the
+/// second-order change of the overlaps: over the square root of overlap times size.
 struct StageUnits {
   double force;   // of a typical bond
   double energy;  // twice the typical energy of the packing
   double length;  // sqrt(overlap size)
   double n_particles;
 
-  /// Size of a displacement (n,), with the force (n,) that makes it and the drag over the time.
+  /// Magnitude of a displacement (n,), from the force (n,) that causes it and the drag over the
+  /// time step.
   template <class X, class F, class C>
   double size(const X &shift, const F &pull, const C &drag) const
   {
@@ -40,19 +42,20 @@ struct StageUnits {
   }
 };
 
-/// Correction that may be left, in these units, and how far a particle may move and turn in one.
+/// Tolerance of the correction, in these units, and the limits of a particle's displacement and
+/// rotation in one step.
 struct StageLimits {
   double accuracy;
   StepBounds step;
 };
 
-/// Factors of the Hessian plus drag at a point, and how many bonds there were.
+/// Factors of the Hessian plus drag at a point, and the number of bonds there.
 struct StageFactors {
   std::shared_ptr<Factors> factors;
   std::size_t n_bonds;
 };
 
-/// Where the solution of a stage ended: refused are guesses whose `sums` say why.
+/// Result of a stage; for rejected guesses `sums` holds the reason.
 struct StageEnd {
   Eigen::VectorXd x;
   LandscapeSums sums;
@@ -61,19 +64,19 @@ struct StageEnd {
   bool solved;
 };
 
-/// Solves a stage as the minimisation that it is. Its gradient is smooth between the kinks where
-/// bonds open and close, and Newton's full steps find which of them do so for all bonds at once
-/// (semismooth Newton: Qi & Sun, Math. Program. 58, 353 (1993)), mostly in three or four
-/// evaluations. Steps that a closing bond turns back with more force than they had end where it
-/// does, or else rods slide to and fro through each other's bonds for ever. Where steps shrink fast
-/// the same factors serve several, as they cost several evaluations. On a kink that holds the
-/// solution steps go to and fro: it is found by bisection and kept as a stiff valley, a
-/// BFGS update of the factors (Lewis & Overton, Math. Program. 141, 135 (2013)). Stages that do not
-/// end are given up soon: half of the time, the time step was too long anyway.
+/// Solves a stage as a minimisation. Its gradient is smooth between the kinks where bonds open and
+/// close, and Newton's full steps find the set of closed bonds at once (semismooth Newton: Qi &
+/// Sun, Math. Program. 58, 353 (1993)), mostly in three or four evaluations. A step that a closing
+/// bond reverses with a larger force ends where the bond closes; otherwise rods could slide back
+/// and forth through each other's bonds forever. Where steps shrink fast, the same factors serve
+/// several, since they cost several evaluations. If the solution lies on a kink, steps oscillate
+/// across it: it is found by bisection and treated as a stiff valley, a BFGS update of the factors
+/// (Lewis & Overton, Math. Program. 141, 135 (2013)). Stages that do not converge are given up
+/// early: in half of the cases the time step was too long anyway.
 class StageSolver {
  public:
   using Vector = Eigen::VectorXd;
-  /// Lets the vicinity take pairs of which some hold at a displacement.
+  /// Gives the vicinity pairs, some of which hold at a displacement.
   using Renew = std::function<void(const Displacement &)>;
 
   StageSolver(Vicinity &landscape, const Stage &equation, const StageUnits &scales,
@@ -83,8 +86,8 @@ class StageSolver {
   {
   }
 
-  /// From a guess, or from another one if particles collide there; with factors of an earlier,
-  /// similar stage, if there are any.
+  /// Solves from a guess, or from another one if particles collide there; with the factors of an
+  /// earlier, similar stage, if given.
   StageEnd solve(const Vector &guess, const Vector &other, StageFactors earlier)
   {
     known = std::move(earlier);
@@ -117,26 +120,27 @@ class StageSolver {
   }
 
  private:
-  /// A stage is given up after so many directions.
+  /// A stage is given up after this many directions.
   static constexpr int DIRECTIONS = 10;
 
-  /// After so many directions, which are enough for smooth stages, what is left are kinks: where
-  /// the force along a step has turned round, to this fraction of what it was, and the solution is
-  /// nearer than so many accuracies or steps go straight to and fro, with this cosine.
+  /// Smooth stages need no more directions than this; later ones are assumed to meet kinks if the
+  /// force along a step has reversed, to this fraction of its value, and the solution is within
+  /// this many tolerances, or if consecutive steps are antiparallel, with this cosine.
   static constexpr int SMOOTH = 3;
   static constexpr double OVERSHOT = 0.3, NEAR = 100.0, BACK = 0.95;
 
-  /// Factors serve once more where they leave a correction so much smaller than the one before. A
-  /// correction of not more than so many accuracies is the last if the next would be within one.
+  /// Factors serve once more if they leave a correction smaller than the previous one by this
+  /// factor. A correction of at most this many tolerances is the last if the next is expected
+  /// within one.
   static constexpr double SHRUNK = 0.02, NEARLY = 10.0;
 
-  /// A guess with a force above this multiple of the typical one has gone through a collision.
+  /// A guess with a force above this multiple of the typical one has passed through a collision.
   static constexpr double COLLISION = 30.0;
 
   struct Point {
     Vector x;
     LandscapeSums sums;
-    Vector gradient;  // of what is minimised
+    Vector gradient;  // of the minimised function
   };
 
   struct Correction {
@@ -157,7 +161,7 @@ class StageSolver {
   StageFactors known;
   std::vector<Kink> kinks;
   int evaluations = 0, factorisations = 0, directions = 0;
-  double size_before = 0.0;  // of the last correction by these factors, at the end of a whole step
+  double size_before = 0.0;  // of the last correction by these factors after a full step
 
   StageEnd end(Point at, bool solved) const
   {
@@ -189,7 +193,7 @@ class StageSolver {
     return first.sums.crossing >= 0 || collides ? point(other) : first;
   }
 
-  /// By the factors that there are, as long as they serve.
+  /// The correction by the present factors, as long as they serve.
   Correction correction_at(const Point &at)
   {
     if (known.factors) {
@@ -202,14 +206,14 @@ class StageSolver {
     return known.factors ? newton(at) : Correction{};
   }
 
-  /// Those of an earlier stage make the first step where as many bonds are there as were then.
+  /// Factors of an earlier stage make the first step if the number of bonds is the same.
   bool serve(const Point &at, double size) const
   {
     if (directions == 0 && at.sums.n_bonds == known.n_bonds) return true;
     return size <= std::max(limits.accuracy, SHRUNK * size_before);
   }
 
-  /// Newton's step, by BFGS for the kinks that were found.
+  /// Newton's step, with BFGS updates for the kinks found.
   Correction newton(const Point &at) const
   {
     Vector q = -at.gradient;
@@ -226,8 +230,8 @@ class StageSolver {
     return {std::move(q), size};
   }
 
-  /// Newton's method squares errors: by factors from the point before, what a correction leaves is
-  /// less than twice its square over the one before.
+  /// Newton's method squares errors: with factors from the previous point, the error left by a
+  /// correction is less than twice its square over the previous one.
   bool is_last(double size) const
   {
     const bool is_near = size <= NEARLY * limits.accuracy;
@@ -235,22 +239,22 @@ class StageSolver {
            (is_near && 2.0 * size * size <= limits.accuracy * size_before);
   }
 
-  /// What is minimised.
+  /// The minimised function.
   double energy(const Point &at) const
   {
     const Vector by = at.x - stage.centre;
     return at.sums.energy + 0.5 * by.dot(stage.drag.cwiseProduct(by));
   }
 
-  /// The part of a step after which the energy is lowest, if its slope is that of the factors, of
-  /// which the step is a part, and from some point on also that of one bond that closes: so that
-  /// energies and slopes at both ends are right.
+  /// The fraction of a step that minimises the energy, assuming the slope of the factors, of which
+  /// the step is a fraction, and from some point on also that of one closing bond: energies and
+  /// slopes at both ends are matched.
   double lowest(const Point &at, const Point &tried, const Vector &step, double part) const
   {
     const double slope = -at.gradient.dot(step);
     const double force = tried.gradient.dot(step) / slope + 1.0 - part;
     const double work = (energy(tried) - energy(at)) / slope + 1.0 - 0.5 * part;
-    const double closed = std::clamp(2.0 * work / force, 1e-3, 1.0);  // part with that bond
+    const double closed = std::clamp(2.0 * work / force, 1e-3, 1.0);  // including that bond
     const double stiffness = force / closed;
     return (1.0 + stiffness * (1.0 - closed)) / (part + stiffness);
   }
@@ -264,8 +268,9 @@ class StageSolver {
     return overshot && (size <= NEAR * limits.accuracy || turns_round);
   }
 
-  /// Finds a kink by bisection, to a part of the way between two points. The gradient there is the
-  /// mean of its sides' that does not push across: zero where it holds the solution.
+  /// Locates a kink by bisection, to a fraction of the distance between two points. The gradient
+  /// there is the mean of those on its sides that does not push across: zero if the solution lies
+  /// on it.
   Point between(Point low, Point high, double width)
   {
     const Vector way = high.x - low.x;

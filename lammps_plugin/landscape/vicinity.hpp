@@ -16,7 +16,7 @@
 
 namespace jamshape {
 
-/// Poses of N particles and the box, every number a double [0] and its small rest [1].
+/// Poses of N particles and the box, in double-double: [0] the doubles, [1] the low parts.
 struct Poses {
   using Numbers = std::vector<double>[2];
   Numbers position;     // (N, D)
@@ -30,7 +30,7 @@ struct Poses {
     of[1][k] = to.rest;
   }
 
-  /// To be strained.
+  /// A view to be strained.
   SplitPoses view(double strain) const
   {
     const auto parts = [](const Numbers &of) { return std::array{of[0].data(), of[1].data()}; };
@@ -38,21 +38,21 @@ struct Poses {
   }
 };
 
-/// What coordinates are: column (N, D + rotations), -1 for none; rotations count as lengths, and
-/// move a surface by at most the turning radius per radian.
+/// Layout of the coordinates: column (N, D + rotations), -1 for none; rotations are measured as
+/// lengths, and move a surface by at most the turning radius per radian.
 struct Coordinates {
   std::size_t n;
   std::vector<std::int64_t> column;
   std::vector<double> radians_per_length, turning_radius;
 };
 
-/// Pairs whose surfaces were closer than `skin` at some poses, and centres than `reach`.
+/// Pairs whose surfaces were closer than `skin` at some poses, and centres closer than `reach`.
 struct NearPairs {
   std::vector<std::int64_t> particles, shift;  // (M, 2), (M, D)
   Poses then;
   double skin, reach;
-  // From `then` to the base, apart from the box's strain: (N, D) displacements, and (N,) angles, in
-  // space (N, 4) quaternions.
+  // Motion from `then` to the base, apart from the box's strain: (N, D) displacements, and (N,)
+  // angles, in 3D (N, 4) quaternions.
   std::vector<double> moved{}, turned{};
 
   PairList list() const { return {particles.size() / 2, particles.data(), shift.data()}; }
@@ -64,15 +64,16 @@ struct Displacement {
   double strain;
 };
 
-/// How far a particle may move, and turn, in one step.
+/// Largest displacement and rotation of a particle in one step.
 struct StepBounds {
   double longest, widest;
 };
 
-/// Energy at a point and its derivatives. A pair that crosses or is unconverged, or -1, refuses it.
+/// Energy at a point and its derivatives. A pair that crosses or is unconverged, else -1,
+/// invalidates it.
 struct LandscapeSums {
   double energy;
-  Eigen::VectorXd gradient;  // (n,) by the coordinates, positions counted where they are then
+  Eigen::VectorXd gradient;  // (n,), positions taken at the strained point
   double strain_gradient, bond_force;
   std::size_t n_bonds;
   std::int64_t crossing, unconverged;
@@ -80,9 +81,9 @@ struct LandscapeSums {
   bool is_refused() const { return crossing >= 0 || unconverged >= 0; }
 };
 
-/// Energy of a packing and its derivatives as functions of n coordinates about a base, as long as a
-/// list of pairs holds: what integrators and minimisers ask for thousands of times, of any shape.
-/// Before anything else, `move_to` a base and `take` pairs.
+/// Energy of a packing and its derivatives as functions of n coordinates about a base, valid as
+/// long as a list of pairs holds: the interface of integrators and minimisers, which evaluate it
+/// thousands of times, for any shape. First of all, `move_to` a base and `take` pairs.
 class Vicinity {
  public:
   virtual ~Vicinity() = default;
@@ -93,55 +94,58 @@ class Vicinity {
   virtual bool has_pairs() const = 0;
   virtual const Poses &poses() const = 0;
 
-  /// From where coordinates count.
+  /// Sets the base of the coordinates.
   virtual void move_to(const Poses &poses) = 0;
-  /// To a point near the base.
+  /// Moves the base to a nearby point.
   virtual void move(const Displacement &at) = 0;
-  /// Keeps the base, from which `deform` begins.
+  /// Stores the base, from which `deform` begins.
   virtual void hold() = 0;
   virtual bool has_held() const = 0;
-  /// To where an upper triangular matrix, rows (D, D), takes positions and cell vectors of the base
-  /// that was kept, and rotation vectors (N, 1 or 3) the particles that can turn.
+  /// Moves the base to the image of the stored one: an upper triangular matrix, rows (D, D), maps
+  /// positions and cell vectors, and rotation vectors (N, 1 or 3) rotate the particles that can
+  /// rotate.
   virtual void deform(const std::vector<long double> &matrix, const double *turns) = 0;
-  /// Pairs of a wide skin, from which those within a smaller one are chosen again and again.
+  /// Takes pairs of a wide skin, from which those within a smaller one are chosen repeatedly.
   virtual void take(NearPairs wider, double smaller_skin) = 0;
-  /// Whether the pairs that there are hold at a point, chosen anew if need be; if not, others are
-  /// to be taken before anything is asked for there.
+  /// Whether the present pairs hold at a point, chosen anew if necessary; if not, new ones must be
+  /// taken before any evaluation there.
   virtual bool holds(const Displacement &at) = 0;
 
-  /// Whether contacts from now on begin where those of the last point were, so that what is found
-  /// depends in its last bits on the points before; for points that follow one another.
+  /// Whether contacts start from those of the previous point from now on, so that the last bits of
+  /// results depend on the points before; for points that follow one another.
   virtual void remember(bool contacts) = 0;
 
-  /// By how many threads sums over contacts are taken, where there are enough: on the number, but
-  /// on nothing else, last bits depend.
+  /// Sets the number of threads of sums over contacts, if there are enough: the last bits depend on
+  /// this number, but on nothing else.
   virtual void share(std::size_t threads) = 0;
 
   virtual LandscapeSums evaluate(const Displacement &at, bool extended) const = 0;
-  /// At most 1: the part of a step (n,) that moves no particle too far and turns none too wide.
+  /// At most 1: the fraction of a step (n,) that keeps every particle within its bounds of
+  /// displacement and rotation.
   virtual double part_within(const double *step, const StepBounds &bounds) const = 0;
-  /// The largest length of a particle's part, force or torque, of a vector (n,).
+  /// The largest magnitude of a particle's displacement, rotation, force or torque in a vector
+  /// (n,).
   virtual double largest_part(const double *vector) const = 0;
 
-  /// Second derivatives by the base's coordinates, for what follows. In space at points that turn
-  /// nothing. Spines that cross add nothing.
+  /// Computes second derivatives with respect to the base's coordinates, for the functions below.
+  /// In 3D at points without rotations. Crossing spines contribute nothing.
   virtual void differentiate(const Displacement &at) = 0;
-  /// (n,) derivative of the gradient by the strain, there.
+  /// (n,) derivative of the gradient with respect to the strain, at that point.
   virtual const Eigen::VectorXd &coupling() const = 0;
-  /// (n,) the diagonal of the Hessian there.
+  /// (n,) diagonal of the Hessian at that point.
   virtual Eigen::VectorXd diagonal() const = 0;
-  /// The Hessian there times a vector (n,).
+  /// Product of that Hessian and a vector (n,).
   virtual Eigen::VectorXd times(const Eigen::Ref<const Eigen::VectorXd> &vector) const = 0;
   /// (n,) for displacements the largest of their diagonal elements, for rotations that of theirs:
-  /// what is nearly round turns far more easily than it moves.
+  /// nearly round particles rotate far more easily than they move.
   virtual Eigen::VectorXd largest_of_kind() const = 0;
-  /// Whether `factors` are those of the Hessian, or of a matrix nearby.
+  /// Whether `factors` are those of the Hessian, or of an approximation.
   virtual bool has_complete_factors() const = 0;
-  /// Factors of the Hessian there plus a diagonal (n,); nothing where a pivot is not positive.
+  /// Factors of that Hessian plus a diagonal (n,); null if a pivot is not positive.
   virtual std::shared_ptr<Factors> factors(const Eigen::VectorXd &diagonal) = 0;
 
-  /// Factors at a point, with a shift, smallest by powers of ten, that leaves no pivot that is not
-  /// positive; nothing of what is not finite.
+  /// Factors at a point, with the smallest shift, in powers of ten, that makes all pivots positive;
+  /// null for non-finite matrices.
   std::shared_ptr<Factors> factorise(const Displacement &at, const Eigen::VectorXd &added)
   {
     differentiate(at);
@@ -159,7 +163,7 @@ class Vicinity {
   }
 };
 
-/// That of one shape in D dimensions.
+/// Vicinity of one shape in D dimensions.
 template <class Model, int D> class VicinityOf : public Vicinity {
  public:
   using Shape = typename Model::Shape;
@@ -324,27 +328,28 @@ template <class Model, int D> class VicinityOf : public Vicinity {
  private:
   static constexpr int BLOCK = D + ROTATIONS<D>;
   static constexpr int VARIABLES = PAIR_VARIABLES<D>;
-  static constexpr int TURNS = D == 2 ? 1 : 4;  // numbers of an orientation
+  static constexpr int TURNS = D == 2 ? 1 : 4;  // per orientation
   using DualContact = ContactOf<Model, D, Dual<VARIABLES>>;
   using Start = typename Model::template Start<D>;
   using PairMatrix = Eigen::Matrix<double, VARIABLES, VARIABLES>;
   using PairRow = Eigen::Matrix<double, VARIABLES, 1>;
 
-  /// What is nearly round may turn so far in one step, if its surface moves no further than it may.
+  /// Largest rotation of nearly round particles in one step, if their surface stays within its
+  /// bound.
   static constexpr double WIDE = 1.0;
 
-  /// In space, elimination couples nearly all of a packing's particles: up to so many it is cheaper
-  /// than the iterations that spare it.
+  /// In 3D, elimination couples nearly all particles of a packing: up to this many it is cheaper
+  /// than the iterations that avoid it.
   static constexpr std::size_t FEW = 150;
 
-  /// Fewer pairs take no longer in one thread.
+  /// Fewer pairs are as fast in one thread.
   static constexpr std::size_t MANY = 2000;
 
-  /// Faces that lie flat on each other move their point of contact without limit as they turn:
-  /// nothing that counts by how stiff it is may be stiffer than so many times the bond.
+  /// The point of contact of two faces moves without limit as they rotate: no stiffness is counted
+  /// above this multiple of the bond's.
   static constexpr double STIFFEST = 1e4;
 
-  /// A pair that touches, and second derivatives by its variables.
+  /// A touching pair, and second derivatives with respect to its variables.
   struct Curved {
     std::size_t p;
     Vec<D> r;
@@ -354,11 +359,11 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   std::vector<Shape> shapes;
   Coordinates coordinates;
   NearPairs wide, pairs;             // `pairs` are those of `wide` that are within `skin`
-  std::vector<std::int64_t> chosen;  // (M,) which of them
+  std::vector<std::int64_t> chosen;  // (M,) their indices in `wide`
   double skin = 0.0;
   bool remembers = false;
   mutable std::vector<Start> starts;  // (M,) of `pairs`
-  bool is_outrun = false;             // `pairs`, at a point where `wide` is so too
+  bool is_outrun = false;             // `pairs` do not hold at a point, and `wide` neither
   Law law;
   Poses held;
   Poses base;
@@ -366,7 +371,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   std::unique_ptr<BlockSystem> hessian;  // none before pairs are known
   Eigen::VectorXd pulled;
   std::unique_ptr<Team> team;
-  std::vector<std::vector<Curved>> curved;  // of each thread's part, empty between uses
+  std::vector<std::vector<Curved>> curved;  // for each thread, empty between uses
 
   Team *team_for(std::size_t n) const { return n < MANY ? nullptr : team.get(); }
 
@@ -393,7 +398,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return nullptr;
   }
 
-  /// Pairs of a list at a point, as long as no other point is asked for.
+  /// Pairs of a list at a point, valid until another point is evaluated.
   template <class S>
   PosedPairs<Model, D, S> posed_at(const NearPairs &list, const Displacement &at) const
   {
@@ -402,7 +407,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return {shapes, there.view(at.strain), list.list(), law};
   }
 
-  /// The number of a pair, or -1, as whoever gave the pairs knows it.
+  /// The number of a pair, or -1, in the caller's numbering.
   std::int64_t of_wide(std::int64_t p) const { return p < 0 ? p : chosen[p]; }
 
   template <class S>
@@ -421,7 +426,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return found;
   }
 
-  /// The torque as it acts on the rotation vector of a particle that was turned by it.
+  /// The torque with respect to the rotation vector of a particle that was rotated by it.
   template <class S> static Vec<1, S> by_turn(const Vec<1> &, const Vec<1, S> &torque)
   {
     return torque;
@@ -437,7 +442,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return {{static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])}};
   }
 
-  /// How the box has changed since a list was made: what takes its cell vectors then to those now,
+  /// Growth of the box since a list was made: the map from its cell vectors then to those now,
   /// upper triangular like both.
   std::array<Vec<D>, D> growth(const NearPairs &list) const
   {
@@ -488,7 +493,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   /// Whether contacts can turn a particle.
   bool turns(std::size_t i) const { return Model::template turns<D>(shapes[i]); }
 
-  /// The angle by which a particle is turned at a point since a list was made, or a little more.
+  /// An upper bound of the rotation angle of a particle at a point since a list was made.
   double turned_to(const NearPairs &list, const Displacement &at, std::size_t i) const
   {
     const double *const before = &list.turned[TURNS * i];
@@ -505,7 +510,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
   static double angle_of(const Vec<1> &turn) { return turn[0]; }
   static double angle_of(const Vec<3> &turn) { return norm(turn); }
 
-  /// By what part of its length the box's change, and then a stretch, changes a vector at most.
+  /// Bound of the relative change of a vector by the box's growth and then by a stretch.
   double box_strain(const NearPairs &list, double stretch) const
   {
     const auto change = growth(list);
@@ -519,7 +524,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return scaled + std::sqrt(sheared_sq);
   }
 
-  /// Whether two surfaces may have come closer by the skin, or by what is left of it.
+  /// Whether the gap of two surfaces may have shrunk by the skin, or by what remains of it.
   bool is_beyond(const NearPairs &list, const Displacement &at, double kept = 0.0) const
   {
     double most = 0.0;
@@ -533,7 +538,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return 2.0 * most >= list.skin - kept - scaled * list.reach;
   }
 
-  /// Those of the wide pairs that are within the smaller skin at a point.
+  /// Chooses the wide pairs that are within the smaller skin at a point.
   void choose(const Displacement &at)
   {
     pairs = {{}, {}, {}, skin, wide.reach - wide.skin + skin};
@@ -582,7 +587,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return by;
   }
 
-  /// From the base to a point, but for the strain there.
+  /// Moves poses from the base to a point, without the strain there.
   void displace(Poses &poses, const Displacement &at) const
   {
     for (std::size_t i = 0; i < shapes.size(); ++i) {
@@ -592,11 +597,11 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     }
   }
 
-  /// The vector of every `stride`-th number from `first` on.
+  /// Maps the vector of every `stride`-th number from `first` on.
   static void map_vector(Poses::Numbers &of, std::size_t first, std::size_t stride,
                          const std::vector<long double> &matrix)
   {
-    for (int k = 0; k < D; ++k) {  // what is still to be read stands behind
+    for (int k = 0; k < D; ++k) {  // later components are still unmodified
       long double sum = 0.0L;
       for (int m = k; m < D; ++m) {
         sum += matrix[D * k + m] * joined(Poses::get(of, first + stride * m));
@@ -634,7 +639,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
         Poses::set(*lengths, k, split(stretch * joined(Poses::get(*lengths, k))));
       }
     }
-    if constexpr (D == 2) {  // whole turns would cost digits
+    if constexpr (D == 2) {  // full turns would cost digits
       constexpr long double TURN = 2.0L * 3.14159265358979323846264338327950288L;
       for (std::size_t i = 0; i < poses.orientation[0].size(); ++i) {
         const long double angle = joined(Poses::get(poses.orientation, i));
@@ -644,7 +649,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     }
   }
 
-  /// With blocks of displacements alone where nothing can turn.
+  /// With blocks of displacements alone if nothing can rotate.
   std::unique_ptr<BlockSystem> block_system() const
   {
     const BlockPlan plan{coordinates.column, pairs.particles, shapes.size(), BLOCK, fill()};
@@ -661,8 +666,8 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return false;
   }
 
-  /// Second derivatives by the variables of a pair that touches, those of turning flat faces on
-  /// each other within bounds.
+  /// Second derivatives with respect to the variables of a touching pair; those of rotating faces
+  /// in contact are bounded.
   PairMatrix by_variables(std::size_t p, const ContactOf<Model, D> &contact,
                           const DualContact &dual) const
   {
@@ -686,7 +691,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return by + std::min(1.0, stiffest / largest) * turning;
   }
 
-  /// What turns a pair's variables into lengths at its surfaces.
+  /// Factors that convert a pair's variables into lengths at its surfaces.
   PairRow per_length(std::size_t p) const
   {
     PairRow part = PairRow::Ones();
@@ -698,7 +703,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
     return part;
   }
 
-  /// Which variable of a pair a coordinate of its first, its second particle is.
+  /// The variable of a pair for a coordinate of its first or second particle.
   static constexpr int variable(int side, int k)
   {
     return k < D || side == 0 ? k : k + ROTATIONS<D>;
@@ -741,7 +746,7 @@ template <class Model, int D> class VicinityOf : public Vicinity {
       }
     }
     hessian->add(p, scaled.data());
-    // The affine strain moves i from j by r.
+    // The affine strain displaces i relative to j in proportion to r.
     for (int side = 0; side < 2; ++side) {
       for (int k = 0; k < BLOCK; ++k) {
         const std::int64_t c = coordinates.column[BLOCK * pairs.particles[2 * p + side] + k];

@@ -13,12 +13,12 @@
 
 namespace jamshape {
 
-/// How far the moves of a Monte Carlo simulation go at most: each coordinate, and the angle.
+/// Largest moves of a Monte Carlo simulation: each coordinate, and the angle.
 struct Moves {
   double shift, turn;
 };
 
-/// What became of the moves of a sweep.
+/// Counts of the moves of a sweep.
 struct Tally {
   std::size_t tried = 0, accepted = 0;
 
@@ -31,8 +31,8 @@ struct Tally {
 };
 
 /// Monte Carlo of hard particles in a periodic box that is at least twice as wide as they are:
-/// every move that leads to no overlap is accepted. `Model` as for pair styles, with
-/// `are_overlapping` for its bodies.
+/// every move without overlaps is accepted. `Model` as for pair styles, with `are_overlapping` for
+/// its bodies.
 template <class Model, int D> class HardParticles {
  public:
   using Body = typename Model::template Body<D>;
@@ -70,7 +70,7 @@ template <class Model, int D> class HardParticles {
     return true;
   }
 
-  /// Whether any two overlap.
+  /// Whether any two particles overlap.
   bool any_overlap() const
   {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -79,7 +79,7 @@ template <class Model, int D> class HardParticles {
     return false;
   }
 
-  /// As many moves as there are particles, each of one taken at random.
+  /// Makes as many moves as there are particles, each of a particle chosen at random.
   Tally sweep(const Moves &moves)
   {
     Tally tally;
@@ -96,7 +96,7 @@ template <class Model, int D> class HardParticles {
 
  private:
   std::vector<Body> bodies;
-  std::vector<double> radius;  // of the spheres around them
+  std::vector<double> radius;  // of the bounding spheres
   std::vector<Quaternion> orientation;
   Vec<D> edges;
   std::mt19937_64 random;
@@ -135,7 +135,7 @@ template <class Model, int D> class HardParticles {
     members[to].push_back(i);
   }
 
-  /// Whether `trial`, a place for particle i, overlaps any other.
+  /// Whether `trial`, a new pose of particle i, overlaps any other particle.
   bool overlaps(std::size_t i, const Body &trial) const
   {
     const std::array<std::size_t, D> centre = cell_of(trial.centre);

@@ -11,10 +11,10 @@
 namespace jamshape {
 
 /// Points with spheres in a periodic box, sorted into cells, with all their images: the box may be
-/// shorter than the distance that is asked for.
+/// shorter than the search distance.
 template <int D> class ImageCells {
  public:
-  /// For neighbours closer than `distance` among about n points.
+  /// Cells for neighbours closer than `distance` among about n points.
   ImageCells(const Vec<D> &box_edges, double distance, std::size_t n) : edges(box_edges)
   {
     const double most = 1.0 + 2.0 * std::pow(static_cast<double>(n), 1.0 / D);  // few are empty
@@ -43,8 +43,8 @@ template <int D> class ImageCells {
   }
 
   /// Whether `test(label, x - y)` holds for any image y of a point whose sphere meets one of this
-  /// radius about x, of the points added after the first `but`. The cell of x comes first: there
-  /// most is found.
+  /// radius about x, of the points added after the first `but`. The cell of x comes first: most
+  /// hits are there.
   template <class Test>
   bool any_near(const Vec<D> &x, double radius, std::size_t but, const Test &test) const
   {
@@ -53,15 +53,15 @@ template <int D> class ImageCells {
            any_in(0, 0, Vec<D>{}, false, about, test);
   }
 
-  /// Begins to fetch what `any_near` will ask for first.
+  /// Prefetches the memory that `any_near` reads first.
   void fetch(const Vec<D> &x) const
   {
     const char *const from = reinterpret_cast<const char *>(&parts[cell_of(x)]);
     for (std::size_t byte = 0; byte < sizeof(Part); byte += 64) __builtin_prefetch(from + byte);
   }
 
-  /// Whether `test(shift)` holds for any sum of edges shorter than a length, each and its opposite
-  /// once.
+  /// Whether `test(shift)` holds for any sum of edges shorter than a length, each pair of opposite
+  /// sums once.
   template <class Test> bool any_shift(double length, const Test &test) const
   {
     return any_shift_from(0, false, length, Vec<D>{}, test);
@@ -80,10 +80,11 @@ template <int D> class ImageCells {
     double radius;
     std::size_t but;
   };
-  /// Points of a cell, side by side in memory: to fetch them is what takes long in a large box.
-  struct Part {
-    std::array<Point, PER_PART> points;
+  /// Points of a cell, contiguous in memory: fetching them dominates the time in a large box. The
+  /// first shares a cache line with the numbers.
+  struct alignas(64) Part {
     std::size_t n = 0, more = NONE;
+    std::array<Point, PER_PART> points;
   };
 
   Vec<D> edges;
@@ -104,7 +105,7 @@ template <int D> class ImageCells {
     return cell;
   }
 
-  /// In the cells around that of x, but not in that.
+  /// Searches the cells around that of x, but not that one.
   template <class Test>
   bool any_in(int k, std::size_t cell, Vec<D> image, bool is_other, const Sphere &about,
               const Test &test) const
@@ -131,7 +132,7 @@ template <int D> class ImageCells {
         if (point.number < about.but) continue;
         Vec<D> apart;
         for (int k = 0; k < D; ++k) {
-          // Across the box the difference is large and then loses an edge: not in doubles.
+          // Across the box the difference is large before an edge is subtracted: not in doubles.
           apart[k] = image[k] == 0.0 ? about.x[k] - point.x[k]
                                      : static_cast<double>(static_cast<long double>(about.x[k]) -
                                                            point.x[k] - image[k] * edges[k]);

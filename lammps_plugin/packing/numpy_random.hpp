@@ -10,8 +10,8 @@
 
 namespace jamshape {
 
-/// Random numbers as `numpy.random.default_rng(seed)` draws them, so that a seed stands for the
-/// same start in a deck and in Python: PCG64 (O'Neill, HMC-CS-2014-0905), seeded by NumPy's
+/// Random numbers as `numpy.random.default_rng(seed)` draws them, so that a seed gives the same
+/// start in a deck and in Python: PCG64 (O'Neill, HMC-CS-2014-0905), seeded by NumPy's
 /// SeedSequence.
 class NumpyRandom {
  public:
@@ -69,7 +69,7 @@ class NumpyRandom {
     return static_cast<std::uint32_t>(both);
   }
 
-  /// A whole number from 0 to `most`.
+  /// A random integer from 0 to `most`.
   std::uint32_t up_to(std::uint32_t most)
   {
     std::uint32_t mask = most;
@@ -109,7 +109,7 @@ class NumpyRandom {
   }
 };
 
-/// `numpy.sum`, to its last bit.
+/// `numpy.sum`, to the last bit.
 inline double numpy_sum(const double *values, std::size_t n)
 {
   if (n < 8) {

@@ -6,8 +6,7 @@
 
 namespace jamshape {
 
-/// The orientation that an angle (2D) or the four numbers of a quaternion of any length (3D) stand
-/// for.
+/// The orientation given by an angle (2D) or the four numbers of a quaternion of any length (3D).
 template <int D> Quaternion orientation_from(const double *numbers)
 {
   if constexpr (D == 2) {

@@ -21,9 +21,9 @@
 
 namespace jamshape {
 
-/// Poses of N particles in a periodic box, every coordinate the sum of a double and its small rest:
-/// overlaps are differences of coordinates, and a double of 40 diameters has lost their last eight
-/// digits. Row-major views: [0] the doubles, [1] the rests. Box and positions are strained.
+/// Poses of N particles in a periodic box, every coordinate a double-double: overlaps are
+/// differences of coordinates, and a double of 40 diameters has lost their last eight digits.
+/// Row-major views: [0] the doubles, [1] the low parts. Box and positions are strained.
 struct SplitPoses {
   using View = std::array<const double *, 2>;
   View position;     // (N, D)
@@ -48,8 +48,8 @@ struct PairList {
 
 namespace detail {
 
-/// A contact, begun where its pair's last one was if that is given, in doubles, and its shape
-/// remembers anything.
+/// Computes a contact in doubles, starting from the pair's previous one if that is given and the
+/// shape supports starts.
 template <class Body, class Law, class Start>
 auto contact_begun(const Body &i, const Body &j, const Law &law, Start *start)
 {
@@ -61,13 +61,14 @@ auto contact_begun(const Body &i, const Body &j, const Law &law, Start *start)
 
 }  // namespace detail
 
-/// Where contacts in the scalar S may begin: long doubles, which settle last bits, always anew.
+/// Type of the starts of contacts in the scalar S: long doubles, which settle the last bits, never
+/// use one.
 template <class Model, int D, class S>
 using StartIn =
     std::conditional_t<std::is_same_v<S, double>, typename Model::template Start<D>, NoStart>;
 
-/// Pairs of posed particles, in the scalar S. Separations have no rounding errors but their own,
-/// whatever S is.
+/// Pairs of posed particles, in the scalar S. Separations have no rounding errors except that of S
+/// itself.
 template <class Model, int D, class S> class PosedPairs {
  public:
   using Long = long double;
@@ -111,8 +112,8 @@ template <class Model, int D, class S> class PosedPairs {
     return r;
   }
 
-  /// Whether the spheres around a pair of this separation touch: most pairs of a list are seen to
-  /// be apart by that, at a tenth of the price of a contact.
+  /// Whether the bounding spheres of a pair of this separation touch: this excludes most pairs of a
+  /// list at a tenth of the cost of a contact.
   bool may_touch(std::size_t p, const Vec<D, S> &r) const
   {
     const double reach = around[first(p)] + around[second(p)];
@@ -131,7 +132,7 @@ template <class Model, int D, class S> class PosedPairs {
     return body[second(p)];
   }
 
-  /// The contact of a pair of this separation, begun where its last one was if that is given.
+  /// The contact of a pair of this separation, starting from its previous one if given.
   ContactOf<Model, D, S> contact(std::size_t p, const Vec<D, S> &r,
                                  StartIn<Model, D, S> *start = nullptr) const
   {
@@ -139,7 +140,8 @@ template <class Model, int D, class S> class PosedPairs {
     return to_its_digits(p, found);
   }
 
-  /// A contact of a pair, in plain or in dual numbers, in long doubles where S is too short.
+  /// A contact of a pair, in plain or in dual numbers, in long doubles where S is not precise
+  /// enough.
   template <class Found> Found to_its_digits(std::size_t p, const Found &found) const
   {
     if constexpr (std::is_same_v<S, double>) {
@@ -149,7 +151,7 @@ template <class Model, int D, class S> class PosedPairs {
     }
   }
 
-  /// What errors of a contact are bounded against.
+  /// The reference for errors of a contact.
   [[gnu::noinline, gnu::cold]] PosedPair<Model, D, Long> pair_in_long(std::size_t p) const
   {
     const std::size_t i = first(p), j = second(p);
@@ -161,7 +163,7 @@ template <class Model, int D, class S> class PosedPairs {
             law};
   }
 
-  /// Whether packs take all of these particles.
+  /// Whether packs support all of these particles.
   bool packs_take_all() const
   {
     return std::all_of(shapes.begin(), shapes.end(), [&](const typename Model::Shape &shape) {
@@ -169,10 +171,10 @@ template <class Model, int D, class S> class PosedPairs {
     });
   }
 
-  /// All at the origin.
+  /// All bodies, at the origin.
   const typename Model::template Body<D, S> *bodies() const { return body.data(); }
 
-  /// Whether surfaces may be closer than a margin.
+  /// Whether the gap between two surfaces may be smaller than a margin.
   bool are_closer(std::size_t p, double margin) const
   {
     return Model::template closer_than<D>(margin, first_body(p, separation(p)), second_body(p));
@@ -184,14 +186,14 @@ template <class Model, int D, class S> class PosedPairs {
     return are_overlapping(first_body(p, separation(p)), second_body(p));
   }
 
-  /// A body that its rotation variables, from `first` on, turn.
+  /// A body rotated by its rotation variables, from `first` on.
   auto turned(std::size_t n, int first_variable) const
   {
     return turned_body<Model, D, S>(shapes[n], orientation_of(n), first_variable);
   }
 
  private:
-  /// So that rounding hides no contact of tips.
+  /// Margin that prevents rounding from hiding a contact of tips.
   static constexpr double WIDER = 1.0 + 1e-14;
 
   const std::vector<typename Model::Shape> &shapes;
@@ -199,9 +201,10 @@ template <class Model, int D, class S> class PosedPairs {
   PairList pairs;
   typename Model::Law law;
   std::vector<typename Model::template Body<D, S>> body;  // at the origin
-  std::vector<double> around;                             // radii of the spheres around them
+  std::vector<double> around;                             // radii of the bounding spheres
 
-  /// The second of a pair by so many of one of the cell vectors; most pairs need none.
+  /// Shifts the second particle of a pair by a number of one of the cell vectors; zero for most
+  /// pairs.
   void move_along(int vector, double turns, Split *apart) const
   {
     for (int k = 0; k <= vector; ++k) {
@@ -248,7 +251,7 @@ template <class Model, int D, class S> class TurnedBodies {
     }
   }
 
-  /// Begun where the pair's last contact was if that is given.
+  /// The contact of a pair, starting from its previous one if given.
   ContactOf<Model, D, Dual<PAIR_VARIABLES<D>, S>>
   contact(std::size_t p, StartIn<Model, D, S> *start = nullptr) const
   {
@@ -307,7 +310,7 @@ template <int D, class S> struct PairSums {
     n_bonds += 1 + (block.two_bonds >> k & 1);
   }
 
-  /// Adds those over pairs that come after.
+  /// Adds the sums over the pairs that follow.
   void add(const PairSums &next)
   {
     energy += next.energy;
@@ -333,8 +336,8 @@ template <int D, class S> struct PairSums {
   }
 };
 
-/// What finds the contacts of these pairs many at once; nothing where they go one by one, as they
-/// do where shortcuts are not wanted.
+/// The function that finds the contacts of these pairs in packs; null if pairs are evaluated one by
+/// one, as without shortcuts.
 template <class Model, int D>
 FindContacts<Model, D> *packs_for(const PosedPairs<Model, D, double> &pairs)
 {
@@ -342,14 +345,13 @@ FindContacts<Model, D> *packs_for(const PosedPairs<Model, D, double> &pairs)
   return PacksOf<Model, D>::of(required_instruction_set());
 }
 
-/// Some of the pairs that may touch, in a block, with the number of each.
+/// Pairs of a list that may touch, in a block, with the number of each.
 template <class Model, int D> class NumberedBlock {
  public:
   using Start = typename Model::template Start<D>;
   static constexpr bool HAS_START = !std::is_same_v<Start, NoStart>;
 
-  /// Their contacts begin where the last ones were, and leave there where they end, if `starts` is
-  /// given.
+  /// Contacts start from the previous ones, and store where they end, if `starts` is given.
   NumberedBlock(const PosedPairs<Model, D, double> &posed, Start *of_pairs) :
       pairs(posed), starts(of_pairs)
   {
@@ -357,7 +359,7 @@ template <class Model, int D> class NumberedBlock {
 
   bool is_empty() const { return block.n == 0; }
 
-  /// Takes as many as fit from the first on; returns where to go on.
+  /// Takes as many as fit from the first on; returns where to resume.
   std::size_t fill(const Range &from)
   {
     std::size_t p = from.first;
@@ -395,7 +397,7 @@ template <class Model, int D> class NumberedBlock {
   std::size_t number[ContactBlock<D>::MOST];
 };
 
-/// Adds contacts of some of the pairs, many at once.
+/// Adds contacts of a range of pairs, in packs.
 template <class Model, int D>
 void add_blocks(PairSums<D, double> &sums, NumberedBlock<Model, D> &block,
                 FindContacts<Model, D> &find, const Range &part)
@@ -406,8 +408,7 @@ void add_blocks(PairSums<D, double> &sums, NumberedBlock<Model, D> &block,
   }
 }
 
-/// Over some of the pairs. Contacts begin where the last ones of these pairs were, if that is
-/// given.
+/// Sums over a range of pairs. Contacts start from the previous ones of these pairs, if given.
 template <class Model, int D, class S>
 PairSums<D, S> sum_part(const PosedPairs<Model, D, S> &pairs, StartIn<Model, D, S> *starts,
                         const Range &part)
@@ -430,7 +431,7 @@ PairSums<D, S> sum_part(const PosedPairs<Model, D, S> &pairs, StartIn<Model, D, 
   return sums;
 }
 
-/// Over all of them, by a team if there is one: in parts, added in their order.
+/// Sums over all pairs, by a team if there is one: in parts, added in their order.
 template <class Model, int D, class S>
 PairSums<D, S> sum_over(const PosedPairs<Model, D, S> &pairs,
                         StartIn<Model, D, S> *starts = nullptr, Team *team = nullptr)

@@ -14,22 +14,21 @@
 
 namespace jamshape {
 
-/// How an insertion ended.
+/// Outcome of an insertion.
 enum class Inserted {
   ALL,
   TOO_SHORT,  // the longest particle meets its own periodic images in every direction tried
   STALLED     // no room found after the attempts allowed
 };
 
-/// Particles placed at random in a periodic box, one after another, wherever they overlap none that
-/// is there: random sequential insertion of hard particles, the longest first, since early there is
-/// room for them and short ones fit into gaps. Orientations are drawn before a place is looked for,
-/// and anew only where none is found: drawing both together would favour particles aligned with
-/// those around them.
+/// Random sequential insertion of hard particles in a periodic box, the longest first, since early
+/// on there is room for them and short ones fit into gaps. An orientation is drawn before a place
+/// is searched for, and redrawn only if none is found: drawing both together would favour particles
+/// aligned with those around them.
 ///
 /// `Model` as for pair styles, with `are_overlapping` for its bodies. `Draw` gives random numbers:
 /// `positions(n, out)`, n D numbers uniform in [0, 1), and `orientations(n, out)`, n angles in 2D
-/// or n quaternions in 3D. The order in which they are drawn is part of what a seed stands for.
+/// or n quaternions in 3D. The order of the draws is part of the definition of a seed.
 template <class Model, int D> class RandomInsertion {
  public:
   using Shape = typename Model::Shape;
@@ -61,7 +60,7 @@ template <class Model, int D> class RandomInsertion {
       if (attempts >= most_attempts) return n_done == 0 ? Inserted::TOO_SHORT : Inserted::STALLED;
       attempts += n_trials;
       const std::size_t n_placed = place(draw, std::min(competing, n - n_done), n_trials);
-      // No room for them as they are.
+      // No room at the present orientations.
       if (n_placed == 0 && n_trials == most_trials && !turn(draw, without_place()))
         return Inserted::TOO_SHORT;
       if (2 * n_placed < std::min(competing, n_trials))
@@ -82,14 +81,15 @@ template <class Model, int D> class RandomInsertion {
  private:
   using Body = typename Model::template Body<D>;
 
-  /// Trials tested in one batch, at most, and those in a batch times the particles near one.
+  /// Most trials tested in one batch, and most products of those and the particles near one.
   static constexpr std::size_t MOST_TRIALS = 4096;
   static constexpr double MOST_PAIRS = 524288.0;
-  /// One particle in so many competes for places in one batch: few, so that the longest stay ahead.
+  /// One in this many particles competes for places in one batch: few, so that the longest stay
+  /// ahead.
   static constexpr std::size_t COMPETING = 16;
-  /// Trials for which memory is fetched ahead.
+  /// Trials for which memory is prefetched.
   static constexpr std::size_t AHEAD = 8;
-  /// Directions in which a particle is tried in a box shorter than it.
+  /// Orientations tried for a particle in a box shorter than it.
   static constexpr int DIRECTIONS = 4096;
 
   const std::vector<Shape> &shapes;
@@ -100,11 +100,10 @@ template <class Model, int D> class RandomInsertion {
   std::vector<Vec<D>> centre;
   std::vector<double> orientation;
   std::vector<std::size_t> waiting;  // from n_done on, ascending
-  std::vector<Body> bodies;          // turned; their centres are set where they are compared
+  std::vector<Body> bodies;          // rotated; their centres are set when they are compared
   std::vector<double> radius;
 
-  /// Draws orientations of these particles that keep them off their own images; false if there are
-  /// none.
+  /// Draws orientations of these particles that avoid their own images; false if there are none.
   template <class Draw> bool turn(Draw &draw, std::vector<std::size_t> which)
   {
     std::vector<double> drawn, ignored;
@@ -112,7 +111,7 @@ template <class Model, int D> class RandomInsertion {
       drawn.resize(PER_ORIENTATION * which.size());
       draw.orientations(which.size(), drawn.data());
       ignored.resize(D * which.size());
-      draw.positions(which.size(), ignored.data());  // seeds have always stood for these as well
+      draw.positions(which.size(), ignored.data());  // part of the definition of a seed
       for (std::size_t k = 0; k < which.size(); ++k) {
         const double *const from = &drawn[PER_ORIENTATION * k];
         std::copy_n(from, PER_ORIENTATION, &orientation[PER_ORIENTATION * which[k]]);
@@ -132,8 +131,8 @@ template <class Model, int D> class RandomInsertion {
                             [&](const Vec<D> &apart) { return overlap(i, i, apart); });
   }
 
-  /// Tries the first of those that wait, each as often as `n_trials` in all allow, anywhere;
-  /// returns how many have found a place.
+  /// Tries random places for the first of the waiting particles, each as often as `n_trials` in all
+  /// allow; returns how many have found one.
   template <class Draw> std::size_t place(Draw &draw, std::size_t competing, std::size_t n_trials)
   {
     std::vector<double> at(D * n_trials);
@@ -156,7 +155,7 @@ template <class Model, int D> class RandomInsertion {
     return keep(found);
   }
 
-  /// Keeps the places found in one batch but those that overlap an earlier one of it.
+  /// Keeps the places found in one batch except those that overlap an earlier one of it.
   std::size_t keep(std::vector<char> &found)
   {
     const std::size_t first_new = placed.size();
@@ -165,7 +164,7 @@ template <class Model, int D> class RandomInsertion {
       found[rank] = found[rank] && !meets(i, centre[i], first_new);
       if (found[rank]) placed.add(i, centre[i], radius[i]);
     }
-    std::size_t to = n_done + found.size();  // the others of the batch move up to those behind it
+    std::size_t to = n_done + found.size();  // the others of the batch move up to the waiting ones
     for (std::size_t rank = found.size(); rank-- > 0;) {
       if (!found[rank]) waiting[--to] = waiting[n_done + rank];
     }
@@ -173,7 +172,7 @@ template <class Model, int D> class RandomInsertion {
     return placed.size() - first_new;
   }
 
-  /// Whether particle i, at x, overlaps any of those placed, but for the first so many.
+  /// Whether particle i, at x, overlaps any placed particle except the first `but`.
   bool meets(std::size_t i, const Vec<D> &x, std::size_t but) const
   {
     return placed.any_near(x, radius[i], but, [&](std::size_t j, const Vec<D> &apart) {

@@ -8,8 +8,8 @@
 namespace jamshape {
 
 /// One contact of the network: two particles (indices), the normal into i, and whether the contact
-/// lies on a face of i, of j. A side-to-side contact of rods is one edge; where the bonds of a
-/// contact are contacts of their own (Model::BONDS_ARE_CONTACTS), each is an edge.
+/// lies on a face of i, of j. A side-to-side contact of rods is one edge; if the bonds of a contact
+/// are contacts of their own (Model::BONDS_ARE_CONTACTS), each is an edge.
 struct ContactEdge {
   std::size_t i, j;
   Vec<3> normal;
@@ -17,10 +17,10 @@ struct ContactEdge {
 };
 
 /// Rattlers: particles with at most D contacts, unless two of these lie on faces of it with
-/// opposite normals, so that neither a shift nor a turn parts them; removed with their contacts
-/// until none is left. In 2D, where the straight sides of rods are faces, it is the rule of
-/// Marschall & Teitel 2018, Sec. III C. One contact on a face holds against D motions, and still
-/// not against being lifted off.
+/// opposite normals, so that neither a translation nor a rotation separates them; removed with
+/// their contacts until none is left. In 2D, where the straight sides of rods are faces, it is the
+/// rule of Marschall & Teitel 2018, Sec. III C. One contact on a face constrains D motions, but
+/// does not prevent lifting off.
 class RattlerSearch {
  public:
   RattlerSearch(std::size_t n_particles, const std::vector<ContactEdge> &contacts, int space) :
@@ -55,7 +55,7 @@ class RattlerSearch {
   std::vector<std::vector<std::size_t>> edges_of;
   std::vector<char> removed;
 
-  /// A particle's side of a contact: normal into the particle, and whether on its flat part.
+  /// A particle's side of a contact: normal into the particle, and whether it is on a face.
   struct Support {
     Vec<3> normal;
     bool flat;
@@ -66,7 +66,7 @@ class RattlerSearch {
     std::vector<Support> supports;
     for (const std::size_t e : edges_of[n]) {
       const ContactEdge &edge = edges[e];
-      if (edge.i == edge.j) {  // touching its own periodic image holds it from both sides
+      if (edge.i == edge.j) {  // touching its own periodic image constrains it from both sides
         supports.push_back({edge.normal, edge.flat_i});
         supports.push_back({-edge.normal, edge.flat_j});
       } else if (edge.i == n && !removed[edge.j]) {

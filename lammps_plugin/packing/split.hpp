@@ -4,19 +4,20 @@
 #include <cmath>
 
 #ifdef __FAST_MATH__
-#error "The rests of sums need -fno-fast-math."
+#error "Double-double arithmetic needs -fno-fast-math."
 #endif
-static_assert(FLT_EVAL_METHOD == 0, "The rests of sums need doubles that are rounded as doubles.");
+static_assert(FLT_EVAL_METHOD == 0,
+              "Double-double arithmetic needs doubles without excess precision.");
 
 namespace jamshape {
 
-/// A number as the sum of a double and its small rest.
+/// A double-double: a number as the unevaluated sum of a double and its low part.
 struct Split {
   double value, rest;
 };
 
-/// The sum of two doubles, and exactly what rounding leaves of it (Knuth, The Art of Computer
-/// Programming 2, Sec. 4.2.2, Theorem B).
+/// The sum of two doubles with its exact rounding error (Knuth, The Art of Computer Programming 2,
+/// Sec. 4.2.2, Theorem B).
 inline Split two_sum(double a, double b)
 {
   const double sum = a + b, of_b = sum - a;
@@ -31,8 +32,7 @@ inline Split split(long double x)
 
 inline long double joined(const Split &x) { return static_cast<long double>(x.value) + x.rest; }
 
-/// One coordinate of x_i - x_j, of which the leading digits cancel, as it is before it is rounded,
-/// in doubles alone.
+/// One coordinate of x_i - x_j, whose leading digits cancel, before rounding, using doubles alone.
 inline Split difference(const Split &i, const Split &j)
 {
   Split found = two_sum(i.value, -j.value);
@@ -40,7 +40,7 @@ inline Split difference(const Split &i, const Split &j)
   return found;
 }
 
-/// That coordinate where j stands so many lengths further on, likewise.
+/// That coordinate with j shifted by `turns` lengths.
 inline Split difference(const Split &apart, const Split &length, double turns)
 {
   const double image = turns * length.value;

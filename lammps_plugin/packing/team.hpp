@@ -13,18 +13,18 @@
 
 namespace jamshape {
 
-/// Numbers from first to before last.
+/// Numbers from first up to, but excluding, last.
 struct Range {
   std::size_t first, last;
 };
 
-/// The k-th of so many parts of n things, whichever thread is faster.
+/// The k-th of `parts` parts of n items, independent of the speed of threads.
 inline Range part_of(std::size_t n, std::size_t k, std::size_t parts)
 {
   return {n * k / parts, n * (k + 1) / parts};
 }
 
-/// Threads that wait for work that is done in parts, one of them by whoever asks for it.
+/// Threads that wait for work done in parts, one of them by the caller.
 class Team {
  public:
   explicit Team(std::size_t n) : failed(n)
@@ -42,8 +42,8 @@ class Team {
 
   std::size_t size() const { return failed.size(); }
 
-  /// Does each part, by its number, and waits for all; throws what the first part that failed
-  /// threw.
+  /// Executes each part, by its number, and waits for all; rethrows the exception of the first part
+  /// that failed.
   void run(const std::function<void(std::size_t)> &part)
   {
     work = &part;
@@ -62,8 +62,8 @@ class Team {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// To be woken takes as long as the contacts of some hundred particles: a thread that waits looks
-  /// for so long whether it can go on before it sleeps.
+  /// Waking a thread takes as long as the contacts of some hundred particles: a waiting thread
+  /// polls for this time before it sleeps.
   static constexpr std::chrono::microseconds AWAKE{50};
 
   std::mutex guard;
@@ -119,7 +119,7 @@ class Team {
   }
 };
 
-/// `work` on each part of n things, by a team if there is one.
+/// Calls `work` on each part of n items, by a team if there is one.
 template <class Work> void in_parts(Team *team, std::size_t n, const Work &work)
 {
   if (team == nullptr) {

@@ -170,7 +170,7 @@ bool AffineBox::is_isotropic() const
   return !now.rate.has_shear() && d[0] == d[1] && (dimension == 2 || d[0] == d[2]);
 }
 
-/// F but for the flips.
+/// F without the flips.
 Upper AffineBox::unflipped(double passed) const
 {
   Upper base{{}, now.base[0], now.base[1], now.base[2]};
@@ -266,12 +266,13 @@ AffineBox::Flip AffineBox::flip_needed(bigint step, double most) const
     return std::abs(tilt) > most * along ? -std::nearbyint(tilt / along) : 0.0;
   };
   Flip found{turns(cell.xy, edge[0]), 0.0, turns(cell.yz, edge[1])};
-  // c takes the tilt of the new b along.
+  // c takes along the tilt of the new b.
   found.n = turns(cell.xz + found.p * cell.xy, edge[0]);
   return found;
 }
 
-/// H M H^-1 with H the cell at strain 0, M the flip: from coordinates of its new choice to the old.
+/// H M H^-1 with H the cell at strain 0 and M the flip: maps coordinates of the new cell vectors to
+/// those of the old.
 Upper AffineBox::flips_in_reference(const Flip &by) const
 {
   const Upper cell = cell_at_start();
@@ -280,7 +281,7 @@ Upper AffineBox::flips_in_reference(const Flip &by) const
 
 Upper AffineBox::flip(const Flip &by)
 {
-  // The product of both, which is of whole numbers.
+  // The product of both flips, whose entries are integers.
   Flip &all = now.flips;
   all = {all.m + by.m, all.n + by.n + all.m * by.p, all.p + by.p};
   return divided(1.0, flips_in_reference(by));

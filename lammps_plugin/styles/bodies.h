@@ -14,8 +14,8 @@
 
 namespace jamshape {
 
-/// Own and ghost particles as bodies of a model, all kept: for bodies of a few numbers, whose
-/// contacts take so little time that putting bodies together would show.
+/// Own and ghost particles as bodies of a model, all stored: for small bodies, whose contacts take
+/// so little time that assembling bodies would matter.
 template <class Model, int D> class StoredBodies {
  public:
   using Body = typename Model::template Body<D>;
@@ -24,7 +24,7 @@ template <class Model, int D> class StoredBodies {
   std::size_t size() const { return now.size(); }
   const Body &operator[](std::size_t i) const { return now[i]; }
 
-  /// Bodies of a block of contacts, put there for packs to find them.
+  /// Bodies of a block of contacts, placed for use by packs.
   class Block {
    public:
     explicit Block(const StoredBodies &of) : bodies(of.now.data()) {}
@@ -51,7 +51,7 @@ template <class Model, int D> class StoredBodies {
     });
   }
 
-  /// Poses kept for later, exactly.
+  /// Poses are stored exactly.
   static constexpr double POSE_ERROR = 0.0;
   struct Pose {
     typename Model::template Pose<D> of_model;
@@ -68,8 +68,8 @@ template <class Model, int D> class StoredBodies {
   std::vector<Body> now;
 };
 
-/// The same for large bodies: each kind of shape (semi-axes and p) is kept once, and a body put
-/// together where it is asked for, from LAMMPS's positions and the orientations read last.
+/// The same for large bodies: each kind of shape (semi-axes and p) is stored once, and bodies are
+/// assembled on demand, from LAMMPS's positions and the last orientations read.
 template <class Model, int D> class AssembledBodies {
  public:
   using Body = typename Model::template Body<D>;
@@ -148,7 +148,7 @@ template <class Model, int D> class AssembledBodies {
     }
     return pose;
   }
-  /// By how far a point of a body at most is off in a pose, over the body's bounding radius.
+  /// Largest error of a point of a body in a stored pose, over the body's bounding radius.
   static constexpr double POSE_ERROR = 1e-6;
   typename Model::template Pose<D> pose_of(std::size_t i, const Pose &pose) const
   {
@@ -166,16 +166,16 @@ template <class Model, int D> class AssembledBodies {
   }
 
  private:
-  static constexpr std::size_t PER_ENTRY = 96;  // of the map, about
+  static constexpr std::size_t PER_ENTRY = 96;  // approximate, of the map
 
   std::vector<int> kind;
   std::vector<Body> kinds;
   std::map<std::tuple<double, double, double, double>, std::size_t> number_of;
   const double *const *centres = nullptr;
-  std::vector<Quaternion> orientations;  // none where no particle turns
+  std::vector<Quaternion> orientations;  // empty if no particle can rotate
 };
 
-/// Bodies larger than this are put together when needed.
+/// Bodies larger than this are assembled on demand.
 inline constexpr std::size_t LARGEST_STORED_BODY = 64;
 
 template <class Model, int D>

@@ -1,12 +1,12 @@
 #pragma once
 
-// The one place that knows what differs between LAMMPS versions and what their installed headers
-// leave out: non-virtual member functions that liblammps exports and no installed header declares.
-// Where a version names something otherwise, the compiler is asked which name there is.
+// The only file that knows the differences between LAMMPS versions and the gaps in their installed
+// headers: non-virtual member functions that liblammps exports but no installed header declares.
+// Where versions use different names, the compiler selects the existing one.
 
 #include "lammps.h"
 
-// The class of commands that stand in a deck, whose header Debian 12 does not install.
+// The class of deck commands, whose header Debian 12 does not install.
 #if __has_include("command.h")
 #include "command.h"
 #else
@@ -33,32 +33,33 @@ class Pair;
 
 class AtomVecEllipsoid {
  public:
-  /// Quaternions (w, i, j, k) of the listed atoms, those without an ellipsoid left out.
+  /// Quaternions (w, i, j, k) of the listed atoms, except those without an ellipsoid.
   int pack_comm_bonus(int n, int *list, double *buf);
   void unpack_comm_bonus(int n, int first, double *buf);
-  /// An atom with an ellipsoid: 1, three semi-axes, quaternion, and what a version keeps beside
-  /// them; without one: 0. Returns the count of numbers.
+  /// For an atom with an ellipsoid: 1, three semi-axes, quaternion, and any version-specific data;
+  /// without one: 0. Returns the number of values.
   int pack_border_bonus(int n, int *list, double *buf);
-  /// Three semi-axes, of an atom with an ellipsoid or without.
+  /// Sets three semi-axes, for an atom with an ellipsoid or without.
   void set_shape(int i, double a, double b, double c);
 };
 
 class Min {
  public:
-  /// Asks LAMMPS's minimiser for `ndof` more degrees of freedom an atom, kept by the pair style.
+  /// Requests `ndof` more degrees of freedom per atom from LAMMPS's minimiser, stored by the pair
+  /// style.
   int request(Pair *pair, int ndof, double maxmove);
 };
 
-/// Sends atoms to the ranks that they belong to, however far these are.
+/// Sends atoms to their ranks, however far away these are.
 class Irregular {
  public:
   explicit Irregular(LAMMPS *lmp);
   ~Irregular();
-  /// Positions are parts of the cell's edges; none of the arguments is needed.
+  /// Positions are fractions of the cell's edges; none of the arguments is needed.
   void migrate_atoms(int sorted, int assigned, int *ranks);
 
  private:
-  alignas(64) unsigned char members[4096];  // LAMMPS's own, in a few hundred bytes
+  alignas(64) unsigned char members[4096];  // size of LAMMPS's own: a few hundred bytes
 };
 
 }  // namespace LAMMPS_NS
@@ -67,11 +68,11 @@ extern "C" int lammps_version(void *handle);
 
 namespace jamshape::compat {
 
-/// An atom style's object as AtomVecEllipsoid, or null if it is of another class: asked of the
-/// object itself, since no header says how the two classes are laid out.
+/// An atom style's object as AtomVecEllipsoid, or null if it is of another class: determined from
+/// the object itself, since no header declares the layout of the two classes.
 LAMMPS_NS::AtomVecEllipsoid *as_ellipsoids(LAMMPS_NS::AtomVec *style);
 
-/// Sends n numbers a particle of a fix to ghosts: `forward_comm_fix` until 2021.
+/// Sends n numbers per particle of a fix to ghosts: `forward_comm_fix` until 2021.
 template <class Comm, class Fix>
 auto forward(Comm *comm, Fix *fix, int n) -> decltype(comm->forward_comm(fix, n))
 {
@@ -83,7 +84,8 @@ auto forward(Comm *comm, Fix *fix, int n) -> decltype(comm->forward_comm_fix(fix
   comm->forward_comm_fix(fix, n);
 }
 
-/// Whether any fix changes forces: the count is public until 2021, later a flag beside it is.
+/// Whether any fix changes forces: the count was public until 2021; later there is a flag beside
+/// it.
 template <class Modify>
 auto has_post_force(const Modify *modify) -> decltype(modify->n_post_force_any != 0)
 {
@@ -95,7 +97,7 @@ auto has_post_force(const Modify *modify) -> decltype(modify->n_post_force != 0)
   return modify->n_post_force != 0;
 }
 
-/// Number of regions that a deck has defined: counted in public until 2022.
+/// Number of regions defined by the deck: a public counter until 2022.
 template <class Domain> auto n_regions(Domain *domain) -> decltype(int(domain->nregion))
 {
   return domain->nregion;
@@ -108,7 +110,7 @@ auto n_regions(Domain *domain) -> decltype(int(domain->get_region_list().size())
 
 }  // namespace jamshape::compat
 
-/// What the PLUGIN package's header, which is not installed, says of plugins for its `plugin load`.
+/// The interface of `plugin load`, as in the PLUGIN package's header, which is not installed.
 extern "C" {
 struct lammpsplugin_t {
   const char *version, *style, *name, *info, *author;

@@ -9,17 +9,17 @@ namespace jamshape {
 
 /// compute ID all contact/local NAME ...
 ///
-/// One row a bond, columns in the order asked for:
+/// One row per bond, columns in the requested order:
 ///   itag jtag             IDs, itag <= jtag
 ///   kind                  0 tip-to-tip, 1 tip-to-side, 2 side-to-side
 ///   bond                  number in its contact, from 0
 ///   dist sumrad overlap   r, d and 1 - r/d
 ///   fx fy fz              force on i
-///   rx ry rz              from the centre of j to that of i
+///   rx ry rz              vector from the centre of j to that of i
 ///   nx ny nz              unit normal into i
 ///   cx cy cz              point of contact
 ///   energy stiffness      V and its second derivative with respect to r
-///   sidei sidej           1 where the contact lies on the flat part of i, of j
+///   sidei sidej           1 if the contact lies on a face of i, of j
 class ComputeContactLocal : public LAMMPS_NS::Compute {
  public:
   ComputeContactLocal(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);

@@ -48,11 +48,11 @@ enum Value {
   DIRECTOR
 };
 
-/// Directions that the cubatic order tries are the axes of at most so many particles.
+/// The cubatic order tries the axes of at most this many particles as directions.
 constexpr LAMMPS_NS::bigint MOST_TRIED = 512;
 
-/// An edge of the contact network as ranks exchange it; bytes over MPI, all ranks being the same
-/// program.
+/// An edge of the contact network as ranks exchange it; as bytes over MPI, since all ranks run the
+/// same program.
 struct SharedEdge {
   LAMMPS_NS::tagint itag, jtag;
   Vec<3> normal;
@@ -60,8 +60,8 @@ struct SharedEdge {
   OnFaces on_faces;
 };
 
-/// The contacts of this rank, from their bonds, which come one contact after another: an edge each,
-/// or one for each bond where those are contacts of their own.
+/// The contacts of this rank, from their bonds, which come contact by contact: one edge each, or
+/// one per bond if bonds are contacts of their own.
 std::vector<SharedEdge> edges_of(const std::vector<LocalBond> &bonds, const LAMMPS_NS::tagint *tag,
                                  const PairContact &pair, bool is_plane)
 {
@@ -75,8 +75,8 @@ std::vector<SharedEdge> edges_of(const std::vector<LocalBond> &bonds, const LAMM
       edges.back().on_faces.i |= bond.on_faces.i;
       edges.back().on_faces.j |= bond.on_faces.j;
     }
-    // In the plane such a contact counts as two also where it carries one force (`sides one`); in
-    // space skew rods touch side to side at one point.
+    // In 2D such a contact counts as two even if it carries one force (`sides one`); in 3D skew
+    // rods touch side to side at one point.
     if (is_plane && bond.kind == ContactKind::SIDE_TO_SIDE) edges.back().n_bonds = 2;
   }
   return edges;
@@ -106,7 +106,7 @@ ComputePacking::ComputePacking(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
   vector_flag = 1;
   size_vector = N_VALUES;
   extvector = 0;
-  peflag = pressflag = timeflag = 1;  // LAMMPS then tallies energy and virial on the steps we need
+  peflag = pressflag = timeflag = 1;  // LAMMPS then tallies energy and virial on the required steps
   vector = new double[N_VALUES]();
 }
 
@@ -134,8 +134,9 @@ void ComputePacking::compute_vector()
   if (update->vflag_global != invoked_vector || update->eflag_global != invoked_vector) {
     error->all(
         FLERR,
-        std::string("compute packing found that energy and virial were not tallied on this step, "
-                    "expected them: use it in thermo output or in a fix that asks a step ahead."));
+        std::string(
+            "compute packing found that energy and virial were not tallied on this step, "
+            "expected them: use it in thermo output or in a fix that requests it a step ahead."));
   }
   pair = &PairContact::evaluated(lmp, "compute packing");
   const std::vector<LocalBond> bonds = pair->reported_bonds();
@@ -145,7 +146,7 @@ void ComputePacking::compute_vector()
   compute_contacts(bonds);
 }
 
-/// The sum of all torques of contacts on this rank's particles, or of this rank's contacts.
+/// The sum of all contact torques on this rank's particles, or of this rank's contacts.
 Vec<3> ComputePacking::torque_of_contacts(const std::vector<LocalBond> &bonds) const
 {
   Vec<3> torque{};
@@ -170,8 +171,8 @@ void ComputePacking::compute_density_and_stress(const std::vector<LocalBond> &bo
   const Vec<3> torque = torque_of_contacts(bonds);
   vector[PHI] = sum(measure) / volume;
   vector[U] = sum(pair->eng_vdwl) / volume;
-  // LAMMPS's virial is xx, yy, zz, xy, xz, yz of r_k f_l. What shear of x along y works against is
-  // r_y f_x: forces and torques of a contact balance, and so that differs by the torques.
+  // LAMMPS's virial is xx, yy, zz, xy, xz, yz of r_k f_l. The stress conjugate to shear of x along
+  // y is r_y f_x: the loads of a contact balance, so that it differs by the torques.
   std::copy_n(pair->virial, 6, mine);
   mine[3] += torque[2];
   mine[4] -= torque[1];
@@ -192,7 +193,7 @@ void ComputePacking::compute_density_and_stress(const std::vector<LocalBond> &bo
 void ComputePacking::compute_order()
 {
   const ParticleView &view = pair->particle_view();
-  std::vector<Vec<3>> axes;  // of particles that have a direction
+  std::vector<Vec<3>> axes;  // of particles with a director
   for (int i = 0; i < atom->nlocal; ++i) {
     const std::optional<int> along = pair->director(view.semi_axes(i), atom->type[i]);
     if (along) axes.push_back(body_axis(view.orientation(i), *along));

@@ -45,7 +45,7 @@ class ComputePacking : public LAMMPS_NS::Compute {
 
  private:
   static constexpr int N_VALUES = 22;
-  PairContact *pair;  // as of this call: another pair_style ends it
+  PairContact *pair;  // as of this call; another pair_style deletes it
 
   double sum(double mine) const;
   double largest(double mine) const;

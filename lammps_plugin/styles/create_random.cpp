@@ -26,11 +26,11 @@ namespace jamshape {
 namespace {
 
 constexpr int MOST_PARTICLES = 10'000'000;
-// A few seconds for 1000 particles; as Python's `random_packing` has it.
+// A few seconds for 1000 particles; the same as in Python's `random_packing`.
 constexpr std::size_t ATTEMPTS = 200'000, ATTEMPTS_PER_PARTICLE = 500;
 constexpr double TWO_PI = 6.283185307179586;
 
-/// What an insertion draws, in the order in which Python's `random_packing` draws it.
+/// Random numbers of an insertion, drawn in the same order as by Python's `random_packing`.
 template <int D> class Draw {
  public:
   explicit Draw(NumpyRandom &from) : random(from) {}
@@ -62,7 +62,7 @@ template <int D> class Draw {
   }
 };
 
-/// How many particles each kind has: what is left over goes to the largest remainders.
+/// Number of particles of each kind: largest remainders are rounded up.
 std::vector<int> numbers(int n, const std::vector<CreateRandom::Kind> &kinds)
 {
   double all = 0.0;
@@ -161,7 +161,7 @@ template <class Model, int D> std::vector<typename Model::Shape> CreateRandom::s
   return shapes;
 }
 
-/// In the order of Python's `random_packing`, so that both give the same state in the plane.
+/// In the same order as Python's `random_packing`, so that both give the same state in 2D.
 template <class Model, int D> CreateRandom::Start CreateRandom::start()
 {
   const std::vector<typename Model::Shape> of_kind = shapes_of_kinds<Model, D>();

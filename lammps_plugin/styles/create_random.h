@@ -12,20 +12,20 @@
 namespace jamshape {
 
 /// The command `create_random SHAPE N PHI SEED type SHARE DX DY DZ [exponent P] ...`: a periodic
-/// box with particles at random places and in random directions that do not overlap. Every rank
-/// finds all places and keeps its own, so that a seed stands for one state on any number of ranks.
+/// box with non-overlapping particles at random positions and orientations. Every rank finds all
+/// positions and keeps its own, so that a seed gives the same state on any number of ranks.
 class CreateRandom : public LAMMPS_NS::Command {
  public:
   explicit CreateRandom(LAMMPS_NS::LAMMPS *lmp) : Command(lmp), view(lmp) {}
   void command(int narg, char **arg) override;
 
-  /// A type of particles: diameters, exponent, and how many there are beside the other types.
+  /// A type of particles: diameters, exponent, and its share of all particles.
   struct Kind {
     double share;
     Vec<3> diameters;
     double exponent = 1.0;
   };
-  /// Places of all particles by ascending ID, as doubles in a row.
+  /// Poses of all particles by ascending ID, as consecutive doubles.
   struct Start {
     double edge = 0.0;
     std::vector<int> type;

@@ -31,11 +31,11 @@ void give_decimal_point(LAMMPS_NS::LAMMPS *lmp)
                                " after LAMMPS had read numbers, 0.5 as 0, expected a decimal "
                                "point: load the plugin first, or set LC_NUMERIC to C.");
   }
-  // For good: commands that follow are not ours to bracket.
+  // Set permanently, because later commands cannot be wrapped.
   uselocale(newlocale(LC_NUMERIC_MASK, "C", duplocale(uselocale(locale_t(0)))));
   if (lmp->comm->me == 0) {
     lmp->error->warning(FLERR, std::string("jamshape") + FOUND +
-                                   ", by which LAMMPS reads 0.5 as 0, and set a point for this "
+                                   ", with which LAMMPS reads 0.5 as 0, and set a point for this "
                                    "thread; numbers before this line were read with the comma");
   }
 }
@@ -44,7 +44,7 @@ void require_decimal_point(LAMMPS_NS::LAMMPS *lmp, const std::string &who)
 {
   if (has_decimal_point()) return;
   lmp->error->all(FLERR, who + FOUND +
-                             ", by which LAMMPS reads 0.5 as 0, expected a decimal point: set "
+                             ", with which LAMMPS reads 0.5 as 0, expected a decimal point: set "
                              "LC_NUMERIC to C before LAMMPS reads numbers.");
 }
 

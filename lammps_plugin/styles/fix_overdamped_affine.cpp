@@ -28,13 +28,13 @@ using LAMMPS_NS::bigint;
 
 namespace {
 
-/// Closer to the stability limit than this fraction of it, the fix warns.
+/// The fix warns if the time step exceeds this fraction of the stability limit.
 constexpr double NEAR_LIMIT = 0.9;
 
-/// The limit is estimated anew at the latest after this strain, in which contacts may form.
+/// Largest strain between estimates of the limit, as contacts may form meanwhile.
 constexpr double STRAIN_BETWEEN_CHECKS = 0.005;
 
-/// A step of LAMMPS may shrink the box by this strain: output between has to see something.
+/// Largest strain of the box in one step of LAMMPS, so that output can resolve the motion.
 constexpr double LARGEST_STRAIN = 1.0;
 
 constexpr int N_OF_SUBSTEPS = 8, N_OF_FLOW = 4;
@@ -43,7 +43,7 @@ constexpr const char *SYNTAX =
     "'drag k_d [compress kappa] [shear gdot] [pure edot] [gradient ...] [volume free|constant] "
     "[flip F] [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]'.";
 
-/// What is global in a restart file. The first number tells files of other versions apart.
+/// Global data of a restart file. The first number identifies the format.
 constexpr std::uint64_t SAVED_AS = 0x6a616d7368617003, WITHOUT_TIME = SAVED_AS - 1;
 
 struct Saved {
@@ -51,11 +51,11 @@ struct Saved {
   AffineBox::State box;
   StepState steps;
   double mean_turn;
-  double time;  // not in files of the format WITHOUT_TIME
+  double time;  // absent from files of the format WITHOUT_TIME
 };
 
-/// Beginnings of the names of fixes that act on velocities or by them; EVENT/ is of accelerated
-/// dynamics at a temperature, as by `tad`.
+/// Prefixes of the names of fixes that act on velocities or through them; EVENT/ belongs to
+/// accelerated dynamics at a temperature, as by `tad`.
 constexpr const char *OF_VELOCITIES[] = {
     "langevin", "viscous", "viscosity", "temp/", "heat", "ehex", "momentum", "thermal/",
     "ffl",      "gle",     "gld",       "ttm",   "srd",  "nvk",  "pimd",     "EVENT/"};
@@ -67,7 +67,7 @@ bool begins_with(const std::string &text, const std::string &with)
 
 }  // namespace
 
-/// What the words of the command say, beside how often to check.
+/// Settings from the arguments of the command, except the interval of checks.
 struct FixOverdampedAffine::Command {
   double k_d;
   Upper gradient{};
@@ -99,7 +99,7 @@ FixOverdampedAffine::Command FixOverdampedAffine::read(int narg, char **arg)
 {
   if (igroup != 0) fail("a group other than all, expected 'all': the whole box moves.");
   if (narg < 5 || std::strcmp(arg[3], "drag")) {
-    fail(std::string("a wrong list of arguments, expected ") + SYNTAX);
+    fail(std::string("wrong arguments, expected ") + SYNTAX);
   }
   Command command;
   command.k_d = number(arg[4]);
@@ -122,8 +122,8 @@ void FixOverdampedAffine::require_no_trace(const Upper &gradient) const
   const double trace = d[0] + d[1] + d[2];
   const double largest = std::max({std::fabs(d[0]), std::fabs(d[1]), std::fabs(d[2])});
   if (std::fabs(trace) > 8.0 * std::numeric_limits<double>::epsilon() * largest) {
-    fail("volume constant and a flow whose trace is " + shown(trace) +
-         ", expected one whose diagonal adds up to 0.");
+    fail("volume constant and a velocity gradient whose trace is " + shown(trace) +
+         ", expected a trace of 0.");
   }
 }
 
@@ -132,7 +132,7 @@ double FixOverdampedAffine::number(const char *text) const
   return LAMMPS_NS::utils::numeric(FLERR, text, false, lmp);
 }
 
-/// Adds what a word says of the flow; how many words that took, 0 for one of another kind.
+/// Reads a keyword of the flow; returns the number of arguments used, 0 for any other keyword.
 int FixOverdampedAffine::read_flow(int k, int narg, char **arg, Command &to) const
 {
   const std::string keyword = arg[k];
@@ -174,7 +174,8 @@ Upper FixOverdampedAffine::read_gradient(char **arg) const
       }
       if (row > column && entry[row][column] != 0.0) {
         fail(std::string("gradient with ") + text +
-             " below the diagonal, expected 0: turn the axes so that the flow keeps the first cell "
+             " below the diagonal, expected 0: rotate the axes so that the flow keeps the first "
+             "cell "
              "vector along x and the second one in the plane of x and y.");
       }
     }
@@ -198,7 +199,7 @@ void FixOverdampedAffine::read_option(const std::string &keyword, const char *te
   } else if (keyword == "flip") {
     largest_tilt = number(text);
     if (!(largest_tilt >= 0.5 && std::isfinite(largest_tilt))) {
-      fail("flip " + value + ", expected a part of an edge of at least 0.5.");
+      fail("flip " + value + ", expected a fraction of an edge, at least 0.5.");
     }
   } else if (keyword == "check") {
     check_every = LAMMPS_NS::utils::bnumeric(FLERR, text, false, lmp);
@@ -224,7 +225,7 @@ void FixOverdampedAffine::make_parts(const Command &of)
   if (integrator->state()) flow->allow_retries();
 }
 
-/// To LAMMPS, in the members that it reads.
+/// Sets the members that LAMMPS reads.
 void FixOverdampedAffine::tell_what_this_is()
 {
   time_integrate = 1;
@@ -262,14 +263,14 @@ int FixOverdampedAffine::setmask()
          (domain->triclinic ? PRE_EXCHANGE : 0);
 }
 
-/// Refuses what LAMMPS would let move the same particles, and what would act on nothing.
+/// Rejects other fixes that move the same particles, and fixes without any effect here.
 void FixOverdampedAffine::require_alone() const
 {
   const std::string integrate = update->integrate_style ? update->integrate_style : "verlet";
   if (integrate != "verlet") {
     fail("run_style " + integrate +
          ", expected verlet: use 'run_style verlet'; integrators rkc2 and heun/adaptive choose "
-         "substeps by themselves.");
+         "their own substeps.");
   }
   if (force->kspace || force->bond || force->angle || force->dihedral || force->improper) {
     fail(
@@ -282,7 +283,7 @@ void FixOverdampedAffine::require_alone() const
     const std::string named = "fix " + std::string(other.style) + " (" + other.id + ")";
     const std::string cure = std::string(": use 'unfix ") + other.id + "'.";
     if (other.time_integrate) {
-      fail(named + ", which moves particles, too, expected this fix alone to move them" + cure);
+      fail(named + ", which also moves particles, expected only this fix to move them" + cure);
     }
     for (const char *const style : OF_VELOCITIES) {
       if (!begins_with(other.style, style)) continue;
@@ -306,7 +307,7 @@ void FixOverdampedAffine::init()
               "p': the whole box moves."));
     }
   }
-  // A contact that a late rebuild misses is lost without a word.
+  // A late rebuild would lose contacts silently.
   if (neighbor->every != 1 || neighbor->delay != 0 || !neighbor->dist_check) {
     if (comm->me == 0) {
       error->warning(
@@ -320,7 +321,7 @@ void FixOverdampedAffine::init()
   running = false;
 }
 
-/// A flow that shears needs a cell that can tilt.
+/// A shear flow needs a cell that can tilt.
 void FixOverdampedAffine::require_cell(const Upper &gradient) const
 {
   if (gradient.has_shear() && !domain->triclinic) {
@@ -337,14 +338,15 @@ void FixOverdampedAffine::setup_post_neighbor()
   running = update->whichflag == 1;
 }
 
-/// Takes up all that may have changed since the last run.
+/// Updates everything that may have changed since the last run.
 void FixOverdampedAffine::begin_run(bigint step)
 {
   if (!box->begin_run(step)) {
     flow->set_mean_turn(0.0);
     if (comm->me == 0) {
-      error->warning(FLERR, std::string("fix overdamped/affine found another box than it left, so "
-                                        "that its strain begins again at 0"));
+      error->warning(FLERR,
+                     std::string("fix overdamped/affine found a box other than the one it left, so "
+                                 "that its strain restarts at 0"));
     }
   }
   const bool is_known = flow->begin_run();
@@ -355,11 +357,11 @@ void FixOverdampedAffine::begin_run(bigint step)
   if (flow->stop_particles() && comm->me == 0) {
     error->warning(FLERR,
                    std::string("fix overdamped/affine set velocities to 0: its motion has no "
-                               "inertia, and pressure and temperature would count them"));
+                               "inertia, but pressure and temperature would include them"));
   }
 }
 
-/// Follows, or refuses, what has changed at the start of a step without a call to this fix.
+/// Follows, or rejects, changes made at the start of a step without a call to this fix.
 void FixOverdampedAffine::take_up(bigint from)
 {
   if (!has_begun) begin_run(from);  // 'run N pre no'
@@ -385,29 +387,30 @@ void FixOverdampedAffine::require_timestep() const
   if (!integrator->state()) return require_strain(strain);
   if (strain <= LARGEST_STRAIN) return;
   flow->stop("found timestep " + shown(update->dt) + ", a strain of " + shown(strain) +
-             ", expected a step from 0 to a strain of 1: the integrator divides it.");
+             ", expected a strain of at most 1 per step: the integrator divides the step.");
 }
 
-/// Of a step that is taken as it is; before it is, since a box that shrinks to nothing takes the
-/// state with it.
+/// Checks the strain of an undivided step; called before the step, since a box that shrinks to
+/// nothing takes the state with it.
 void FixOverdampedAffine::require_strain(double strain) const
 {
   const double radii = 0.5 * strain / flow->largest_strain();
-  if (radii <= 0.5) return;  // false for NaN
+  if (radii <= 0.5) return;  // also for NaN
   flow->stop(
       "found a strain of " + shown(strain) + " in one step, which pushes a particle " +
       shown(radii) +
       " radii into its neighbour, expected at most half its radius: use a smaller timestep.");
 }
 
-/// The numbers are the pair style's to say; see PairContact::report_left_out.
+/// Writes the pair style's report of skipped work; see PairContact::report_left_out.
 void FixOverdampedAffine::tell_what_is_left_out()
 {
   if (comm->me != 0 || was_told) return;
   was_told = true;
   std::string text = "energy and virial of stages within steps";
   if (!integrator->state()) text += ", second derivatives";
-  LAMMPS_NS::utils::logmesg(lmp, "fix overdamped/affine leaves out of this scene: " + text + "\n");
+  LAMMPS_NS::utils::logmesg(
+      lmp, "fix overdamped/affine: skipped, because this run does not need it: " + text + "\n");
 }
 
 void FixOverdampedAffine::post_neighbor()
@@ -420,7 +423,7 @@ void FixOverdampedAffine::post_neighbor()
 
 void FixOverdampedAffine::min_post_neighbor() { flow->measure_particles(); }
 
-/// LAMMPS calls it after minimisations, too.
+/// LAMMPS also calls this after minimisations.
 void FixOverdampedAffine::post_run()
 {
   if (running) flow->require_untouched();
@@ -448,7 +451,7 @@ void FixOverdampedAffine::initial_integrate(int)
   ask_for_flip();
 }
 
-/// Atoms change their images with the cell, which they can only where LAMMPS makes its lists.
+/// Atoms change their images with the cell, which is possible only when LAMMPS builds its lists.
 void FixOverdampedAffine::ask_for_flip()
 {
   const bigint step = update->ntimestep;
@@ -501,12 +504,12 @@ void FixOverdampedAffine::check_stability(bigint step)
   const std::string largest =
       shown(limit) + " (2 over the largest relaxation rate " + shown(largest_rate) + ")";
   if (update->dt > limit) {
-    error->all(FLERR, found + " past the stability limit " + largest + ": use a timestep below " +
+    error->all(FLERR, found + " above the stability limit " + largest + ": use a timestep below " +
                           shown(NEAR_LIMIT * limit) + ".");
   }
   if (!warned && comm->me == 0) {
     error->warning(FLERR, found + " close to the stability limit " + largest +
-                              ": a denser state may pass it.");
+                              ": a denser state may exceed it.");
   }
   warned = true;
 }
@@ -583,8 +586,8 @@ void FixOverdampedAffine::restart(char *buf)
   Saved saved{};
   std::memcpy(&saved.format, buf, sizeof(saved.format));
   if (saved.format != SAVED_AS && saved.format != WITHOUT_TIME) {
-    fail("a restart file that another version of jamshape wrote, expected one of this version: go "
-         "on with that version, or start from a data file.");
+    fail("a restart file of another version of jamshape, expected one of this version: "
+         "continue with that version, or start from a data file.");
   }
   std::memcpy(&saved, buf, saved.format == SAVED_AS ? sizeof(saved) : offsetof(Saved, time));
   box->restore(saved.box, saved.time);
@@ -600,7 +603,7 @@ int FixOverdampedAffine::unpack_exchange(int i, double *buf) { return flow->unpa
 
 int FixOverdampedAffine::pack_restart(int i, double *buf)
 {
-  buf[0] = size_restart(i);  // LAMMPS skips by this number
+  buf[0] = size_restart(i);  // size by which LAMMPS skips
   std::memcpy(buf + 1, flow->coordinates(i), flow->n_coordinates() * sizeof(double));
   return size_restart(i);
 }

@@ -14,18 +14,17 @@ namespace jamshape {
 ///     [gradient xx xy yx yy | xx xy xz yx yy yz zx zy zz] [flip F]
 ///     [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]
 ///
-/// Overdamped motion on a substrate that moves affinely with the box, with the sum of the velocity
-/// gradients named: -kappa 1 (Marschall & Teitel 2018, Eqs. 6-14), G_xy = gdot (Marschall, Keta,
+/// Overdamped motion on a substrate that moves affinely with the box, with the sum of the specified
+/// velocity gradients: -kappa 1 (Marschall & Teitel 2018, Eqs. 6-14), G_xy = gdot (Marschall, Keta,
 /// Olsson & Teitel, Phys. Rev. Lett. 122, 188002), G_xx = -G_yy = edot, or any without entries
-/// below its diagonal. The box takes another choice of cell vectors when its tilt passes the part F
-/// of an edge. Global vector: time since strain 0, strain (of all lengths, on the mean), largest
+/// below the diagonal. The box switches to other cell vectors when its tilt exceeds the fraction F
+/// of an edge. Global vector: time since strain 0, strain (mean shrinkage of lengths), largest
 /// relaxation rate, largest stable time step, dissipated power, force evaluations, list rebuilds
-/// inside steps, largest difference of the stages of the last step; of integrators that choose
-/// their steps: accepted, rejected and forced substeps, the next one's length, and of the last step
-/// of LAMMPS the shortest substep, largest local error and most stages; the mean overlap length
-/// that errors are measured by; then the strains of simple and of pure shear, the mean angle about
-/// z by which particles have turned, and the power of torques on the rotation that the host alone
-/// gives.
+/// inside steps, largest difference of the stages of the last step; of adaptive integrators:
+/// accepted, rejected and forced substeps, the next substep, and of the last step of LAMMPS the
+/// shortest substep, largest local error and most stages; the mean overlap length that errors are
+/// relative to; then the strains of simple and of pure shear, the mean rotation of particles about
+/// z, and the power of torques on the rotation due to the host alone.
 class FixOverdampedAffine : public LAMMPS_NS::Fix {
  public:
   FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg);
@@ -65,8 +64,8 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   LAMMPS_NS::bigint check_every, next_check;
   double largest_rate, largest_tilt;
   bool warned, was_told, running, inside_step;
-  bool has_begun;               // the present run
-  LAMMPS_NS::bigint next_look;  // at what other fixes did
+  bool has_begun;               // in the present run
+  LAMMPS_NS::bigint next_look;  // for changes by other fixes
 
   struct Command;
   Command read(int narg, char **arg);

@@ -15,8 +15,8 @@ namespace {
 constexpr double DEFAULT_TOLERANCE = 1e-4;
 constexpr int DEFAULT_STAGES = 200, MOST_STAGES = 1000;
 
-/// Two stages, second order (Marschall & Teitel 2018, Sec. II): Euler to the end of the step, then
-/// the mean of the rates at both ends.
+/// Two stages, second order (Marschall & Teitel 2018, Sec. II): an Euler step, then the mean of the
+/// rates at both ends.
 class Heun : public Integrator {
  public:
   explicit Heun(AffineBox &affine_box) : box(affine_box) {}
@@ -36,8 +36,8 @@ class Heun : public Integrator {
   AffineBox &box;
 };
 
-/// The same with its difference from Euler's method as the error: of Euler's step, so that Heun's
-/// is far smaller.
+/// Heun's method with its difference from Euler's as the error estimate: that of Euler's step, so
+/// that Heun's is far smaller.
 class HeunEuler : public StepControl {
  public:
   using StepControl::StepControl;
@@ -66,7 +66,7 @@ class HeunEuler : public StepControl {
   bool has_forces_at_end() const override { return false; }
 };
 
-/// Second-order Runge-Kutta-Chebyshev: s stages are stable to about 0.65 s^2 over the largest
+/// Second-order Runge-Kutta-Chebyshev: s stages are stable up to about 0.65 s^2 over the largest
 /// relaxation rate (Sommeijer, Shampine & Verwer, J. Comput. Appl. Math. 88, 315 (1998)).
 class Rkc2 : public StepControl {
  public:
@@ -124,15 +124,16 @@ double tolerance_of(const IntegratorOptions &options)
 
 void refuse_stages(const IntegratorOptions &options)
 {
-  if (options.stages) throw std::invalid_argument("stages, which belong to integrator rkc2.");
+  if (options.stages)
+    throw std::invalid_argument("stages without integrator rkc2: leave it out or use rkc2.");
 }
 
 std::unique_ptr<Integrator> make_heun(AffineBox &box, const IntegratorOptions &options)
 {
   refuse_stages(options);
   if (options.tolerance) {
-    throw std::invalid_argument(
-        "a tolerance, which belongs to integrators that choose their steps, not to heun.");
+    throw std::invalid_argument("tolerance with integrator heun, expected heun/adaptive or rkc2: "
+                                "leave it out or use these.");
   }
   return std::make_unique<Heun>(box);
 }

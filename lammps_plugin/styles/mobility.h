@@ -15,14 +15,14 @@ namespace jamshape {
 class PairContact;
 
 /// Velocity and angular velocity of a particle relative to the affine motion, in space coordinates;
-/// in the plane without the components that are zero.
+/// in 2D without the components that are zero.
 template <int D> struct RateIn {
   Vec<D> shift;
   Torque<D> turn;
 };
 using Rate = RateIn<3>;
 
-/// Rates as rows of 3 numbers in the plane, 6 in space.
+/// Rates as rows of 3 numbers in 2D, 6 in 3D.
 inline int rate_width(int dimension) { return dimension == 2 ? 3 : 6; }
 template <int D> RateIn<D> read_rate(const double *from)
 {
@@ -36,12 +36,12 @@ template <int D> void write_rate(double *to, const RateIn<D> &rate)
   for (int k = 0; k < D; ++k) to[k] = rate.shift[k];
   for (int k = 0; k < ROTATIONS<D>; ++k) to[D + k] = rate.turn[k];
 }
-/// The same where the dimension is known at run time only.
+/// The same if the dimension is known at run time only.
 Rate read_rate(const double *from, int dimension);
 void write_rate(double *to, const Rate &rate, int dimension);
 
-/// What forces do to the particles of this rank against the drag of the substrate (Marschall &
-/// Teitel 2018, Eqs. 8-12).
+/// Motion of the particles of this rank due to forces against the drag of the substrate (Marschall
+/// & Teitel 2018, Eqs. 8-12).
 class Mobilities : protected LAMMPS_NS::Pointers {
  public:
   Mobilities(LAMMPS_NS::LAMMPS *lmp, double k_d) :
@@ -49,25 +49,25 @@ class Mobilities : protected LAMMPS_NS::Pointers {
   {
   }
 
-  /// Of one kind of particle.
+  /// Mobility of one kind of particle.
   struct Mobility {
     double shift;
     Vec<3> turn;        // per body axis
-    Vec<3> bretherton;  // the same: how far the host's strain turns it, 0 of what is round about it
+    Vec<3> bretherton;  // per body axis: response to the host's strain, 0 if round about the axis
     double shortest;    // semi-axis
-    double longest;     // what a turn moves at most
-    double gyration;    // length that a radian stands for
+    double longest;     // largest distance of the surface from the centre
+    double gyration;    // length that one radian stands for
   };
 
-  /// Reads sizes of own atoms; after every exchange of atoms. Stops with one sentence at one
-  /// without a shape, which may have come in between.
+  /// Reads the sizes of own atoms; after every exchange of atoms. Stops with an error at an atom
+  /// without a shape, which may have been added meanwhile.
   void measure(const PairContact &of);
   const Mobility &operator[](int i) const { return kinds[kind[i]]; }
   const std::vector<Mobility> &all_kinds() const { return kinds; }
   int n_measured() const { return static_cast<int>(kind.size()); }
 
-  /// The rate that a force and torque give, that of the present ones, and the force and torque (in
-  /// the places of a rate) that a rate takes.
+  /// The rate due to a force and torque, the rate due to the present ones, and the force and torque
+  /// (stored as a rate) that cause a rate.
   Rate times(int i, const Vec<3> &force, const Vec<3> &torque) const
   {
     const Mobility &m = (*this)[i];

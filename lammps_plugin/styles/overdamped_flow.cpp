@@ -29,25 +29,25 @@ namespace {
 
 Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
 
-/// A particle may move at most this fraction of its shortest semi-axis in one step; beyond it
-/// contacts would be passed through.
+/// Largest displacement of a particle in one step, over its shortest semi-axis; beyond it particles
+/// could pass through contacts.
 constexpr double LARGEST_STEP = 0.5;
 
 double step_limit(const Mobilities::Mobility &of) { return LARGEST_STEP * of.shortest; }
 
-/// And this part of that where a shorter step may be tried instead.
+/// The same, over LARGEST_STEP, if a shorter step may be tried instead.
 constexpr double LARGEST_TRIAL = 0.5;
 
-/// Coordinates that agree with the atom's position to this fraction of the box are its own.
+/// Coordinates that agree with the atom's position to this fraction of the box are valid.
 constexpr double SAME_POSITION = 1e-13;
 
-/// The same within a run, in which rounding and counts of images grow.
+/// The same within a run, where rounding and image counts grow.
 constexpr double UNTOUCHED = 1e-10;
 
 }  // namespace
 
-/// What is kept of a particle, in its order: coordinates, rates of the stored stage, orientation at
-/// the step's start, registers.
+/// Data stored per particle, in order: coordinates, rates of the stored stage, orientation at the
+/// step's start, registers.
 template <int D> struct OverdampedFlow::Row {
   static constexpr int N_RATES = D + ROTATIONS<D>, N_TURNS = D == 2 ? 2 : 4;
 
@@ -86,7 +86,7 @@ template <int D> struct OverdampedFlow::Row {
     }
   }
 
-  /// Of the last move (0) and of the one before it.
+  /// Displacement of the last move (0) or of the one before it.
   RateIn<D> displacement(int which) const
   {
     return read_rate<D>(values + D + N_RATES + N_TURNS + which * N_RATES);
@@ -130,7 +130,7 @@ bool OverdampedFlow::begin_run()
   return sum(moved) == 0.0;
 }
 
-/// Whether atom i is where its coordinates put it, to this fraction of the box.
+/// Whether atom i is at the position of its coordinates, to this fraction of the box.
 template <int D>
 bool OverdampedFlow::is_at(int i, const AffineBox::Deformed<D> &present, double tolerance) const
 {
@@ -206,8 +206,8 @@ template <int D> void add(RateIn<D> &to, double weight, const RateIn<D> &rate)
 
 }  // namespace
 
-/// How the host alone turns some particles, at their present orientations: nothing that is computed
-/// where it turns none.
+/// Rotation of particles due to the host alone, at their present orientations: nothing is computed
+/// if it rotates none.
 template <int D> struct OverdampedFlow::Spins {
   const bool exist;
   const int first;
@@ -222,7 +222,7 @@ template <int D> struct OverdampedFlow::Spins {
     });
   }
 
-  /// That of atom i added to a rate.
+  /// A rate plus the rotation of atom i by the host.
   RateIn<D> added_to(RateIn<D> rate, int i) const
   {
     if (exist) rate.turn += of[i - first];
@@ -241,7 +241,7 @@ void OverdampedFlow::hold_start(const Upper &deformation)
   });
 }
 
-/// Of at most a block of particles.
+/// Stores the start for at most a block of particles.
 template <int D> void OverdampedFlow::hold(int begin, int end, const Upper &inverse)
 {
   if (pair->particles_turn()) {
@@ -255,7 +255,7 @@ template <int D> void OverdampedFlow::hold(int begin, int end, const Upper &inve
   }
 }
 
-/// What a move's parts are multiplied by, without a division for each particle.
+/// Coefficients of a move, computed without a division per particle.
 struct OverdampedFlow::Weights {
   double stored;
   Upper present_shift;
@@ -276,7 +276,8 @@ RateIn<D> OverdampedFlow::sum_of(const Row<D> &of, const Weights &m, RateIn<D> p
   RateIn<D> sum{m.stored * stored.shift, m.stored * stored.turn};
   if (m.present != 0.0) {
     if constexpr (D == 3) {
-      // The rate of a rotation vector is not the angular velocity, to first order in the vector.
+      // The rate of a rotation vector differs from the angular velocity at first order in the
+      // vector.
       if (n_registers > 0) present.turn += -0.5 * cross(of.displacement(0).turn, present.turn);
     }
     sum.shift += m.present_shift * present.shift;
@@ -295,11 +296,11 @@ void OverdampedFlow::require_small(int i, const RateIn<D> &moved, const Upper &d
   if (can_retry) {
     const double reached = norm(deformation * moved.shift) + of.longest * norm(moved.turn);
     const double ratio = reached / (LARGEST_TRIAL * limit);
-    farthest = ratio <= farthest ? farthest : ratio;  // NaN too
+    farthest = ratio <= farthest ? farthest : ratio;  // also for NaN
     return;
   }
   const double distance_sq = norm_sq(deformation * moved.shift);
-  if (distance_sq <= limit * limit) return;  // false for NaN
+  if (distance_sq <= limit * limit) return;  // not for NaN
   refuse(lmp, FLERR,
          "fix overdamped/affine found that one step moves atom " + std::to_string(atom->tag[i]) +
              " by " + shown(std::sqrt(distance_sq)) +
@@ -334,7 +335,7 @@ template <int D> void OverdampedFlow::move_in(const Move &m, Pass pass)
   ParticleView::in_blocks(atom->nlocal, [&](int begin, int end) {
     if (pass == Pass::START) hold<D>(begin, end, back);
     const Spins<D> spins(*this, begin, m.present != 0.0 ? end : begin);
-    // Two loops, so that many of the roots and quotients of `turned` are under way at a time.
+    // Two loops, so that many of the square roots and divisions of `turned` overlap.
     Torque<D> turns[ParticleView::BLOCK];
     for (int i = begin; i < end; ++i) turns[i - begin] = place(i, spins);
     if (!pair->particles_turn()) return;
@@ -424,7 +425,7 @@ void OverdampedFlow::clear_forces()
   std::memset(&atom->torque[0][0], 0, 3 * n * sizeof(double));
 }
 
-/// As LAMMPS's own step: atoms change ranks, ghosts and lists are made anew.
+/// Like LAMMPS's own step: exchanges atoms, ghosts and lists.
 void OverdampedFlow::rebuild_lists()
 {
   if (modify->n_pre_exchange) modify->pre_exchange();
@@ -446,7 +447,7 @@ void OverdampedFlow::rebuild_lists()
 
 void OverdampedFlow::evaluate_forces()
 {
-  ++neighbor->ago;  // 0 tells the pair style that the list is new
+  ++neighbor->ago;  // 0 signals a new list to the pair style
   if (neighbor->check_distance()) {
     rebuild_lists();
   } else {
@@ -477,7 +478,7 @@ OverdampedFlow::Touching OverdampedFlow::touching()
   ++evaluations;
   double mine[4] = {0.0, 0.0, 0.0, 0.0}, all[4];
   pair->for_each_bond([&](const LocalBond &b) {
-    // Without newton both ranks see the bond.
+    // Without newton both ranks have the bond.
     const double share = force->newton_pair || b.j < atom->nlocal ? 1.0 : 0.5;
     mine[0] += share;
     mine[1] += share * std::max(b.reach - b.distance, 0.0);

@@ -13,9 +13,10 @@
 
 namespace jamshape {
 
-/// The equations of motion (Marschall & Teitel 2018, Eqs. 11-14): what an integrator can ask of the
-/// particles. Positions are held in coordinates of the box of strain 0, in which the affine motion
-/// vanishes exactly and only forces move a particle; these coordinates are the state.
+/// The equations of motion (Marschall & Teitel 2018, Eqs. 11-14), as the interface between
+/// integrators and particles. Positions are held in coordinates of the box of strain 0, in which
+/// the affine motion vanishes exactly and only forces move a particle; these coordinates are the
+/// state.
 class OverdampedFlow : protected LAMMPS_NS::Pointers {
  public:
   OverdampedFlow(LAMMPS_NS::LAMMPS *lmp, double k_d, const AffineBox &affine_box,
@@ -24,27 +25,27 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
 
   /* set-up */
 
-  /// False when particles are not where the last run left them.
+  /// Returns false if particles are not where the last run left them.
   bool begin_run();
-  /// Sets velocities to 0, since this motion has none; true if there were any.
+  /// Sets velocities, which overdamped motion does not have, to 0; true if there were any.
   bool stop_particles();
   /// Whether the last `begin_run` was for the present particles and pair style.
   bool knows_particles() const;
-  /// Between steps: ends the run, with one sentence, where something else has moved a particle or
-  /// given it a velocity.
+  /// Between steps: stops with an error if something else has moved a particle or given it a
+  /// velocity.
   void require_untouched() const;
-  /// Strain of a step that pushes touching particles into each other by half their radius, as far
-  /// as forces may move them in a step; over all particles, after `begin_run`.
+  /// Strain of a step that pushes touching particles into each other by half their radius, the
+  /// largest displacement allowed in a step; over all particles, after `begin_run`.
   double largest_strain() const;
-  /// Sizes of own atoms; after every exchange of atoms.
+  /// Reads the sizes of own atoms; after every exchange of atoms.
   void measure_particles() { mobilities.measure(*pair); }
 
   /* stages of a step, for integrators: from `hold_start` to `finish_step`, coordinates and rates at
      the start of the step and registers stay with their atoms on whatever rank. Deformations are
      those of the box since strain 0 */
 
-  /// The present state is where every move starts, until the step is finished; the rates of the
-  /// present forces, which belong to the box of this deformation, are stored.
+  /// Makes the present state the start of all moves until the step is finished; stores the rates of
+  /// the present forces, which belong to the box of this deformation.
   void hold_start(const Upper &deformation);
   /// Moves every particle from its coordinates at the start of the step, into the box `to`, by
   ///
@@ -57,58 +58,59 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
     Upper from, to;
     double last = 0.0, before = 0.0;
   };
-  /// Without registers, stops the run at a move of more than half a radius; `allow_retries` makes
-  /// it return false on all ranks, at a quarter of it, turns included: nothing can be passed
-  /// through then, and another move may follow.
+  /// Without registers, stops the run at a move of more than half a radius; with `allow_retries` it
+  /// returns false on all ranks instead, at a quarter of it, rotations included: particles cannot
+  /// pass through each other then, and another move may follow.
   bool move_by(const Move &move);
   void allow_retries() { can_retry = true; }
   /// `hold_start(move.from)` and `move_by(move)` in one pass over the particles.
   bool start_by(const Move &move);
-  /// As move_by, and makes it the state.
+  /// Like move_by, and makes the result the new state.
   void finish_step(const Move &move);
-  /// Coordinates in the box of strain 0 become those in another one; between steps only.
+  /// Converts coordinates in the box of strain 0 to those in another one; between steps only.
   void change_reference(const Upper &factor);
-  /// Coordinates follow LAMMPS's counts of images where these have begun anew.
+  /// Corrects coordinates where LAMMPS's image counts have wrapped around.
   void follow_images();
-  /// The same sum as a length: rms over all particles that a force moves, turns times the radius of
-  /// gyration.
+  /// The same sum as a length: rms over all particles that a force moves, rotations times the
+  /// radius of gyration.
   double rms_of(const Move &sum);
-  /// With registers, from the last `rms_of`: by how much the rates changed over the last move, over
-  /// that move, where the sum was large. Of the order of the largest relaxation rate when the step
-  /// is unstable, whatever makes it so; below it in smooth motion.
+  /// With registers, from the last `rms_of`: the change of the rates over the last move, divided by
+  /// that move, where the sum was large. Of the order of the largest relaxation rate if the step is
+  /// unstable, for whatever reason; below it in smooth motion.
   double rate_seen() const { return seen; }
-  /// Forces at the present positions, neighbour lists kept valid. Counts as one evaluation.
+  /// Computes forces at the present positions, with valid neighbour lists. Counts as one
+  /// evaluation.
   void evaluate_forces();
-  /// LAMMPS's own.
+  /// Counts an evaluation made by LAMMPS itself.
   void count_evaluation() { ++evaluations; }
 
   /* numbers about the flow */
 
-  /// Largest relaxation rates, as RelaxationRate estimates them.
+  /// Largest relaxation rates, as estimated by RelaxationRate.
   double largest_rate_of_bonds() { return relaxation.of_bonds(*pair); }
   double largest_rate(double tolerance) { return relaxation.largest(*pair, tolerance); }
   /// Means over all bonds.
   struct Touching {
-    double bonds;    // how many
+    double bonds;    // number of bonds
     double overlap;  // [length]
     double reach;    // distance of first touch [length]
-    double rate;     // with which a single contact of two particles like the first relaxes [1/time]
+    double rate;     // at which a single contact of two particles like the first relaxes [1/time]
   };
   Touching touching();
   double largest_edge() const;
-  /// Ends the run, on all ranks, with a sentence about the fix.
+  /// Stops the run on all ranks with an error message of the fix.
   [[noreturn]] void stop(const std::string &found) const;
-  /// Power that the drag takes: sum F^2/(k_d A) + tau^2/(k_d A I), over all ranks.
+  /// Dissipated power of the drag: sum F^2/(k_d A) + tau^2/(k_d A I), over all ranks.
   double dissipated_power() const;
-  /// Power of the torques on particles that turn with the host alone.
+  /// Power of the torques on the rotation due to the host alone.
   double power_of_host() const;
-  /// Mean angle about z by which particles have turned since strain 0 [rad].
+  /// Mean rotation of particles about z since strain 0 [rad].
   double mean_turn() const;
   void set_mean_turn(double angle);
-  /// Largest distance between the end of the last step and where the stored rates alone had led: of
-  /// the order of the local error of Euler's method, a bound of Heun's.
+  /// Largest distance between the end of the last step and the position predicted by the stored
+  /// rates alone: of the order of the local error of Euler's method, a bound of Heun's.
   double stage_difference() const;
-  /// Passes over all contacts: forces, and what estimates need.
+  /// Number of passes over all contacts: forces, and those of estimates.
   LAMMPS_NS::bigint n_evaluations() const { return evaluations + relaxation.n_evaluations(); }
   LAMMPS_NS::bigint n_rebuilds() const { return rebuilds; }
 
@@ -124,7 +126,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   int width() const { return dimension + n_rates + n_turns + n_registers * n_rates; }
   double memory_usage() const;
 
-  /* what the estimate of rates sends to ghosts */
+  /* data that the estimate of rates sends to ghosts */
 
   int pack_direction(int n, const int *list, double *buf) const
   {
@@ -143,8 +145,8 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   // (displacements of the last move and of the one before).
   double *values;
   bool can_retry;
-  double farthest;       // of the last move, over what is allowed
-  double turned_so_far;  // about z, summed over what this rank has moved
+  double farthest;       // of the last move, over the largest allowed
+  double turned_so_far;  // about z, summed over the moves on this rank
   double seen;
   double largest_difference;
   LAMMPS_NS::bigint evaluations, rebuilds;
@@ -163,7 +165,7 @@ class OverdampedFlow : protected LAMMPS_NS::Pointers {
   template <int D> RateIn<D> sum_of(const Row<D> &row, const Weights &of, RateIn<D> present) const;
   template <int D> double length_of(int i, const RateIn<D> &of, const Upper &deformation) const;
   template <int D> void require_small(int i, const RateIn<D> &moved, const Upper &deformation);
-  /// What a pass over the particles does beside moving them.
+  /// Additional work of a pass over the particles beside moving them.
   enum class Pass { MOVE, START, FINISH };
   template <int D> void move_in(const Move &move, Pass pass);
   void move(const Move &move, Pass pass);

@@ -29,11 +29,11 @@ using LAMMPS_NS::bigint;
 
 namespace {
 
-/// What two ways to compute a length may differ by, relative.
+/// Largest relative difference between two ways to compute a length.
 constexpr double ROUNDING = 1e-12;
 
-/// The largest rotation out of the plane that rounding can explain [rad]: it changes lengths seen
-/// in the plane by 1e-16 of themselves.
+/// Largest rotation out of the plane that rounding can explain [rad]: it changes projected lengths
+/// by a relative 1e-16.
 constexpr double MOST_TILT = 1e-8;
 
 bool begins_with(const char *text, const char *beginning)
@@ -83,8 +83,8 @@ PairContact &PairContact::evaluated(LAMMPS_NS::LAMMPS *lmp, const std::string &w
   if (!pair.has_current_contacts()) {
     lmp->error->all(FLERR, who +
                                " found no contacts of the present atoms, expected those of a run: "
-                               "ask after 'run 0' or another run, and again after one where the "
-                               "pair style or the number of atoms has changed.");
+                               "use it after 'run 0' or another run, and again after a change of "
+                               "the pair style or of the number of atoms.");
   }
   if (!lmp->atom->tag_enable) {
     lmp->error->all(FLERR, who + " found atoms without IDs, expected one for each: leave out "
@@ -170,14 +170,14 @@ void PairContact::stop_at_shape(const Vec<3> &semi_axes, const std::string &whic
              shown(diameters[2]) + ", expected that " + shape_rule() + ": correct its shape.");
 }
 
-/// The largest particle of each type, and whether any particle can turn. Sizes are per particle, so
-/// cutoffs follow from the particles themselves, never from an input that could be too short. Where
-/// LAMMPS has yet to say which types are this style's, as in a hybrid pair style, all that have a
-/// valid shape are measured.
+/// Finds the largest particle of each type, and whether any particle can rotate. Sizes are per
+/// particle, so that cutoffs follow from the particles themselves, never from an input that could
+/// be too small. If LAMMPS has not yet assigned types to this style, as in a hybrid pair style, all
+/// particles with a valid shape are measured.
 void PairContact::measure_particles()
 {
   std::vector<double> mine(atom->ntypes + 1, 0.0);
-  int found[3] = {0, 0, 0};  // particles that turn, round ones, ellipsoids
+  int found[3] = {0, 0, 0};  // particles that can rotate, round ones, ellipsoids
   for (int i = 0; i < atom->nlocal; ++i) {
     const int type = atom->type[i];
     const Vec<3> semi_axes = particles.semi_axes(i);
@@ -212,7 +212,7 @@ void PairContact::init_style()
   }
   particles.find_ellipsoids("pair_style " + style_name());
   choose_instructions();
-  is_ours.assign(atom->ntypes + 1, force->pair == this);  // of a hybrid style init_one learns them
+  is_ours.assign(atom->ntypes + 1, force->pair == this);  // in a hybrid style init_one sets them
   measure_particles();
   require_orientations_of_rerun();
   if (update->whichflag == 2) require_held_in_minimisation();
@@ -229,8 +229,8 @@ void PairContact::choose_instructions()
   }
 }
 
-/// LAMMPS reads positions alone from a dump. Of all commands that evaluate forces `rerun` alone
-/// begins at another step than the present one or has a last step that no number of steps leads to.
+/// LAMMPS reads only positions from a dump. Of all commands that evaluate forces, only `rerun`
+/// starts at another step than the present one or has an unreachable last step.
 void PairContact::require_orientations_of_rerun() const
 {
   const bigint first = update->firststep, last = update->laststep;
@@ -239,31 +239,30 @@ void PairContact::require_orientations_of_rerun() const
   if (!any_turns || update->whichflag != 1 || is_run || is_unset) return;
   error->all(
       FLERR,
-      std::string("rerun reads no orientations from a dump, expected particles that cannot turn: "
+      std::string("rerun reads no orientations from a dump, expected particles that cannot rotate: "
                   "read its frames with jamshape.load, or use data or restart files."));
 }
 
-/// Fixes that hold particles in dynamics, of those that LAMMPS leaves out of a minimisation.
+/// Rejects fixes that hold particles in dynamics but that LAMMPS ignores in a minimisation.
 void PairContact::require_held_in_minimisation() const
 {
   for (int k = 0; k < modify->nfix; ++k) {
     const LAMMPS_NS::Fix &fix = *modify->fix[k];
     const bool holds = begins_with(fix.style, "freeze") || begins_with(fix.style, "rigid");
     if (!holds || modify->fmask[k] & LAMMPS_NS::FixConst::MIN_POST_FORCE) continue;
-    error->all(FLERR,
-               std::string("minimize found fix ") + fix.id + " of style " + fix.style +
-                   ", which LAMMPS leaves out of minimisations: hold its particles with 'fix "
-                   "ID group setforce 0 0 0' and use 'unfix " +
-                   fix.id + "'.");
+    error->all(FLERR, std::string("minimize found fix ") + fix.id + " of style " + fix.style +
+                          ", which LAMMPS ignores in minimisations: hold its particles with 'fix "
+                          "ID group setforce 0 0 0' and use 'unfix " +
+                          fix.id + "'.");
   }
 }
 
-/// Two styles that turn the same particles would each give them rotations of their own.
+/// Two styles that can rotate the same particles would each keep rotations of their own.
 void PairContact::require_only_one_turns() const
 {
   if (force->pair == this) return;
   int n_ours = 0;
-  LAMMPS_NS::Pair *last = nullptr;  // the only one that matches has every number
+  LAMMPS_NS::Pair *last = nullptr;  // the only match has every number
   for (int n = 1; auto *const style = force->pair_match("/harmonic", 0, n); ++n) {
     if (style == last) break;
     n_ours += dynamic_cast<PairContact *>(style) != nullptr;
@@ -273,7 +272,7 @@ void PairContact::require_only_one_turns() const
   error->all(
       FLERR,
       std::string("minimize found several of jamshape's pair styles in a hybrid one, expected one "
-                  "that turns particles: use one of them."));
+                  "that rotates particles: use one of them."));
 }
 
 void PairContact::request_minimiser()
@@ -282,7 +281,7 @@ void PairContact::request_minimiser()
   const std::string style = update->minimize_style;
   if (style != "cg" && style != "sd") {
     error->all(FLERR, "min_style " + style +
-                          " cannot turn particles: use 'min_style cg' or 'min_style "
+                          " cannot rotate particles: use 'min_style cg' or 'min_style "
                           "sd', which relax positions and orientations together.");
   }
   const double max_move = 0.1;  // as min_modify dmax: rotations are lengths here too
@@ -296,7 +295,7 @@ double PairContact::init_one(int i, int j)
       error->all(FLERR, std::string("All pair coeffs are not set"));
     k_e[i][j] = std::sqrt(k_e[i][i] * k_e[j][j]);
   }
-  // A fix such as adapt may have changed it.
+  // A fix such as adapt may have changed the coefficient.
   require_energy(k_e[i][j], shown(k_e[i][j]), "pair_style " + style_name());
   k_e[j][i] = k_e[i][j];
   is_ours[i] = is_ours[j] = true;
@@ -307,7 +306,7 @@ void PairContact::setup()
 {
   is_new_run = true;
   const double needed = largest_reach() + neighbor->skin;
-  // Of a tilted box LAMMPS counts cutoffs in parts of the distance between its faces.
+  // In a tilted box LAMMPS expresses cutoffs as fractions of the distance between its faces.
   const double *const h = domain->h_inv;  // xx, yy, zz, yz, xz, xy
   const double inverse[3] = {std::hypot(h[0], h[5], h[4]), std::hypot(h[1], h[3]), h[2]};
   for (int k = 0; k < domain->dimension; ++k) {
@@ -330,7 +329,7 @@ double PairContact::largest_reach() const
 }
 
 /* ----------------------------------------------------------------------
-   what a scene does not need
+   work that the present particles do not need
 ------------------------------------------------------------------------- */
 
 void PairContact::read_general(int narg, char **arg)
@@ -347,8 +346,8 @@ void PairContact::read_general(int narg, char **arg)
   }
   if (is_known) return;
   error->all(FLERR, "pair_style " + style_name() + " found '" + joined(narg, arg) +
-                        "', expected 'general' and any of rotation, pairs, contact: leave it out "
-                        "but for tests and timings.");
+                        "', expected 'general' and any of rotation, pairs, contact: use it only "
+                        "for tests and timings.");
 }
 
 std::vector<std::string> PairContact::spared() const
@@ -356,14 +355,14 @@ std::vector<std::string> PairContact::spared() const
   const bool is_plane = domain->dimension == 2;
   std::vector<std::string> found{"energy and virial of steps without output"};
   if (is_plane) found.emplace_back("the third dimension");
-  if (!any_turns) found.emplace_back("rotation and torque");
+  if (!any_turns) found.emplace_back("rotations and torques");
   if (any_round && !general.contact) {
-    found.emplace_back(is_plane ? "the search for contacts of discs"
-                                : "the search for contacts of spheres");
+    found.emplace_back(is_plane ? "the contact search for discs"
+                                : "the contact search for spheres");
   }
   if (any_ellipsoids && !general.contact) {
-    found.emplace_back(is_plane ? "the search of other exponents for ellipses"
-                                : "the search of other exponents for ellipsoids");
+    found.emplace_back(is_plane ? "the general contact search for ellipses"
+                                : "the general contact search for ellipsoids");
   }
   return found;
 }
@@ -385,7 +384,8 @@ void PairContact::report_left_out(double listed, double close)
   said = text + numbers;
   if (comm->me == 0 && text != told) {
     LAMMPS_NS::utils::logmesg(lmp, "pair_style " + style_name() +
-                                       " leaves out of this scene: " + said + "\n");
+                                       ": skipped, because this run does not need it: " + said +
+                                       "\n");
   }
   told = text;
 }
@@ -404,10 +404,11 @@ void PairContact::require_same_bound(int i, const Vec<3> &semi_axes) const
 
 void PairContact::stop_at_unexpected_turns(int i) const
 {
-  refuse(lmp, FLERR,
-         "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
-             " with a shape that turns, where none did at the start of the run: give shapes before "
-             "it, and do not use 'pre no' in the run after changing them.");
+  refuse(
+      lmp, FLERR,
+      "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
+          " with a shape that can rotate, although none could at the start of the run: set shapes "
+          "before it, and do not use 'pre no' in the run after changing them.");
 }
 
 double PairContact::special_weight(int i, int j, int which) const
@@ -421,7 +422,7 @@ double PairContact::special_weight(int i, int j, int which) const
              ", expected 0 or 1: such a pair is in contact like any other, or not at all.");
 }
 
-/// Contacts of a particle that is nowhere would be dropped in silence.
+/// Contacts of a particle without a finite position would be dropped silently.
 void PairContact::require_numbers(int n) const
 {
   for (int i = 0; i < n; ++i) {
@@ -446,8 +447,8 @@ void PairContact::require_in_plane(int n) const
     if (!(2.0 * std::hypot(q.i, q.j) <= MOST_TILT)) {
       refuse(lmp, FLERR,
              "pair_style " + style_name() + " found atom " + std::to_string(atom->tag[i]) +
-                 " turned out of the plane, expected a quaternion (w, 0, 0, k) in dimension "
-                 "2: turn it about z only.");
+                 " rotated out of the plane, expected a quaternion (w, 0, 0, k) in dimension "
+                 "2: rotate it about z only.");
     }
   }
 }
@@ -473,7 +474,7 @@ bool PairContact::is_mine(int i, int j) const
 {
   if (force->newton_pair || j < atom->nlocal) return true;
   if (atom->tag[i] != atom->tag[j]) return atom->tag[i] < atom->tag[j];
-  // A particle and its own image: both directions of the image are in the list.
+  // A particle and its own image: the list has both directions of the image.
   const double *xi = atom->x[i], *xj = atom->x[j];
   for (int k = 0; k < 3; ++k) {
     if (xi[k] != xj[k]) return xi[k] < xj[k];
@@ -622,9 +623,9 @@ void PairContact::min_xf_get(int)
   }
 }
 
-/// A particle is held in a minimisation where fix setforce, whose arguments no header tells, makes
-/// every component of a force on it zero: it is asked to do so with forces of one. What other
-/// styles of a hybrid one handle is not ours to turn.
+/// A particle is held in a minimisation if fix setforce, whose arguments no header exposes, sets
+/// every component of its force to zero: the fix is called with unit forces to find out. Particles
+/// handled by other styles of a hybrid one are left alone.
 void PairContact::find_held()
 {
   const int nlocal = atom->nlocal, d = domain->dimension;
@@ -638,7 +639,7 @@ void PairContact::find_held()
     if (!acts || !begins_with(fix.style, "setforce")) continue;
     kept.assign(all, all + 3 * nlocal);
     std::fill_n(all, 3 * nlocal, 1.0);
-    fix.min_post_force(0);  // by all ranks: it may evaluate variables
+    fix.min_post_force(0);  // on all ranks: it may evaluate variables
     for (int i = 0; i < nlocal; ++i) {
       is_held[i] |= std::all_of(f[i], f[i] + d, [](double component) { return component == 0.0; });
     }

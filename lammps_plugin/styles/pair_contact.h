@@ -26,26 +26,26 @@ struct LocalBond {
   OnFaces on_faces;
 };
 
-/// Second derivatives of a contact's energy by x_i - x_j and by the rotations of i and of j (in 2D
-/// 4 variables, in 3D 9): the lower triangle, row by row.
+/// Second derivatives of a contact's energy with respect to x_i - x_j and the rotations of i and of
+/// j (4 variables in 2D, 9 in 3D): the lower triangle, row by row.
 struct LocalCurvature {
   int i, j;
   const std::vector<double> &triangle;
 };
 
-/// What every pair style of ours is, whatever its shape: coefficients, cutoffs from the particles'
-/// sizes, restarts, and orientation as extra degrees of freedom of LAMMPS's minimisers. The loop
-/// over contacts is in PairContactOf.
+/// Base of the pair styles of all shapes: coefficients, cutoffs from the particles' sizes,
+/// restarts, and orientation as extra degrees of freedom of LAMMPS's minimisers. The loop over
+/// contacts is in PairContactOf.
 class PairContact : public LAMMPS_NS::Pair {
  public:
   explicit PairContact(LAMMPS_NS::LAMMPS *lmp);
   ~PairContact() override;
 
-  /// The pair style in use, null if it is none of ours.
+  /// The pair style in use, null if it is not one of this plugin.
   static PairContact *find(LAMMPS_NS::LAMMPS *lmp);
-  /// The same; ends the run with a sentence about `who` asks if it is none of ours.
+  /// The same; stops with an error on behalf of `who` if it is not one of this plugin.
   static PairContact &of(LAMMPS_NS::LAMMPS *lmp, const std::string &who);
-  /// The same, and with one if its contacts are not those of the present atoms.
+  /// The same, and stops with an error if its contacts are not those of the present atoms.
   static PairContact &evaluated(LAMMPS_NS::LAMMPS *lmp, const std::string &who);
 
   void settings(int narg, char **arg) override;
@@ -64,29 +64,30 @@ class PairContact : public LAMMPS_NS::Pair {
   void min_xf_get(int ignore) override;
   void min_x_set(int ignore) override;
 
-  /// Drag coefficients of a particle of a type, and whether a contact can turn any of this scene.
+  /// Drag coefficients of a particle of a type, and whether any contact of the present particles
+  /// can rotate one.
   virtual SubstrateDrag drag(const Vec<3> &semi_axes, int type) const = 0;
   bool particles_turn() const { return any_turns; }
 
-  /// What this scene is spared, as it is written to the log: a sentence, empty before the first
+  /// Report of the work skipped for the present particles, as in the log; empty before the first
   /// evaluation.
   const std::string &left_out() const { return said; }
 
-  /// The body axis (0, 1, 2) that tells a particle's direction; nothing for those that have none.
+  /// The body axis (0, 1, 2) that gives a particle's direction; nothing for particles without one.
   virtual std::optional<int> director(const Vec<3> &semi_axes, int type) const = 0;
-  /// Whether all three axes of the bodies count, as for the cubatic order.
+  /// Whether all three axes of the bodies are distinguished, as for the cubatic order.
   virtual bool has_three_axes() const { return false; }
 
-  /// Whether each bond holds a particle like a contact, as far as rattlers go.
+  /// Whether each bond constrains a particle like a contact, in the definition of rattlers.
   virtual bool bonds_are_contacts() const = 0;
 
-  /// Shows every bond of this rank's pairs, at the current positions, to `visit`.
+  /// Calls `visit` for every bond of this rank's pairs, at the current positions.
   virtual void for_each_bond(const std::function<void(const LocalBond &)> &visit) = 0;
-  /// Shows the second derivatives of every contact of this rank's pairs, prestress included. Costs
-  /// `curvature_cost` times as much as forces.
+  /// Calls `visit` with the second derivatives of every contact of this rank's pairs, prestress
+  /// included. Costs `curvature_cost` times as much as forces.
   virtual void for_each_curvature(const std::function<void(const LocalCurvature &)> &visit) = 0;
   virtual int curvature_cost() const = 0;
-  /// False where forces jump: beside a jump the second derivative says nothing of stiffness.
+  /// False if forces jump: next to a jump the second derivative does not measure stiffness.
   virtual bool has_smooth_forces() const { return true; }
   /// Each bond once over all ranks and with tag[i] <= tag[j].
   std::vector<LocalBond> reported_bonds();
@@ -100,27 +101,29 @@ class PairContact : public LAMMPS_NS::Pair {
   double **k_e;
   bool any_turns;
   InstructionSet instructions;
-  /// Where the general path is taken although the scene does not need it: for tests and timings.
+  /// Shortcuts disabled although the present particles do not need the general path: for tests and
+  /// timings.
   struct General {
     bool rotation = false, pairs = false, contact = false;
   } general;
 
-  /// 'general WHAT ...' from the first of these arguments on; nothing where there is none.
+  /// Reads 'general WHAT ...' from the first of these arguments on; nothing if absent.
   void read_general(int narg, char **arg);
 
-  /// Names the style, its energy and what has no contact force, in messages.
+  /// Names of the style, of its energy and of the objects without a contact force, in messages.
   virtual std::string style_name() const = 0;
   virtual std::string settings_rule() const { return "no arguments: leave them out"; }
   virtual std::string energy_name() const { return "k_e"; }
   virtual std::string coeff_rule() const { return "'I J k_e'"; }
-  /// Coefficients of a type beside its energy, as they follow that in 'pair_coeff I I'.
+  /// Further coefficients of a type, as they follow the energy in 'pair_coeff I I'.
   virtual std::string more_coefficients(int /*type*/) const { return ""; }
   virtual std::string without_force() const { return "crossing spines or coinciding centres"; }
 
   /// Whether the contacts of the last evaluation are those of the present atoms.
   virtual bool has_current_contacts() const = 0;
 
-  /// Checks one shape and says what it should be. Some shapes have an exponent, by type.
+  /// Checks one shape and returns a description of the required one. Some shapes have an exponent,
+  /// by type.
   virtual double exponent(int /*type*/) const { return 1.0; }
   virtual bool is_valid_shape(const Vec<3> &semi_axes, int type) const = 0;
   virtual std::string shape_rule() const = 0;
@@ -132,13 +135,13 @@ class PairContact : public LAMMPS_NS::Pair {
 
   [[noreturn]] void stop_at_crossing(int i, int j);
   [[noreturn]] void stop_at_unconverged(int i, int j);
-  /// Whether an atom is this style's to judge: in a hybrid pair style those of its types are.
+  /// Whether this style is responsible for an atom: in a hybrid pair style, for those of its types.
   bool handles(int i) const { return is_ours[atom->type[i]]; }
   void require_shape(int i, const Vec<3> &semi_axes) const;
   [[noreturn]] void stop_at_shape(const Vec<3> &semi_axes, const std::string &which) const;
   void require_same_bound(int i, const Vec<3> &semi_axes) const;
   [[noreturn]] void stop_at_unexpected_turns(int i) const;
-  /// Whether special_bonds leaves pair (i, j), as it stands in LAMMPS's list, in the sum.
+  /// Whether special_bonds keeps the pair (i, j) of LAMMPS's list in the sum.
   bool has_full_weight(int i, int listed) const
   {
     const int which = sbmask(listed);
@@ -149,19 +152,19 @@ class PairContact : public LAMMPS_NS::Pair {
   void require_numbers(int n) const;
   void require_in_plane(int n) const;
 
-  /// At the first evaluation of a run: tells the log what was left out, when that has changed.
-  /// `listed` pairs were in LAMMPS's list of this rank, `close` of them are kept.
+  /// At the first evaluation of a run: writes the report of skipped work to the log if it has
+  /// changed. `listed` pairs were in LAMMPS's list of this rank, `close` of them are kept.
   void report_left_out(double listed, double close);
 
-  /// Whether the pair (own i, j) is this rank's to report: with newton off both owners see it.
+  /// Whether this rank reports the pair (own i, j): with newton off both owners have it.
   bool is_mine(int i, int j) const;
 
  private:
-  std::vector<char> is_ours;             // per type: whether this style acts on particles of it
+  std::vector<char> is_ours;             // per type: whether this style acts on its particles
   std::vector<double> largest_radius;    // per type: bounding radius of the largest particle
   std::vector<double> x_extra, f_extra;  // rotations as lengths, for the minimiser
   std::vector<double> gyration;          // length per radian of each own particle
-  std::vector<char> is_held;             // whether a minimisation keeps an own particle's pose
+  std::vector<char> is_held;             // whether a minimisation keeps the pose of an own particle
   bool any_round, any_ellipsoids;
   bool is_new_run;
   std::string told, said;  // the last line in the log, without and with its numbers

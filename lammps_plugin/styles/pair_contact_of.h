@@ -34,8 +34,8 @@
 namespace jamshape {
 
 /// The loop over contacts, once for all shapes, in 2D and 3D. LAMMPS's list holds pairs of bounding
-/// spheres; from it this class keeps the pairs whose surfaces are closer than a margin, and looks
-/// at LAMMPS's list again when particles have moved, turned or been pushed together by that margin.
+/// spheres; this class keeps the pairs whose surfaces are closer than a margin, and consults
+/// LAMMPS's list again when particles have moved, rotated or been pushed together by that margin.
 template <class Model> class PairContactOf : public PairContact {
  public:
   using PairContact::PairContact;
@@ -66,7 +66,7 @@ template <class Model> class PairContactOf : public PairContact {
     domain->dimension == 2 ? visit_curvatures<2>(visit) : visit_curvatures<3>(visit);
   }
 
-  /// One for the contact itself.
+  /// Includes one for the contact itself.
   int curvature_cost() const override
   {
     return 1 + (domain->dimension == 2 ? PAIR_VARIABLES<2> : PAIR_VARIABLES<3>);
@@ -135,7 +135,7 @@ template <class Model> class PairContactOf : public PairContact {
   template <int D> using Body = typename Model::template Body<D>;
   template <int D> using Touch = ContactOf<Model, D>;
 
-  /// Whether a contact is found sooner from the normal that the pair had a moment before.
+  /// Whether the search for a contact is faster from the pair's previous normal.
   template <int D, class = void> struct StartsFromNormal : std::false_type {};
   template <int D>
   struct StartsFromNormal<
@@ -178,11 +178,11 @@ template <class Model> class PairContactOf : public PairContact {
   Bodies<3> in_3d;
   double margin = 0.0, n_listed = 0.0;
   LAMMPS_NS::bigint chosen_at = -1;  // step of the list that pairs were chosen from
-  double shapes_read = -1.0;         // when the run began in which shapes were read last
-  std::uint64_t shapes = 0;          // a checksum of them
+  double shapes_read = -1.0;         // when the run began in which shapes were last read
+  std::uint64_t shapes = 0;          // their checksum
   bool packs_take_all = false;
   std::vector<int> first, partner;  // close pairs: partners of the n-th atom of LAMMPS's list
-  std::vector<float> last_normal;   // D a close pair, if contacts start from it; zeros at first
+  std::vector<float> last_normal;   // D per close pair, if contacts start from it; zeros at first
 
   template <int D> Bodies<D> &all()
   {
@@ -215,7 +215,7 @@ template <class Model> class PairContactOf : public PairContact {
     evaluate_pairs<D, TURNS, TALLY>();
   }
 
-  /// Many pairs at once.
+  /// Evaluates pairs in packs.
   template <int D, bool TURNS, bool TALLY> void evaluate_blocks(FindContacts<Model, D> &find)
   {
     const int *const type = atom->type;
@@ -239,7 +239,7 @@ template <class Model> class PairContactOf : public PairContact {
     if (block.n > 0) add_block<D, TURNS, TALLY>(find, bodies, block, next);
   }
 
-  /// The contacts of a block, the first of which is of this pair of the list, and empties it.
+  /// Adds the contacts of a block, the first of which is of this pair of the list, and empties it.
   template <int D, bool TURNS, bool TALLY, class InBlock>
   void add_block(FindContacts<Model, D> &find, InBlock &bodies, ContactBlock<D> &block, int pair)
   {
@@ -258,7 +258,7 @@ template <class Model> class PairContactOf : public PairContact {
     bodies.clear();
   }
 
-  /// Where the contacts of a block begin, if they begin from a normal.
+  /// Sets the starts of the contacts of a block, if they use normals.
   template <int D> void read_normals(ContactBlock<D> &block, int pair) const
   {
     if (!StartsFromNormal<D>::value || !any_turns) return;
@@ -301,7 +301,7 @@ template <class Model> class PairContactOf : public PairContact {
     if constexpr (TALLY) tally<D>(i, j, load);
   }
 
-  /// A pair that packs leave.
+  /// Adds a pair that packs leave out.
   template <int D, bool TURNS, bool TALLY> void add_alone(int pair, int i, int j)
   {
     const BodiesOf<Model, D> &bodies = all<D>().now;
@@ -354,7 +354,7 @@ template <class Model> class PairContactOf : public PairContact {
                                    [&] { return pair_in_long<D>(pair[0], pair[1]); });
   }
 
-  /// Where it starts from is worth time only, so floats do.
+  /// A starting point affects only the time, so that floats suffice.
   template <int D>
   Touch<D> contact_begun(int k, const Body<D> &i, const Body<D> &j, const typename Model::Law &law)
   {
@@ -413,13 +413,13 @@ template <class Model> class PairContactOf : public PairContact {
 
   int n_all() const { return atom->nlocal + atom->nghost; }
 
-  /// Another number in each run, also where 'pre no' leaves out the set-up.
+  /// A number that differs between runs, also if 'pre no' skips the set-up.
   double run_began() const { return timer->get_wall(LAMMPS_NS::Timer::TOTAL); }
 
-  /// What stands for an atom of other styles in a hybrid one, of which no pair is listed here.
+  /// Placeholder for an atom of other styles in a hybrid one, of which no pair is listed here.
   static typename Model::Shape ball() { return *Model::shape_from({{1.0, 1.0, 1.0}}, 1.0); }
 
-  /// Returns whether any has changed. What the set-up of the run found of them must hold still.
+  /// Returns whether any has changed. The results of the set-up of the run must remain valid.
   template <int D> bool read_shapes()
   {
     BodiesOf<Model, D> &bodies = all<D>().now;
@@ -449,7 +449,7 @@ template <class Model> class PairContactOf : public PairContact {
     return std::exchange(shapes, checksum) != checksum;
   }
 
-  /// A step of a checksum over numbers in their order.
+  /// One step of a checksum over numbers in order.
   static std::uint64_t mixed(std::uint64_t sum, double number)
   {
     std::uint64_t bits;
@@ -499,9 +499,9 @@ template <class Model> class PairContactOf : public PairContact {
     chosen_at = neighbor->lastcall;
   }
 
-  /// Whether two particles may have come closer by the margin, or a pose is no number: their own
-  /// motion on top of the box's affine one, which takes a gap g to at least (1 - strain) g - strain
-  /// * (sum of bounding radii).
+  /// Whether two particles may have approached by the margin, or a pose is NaN: their own motion on
+  /// top of the box's affine one, which reduces a gap g to no less than (1 - strain) g - strain *
+  /// (sum of bounding radii).
   template <int D> bool have_outrun_margin()
   {
     const Bodies<D> &bodies = all<D>();

@@ -15,7 +15,7 @@ class PairSpherocylinderHarmonic : public PairContactOf<SpherocylinderModel> {
  public:
   using PairContactOf::PairContactOf;
 
-  /// The lever arm of the one bond jumps from end to end of parallel rods.
+  /// The lever arm of the single bond jumps from end to end of parallel rods.
   bool has_smooth_forces() const override { return sides == Sides::TWO; }
 
   void settings(int narg, char **arg) override;

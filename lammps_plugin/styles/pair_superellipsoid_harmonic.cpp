@@ -19,7 +19,7 @@ template class PairContactOf<SuperellipsoidModel>;
 
 namespace {
 
-constexpr double ELLIPSOID = 1.0;  // the exponent of types that were given none
+constexpr double ELLIPSOID = 1.0;  // default exponent of types
 
 }  // namespace
 
@@ -54,7 +54,7 @@ void PairSuperellipsoidHarmonic::init_style()
   }
 }
 
-/// An exponent is of a type: of all types of a line whose I and J name the same ones.
+/// An exponent belongs to a type: to all types of a line whose I and J are the same.
 void PairSuperellipsoidHarmonic::read_exponent(char **arg)
 {
   const std::string text = arg[3];
@@ -65,7 +65,7 @@ void PairSuperellipsoidHarmonic::read_exponent(char **arg)
   if (lo[0] != lo[1] || hi[0] != hi[1]) {
     error->all(FLERR, "pair_coeff of superellipsoid/harmonic found p = " + text + " for types " +
                           arg[0] + " and " + arg[1] +
-                          ", expected it where both are the same: an exponent belongs to a type, "
+                          ", expected p only for equal types: an exponent belongs to a type; "
                           "give it with 'pair_coeff I I epsilon p'.");
   }
   const double p = LAMMPS_NS::utils::numeric(FLERR, arg[3], false, lmp);

@@ -11,7 +11,7 @@ namespace jamshape {
 
 namespace compat {
 
-/// Any object with virtual functions: enough to ask it for its class and for where it begins.
+/// Any object with virtual functions: sufficient to query its class and where it begins.
 struct AnyObject {
   virtual ~AnyObject();
 };
@@ -43,7 +43,7 @@ void ParticleView::find_ellipsoids(const std::string &style)
     refuse(lmp, FLERR,
            style + " found " + std::to_string(size) +
                " numbers with the shape of an atom, expected " + std::to_string(PER_SHAPE) +
-               ": write 'atom_style ellipsoid' without a word after it, and give exponents with "
+               ": write 'atom_style ellipsoid' without further arguments, and give exponents with "
                "'pair_coeff I I epsilon p'.");
   }
 }

@@ -13,8 +13,8 @@ void refuse(LAMMPS_NS::LAMMPS *lmp, const std::string &file, int line, const std
 {
   try {
     lmp->error->one(file, line, sentence);
-  } catch (...) {  // newer LAMMPS has yet to end the ranks
-    // The mpirun of MPICH forgets what it has not read when they end: one sentence of ten.
+  } catch (...) {  // newer LAMMPS has not ended the ranks yet
+    // The mpirun of MPICH loses unread output when they end: about one message of ten.
     if (lmp->comm->nprocs > 1) {
       if (lmp->screen) std::fflush(lmp->screen);
       std::this_thread::sleep_for(std::chrono::milliseconds(200));

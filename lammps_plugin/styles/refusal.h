@@ -6,8 +6,8 @@
 
 namespace jamshape {
 
-/// Stops all ranks with the sentence of this one, as `error->one` does, and sees to it that it is
-/// read.
+/// Stops all ranks with the message of this one, as `error->one` does, and ensures that it is
+/// printed.
 [[noreturn]] void refuse(LAMMPS_NS::LAMMPS *lmp, const std::string &file, int line,
                          const std::string &sentence);
 

@@ -1,4 +1,4 @@
-// The plugin's table of contents: one line a style, and how LAMMPS gets to know them.
+// The plugin's table of contents, one line per style, and its registration in LAMMPS.
 
 #include "comm.h"
 #include "compat.h"
@@ -24,7 +24,7 @@
 #define JAMSHAPE_QUOTED(x) #x
 #define JAMSHAPE_TEXT(x) JAMSHAPE_QUOTED(x)
 
-// Handles of one MPI library mean nothing to another, though its functions have the same names.
+// Handles of one MPI library are invalid in another, although its functions have the same names.
 #if defined(OPEN_MPI)
 #define JAMSHAPE_MPI "Open MPI"
 #elif defined(MPICH_VERSION)
@@ -49,7 +49,7 @@ template <class T> LAMMPS_NS::Compute *compute(LAMMPS *lmp, int narg, char **arg
 
 LAMMPS_NS::Command *command(LAMMPS *lmp) { return new jamshape::CreateRandom(lmp); }
 
-/// Gives each style to `add`, which knows pairs, fixes, computes and commands apart.
+/// Passes each style to `add`, which distinguishes pairs, fixes, computes and commands.
 template <class Add> void for_all_styles(Add &&add)
 {
   using namespace jamshape;
@@ -62,7 +62,7 @@ template <class Add> void for_all_styles(Add &&add)
   add("create_random", command);
 }
 
-/// Into the tables of LAMMPS.
+/// Adds styles to the tables of LAMMPS.
 struct AddToMaps {
   LAMMPS *lmp;
 
@@ -84,7 +84,7 @@ struct AddToMaps {
   }
 };
 
-/// By the function of the PLUGIN package, which then lists them and can take them away again.
+/// Adds styles by the function of the PLUGIN package, which can then list and unload them.
 struct AddAsPlugins {
   LAMMPS *lmp;
   void *handle;
@@ -110,7 +110,7 @@ struct AddAsPlugins {
  private:
   lammpsplugin_t named(const char *kind, const char *name) const
   {
-    // That it was built for this version was seen to.
+    // The version has already been checked.
     return {lmp->version, kind, name, name, "jamshape", {}, handle};
   }
   template <class Creator>
@@ -135,11 +135,11 @@ struct AddAsPlugins {
 extern "C" {
 
 /// The LAMMPS version that this binary was compiled for, as an integer such as 20210929, and the
-/// MPI library. (Variables, so that a test can pretend to be another build.)
+/// MPI library. (Variables, so that a test can simulate another build.)
 int jamshape_built_for = JAMSHAPE_LAMMPS_VERSION;
 const char *jamshape_built_with = JAMSHAPE_MPI;
 
-/// The same as text that can be found in the file, which nothing but LAMMPS can load.
+/// The same as text in the file, readable without loading it into LAMMPS.
 extern const char jamshape_label[];
 const char jamshape_label[] = "jamshape plugin for LAMMPS " JAMSHAPE_TEXT(JAMSHAPE_LAMMPS_VERSION);
 }
@@ -147,8 +147,8 @@ const char jamshape_label[] = "jamshape plugin for LAMMPS " JAMSHAPE_TEXT(JAMSHA
 
 namespace {
 
-/// One sentence if this is another LAMMPS than the one compiled for, whose objects are laid out
-/// differently, or one with another MPI library; else nothing.
+/// An error message if this LAMMPS is not the one compiled for, whose objects have another layout,
+/// or uses another MPI library; else empty.
 std::string what_differs(void *handle)
 {
   const int found = lammps_version(handle);
@@ -167,9 +167,8 @@ std::string what_differs(void *handle)
   return "";
 }
 
-/// Names the file of this plugin to decks: the variable `jamshape_plugin`, which there is only
-/// where the styles are. Not by a command, in which LAMMPS would read quotes and dollars of the
-/// path.
+/// Sets the variable `jamshape_plugin` of decks, which exists only with the styles, to the file of
+/// this plugin. Not by a command, in which LAMMPS would interpret quotes and dollars of the path.
 void tell_plugin_file(LAMMPS *lmp)
 {
   Dl_info found;
@@ -189,8 +188,8 @@ void tell_plugin_file(LAMMPS *lmp)
 #pragma GCC visibility push(default)
 extern "C" {
 
-/// One sentence if the plugin was not built for this LAMMPS, else nothing: for those that LAMMPS's
-/// own way to stop would end. Valid until asked again.
+/// An error message if the plugin was not built for this LAMMPS, else null: for callers that
+/// LAMMPS's own errors would end. Valid until the next call.
 const char *jamshape_differs(void *handle)
 {
   static std::string sentence;
@@ -198,8 +197,8 @@ const char *jamshape_differs(void *handle)
   return sentence.c_str();
 }
 
-/// Adds the styles of this plugin to a LAMMPS instance; stops it with one sentence when it is
-/// another one than it was built for.
+/// Adds the styles of this plugin to a LAMMPS instance; stops it with an error if it is another one
+/// than it was built for.
 void jamshape_register(void *handle)
 {
   auto *lmp = static_cast<LAMMPS *>(handle);
@@ -210,8 +209,8 @@ void jamshape_register(void *handle)
   tell_plugin_file(lmp);
 }
 
-/// What `plugin load` and LAMMPS_PLUGIN_PATH call. With another LAMMPS it only says so: one that
-/// finds plugins by itself shall go on without.
+/// Entry point of `plugin load` and LAMMPS_PLUGIN_PATH. Another LAMMPS only gets a warning: one
+/// that finds plugins by itself must be able to continue without.
 void lammpsplugin_init(void *handle, void *library, void *add)
 {
   auto *lmp = static_cast<LAMMPS *>(handle);
@@ -225,8 +224,8 @@ void lammpsplugin_init(void *handle, void *library, void *add)
   tell_plugin_file(lmp);
 }
 
-/// What the scene at hand is spared, as in the log; empty before the first evaluation. Valid until
-/// the next run.
+/// Report of the work skipped for the present particles, as in the log; empty before the first
+/// evaluation. Valid until the next run.
 const char *jamshape_left_out(void *handle)
 {
   const auto *lmp = static_cast<LAMMPS *>(handle);

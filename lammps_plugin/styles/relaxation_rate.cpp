@@ -19,7 +19,8 @@ namespace {
 
 constexpr int STEPS = 30, STEPS_AT_LEAST = 6;
 
-/// A direction shorter than this against the first is rounding: all eigenvalues have been found.
+/// A direction shorter than this relative to the first is rounding: all eigenvalues have been
+/// found.
 constexpr double EXHAUSTED = 1e-12;
 
 Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
@@ -47,7 +48,8 @@ double largest_eigenvalue(const std::vector<double> &diagonal,
   return low;
 }
 
-/// A number in (-1, 1) that depends on the atom's ID only, so that ranks and orders do not matter.
+/// A number in (-1, 1) that depends on the atom's ID only, so that it is independent of ranks and
+/// order.
 double hashed(std::uint64_t tag, std::uint64_t component)
 {
   std::uint64_t z = 6 * tag + component + 0x9e3779b97f4a7c15ULL;
@@ -80,7 +82,7 @@ double RelaxationRate::largest(PairContact &pair, double tolerance)
 
 /* ----------------------------------------------------------------------
    Lanczos' method in the metric of the drag, in which mobility times stiffness is symmetric. Each
-   direction is the rate of a force; what is left of the next one is in the force arrays.
+   direction is the rate of a force; the remainder of the next one is in the force arrays.
 ------------------------------------------------------------------------- */
 
 double RelaxationRate::largest_eigenvalue_of(const std::function<void()> &add_stiffness_times,
@@ -104,7 +106,7 @@ double RelaxationRate::largest_eigenvalue_of(const std::function<void()> &add_st
   return largest_eigenvalue(diagonal, off_diagonal);
 }
 
-/// Puts the present forces aside and a random one in their place.
+/// Stores the present forces and replaces them by random ones.
 void RelaxationRate::begin()
 {
   const std::size_t nlocal = atom->nlocal, nghost = atom->nghost;
@@ -120,8 +122,8 @@ void RelaxationRate::begin()
   }
 }
 
-/// The rate of what is left, of length 1; the forces become what keeps the next one orthogonal to
-/// the direction before. False when nothing is left.
+/// The rate of the remainder, of length 1; the forces become the term that keeps the next one
+/// orthogonal to the previous direction. False if nothing is left.
 bool RelaxationRate::next_direction(double size)
 {
   const double length =
@@ -227,7 +229,8 @@ template <int D> void RelaxationRate::add_curvatures_times(const Curvatures &of)
   }
 }
 
-/// To ghosts, whose forces are cleared: what follows adds to them.
+/// Sends the direction to ghosts, whose forces are cleared, because later contributions are added
+/// to them.
 void RelaxationRate::send_direction()
 {
   compat::forward(comm, fix, n_rates);
@@ -245,14 +248,14 @@ void RelaxationRate::add_load(int i, const Vec<3> &force_on, const Vec<3> &torqu
   }
 }
 
-/// The force and torque that belong to a rate, times a factor.
+/// Adds the force and torque of a rate, times a factor.
 void RelaxationRate::add_force(int i, double factor, const Rate &rate)
 {
   const Rate load = mobilities.resistance_times(i, rate);
   add_load(i, factor * load.shift, factor * load.turn);
 }
 
-/// Force and torque on i without the components that are zero in the plane, and back.
+/// Copies force and torque on i without the components that are zero in 2D, and back.
 void RelaxationRate::pack_force(int i, double *to) const
 {
   write_rate(to, {vec3(atom->f[i]), vec3(atom->torque[i])}, dimension);

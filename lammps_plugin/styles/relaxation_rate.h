@@ -11,22 +11,22 @@
 
 namespace jamshape {
 
-/// Estimates the largest relaxation rate: the largest eigenvalue of mobility times stiffness, by
-/// Lanczos' method, from below. It works in the arrays of forces and leaves them as they were.
+/// Estimates the largest relaxation rate, the largest eigenvalue of mobility times stiffness, by
+/// Lanczos' method, from below. It works in the force arrays and restores them.
 class RelaxationRate : protected LAMMPS_NS::Pointers {
  public:
-  /// Directions are sent to ghosts through the fix `owner`.
+  /// Directions are sent to ghosts by the fix `owner`.
   RelaxationRate(LAMMPS_NS::LAMMPS *lmp, LAMMPS_NS::Fix *owner, const Mobilities &of);
 
-  /// Of the bonds: without the prestress, so that kinks of the energy, where second derivatives
-  /// blow up, do not enter; but for long nearly parallel rods in 3D the true rate may be twice, for
-  /// nearly round ones in the plane several times this one.
+  /// Rate of the bonds: without the prestress, so that kinks of the energy, where second
+  /// derivatives diverge, do not enter; but for long nearly parallel rods in 3D the true rate may
+  /// be twice, for nearly round ones in 2D several times this one.
   double of_bonds(PairContact &pair, double tolerance = 0.0);
-  /// Of the whole second derivative, where forces have no jumps, else of the bonds. Ends when an
+  /// Rate of the full second derivative if forces have no jumps, else of the bonds. Stops when an
   /// iteration adds less than this fraction.
   double largest(PairContact &pair, double tolerance);
 
-  /// Passes over all contacts that this took.
+  /// Passes over all contacts used so far.
   LAMMPS_NS::bigint n_evaluations() const { return evaluations; }
 
   int pack_direction(int n, const int *list, double *buf) const;
@@ -37,9 +37,9 @@ class RelaxationRate : protected LAMMPS_NS::Pointers {
   const Mobilities &mobilities;
   LAMMPS_NS::Fix *fix;
   LAMMPS_NS::bigint evaluations;
-  std::vector<double> directions;              // of own and ghost atoms, while an estimate runs
-  std::vector<double> forces;                  // the present ones, to be put back
-  std::vector<double> diagonal, off_diagonal;  // of the matrix in Lanczos' directions
+  std::vector<double> directions;              // of own and ghost atoms, during an estimate
+  std::vector<double> forces;                  // the present ones, to be restored
+  std::vector<double> diagonal, off_diagonal;  // of the matrix in the Lanczos basis
 
   /// Second derivatives of all contacts, to be applied many times.
   struct Curvatures {

@@ -18,24 +18,24 @@ constexpr double TARGET = 0.5, OF_ERROR = 0.7, OF_ERROR_BEFORE = 0.4;
 constexpr double LARGEST_GROWTH = 5.0, SMALLEST_GROWTH = 0.2, SMALLEST_CUT = 0.1, LARGEST_CUT = 0.6;
 constexpr double SMALLEST_ERROR = 1e-8;
 
-/// The rate is estimated from below, and contacts that close may raise it before it is made anew.
+/// The rate is estimated from below, and closing contacts may raise it before the next estimate.
 constexpr double MARGIN_OF_RATE = 1.15, ERROR_OF_RATE = 0.02;
 
-/// Nor has it the prestress and the bends of the energy, which may be stiffer than the bonds: the
-/// margin follows what the forces show in the substeps, up to this, and forgets it slowly.
+/// The estimate also lacks the prestress and the curvature of the energy, which may be stiffer than
+/// the bonds: the margin follows the rate seen in the substeps, up to this, and decays slowly.
 constexpr double LARGEST_MARGIN = 12.0, MEMORY_OF_MARGIN = 0.98;
 
-/// Estimates are made anew when this many times as much has been spent on forces: 5 % of the cost.
+/// Estimates are renewed after this many times their cost in forces: 5 % of the total.
 constexpr bigint REFRESH = 20;
-constexpr bigint REJECTIONS_TO_REFRESH = 4;  // and after so many substeps that failed
+constexpr bigint REJECTIONS_TO_REFRESH = 4;  // and after this many failed substeps
 
 /// Longest substep as a strain of the box.
 constexpr double LARGEST_STRAIN = 1e-3;
 
-/// Smallest substep, times the square root of the tolerance over the fastest rate.
+/// Smallest substep, over the square root of the tolerance over the fastest rate.
 constexpr double SMALLEST_STEP = 0.5;
 
-/// Below this part of the smallest substep even a particle in free flight went too far.
+/// Below this fraction of the smallest substep even a freely moving particle went too far.
 constexpr double NO_PROGRESS = 1e-9;
 
 }  // namespace
@@ -63,7 +63,7 @@ void StepControl::step(OverdampedFlow &flow, bigint to, double dt)
   }
 }
 
-/// Estimates of the rate and of the overlaps, at a state with forces.
+/// Estimates the rate and the overlaps, at a state with forces.
 void StepControl::refresh(OverdampedFlow &flow)
 {
   const bool begins = now.h == 0.0;
@@ -87,7 +87,7 @@ void StepControl::refresh(OverdampedFlow &flow)
   now.touching_age += flow.n_evaluations() - before;
 }
 
-/// The next substep of what is left of the step of LAMMPS; never a small rest.
+/// The next substep of the remainder of the step of LAMMPS; never a small remainder.
 StepControl::Span StepControl::choose(const Span &left) const
 {
   Span span = left;
@@ -163,8 +163,8 @@ void StepControl::accept(OverdampedFlow &flow, const Span &span, double error, b
   now.h = std::max(now.h, smallest_step());
 }
 
-/// In length. Overlaps are measured by what the box's own motion pushes a single contact to, where
-/// they are smaller, and errors by the rounding of coordinates.
+/// Tolerance as a length. Overlaps are bounded below by the distance that the box's motion pushes a
+/// single contact, and errors by the rounding of coordinates.
 double StepControl::allowed_error(const OverdampedFlow &flow, const Span &span) const
 {
   const OverdampedFlow::Touching &t = now.touching;
@@ -173,9 +173,10 @@ double StepControl::allowed_error(const OverdampedFlow &flow, const Span &span) 
   return tolerance * std::max(t.overlap, pushed) + (1.0 + span.z) * rounding;
 }
 
-/// Smooth motion and contacts that close meet the tolerance with longer steps, even where the
-/// fastest mode is as large as the overlaps. What is left are jumps of the force (`sides one`),
-/// which make particles chatter, the less the smaller the step, and never end.
+/// Smooth motion and closing contacts meet the tolerance with longer steps, even if the
+/// displacement of the fastest mode is as large as the overlaps. Only jumps of the force (`sides
+/// one`) need smaller ones: they make particles chatter, the less the smaller the step, without
+/// end.
 double StepControl::smallest_step() const
 {
   const double rate = std::max(now.rate, now.touching.rate);

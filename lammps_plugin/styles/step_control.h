@@ -4,11 +4,11 @@
 
 namespace jamshape {
 
-/// A step of LAMMPS in as many substeps as the accuracy needs. The local error of a substep is the
-/// rms, over all particles that a force moves, of the difference of two methods (in length; turns
-/// times the radius of gyration); allowed is `tolerance` times the mean overlap length of the
-/// bonds. Forces are stiffness times overlap, so it is the error of the forces over the typical
-/// force as well. A particle without a bond has no error.
+/// A step of LAMMPS divided into as many substeps as the accuracy needs. The local error of a
+/// substep is the rms, over all particles that a force moves, of the difference of two methods (as
+/// a length; rotations times the radius of gyration); the tolerance is `tolerance` times the mean
+/// overlap length of the bonds. Forces are stiffness times overlap, so that it is the relative
+/// error of typical forces as well. A particle without a bond has no error.
 class StepControl : public Integrator {
  public:
   StepControl(AffineBox &affine_box, double tolerance);
@@ -39,10 +39,10 @@ class StepControl : public Integrator {
   StepState now;
   StepReport last;
 
-  /// Tries a substep and returns its error (rms, in length), infinite when a particle would move
-  /// too far. What `finish` needs is left in the forces and in the flow.
+  /// Tries a substep and returns its error (rms, as a length), infinite if a particle would move
+  /// too far. The data that `finish` needs is left in the forces and in the flow.
   virtual double attempt(OverdampedFlow &flow, const Span &span) = 0;
-  /// Makes the end of the substep that was tried the state.
+  /// Makes the end of the last substep tried the state.
   virtual void finish(OverdampedFlow &flow, const Span &span) = 0;
   virtual bool has_forces_at_end() const = 0;
   /// The error falls with this power of the substep.

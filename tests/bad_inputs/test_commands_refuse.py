@@ -117,7 +117,7 @@ CASES = [
     (f"{PUBLISHED} --search halving --minimiser none", "invalid choice"),
     (f"{PUBLISHED} --minimiser cg_marschall", "--minimiser cg_marschall has no effect with the search direct"),
     *((f"{PUBLISHED} --start {name}", sentence) for name, sentence in STARTS.items()),
-    (f"{PUBLISHED} --start run.h5 --n 9", "n is 9 and that of the start run.h5 8; leave n out"),
+    (f"{PUBLISHED} --start run.h5 --n 9", "--n 9 differs from 8 of --start run.h5; leave it out"),
     (f"{PUBLISHED} --start run.h5 --alpha 3", "requested, Particles\\('spherocylinder', alpha=3"),
     (f"{PUBLISHED} --start run.h5 --shape dimer", "requested, Particles\\('dimer'"),
     (f"{PUBLISHED} --start run.h5 --kappa 1e-6", "--kappa 1e-06 has no effect on a start that is already compressed"),

@@ -197,5 +197,5 @@ def test_near_and_overlapping_are_gaps_of_discs(dimension):
 )
 def test_other_shapes_are_refused(diameters):
     every = np.array([[3.0, 1.0, 1.0], diameters])
-    with pytest.raises(ValueError, match="particle 1 is no such shape: a dimer has diameters"):
+    with pytest.raises(ValueError, match="particle 1 is not a valid shape: a dimer has diameters"):
         _contact.Dimers(every, np.ones(2), 2, 1.0, 1)

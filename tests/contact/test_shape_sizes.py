@@ -81,9 +81,9 @@ def test_sizes_of_superellipsoids(dimension, diameters, p, is_round, symmetric, 
         ({"k_e": 0.0}, "k_e is 0, expected a positive energy."),
         ({"k_e": np.nan}, "k_e is nan, expected a positive energy."),
         ({"sides": 3}, "sides is 3, expected 1 or 2."),
-        ({"exponent": np.ones(3)}, "diameters and exponent have no shapes .*"),
-        ({"diameters": np.ones((2, 2))}, "diameters and exponent have no shapes .*"),
-        ({"diameters": np.array([[1.0, 1, 1], [0, 0, 0]])}, "particle 1 is no such shape: .*"),
+        ({"exponent": np.ones(3)}, "diameters and exponent do not have shapes .*"),
+        ({"diameters": np.ones((2, 2))}, "diameters and exponent do not have shapes .*"),
+        ({"diameters": np.array([[1.0, 1, 1], [0, 0, 0]])}, "particle 1 is not a valid shape: .*"),
     ],
 )
 def test_bad_particles_are_refused(shape, change, sentence):
@@ -97,5 +97,5 @@ def test_vicinities_have_coordinates_of_their_space():
     for dimension, columns in ((2, 3), (3, 6)):
         shape = _contact.Dimers(np.ones((2, 3)), np.ones(2), dimension, 1.0, 1)
         shape.vicinity(np.arange(2 * columns).reshape(2, columns), np.ones(2), np.ones(2))
-        with pytest.raises(ValueError, match=r"no shapes \(N, 3\) or in space \(N, 6\)"):
+        with pytest.raises(ValueError, match=r"do not have shapes \(N, 3\), in space \(N, 6\)"):
             shape.vicinity(np.zeros((2, 9 - columns), np.int64), np.ones(2), np.ones(2))

@@ -161,7 +161,7 @@ def test_bad_input_is_refused_in_one_sentence():
     i, j = random_pairs(rng, 3, 3, 1.0)
     for field, value in (("p", 0.5), ("p", np.nan), ("semi_axes", 0.0), ("semi_axes", np.inf)):
         bad = j.replaced(**{field: np.full_like(getattr(j, field), value)})
-        with pytest.raises(ValueError, match="body 0 is no such shape"):
+        with pytest.raises(ValueError, match="body 0 is not a valid shape"):
             contacts(i, bad)
     with pytest.raises(ValueError, match="differ in shape"):
         _contact.superellipsoid_contacts(i.rows, j.rows[:2], 1.0)
@@ -169,12 +169,12 @@ def test_bad_input_is_refused_in_one_sentence():
         _contact.superellipsoid_contacts(*2 * [np.ascontiguousarray(i.rows[:, :5])], 1.0)
     with pytest.raises(ValueError, match="k_e is"):
         contacts(i, j, 0.0)
-    with pytest.raises(ValueError, match="normals have no shape"):
+    with pytest.raises(ValueError, match="normals do not have the shape"):
         scales(i, j, np.zeros((3, 2)))
     diameters = np.ones((6, 3))
-    with pytest.raises(ValueError, match="diameters and exponent have no shapes"):
+    with pytest.raises(ValueError, match="diameters and exponent do not have shapes"):
         _contact.Superellipsoids(diameters, np.ones(5), 3, 1.0, 1)
-    with pytest.raises(ValueError, match="particle 4 is no such shape"):
+    with pytest.raises(ValueError, match="particle 4 is not a valid shape"):
         _contact.Superellipsoids(diameters, np.array([1, 1, 1, 1, 0.4, 1.0]), 3, 1.0, 1)
     with pytest.raises(ValueError, match="dimension is 4"):
         drag(diameters, np.ones(6), 4)

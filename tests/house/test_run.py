@@ -27,7 +27,7 @@ def test_unknown_words_are_refused():
     done = run("sing")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.strip() == (
-        "./run: there is no 'sing', expected setup, demo, test, lint, docs, sanitize, valgrind or wheel; ./run shows what they do."
+        "./run: unknown command 'sing', expected setup, demo, test, lint, docs, sanitize, valgrind or wheel; ./run describes them."
     )
 
 
@@ -89,7 +89,7 @@ def test_a_stage_that_fails_says_what_to_do(tmp_path):
     assert done.stderr.splitlines() == [
         "fatal error: no such file",
         "",
-        "./run: this did not work: look elsewhere; all that was said is in build/setup.log.",
+        "./run: this step failed: look elsewhere; the full output is in build/setup.log.",
     ]
     assert "noise" in (tmp_path / "build" / "setup.log").read_text()
 

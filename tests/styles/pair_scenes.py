@@ -35,6 +35,14 @@ class Scene(NamedTuple):
     """As in `difference_from`."""
 
 
+def with_rattlers(case):
+    """Two particles become so small that they touch nothing."""
+    packing = pressed(case)
+    diameters = packing.diameters.copy()
+    diameters[:2] /= 2
+    return packing.with_(diameters=diameters)
+
+
 def lone_rod():
     """A rod tip to tip with its own image, and side to side with the next row's."""
     return rods([[0.1, 0.2]], 0.01, 1.0, 0.5, [2.9, 0.9375])
@@ -98,6 +106,7 @@ SCENES = {
             (pressed, "", ALL),
             (in_a_small_box, "-small", (*TYPICAL, *MIXTURES)),
             (partial(squeezed, overlap=0.002), "-barely", ALL),
+            (with_rattlers, "-loose", TYPICAL),
         )
         for case in cases
     },

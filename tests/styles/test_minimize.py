@@ -137,7 +137,7 @@ def test_other_minimisers_are_refused_for_rods_only(tmp_path):
             min_style {style}
             minimize 0.0 0.0 10 100""")
         assert sentence == (
-            f"min_style {style} cannot turn particles: use 'min_style cg' or 'min_style sd', which "
+            f"min_style {style} cannot rotate particles: use 'min_style cg' or 'min_style sd', which "
             "relax positions and orientations together."
         )
     with loaded(SCENES["discs"](), tmp_path, sides="two") as session:

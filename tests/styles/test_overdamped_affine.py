@@ -593,7 +593,7 @@ def test_time_steps_near_the_limit_warn_and_past_it_stop(sides, tmp_path):
     assert near.returncode == 0
     assert near.stdout.count(warning) == 1
     assert re.fullmatch(
-        rf"fix overdamped/affine found timestep {1.05 * limit:g} past the stability limit "
+        rf"fix overdamped/affine found timestep {1.05 * limit:g} above the stability limit "
         rf"{limit:g} \(2 over the largest relaxation rate {2 / limit:g}\): use a timestep below "
         rf"{0.9 * limit:g}\.",
         error_of(past),
@@ -615,7 +615,7 @@ def test_absurd_time_steps_stop_before_anything_is_lost(dt, check, tmp_path):
         tmp_path,
     )
     assert re.search(
-        "expected at most half its radius: use a smaller timestep|past the stability limit"
+        "expected at most half its radius: use a smaller timestep|above the stability limit"
         "|crossing spines",
         error_of(done),
     )

@@ -118,7 +118,7 @@ def test_a_restart_file_of_another_version_is_refused(rods, tmp_path):
     assert content.count(mark) == 1
     path.write_bytes(content.replace(mark, bytes(8)))
     sentence = refusal_of(f"read_restart {path}\n{after_restart()}\n{fix()}")
-    assert "found a restart file that another version of jamshape wrote" in sentence
+    assert "found a restart file of another version of jamshape" in sentence
 
 
 def test_a_restart_file_without_the_time_is_read(rods, tmp_path):

@@ -22,7 +22,7 @@ def _moves(style: str, arguments: str = "") -> Feature:
     return _beside(
         f"`fix {style}`",
         f"{style} {arguments}",
-        rf"fix overdamped/affine found fix {style} \(g\), which moves particles, too, .*",
+        rf"fix overdamped/affine found fix {style} \(g\), which also moves particles, .*",
     )
 
 
@@ -82,7 +82,7 @@ _TIME = (
     Feature("`tad`", f"{FLOW}\natom_modify sort 0 0\ncompute e all event/displace 0.5\nfix n all neb 1\ntad 10 1 1 2 0.5 1 e",
             refused=r"fix overdamped/affine found fix EVENT/TAD \(tad_event\), which acts on velocities, .*", ranks=2),
     Feature("`neb`", f"{FLOW}\nfix n all neb 1\nmin_style quickmin\nneb 0 0.1 10 10 1 none",
-            refused="min_style quickmin cannot turn particles: .*", ranks=2),
+            refused="min_style quickmin cannot rotate particles: .*", ranks=2),
 )  # fmt: skip
 
 _FIXES = (
@@ -148,7 +148,7 @@ _STATES = (
             f"{FLOW}\nrun 25\nvelocity all create 1.0 3\nrun 25 pre no", "press", PLAIN, 1e-12,
             warned="fix overdamped/affine set velocities to 0", scene=CROWD),
     Feature("`change_box final`: strain", f"{FLOW}\nrun 20\nchange_box all x final 0 20 remap\nrun 30",
-            "f_f[2]", 0.03, warned="fix overdamped/affine found another box than it left"),
+            "f_f[2]", 0.03, warned="fix overdamped/affine found a box other than the one it left"),
     Feature("`change_box triclinic`", f"{FLOW}\nrun 20\nchange_box all triclinic",
             refused="Cannot change box ortho/triclinic with certain fixes defined"),
     Feature("`replicate` beside the fix", f"{FLOW}\nrun 25\nreplicate 2 2 1",

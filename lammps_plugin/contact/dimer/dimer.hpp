@@ -11,14 +11,14 @@
 namespace jamshape {
 
 /// Two equal discs (balls in 3D) of radius R with centres at +-A on the body's x, joined rigidly;
-/// for A < R they run into each other.
+/// they overlap if A < R.
 struct Dimer {
   double half_length;
   double radius;
 };
 
-/// Area (volume in 3D) and moments of the union: twice the part of one disc that lies on its side
-/// of the middle. With x from that disc's centre, it ends at x = -h, h = min(A, R).
+/// Area (volume in 3D) and moments of the union: twice the portion of one disc on its side of the
+/// middle. With x measured from that disc's centre, it ends at x = -h, h = min(A, R).
 template <int D> SubstrateDrag substrate_drag(const Dimer &shape);
 
 template <> inline SubstrateDrag substrate_drag<2>(const Dimer &shape)
@@ -27,7 +27,7 @@ template <> inline SubstrateDrag substrate_drag<2>(const Dimer &shape)
   const double c = std::min(A / R, 1.0), s = std::sqrt((1.0 - c) * (1.0 + c)), cs = c * s;
   const double angle = M_PI - std::acos(c), by_angle = cs * (2.0 * c * c - 1.0);
   const double area = R * R * (angle + cs);
-  const double x = 2.0 / 3.0 * R * R * R * s * s * s;  // integrals of x, x^2 and y^2 over the part
+  const double x = 2.0 / 3.0 * R * R * R * s * s * s;  // integrals of x, x^2, y^2 over it
   const double xx = 0.25 * R * R * R * R * (angle + by_angle);
   const double yy = R * R * R * R * (0.25 * angle + cs / 3.0 - by_angle / 12.0);
   const double about_y = A * A + (2.0 * A * x + xx) / area;
@@ -39,7 +39,7 @@ template <> inline SubstrateDrag substrate_drag<3>(const Dimer &shape)
   const double A = shape.half_length, R = shape.radius, h = std::min(A, R);
   const double R2 = R * R, R3 = R2 * R, R5 = R3 * R2, h2 = h * h, h3 = h2 * h, h5 = h3 * h2;
   const double volume = M_PI * (2.0 / 3.0 * R3 + R2 * h - h3 / 3.0);
-  const double x = 0.25 * M_PI * (R2 - h2) * (R2 - h2);  // of x, x^2 and y^2 + z^2
+  const double x = 0.25 * M_PI * (R2 - h2) * (R2 - h2);  // integrals of x, x^2 and y^2 + z^2
   const double xx = M_PI * (2.0 / 15.0 * R5 + R2 * h3 / 3.0 - 0.2 * h5);
   const double across =
       0.5 * M_PI * (8.0 / 15.0 * R5 + R2 * R2 * h - 2.0 / 3.0 * R2 * h3 + 0.2 * h5);
@@ -49,7 +49,7 @@ template <> inline SubstrateDrag substrate_drag<3>(const Dimer &shape)
 
 template <int D, class S = double> using DimerBody = BodyAlongX<Dimer, D, S>;
 
-/// From the centre of a dimer to that of its first or its second disc.
+/// Vector from the centre of a dimer to that of its first or second disc.
 template <int D, class S> Vec<D, S> to_disc(const DimerBody<D, S> &body, int which)
 {
   return S(which == 0 ? body.half_length : -body.half_length) * body.axis;
@@ -59,8 +59,8 @@ struct DimerLaw {
   Harmonic harmonic;
 };
 
-/// Contact of two dimers: V is the sum over the up to four pairs of discs of the harmonic law of
-/// their overlaps 1 - r/d, each a bond that acts along the line of their centres.
+/// Contact of two dimers: V is the sum of harmonic energies of the overlaps 1 - r/d of up to four
+/// pairs of discs, each a bond along the line of centres.
 template <int D, class S> class DimerContact {
  public:
   using Found = Contact<D, S, 4>;
@@ -87,8 +87,7 @@ template <int D, class S> class DimerContact {
   Harmonic law;
   double reach;
 
-  /// Of the discs at these arms, if they touch; where their centres lie on each other there is
-  /// none.
+  /// Adds the bond of the discs at these arms if they touch; coinciding centres give no bond.
   void add_bond(Found &contact, const Vec<D, S> &arm_i, const Vec<D, S> &arm_j) const
   {
     if (contact.status == ContactStatus::CROSSING) return;
@@ -113,9 +112,9 @@ template <int D, class S> class DimerContact {
   {
     const S distance = norm(apart), overlap = (reach - distance) / reach;
     bond.normal = (1.0 / distance) * apart;
-    // In dual numbers the law's slope is a constant: `own_stiffness` stands for what it leaves out.
+    // In dual numbers the slope of the law is held constant: `own_stiffness` accounts for it.
     bond.force = (law.energy_gradient(constant(overlap)) / reach) * bond.normal;
-    bond.arm_i = arm_i - (i.radius / reach * distance) * bond.normal;  // where surfaces overlap
+    bond.arm_i = arm_i - (i.radius / reach * distance) * bond.normal;  // inside the overlap
     bond.lever_i = cross(arm_i, bond.normal);
     bond.lever_j = -cross(arm_j, bond.normal);
     bond.distance = distance;
@@ -133,7 +132,7 @@ Contact<D, S, 4> contact_of(const DimerBody<D, S> &i, const DimerBody<D, S> &j, 
   return DimerContact<D, S>(i, j, law).evaluate();
 }
 
-/// What is asked of a shape (see SpherocylinderModel).
+/// Interface of a shape (see SpherocylinderModel).
 struct DimerModel : AlongX<Dimer> {
   using Law = DimerLaw;
 
@@ -143,7 +142,8 @@ struct DimerModel : AlongX<Dimer> {
   static constexpr const char *CORE = "centres";
   static constexpr int MOST_BONDS = 4;
   static constexpr bool HAS_SIDES = false;
-  /// Each pair of discs holds like one, whatever others the two dimers share.
+  /// Each pair of discs constrains like a contact of its own, whatever other bonds the dimers
+  /// share.
   static constexpr bool BONDS_ARE_CONTACTS = true;
 
   static Law law(double k_e, Sides, bool /*shortcuts*/ = true) { return {{k_e}}; }
@@ -163,7 +163,7 @@ struct DimerModel : AlongX<Dimer> {
     return {false, false};
   }
 
-  /// Whether the surfaces of i and j are closer than `margin`.
+  /// Whether the gap between the surfaces of i and j is smaller than `margin`.
   template <int D> static bool closer_than(double margin, const Body<D> &i, const Body<D> &j)
   {
     if (!spheres_are_closer<D>(margin, i, j)) return false;

@@ -4,8 +4,8 @@
 
 namespace jamshape {
 
-/// A number of dimensions that is known when the program runs, as one that the compiler knows:
-/// `in_dimension(d, [&](auto D) { return f<D>(x); })`.
+/// Passes a dimension known at run time as a compile-time constant: `in_dimension(d, [&](auto D) {
+/// return f<D>(x); })`.
 template <class Visit> auto in_dimension(int dimension, const Visit &visit)
 {
   return dimension == 2 ? visit(std::integral_constant<int, 2>())

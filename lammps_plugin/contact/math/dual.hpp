@@ -6,15 +6,16 @@
 
 namespace jamshape {
 
-/// A number with its derivatives by N variables: forward-mode differentiation, to rounding. Where
-/// the force is written for any scalar, its exact derivative is that code run on these numbers, and
-/// no formula of a second derivative stands anywhere. Branches look at the values alone.
+/// A number with its derivatives with respect to N variables: forward-mode differentiation,
+/// accurate to rounding. Force code written for any scalar gives its exact derivative when run on
+/// these numbers, so that no second derivative is coded by hand. Branches depend on the values
+/// alone.
 template <int N, class S = double> struct Dual {
   S value;
   S d[N];
 
   Dual() = default;
-  Dual(S x) : value(x), d{} {}  // constants convert by themselves
+  Dual(S x) : value(x), d{} {}  // constants convert implicitly
 
   /// The k-th variable, with value x.
   static Dual variable(S x, int k)
@@ -24,7 +25,7 @@ template <int N, class S = double> struct Dual {
     return a;
   }
 
-  /// The function value f(x) with f'(x) times the derivatives of x.
+  /// The function value f(x), with derivatives f'(x) times those of x.
   [[gnu::always_inline]] Dual chain(S f, S slope) const
   {
     Dual a(f);
@@ -100,7 +101,7 @@ template <int N, class S = double> struct Dual {
     const S power = std::exp(a.value);
     return a.chain(power, power);
   }
-  /// Of a base that is not negative, to a constant power that is at least 1.
+  /// Power of a non-negative base to a constant exponent that is at least 1.
   [[gnu::always_inline]] friend Dual pow(const Dual &a, const S &exponent)
   {
     return a.chain(std::pow(a.value, exponent), exponent * std::pow(a.value, exponent - 1));

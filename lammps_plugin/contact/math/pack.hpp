@@ -5,8 +5,8 @@
 #include <cstring>
 #include <utility>
 
-/// The set of instructions that this file is compiled for. Packs bear its name, and so does all
-/// that is made of them: a linker takes two functions that are called alike for one.
+/// The instruction set that this file is compiled for. Packs and everything built from them carry
+/// its name, because a linker merges functions of the same name.
 #ifndef JAMSHAPE_SET
 #define JAMSHAPE_SET baseline
 #endif
@@ -27,7 +27,7 @@ using Doubles = double __attribute__((vector_size(8 * LANES)));
 using Words = long long __attribute__((vector_size(8 * LANES)));
 using Naturals = unsigned long long __attribute__((vector_size(8 * LANES)));
 
-/// As many truths, words of ones or zeros.
+/// One truth value per lane, as words of all ones or all zeros.
 struct Mask {
   Words words;
 
@@ -41,16 +41,16 @@ struct Mask {
   }
 };
 
-/// A register of doubles as a scalar: geometry that is written for any scalar and without branches
-/// runs on all lanes at once, each with the roundings of a double.
+/// A register of doubles as a scalar: geometry written for any scalar and without branches runs on
+/// all lanes at once, with the rounding of doubles in each.
 struct Pack {
   Doubles lanes;
 
   Pack() = default;
-  Pack(double x) : lanes(x - Doubles{}) {}  // constants convert by themselves
+  Pack(double x) : lanes(x - Doubles{}) {}  // constants convert implicitly
   explicit Pack(const Doubles &values) : lanes(values) {}
 
-  /// of(0) to of(LANES - 1).
+  /// A pack of of(0) to of(LANES - 1).
   template <class Of> static Pack from(const Of &of) { return from(of, Each()); }
   static Pack load(const double *at)
   {
@@ -103,9 +103,9 @@ struct Pack {
     return of_words((a.words() & ~SIGN) | (sign.words() & SIGN));
   }
 
-  /// Of numbers below 2^51.
+  /// Rounds to the nearest integer; |a| must be below 2^51.
   friend Pack nearest_whole(const Pack &a) { return a + WHOLE - WHOLE; }
-  /// Of whole numbers from -1022 to 1023.
+  /// 2^n for integers n from -1022 to 1023.
   friend Pack power_of_two(const Pack &whole)
   {
     return of_words(((whole + WHOLE).naturals() + BIAS) << MANTISSA);
@@ -115,9 +115,9 @@ struct Pack {
  private:
   using Each = std::make_integer_sequence<int, LANES>;
   static constexpr long long SIGN = static_cast<long long>(1ULL << 63);
-  static constexpr int MANTISSA = 52;               // bits of it
-  static constexpr unsigned long long BIAS = 1023;  // of the exponent above it
-  static constexpr double WHOLE = 0x1.8p52;         // numbers about this one are whole
+  static constexpr int MANTISSA = 52;               // number of its bits
+  static constexpr unsigned long long BIAS = 1023;  // bias of the exponent above it
+  static constexpr double WHOLE = 0x1.8p52;         // doubles near this one are integers
 
   template <class Of, int... K> static Pack from(const Of &of, std::integer_sequence<int, K...>)
   {
@@ -135,10 +135,10 @@ struct Pack {
 struct PowerOfTwo {
   Pack power, rest;
 
-  /// Of positive normal numbers.
+  /// Requires positive normal numbers.
   explicit PowerOfTwo(const Pack &x)
   {
-    // Exponents above that of sqrt(1/2), which is added to them so that none is negative.
+    // Exponents relative to sqrt(1/2), shifted by ABOVE to stay positive.
     constexpr unsigned long long FROM = 0x3fe6a09e667f3bcd, ABOVE = 1024;
     const Naturals above = (x.naturals() - FROM + (ABOVE << Pack::MANTISSA)) >> Pack::MANTISSA;
     power = Pack::of_words(above + WHOLE_WORD) - (Pack::WHOLE + ABOVE);
@@ -146,10 +146,10 @@ struct PowerOfTwo {
   }
 
  private:
-  static constexpr unsigned long long WHOLE_WORD = 0x4338000000000000;  // of Pack::WHOLE
+  static constexpr unsigned long long WHOLE_WORD = 0x4338000000000000;  // bits of Pack::WHOLE
 };
 
-/// The truths as bits, lane 0 the lowest.
+/// The truth values as bits, lane 0 the lowest.
 inline unsigned bits_of(const Mask &mask)
 {
 #if defined(__AVX__) && !defined(__AVX512F__)

@@ -4,13 +4,12 @@
 
 #include <limits>
 
-/// The functions that libraries have for one number at a time, for all lanes of a pack at once, to
-/// two roundings or so. They are sums and products in a fixed order, so that they round alike with
-/// every set of instructions.
+/// Elementary functions for all lanes of a pack at once, accurate to about two roundings. They are
+/// sums and products in a fixed order, so that they round identically with every instruction set.
 namespace jamshape {
 inline namespace JAMSHAPE_SET {
 
-// ln 2 = LN2 + LN2_REST; a whole number up to 2^20 times LN2 has no rounding error.
+// ln 2 = LN2 + LN2_REST; the product of LN2 and an integer up to 2^20 is exact.
 inline constexpr double LN2 = 0x1.62e42fep-1, LN2_REST = 0x1.f473de6af278fp-30;
 inline constexpr double PER_LN2 = 0x1.71547652b82fep+0;
 
@@ -22,8 +21,8 @@ template <int N> Pack polynomial(const double (&c)[N], const Pack &x)
   return sum;
 }
 
-/// exp(k ln 2 + r), |r| < ln 2 / 2, by Taylor's series of exp(r). 0 below the smallest normal
-/// number.
+/// exp(k ln 2 + r), |r| < ln 2 / 2, by the Taylor series of exp(r). Returns 0 below the smallest
+/// normal number.
 inline Pack exp(const Pack &x)
 {
   constexpr double SERIES[] = {1.0,
@@ -47,8 +46,8 @@ inline Pack exp(const Pack &x)
   return select(x < LEAST, 0.0, select(x > MOST, std::numeric_limits<double>::infinity(), found));
 }
 
-/// ln x = k ln 2 + 2 artanh((m - 1) / (m + 1)), x = 2^k m, m from sqrt(1/2) to sqrt(2). Of what is
-/// not a positive normal number: NaN.
+/// ln x = k ln 2 + 2 artanh((m - 1) / (m + 1)), x = 2^k m, m from sqrt(1/2) to sqrt(2). Returns NaN
+/// unless x is a positive normal number.
 inline Pack log(const Pack &x)
 {
   constexpr double SERIES[] = {2.0 / 3,  2.0 / 5,  2.0 / 7,  2.0 / 9,  2.0 / 11,
@@ -61,14 +60,14 @@ inline Pack log(const Pack &x)
   return select(normal, part.power * LN2 + of_rest, std::numeric_limits<double>::quiet_NaN());
 }
 
-/// ln(1 + x) by that of the rounded sum, and what was rounded off.
+/// ln(1 + x) from the logarithm of the rounded sum, corrected for the rounding.
 inline Pack log1p(const Pack &x)
 {
   const Pack sum = 1.0 + x;
   return log(sum) + (x - (sum - 1.0)) / sum;
 }
 
-/// Of a base that is not negative, to a positive power. Its relative error grows as power * ln x.
+/// Power of a non-negative base to a positive exponent. The relative error grows as power * ln x.
 inline Pack pow(const Pack &x, double power)
 {
   return select(x < Pack(std::numeric_limits<double>::min()), 0.0, exp(power * log(x)));

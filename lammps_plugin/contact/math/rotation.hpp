@@ -7,7 +7,7 @@
 
 namespace jamshape {
 
-/// Unit quaternion, w first as in LAMMPS; turns body coordinates into space coordinates.
+/// Unit quaternion, w first as in LAMMPS; rotates body coordinates into space coordinates.
 template <class S> struct QuaternionOf {
   S w, i, j, k;
 };
@@ -56,8 +56,8 @@ template <class S> struct CosSin {
   S cosine, sine;
 };
 
-/// Both at once; one step of a slow flow turns particles by so little that series to the rounding
-/// of doubles do.
+/// Cosine and sine together; the rotations of one step of a slow flow are so small that a series is
+/// exact to double precision.
 template <class S> CosSin<S> cos_sin(S x)
 {
   if (!std::is_same_v<S, double> || std::abs(x) > 0.01) return {std::cos(x), std::sin(x)};
@@ -80,7 +80,7 @@ template <class S> QuaternionOf<S> rotation_by(const Vec<1, S> &v)
   return {half.cosine, S(0.0), S(0.0), half.sine};
 }
 
-/// `q` turned by the rotation vector `v`. A rotation of zero returns `q` to the last bit.
+/// `q` rotated by the rotation vector `v`. A rotation of zero returns `q` exactly.
 template <int M, class S> QuaternionOf<S> turned(const QuaternionOf<S> &q, const Vec<M, S> &v)
 {
   if (norm_sq(v) == 0.0) return q;

@@ -6,9 +6,9 @@
 
 namespace jamshape {
 
-/// An upper triangular matrix, as LAMMPS's cells are: the first cell vector along x, the second one
-/// in the plane of x and y. A constant velocity gradient, the deformation it leads to and the cell
-/// are all of this kind. One that is a number times 1 acts as that number to the last bit.
+/// An upper triangular matrix, as LAMMPS's cells are: the first cell vector along x, the second in
+/// the xy plane. A constant velocity gradient, the resulting deformation and the cell are all of
+/// this form. A multiple of the identity acts exactly as a number.
 struct Upper {
   Vec<3> diagonal;
   double xy, xz, yz;
@@ -18,7 +18,7 @@ struct Upper {
   bool has_shear() const { return xy != 0.0 || xz != 0.0 || yz != 0.0; }
 };
 
-/// From the rows of a matrix (D, D), whose entries below the diagonal are not read.
+/// Upper triangle of a matrix (D, D), given by rows; entries below the diagonal are not read.
 template <int D> Upper upper_from(const double *rows)
 {
   const auto at = [&](int k, int m) { return k < D && m < D ? rows[D * k + m] : 0.0; };
@@ -52,7 +52,7 @@ inline Upper operator*(const Upper &a, const Upper &b)
           p[1] * b.yz + a.yz * q[2]};
 }
 
-/// `factor` times the inverse.
+/// `factor` times the inverse of a.
 inline Upper divided(double factor, const Upper &a)
 {
   const Vec<3> &p = a.diagonal;
@@ -63,8 +63,8 @@ inline Upper divided(double factor, const Upper &a)
           -factor * yy * a.yz * zz};
 }
 
-/// exp(a): by its series for a / 2^n, squared n times; the diagonal, which must not lose digits to
-/// that, by itself. Of a matrix without a diagonal it is exact.
+/// exp(a), from its series for a / 2^n, squared n times; the diagonal, which must not lose digits,
+/// is computed separately. Exact for a matrix with zero diagonal.
 inline Upper exponential(const Upper &a)
 {
   const Vec<3> &d = a.diagonal;

@@ -4,9 +4,9 @@
 
 namespace jamshape {
 
-/// Vector of D components of a scalar type S; an aggregate, so that `Vec<2>{x, y}` is all there is
-/// to construct. S is double in the hot loops, long double where doubles are too short, and a dual
-/// number where derivatives are wanted.
+/// Vector of D components of a scalar type S; an aggregate, constructed as `Vec<2>{x, y}`. S is
+/// double in the hot loops, long double where doubles are not precise enough, and a dual number for
+/// derivatives.
 template <int D, class S = double> struct Vec {
   S c[D];
   S &operator[](int k) { return c[k]; }
@@ -86,7 +86,7 @@ template <int D, class S>
   return values;
 }
 
-/// The same in another scalar, as constants.
+/// The same vector in another scalar type, as constants.
 template <class S, int D, class V>
 [[gnu::always_inline]] inline Vec<D, S> constants_of(const Vec<D, V> &values)
 {

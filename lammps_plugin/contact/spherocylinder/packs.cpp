@@ -1,4 +1,4 @@
-// Compiled once for each set of instructions, JAMSHAPE_SET.
+// Compiled once for each instruction set, JAMSHAPE_SET.
 
 #include "contact/contact_block.hpp"
 #include "contact/math/pack.hpp"
@@ -38,8 +38,8 @@ SpherocylinderContact<D, Pack> pairs_of(const SpherocylinderBody<D> *bodies,
 
 }  // namespace
 
-/// Flattened: whatever is called becomes part of it, and no function of these instructions stands
-/// by itself under a name that other files have, too.
+/// Flattened: all called functions are inlined, so that none compiled for this instruction set
+/// exists under a name that other files share.
 template <InstructionSet SET, int D>
 [[gnu::flatten]] void find_rod_contacts(const SpherocylinderBody<D> *bodies,
                                         const SpherocylinderLaw &law, ContactBlock<D> &block)

@@ -18,7 +18,7 @@ template <int D, class S = double> struct SpinePair {
   Plain<S> A_j;
 };
 
-/// The pair without its derivatives, itself if it has none: searches and other decisions look at
+/// The pair without derivatives, or itself if it has none: searches and other decisions depend on
 /// values alone.
 template <int D, class S> decltype(auto) values_of(const SpinePair<D, S> &p)
 {
@@ -57,13 +57,13 @@ Feet<D, S> chosen(const Truth<S> &where, const Feet<D, S> &a, const Feet<D, S> &
           select(where, a.distance_sq, b.distance_sq)};
 }
 
-/// `x` limited to [-bound, bound], in the two instructions that std::clamp does not become.
+/// `x` clamped to [-bound, bound], in two instructions, which std::clamp does not compile to.
 template <class S> S limited(const S &x, const Plain<S> &bound)
 {
   return least(S(bound), most(S(-bound), x));
 }
 
-/// Foot on spine j of the point s of spine i, and the reverse.
+/// Foot on spine j of the point s of spine i, and vice versa.
 template <int D, class S> S foot_on_j(const SpinePair<D, S> &p, const S &s)
 {
   return limited(dot(p.u_j, p.r + s * p.u_i), p.A_j);
@@ -75,7 +75,7 @@ template <int D, class S> S foot_on_i(const SpinePair<D, S> &p, const S &t)
 }
 
 /// The four tips with their feet on the other spine: tips +, - of i, then +, - of j. Kept as
-/// numbers in arrays: `nearest` is all that is asked of most pairs.
+/// numbers in arrays, since most pairs need only `nearest`.
 template <int D, class S> struct TipFeet {
   S s[4], t[4], distance_sq[4];
 
@@ -91,7 +91,7 @@ template <int D, class S> struct TipFeet {
     for (int k = 0; k < 4; ++k) distance_sq[k] = norm_sq(p.r + s[k] * p.u_i - t[k] * p.u_j);
   }
 
-  /// A tip and its foot, of the same pair in any scalar.
+  /// A tip and its foot, for the same pair in any scalar.
   template <class T> Feet<D, T> feet(const SpinePair<D, T> &p, int k) const
   {
     if constexpr (std::is_same_v<T, S>) {
@@ -103,14 +103,14 @@ template <int D, class S> struct TipFeet {
     }
   }
 
-  /// Index of the least distance; without branches, which nothing could predict.
+  /// Index of the smallest distance; without branches, which would be unpredictable.
   int nearest() const
   {
     const int of_i = distance_sq[1] < distance_sq[0], of_j = 2 + (distance_sq[3] < distance_sq[2]);
     return distance_sq[of_j] < distance_sq[of_i] ? of_j : of_i;
   }
 
-  /// The t of that tip.
+  /// The t of the nearest tip.
   S t_of_nearest() const
   {
     if constexpr (std::is_same_v<Truth<S>, bool>) {
@@ -124,10 +124,10 @@ template <int D, class S> struct TipFeet {
   }
 };
 
-/// Whether feet `a` are closer than `b`, each a tip and its foot on the other spine. Where they
-/// share a tip, the one whose other foot lies inside the spine is: its distance is the least from
-/// that tip. Rounded distances cannot tell that of feet within 1e-8 of each other, and would leave
-/// normal and lever arms with half of the digits.
+/// Whether feet `a` are closer than `b`, each a tip and its foot on the other spine. If they share
+/// a tip, the one whose other foot lies inside the spine is closer: it is the nearest point to that
+/// tip. Rounded distances cannot distinguish feet within 1e-8 of each other, which would leave
+/// normal and lever arms with half of their digits.
 template <int D, class S>
 Truth<S> is_closer(const SpinePair<D, S> &p, const Feet<D, S> &a, const Feet<D, S> &b)
 {
@@ -207,34 +207,34 @@ template <int D, class S> struct EndFeet {
   }
 };
 
-/// The closest points from a point t close to that on spine j: they are each other's feet.
+/// The closest points near the point t of spine j: each is the foot of the other.
 template <int D, class S> Feet<D, S> each_others_feet(const SpinePair<D, S> &p, const S &t)
 {
   const S s = foot_on_i(p, t);
   return feet_at(p, s, foot_on_j(p, s));
 }
 
-/// The closest points of two spines, from the point t on j of their nearer end. In the plane,
-/// spines that do not cross are closest there; skew spines in 3D may be closest inside both.
+/// The closest points of two spines, given the point t on j of their nearer end. In 2D, spines that
+/// do not cross are closest there; skew spines in 3D may be closest inside both.
 template <class S> Feet<2, S> closest_from_end(const SpinePair<2, S> &p, const S &t)
 {
   return each_others_feet(p, t);
 }
 
-/// The points inside both of two skew spines that are closest, if there are any; else `at_end()`.
+/// The closest points of two skew spines if they lie inside both; else `at_end()`.
 template <class S, class AtEnd>
 Feet<3, S> closest_inside(const SpinePair<3, S> &p, const AtEnd &at_end)
 {
-  // The part of u_i across u_j, from the difference of the axes: nearly parallel spines lose no
-  // digits.
+  // The component of u_i across u_j, from the difference of the axes, so that nearly parallel
+  // spines lose no digits.
   const Vec<3, S> turn = p.u_i - copysign(S(1.0), dot(p.u_i, p.u_j)) * p.u_j;
   const Vec<3, S> across = turn - dot(turn, p.u_j) * p.u_j;
   const S sin_sq = norm_sq(across);
   const S s = -dot(p.r, across) / sin_sq;
   const S t = dot(p.u_j, p.r + s * p.u_i);
-  // Feet inside both spines are the minimum, the distance being convex: comparing it with that at
-  // the ends would leave it to rounding where the feet of nearly parallel spines sit. Of parallel
-  // ones s is infinite or no number.
+  // Feet inside both spines are the minimum, since the distance is convex; comparing it with that
+  // at the ends would place the feet of nearly parallel spines by rounding. For parallel ones s is
+  // infinite or NaN.
   const Truth<S> inside = (abs(s) < p.A_i) & (abs(t) < p.A_j) & !(sin_sq == S(0.0));
   if (!any(inside)) return at_end();
   const Feet<3, S> found = feet_at(p, foot_on_i(p, t), t);
@@ -255,8 +255,8 @@ template <class S> Feet<3, S> closest_to_end(const SpinePair<3, S> &p, const Fee
   return closest_inside(p, [&] { return end; });
 }
 
-/// Below this squared sine of the angle the intersection of the lines through two spines does not
-/// tell where the spines are closest.
+/// Below this squared sine of the angle, the intersection of the lines through two spines does not
+/// determine where the spines are closest.
 inline constexpr double NO_INTERSECTION_SINE_SQ = 1e-8;
 
 template <int D, class S> Feet<D, S> closest_by_tips(const SpinePair<D, S> &p)
@@ -265,9 +265,9 @@ template <int D, class S> Feet<D, S> closest_by_tips(const SpinePair<D, S> &p)
   return closest_from_end(p, tips.t_of_nearest());
 }
 
-/// The closest points of two spines. In the plane they are at the tip towards the intersection of
-/// their lines, which saves the search over four tips; crossing spines, a state to detect
-/// (`spines_cross`), end up at it.
+/// The closest points of two spines. In 2D they are at the tip towards the intersection of their
+/// lines, which saves the search over four tips; crossing spines, a state to detect
+/// (`spines_cross`), end up at the intersection.
 template <int D, class S> Feet<D, S> closest_feet(const SpinePair<D, S> &p)
 {
   if constexpr (D == 2) {
@@ -282,18 +282,18 @@ template <int D, class S> Feet<D, S> closest_feet(const SpinePair<D, S> &p)
   }
 }
 
-/// Whether the far ends of what lies opposite of two spines may be closer than `reach`, the feet
-/// where they are closest given. Spines in the plane part from there by the sine of their angle.
+/// Whether the far ends of the facing portions of two spines may be closer than `reach`, given the
+/// feet where they are closest. Spines in 2D diverge from there by the sine of their angle.
 template <class S>
 Truth<S> far_ends_may_touch(const SpinePair<2, S> &p, const Feet<2, S> &closest,
                             const Plain<S> &reach)
 {
   const S sine = cross(p.u_i, p.u_j)[0], cosine = dot(p.u_i, p.u_j);
-  // Where they lie on one side of each other's tip, nothing is opposite.
+  // If they lie on one side of each other's tip, no portions face each other.
   const Truth<S> beside = (p.A_i + p.A_j * abs(cosine) <= abs(dot(p.u_i, p.r))) |
                           (p.A_j + p.A_i * abs(cosine) <= abs(dot(p.u_j, p.r)));
   if (all(beside)) return !beside;
-  // Towards the intersection of their lines they come closer.
+  // They converge towards the intersection of their lines.
   const S of_i =
       p.A_i + copysign(closest.s, closest.s * (cross(p.u_j, p.r)[0] - closest.s * sine) * sine);
   const S of_j =
@@ -307,8 +307,8 @@ Truth<S> far_ends_may_touch(const SpinePair<3, S> &, const Feet<3, S> &closest, 
   return closest.distance_sq == closest.distance_sq;
 }
 
-/// |sin| of the angle between the spines: the one measure of being parallel used everywhere; it
-/// takes angles modulo pi, since rods have no head.
+/// |sin| of the angle between the spines, the only measure of parallelism used; angles are taken
+/// modulo pi, since rods have no head.
 template <int D, class S> S abs_sine(const SpinePair<D, S> &p) { return norm(cross(p.u_i, p.u_j)); }
 
 /// True when the two segments cross in the plane: each has its tips on opposite sides of the other.

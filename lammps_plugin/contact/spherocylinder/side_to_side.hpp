@@ -6,8 +6,9 @@
 namespace jamshape {
 
 /// Depth y of two bonds: mean overlap (a length) over A_min^2 / d, A_min the shorter half length.
-/// From SHALLOW on they become one, and the length over which the second fades in grows from
-/// FADE_LENGTH A_min to A_min. A norm of a smaller exponent than the least is the larger bond.
+/// Beyond SHALLOW they merge into one, and the length over which the second bond fades in grows
+/// from FADE_LENGTH A_min to A_min. Below the smallest exponent, the norm is taken as the larger
+/// bond.
 inline constexpr double SHALLOW = 0.01;
 inline constexpr double FADE_LENGTH = 0.05;
 inline constexpr double FADE_GROWTH = 4.0;
@@ -35,9 +36,9 @@ template <class S> ValueAndSlope<S> fade_length(const S &h)
   return {length, part * (1.0 - e_sq) / (one * one * length)};
 }
 
-/// Two rods side to side: u_i.r, u_j.r, c = u_i.u_j and their depth, infinite for discs. What lies
-/// opposite of i is q_i = A_i + A_j |c| - |u_i.r|; `opposite` is the harmonic mean of both, 0 where
-/// one of them is none.
+/// Two rods side to side: u_i.r, u_j.r, c = u_i.u_j and their depth, infinite for discs. The length
+/// facing i is q_i = A_i + A_j |c| - |u_i.r|; `opposite` is the harmonic mean of both, 0 if either
+/// is not positive.
 template <class S> struct SideBySide {
   Plain<S> shorter, depth_per_overlap;
   S along_i, along_j, cosine, depth, opposite_i, opposite_j, opposite;
@@ -55,7 +56,7 @@ template <class S> struct SideBySide {
       opposite = select(both, 2.0 * opposite_i * opposite_j / (opposite_i + opposite_j), opposite);
   }
 
-  /// Whether the exponent is 1, as of most, or 0: known without computing it.
+  /// Whether the exponent is 1, as for most pairs, or 0, without computing it.
   Truth<S> has_two_bonds() const
   {
     const S length = least(opposite, S(2.0 * shorter * abs(cosine)));
@@ -94,8 +95,8 @@ template <class S> struct EndExponent {
   }
 };
 
-/// ln(b / a) of the overlaps a >= b > 0 of the nearer end and the farther one: from the difference
-/// of the feet, since the overlaps may differ by less than they round.
+/// ln(b / a) of the overlaps a >= b > 0 of the nearer and the farther end: from the difference of
+/// the feet, since the overlaps may differ by less than their rounding.
 template <int D, class S>
 S log_ratio_of(const SpinePair<D, S> &p, const Feet<D, S> &near, const Feet<D, S> &far,
                const Plain<S> &reach)
@@ -110,8 +111,9 @@ S log_ratio_of(const SpinePair<D, S> &p, const Feet<D, S> &near, const Feet<D, S
   return any(little) ? select(little, log1p(-lost), of_overlaps) : of_overlaps;
 }
 
-/// The norm V = (E(a)^(1/w) + E(b)^(1/w))^w of harmonic energies, from ln(b / a): their parts of
-/// the sum, shares in V = share_a E(a) + share_b E(b), and d ln V / dw, the entropy of the parts.
+/// The norm V = (E(a)^(1/w) + E(b)^(1/w))^w of harmonic energies, from ln(b / a): their fractions
+/// of the sum, shares in V = share_a E(a) + share_b E(b), and d ln V / dw, the entropy of the
+/// fractions.
 template <class S> struct EndNorm {
   S part_a, part_b, share_a, share_b, entropy;
 

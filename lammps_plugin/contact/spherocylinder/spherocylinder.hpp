@@ -57,12 +57,12 @@ template <int D, class S = double> using SpherocylinderBody = BodyAlongX<Spheroc
 template <class K> struct SpherocylinderLawOf {
   HarmonicOf<K> harmonic;
   Sides sides;
-  bool shortcuts;  // false: discs by the search for feet, too
+  bool shortcuts;  // false: also discs by the search for feet
 };
 using SpherocylinderLaw = SpherocylinderLawOf<double>;
 
-/// Below this |sin| of the angle between them two spines are parallel: their one bond sits in the
-/// middle of the overlap of the spines (Marschall & Teitel 2018, Sec. II, taken modulo pi).
+/// Below this |sin| of the angle between them two spines count as parallel: their single bond acts
+/// at the middle of the overlap of the spines (Marschall & Teitel 2018, Sec. II, taken modulo pi).
 inline constexpr double PARALLEL_SINE = 1e-8;
 
 template <int D, class S>
@@ -71,7 +71,7 @@ SpinePair<D, S> spine_pair(const SpherocylinderBody<D, S> &i, const Spherocylind
   return {i.centre - j.centre, i.axis, i.half_length, j.axis, j.half_length};
 }
 
-/// Class of a contact with one bond. Two feet inside the flat parts happen only for skew rods in
+/// Class of a contact with one bond. Two feet inside the flat portions occur only for skew rods in
 /// 3D.
 template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Feet<D, S> &feet)
 {
@@ -123,7 +123,7 @@ template <int D, class S> class SpherocylinderContact {
     }
   }
 
-  /// Lanes all of which were found to be `shared`.
+  /// Evaluates lanes all of which were found to be `shared`.
   ContactLanes<D, S> evaluate_shared_lanes() const
   {
     const EndFeet<D, S> ends(pair);
@@ -142,7 +142,7 @@ template <int D, class S> class SpherocylinderContact {
     return lanes;
   }
 
-  /// The same of all lanes of a pack, but for the rare ones.
+  /// Evaluates all lanes of a pack except the rare ones.
   ContactLanes<D, S> evaluate_lanes() const
   {
     const Truth<S> round = (pair.A_i == S(0.0)) & (pair.A_j == S(0.0));
@@ -165,8 +165,9 @@ template <int D, class S> class SpherocylinderContact {
   S inverse_reach;
   SpherocylinderLawOf<Plain<S>> law;
 
-  /// How a bond enters the energy: its `share`, by which the harmonic law of its own overlap is
-  /// multiplied, what else the energy changes with its overlap by (`slope`), and its `coupling`.
+  /// Contribution of a bond to the energy: its `share`, a factor of the harmonic law of its own
+  /// overlap, the additional derivative of the energy with respect to its overlap (`slope`), and
+  /// its `coupling`.
   struct Part {
     S share, slope, coupling;
   };
@@ -189,7 +190,7 @@ template <int D, class S> class SpherocylinderContact {
     return feet.distance_sq <= COINCIDENT * reach * COINCIDENT * reach;
   }
 
-  /// What the general path gives for two spines of no length, without the search for feet.
+  /// Result of the general path for two spines of zero length, without the search for feet.
   Found discs() const
   {
     const Feet<D, S> centres{0.0, 0.0, pair.r, norm_sq(pair.r)};
@@ -248,8 +249,7 @@ template <int D, class S> class SpherocylinderContact {
     return contact;
   }
 
-  /// What two bonds that share an energy add to a contact beside their loads: `push` on i, and
-  /// turns of both.
+  /// Additional loads of two bonds that share an energy: `push` on i, and the torques on both.
   struct Sharing {
     S distance, far_distance;
     Part near, far;
@@ -262,14 +262,14 @@ template <int D, class S> class SpherocylinderContact {
   {
     const S log_ratio = log_ratio_of(pair, closest, far_end, reach);
     const EndNorm<S> norm(log_ratio, w.value);
-    // In dual numbers what shares change by with the overlaps is left out: `coupling` stands for
-    // it.
+    // In dual numbers the derivatives of the shares with respect to the overlaps are left out:
+    // `coupling` accounts for them.
     const EndNorm<S> fixed(constant(log_ratio), w.value);
     const S distance = sqrt(closest.distance_sq), far_distance = sqrt(far_end.distance_sq);
     const S energy = norm.share_a * law.harmonic.energy(overlap_at(distance)) +
                      norm.share_b * law.harmonic.energy(overlap_at(far_distance));
     const S by_exponent = energy * norm.entropy, by_overlap = 0.5 * by_exponent * w.by_mean;
-    // The norm's exponent over overlaps, less that of two bonds.
+    // Coefficient of the norm's exponent over the overlaps, less that of two bonds.
     const ValueOf<S> curved = most(ValueOf<S>(2.0 / value_of(w.value) - 2.0), ValueOf<S>(0.0));
     const ValueOf<S> root = sqrt(curved * law.harmonic.k_e) * value_of(inverse_reach);
     const ValueOf<S> coupling_a = root * sqrt(value_of(fixed.part_b * fixed.share_a));
@@ -306,7 +306,7 @@ template <int D, class S> class SpherocylinderContact {
     return contact;
   }
 
-  /// The second bonds of lanes that have two whole ones.
+  /// Adds the second bond of lanes with two full bonds.
   void add_far_ends(ContactLanes<D, S> &lanes, Feet<D, S> &closest) const
   {
     const Truth<S> opposite = lanes.touching & far_ends_may_touch(pair, closest, reach);
@@ -324,7 +324,7 @@ template <int D, class S> class SpherocylinderContact {
     lanes.bond_force += add_load(lanes, far_end, distance_of_second, whole()).size;
   }
 
-  /// What a bond adds to a contact's energy, force and torques.
+  /// Contribution of a bond to a contact's energy, force and torques.
   struct Load {
     Vec<D, S> normal, force;
     S overlap, size, energy;
@@ -334,8 +334,8 @@ template <int D, class S> class SpherocylinderContact {
   {
     const S overlap = overlap_at(distance);
     const Vec<D, S> normal = (1.0 / sqrt(feet.distance_sq)) * feet.delta;
-    // In dual numbers the law's own slope is left out here: `own_stiffness` stands for it, so that
-    // what the derivatives of force and torque hold is the small rest, not its sum with a large
+    // In dual numbers the slope of the law is left out here: `own_stiffness` accounts for it, so
+    // that the derivatives of force and torque hold the small remainder, not its sum with a large
     // number.
     const S slope = part.share * law.harmonic.energy_gradient(constant(overlap)) + part.slope;
     const S size = slope * inverse_reach;
@@ -349,14 +349,14 @@ template <int D, class S> class SpherocylinderContact {
   }
 
   /// Adds a bond with the lever arms of `feet` and the overlap of `distance`. Any point on the line
-  /// of `feet` gives the same torque; the one reported lies where the surfaces interpenetrate.
+  /// of `feet` gives the same torque; the reported one lies inside the overlap.
   void add_bond(Found &contact, const Feet<D, S> &feet, const S &distance, const Part &part) const
   {
     const Load load = add_load(contact, feet, distance, part);
     Bond<D, S> &bond = contact.bond[contact.n_bonds++];
     bond.normal = load.normal;
     bond.force = load.force;
-    // Nobody asks for derivatives of these.
+    // Derivatives of these are never needed.
     const auto &values = values_of(pair);
     const auto along = values_of(load.normal);
     const auto depth = radius_i * value_of(distance) * value_of(inverse_reach);
@@ -381,30 +381,31 @@ Contact<D, S, 2> contact_of(const SpherocylinderBody<D, S> &i, const Spherocylin
   return SpherocylinderContact<D, S>(i, j, law).evaluate();
 }
 
-/// With AlongX all that pair styles, Python and sums over pairs need to know of a shape; every
-/// shape has one such struct (see ARCHITECTURE.md, how to add a shape).
+/// Together with AlongX, all that pair styles, Python and sums over pairs need to know about a
+/// shape; every shape has one such struct (see ARCHITECTURE.md, how to add a shape).
 struct SpherocylinderModel : AlongX<Spherocylinder> {
   using Law = SpherocylinderLaw;
 
   static constexpr const char *NAME = "spherocylinder";
   static constexpr const char *SHAPE_RULE =
       "a spherocylinder has diameters (2(A+R), 2R, 2R), its long axis the body's x";
-  /// What of two particles must not cross.
+  /// Name of the core that must not cross that of another particle.
   static constexpr const char *CORE = "spines";
   /// Bonds of a contact, and whether `sides` changes the law.
   static constexpr int MOST_BONDS = 2;
   static constexpr bool HAS_SIDES = true;
-  /// Whether each bond holds a particle like a contact; two bonds side to side are one contact.
+  /// Whether each bond constrains a particle like a separate contact; two bonds side to side are
+  /// one contact.
   static constexpr bool BONDS_ARE_CONTACTS = false;
 
-  /// Without shortcuts particles whose contacts need no search are searched, too.
+  /// Without shortcuts, the search also runs for particles whose contacts have a closed form.
   static Law law(double k_e, Sides sides, bool shortcuts = true)
   {
     return {{k_e}, sides, shortcuts};
   }
   static double k_e(const Law &law) { return law.harmonic.k_e; }
 
-  /// Whose contacts need no search.
+  /// Class of shapes whose contacts have a closed form.
   template <int D> static Shortcut shortcut(const Shape &shape)
   {
     return shape.half_length > 0.0 ? Shortcut::NONE : Shortcut::ROUND;
@@ -415,7 +416,7 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
     return substrate_drag<D>(shape);
   }
 
-  /// Of bond b of a contact.
+  /// Faces of bond b of a contact.
   template <int D, class S>
   static OnFaces on_faces(const Contact<D, S, MOST_BONDS> &contact, int b, const Body<D, S> &,
                           const Body<D, S> &)
@@ -425,7 +426,7 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
     return {is_between || contact.bond[b].on_side_i, is_between || contact.bond[b].on_side_j};
   }
 
-  /// Whether the surfaces of i and j are closer than `margin`.
+  /// Whether the gap between the surfaces of i and j is smaller than `margin`.
   template <int D> static bool closer_than(double margin, const Body<D> &i, const Body<D> &j)
   {
     const double reach = i.radius + j.radius + margin;
@@ -434,7 +435,7 @@ struct SpherocylinderModel : AlongX<Spherocylinder> {
   }
 };
 
-/// Compiled in packs.cpp for each set.
+/// Compiled in packs.cpp for each instruction set.
 template <InstructionSet SET, int D> FindContacts<SpherocylinderModel, D> find_rod_contacts;
 
 template <int D> struct PacksOf<SpherocylinderModel, D> {

@@ -12,14 +12,14 @@ namespace jamshape {
 
 namespace detail {
 
-/// The slow and certain way to a tangency, for any two exponents: the least t with a point y in
+/// The slow but certain way to a tangency, for any two exponents: the least t with a point y in
 /// both bodies scaled by t. With q = 2p and x_k the components of y over the semi-axes, g(y) <= t
-/// where there are u_k with
+/// if there are u_k with
 ///     |x_k| <= u_k^(1/q) t^(1 - 1/q),    sum u_k <= t,
 /// all of them convex cones with self-concordant barriers B (Chares 2009 for the power cone).
-/// Newton's method on t / mu + B with steps cut to 1 / (1 + decrement) then converges from every
-/// interior point (Nesterov & Nemirovskii 1994), flat faces and sharp tips alike, and the t reached
-/// exceeds the least by no more than mu times the barrier's parameter.
+/// Newton's method on t / mu + B with steps damped by 1 / (1 + decrement) then converges from every
+/// interior point (Nesterov & Nemirovskii 1994), for flat faces and sharp tips alike, and the t
+/// reached exceeds the least by at most mu times the barrier's parameter.
 template <int D, class T> class ConeBarrier {
  public:
   static constexpr int M = 3 * D + 1;  // y, t, u of i, u of j
@@ -35,7 +35,7 @@ template <int D, class T> class ConeBarrier {
     of_j.share(x_j, z[D], &z[2 * D + 1]);
   }
 
-  /// Along the path of centres down to mu = `last` t; false where rounding spoiled a step.
+  /// Follows the central path down to mu = `last` t; false if rounding spoiled a step.
   bool follow(T last, int &iterations)
   {
     for (bool is_last = false; !is_last;) {
@@ -46,7 +46,7 @@ template <int D, class T> class ConeBarrier {
     return true;
   }
 
-  /// A normal, and a point of which t is the scale at most.
+  /// A normal, and a point with a scale of at most t.
   Tangency<D, T> tangency() const
   {
     const Vec<D, T> y = point(), x = of_i.components(y);
@@ -58,7 +58,8 @@ template <int D, class T> class ConeBarrier {
   }
 
  private:
-  /// |x| <= u^alpha t^(1 - alpha): slope and bend of its barrier by (x, u, t).
+  /// |x| <= u^alpha t^(1 - alpha): gradient and second derivatives of its barrier with respect to
+  /// (x, u, t).
   struct Cone {
     T slope[3], bend[3][3];
 
@@ -134,8 +135,8 @@ template <int D, class T> class ConeBarrier {
   Vec<M, T> z{};
   T mu;
 
-  static constexpr T NEAR = T(0.3);   // decrement from which whole steps are taken
-  static constexpr T RATIO = T(0.3);  // of one mu to the next
+  static constexpr T NEAR = T(0.3);   // decrement below which full steps are taken
+  static constexpr T RATIO = T(0.3);  // of successive mu
 
   Vec<D, T> point() const
   {
@@ -160,7 +161,7 @@ template <int D, class T> class ConeBarrier {
       const T decrement = sqrt(dot(step, at.residual));
       ++iterations;
       z -= (decrement < NEAR ? T(1) : 1 / (1 + decrement)) * step;
-      if (!is_inside()) {  // nor is what is no number
+      if (!is_inside()) {  // also rejects NaN
         z = before;
         return false;
       }
@@ -186,7 +187,7 @@ template <int D, class T> class ConeBarrier {
     for (int k = 0; k < D; ++k) room -= z[first + k];
     for (int k = 0; k < D; ++k) {
       const Cone cone(half.alpha[k], x[k], z[first + k], t);
-      T to[M][3]{};  // of (x, u, t) by the unknowns
+      T to[M][3]{};  // derivatives of (x, u, t) with respect to the unknowns
       for (int a = 0; a < D; ++a) to[a][0] = sign * half.row[k][a];
       to[first + k][1] = to[D][2] = 1;
       const auto touches = [&](int a) { return a <= D || a == first + k; };

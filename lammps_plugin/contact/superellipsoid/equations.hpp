@@ -10,8 +10,8 @@
 
 namespace jamshape {
 
-/// Where two bodies scaled by `scale` about their centres touch. The one's centre is at r from the
-/// other's; n.r > 0.
+/// Tangency of two bodies scaled by `scale` about their centres. The centre of the first is at r
+/// from that of the second; n.r > 0.
 template <int D, class S> struct Tangency {
   S scale;
   Vec<D, S> normal;   // of any length, along r
@@ -25,7 +25,8 @@ template <int M, class T> struct Matrix {
   T row[M][M];
 };
 
-/// a x = b by elimination with pivots; b of any scalar. A singular matrix gives what is not finite.
+/// Solves a x = b by elimination with pivoting; b of any scalar. A singular matrix gives non-finite
+/// results.
 template <int M, class T, class S> Vec<M, S> solved(Matrix<M, T> a, Vec<M, S> b)
 {
   for (int k = 0; k < M; ++k) {
@@ -49,7 +50,7 @@ template <int M, class T, class S> Vec<M, S> solved(Matrix<M, T> a, Vec<M, S> b)
   return b;
 }
 
-/// The same for a symmetric positive definite matrix, of which the lower half is read.
+/// The same for a symmetric positive definite matrix, of which only the lower half is read.
 template <int M, class T> Vec<M, T> solved_symmetric(Matrix<M, T> a, Vec<M, T> b)
 {
   T inverse[M];
@@ -68,7 +69,7 @@ template <int M, class T> Vec<M, T> solved_symmetric(Matrix<M, T> a, Vec<M, T> b
   return b;
 }
 
-/// In 3D by cofactors: one division instead of three in a row.
+/// In 3D by cofactors, with one division instead of three in sequence.
 template <class T> Vec<3, T> solved_symmetric(const Matrix<3, T> &a, const Vec<3, T> &b)
 {
   const T xx = a.row[0][0], yx = a.row[1][0], yy = a.row[1][1];
@@ -81,8 +82,8 @@ template <class T> Vec<3, T> solved_symmetric(const Matrix<3, T> &a, const Vec<3
            inverse * (c_xz * b[0] + c_yz * b[1] + c_zz * b[2])}};
 }
 
-/// Two bodies that are both flat where they touch (face on face, tip on tip) leave a matrix
-/// singular; this much of its largest element on its diagonal keeps the step finite.
+/// Two bodies that are both flat where they touch (face on face, tip on tip) make the matrix
+/// singular; adding this fraction of its largest element to its diagonal keeps the step finite.
 inline constexpr double FLAT = 1e-15;
 
 template <int D, int M, class T> void lift_diagonal(Matrix<M, T> &a)
@@ -99,9 +100,9 @@ template <int M, class T> struct Linearised {
   Matrix<M, T> jacobian;
 };
 
-/// A symmetric positive definite matrix is well posed if its largest eigenvalue is no more than so
-/// many times the smallest: what equations of contact lose by rounding then turns a normal by no
-/// more than 1e-9 or so. (Times up to D^2: compared are sums of eigenvalues and of their products.)
+/// A symmetric positive definite matrix is well posed if the ratio of its largest to its smallest
+/// eigenvalue is at most this: rounding in the equations of contact then rotates a normal by about
+/// 1e-9 at most. (Times up to D^2: the test compares sums of eigenvalues and of their products.)
 inline constexpr double WELL_POSED = 1e6;
 
 template <class T> Truth<T> is_well_posed(const Matrix<2, T> &a)
@@ -117,11 +118,12 @@ template <class T> Truth<T> is_well_posed(const Matrix<3, T> &a)
   const T c_xx = yy * zz - zy * zy, c_yy = xx * zz - zx * zx, c_zz = xx * yy - yx * yx;
   const T trace = xx + yy + zz, minors = c_xx + c_yy + c_zz;
   const T determinant = xx * c_xx - yx * (yx * zz - zx * zy) + zx * (yx * zy - zx * yy);
-  // Where two eigenvalues are lost in rounding, only the first of these sees it.
+  // If two eigenvalues are lost in rounding, only the first condition detects it.
   return (trace * trace < T(WELL_POSED) * minors) & (trace * minors < T(WELL_POSED) * determinant);
 }
 
-/// Whether the normal n of a plane is what the equations know of a body, or a point of its surface.
+/// Whether the equations represent a body by the normal n of a plane, rather than by a point of its
+/// surface.
 inline bool is_by_normal(double p) { return p <= 1.0; }
 
 template <class T> T smooth_exponent(double p)
@@ -129,14 +131,14 @@ template <class T> T smooth_exponent(double p)
   return is_by_normal(p) ? 1 / (2 * T(p) - 1) : 2 * T(p) - 1;
 }
 
-/// Two bodies, r = x_i - x_j, and the exponents (those of PowerNorm in the norm that is smooth) to
-/// which the equations below are posed: on the way to the bodies' own they pass through others.
+/// Two bodies, r = x_i - x_j, and the exponents (those of PowerNorm in the norm that is smooth) of
+/// the equations below: continuation to the bodies' own exponents passes through others.
 template <int D, class S> struct TangencyProblem {
   const SuperellipsoidBody<D, S> &i, &j;
   Vec<D, S> r;
   Common<ValueOf<S>> exponent_i, exponent_j;
 
-  /// With the bodies' own exponents.
+  /// The problem with the bodies' own exponents.
   static TangencyProblem of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
                             const Vec<D, S> &r)
   {
@@ -145,9 +147,9 @@ template <int D, class S> struct TangencyProblem {
   }
 };
 
-/// Both bodies by their support functions, p <= 1, where these are smooth. With F = h_i + h_j the
+/// Both bodies by their support functions, p <= 1, where these are smooth. With F = h_i + h_j, the
 /// scale at which two bodies touch is the largest r.n / F(n); the n with F(n) = r.n / F(n)
-/// minimises the convex F^2 / 2 - r.n, that is F grad F = r, and eta = F there.
+/// minimises the convex F^2 / 2 - r.n, that is, F grad F = r, and eta = F there.
 template <int D, class S> class ByNormal {
  public:
   static constexpr int M = D;
@@ -186,14 +188,14 @@ template <int D, class S> class ByNormal {
     return solved_symmetric(at.jacobian, at.residual);
   }
 
-  /// Tips leave the matrix nearly singular: their point is the same for many a normal.
+  /// Tips make the matrix nearly singular: many normals share their point.
   static constexpr bool MAY_BE_ILL_POSED = true;
   static Truth<T> is_well_posed(const Matrix<M, T> &jacobian)
   {
     return detail::is_well_posed(jacobian);
   }
 
-  /// Of all lengths of n the one that makes F^2 / 2 - r.n least.
+  /// Scales n to the length that minimises F^2 / 2 - r.n.
   Vec<M, T> start(const Tangency<D, T> &from) const
   {
     const T F = h_i.value(from.normal) + h_j.value(from.normal);
@@ -245,7 +247,7 @@ template <int D, class T> class ByNormalOfEllipsoids {
     return solved_symmetric(at.jacobian, at.residual);
   }
 
-  /// Exact where the two are alike: F^2 = 2 n.(A_i + A_j) n then.
+  /// Exact for two identical ellipsoids: then F^2 = 2 n.(A_i + A_j) n.
   Vec<M, T> start() const
   {
     Matrix<D, T> sum;
@@ -341,7 +343,7 @@ template <int D, class S> class ByPointAndNormal {
 
   static Vec<M, T> step(const Linearised<M, T> &at) { return solved(at.jacobian, at.residual); }
 
-  /// A tip knows the point and a face the normal.
+  /// A tip determines the point and a face the normal.
   static constexpr bool MAY_BE_ILL_POSED = false;
 
   Vec<M, T> start(const Tangency<D, T> &from) const { return from.point_i; }
@@ -358,9 +360,8 @@ template <int D, class S> class ByPointAndNormal {
   PowerNorm<D, S> g_i, h_j;
 };
 
-/// Both bodies by their gauges, p > 1. Unknowns are the point y on i and a weight w: of the point
-/// where max(g_i(y), g_j(r - y)) is least the conditions w grad g_i = (1 - w) grad g_j and
-/// g_i = g_j.
+/// Both bodies by their gauges, p > 1. Unknowns are the point y on i and a weight w: the point
+/// where max(g_i(y), g_j(r - y)) is least satisfies w grad g_i = (1 - w) grad g_j and g_i = g_j.
 template <int D, class S> class ByPoint {
  public:
   static constexpr int M = D + 1;
@@ -397,7 +398,7 @@ template <int D, class S> class ByPoint {
 
   static Vec<M, T> step(const Linearised<M, T> &at) { return solved(at.jacobian, at.residual); }
 
-  /// Faces leave the point open, but they know the normal.
+  /// Faces leave the point undetermined, but they determine the normal.
   static constexpr bool MAY_BE_ILL_POSED = false;
 
   Vec<M, T> start(const Tangency<D, T> &from) const
@@ -418,7 +419,7 @@ template <int D, class S> class ByPoint {
 
  private:
   Vec<D, S> r;
-  T length;  // makes the equations of one unit
+  T length;  // gives all equations the same unit
   PowerNorm<D, S> g_i, g_j;
 
   static Vec<D, S> point(const Vec<M, S> &z)
@@ -439,9 +440,9 @@ template <int D, class S> class ByPoint {
   }
 };
 
-/// Newton's method with steps cut until the residual falls. True when a step was shorter than
-/// `tolerance` of the unknowns: that step is taken and leaves an error of its square. Where the
-/// matrix of the last step is asked for, it is given, too.
+/// Newton's method with steps shortened until the residual decreases. True if a step was shorter
+/// than `tolerance` times the unknowns: that step is taken and leaves an error of its square. On
+/// request, also returns the matrix of the last step.
 template <class Equations, int M, class T>
 bool newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iterations,
             Matrix<M, T> *matrix = nullptr)
@@ -477,8 +478,8 @@ bool newton(const Equations &equations, Vec<M, T> &z, T tolerance, int &iteratio
   return false;
 }
 
-/// The same of all lanes of a pack that are `sought`, where no step is cut: true of those that such
-/// steps lead to the end. A lane that has come there waits.
+/// The same for all lanes of a pack that are `sought`, without shortening of steps: true for those
+/// that full steps lead to convergence. Converged lanes wait.
 template <class Equations, int M, class T>
 Truth<T> newton_in_lanes(const Equations &equations, Vec<M, T> &z, double tolerance,
                          const Truth<T> &sought, Matrix<M, T> *matrix = nullptr)

@@ -14,7 +14,7 @@ namespace jamshape {
 
 namespace detail {
 
-/// Matrices in the plane across a normal.
+/// Matrices in the plane normal to a vector.
 template <int D, class T> using AcrossMatrix = Matrix<D - 1, T>;
 
 template <class T> Matrix<1, T> inverse(const Matrix<1, T> &a) { return {{{1 / a.row[0][0]}}}; }
@@ -43,7 +43,7 @@ template <int M, class T> Matrix<M, T> sum(Matrix<M, T> a, const Matrix<M, T> &b
   return a;
 }
 
-/// At least the factor by which a matrix makes a vector longer; infinite where it is no number.
+/// Upper bound of the norm of a matrix; infinite if it is NaN.
 template <int M, class T> T size_of(const Matrix<M, T> &a)
 {
   T square = 0;
@@ -54,7 +54,7 @@ template <int M, class T> T size_of(const Matrix<M, T> &a)
   return size < std::numeric_limits<T>::max() ? size : std::numeric_limits<T>::infinity();
 }
 
-/// By how much |x|^power changes for every x at most that changes by `off`, in units of `unit`.
+/// Bound of the change of |x|^power for all changes of x up to `off`, in units of `unit`.
 template <int D, class T> struct PowerOff {
   Vec<D, T> x, off, unit;
   T power;
@@ -71,9 +71,9 @@ template <int D, class T> struct PowerOff {
   }
 };
 
-/// One body at the point where another touches it, both scaled by eta: how normal and point change
-/// with each other. Of p <= 1 the normal is the smooth unknown, `bend` takes changes of it to those
-/// of the point; of p > 1 it takes changes of the point to those of the normal.
+/// One body at the point where another touches it, both scaled by eta: the dependence of normal and
+/// point on each other. For p <= 1 the normal is the smooth unknown and `bend` maps its changes to
+/// those of the point; for p > 1 it maps changes of the point to those of the normal.
 template <int D, class T> class BodyAtPoint {
  public:
   using Body = SuperellipsoidBody<D, T>;
@@ -101,11 +101,11 @@ template <int D, class T> class BodyAtPoint {
   bool by_normal() const { return is_by_normal(body.p); }
   T exponent() const { return smooth_exponent<T>(body.p); }
 
-  Vec<D, T> normal, point;  // each from the other
+  Vec<D, T> normal, point;  // each computed from the other
   AcrossMatrix<D, T> bend;
 
-  /// How far the normal is off at most where the point is by `off`, and the other way round: also
-  /// where a face or a tip leaves `bend` zero.
+  /// Bound of the error of the normal for an error `off` of the point, and vice versa: also valid
+  /// at a face or a tip, where `bend` is zero.
   T normal_off(const T &off) const
   {
     PowerOff<D, T> from{{}, {}, {}, 2 * T(body.p) - 1};
@@ -168,14 +168,14 @@ template <int D, class T> class BodyAtPoint {
   }
 };
 
-/// How far the normal (of length 1) and the point are off.
+/// Errors of the normal (of length 1) and of the point.
 template <class T> struct OffByResidual {
   T normal, point;
 };
 
-/// By the residual of the equations of contact, the rounding of these, and their conditioning:
-/// linearly, with a factor for how the bend changes on the way to the solution, and by how normal
-/// and point of each body bound each other.
+/// Errors from the residual of the equations of contact, its rounding, and their conditioning: to
+/// linear order, with a factor for the change of curvature on the way to the solution, and from how
+/// normal and point of each body bound each other.
 template <int D, class T> class Conditioning {
  public:
   using At = BodyAtPoint<D, T>;
@@ -233,11 +233,12 @@ template <int D, class T> class Conditioning {
     const auto inverted = inverse(matrix);
     const T point = size_of(inverted) * residual;
     const T normal = size_of(product(i.bend, inverted)) * residual;
-    // The point of j is as far from that of this normal as the residual says.
+    // The distance of the point of j from that of this normal is the residual.
     return {std::min(steepest * normal, j.normal_off(point + residual)) + ROUNDING, point};
   }
 
-  /// The share of a residual that one of two bends takes, at least 1; the smaller of both.
+  /// The larger fraction of a residual that one of the two bodies takes, at least 1; the smaller of
+  /// two bounds.
   T shared(const AcrossMatrix<D, T> &inverse_sum) const
   {
     const T share =
@@ -248,7 +249,7 @@ template <int D, class T> class Conditioning {
 
 }  // namespace detail
 
-/// Of the two bounds of the scale, and of Conditioning.
+/// Errors from the two bounds of the scale, and from Conditioning.
 template <int D, class T>
 ErrorsOfGeometry<T> errors_of_geometry(const SuperellipsoidBody<D, T> &i,
                                        const SuperellipsoidBody<D, T> &j,

@@ -1,4 +1,4 @@
-// Compiled once for each set of instructions, JAMSHAPE_SET.
+// Compiled once for each instruction set, JAMSHAPE_SET.
 
 #include "contact/contact_block.hpp"
 #include "contact/math/pack.hpp"
@@ -38,20 +38,19 @@ template <int D> bool are_round(const BodyLanes<D> &bodies)
 template <int D> struct PairLanes {
   BodyLanes<D> i, j;
   Vec<D, Pack> r;
-  Mask near;  // those whose spheres touch
+  Mask near;  // lanes whose bounding spheres touch
 };
 
-/// Of pairs that are sought, as no plane was seen to divide them, whether and where they touch.
+/// Whether and where the pairs touch that no plane was found to separate.
 template <int D> struct FoundLanes {
   Tangency<D, Pack> at;
   Mask sought, found;
 };
 
-/// How short the last step of Newton's method is that only begins another search.
+/// Tolerance of the last Newton step of a search that only provides a starting point.
 inline constexpr double ROUGH = 1e-2;
 
-/// Normals to begin with: those of the block where it has any, and they point along r, elsewhere
-/// those of ellipsoids.
+/// Initial normals: those of the block if it has any that point along r, else those of ellipsoids.
 template <int D>
 Vec<D, Pack> begin(const PairLanes<D> &pairs, const ContactBlock<D> &block, int first)
 {
@@ -83,7 +82,7 @@ template <int D> FoundLanes<D> found_by_ellipsoids(const PairLanes<D> &pairs, Ve
   return {equations.tangency(n), sought, found};
 }
 
-/// At once with their own exponents.
+/// Solves directly with the bodies' own exponents.
 template <class Equations, int D>
 FoundLanes<D> found_by(const PairLanes<D> &pairs, const Vec<D, Pack> &n)
 {
@@ -152,8 +151,8 @@ ContactLanes<D, Pack> contacts_of(const SuperellipsoidBody<D> *bodies, ContactBl
 
 }  // namespace
 
-/// Flattened: whatever is called becomes part of it, and no function of these instructions stands
-/// by itself under a name that other files have, too.
+/// Flattened: all called functions are inlined, so that none compiled for this instruction set
+/// exists under a name that other files share.
 template <InstructionSet SET, int D>
 [[gnu::flatten]] void find_superellipsoid_contacts(const SuperellipsoidBody<D> *bodies,
                                                    const SuperellipsoidLaw &,

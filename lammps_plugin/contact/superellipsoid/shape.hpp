@@ -30,8 +30,8 @@ struct Superellipsoid {
     return p == 1.0;
   }
 
-  /// Of spheroids the first axis whose two others are equal; other exponents have corners or edges
-  /// about every axis.
+  /// Axis of symmetry of a spheroid, whose two other axes are equal; other exponents have corners
+  /// or edges about every axis.
   std::optional<int> symmetry_axis() const
   {
     for (int k = 0; k < 3; ++k) {
@@ -41,7 +41,7 @@ struct Superellipsoid {
   }
 
   /// The longest axis of long particles and the shortest of flat ones (Yuan et al. 2019, Sec. 2.4);
-  /// the first where they are equal, as in cubes.
+  /// the first one if they are equal, as in cubes.
   template <int D> std::optional<int> director() const
   {
     if (is_round<D>()) return std::nullopt;
@@ -68,7 +68,7 @@ struct Superellipsoid {
   }
 };
 
-/// Nothing unless the semi-axes are lengths and the particle is strictly convex.
+/// Returns nothing unless the semi-axes are positive lengths and the particle is strictly convex.
 inline std::optional<Superellipsoid> superellipsoid_from(const Vec<3> &semi_axes, double p)
 {
   for (int k = 0; k < 3; ++k) {
@@ -95,7 +95,8 @@ template <int D> SubstrateDrag substrate_drag(const Superellipsoid &shape)
   return {volume, {{mean_sq[1] + mean_sq[2], mean_sq[0] + mean_sq[2], about_z}}};
 }
 
-/// Shape and pose of one particle, as the pair loops read it; in packs of several, of one exponent.
+/// Shape and pose of one particle, as the pair loops read it; in packs, of several with the same
+/// exponent.
 template <int D, class S = double> struct SuperellipsoidBody {
   Vec<D, S> centre;
   Vec<D, S> axis[D];
@@ -104,13 +105,13 @@ template <int D, class S = double> struct SuperellipsoidBody {
   Plain<S> bounding_radius;
 };
 
-/// Where the surface bends by less than this part of what the ellipsoid of the same axes does, it
-/// is a face: the point of contact then moves ten times as far as on that when the particle turns.
+/// The surface is a face where its curvature is below this fraction of that of the ellipsoid of the
+/// same axes: the point of contact then moves ten times as far when the particle rotates.
 inline constexpr double FACE_CURVATURE = 0.1;
 
-/// Whether the surface is flat in all directions at a point, from the centre, or at that of a
-/// scaled body. Near the end of axis k it bends along axis l by (2p-1) |x_l/a_l|^(2p-2) times the
-/// ellipsoid's a_k / a_l^2.
+/// Whether the surface is flat in all directions at a point, relative to the centre, or at that of
+/// a scaled body. Near the end of axis k its curvature along axis l is (2p-1) |x_l/a_l|^(2p-2)
+/// times the ellipsoid's a_k / a_l^2.
 template <int D, class S>
 bool is_flat_at(const SuperellipsoidBody<D, S> &body, const Vec<D, S> &point)
 {
@@ -129,8 +130,9 @@ bool is_flat_at(const SuperellipsoidBody<D, S> &body, const Vec<D, S> &point)
   return true;
 }
 
-/// x^e of x >= 0. Small whole powers, all that the usual shapes need, are products; of scalars
-/// without derivatives half ones, too (the root of a dual number has none at 0, but x^1.5 has one).
+/// x^e for x >= 0. Small integer powers, which the usual shapes need, are products; so are
+/// half-integer ones of scalars without derivatives (the square root of a dual number has no
+/// derivative at 0, but x^1.5 has).
 template <class T> class Exponent {
  public:
   explicit Exponent(T exponent) : e(exponent), halves(halves_in(exponent)) {}
@@ -148,7 +150,7 @@ template <class T> class Exponent {
 
  private:
   T e;
-  int halves;  // in e, or -1
+  int halves;  // 2e, or -1
 
   static int halves_in(T exponent)
   {
@@ -179,11 +181,10 @@ template <int D, class T> struct CurvedNormAt {
 };
 
 /// N(v) = (sum |s_k v_k|^(e+1))^(1/(e+1)), v_k along the body's axes. Both norms of a
-/// superellipsoid are of this form, each the other's dual:
+/// superellipsoid have this form, each the dual of the other:
 ///     the gauge g of a point, 1 on the surface:     s_k = 1 / a_k, e = 2p - 1
 ///     the support function h of a direction:        s_k = a_k,     e = 1 / (2p - 1)
-/// The gradient of g at a point is a normal there; the gradient of h the point where that is
-/// normal.
+/// The gradient of g at a point is a normal there; the gradient of h is the point with that normal.
 template <int D, class S> class PowerNorm {
  public:
   using T = ValueOf<S>;
@@ -221,7 +222,7 @@ template <int D, class S> class PowerNorm {
     return norm;
   }
 
-  /// Not of dual numbers.
+  /// Not available for dual numbers.
   CurvedNormAt<D, T> curved_at(const Vec<D, T> &v) const
   {
     const Components c = components<true>(v);
@@ -254,7 +255,7 @@ template <int D, class S> class PowerNorm {
     T bend[D];  // s_k^2 (|s_k v_k| / N)^(e-1), where CURVED
   };
 
-  /// Second derivatives are for plain numbers and e >= 1, where the norm is smooth.
+  /// Second derivatives require plain numbers and e >= 1, where the norm is smooth.
   template <bool CURVED> Components components(const Vec<D, S> &v) const
   {
     S t[D], largest = 0.0;
@@ -266,7 +267,7 @@ template <int D, class S> class PowerNorm {
     Components c;
     S sum = T(0), power[D];
     T lower_power[D]{};
-    for (int k = 0; k < D; ++k) {  // nothing over- or underflows: the largest ratio is 1
+    for (int k = 0; k < D; ++k) {  // no over- or underflow: the largest ratio is 1
       const S ratio = abs(t[k]) * inverse;
       if constexpr (CURVED) {
         lower_power[k] = e_minus_one(ratio);

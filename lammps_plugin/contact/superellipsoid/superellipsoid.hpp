@@ -21,11 +21,11 @@ namespace jamshape {
 /// overlap 1 - eta^2.
 struct SuperellipsoidLaw {
   double epsilon;
-  bool shortcuts;  // false: spheres and ellipsoids by the search of all exponents, too
+  bool shortcuts;  // false: also spheres and ellipsoids by the search for all exponents
 };
 
-/// A scale with a larger relative error bar is no contact that could be computed: it is reported as
-/// such (UNCONVERGED), not dropped. None has been seen.
+/// Above this relative error bar of the scale the contact could not be computed and is reported as
+/// UNCONVERGED, not dropped. No such case is known.
 inline constexpr double USELESS = 1e-6;
 
 template <int D, class S>
@@ -35,8 +35,8 @@ Tangency<D, S> tangency_of_spheres(const Vec<D, S> &r, const Plain<S> &R_i, cons
   return {norm(r) / d, r, S(R_i / d) * r, S(R_j / d) * r};
 }
 
-/// What a tangency at r adds to a contact. In dual numbers the law's own slope is a constant:
-/// `own_stiffness` stands for what it leaves out (see ContactDerivatives).
+/// Contribution of a tangency at r to a contact. In dual numbers the slope of the law is held
+/// constant: `own_stiffness` accounts for it (see ContactDerivatives).
 template <int D, class S> struct TangencyLoad {
   S x, overlap, energy;
   Vec<D, S> gradient, force, arm_i, arm_j;
@@ -53,15 +53,15 @@ template <int D, class S> struct TangencyLoad {
 
 /// Contact of two superellipsoids in 2D or 3D. With x = eta^2, n the common normal where the scaled
 /// bodies touch, grad_r x = 2 x n / (r.n): the printed force (Yuan et al. 2019, Eq. 3) lacks one
-/// eta. Torques are by the envelope theorem those of this force at the point of tangency of the
-/// **scaled** bodies. The one bond has as normal and levers the gradient of x over |grad_r x|, that
-/// of a length; as reach 1 / |grad_r x|, so that the stiffness is epsilon / reach^2 as of other
-/// laws; as distance reach times x, so that 1 - distance / reach is the overlap. For two spheres of
-/// contact distance d the distance is r / 2, and reach d / 2 where they touch.
+/// eta. By the envelope theorem the torques are those of this force at the point of tangency of the
+/// **scaled** bodies. Normal and levers of the one bond are the gradient of x over |grad_r x|, that
+/// of a length; its reach is 1 / |grad_r x|, so that the stiffness is epsilon / reach^2 as for
+/// other laws; its distance is reach times x, so that 1 - distance / reach is the overlap. For two
+/// spheres of contact distance d the distance is r / 2, and the reach d / 2 where they touch.
 ///
-/// Where two faces lie on each other, the scale hardly depends on the point of tangency, and where
-/// two tips do, hardly on the normal: a small gap between the bounds of the scale says nothing of
-/// these (see errors.hpp).
+/// Where two faces are in contact, the scale hardly depends on the point of tangency, and where two
+/// tips are, hardly on the normal: a small gap between the bounds of the scale does not bound the
+/// errors of these (see errors.hpp).
 template <int D, class S> class SuperellipsoidContact {
  public:
   using Found = Contact<D, S, 1>;
@@ -74,7 +74,7 @@ template <int D, class S> class SuperellipsoidContact {
   {
   }
 
-  /// Begins at a normal and leaves there the one it found, also where the bodies are apart.
+  /// Starts from the normal `last` and replaces it by the one found, also if the bodies are apart.
   Found evaluate_from(Vec<D, T> &last) { return evaluate_with(&last); }
 
   Found evaluate() const { return evaluate_with(nullptr); }
@@ -85,7 +85,7 @@ template <int D, class S> class SuperellipsoidContact {
   Harmonic law;
   bool shortcuts;
 
-  static constexpr bool IS_PLAIN = sizeof(S) == sizeof(T);  // no derivatives beside the value
+  static constexpr bool IS_PLAIN = sizeof(S) == sizeof(T);  // no derivatives
 
   Found evaluate_with(Vec<D, T> *last) const
   {
@@ -97,7 +97,7 @@ template <int D, class S> class SuperellipsoidContact {
       return without_bonds<D, S, Found::MOST_BONDS>(ContactStatus::CROSSING);
     }
     if (shortcuts && is_round(i) && is_round(j))
-      // Bounded by themselves.
+      // A closed form bounds itself.
       return touching(tangency_of_spheres(r, i.semi_axes[0], j.semi_axes[0]), T(0));
     const FoundTangency<D, T> found = find_tangency(last);
     if (last != nullptr) *last = found.at.normal;
@@ -177,8 +177,8 @@ Contact<D, S, 1> contact_of(const SuperellipsoidBody<D, S> &i, const Superellips
   return SuperellipsoidContact<D, S>(i, j, law).evaluate();
 }
 
-/// The same, begun at the normal that this pair had a moment before (any vector at first), which is
-/// replaced by the present one: a step or two instead of ten.
+/// The same, starting from the normal that this pair had at the previous step (any vector at
+/// first), which is replaced by the present one: one or two iterations instead of ten.
 template <int D, class S>
 Contact<D, S, 1> contact_of(const SuperellipsoidBody<D, S> &i, const SuperellipsoidBody<D, S> &j,
                             const SuperellipsoidLaw &law, Vec<D, ValueOf<S>> &last_normal)
@@ -186,7 +186,7 @@ Contact<D, S, 1> contact_of(const SuperellipsoidBody<D, S> &i, const Superellips
   return SuperellipsoidContact<D, S>(i, j, law).evaluate_from(last_normal);
 }
 
-/// What is asked of a shape (see SpherocylinderModel).
+/// Interface of a shape (see SpherocylinderModel).
 struct SuperellipsoidModel {
   using Shape = Superellipsoid;
   using Law = SuperellipsoidLaw;
@@ -274,9 +274,9 @@ struct SuperellipsoidModel {
     return {is_flat_at(i, arm_i), is_flat_at(j, arm_i + (i.centre - j.centre))};
   }
 
-  /// Whether the surfaces of i and j may be closer than `margin`: false where the gap between two
-  /// parallel planes says no. Tried are the planes across the line of centres, those of the bodies'
-  /// axes and nearly that of two ellipsoids.
+  /// Whether the surfaces of i and j may be closer than `margin`: false if the gap between two
+  /// parallel planes excludes it. The planes tried are normal to the line of centres, to the
+  /// bodies' axes and, nearly, the tangent plane of two ellipsoids.
   template <int D> static bool closer_than(double margin, const Body<D> &i, const Body<D> &j)
   {
     const Vec<D> r = i.centre - j.centre;
@@ -307,7 +307,7 @@ struct SuperellipsoidModel {
     return pose;
   }
 
-  /// Upper bound of the squared distance that any point of the body moved, |dx + sum x_k du_k| over
+  /// Upper bound of the squared displacement of any point of the body, |dx + sum x_k du_k| over
   /// |x_k| <= a_k.
   template <int D>
   static double motion_sq(const Vec<D> &shift, const Body<D> &now, const Pose<D> &then)
@@ -319,7 +319,7 @@ struct SuperellipsoidModel {
   }
 };
 
-/// Compiled in packs.cpp for each set.
+/// Compiled in packs.cpp for each instruction set.
 template <InstructionSet SET, int D>
 FindContacts<SuperellipsoidModel, D> find_superellipsoid_contacts;
 

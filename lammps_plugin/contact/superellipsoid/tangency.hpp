@@ -13,46 +13,46 @@
 
 namespace jamshape {
 
-/// A step of Newton's method that is shorter than this part of the unknowns is the last.
+/// A Newton step shorter than this fraction of the unknowns is the last.
 inline constexpr double SHORT_STEP = 1e-9;
 
-/// The same in a scalar of more digits: the error that such a step leaves, its square, is below
-/// these.
+/// The same in a scalar of higher precision: the error left by such a step, its square, is below
+/// that precision.
 template <class T> constexpr double short_step()
 {
   constexpr int DIGITS = std::numeric_limits<T>::digits;
   return DIGITS <= 53 ? SHORT_STEP : DIGITS <= 64 ? 1e-11 : 1e-18;
 }
 
-/// A tangency found by iteration: eta lies in scale (1 +- gap), whatever the iteration did.
+/// A tangency found by iteration: eta lies in scale (1 +- gap), regardless of convergence.
 template <int D, class T> struct FoundTangency {
   Tangency<D, T> at;
   T gap;
   int iterations;
   bool is_fallback;
-  bool is_apart;    // decided by a separating plane; the tangency was not sought then
+  bool is_apart;    // decided by a separating plane, without a search for the tangency
   bool is_settled;  // the iteration converged, its bounds meet, and its equations have one solution
 };
 
-/// A gap between bounds of the scale that is larger than this part of the overlap is no longer far
-/// below it.
+/// A gap between the bounds of the scale is far below the overlap if it is less than this fraction
+/// of it.
 inline constexpr double FAR_BELOW = 1e-3;
 
-/// Whether an overlap of two bounds, 1 - scale^2, has its leading digits.
+/// Whether the leading digits of an overlap, 1 - scale^2, are determined by its bounds.
 template <class T> Truth<T> is_far_below(const T &gap, const T &scale)
 {
   return gap <= T(FAR_BELOW) * abs((T(1.0) - scale) * (T(1.0) + scale));
 }
 
-/// Whether doubles are too short to say if two bodies touch, and with which force.
+/// Whether double precision is insufficient to decide if two bodies touch, and with which force.
 template <int D> bool needs_digits(const FoundTangency<D, double> &found)
 {
   if (found.is_apart || found.at.scale * (1.0 - found.gap) >= 1.0) return false;
   return !found.is_settled || !is_far_below(found.gap, found.at.scale);
 }
 
-/// What is asked of a pair: r = x_i - x_j, whether "apart" is answer enough where a plane divides
-/// the bodies, a normal to begin with (or null), and whether ellipsoids may take their own path.
+/// Options of the search: r = x_i - x_j, whether it may stop with "apart" if a plane separates the
+/// bodies, an initial normal (or null), and whether ellipsoids may take their closed path.
 template <int D, class T> struct TangencyWish {
   Vec<D, T> r;
   bool may_stop_apart;
@@ -61,8 +61,8 @@ template <int D, class T> struct TangencyWish {
 };
 
 /// Bounds of the scale, |scale - eta| / scale < gap: the plane with normal n gives the lower one,
-/// r.n / (h_i + h_j), a point y the upper, max(g_i(y), g_j(r - y)). The equations have met one half
-/// of each by how the tangency follows from their unknowns.
+/// r.n / (h_i + h_j), a point y the upper, max(g_i(y), g_j(r - y)). One half of each follows from
+/// how the equations derive the tangency from their unknowns.
 template <int D, class T>
 T gap_of(const detail::TangencyProblem<D, T> &pair, const Tangency<D, T> &at)
 {
@@ -79,16 +79,16 @@ T gap_of(const detail::TangencyProblem<D, T> &pair, const Tangency<D, T> &at)
   return gap / at.scale;
 }
 
-/// Finds the tangency of two bodies in plain numbers T. From the ellipsoids of the same axes, where
-/// Newton's method takes four steps, it follows the solution as the exponents grow, in stages of
-/// one to a few Newton steps each. Where a stage fails it starts again with finer ones, then from
-/// centres of a barrier, which exist and are found for every pair. Method and measurements:
-/// analysis/contact_error.py.
+/// Finds the tangency of two bodies in plain numbers T. Starting from the ellipsoids of the same
+/// axes, where Newton's method takes four steps, it follows the solution as the exponents grow, in
+/// stages of a few Newton steps each. If a stage fails, it starts again with finer ones, then from
+/// points of the central path of a barrier, which exist and are found for every pair. Method and
+/// measurements: analysis/contact_error.py.
 template <int D, class T> class TangencySearch {
  public:
   using Body = SuperellipsoidBody<D, T>;
 
-  /// Bodies are symmetric about their centres, so exchanging them leaves r as it is.
+  /// Bodies are symmetric about their centres, so that exchanging them leaves r unchanged.
   TangencySearch(const Body &body_i, const Body &body_j, const TangencyWish<D, T> &wish) :
       r(wish.r), may_stop_apart(wish.may_stop_apart), shortcuts(wish.shortcuts),
       is_swapped(detail::is_by_normal(body_i.p) && !detail::is_by_normal(body_j.p)),
@@ -96,7 +96,7 @@ template <int D, class T> class TangencySearch {
   {
   }
 
-  /// Relative gap at which a tangency is found: the bounds then agree to their own rounding.
+  /// Relative gap at which a tangency counts as found: the bounds then agree to rounding.
   static constexpr T GAP = 64 * std::numeric_limits<T>::epsilon();
 
   FoundTangency<D, T> find() const
@@ -112,7 +112,7 @@ template <int D, class T> class TangencySearch {
     return ordered(found);
   }
 
-  /// From a normal near the one sought; where that leads nowhere, without it.
+  /// Searches from a nearby normal; if that fails, without it.
   FoundTangency<D, T> find_from(const Vec<D, T> &n) const
   {
     using Norm = PowerNorm<D, T>;
@@ -130,8 +130,8 @@ template <int D, class T> class TangencySearch {
     return is_found(found, 1.0) ? ordered(found) : find();
   }
 
-  /// Whether the scale is below 1, or nothing where doubles are too short to say; a point inside
-  /// both bodies ends it early, as a plane between them.
+  /// Whether the scale is below 1, or nothing if doubles cannot decide; stops early at a point
+  /// inside both bodies or a plane between them.
   std::optional<bool> is_overlap() const
   {
     FoundTangency<D, T> found{};
@@ -150,8 +150,7 @@ template <int D, class T> class TangencySearch {
     return found.at.scale < 1;
   }
 
-  /// From a tangency near the one sought, found before or in fewer digits; false if it leads
-  /// nowhere.
+  /// Improves a nearby tangency, found before or in lower precision; false on failure.
   bool improve(FoundTangency<D, T> &found) const
   {
     found = ordered(found);
@@ -174,7 +173,7 @@ template <int D, class T> class TangencySearch {
 
   static constexpr T TOLERANCE = T(short_step<T>());
   static constexpr T ROUGH = T(1e-2);
-  static constexpr double RATIOS[] = {3.0, 1.5};  // of exponents, stage to stage
+  static constexpr double RATIOS[] = {3.0, 1.5};  // ratio of exponents, stage to stage
   static constexpr double BARRIERS[] = {1e-4,  1e-6,  1e-8,  1e-9,  1e-10, 1e-11, 1e-12, 1e-13,
                                         1e-15, 1e-17, 1e-20, 1e-23, 1e-26, 1e-29};  // their last mu
 
@@ -222,9 +221,9 @@ template <int D, class T> class TangencySearch {
     return found;
   }
 
-  /// The first attempt that ends in a short step and within bounds; else, where both bodies are so
-  /// flat that steps stay long, the one of the closest bounds. Those of a centre differ by 20
-  /// times its mu, and rounding.
+  /// Keeps the first attempt that ends in a short step and within bounds; if both bodies are so
+  /// flat that steps stay long, the one with the closest bounds. Those from the central path differ
+  /// by 20 times its mu, and rounding.
   void follow(FoundTangency<D, T> &found) const
   {
     const Tangency<D, T> start = found.at;
@@ -258,7 +257,7 @@ template <int D, class T> class TangencySearch {
     return is_converged && found.gap <= GAP;
   }
 
-  /// The bounds of a normal and a point that need not belong to each other.
+  /// Sets the bounds from a normal and a point that need not belong to each other.
   void bound(FoundTangency<D, T> &found) const
   {
     found.at.scale = reach_of(found.at.point_i);
@@ -267,7 +266,7 @@ template <int D, class T> class TangencySearch {
     if (!(found.gap >= T(0))) found.gap = std::numeric_limits<T>::infinity();
   }
 
-  /// In stages of this ratio, or at once for ratio 1.
+  /// Continues to the bodies' own exponents in stages of this ratio, or directly for ratio 1.
   bool to_own_exponents(FoundTangency<D, T> &found, double ratio) const
   {
     if (detail::is_by_normal(i.p)) return in_stages<detail::ByNormal<D, T>>(found, ratio);
@@ -301,7 +300,7 @@ template <int D, class T> class TangencySearch {
     return is_converged;
   }
 
-  /// Whole powers cost no logarithm.
+  /// Integer powers need no logarithm.
   static T between(T exponent, T share)
   {
     const T power = pow(exponent, share);
@@ -309,7 +308,7 @@ template <int D, class T> class TangencySearch {
   }
 };
 
-/// In plain numbers T, without derivatives.
+/// A vector in plain numbers T, without derivatives.
 template <class T, int D, class S> Vec<D, T> plain(const Vec<D, S> &v)
 {
   Vec<D, T> values;
@@ -335,8 +334,8 @@ template <class T, int D, class S> Tangency<D, T> plain(const Tangency<D, S> &at
           plain<T>(at.point_j)};
 }
 
-/// The tangency of two bodies, or that they are apart where this is all the caller wants; begun at
-/// the normal `last` where that is given (the pair's, a moment before).
+/// The tangency of two bodies, or only that they are apart if that suffices; starts from the normal
+/// `last` if given (the pair's, at the previous step).
 template <int D>
 FoundTangency<D, double> tangency_of(const SuperellipsoidBody<D, double> &i,
                                      const SuperellipsoidBody<D, double> &j,
@@ -346,7 +345,7 @@ FoundTangency<D, double> tangency_of(const SuperellipsoidBody<D, double> &i,
   return wish.last == nullptr ? search.find() : search.find_from(*wish.last);
 }
 
-/// Long doubles are reached from the solution in doubles by a step or two.
+/// In long doubles, one or two steps from the solution in doubles.
 template <int D>
 FoundTangency<D, long double> tangency_of(const SuperellipsoidBody<D, long double> &i,
                                           const SuperellipsoidBody<D, long double> &j,

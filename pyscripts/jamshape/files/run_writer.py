@@ -53,7 +53,7 @@ def fold(path: PathLike) -> None:
 class RunWriter:
     """Appends to the file of a run: rows to its journal, which are folded into the file now and then.
 
-    The file is whole at every moment, and what is read with `jamshape.files.h5md` has all rows; other
+    The file is complete at any time, and reading with `jamshape.files.h5md` returns all rows; other
     programs see those that were folded, all of them once the writer is closed. Nobody else can write the
     run until then. It is a context manager, which closes it.
 
@@ -307,7 +307,7 @@ class RunWriter:
 
     @contextmanager
     def _replacing(self, change: Any, *, is_last: bool = False) -> Iterator[h5py.File]:
-        """Replace the file by a changed one, from which an empty journal goes on."""
+        """Replace the file by a changed one, continued by an empty journal."""
         began, token = perf_counter(), None if is_last else new_token()
         with change as file:
             yield file

@@ -1,4 +1,4 @@
-"""Flows in files: a run of `jamshape.flow.motion` recorded in H5MD, which goes on after a kill."""
+"""Flows in files: a run of `jamshape.flow.motion` recorded in H5MD, resumed after a kill."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def require_same(to: Recording, settings: Motion, dimension: int) -> None:
 def begin(session: Session, settings: Motion, start: Packing, to: Recording) -> FlowRun[Motion]:
     """Start a run and its file."""
     run = FlowRun(session, settings, start)
-    to.restarts.forget()  # of another run, which was cut off and is begun anew
+    to.restarts.forget()  # of another run, interrupted, and started over
     first = run.measure()
     run.write_restart(to.restarts.next())
     attributes = dataclasses.asdict(settings) | dict(to.attributes)
@@ -132,7 +132,7 @@ def settings_of(stored: Mapping[str, Any]) -> Motion:
 def resume(session: Session, path: Path) -> tuple[FlowRun[Motion], Recording]:
     """Resume a killed run from its newest whole restart file, with its settings.
 
-    Without any it begins anew from its first frame.
+    Without any it starts over from its first frame.
 
     Raises
     ------

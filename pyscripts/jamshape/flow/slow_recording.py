@@ -1,4 +1,4 @@
-"""Slow flows in files: a run of `jamshape.flow.implicit` recorded in H5MD, which goes on after a kill."""
+"""Slow flows in files: a run of `jamshape.flow.implicit` recorded in H5MD, resumed after a kill."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jamshape.landscape import Landscape, State
 from jamshape.measures.runs import onset_report
 from jamshape.packing import Packing
 
-# Steps between two frames, from which a run goes on.
+# Steps between two frames, from which a run resumes.
 STEPS_PER_FRAME = 100
 
 _ROW = (

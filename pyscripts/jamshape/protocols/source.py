@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.checks import RANGES
+from jamshape.checks import RANGES, ArgumentError
 from jamshape.files.disk import named
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.measures.runs import rate_of
@@ -65,10 +65,8 @@ class Source(NamedTuple):
         for name, value in asked.items():
             own = getattr(self, name)
             if value is not None and value != own:
-                msg = (
-                    f"{name} is {value} but {own} in the start {named(self.path)}; leave {name} out"
-                )
-                raise ValueError(msg)
+                said = f"{{{name}}} differs from {own} of {{start}}; leave it out"
+                raise ArgumentError(said, {name: value, "start": named(self.path)})
         if particles is not None and not self._has(particles):
             msg = (
                 f"the start {named(self.path)} holds {self.n} particles of {self.particles}, expected those"

@@ -148,5 +148,5 @@ def test_factors_of_what_is_not_finite_are_refused(jammed):
     with pytest.raises(ValueError, match="not a number"):
         posed.vicinity.factorise(np.zeros(posed.n), 0.0, np.full(posed.n, np.nan))
     for guesses in ((np.nan, 0.0), (0.0, np.nan)):
-        with pytest.raises(ValueError, match="a part of a stage is nan"):
+        with pytest.raises(ValueError, match="a vector of a stage is nan"):
             posed.solve(*(np.full(posed.n, guess) for guess in guesses))

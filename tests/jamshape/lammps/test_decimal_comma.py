@@ -1,4 +1,4 @@
-"""A decimal comma of the host program (LC_NUMERIC), by which LAMMPS reads 0.5 as 0, changes nothing."""
+"""A decimal comma of the host program (LC_NUMERIC), with which LAMMPS reads 0.5 as 0, changes nothing."""
 
 from __future__ import annotations
 

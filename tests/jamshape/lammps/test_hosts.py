@@ -24,7 +24,7 @@ except Exception as error:
     print("caught", type(error).__name__, error)
 print("still alive")
 """
-SENTENCE = "caught LammpsError fix overdamped/affine found timestep 2 past the stability limit"
+SENTENCE = "caught LammpsError fix overdamped/affine found timestep 2 above the stability limit"
 COMPRESSED = """
 import os, jamshape as js
 run = js.compress(js.Spherocylinders(alpha=1), n=8, phi=(0.3, 0.4), kappa=1e-2, rows=2, frames=2, {file}progress=False)

@@ -100,7 +100,7 @@ def test_a_compression_that_is_refused_leaves_a_whole_file(tmp_path):
     """Its time step is past what the pressure on the way lets it be."""
     rods = js.Spherocylinders(alpha=4)
     settings = {"n": 16, "kappa": 1e-2, "phi": (0.4, 1.4), "progress": False}
-    with pytest.raises(LammpsError, match=r"found timestep 3 past the stability limit"):
+    with pytest.raises(LammpsError, match=r"found timestep 3 above the stability limit"):
         js.compress(rods, dt=3.0, file=tmp_path / "refused.h5", **settings)
     assert not read_attributes(tmp_path / "refused.h5")["finished"]
     assert np.isfinite(read_observables(tmp_path / "refused.h5")["pressure"]).all()

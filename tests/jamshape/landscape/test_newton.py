@@ -128,11 +128,11 @@ def test_equations_are_refused_before_they_are_prepared_and_of_another_size():
     with pytest.raises(ValueError, match="not prepared, expected prepare before"):
         _ = newton.coupling
     newton.prepare()
-    with pytest.raises(ValueError, match="right has another length"):
+    with pytest.raises(ValueError, match="right does not have"):
         newton.solve(right[:, 1:], 1e-3)
     right[0, 2] = np.nan
     with pytest.raises(ValueError, match="number 2 of right is"):
         newton.solve(right, 1e-3)
     for shift in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="the shift is no positive number"):
+        with pytest.raises(ValueError, match="the shift is not a positive number"):
             Vicinity(landscape, State.of(packing)).newton(shift)

@@ -220,9 +220,9 @@ def test_a_search_ends_after_so_many_minimisations(run, tmp_path, monkeypatch):
 
 
 OTHERS = {
-    "n is 32 and that of the start": {"n": 32},
-    "seed is 4 and that of the start": {"seed": 4},
-    "dimension is 3 and that of the start": {"dimension": 3},
+    "n=32 differs from 16 of start=": {"n": 32},
+    "seed=4 differs from 3 of start=": {"seed": 4},
+    "dimension=3 differs from 2 of start=": {"dimension": 3},
     "kappa=1e-06 has no effect on a start": {"kappa": 1e-6},
     "phi_end=0.9 has no effect on a start": {"phi_end": 0.9},
     "phi_start=0.3 has no effect on a start": {"phi_start": 0.3},

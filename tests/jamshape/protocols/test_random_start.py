@@ -158,7 +158,7 @@ def test_box_too_short_for_the_longest(alpha, dimension):
     assert random_packing(1, phi, 1, rod, dimension=dimension).n == 1
 
 
-NO_ROD = r"a particle of the mixture is no spherocylinder, expected \(2\(A\+R\), 2R, 2R\)"
+NO_ROD = r"a particle of the mixture is not a spherocylinder, expected \(2\(A\+R\), 2R, 2R\)"
 
 
 @pytest.mark.parametrize(

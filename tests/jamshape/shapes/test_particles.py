@@ -8,7 +8,7 @@ import pytest
 
 from jamshape.shapes.command_line import add_particle_options, particles_of
 from jamshape.shapes.particles import Kind, Particles, parse_kind
-from jamshape.shapes.table import SHAPES, guess_shape_style, shape_named
+from jamshape.shapes.table import guess_shape_style
 
 
 def drawn(particles, n=100, seed=1):
@@ -19,18 +19,6 @@ def from_options(*options):
     parser = ArgumentParser()
     add_particle_options(parser)
     return particles_of(parser.parse_args(options))
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_sizes_and_parameters_are_inverse(name):
-    shape = shape_named(name)
-    for parameters in shape.examples:
-        diameters, exponent = shape.sizes(parameters, np.array([1.0, 2.5]))
-        assert shape.fits(diameters)
-        for k, size in enumerate((1.0, 2.5)):
-            found, its_size = shape.parameters_of(diameters[k], exponent[k])
-            assert its_size == pytest.approx(size, rel=1e-15)
-            assert found == pytest.approx(dict(parameters), rel=1e-14)
 
 
 def test_small_and_big_ones_are_of_the_same_number_and_one_more_small():

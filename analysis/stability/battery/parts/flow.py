@@ -34,7 +34,7 @@ from jamshape.arrays import FloatArray
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
 
-PAST = r"past the stability limit .* use a timestep below"
+PAST = r"above the stability limit .* use a timestep below"
 TOO_FAR = "one step moves atom .* expected at most half its radius: use a smaller timestep"
 CROSSING = "crossing spines or coinciding centres, where no contact force exists"
 
