@@ -274,8 +274,6 @@ OPTIONS = [
     ("errors/minimiser_error.py --seconds nan --out new", "seconds is nan"),
     ("errors/stiff_error.py --kappas 0 --out new", "kappa is 0"),
     ("errors/spectrum_error.py none.h5 --out new.png", "none.h5"),
-    ("stability/stability_report.py --only ( --out new", "is no pattern"),
-    ("stability/stability_report.py --only xyzzy --out new", "no case is called"),
 ]  # fmt: skip
 
 

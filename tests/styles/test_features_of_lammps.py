@@ -22,10 +22,6 @@ from lammps_runs import (
 )
 from lammps_scenes import dense, dense_mixture
 
-sys.path.insert(0, str(REPOSITORY / "analysis" / "stability"))
-from features.contacts import CONTACTS
-from features.feature import judge
-
 from jamshape import contacts
 
 pytestmark = pytest.mark.lammps
@@ -44,28 +40,6 @@ TWO_RODS = """
 
 def two_rods(more=""):
     return f"{before_box(2)}\n{load_plugin()}\n{TWO_RODS}\n{more}"
-
-
-# A process each: of the others, the daily ones are those that have failed users.
-DAILY = {
-    "`atom_style hybrid ellipsoid molecular`", "`units real`", "`pair_style hybrid`, `minimize`",
-    "`pair_style hybrid`, other atoms without a shape", "`special_bonds lj 0.5`", "`write_coeff`",
-    "`write_data`, `read_data`", "restart file to data file, in a deck", "`rerun` of rods",
-    "`fix setforce 0 0 0`, `minimize`", "`fix freeze`, `minimize`", "`fix adapt` of mixed k_e",
-    "`fix deposit`", "`set shape` before `run pre no`", "`fix rigid` in the plane",
-}  # fmt: skip
-
-
-def marked(feature):
-    marks = () if feature.name in DAILY else (pytest.mark.validate,)
-    return pytest.param(feature, marks=marks, id=feature.name)
-
-
-@pytest.mark.parametrize("feature", [marked(feature) for feature in CONTACTS])
-def test_a_feature_works_or_is_refused(feature):
-    """Each row of the table of docs/results/stability.md."""
-    outcome = judge(feature)
-    assert outcome.holds, outcome.found
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -9,6 +9,7 @@ from lammps_scenes import dense
 from jamshape.files.lammps_text import write_data
 from jamshape.flow.motion import Motion
 from jamshape.flow.shear import Shear
+from jamshape.shapes.table import SHAPES
 
 PAGES = REPOSITORY / "docs" / "reference"
 STYLES = [page.stem for kind in ("pair", "fix", "compute") for page in PAGES.glob(f"{kind}_*.md")]
@@ -38,7 +39,7 @@ def test_a_page_has_the_sections_of_lammps(name):
 
 def test_every_style_that_is_registered_has_a_page():
     register = (REPOSITORY / "lammps_plugin" / "styles" / "register.cpp").read_text()
-    registered = re.findall(r'add\("([\w/]+)"', register)
+    registered = re.findall(r'add\("([\w/]+)"', register) + [f"{name}/harmonic" for name in SHAPES]
     pages = {re.sub(r"^(pair|fix|compute)_", "", name).replace("_", "/") for name in STYLES}
     assert set(registered) - {"create_random"} == pages
 

@@ -254,9 +254,5 @@ def _picked(known: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     return {name: known[name] for name in names if known.get(name) is not None}
 
 
-_READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
-    HDF5: _hdf5,
-    RESTART: _restart,
-    GSD: _gsd,
-}
+_READERS: dict[str, Callable[[Path], dict[str, Any]]] = {HDF5: _hdf5, RESTART: _restart, GSD: _gsd}
 _TEXTS: dict[str, Callable[[Path, Wanted], dict[str, Any]]] = {DUMP: _dump, DATA: _data}

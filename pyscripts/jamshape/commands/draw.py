@@ -18,13 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jamshape.checks import (
-    ArgumentError,
-    Range,
-    require_in,
-    require_other_file,
-    require_stated,
-)
+from jamshape.checks import ArgumentError, Range, require_in, require_other_file, require_stated
 from jamshape.command import parser_of, report, typed
 from jamshape.drawing.colors import CHOICES
 from jamshape.drawing.packing import Look

@@ -45,11 +45,7 @@ _LINES = {
     "holds": ("{frames} frames", "{rows} rows of error and time", "step {step}", "time {time:.6g}"),
     "error": ("{error_of} {error:.2g}",),
     "took": ("{wall_seconds:.3g} s",),
-    "written by": (
-        "LAMMPS of {lammps}",
-        "jamshape {jamshape_version}",
-        "format {format_version}",
-    ),
+    "written by": ("LAMMPS of {lammps}", "jamshape {jamshape_version}", "format {format_version}"),
     "not reached": ("{shortfall}",),
     "made on": ("{origin}",),
     "continue with": ("{go_on}",),

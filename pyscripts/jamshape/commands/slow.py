@@ -15,13 +15,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
-from jamshape.checks import (
-    RANGES,
-    ArgumentError,
-    require_in,
-    require_no_effect,
-    require_with,
-)
+from jamshape.checks import RANGES, ArgumentError, require_in, require_no_effect, require_with
 from jamshape.command import add_numbers, parser_of, report, typed
 from jamshape.commands.onset import add_onset_options, tell_onset
 from jamshape.flow.implicit import METHODS

@@ -9,15 +9,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.contacts import Contacts
 from jamshape.drawing import plane, space
-from jamshape.drawing.colors import (
-    ORDER,
-    Coloring,
-    Scale,
-    all_one,
-    by_direction,
-    by_kind,
-    order_of,
-)
+from jamshape.drawing.colors import ORDER, Coloring, Scale, all_one, by_direction, by_kind, order_of
 from jamshape.drawing.styles import KINDS
 
 if TYPE_CHECKING:

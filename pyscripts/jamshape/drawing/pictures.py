@@ -47,11 +47,7 @@ class Drawn(NamedTuple):
 
 
 def read_picture(
-    path: Path,
-    frame: int = -1,
-    sides: int | None = None,
-    color: str = "",
-    wanted: Wanted = NOTHING,
+    path: Path, frame: int = -1, sides: int | None = None, color: str = "", wanted: Wanted = NOTHING
 ) -> Picture:
     """Read a packing, find its contacts and count.
 

@@ -19,16 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.exchange.edited import as_edited
-from jamshape.exchange.fields import (
-    alike,
-    box_fields,
-    centered,
-    packing_of,
-    particle_fields,
-)
+from jamshape.exchange.fields import alike, box_fields, centered, packing_of, particle_fields
 from jamshape.exchange.tools import tool
 from jamshape.files.disk import PathLike, replacing
-from jamshape.files.frames import Form
+from jamshape.files.frames import Form, row_of
 from jamshape.files.layout import FileFormatError
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
@@ -113,10 +107,7 @@ def read_gsd(path: PathLike, frame: int = -1) -> Packing:
         msg = f"{path}: {error}, expected a GSD file; write it with write_gsd"
         raise FileFormatError(msg) from error
     with file:
-        if not -len(file) <= frame < len(file):
-            msg = f"{path}: has {len(file)} frames, expected frame {frame} to be one of them"
-            raise ValueError(msg)
-        return _packing(path, hoomd, file[frame % len(file)])
+        return _packing(path, hoomd, file[row_of(frame, len(file), path)])
 
 
 def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:

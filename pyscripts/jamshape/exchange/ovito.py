@@ -17,13 +17,7 @@ import numpy as np
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.drawing.colors import of_kinds
 from jamshape.drawing.kinds import kinds_of
-from jamshape.exchange.fields import (
-    PARTICLE_RESTS,
-    alike,
-    in_space,
-    packing_of,
-    particle_fields,
-)
+from jamshape.exchange.fields import PARTICLE_RESTS, alike, in_space, packing_of, particle_fields
 from jamshape.exchange.tools import tool
 from jamshape.files.frames import as_rest
 from jamshape.files.layout import FileFormatError

@@ -13,6 +13,8 @@ from jamshape.packing import Lengths, Packing
 if TYPE_CHECKING:
     import h5py
 
+    from jamshape.files.disk import PathLike
+
 # Elements under /particles/all, some by the fields of a packing.
 RESTS = {"position_rest": "position_rest", "orientation_rest": "orientation_rest"}
 EDGES, EDGES_REST = "box/edges", "box/edges_rest"
@@ -42,6 +44,14 @@ class Form(NamedTuple):
     def joined(self, other: Form) -> Form:
         """Return the form of a file with frames of both."""
         return Form(self.rests or other.rests, self.tilted or other.tilted)
+
+
+def row_of(frame: int, n_frames: int, path: PathLike) -> int:
+    """Count a frame from 0, a negative one from the end; ValueError if there is none."""
+    if not -n_frames <= frame < n_frames:
+        msg = f"{path}: has {n_frames} frames, expected frame {frame} to be one of them"
+        raise ValueError(msg)
+    return frame % n_frames
 
 
 def frame_values(packing: Packing, form: Form) -> dict[str, NDArray[Any]]:

@@ -50,13 +50,9 @@ from numpy.typing import ArrayLike, NDArray
 from jamshape.checks import require_other_file
 from jamshape.files import layout
 from jamshape.files.disk import PathLike, replacing
-from jamshape.files.frames import Form
+from jamshape.files.frames import Form, row_of
 from jamshape.files.journal import read_journal
-from jamshape.files.layout import (
-    FileFormatError,
-    Report,
-    Series,
-)
+from jamshape.files.layout import FileFormatError, Report, Series
 from jamshape.files.rows import check_after, check_same_particles
 from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, renamed
 from jamshape.packing import Packing
@@ -208,10 +204,7 @@ def read_packing(path: PathLike, frame: int = -1) -> Packing:
     """
     with layout.opened(path) as file:
         n_frames = layout.count(file, "particles/all/position")
-        if not -n_frames <= frame < n_frames:
-            msg = f"{path}: has {n_frames} frames, expected frame {frame} to be one of them"
-            raise ValueError(msg)
-        return layout.read_frame(file, frame % n_frames)
+        return layout.read_frame(file, row_of(frame, n_frames, path))
 
 
 def count_frames(path: PathLike) -> int:

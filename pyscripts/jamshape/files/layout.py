@@ -15,15 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.disk import PathLike, store
-from jamshape.files.frames import (
-    EDGES,
-    EDGES_REST,
-    RESTS,
-    Form,
-    as_rest,
-    frame_values,
-    lengths_of,
-)
+from jamshape.files.frames import EDGES, EDGES_REST, RESTS, Form, as_rest, frame_values, lengths_of
 from jamshape.files.journal import Pending, Table, read_journal
 from jamshape.files.origin import origin
 from jamshape.files.rows import Columns, Stored, as_column, gathered, table

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
 
 from jamshape.arguments import checked
 from jamshape.checks import (
@@ -27,7 +26,7 @@ from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import place
 from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import RunFile
-from jamshape.front.starts import start_of, told_of
+from jamshape.front.starts import Asked, Start
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.random_start import random_packing
@@ -37,7 +36,6 @@ PHI = (0.4, 0.9)
 """Default packing fractions of the random start and of the end of a compression."""
 
 _PHI_SLOW_USUAL = (0.8, 0.9)
-_N, _SEED = 256, 1
 _SAME = 1e-9  # of packing fractions, up to rounding
 _DT, _ERROR = 0.05, 1e-4
 
@@ -227,19 +225,28 @@ def slow_compress(
     for _, rate in protocol.rates:
         require_stated(kappa=rate)
     at = place(file, "slow.h5")
-    if start is not None:
-        of: _Known | _Random = _Known.of(start, phi_start)
-    else:
-        of = _Random.of(particles, n=n, phi=phi_start, seed=seed)
-        require_rising(of.phi, phi_end)
+    if start is None:
+        phi_start = _PHI_SLOW_USUAL[0] if phi_start is None else phi_start
+        require_in("phi_start", phi_start, _PHI_SLOW)
+        require_rising(phi_start, phi_end)
+    asked = Asked(n, None if start is not None else phi_start, seed)
+    of = Start.of(particles, asked, start, usual_phi=_PHI_SLOW_USUAL[0])
+    _require_own(of.known, phi_start)
     if at.path.exists() and not again:
         slow_recording.require_same(at.path, protocol, of.made_from)
     else:
-        first = of.packing()
+        first = of.known or compressed_start(of.random(_PHI_RANDOM), of.phi)
         _require_end_ahead(first, protocol)
         slow_recording.begin(at.path, first, protocol, of.made_from)
     resume(at.path, progress=progress)
     return RunFile(*at)
+
+
+def _require_own(start: Packing | None, phi: float | None) -> None:
+    """Refuse a packing fraction that differs from that of a start."""
+    if start and phi is not None and not math.isclose(phi, start.phi, rel_tol=_SAME):
+        said = f"{{phi_start}} differs from that of the start, {start.phi:.6g}, expected no value beside a start; leave it out"
+        raise ArgumentError(said, {"phi_start": phi})
 
 
 def _require_end_ahead(first: Packing, protocol: Protocol) -> None:
@@ -251,55 +258,3 @@ def _require_end_ahead(first: Packing, protocol: Protocol) -> None:
     if pressure >= protocol.p_end:
         said = f"{{p_end}} is not above the pressure of the start, {pressure:.4g}, expected a larger one"
         raise ArgumentError(said, {"p_end": protocol.p_end})
-
-
-class _Known(NamedTuple):
-    """A start that was given."""
-
-    start: MeasuredPacking
-
-    @classmethod
-    def of(cls, start: Packing | str | Path, phi: float | None) -> _Known:
-        """Take a start; raise if another packing fraction than its own was given."""
-        found = start_of(start)
-        if phi is not None and not math.isclose(phi, found.phi, rel_tol=_SAME):
-            said = f"{{phi_start}} differs from that of the start, {found.phi:.6g}, expected no value beside a start; leave it out"
-            raise ArgumentError(said, {"phi_start": phi})
-        return cls(found)
-
-    @property
-    def made_from(self) -> dict[str, Any]:
-        return told_of(self.start)
-
-    def packing(self) -> Packing:
-        return self.start
-
-
-class _Random(NamedTuple):
-    """A random start, compressed fast."""
-
-    particles: Particles
-    n: int
-    phi: float
-    seed: int
-
-    @classmethod
-    def of(cls, particles: Particles | None, **asked: Any) -> _Random:
-        """Take n, phi and seed, with defaults for those that are None."""
-        if particles is None:
-            msg = "neither particles nor a start are given, expected one of them"
-            raise ValueError(msg)
-        given = {name: value for name, value in asked.items() if value is not None}
-        found = cls(particles, **{"n": _N, "phi": _PHI_SLOW_USUAL[0], "seed": _SEED} | given)
-        require_stated(n=found.n, seed=found.seed)
-        require_in("phi_start", found.phi, _PHI_SLOW)
-        return found
-
-    @property
-    def made_from(self) -> dict[str, Any]:
-        return dict(self.particles.told) | {"n": self.n, "seed": self.seed}
-
-    def packing(self) -> Packing:
-        return compressed_start(
-            random_packing(self.n, _PHI_RANDOM, self.seed, self.particles), self.phi
-        )

@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.arguments import checked
 from jamshape.arrays import FloatArray, IntArray
-from jamshape.checks import (
-    Range,
-    require_in,
-    require_no_effect,
-    require_one_of,
-    require_other_file,
-)
+from jamshape.checks import Range, require_in, require_no_effect, require_one_of, require_other_file
 from jamshape.files.disk import require_hdf5_name, settled
 from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking

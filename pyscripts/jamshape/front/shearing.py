@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 from jamshape.arguments import checked
-from jamshape.checks import (
-    require_given,
-    require_no_effect,
-    require_one_of,
-    require_path,
-    require_stated,
-)
+from jamshape.checks import require_given, require_no_effect, require_path, require_stated
 from jamshape.flow import quasistatic_recording, recording, slow_recording
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.quasistatic import QuasistaticShear
@@ -23,23 +17,18 @@ from jamshape.flow.slow_shear import SlowShear
 from jamshape.front.progress import place
 from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import QuasistaticShearFile, ShearFile
-from jamshape.front.starts import start_of, told_of
+from jamshape.front.starts import Asked, Start
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.quasistatic import compressed_to
-from jamshape.protocols.random_start import start_below
 from jamshape.shapes.particles import Particles
-from jamshape.shapes.shape import Interaction
-
-if TYPE_CHECKING:
-    from jamshape.front.packing import MeasuredPacking
-
 
 _SLOW = 3e-7  # rate below which implicit steps are faster than explicit ones
 _ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3  # default tolerances
 
 _FRAMES = 20
+_PHI_NAME = "phi_sheared"  # of the start, in files
 
 # Relative tolerance of the packing fraction of a random start.
 _ROUNDING = 1e-9
@@ -138,7 +127,8 @@ def shear(
     """
     require_stated(gdot=gdot, strain=strain, rows=rows)
     require_given(dt=dt, tolerance=tolerance, frames=frames)
-    of = _Start.of(particles, _Asked(n, phi, seed, dimension), start, usual_phi=0.8, sides=sides)
+    asked = Asked(n, phi, seed, dimension)
+    of = Start.of(particles, asked, start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)
     at = place(file, "shear.h5")
     integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
     if integrator in METHODS:
@@ -238,13 +228,14 @@ def quasistatic_shear(
     """
     require_stated(frames=frames, strain_step=step, strain_end=strain)
     require_stated(tolerance=tolerance, hold_pressure=pressure)
-    of = _Start.of(particles, _Asked(n, phi, seed, dimension), start, usual_phi=0.9)
+    asked = Asked(n, phi, seed, dimension)
+    of = Start.of(particles, asked, start, usual_phi=0.9, phi_name=_PHI_NAME)
     how = QuasistaticShear(step, strain, flow, pressure, tolerance)
     at = place(file, "aqs.h5")
     require_path(at.path)
     made_from = of.made_from | {"frames": frames}
     if again or not at.path.exists():
-        quasistatic_recording.begin(at.path, of.still(), how, made_from)
+        quasistatic_recording.begin(at.path, _still(of), how, made_from)
     else:
         quasistatic_recording.require_same(at.path, how, made_from)
     resume(at.path, progress=progress)
@@ -256,97 +247,21 @@ class _How(NamedTuple):
     progress: bool
 
 
-class _Asked(NamedTuple):
-    """Arguments of a random start."""
-
-    n: int | None
-    phi: float | None
-    seed: int | None
-    dimension: int | None
-
-
-class _Numbers(NamedTuple):
-    """Settings of a random start."""
-
-    n: int
-    phi: float
-    seed: int
-    dimension: int
-
-    @classmethod
-    def of(cls, asked: _Asked, usual_phi: float) -> _Numbers:
-        """Fill in defaults."""
-        given = {name: value for name, value in asked._asdict().items() if value is not None}
-        require_one_of("dimension", given.get("dimension", 2), (2, 3))
-        require_stated(**{name: value for name, value in given.items() if name != "dimension"})
-        return cls(**{"n": 256, "phi": usual_phi, "seed": 1, "dimension": 2} | given)
+def _flowing(of: Start) -> Packing:
+    """Return the start, compressed at a finite rate."""
+    if of.known:
+        return of.known
+    random = of.random()
+    is_looser = random.phi < of.phi * (1 - _ROUNDING)
+    return compressed_start(random, of.phi) if is_looser else random
 
 
-class _Start(NamedTuple):
-    """Initial state of a run: a packing, or particles with their settings."""
-
-    known: MeasuredPacking | None
-    particles: Particles | None
-    numbers: _Numbers
-
-    @classmethod
-    def of(
-        cls,
-        particles: Particles | None,
-        asked: _Asked,
-        start: Packing | str | Path | None,
-        *,
-        usual_phi: float,
-        sides: int = 2,
-    ) -> _Start:
-        """Take a start, which excludes other arguments, or particles with defaults."""
-        require_no_effect("start", start, particles=particles, **asked._asdict())
-        numbers = _Numbers.of(asked, usual_phi)
-        if start is not None:
-            return cls(start_of(start, sides), None, numbers)
-        if particles is None:
-            msg = "neither particles nor a start are given, expected one of them"
-            raise ValueError(msg)
-        return cls(None, particles, numbers)
-
-    @property
-    def dimension(self) -> int:
-        return self.known.dimension if self.known else self.numbers.dimension
-
-    @property
-    def k_e(self) -> float:
-        """Stiffness of the contacts, [energy]."""
-        return self.known.law.k_e if self.known else Interaction().k_e
-
-    @property
-    def made_from(self) -> dict[str, Any]:
-        """Describe the particles and the start."""
-        if self.known:
-            return told_of(self.known)
-        assert self.particles
-        n, phi, seed, _ = self.numbers
-        return dict(self.particles.told) | {"n": n, "phi_sheared": phi, "seed": seed}
-
-    def _random(self) -> Packing:
-        n, phi, seed, dimension = self.numbers
-        return start_below(phi, n, seed, self.particles, dimension)
-
-    def flowing(self) -> Packing:
-        """Return the start, compressed at a finite rate."""
-        if self.known:
-            return self.known
-        random = self._random()
-        phi = self.numbers.phi
-        is_looser = random.phi < phi * (1 - _ROUNDING)
-        return compressed_start(random, phi) if is_looser else random
-
-    def still(self) -> Packing:
-        """Return the start, compressed quasistatically."""
-        if self.known:
-            return self.known
-        random = self._random()
-        landscape = Landscape(random)
-        return compressed_to(landscape, State.of(random), self.numbers.phi).packing(random)
+def _still(of: Start) -> Packing:
+    """Return the start, compressed quasistatically."""
+    if of.known:
+        return of.known
+    random = of.random()
+    return compressed_to(Landscape(random), State.of(random), of.phi).packing(random)
 
 
 def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
@@ -356,10 +271,10 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
     return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
 
 
-def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> None:
+def _shear_in_lammps(settings: Shear, of: Start, to: Recording, how: _How) -> None:
     require_path(to.path)
     if how.again or not to.path.exists():
-        first = of.flowing()
+        first = _flowing(of)
         settings.all_steps(first)  # refuses what does not end
         if said := settings.warning(first):
             warnings.warn(said, stacklevel=3)
@@ -369,7 +284,7 @@ def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> N
         resume(to.path, progress=how.progress)
 
 
-def _shear_slowly(settings: SlowShear, of: _Start, path: Path, *, again: bool, sides: int) -> None:
+def _shear_slowly(settings: SlowShear, of: Start, path: Path, *, again: bool, sides: int) -> None:
     """Create the file of a run by implicit steps, or check that it holds this run."""
     require_path(path)
     if of.dimension != 2 or sides != 2:
@@ -381,4 +296,4 @@ def _shear_slowly(settings: SlowShear, of: _Start, path: Path, *, again: bool, s
     if path.exists() and not again:
         slow_recording.require_same(path, settings, of.made_from)
     else:
-        slow_recording.begin(path, of.flowing(), settings, of.made_from)
+        slow_recording.begin(path, _flowing(of), settings, of.made_from)

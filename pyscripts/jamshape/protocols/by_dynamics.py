@@ -9,12 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.files.h5md import (
-    read_attributes,
-    read_observables,
-    read_packing,
-    require_attributes,
-)
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, require_attributes
 from jamshape.files.journal import remove_run
 from jamshape.files.restarts import is_whole
 from jamshape.files.run_writer import RunWriter, fold

@@ -9,9 +9,7 @@ from jamshape.files.vocabulary import read_protocol
 from jamshape.minima import METHODS
 from jamshape.protocols.defaults import PROTOCOLS, SETTINGS, WAYS
 from jamshape.protocols.recipe import SEARCHES
-from jamshape.shapes.command_line import (
-    add_particle_options,
-)
+from jamshape.shapes.command_line import add_particle_options
 
 _CHOICES = {"search": tuple(SEARCHES), "minimiser": tuple(METHODS)}
 

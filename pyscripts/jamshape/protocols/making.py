@@ -89,10 +89,8 @@ class SearchFile:
     def read(self, landscape: Landscape) -> Search | None:
         """Read the search, if it belongs to this recipe; the landscape continues its count."""
         remove_leftovers(self.path)  # a resumed run may end without writing the file again
-        if not self.path.exists():
-            return None
-        stored = read_attributes(self.path)
-        if not _same(stored, self.recipe.attributes()):
+        stored = stored_of(self.path, self.recipe)
+        if stored is None:
             return None
         landscape.evaluations = int(stored.get("evaluations", 0))
         self.minimisations = int(stored.get("minimisations", 0))
@@ -198,5 +196,8 @@ def write_states(
     write_frames(path, [state.packing(like) for state in states], attributes)
 
 
-def _same(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:
-    return all(stored.get(name) == value for name, value in expected.items())
+def stored_of(path: Path, recipe: Recipe) -> dict[str, Any] | None:
+    """Read the attributes that an earlier call with this recipe has written, if any."""
+    stored = read_attributes(path) if path.exists() else {}
+    own = recipe.attributes()
+    return stored if stored and all(stored.get(k) == v for k, v in own.items()) else None

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum
 from jamshape.packing import State
-from jamshape.protocols.making import Progress, write_states
+from jamshape.protocols.making import Progress, stored_of, write_states
 from jamshape.protocols.recipe import Recipe
 from jamshape.protocols.retry import Retry, go_on
 
@@ -39,11 +39,8 @@ class RetryFile:
 
     def read(self) -> Retry | None:
         """Read the state of an earlier call with this recipe."""
-        if not self.path.exists():
-            return None
-        stored = read_attributes(self.path)
-        known = [stored.get(name) == value for name, value in self.recipe.attributes().items()]
-        if not all(known) or "retry_budget" not in stored:
+        stored = stored_of(self.path, self.recipe)
+        if stored is None or "retry_budget" not in stored:
             return None
         numbers = {name: stored[f"retry_{name}"] for name in _NUMBERS}
         return Retry(State.of(read_packing(self.path)), **numbers)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum
 from jamshape.packing import State
-from jamshape.protocols.making import Progress, write_states
+from jamshape.protocols.making import Progress, stored_of, write_states
 from jamshape.protocols.recipe import Recipe
 from jamshape.protocols.strict import StrictSearch, descend, start
 
@@ -38,10 +38,8 @@ class StrictFile:
     def read(self, landscape: Landscape) -> StrictSearch | None:
         """Read the state of an earlier search with this recipe."""
         assert self.recipe.target is not None
-        if not self.path.exists():
-            return None
-        stored = read_attributes(self.path)
-        if any(stored.get(name) != value for name, value in self.recipe.attributes().items()):
+        stored = stored_of(self.path, self.recipe)
+        if stored is None:
             return None
         search = start(landscape, State.of(read_packing(self.path)))
         search.n_steps, search.n_fallen = int(stored["strict_steps"]), int(stored["strict_fallen"])

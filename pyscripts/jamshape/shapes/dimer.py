@@ -15,10 +15,12 @@ from jamshape.shapes.solid import Balls
 
 
 class Dimer(ElongatedShape):
-    """Dimers with the harmonic law of the overlap 1 - r/d of every pair of discs."""
+    """Dimers: two equal discs (spheres) of radius R joined rigidly, centres A from the middle.
+
+    Every pair of discs has the harmonic law of the overlap 1 - r/d.
+    """
 
     name = "dimer"
-    compiled_name = "Dimers"
     # Coinciding discs would count as four bonds with each neighbour.
     parameters = (
         Parameter(

@@ -104,8 +104,6 @@ class Shape(ABC):
 
     name: ClassVar[str]
     """Name in files and on command lines."""
-    compiled_name: ClassVar[str]
-    """Name of its class in `jamshape._contact`."""
     parameters: ClassVar[tuple[Parameter, ...]]
     unit: ClassVar[str]
     """Length that equals 1 for a particle of size 1."""
@@ -123,6 +121,11 @@ class Shape(ABC):
 
     def __hash__(self) -> int:
         return hash(type(self))
+
+    @property
+    def compiled_name(self) -> str:
+        """Name of its class in `jamshape._contact`, and of the function that makes particles."""
+        return f"{self.name.capitalize()}s"
 
     def compiled(
         self, particles: tuple[FloatArray, FloatArray], dimension: int, law: Interaction

@@ -17,10 +17,12 @@ from jamshape.shapes.solid import RoundedSegment
 
 
 class Spherocylinder(ElongatedShape):
-    """Spherocylinders with the harmonic law of the overlap 1 - r/d (Eqs. 3 and 22)."""
+    """Spherocylinders: segments of length 2A thickened by the radius R (Marschall & Teitel 2018).
+
+    Contacts have the harmonic law of the overlap 1 - r/d (Eqs. 3 and 22).
+    """
 
     name = "spherocylinder"
-    compiled_name = "Spherocylinders"
     examples = ({"alpha": 4.0}, {"alpha": 0.01}, {"alpha": 0.0})
 
     def style(self, packing: Any, law: Interaction) -> Style:

@@ -20,10 +20,13 @@ from jamshape.shapes.superellipsoid_surface import surface_mesh
 
 
 class Superellipsoid(Shape):
-    """Superellipsoids with U = epsilon/2 (eta^2 - 1)^2 (Eq. 3)."""
+    """Superellipsoids ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1`` (Yuan et al. 2019, Eqs. 1 and 2).
+
+    Contacts have the energy epsilon/2 (eta^2 - 1)^2 (Eq. 3). p is 1 for ellipsoids, more towards boxes, less
+    towards octahedra.
+    """
 
     name = "superellipsoid"
-    compiled_name = "Superellipsoids"
     parameters = (
         Parameter(
             "exponent", 1.0, "p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1", "p",

@@ -76,9 +76,7 @@ class Moduli(NamedTuple):
 
 
 def moduli(
-    matrix: DynamicalMatrix,
-    soft: Spectrum | None = None,
-    at: tuple[Landscape, State] | None = None,
+    matrix: DynamicalMatrix, soft: Spectrum | None = None, at: tuple[Landscape, State] | None = None
 ) -> Moduli:
     """Compute bulk and shear moduli with error bounds.
 
@@ -250,10 +248,7 @@ class Response:
 
     def squared(self, along: FloatArray) -> FloatArray:
         """(k,) bound of the change of E by such a remaining slope."""
-        values, bound = (
-            np.abs(self.soft.eigenvalues[self._is_in]),
-            self.soft.bound[self._is_in],
-        )
+        values, bound = (np.abs(self.soft.eigenvalues[self._is_in]), self.soft.bound[self._is_in])
         # All unknown modes are stiffer than the known ones; a whole spectrum has no unknown modes.
         beside = 0.5 * values.max(initial=0.0) if values.size else np.inf
         stiffness = np.append(values - bound, beside)

@@ -74,10 +74,7 @@ class ShiftedInverse:
         if shift == 0.0:
             held[_supports(matrix.translations, floppy)] = -self.scale
         one = scipy.sparse.identity(C.shape[0])
-        blocks = [
-            [-(S + scipy.sparse.diags(held)) / self.scale, C.T],
-            [C, -self.scale * one],
-        ]
+        blocks = [[-(S + scipy.sparse.diags(held)) / self.scale, C.T], [C, -self.scale * one]]
         self._factors = splu(scipy.sparse.bmat(blocks, format="csc"))
 
     def solve(self, b: FloatArray) -> Solution:

@@ -44,16 +44,8 @@ _PARTS = ("affine", "rounding", "of_state")
 _ERRORS = ("solver_error", "entry_error", "overlap_error")
 
 _COLUMNS = (
-    *("eigenvalues", "omega", "sign", *_ERRORS, "state_error"),
-    *(
-        "is_translation",
-        "participation",
-        "parallel",
-        "perpendicular",
-        "rotation",
-        "of_round",
-        "band",
-    ),
+    *("eigenvalues", "omega", "sign", *_ERRORS, "state_error", "is_translation"),
+    *("participation", "parallel", "perpendicular", "rotation", "of_round", "band"),
 )
 
 
@@ -270,11 +262,7 @@ def _read(file: h5py.File) -> ModeTable:
     columns = {"overlap_error": np.zeros(len(stored_of["eigenvalues"]))} | stored_of
     if missing := set(_COLUMNS) - columns.keys():
         raise KeyError(*missing)
-    for name in (
-        "eigenvalues",
-        "omega",
-        *_ERRORS,
-    ):  # files of earlier versions have what rounding left
+    for name in ("eigenvalues", "omega", *_ERRORS):  # earlier versions stored rounding errors here
         columns[name] = np.where(columns["is_translation"], 0.0, columns[name])
     particle, kind, direction = (of[name][()] for name in ("particle", "kind", "direction"))
     n_all, dimension = int(of.attrs["n_all"]), int(of.attrs["dimension"])
