@@ -6,7 +6,7 @@ import re
 import tokenize
 
 import pytest
-from test_house import LIBRARY, PLUGIN, ROOT, docstrings, python_files, tree_of
+from test_house import PLUGIN, ROOT, SHARED, docstrings, python_files, tree_of
 
 # A docstring says what is returned or done; these begin half a sentence, or stand for a standard verb.
 NO_FIRST_WORD = re.compile(
@@ -49,7 +49,7 @@ def cpp_words(path):
 
 
 SOURCES = {
-    "python": (python_files(LIBRARY), python_docs, python_words),
+    "python": (python_files(*SHARED), python_docs, python_words),
     "cpp": ([*PLUGIN.rglob("*.[ch]pp"), *PLUGIN.rglob("*.h")], cpp_docs, cpp_words),
 }
 
