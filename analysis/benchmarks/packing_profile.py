@@ -135,7 +135,7 @@ def main(options: Namespace) -> None:
     parts = profile.parts
     parts[REST].seconds = total - sum(part.seconds for part in parts.values())
     counts = "minimisations | evaluations | factorisations | products"
-    print(f"| | {counts} | core s | longest | us an evaluation |")
+    print(f"| | {counts} | core s | longest | us per evaluation |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for name, part in parts.items():
         print("| " + " | ".join([name, *part.told()]) + " |")

@@ -250,7 +250,7 @@ def second_derivatives(packing: Packing, options: Namespace) -> Row:
 def table(rows: list[Row]) -> str:
     """Write the rows as Markdown."""
     lines = [
-        "| scene | left out | per | turned back on: times as long (quartiles) | forces differ by |",
+        "| particles | skipped | per | without the shortcut: time ratio (quartiles) | forces differ by |",
         "| --- | --- | --- | --- | --- |",
     ]
     for r in rows:
