@@ -68,9 +68,9 @@ class Published(NamedTuple):
     value: float
     error: float
     result: str
-    """Where it is among the results here."""
+    """Path of our value among the results."""
     per: str
-    """Where that is by which the result is divided; empty for nothing."""
+    """Path of the divisor of the result; empty for none."""
     remark: str
 
 
@@ -79,13 +79,13 @@ class Ours(NamedTuple):
 
     value: float
     error: float = math.nan
-    """NaN where nobody knows."""
+    """NaN if unknown."""
     samples: int = 0
-    """0 where nobody knows."""
+    """0 if unknown."""
     reached: float = math.nan
-    """The same without the packings that did not reach their goal; NaN where all or none did."""
+    """Value over packings that reached their goal; NaN if all or none did."""
     reached_samples: int | None = None
-    """How many did; None where all."""
+    """Number of these packings; None if all."""
 
 
 class Row(NamedTuple):
@@ -94,10 +94,10 @@ class Row(NamedTuple):
     published: Published
     ours: Ours | None
     difference: float
-    """Ours minus the paper's in joint errors; NaN where that is not known."""
+    """Ours minus the paper's in joint errors; NaN if unknown."""
     verdict: str
     commit: str = ""
-    """Of the code that found ours."""
+    """Commit of the code that found our value."""
 
 
 class Took(NamedTuple):
@@ -106,12 +106,12 @@ class Took(NamedTuple):
     name: str
     seconds: float
     end: float
-    """When it ended, in seconds since 1970."""
+    """End, in seconds since 1970."""
     command: str
 
     @property
     def kind(self) -> str:
-        """What it did: a command of jamshape, or a script."""
+        """Task: a command of jamshape, or a script."""
         words = shlex.split(self.command.replace("$analysis/", ""))
         scripts = [Path(word).name for word in words if word.endswith(".py")]
         own = f"jamshape {words[words.index('jamshape') + 1]}" if "jamshape" in words else ""
@@ -358,7 +358,7 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def versions() -> list[tuple[str, str]]:
-    """Tell with what and on what this page was made."""
+    """Return the software and hardware that made this page."""
     known = [("jamshape", jamshape.__version__), ("its commit", commit()), ("LAMMPS", lammps())]
     known.append(("Python", platform.python_version()))
     for name in ("numpy", "scipy", "h5py", "snakemake"):
@@ -379,7 +379,7 @@ def commit() -> str:
 
 
 def lammps() -> str:
-    """Tell for which LAMMPS the plugin was built."""
+    """Return the LAMMPS version that the plugin was built for."""
     try:
         return str(built_for(plugin_path()))
     except PluginError:

@@ -16,12 +16,12 @@ from typing import Any
 
 from tqdm import tqdm
 
+from common.ladder import Rung, climb
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes
 from jamshape.files.outcomes import shortfall
 from jamshape.files.sets import PackingFile
 from jamshape.minima.target import Target
-from jamshape.protocols.ladder import Rung, climb
 
 SUMMARY = ("u0", "seed", "outcome", "phi", "phi_J", "residual", "z", "contacts_shared")
 

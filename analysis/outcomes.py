@@ -22,12 +22,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from common.averages import mean_over
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_packing
 from jamshape.files.outcomes import is_reached
 from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape, State
-from jamshape.measures.averages import Mean, mean_over
+from jamshape.measures.averages import Mean
 from jamshape.minima.target import TargetError
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import make

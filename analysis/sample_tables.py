@@ -22,10 +22,10 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from common.ensembles import OTHERS
 from jamshape.command import parser_of, report, run
 from jamshape.files.h5md import read_attributes, read_style
 from jamshape.files.outcomes import is_reached
-from jamshape.files.sets import OTHERS
 from jamshape.measures.runs import rate_of
 from jamshape.vibration.sets import TOLD, count_of, of_packing
 from jamshape.vibration.table import read_modes

@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from common.averages import mean
+from common.ensembles import finished
 from jamshape.command import parser_of, report, run
-from jamshape.files.sets import PackingFile, finished
+from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape, State
-from jamshape.measures.averages import mean
 from jamshape.minima import Stop, minimise
 from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix
 from jamshape.vibration.sets import TOLD

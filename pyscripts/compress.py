@@ -2,7 +2,7 @@
 
     python pyscripts/compress.py --alpha 4 --n 1024 --kappa 1e-6 --phi-start 0.4 --phi-end 0.9 --out run.h5
 
-The same as ``jamshape compress``; --help tells the options.
+The same as ``jamshape compress``; --help lists the options.
 """
 
 import sys

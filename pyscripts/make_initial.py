@@ -2,7 +2,7 @@
 
     python pyscripts/make_initial.py --alpha 4 --n 256 --phi 0.4 --out start.data
 
-The same as ``jamshape initial``; --help tells the options.
+The same as ``jamshape initial``; --help lists the options.
 """
 
 import sys

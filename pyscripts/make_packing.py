@@ -2,7 +2,7 @@
 
     python pyscripts/make_packing.py --alpha 4 --n 256 --seed 1 --u0 1e-15 --out packing.h5
 
-The same as ``jamshape pack``; --help tells the options.
+The same as ``jamshape pack``; --help lists the options.
 """
 
 import sys

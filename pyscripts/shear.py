@@ -2,7 +2,7 @@
 
     python pyscripts/shear.py --alpha 4 --n 256 --phi 0.8 --gdot 1e-4 --strain 5 --out shear.h5
 
-The same as ``jamshape shear``; --help tells the options.
+The same as ``jamshape shear``; --help lists the options.
 """
 
 import sys

@@ -2,7 +2,7 @@
 
     python pyscripts/slow_compress.py --alpha 4 --n 256 --kappa 1e-9 --phi-end 0.88 --out slow.h5
 
-The same as ``jamshape slow``; --help tells the options.
+The same as ``jamshape slow``; --help lists the options.
 """
 
 import sys

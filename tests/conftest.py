@@ -1,8 +1,11 @@
-"""Fixture `measured`: the worst numbers a test saw, printed after the run with `pytest -v`."""
+"""Fixtures for what tests measure: numbers after the run with `pytest -v`, tables with `--report FILE.md`."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+from tables import ROW, Tables
 
 MEASURED = "measured"
 
@@ -33,3 +36,27 @@ def pytest_terminal_summary(terminalreporter, config):
     for name, numbers in found.items():
         values = "  ".join(f"{key} {value:.3g}" for key, value in numbers.items())
         terminalreporter.write_line(f"{name.rpartition('::')[2]}: {values}")
+
+
+# --- tables --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def table_row(request):
+    """Give the row of this test, cells by column, for the table of this heading."""
+
+    def record(heading, cells):
+        request.node.user_properties.append((ROW, (heading, cells)))
+
+    return record
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--report", metavar="FILE.md", type=Path, help="write the tables of tests that have rows"
+    )
+
+
+def pytest_configure(config):
+    if page := config.getoption("--report"):
+        config.pluginmanager.register(Tables(page, is_worker=hasattr(config, "workerinput")))

@@ -1,4 +1,4 @@
-"""What tells a minimum from any other state: its eigenvalues, and the energies of its neighbours.
+"""Criteria of a minimum: its eigenvalues, and the energies of its neighbours.
 
 In two dimensions. A mode that no bond resists to quadratic order has an eigenvalue of the first order in
 the overlap, or, if it is a rod that slides along its flat side, of the second: 1e-8 and 1e-16 at
@@ -55,7 +55,7 @@ def dense(landscape, state):
 
 
 def _held(landscape, state):
-    """Which particles are no rattlers, and all contacts and which of them are between these."""
+    """Flag particles other than rattlers; return all contacts, and those between these particles."""
     rattlers = landscape.rattlers(state)
     found = landscape.derivatives(state, extended=True)
     return ~rattlers, found, ~rattlers[found["particles"]].any(axis=1)
@@ -146,7 +146,7 @@ class Probe(NamedTuple):
 
 
 def allowed_residual(minimum):
-    """Of a bond's force: what may be left of the forces."""
+    """Allowed residual force, over that of a bond."""
     return TOLERANCE if minimum.outcome is Outcome.CONVERGED else _SLIDING
 
 
@@ -201,7 +201,7 @@ def soft_directions(landscape, state, number):
 
 
 def complaints(landscape, minimum, n_random=10, n_soft=20):
-    """Say all that speaks against a minimum with no other zero modes than those that are known."""
+    """List all evidence against a minimum with no zero modes but the known ones."""
     said = []
     state = minimum.state
     if landscape.rattlers(state).all():

@@ -56,7 +56,7 @@ ALONE = "evaluation of {}"
 
 
 class At(NamedTuple):
-    """Where styles are compared."""
+    """Conditions under which styles are compared."""
 
     measure: str
     case: Case
@@ -67,7 +67,7 @@ class At(NamedTuple):
 
     @property
     def row(self) -> Row:
-        """How a row of the table begins."""
+        """First columns of a row of the table."""
         return {"measure": self.measure, "case": self.case.name, "phi": self.phi, "N": self.n}
 
 

@@ -49,7 +49,7 @@ class System(NamedTuple):
     dimension: int
     particles: Particles
     options: str
-    """Of the command that makes the start, but for their number."""
+    """Options of the command that makes the start, without the number of particles."""
     dt: float
 
 
@@ -66,7 +66,7 @@ SYSTEMS = (
 
 
 class Cost(NamedTuple):
-    """What one process took."""
+    """Cost of one process."""
 
     seconds: float
     busy: float

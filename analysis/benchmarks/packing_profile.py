@@ -46,7 +46,7 @@ LOOSE = 1e-2
 
 @dataclass
 class Part:
-    """What one part of the way takes."""
+    """Cost of one stage."""
 
     minimisations: int = 0
     evaluations: int = 0

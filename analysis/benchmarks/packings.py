@@ -64,7 +64,7 @@ class Task(NamedTuple):
 
 
 class Growth(NamedTuple):
-    """How the seconds of a case grow with N."""
+    """Growth of the time of a case with N."""
 
     case: str
     n: list[int]
@@ -125,7 +125,7 @@ def tasks(options: Namespace) -> Iterator[Task]:
 
 
 def file_of(task: Task, options: Namespace) -> Path:
-    """Where what is finished is kept."""
+    """Return the file of a finished task."""
     path: Path = options.out / f"{task.case}_n{task.n}_seed{task.seed}.json"
     return path
 

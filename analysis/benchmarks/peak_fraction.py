@@ -39,7 +39,7 @@ _SECONDS = 1.0
 
 
 class Work(NamedTuple):
-    """What evaluations need."""
+    """Work of evaluations."""
 
     operations: float
     """On doubles."""
@@ -47,7 +47,7 @@ class Work(NamedTuple):
 
 
 class Machine(NamedTuple):
-    """What one core can do."""
+    """Peak performance of one core."""
 
     operations: float
     """A second."""

@@ -93,7 +93,7 @@ class Task(NamedTuple):
 
     @property
     def code(self) -> str:
-        """What makes it and prints what it took."""
+        """Code that makes it and prints its cost."""
         D, shape, _ = CASES[self.case]
         code = PEERS.get(self.maker, OURS)
         return code.format(D=D, shape=shape, n=self.n, seed=self.seed)
@@ -128,7 +128,7 @@ def main(options: Namespace) -> None:
 
 
 def peers_of(options: Namespace) -> dict[str, Path]:
-    """Say which peers take part, and by which Python."""
+    """List the peers that take part, with their Python."""
     found = {name: getattr(options, name) for name in PEERS}
     return {name: python for name, python in found.items() if python}
 

@@ -47,7 +47,7 @@ ROUNDING = 1e-11
 
 
 class Scene(NamedTuple):
-    """How a state is made: particles, compressed from a dilute start."""
+    """Recipe of a state: particles, compressed from a dilute start."""
 
     particles: Particles
     dimension: int
@@ -84,7 +84,7 @@ class Case(NamedTuple):
 
 
 class Row(NamedTuple):
-    """What one case came to."""
+    """Result of one case."""
 
     scene: str
     left_out: str

@@ -42,7 +42,7 @@ class Study(NamedTuple):
 
     title: str
     error: str
-    """What its curves show: the last JSON line of a script may have `curves` of name, seconds, error."""
+    """Study with curves: the last JSON line of a script may have `curves` of name, seconds, error."""
     short: list[str]
     full: list[str]
     pictures: list[str]

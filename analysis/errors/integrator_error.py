@@ -54,7 +54,7 @@ class Case(NamedTuple):
 
     @property
     def name(self) -> str:
-        """For files."""
+        """Name in files."""
         return f"n{self.n}_alpha{self.alpha:g}_kappa{self.kappa:g}"
 
     def settings(self, method: str, tolerance: float) -> Compression:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
@@ -34,15 +35,22 @@ from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape
 from jamshape.measures.minimum import write_minimum
 from jamshape.minima import History, Stop, minimise
+from jamshape.minima.minimise import Method
 from jamshape.minima.target import Search, Target, TargetError, direct, find, halving
 from jamshape.packing import Packing, State
-from jamshape.packing.spines import with_spines
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Recipe, is_done, make
 from jamshape.shapes.particles import Kind, Particles
 from jamshape.shapes.table import DEFAULT
 
-MINIMISERS = ("auto", "newton", "lbfgs", "lammps", "paper")
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.spines import with_spines
+from methods.lammps_cg import lammps_cg
+from methods.lbfgs import lbfgs
+
+MINIMISERS: dict[str, str | Method] = {
+    "auto": "auto", "newton": "newton", "lbfgs": lbfgs, "lammps": lammps_cg, "cg_marschall": "cg_marschall",
+}  # fmt: skip
 LEVELS = (1e-4, 1e-6, 1e-8)
 DISPLACEMENT = 1e-6
 STRAIN = 1e-6
@@ -54,7 +62,7 @@ TARGETS: dict[str, tuple[Callable[..., Any], str, float]] = {
     "direct": (direct, "auto", 1e-7),
     "direct to 1e-4": (direct, "auto", 1e-4),
     "halving": (halving, "auto", 1e-7),
-    "as published": (halving, "paper", 1e-7),
+    "as published": (halving, "cg_marschall", 1e-7),
 }
 LONGER = 20.0
 
@@ -136,7 +144,7 @@ def run_minimiser(method: str, packing: Packing, seconds: float) -> Row:
     step = DISPLACEMENT * float(landscape.inner_radius.min()) * rng.normal(size=landscape.size)
     start = landscape.displaced(State.of(packing), step)
     began, busy = time.perf_counter(), time.process_time()
-    found = minimise(landscape, start, method, Stop(seconds=seconds))
+    found = minimise(landscape, start, MINIMISERS[method], Stop(seconds=seconds))
     part = (time.process_time() - busy) / (time.perf_counter() - began)
     return {"outcome": found.outcome.value, **curve(found.history, part)}
 

@@ -70,7 +70,7 @@ class Case(NamedTuple):
 
     @property
     def name(self) -> str:
-        """For files."""
+        """Name in files."""
         return f"n{self.n}_alpha{self.alpha:g}_gdot{self.gdot:g}"
 
 

@@ -25,8 +25,8 @@ from studies.shown import Point, curves, figure_of
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.saving import save_figure
+from jamshape.drawing.text import packing_text
 from jamshape.files.h5md import read_packing
 from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape

@@ -10,17 +10,23 @@ standard output is one JSON object with the same.
 from __future__ import annotations
 
 import math
+import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from jamshape.command import parser_of, report, run
-from jamshape.files.sets import System, n_of, of_paper, read_groups
-from jamshape.measures import published
-from jamshape.measures.averages import Mean, mean, mean_over
+from jamshape.files.sets import System
+from jamshape.measures.averages import Mean
 from jamshape.measures.runs import read_run
-from jamshape.vibration.sets import TOLD, fraction_of, read_tables
+from jamshape.vibration.sets import TOLD
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common import published
+from common.averages import mean, mean_over
+from common.ensembles import n_of, of_paper, read_groups
+from common.mode_tables import fraction_of, read_tables
 
 NONE = Mean(math.nan)
 

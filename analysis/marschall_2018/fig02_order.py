@@ -9,6 +9,7 @@ line of standard output is one JSON object with the averages over phi.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,12 +18,15 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import counted, ensemble_labels, ensembles_title
 from jamshape.files.sets import PackingFile
-from jamshape.measures.averages import Mean, mean, standard_error
+from jamshape.measures.averages import Mean
 from jamshape.measures.runs import Ensemble, ensemble_of, observables_of
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean, standard_error
+from common.axes import SMALL_TEXT, figure_of
+from common.text import counted, ensemble_labels, ensembles_title
 
 ORDERS = {"S_2": "nematic", "S_4": "tetratic"}
 POINTS = 30
@@ -70,9 +74,7 @@ def average(n: int, runs: Samples) -> Curve:
 
 def draw(curves: dict[Ensemble, Curve], options: Namespace) -> None:
     """Draw S_2 on the left and S_4 on the right."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(8, 3.7), dpi=200, layout="constrained")
+    figure = figure_of(8, 3.7)
     panels, labels = figure.subplots(1, 2, sharey=True), ensemble_labels(curves)
     for order, (axes, (name, text)) in enumerate(zip(panels, ORDERS.items(), strict=True)):
         for k, (ensemble, curve) in enumerate(curves.items()):

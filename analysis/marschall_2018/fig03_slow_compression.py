@@ -15,6 +15,7 @@ standard output is one JSON object.
 from __future__ import annotations
 
 import math
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,10 +24,8 @@ import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import (
-    counted,
     ensemble_text,
     onset_symbol,
     pressure_unit,
@@ -35,8 +34,13 @@ from jamshape.drawing.text import (
 )
 from jamshape.files.h5md import read_attributes
 from jamshape.files.sets import PackingFile, System
-from jamshape.measures.averages import Mean, mean
+from jamshape.measures.averages import Mean
 from jamshape.measures.runs import Run, read_run
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean
+from common.axes import SMALL_TEXT, figure_of
+from common.text import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -140,10 +144,8 @@ def cost_of(one: Run) -> Cost | None:
 
 def draw(rates: list[Rate], packings: dict[Place, list[float]], out: Path) -> None:
     """Draw one column for each system and N; `packings` are their phi_J."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
     places = list(dict.fromkeys(of.place for of in rates))
-    figure = Figure(figsize=(4.5 * len(places), 6), dpi=100, layout="constrained")
+    figure = figure_of(4.5 * len(places), 6, dpi=100)
     axes = figure.subplots(2, len(places), squeeze=False, sharex="col")
     for place, (linear, logarithmic) in zip(places, axes.T, strict=True):
         own = [of for of in rates if of.place == place]

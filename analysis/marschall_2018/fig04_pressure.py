@@ -12,19 +12,24 @@ its rate, the band and, if the runs differ in nothing but their seed, the mean.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT
 from jamshape.drawing.pressure import draw_jamming, draw_onset, onset_text
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import ensemble_text, onset_symbol, pressure_unit
-from jamshape.files.sets import of_paper
-from jamshape.measures.averages import Mean, mean
+from jamshape.measures.averages import Mean
 from jamshape.measures.onset import OnsetFit
-from jamshape.measures.published import PHI_J
 from jamshape.measures.runs import Run, read_run
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean
+from common.axes import SMALL_TEXT, figure_of
+from common.ensembles import of_paper
+from common.published import PHI_J
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,12 +61,10 @@ def draw_onsets(axes: Axes, runs: list[Run]) -> None:
 
 def draw(runs: list[Run], average: Mean | None, options: Namespace) -> None:
     """Draw all of each curve on the left; on the right the onsets with their lines."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
     # Each band has a long line of its own in the legend.
     columns = 1 if any(one.jamming for one in runs) else 2
     lines = 4 + min(len(runs), NAMED) * (3 - columns) / columns
-    figure = Figure(figsize=(8, 3.7 + 0.17 * lines), dpi=200, layout="constrained")
+    figure = figure_of(8, 3.7 + 0.17 * lines)
     whole, onset = figure.subplots(1, 2)
     draw_onsets(onset, runs)
     for k, one in enumerate(runs):

@@ -11,29 +11,26 @@ the averages over samples.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import PAPER_STYLE, color
-from jamshape.drawing.text import conditions_text, system_labels
-from jamshape.files.sets import (
-    Curve,
-    Groups,
-    PackingFile,
-    System,
-    conditions,
-    curves_over,
-    of_paper,
-    read_groups,
-)
-from jamshape.measures.averages import Mean, mean_over
-from jamshape.measures.published import PHI_J
+from jamshape.files.sets import PackingFile, System
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean_over
+from common.axes import SMALL_TEXT, discs_at, error_bars, figure_of, label_alpha_axis
+from common.ensembles import Curve, Groups, conditions, curves_over, of_paper, read_groups
+from common.published import PHI_J
+from common.styles import PAPER_STYLE, color
+from common.text import conditions_text, system_labels
 
 WAYS = {
     "phi_J": ("o-", r"$\phi_J$ from $u_0$ to 0"),
@@ -59,9 +56,7 @@ def average(samples: Sequence[PackingFile], name: str) -> Mean:
 
 def draw(known: dict[System, Averages], groups: Groups, options: Namespace) -> None:
     """Draw phi_J against alpha, discs at the left end."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(5.6, 4), dpi=200, layout="constrained")
+    figure = figure_of(5.6, 4)
     axes = figure.subplots()
     discs = discs_at([*PHI_J, *(alpha for of in known.values() for alpha in of["phi_J"])])
     labels = system_labels(known)

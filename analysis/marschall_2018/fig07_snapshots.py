@@ -9,17 +9,21 @@ contact. The last line of standard output is one JSON object with what was count
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import Contacts
-from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.packing import add_legend, colorings, draw_packing
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.space import save_smooth
-from jamshape.drawing.text import counted
-from jamshape.files.sets import Choice, Groups, choose, read_groups
+from jamshape.drawing.text import packing_text
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.ensembles import Choice, Groups, choose, read_groups
+from common.text import counted
 
 PAPER_ALPHAS = (0.01, 4.0)
 INCHES, ROOM = 5.0, 0.9  # of a panel, and below it

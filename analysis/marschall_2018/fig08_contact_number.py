@@ -10,21 +10,28 @@ each is a curve. The last line of standard output is one JSON object with the av
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import PAPER_STYLE, SKY, color
-from jamshape.drawing.text import conditions_text, system_labels
-from jamshape.files.sets import System, conditions, curves_over, of_paper, read_groups
-from jamshape.measures.averages import Mean, averages
-from jamshape.measures.contact_statistics import OffsetPowerLaw, fit_offset_power_law
-from jamshape.measures.published import RATTLERS, Z
+from jamshape.drawing.styles import SKY
+from jamshape.files.sets import System
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages
+from common.axes import SMALL_TEXT, discs_at, error_bars, figure_of, label_alpha_axis
+from common.ensembles import conditions, curves_over, of_paper, read_groups
+from common.offset_power_law import OffsetPowerLaw, fit_offset_power_law
+from common.published import RATTLERS, Z
+from common.styles import PAPER_STYLE, color
+from common.text import conditions_text, system_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,9 +106,7 @@ def above(known: Averages, limit: int) -> Averages:
 
 def draw(curves: dict[System, Found], title: str, options: Namespace) -> None:
     """Draw z on the left, what it is above its limit on logarithmic axes on the right."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(10.5, 4.4), dpi=200, layout="constrained")
+    figure = figure_of(10.5, 4.4)
     linear, logarithmic = figure.subplots(1, 2)
     discs = discs_at([*Z, *(alpha for found in curves.values() for alpha in found.z["z"])])
     labels = system_labels(curves)

@@ -10,19 +10,26 @@ JSON object with the averages over samples.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT, discs_at, error_bars, label_alpha_axis
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import BLUE, GREEN, ORANGE, PAPER_STYLE, RED
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Curve, System, conditions, of_paper, one_curve, read_groups
-from jamshape.measures.averages import Mean, mean_over
-from jamshape.measures.touching import NAMES, class_numbers
+from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED
+from jamshape.files.sets import System
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean_over
+from common.axes import SMALL_TEXT, discs_at, error_bars, figure_of, label_alpha_axis
+from common.contact_classes import NAMES, class_numbers
+from common.ensembles import Curve, conditions, of_paper, one_curve, read_groups
+from common.styles import PAPER_STYLE
+from common.text import conditions_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,9 +78,7 @@ def draw_paper(axes: Axes, known: Averages, discs: float) -> None:
 
 def draw(system: System, known: Averages, title: str, options: Namespace) -> None:
     """Draw classes on the left and flat contacts on the right."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(9, 4.4), dpi=200, layout="constrained")
+    figure = figure_of(9, 4.4)
     classes, flat = figure.subplots(1, 2, sharex=True)
     discs = discs_at([*known, *PAPER_FLAT])
     draw_all(classes, known, discs, STYLES)

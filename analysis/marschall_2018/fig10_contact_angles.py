@@ -10,14 +10,17 @@ output is one JSON object with the height of the peak and how much of P is on th
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.contact_angles import contact_angle_figure
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import conditions_alone, system_labels
-from jamshape.files.sets import Choice, choose, conditions, read_groups
-from jamshape.measures.touching import angle_curve
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.contact_angles import angle_curve, contact_angle_figure
+from common.ensembles import Choice, choose, conditions, read_groups
+from common.text import conditions_alone, system_labels
 
 PAPER_ALPHAS = (0.01, 0.12, 1.0)
 MOST = 5  # curves

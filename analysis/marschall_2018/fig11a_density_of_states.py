@@ -11,15 +11,24 @@ the fractions of modes in each band, beside the paper's.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.command import report, run
-from jamshape.drawing.axes import SMALL_TEXT, log_bars
-from jamshape.drawing.mode_axes import (
+from jamshape.drawing.saving import save_figure
+from jamshape.vibration.sets import TOLD, Key
+from jamshape.vibration.table import ModeTable
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean, standard_error
+from common.axes import SMALL_TEXT, figure_of, log_bars
+from common.ensembles import of_paper
+from common.mode_axes import (
     Sides,
     add_sides,
     bin_edges,
@@ -29,13 +38,9 @@ from jamshape.drawing.mode_axes import (
     modes_parser,
     tables_asked,
 )
-from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import PAPER_STYLE, marked
-from jamshape.files.sets import of_paper
-from jamshape.measures.averages import mean, standard_error
-from jamshape.measures.published import BANDS
-from jamshape.vibration.sets import TOLD, Key, Tables, every, sizes, stable, unstable
-from jamshape.vibration.table import ModeTable
+from common.mode_tables import Tables, every, sizes, stable, unstable
+from common.published import BANDS
+from common.styles import PAPER_STYLE, marked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,9 +92,7 @@ def draw_curve(row: Sides, samples: list[ModeTable], edges: FloatArray, **style:
 
 def draw(tables: Tables, options: Namespace) -> None:
     """Draw all curves."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(7, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(7, 4.2)
     (row,) = add_sides(figure, tables)
     edges, labels = bin_edges(every(tables)), key_labels(tables)
     least = min(

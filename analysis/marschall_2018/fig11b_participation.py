@@ -11,13 +11,19 @@ is one JSON object with averages over bands.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from jamshape.command import report, run
-from jamshape.drawing.mode_axes import (
+from jamshape.drawing.saving import save_figure
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import figure_of
+from common.mode_axes import (
     add_sides,
     bin_edges,
     draw_binned,
@@ -27,16 +33,13 @@ from jamshape.drawing.mode_axes import (
     modes_parser,
     tables_asked,
 )
-from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import marked
-from jamshape.vibration.sets import Tables, band_means, every
+from common.mode_tables import Tables, band_means, every
+from common.styles import marked
 
 
 def draw(tables: Tables, options: Namespace) -> None:
     """Draw all curves."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(7, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(7, 4.2)
     (row,) = add_sides(figure, tables)
     edges, labels = bin_edges(every(tables)), key_labels(tables)
     for k, (key, samples) in enumerate(tables.items()):

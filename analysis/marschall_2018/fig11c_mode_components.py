@@ -10,12 +10,21 @@ drawn apart, on the left. The last line of standard output is one JSON object wi
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 from jamshape.command import report, run
-from jamshape.drawing.mode_axes import (
-    COMPONENTS,
+from jamshape.drawing.modes import COMPONENTS
+from jamshape.drawing.saving import save_figure
+from jamshape.drawing.text import systems_text
+from jamshape.vibration.sets import TOLD, Key
+from jamshape.vibration.table import ModeTable
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import figure_of
+from common.mode_axes import (
     add_sides,
     bin_edges,
     draw_binned,
@@ -24,10 +33,8 @@ from jamshape.drawing.mode_axes import (
     modes_parser,
     tables_asked,
 )
-from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import samples_text, systems_text
-from jamshape.vibration.sets import TOLD, Key, Tables, band_means, every, n_of
-from jamshape.vibration.table import ModeTable
+from common.mode_tables import Tables, band_means, every, n_of
+from common.text import samples_text
 
 MOST = 4  # panels
 
@@ -54,9 +61,7 @@ def turning(tables: Tables) -> Tables:
 
 def draw(tables: Tables, options: Namespace) -> None:
     """Draw one panel for each system and u0."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(7, 1.4 + 2.4 * len(tables)), dpi=200, layout="constrained")
+    figure = figure_of(7, 1.4 + 2.4 * len(tables))
     rows = add_sides(figure, tables, len(tables))
     edges = bin_edges(every(tables))
     thin: dict[str, Any] = {"mfc": "none", "ms": 4, "lw": 0.8, "elinewidth": 0.8, "capsize": 1.5}

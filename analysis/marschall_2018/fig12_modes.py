@@ -12,6 +12,7 @@ of the mode is in. The last line of standard output is one JSON object.
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,15 +21,18 @@ import numpy as np
 
 from jamshape.arrays import BoolArray, FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.mode_axes import mode_text, packing_text
 from jamshape.drawing.plane import draw_bodies, images, show_box
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import RATTLER
+from jamshape.drawing.text import packing_text
 from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape
 from jamshape.packing import Box, Packing
-from jamshape.vibration.sets import Wanted, pick_modes, table_of
 from jamshape.vibration.table import ModeTable
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.mode_axes import mode_text
+from common.mode_tables import Wanted, pick_modes, table_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

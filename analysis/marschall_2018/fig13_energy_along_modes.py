@@ -12,6 +12,7 @@ it is dashed. Below are the bonds that have broken and formed. Dots are where a 
 from __future__ import annotations
 
 import math
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,13 +22,16 @@ from tqdm import tqdm
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.mode_axes import mode_text, packing_text
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import unit_text
+from jamshape.drawing.text import packing_text, unit_text
 from jamshape.files.sets import PackingFile
-from jamshape.vibration.energy_along import AlongModes, Crossover, EnergyAlong, fit_crossover
-from jamshape.vibration.sets import Wanted, pick_modes, table_of
 from jamshape.vibration.table import ModeTable
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import figure_of
+from common.energy_along import AlongModes, Crossover, EnergyAlong, fit_crossover
+from common.mode_axes import mode_text
+from common.mode_tables import Wanted, pick_modes, table_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -104,9 +108,8 @@ def explain(top: Axes, bottom: Axes, curves: Curves) -> None:
 def draw(curves: Curves, table: ModeTable, file: PackingFile, out: Path) -> None:
     """Draw energies, and the bonds that break and form."""
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
-    from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(8.4, 6.0), dpi=200, layout="constrained")
+    figure = figure_of(8.4, 6.0)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2.3, 1])
     shades = colormaps["viridis"](np.linspace(0.92, 0.0, len(curves)))
     for color, (mode, curve) in zip(shades, curves.items(), strict=True):

@@ -12,21 +12,29 @@ a gap below the high band; the last line of standard output is one JSON object w
 from __future__ import annotations
 
 import math
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from jamshape.command import report, run
-from jamshape.drawing.axes import energy_label, log_bars
-from jamshape.drawing.mode_axes import frequency_unit, modes_parser, tables_asked
+from jamshape.drawing.modes import frequency_unit
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLUE, RED
-from jamshape.drawing.text import range_text, systems_text
-from jamshape.files.sets import System, of_paper
-from jamshape.measures.averages import Mean, mean
-from jamshape.vibration.sets import Tables, n_of, seed_of, sizes, stable, unstable
+from jamshape.drawing.text import systems_text
+from jamshape.files.sets import System
+from jamshape.measures.averages import Mean
 from jamshape.vibration.table import ModeTable
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean
+from common.axes import energy_label, figure_of, log_bars
+from common.ensembles import of_paper
+from common.mode_axes import modes_parser, tables_asked
+from common.mode_tables import Tables, n_of, seed_of, sizes, stable, unstable
+from common.text import range_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -173,9 +181,7 @@ def band_label(band: Band, law: Fit | None) -> str:
 
 def draw(found: dict[System, Ladder], tables: Tables, options: Namespace) -> None:
     """Draw one panel for each system."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(0.9 + 3.4 * len(found), 3.9), dpi=200, layout="constrained")
+    figure = figure_of(0.9 + 3.4 * len(found), 3.9)
     panels = figure.subplots(1, len(found), sharey=True, squeeze=False)[0]
     for axes, (system, ladder) in zip(panels, found.items(), strict=True):
         for band in STYLES:

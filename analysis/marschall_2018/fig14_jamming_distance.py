@@ -11,19 +11,26 @@ these numbers beside the paper's.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT, energy_label
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import PAPER_STYLE, color, marked
-from jamshape.drawing.text import bars_text, counted, system_labels, systems_text
-from jamshape.files.sets import PackingFile, System, finished, of_paper
-from jamshape.measures.averages import Mean, mean
-from jamshape.measures.published import DISTANCE
+from jamshape.drawing.text import systems_text
+from jamshape.files.sets import PackingFile, System
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean
+from common.axes import SMALL_TEXT, energy_label, figure_of
+from common.ensembles import finished, of_paper
+from common.published import DISTANCE
+from common.styles import PAPER_STYLE, color, marked
+from common.text import bars_text, counted, system_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,9 +123,7 @@ def draw_paper(panels: list[Axes], stars: dict[float, float], tint: str) -> None
 
 def draw(ladder: Ladder, n: str, options: Namespace) -> None:
     """Draw phi - phi_J on the left, without its trend on the right."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(9, 3.9), dpi=200, layout="constrained")
+    figure = figure_of(9, 3.9)
     left, right = panels = list(figure.subplots(1, 2))
     energies = [u for samples in ladder.values() for u in averages(samples)]
     labels, with_stars = system_labels(ladder), False

@@ -11,20 +11,25 @@ quantiles.
 from __future__ import annotations
 
 import math
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT, log_bars
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import marked
-from jamshape.drawing.text import bars_text, conditions_alone, counted, system_labels
 from jamshape.files.h5md import read_observables
-from jamshape.files.sets import Choice, PackingFile, System, choose, conditions, read_groups
-from jamshape.measures.averages import standard_error
+from jamshape.files.sets import PackingFile, System
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import standard_error
+from common.axes import SMALL_TEXT, figure_of, log_bars
+from common.ensembles import Choice, choose, conditions, read_groups
+from common.styles import marked
+from common.text import bars_text, conditions_alone, counted, system_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,9 +79,7 @@ def draw_curve(axes: Axes, samples: list[FloatArray], bins: FloatArray, **style:
 
 def draw(residuals: dict[str, Values], title: str, options: Namespace) -> None:
     """Draw both distributions."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(9, 4.4), dpi=200, layout="constrained")
+    figure = figure_of(9, 4.4)
     panels = figure.subplots(1, 2)
     for axes, (name, values) in zip(panels, residuals.items(), strict=True):
         bins, labels = decade_bins(values), system_labels(values)

@@ -11,12 +11,16 @@ density, with standard errors. The last line of standard output is one JSON obje
 from __future__ import annotations
 
 import csv
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import NamedTuple
 
 from jamshape.command import parser_of, report, run
-from jamshape.measures.averages import Mean, mean
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean
 
 NEEDED = ("file", "alpha", "u0", "z", "n_backbone", "n_grazing", "low", "middle", "high")
 

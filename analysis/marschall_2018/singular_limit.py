@@ -14,6 +14,7 @@ only if all packings are there and in equilibrium.
 from __future__ import annotations
 
 import math
+import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable
@@ -25,21 +26,24 @@ from scipy.stats import ks_2samp
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.contact_angles import contact_angle_figure
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import conditions_alone
 from jamshape.files.h5md import require_attributes
 from jamshape.files.outcomes import shortfall
-from jamshape.files.sets import Curve, PackingFile, is_among, one_curve, read_groups
+from jamshape.files.sets import PackingFile
 from jamshape.landscape import Landscape, State
-from jamshape.measures.averages import mean_over
 from jamshape.measures.minimum import write_minimum
-from jamshape.measures.touching import angle_curve, angles_of, class_numbers
 from jamshape.minima.target import Target, TargetError, find
-from jamshape.packing.spines import with_spines
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.make import Dynamics, Recipe, is_done, make, require_same
 from jamshape.shapes.particles import Particles
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean_over
+from common.contact_angles import angle_curve, angles_of, contact_angle_figure
+from common.contact_classes import class_numbers
+from common.ensembles import Curve, is_among, one_curve, read_groups
+from common.spines import with_spines
+from common.text import conditions_alone
 
 # At alpha = 0.01; "virtually all the particles (96.3% of them)" have a flat contact (Sec. III C).
 PAPER = {"flat": 0.963, "z": 4.43, "rattlers": 34 / 1024}

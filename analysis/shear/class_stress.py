@@ -9,6 +9,7 @@ output is one JSON object.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import NamedTuple
@@ -19,12 +20,16 @@ from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import Contacts
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import color
 from jamshape.drawing.text import ensemble_text
 from jamshape.files.h5md import count_frames, read_packing
-from jamshape.measures.averages import Mean, mean
-from jamshape.measures.class_stress import class_stress
+from jamshape.measures.averages import Mean
 from jamshape.measures.shears import ShearOf, read_shear
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import mean
+from common.axes import figure_of
+from common.contact_classes import class_stress
+from common.styles import color
 
 CLASSES = ("tip-to-tip", "tip-to-side", "side-to-side")
 PARTS = {"pressure": "part of the pressure", "shear_stress": "part of the shear stress"}
@@ -63,12 +68,10 @@ def _by_class(found: Contacts) -> FloatArray:
 
 def main(options: Namespace) -> None:
     """Read, average, draw, report."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
     found = sorted(
         (parts_of(path, options.after) for path in options.files), key=lambda p: p.run.ensemble.phi
     )
-    figure = Figure(figsize=(5.5, 6), dpi=160, layout="constrained")
+    figure = figure_of(5.5, 6, dpi=160)
     for axes, (name, label) in zip(figure.subplots(2, 1, sharex=True), PARTS.items(), strict=True):
         phi = [one.run.ensemble.phi for one in found]
         for k, kind in enumerate(CLASSES):

@@ -10,19 +10,20 @@ on the flat sides.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import NamedTuple
 
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import Contacts
-from jamshape.drawing.contact_angles import contact_angle_figure
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import scientific
 from jamshape.files.h5md import count_frames, read_packing
-from jamshape.measures.contact_statistics import contact_angles
 from jamshape.measures.shears import ShearOf, read_shear
-from jamshape.measures.touching import AngleCurve, curve_of_angles
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.contact_angles import AngleCurve, contact_angle_figure, contact_angles, curve_of_angles
 
 
 class Found(NamedTuple):

@@ -9,6 +9,7 @@ turn against it. One panel for each file, of the frame `--frame`. As the picture
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import NamedTuple
@@ -24,8 +25,11 @@ from jamshape.drawing.saving import save_figure
 from jamshape.drawing.shear import title_of
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.flow.host import Host
-from jamshape.flow.rotation import rotation_rates
 from jamshape.measures.shears import ShearOf, read_shear
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import figure_of
+from common.rotation import rotation_rates
 
 # Colours end here, as rates over that of the shear.
 END = 2.0
@@ -52,10 +56,9 @@ def main(options: Namespace) -> None:
     """Read, draw, report."""
     from matplotlib.cm import ScalarMappable  # noqa: PLC0415 - not needed for --help and for errors
     from matplotlib.colors import Normalize  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415
 
     frames = [frame_of(path, options.frame) for path in options.files]
-    figure = Figure(figsize=(5.2 * len(frames) + 0.8, 5.4), dpi=160, layout="constrained")
+    figure = figure_of(5.2 * len(frames) + 0.8, 5.4, dpi=160)
     mapped = ScalarMappable(Normalize(-END, END), "RdBu")
     panels = figure.subplots(1, len(frames), squeeze=False)[0]
     for axes, one in zip(panels, frames, strict=True):

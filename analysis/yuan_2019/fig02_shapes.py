@@ -10,7 +10,9 @@ numbers.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,10 +20,8 @@ from scipy.spatial import ConvexHull
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.families import NEEDS, with_three_axes
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.space import lit, mean_normals, view
-from jamshape.drawing.styles import BODIES
 from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.roundness import (
     asphericity,
@@ -30,6 +30,10 @@ from jamshape.shapes.roundness import (
     surface_area,
     volume,
 )
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.families import NEEDS, with_three_axes
+from common.styles import BODIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

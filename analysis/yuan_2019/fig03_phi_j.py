@@ -9,17 +9,22 @@ line of standard output is one JSON object with averages over samples and their 
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import points
-from jamshape.drawing.families import NEEDS, beta, family_legend, is_axisymmetric, shape_of
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import PAPER_LINE
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, System, conditions, only, read_groups
-from jamshape.measures.averages import averages, exactly, rows
+from jamshape.files.sets import System
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages, exactly, rows
+from common.axes import figure_of, points
+from common.ensembles import Groups, conditions, only, read_groups
+from common.families import NEEDS, beta, family_legend, is_axisymmetric, shape_of
+from common.styles import PAPER_LINE
+from common.text import conditions_text
 
 PHI_SPHERES = 0.64  # the paper's
 TICKS = (0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 4)
@@ -32,9 +37,7 @@ def is_superball(system: System) -> bool:
 
 def draw(groups: Groups, options: Namespace) -> None:
     """Draw phi_J against w and against p."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(9, 4), dpi=200, layout="constrained")
+    figure = figure_of(9, 4)
     panels = figure.subplots(1, 2, sharey=True)
     cases: tuple[Any, ...] = ((is_axisymmetric, beta), (is_superball, lambda s: shape_of(s)[0]))
     for axes, (belongs, x) in zip(panels, cases, strict=True):

@@ -11,21 +11,26 @@ and are not drawn. The last line of standard output is one JSON object.
 from __future__ import annotations
 
 import math
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import beta_axis, points
-from jamshape.drawing.families import NEEDS, beta, family_legend, mark
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import BLACK, PAPER_LINE
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, conditions, n_of, only, read_groups
-from jamshape.measures.averages import averages, exactly, mean, rows
+from jamshape.drawing.styles import BLACK
 from jamshape.measures.order3d import cubatic_order, nematic_order
 from jamshape.packing import body_axes
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages, exactly, mean, rows
+from common.axes import beta_axis, figure_of, points
+from common.ensembles import Groups, conditions, n_of, only, read_groups
+from common.families import NEEDS, beta, family_legend, mark
+from common.styles import PAPER_LINE
+from common.text import conditions_text
 
 DRAWS = 40
 
@@ -40,9 +45,7 @@ def random_order(n: int) -> dict[str, float]:
 
 def draw(every: Groups, at_random: dict[str, float], options: Namespace) -> None:
     """Draw S_2 against C_4 and beta."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(10.5, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(10.5, 4.2)
     both, flat = figure.subplots(1, 2, sharey=True)
     known, level = averages(every, "S2"), 1 / math.sqrt(n_of(every))
     groups = only(every, lambda system: known[system].samples > 0)

@@ -10,17 +10,22 @@ ones of protocol 2. The last line of standard output is one JSON object with ave
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import points
-from jamshape.drawing.families import NEEDS, SPHERES, family, family_legend, is_axisymmetric
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import PAPER_LINE, YELLOW
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, conditions, read_groups
-from jamshape.measures.averages import averages, rows
+from jamshape.drawing.styles import YELLOW
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages, rows
+from common.axes import figure_of, points
+from common.ensembles import Groups, conditions, read_groups
+from common.families import NEEDS, SPHERES, family, family_legend, is_axisymmetric
+from common.styles import PAPER_LINE
+from common.text import conditions_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,13 +71,11 @@ def draw_z(groups: Groups, panels: list[Axes]) -> None:
 
 def draw(groups: Groups, options: Namespace) -> None:
     """Draw one figure."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
     if options.quantity == "phi_J":
-        figure = Figure(figsize=(7.4, 4.4), dpi=200, layout="constrained")
+        figure = figure_of(7.4, 4.4)
         draw_phi(groups, figure.subplots())
     else:
-        figure = Figure(figsize=(11, 4.2), dpi=200, layout="constrained")
+        figure = figure_of(11, 4.2)
         draw_z(groups, list(figure.subplots(1, 2)))
     save_figure(figure, options.out)
 

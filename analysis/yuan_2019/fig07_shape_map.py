@@ -10,20 +10,27 @@ them. The last line of standard output is one JSON object.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import beta_axis
-from jamshape.drawing.families import NEEDS, beta, is_thermal, shape_of
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import BLACK, COLORS, PAPER_LINE
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, System, conditions, only, read_groups
+from jamshape.drawing.styles import BLACK
+from jamshape.files.sets import System
 from jamshape.files.vocabulary import NUMBERED, read_protocol
-from jamshape.measures.averages import Mean, averages, exactly, rows
+from jamshape.measures.averages import Mean
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages, exactly, rows
+from common.axes import beta_axis, figure_of
+from common.ensembles import Groups, conditions, only, read_groups
+from common.families import NEEDS, beta, is_thermal, shape_of
+from common.styles import COLORS, PAPER_LINE
+from common.text import conditions_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,9 +96,7 @@ def draw_contours(axes: Axes, x: Any, y: Any, z: Any) -> None:
 
 def draw(groups: Groups, options: Namespace) -> bool:
     """Draw both panels; return whether there are contours."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(9.5, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(9.5, 4.2)
     left, right = figure.subplots(1, 2)
     A, phi = averages(groups, "asphericity"), averages(groups, "phi_J")
     draw_bands(left, A, phi)

@@ -9,16 +9,21 @@ line of standard output is one JSON object with the averages and, of shapes with
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import points
-from jamshape.drawing.families import family_legend, is_thermal, mark
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, PackingFile, System, conditions, only, read_groups
-from jamshape.measures.averages import averages, mean, rows
+from jamshape.files.sets import PackingFile, System
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages, mean, rows
+from common.axes import figure_of, points
+from common.ensembles import Groups, conditions, only, read_groups
+from common.families import family_legend, is_thermal, mark
+from common.text import conditions_text
 
 PANELS = {"S2": "nematic order $S_2$", "C4": "cubatic order $C_4$", "z": "contacts $z_J$"}
 NAMES = ("phi_J", *PANELS)
@@ -40,9 +45,7 @@ def with_both(groups: Groups) -> Groups:
 
 def draw(groups: Groups, options: Namespace) -> None:
     """Draw order and contacts against phi_J."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(12, 4), dpi=200, layout="constrained")
+    figure = figure_of(12, 4)
     panels = figure.subplots(1, len(PANELS))
     first, second = only(groups, lambda s: not is_thermal(s)), only(groups, is_thermal)
     for axes, (name, text) in zip(panels, PANELS.items(), strict=True):

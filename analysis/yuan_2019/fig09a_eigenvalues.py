@@ -11,6 +11,7 @@ standard output is one JSON object.
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,17 @@ from tqdm import tqdm
 
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import SMALL_TEXT
-from jamshape.drawing.families import shape_of
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import conditions_alone, system_labels, unit_text
-from jamshape.files.sets import Groups, System, conditions, read_groups
-from jamshape.vibration.quartic import KEPT, by_size, kept_modes, quartic_count
+from jamshape.drawing.text import unit_text
+from jamshape.files.sets import System
 from jamshape.vibration.table import ModeTable
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import SMALL_TEXT, figure_of
+from common.ensembles import Groups, conditions, read_groups
+from common.families import shape_of
+from common.quartic import KEPT, by_size, kept_modes, quartic_count
+from common.text import conditions_alone, system_labels
 
 Tables = dict[System, ModeTable]
 SMOOTH = 31  # modes that the share of rotation is averaged over
@@ -43,9 +48,8 @@ def smooth(values: FloatArray) -> FloatArray:
 def draw(tables: Tables, title: str, options: Namespace) -> None:
     """Draw eigenvalues and the share of rotation."""
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
-    from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(8.4, 6), dpi=200, layout="constrained")
+    figure = figure_of(8.4, 6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
     shades = colormaps["turbo"](np.linspace(0.05, 0.95, len(tables)))
     labels = system_labels(tables)

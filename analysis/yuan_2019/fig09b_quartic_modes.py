@@ -11,6 +11,7 @@ output is one JSON object with a row for each packing.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
@@ -19,11 +20,15 @@ import numpy as np
 from tqdm import tqdm
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.families import family_legend, mark
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, PackingFile, System, conditions, read_groups
-from jamshape.vibration.quartic import KEPT, QuarticCount, followed, kept_modes, quartic_count
+from jamshape.files.sets import PackingFile, System
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.axes import figure_of
+from common.ensembles import Groups, conditions, read_groups
+from common.families import family_legend, mark
+from common.quartic import KEPT, QuarticCount, followed, kept_modes, quartic_count
+from common.text import conditions_text
 
 Counts = dict[System, list[QuarticCount]]
 LINE: dict[str, Any] = {"ls": "--", "color": "0.5", "lw": 1, "zorder": 0}
@@ -31,9 +36,7 @@ LINE: dict[str, Any] = {"ls": "--", "color": "0.5", "lw": 1, "zorder": 0}
 
 def draw(groups: Groups, counts: Counts, options: Namespace) -> None:
     """Draw all packings on the unit line, and their distance from it."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(5.6, 6), dpi=200, layout="constrained")
+    figure = figure_of(5.6, 6)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
     for system, found in counts.items():
         style: dict[str, Any] = mark(system) | {"ls": "none", "ms": 6}

@@ -11,7 +11,9 @@ one packing at several pressures. The last line of standard output is one JSON o
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,15 +21,18 @@ from tqdm import tqdm
 
 from jamshape.checks import Range, require_in
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.families import label, mark
-from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.styles import PAPER_LINE, RED
-from jamshape.drawing.text import pressure_unit, systems_text, unit_text
-from jamshape.files.sets import PackingFile, System, read_groups
-from jamshape.vibration.energy_along import EnergyAlong, quartic_crossover
-from jamshape.vibration.quartic import along, found_modes, quartic_count
-from jamshape.vibration.sets import Wanted, pick_modes
+from jamshape.drawing.styles import RED
+from jamshape.drawing.text import packing_text, pressure_unit, systems_text, unit_text
+from jamshape.files.sets import PackingFile, System
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.energy_along import EnergyAlong, quartic_crossover
+from common.ensembles import read_groups
+from common.families import label, mark
+from common.mode_tables import Wanted, pick_modes
+from common.quartic import along, found_modes, quartic_count
+from common.styles import PAPER_LINE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

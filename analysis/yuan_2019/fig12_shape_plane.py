@@ -9,19 +9,23 @@ standard output is one JSON object with the shapes.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
-from jamshape.drawing.axes import beta_axis, points
-from jamshape.drawing.families import NEEDS, beta, family_legend
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLUE, RED
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, conditions, read_groups
-from jamshape.measures.averages import averages, exactly, rows
 from jamshape.shapes.roundness import asphericity, axes_from
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages, exactly, rows
+from common.axes import beta_axis, figure_of, points
+from common.ensembles import Groups, conditions, read_groups
+from common.families import NEEDS, beta, family_legend
+from common.text import conditions_text
 
 LARGEST, POINTS = 6.0, 40  # of beta, and of 1/beta
 BOX = 2.0  # exponent of the grey lines
@@ -29,9 +33,7 @@ BOX = 2.0  # exponent of the grey lines
 
 def draw(groups: Groups, options: Namespace) -> None:
     """Draw shapes and the curves that bound them."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(7, 4.6), dpi=200, layout="constrained")
+    figure = figure_of(7, 4.6)
     axes = figure.subplots()
     long = np.geomspace(1, LARGEST, POINTS)
     for p, style in ((1.0, "-"), (BOX, "--")):

@@ -10,23 +10,29 @@ averages over samples and their errors.
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 
 import numpy as np
 
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import find_contacts
-from jamshape.drawing.axes import points
 from jamshape.drawing.colors import ORDER
-from jamshape.drawing.families import family_legend
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLACK
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, System, conditions, only, read_groups
-from jamshape.measures.averages import Mean, averages, mean, rows
+from jamshape.files.sets import System
+from jamshape.measures.averages import Mean
 from jamshape.measures.local_order import local_order
 from jamshape.measures.order3d import local_cubatic_order, local_nematic_order
 from jamshape.packing import Packing, body_axes
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages, mean, rows
+from common.axes import figure_of, points
+from common.ensembles import Groups, conditions, only, read_groups
+from common.families import family_legend
+from common.text import conditions_text
 
 GLOBAL = {"S2": "nematic order $S_2$", "C4": "cubatic order $C_4$"}
 
@@ -62,9 +68,7 @@ def measure(groups: Groups) -> tuple[Columns, Columns]:
 
 def draw(groups: Groups, local: Columns, lost: Columns, options: Namespace) -> None:
     """Draw both kinds of order."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
-
-    figure = Figure(figsize=(10.5, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(10.5, 4.2)
     panels = figure.subplots(1, 2)
     for axes, name in zip(panels, GLOBAL, strict=True):
         known = averages(groups, name)

@@ -9,7 +9,9 @@ line of standard output is one JSON object with quantiles and the rank correlati
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,13 +20,17 @@ from scipy.stats import spearmanr
 from jamshape.arrays import FloatArray
 from jamshape.command import parser_of, report, run
 from jamshape.contacts import find_contacts
-from jamshape.drawing.families import NEEDS, SPHERES, family, label, mark
 from jamshape.drawing.saving import save_figure
-from jamshape.drawing.text import conditions_text
-from jamshape.files.sets import Groups, PackingFile, System, conditions, read_groups
-from jamshape.measures.averages import averages
+from jamshape.files.sets import PackingFile, System
 from jamshape.packing import body_axes
-from jamshape.shapes.curvature import contact_curvatures
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from common.averages import averages
+from common.axes import figure_of
+from common.curvature import contact_curvatures
+from common.ensembles import Groups, conditions, read_groups
+from common.families import NEEDS, SPHERES, family, label, mark
+from common.text import conditions_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,9 +70,8 @@ def draw_distribution(axes: Axes, values: FloatArray, **style: Any) -> None:
 def draw(groups: Groups, known: Curvatures, options: Namespace) -> None:
     """Draw distributions, and medians against z."""
     from matplotlib import colormaps  # noqa: PLC0415 - not needed for --help and for errors
-    from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(11.5, 4.2), dpi=200, layout="constrained")
+    figure = figure_of(11.5, 4.2)
     left, right = figure.subplots(1, 2)
     z, shades = averages(groups, "z"), colormaps["turbo"](np.linspace(0.05, 0.95, len(known)))
     named: set[System] = set()

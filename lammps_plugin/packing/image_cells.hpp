@@ -80,10 +80,11 @@ template <int D> class ImageCells {
     double radius;
     std::size_t but;
   };
-  /// Points of a cell, contiguous in memory: fetching them dominates the time in a large box.
-  struct Part {
-    std::array<Point, PER_PART> points;
+  /// Points of a cell, contiguous in memory: fetching them dominates the time in a large box. The
+  /// first shares a cache line with the numbers.
+  struct alignas(64) Part {
     std::size_t n = 0, more = NONE;
+    std::array<Point, PER_PART> points;
   };
 
   Vec<D> edges;

@@ -6,13 +6,16 @@
 #include "particle_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <map>
-#include <tuple>
 #include <type_traits>
 #include <vector>
 
 namespace jamshape {
+
+/// Semi-axes and exponent, the numbers that LAMMPS holds of a shape.
+using ShapeNumbers = std::array<double, 4>;
 
 /// Own and ghost particles as bodies of a model, all stored: for small bodies, whose contacts take
 /// so little time that assembling bodies would matter.
@@ -38,7 +41,11 @@ template <class Model, int D> class StoredBodies {
   };
 
   void begin_shapes(std::size_t n) { resize_closely(now, n); }
-  void set_shape(std::size_t i, const Shape &shape) { now[i] = Model::template body<D>(shape); }
+  /// A shape, and the numbers that it was made of.
+  void set_shape(std::size_t i, const Shape &shape, const ShapeNumbers &)
+  {
+    now[i] = Model::template body<D>(shape);
+  }
 
   void read_centres(const double *const *x)
   {
@@ -115,10 +122,9 @@ template <class Model, int D> class AssembledBodies {
     number_of.clear();
     orientations.clear();
   }
-  void set_shape(std::size_t i, const Shape &shape)
+  void set_shape(std::size_t i, const Shape &shape, const ShapeNumbers &numbers)
   {
-    const Vec<3> &a = shape.semi_axes;
-    const auto found = number_of.emplace(std::make_tuple(a[0], a[1], a[2], shape.p), kinds.size());
+    const auto found = number_of.emplace(numbers, kinds.size());
     if (found.second) kinds.push_back(Model::template body<D>(shape));
     kind[i] = static_cast<int>(found.first->second);
   }
@@ -170,7 +176,7 @@ template <class Model, int D> class AssembledBodies {
 
   std::vector<int> kind;
   std::vector<Body> kinds;
-  std::map<std::tuple<double, double, double, double>, std::size_t> number_of;
+  std::map<ShapeNumbers, std::size_t> number_of;
   const double *const *centres = nullptr;
   std::vector<Quaternion> orientations;  // empty if no particle can rotate
 };

@@ -43,6 +43,12 @@ bool begins_with(const char *text, const char *beginning)
 
 }  // namespace
 
+std::map<std::string, LAMMPS_NS::Pair *(*)(LAMMPS_NS::LAMMPS *)> &pair_styles()
+{
+  static std::map<std::string, LAMMPS_NS::Pair *(*)(LAMMPS_NS::LAMMPS *)> styles;
+  return styles;
+}
+
 PairContact::PairContact(LAMMPS_NS::LAMMPS *lmp) :
     Pair(lmp), particles(lmp), k_e(nullptr), any_turns(true), instructions(InstructionSet::scalar),
     any_round(false), any_ellipsoids(false), is_new_run(false)

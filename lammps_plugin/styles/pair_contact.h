@@ -9,6 +9,7 @@
 #include "particle_view.h"
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,6 +33,9 @@ struct LocalCurvature {
   int i, j;
   const std::vector<double> &triangle;
 };
+
+/// Factories of the pair styles by name; the .cpp of each style adds its own.
+std::map<std::string, LAMMPS_NS::Pair *(*)(LAMMPS_NS::LAMMPS *)> &pair_styles();
 
 /// Base of the pair styles of all shapes: coefficients, cutoffs from the particles' sizes,
 /// restarts, and orientation as extra degrees of freedom of LAMMPS's minimisers. The loop over

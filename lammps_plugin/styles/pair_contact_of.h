@@ -40,6 +40,8 @@ template <class Model> class PairContactOf : public PairContact {
  public:
   using PairContact::PairContact;
 
+  static std::string name() { return std::string(Model::NAME) + "/harmonic"; }
+
   void init_list(int id, LAMMPS_NS::NeighList *neigh_list) override
   {
     PairContact::init_list(id, neigh_list);
@@ -105,6 +107,7 @@ template <class Model> class PairContactOf : public PairContact {
  protected:
   Sides sides = Sides::TWO;
 
+  std::string style_name() const override { return name(); }
   bool is_valid_shape(const Vec<3> &semi_axes, int type) const override
   {
     return shape_from(semi_axes, type).has_value();
@@ -429,7 +432,7 @@ template <class Model> class PairContactOf : public PairContact {
     std::uint64_t checksum = 0;
     for (int i = 0; i < n_all(); ++i) {
       if (!handles(i)) {
-        bodies.set_shape(i, ball());
+        bodies.set_shape(i, ball(), {1.0, 1.0, 1.0, 1.0});
         continue;
       }
       const Vec<3> semi_axes = particles.semi_axes(i);
@@ -437,9 +440,9 @@ template <class Model> class PairContactOf : public PairContact {
       require_same_bound(i, semi_axes);
       const typename Model::Shape shape = *shape_from(semi_axes, atom->type[i]);
       if (!any_turns && Model::template turns<D>(shape)) stop_at_unexpected_turns(i);
-      bodies.set_shape(i, shape);
-      for (const double axis : semi_axes.c) checksum = mixed(checksum, axis);
-      checksum = mixed(checksum, exponent(atom->type[i]));
+      const ShapeNumbers numbers{semi_axes[0], semi_axes[1], semi_axes[2], exponent(atom->type[i])};
+      bodies.set_shape(i, shape, numbers);
+      for (const double number : numbers) checksum = mixed(checksum, number);
       if constexpr (PacksOf<Model, D>::EXIST) {
         if (!of_first) of_first = shape;
         packs_take_all = packs_take_all && PacksOf<Model, D>::take(shape, *of_first);
@@ -609,6 +612,16 @@ template <class Model> class PairContactOf : public PairContact {
   template <int D> static Vec<3> in_space(const Vec<D> &v)
   {
     return {{v[0], v[1], D == 2 ? 0.0 : v[D - 1]}};
+  }
+};
+
+/// A constant of this type lists a pair style for LAMMPS.
+template <class Style> struct PairStyle {
+  PairStyle()
+  {
+    pair_styles()[Style::name()] = [](LAMMPS_NS::LAMMPS *lmp) -> LAMMPS_NS::Pair * {
+      return new Style(lmp);
+    };
   }
 };
 

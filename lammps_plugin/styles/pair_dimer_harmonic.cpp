@@ -1,7 +1,24 @@
-#include "pair_dimer_harmonic.h"
+#include "contact/dimer/dimer.hpp"
+
+#include "pair_contact_of.h"
+
+#include <string>
 
 namespace jamshape {
 
-template class PairContactOf<DimerModel>;
+namespace {
+
+/// pair_style dimer/harmonic; pair_coeff I J k_e
+class PairDimerHarmonic : public PairContactOf<DimerModel> {
+ public:
+  using PairContactOf::PairContactOf;
+
+ protected:
+  std::string without_force() const override { return "coinciding discs"; }
+};
+
+const PairStyle<PairDimerHarmonic> listed;
+
+}  // namespace
 
 }  // namespace jamshape

@@ -1,7 +1,8 @@
-#include "pair_spherocylinder_harmonic.h"
+#include "contact/spherocylinder/spherocylinder.hpp"
 
 #include "comm.h"
 #include "error.h"
+#include "pair_contact_of.h"
 #include "text.hpp"
 #include "utils.h"
 
@@ -10,7 +11,26 @@
 
 namespace jamshape {
 
-template class PairContactOf<SpherocylinderModel>;
+namespace {
+
+/// pair_style spherocylinder/harmonic sides one|two; pair_coeff I J k_e
+class PairSpherocylinderHarmonic : public PairContactOf<SpherocylinderModel> {
+ public:
+  using PairContactOf::PairContactOf;
+
+  /// The lever arm of the one bond jumps from end to end of parallel rods.
+  bool has_smooth_forces() const override { return sides == Sides::TWO; }
+
+  void settings(int narg, char **arg) override;
+  void write_restart(FILE *fp) override;
+  void read_restart(FILE *fp) override;
+  void write_restart_settings(FILE *fp) override;
+  void read_restart_settings(FILE *fp) override;
+};
+
+const PairStyle<PairSpherocylinderHarmonic> listed;
+
+}  // namespace
 
 void PairSpherocylinderHarmonic::settings(int narg, char **arg)
 {

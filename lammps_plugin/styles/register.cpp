@@ -1,4 +1,5 @@
-// The plugin's table of contents, one line per style, and its registration in LAMMPS.
+// The plugin's table of contents, one line per style other than pair styles, and its registration
+// in LAMMPS.
 
 #include "comm.h"
 #include "compat.h"
@@ -11,9 +12,7 @@
 #include "force.h"
 #include "input.h"
 #include "modify.h"
-#include "pair_dimer_harmonic.h"
-#include "pair_spherocylinder_harmonic.h"
-#include "pair_superellipsoid_harmonic.h"
+#include "pair_contact.h"
 #include "variable.h"
 
 #include <dlfcn.h>
@@ -37,7 +36,6 @@ namespace {
 
 using LAMMPS_NS::LAMMPS;
 
-template <class T> LAMMPS_NS::Pair *pair(LAMMPS *lmp) { return new T(lmp); }
 template <class T> LAMMPS_NS::Fix *fix(LAMMPS *lmp, int narg, char **arg)
 {
   return new T(lmp, narg, arg);
@@ -53,9 +51,7 @@ LAMMPS_NS::Command *command(LAMMPS *lmp) { return new jamshape::CreateRandom(lmp
 template <class Add> void for_all_styles(Add &&add)
 {
   using namespace jamshape;
-  add("dimer/harmonic", pair<PairDimerHarmonic>);
-  add("spherocylinder/harmonic", pair<PairSpherocylinderHarmonic>);
-  add("superellipsoid/harmonic", pair<PairSuperellipsoidHarmonic>);
+  for (const auto &[name, creator] : pair_styles()) add(name.c_str(), creator);
   add("overdamped/affine", fix<FixOverdampedAffine>);
   add("contact/local", compute<ComputeContactLocal>);
   add("packing", compute<ComputePacking>);

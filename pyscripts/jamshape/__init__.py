@@ -6,7 +6,7 @@
 >>> packing.n, packing.results["outcome"]
 (16, 'converged')
 
-Names are loaded when they are first used, so that the import itself is quick and needs neither LAMMPS nor HDF5 nor
+Names are loaded on first use, so that the import is quick and needs neither LAMMPS nor HDF5 nor
 matplotlib; ``__init__.pyi`` lists them.
 """
 

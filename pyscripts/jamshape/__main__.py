@@ -1,4 +1,4 @@
-"""``python -m jamshape`` is the command ``jamshape``."""
+"""``python -m jamshape``, the same as the command ``jamshape``."""
 
 from jamshape.commands import main
 

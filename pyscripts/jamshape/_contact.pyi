@@ -1,170 +1,136 @@
 """Contact geometry and energies: arrays in, arrays out, over lammps_plugin/contact/.
 
-A class for each shape; functions that rest on single pairs are for tests and measurements of errors.
+A class for each shape, with the members of `_Shape`; functions of single pairs are for tests and
+measurements of errors.
 Their bodies are C-contiguous rows: of spherocylinders (M, 6) in 2D, (M, 8) in 3D: centre, unit axis,
 half_length, radius; of superellipsoids (M, 6) in 2D, (M, 11) in 3D: centre, angle or quaternion
 w i j k, semi-axes, exponent p.
 """
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+_Reals: TypeAlias = NDArray[np.float64]
+_Ints: TypeAlias = NDArray[np.int64]
+_Bools: TypeAlias = NDArray[np.bool_]
+_Arrays: TypeAlias = dict[str, NDArray[Any]]
+_Sums: TypeAlias = tuple[float, _Reals, float, float, int, int, int]
+_Renew: TypeAlias = Callable[[_Reals, float], None]
+
 class _Shape:
+    """Any of the classes; `Shape.compiled` looks them up by name."""
+
     name: ClassVar[str]
     core: ClassVar[str]
     most_bonds: ClassVar[int]
     has_sides: ClassVar[bool]
     bonds_are_contacts: ClassVar[bool]
-    measure: NDArray[np.float64]
-    moment: NDArray[np.float64]
-    outer_radius: NDArray[np.float64]
-    inner_radius: NDArray[np.float64]
-    rotation_length: NDArray[np.float64]
-    turning_radius: NDArray[np.float64]
-    symmetry_axis: NDArray[np.int64]
-    director: NDArray[np.int64]
+    measure: _Reals
+    moment: _Reals
+    outer_radius: _Reals
+    inner_radius: _Reals
+    rotation_length: _Reals
+    turning_radius: _Reals
+    symmetry_axis: _Ints
+    director: _Ints
     def __init__(
-        self,
-        diameters: NDArray[np.float64],
-        exponent: NDArray[np.float64],
-        dimension: int,
-        k_e: float,
-        sides: int,
+        self, diameters: _Reals, exponent: _Reals, dimension: int, k_e: float, sides: int
     ) -> None: ...
-    def host_spin(
-        self, orientation: NDArray[np.float64], gradient: NDArray[np.float64]
-    ) -> NDArray[np.float64]: ...
+    def host_spin(self, orientation: _Reals, gradient: _Reals) -> _Reals: ...
     def near(
         self,
-        position: NDArray[np.float64],
-        orientation: NDArray[np.float64],
-        cell: NDArray[np.float64],
-        pairs: NDArray[np.int64],
-        shift: NDArray[np.int64],
+        position: _Reals,
+        orientation: _Reals,
+        cell: _Reals,
+        pairs: _Ints,
+        shift: _Ints,
         margin: float,
-    ) -> NDArray[np.bool_]: ...
+    ) -> _Bools: ...
     def overlaps(
-        self,
-        position: NDArray[np.float64],
-        orientation: NDArray[np.float64],
-        cell: NDArray[np.float64],
-        pairs: NDArray[np.int64],
-        shift: NDArray[np.int64],
-    ) -> NDArray[np.bool_]: ...
+        self, position: _Reals, orientation: _Reals, cell: _Reals, pairs: _Ints, shift: _Ints
+    ) -> _Bools: ...
     def contacts(
         self,
-        position: NDArray[np.float64],
-        orientation: NDArray[np.float64],
-        cell: NDArray[np.float64],
-        pairs: NDArray[np.int64],
-        shift: NDArray[np.int64],
+        position: _Reals,
+        orientation: _Reals,
+        cell: _Reals,
+        pairs: _Ints,
+        shift: _Ints,
         extended: bool = False,
         errors: bool = False,
-    ) -> dict[str, NDArray[Any]]: ...
+    ) -> _Arrays: ...
     def sums(
         self,
-        position: NDArray[np.float64],
-        orientation: NDArray[np.float64],
-        cell: NDArray[np.float64],
-        pairs: NDArray[np.int64],
-        shift: NDArray[np.int64],
+        position: _Reals,
+        orientation: _Reals,
+        cell: _Reals,
+        pairs: _Ints,
+        shift: _Ints,
         extended: bool = False,
     ) -> dict[str, Any]: ...
     def derivatives(
         self,
-        position: NDArray[np.float64],
-        orientation: NDArray[np.float64],
-        cell: NDArray[np.float64],
-        pairs: NDArray[np.int64],
-        shift: NDArray[np.int64],
+        position: _Reals,
+        orientation: _Reals,
+        cell: _Reals,
+        pairs: _Ints,
+        shift: _Ints,
         extended: bool = False,
-    ) -> dict[str, NDArray[Any]]: ...
+    ) -> _Arrays: ...
     def insert(
         self,
-        edges: NDArray[np.float64],
-        positions: Callable[[int], NDArray[np.float64]],
-        orientations: Callable[[int], NDArray[np.float64]],
+        edges: _Reals,
+        positions: Callable[[int], _Reals],
+        orientations: Callable[[int], _Reals],
         most_attempts: int,
     ) -> dict[str, Any]: ...
     def sweeps(
         self,
-        position: NDArray[np.float64],
-        orientation: NDArray[np.float64],
-        edges: NDArray[np.float64],
+        position: _Reals,
+        orientation: _Reals,
+        edges: _Reals,
         shift: float,
         turn: float,
         n_sweeps: int,
         seed: int,
     ) -> dict[str, Any]: ...
     def vicinity(
-        self,
-        column: NDArray[np.int64],
-        rotation_length: NDArray[np.float64],
-        turning_radius: NDArray[np.float64],
+        self, column: _Ints, rotation_length: _Reals, turning_radius: _Reals
     ) -> Vicinity: ...
 
-class Spherocylinders(_Shape): ...
-class Superellipsoids(_Shape): ...
-class Dimers(_Shape): ...
-
 def find_rattlers(
-    n_particles: int,
-    dimension: int,
-    pairs: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    flat: NDArray[np.bool_],
-) -> NDArray[np.bool_]: ...
+    n_particles: int, dimension: int, pairs: _Ints, normals: _Reals, flat: _Bools
+) -> _Bools: ...
 def instruction_sets() -> list[str]: ...
 def spherocylinder_contacts(
-    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64], k_e: float, sides: int
-) -> dict[str, NDArray[Any]]: ...
-def spine_distances(
-    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64]
-) -> NDArray[np.float64]: ...
+    bodies_i: _Reals, bodies_j: _Reals, k_e: float, sides: int
+) -> _Arrays: ...
+def spine_distances(bodies_i: _Reals, bodies_j: _Reals) -> _Reals: ...
 def superellipsoid_contacts(
-    bodies_i: NDArray[np.float64],
-    bodies_j: NDArray[np.float64],
-    epsilon: float,
-    extended: bool = False,
-    errors: bool = False,
-) -> dict[str, NDArray[Any]]: ...
+    bodies_i: _Reals, bodies_j: _Reals, epsilon: float, extended: bool = False, errors: bool = False
+) -> _Arrays: ...
 def superellipsoid_scales(
-    bodies_i: NDArray[np.float64],
-    bodies_j: NDArray[np.float64],
-    normals: NDArray[np.float64] | None = None,
-) -> dict[str, NDArray[Any]]: ...
-def superellipsoid_near(
-    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64], margin: float
-) -> NDArray[np.bool_]: ...
-def superellipsoid_motion_sq(
-    then: NDArray[np.float64], now: NDArray[np.float64]
-) -> NDArray[np.float64]: ...
-def counts_of_team(
-    threads: int, first_that_fails: int, rounds: int
-) -> tuple[NDArray[np.int64], str]: ...
-def superellipsoid_overlap(
-    bodies_i: NDArray[np.float64], bodies_j: NDArray[np.float64]
-) -> NDArray[np.bool_]: ...
+    bodies_i: _Reals, bodies_j: _Reals, normals: _Reals | None = None
+) -> _Arrays: ...
+def superellipsoid_near(bodies_i: _Reals, bodies_j: _Reals, margin: float) -> _Bools: ...
+def superellipsoid_motion_sq(then: _Reals, now: _Reals) -> _Reals: ...
+def counts_of_team(threads: int, first_that_fails: int, rounds: int) -> tuple[_Ints, str]: ...
+def superellipsoid_overlap(bodies_i: _Reals, bodies_j: _Reals) -> _Bools: ...
 
 LEAST_SHIFT: float
 
 class Factors:
-    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def solve(self, right: _Reals) -> _Reals: ...
 
 class StageUnits:
     force: float
     energy: float
     length: float
     def __init__(self, force: float, energy: float, length: float, n_particles: float) -> None: ...
-    def size(
-        self,
-        shift: NDArray[np.float64],
-        force: NDArray[np.float64],
-        drag: NDArray[np.float64],
-    ) -> float: ...
+    def size(self, shift: _Reals, force: _Reals, drag: _Reals) -> float: ...
 
 class StageLimits:
     def __init__(self, accuracy: float, longest_step: float, widest_turn: float) -> None: ...
@@ -172,18 +138,18 @@ class StageLimits:
 class Stage:
     def __init__(
         self,
-        drag: NDArray[np.float64],
-        centre: NDArray[np.float64],
+        drag: _Reals,
+        centre: _Reals,
         extended: bool,
         units: StageUnits,
         limits: StageLimits,
-        guess: NDArray[np.float64],
-        other: NDArray[np.float64],
+        guess: _Reals,
+        other: _Reals,
     ) -> None: ...
 
 class StageEnd:
-    x: NDArray[np.float64]
-    sums: tuple[float, NDArray[np.float64], float, float, int, int, int]
+    x: _Reals
+    sums: _Sums
     factors: Factors | None
     bonds_of_factors: int
     evaluations: int
@@ -207,68 +173,48 @@ class DescentStop:
 
 class DescentEnd:
     outcome: str
-    sums: tuple[float, NDArray[np.float64], float, float, int, int, int]
+    sums: _Sums
     rows: list[tuple[float, int, float, float]]
     evaluations: int
     factorisations: int
     products: int
 
 class NewtonSystem:
-    coupling: NDArray[np.float64]
+    coupling: _Reals
     shift: float
     def __init__(self, vicinity: Vicinity, shift: float) -> None: ...
     def prepare(self) -> None: ...
-    def solve(self, right: NDArray[np.float64], accuracy: float) -> NDArray[np.float64]: ...
+    def solve(self, right: _Reals, accuracy: float) -> _Reals: ...
     def learn(self, tries: int) -> None: ...
 
 class Vicinity:
-    poses: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-    def move_to(
-        self,
-        position: NDArray[np.float64],
-        orientation: NDArray[np.float64],
-        cell: NDArray[np.float64],
-    ) -> None: ...
-    def move(
-        self, x: NDArray[np.float64], strain: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    poses: tuple[_Reals, _Reals, _Reals]
+    def move_to(self, position: _Reals, orientation: _Reals, cell: _Reals) -> None: ...
+    def move(self, x: _Reals, strain: float) -> tuple[_Reals, _Reals, _Reals]: ...
     def hold(self) -> None: ...
-    def deform(self, matrix: NDArray[np.float64], turns: NDArray[np.float64]) -> None: ...
+    def deform(self, matrix: _Reals, turns: _Reals) -> None: ...
     def take_pairs(
         self,
-        position: NDArray[np.float64],
-        orientation: NDArray[np.float64],
-        cell: NDArray[np.float64],
-        pairs: NDArray[np.int64],
-        shift: NDArray[np.int64],
+        position: _Reals,
+        orientation: _Reals,
+        cell: _Reals,
+        pairs: _Ints,
+        shift: _Ints,
         wide: float,
         reach: float,
         skin: float,
     ) -> None: ...
     def share(self, threads: int) -> None: ...
-    def evaluate(
-        self, x: NDArray[np.float64], strain: float, extended: bool
-    ) -> tuple[float, NDArray[np.float64], float, float, int, int, int] | None: ...
-    def part_within(
-        self, x: NDArray[np.float64], longest_step: float, widest_turn: float
-    ) -> float: ...
-    def factorise(
-        self,
-        x: NDArray[np.float64],
-        strain: float,
-        diagonal: NDArray[np.float64],
-    ) -> Factors: ...
+    def evaluate(self, x: _Reals, strain: float, extended: bool) -> _Sums | None: ...
+    def part_within(self, x: _Reals, longest_step: float, widest_turn: float) -> float: ...
+    def factorise(self, x: _Reals, strain: float, diagonal: _Reals) -> Factors: ...
     def solve_stage(
-        self,
-        stage: Stage,
-        factors: Factors | None,
-        bonds_of_factors: int,
-        renew: Callable[[NDArray[np.float64], float], None],
+        self, stage: Stage, factors: Factors | None, bonds_of_factors: int, renew: _Renew
     ) -> StageEnd: ...
     def descend(
         self,
         stop: DescentStop,
         shift: float,
-        renew: Callable[[NDArray[np.float64], float], None],
+        renew: _Renew,
         tell: Callable[[tuple[float, int, float, float]], None],
     ) -> DescentEnd: ...

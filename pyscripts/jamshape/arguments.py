@@ -1,4 +1,4 @@
-"""Arguments of public functions: of the types that their annotations name, or refused in one sentence."""
+"""Type checks of the arguments of public functions, from their annotations."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _T = TypeVar("_T")
 
 
 class ArgumentTypeError(TypeError, ValueError):
-    """An argument is not of a type that the function takes; the text is one sentence."""
+    """An argument has a type that the function does not accept; the message is one sentence."""
 
 
 def checked(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Refuse arguments that are not of the types that a public function's annotations name.
+    """Check the arguments of a public function against the types of its annotations.
 
-    Numbers of NumPy, also arrays without dimensions, become Python's. What an annotation says beyond classes,
-    numbers, paths and sequences of these is left to the function.
+    NumPy scalars and zero-dimensional arrays become Python numbers. Only classes, numbers, paths and sequences of
+    these are checked; the rest is up to the function.
 
     Examples
     --------
@@ -44,16 +44,16 @@ def checked(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def checked_fields(record: type[_T]) -> type[_T]:
-    """Check what a dataclass is made of as `checked` does arguments."""
+    """Check the fields of a dataclass as `checked` checks arguments."""
     names: dict[str, Any] = {}
     for one in reversed(record.__mro__):
-        names |= vars(sys.modules[one.__module__])  # fields of a base are named as there
+        names |= vars(sys.modules[one.__module__])  # fields of a base use names of its module
     record.__init__ = _checked(record.__init__, names)  # type: ignore[method-assign]
     return record
 
 
 def _checked(function: Callable[_P, _R], names: dict[str, Any]) -> Callable[_P, _R]:
-    """Check arguments, whose annotations hold names."""
+    """Check arguments whose annotations hold names."""
     parameters = inspect.signature(function).parameters
     positions = list(parameters)
     rest = next((p.name for p in parameters.values() if p.kind is p.VAR_KEYWORD), "")
@@ -65,7 +65,7 @@ def _checked(function: Callable[_P, _R], names: dict[str, Any]) -> Callable[_P, 
 
     @functools.wraps(function)
     def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        # What is missing or too much the function says as Python does.
+        # Missing or surplus arguments are left to Python's own error.
         first = [
             _taken(name, value, kinds_of(name))
             for name, value in zip(positions, args, strict=False)
@@ -77,7 +77,7 @@ def _checked(function: Callable[_P, _R], names: dict[str, Any]) -> Callable[_P, 
 
 
 def _kinds_of(annotation: Any, names: dict[str, Any]) -> tuple[Any, ...]:
-    """Types that an annotation names; none where one is of a module that only checkers of types import, or is unknown."""
+    """Return the types of an annotation; none if one is unknown or imported only for type checkers."""
     if not isinstance(annotation, str):
         return ()
     try:
@@ -89,7 +89,7 @@ def _kinds_of(annotation: Any, names: dict[str, Any]) -> tuple[Any, ...]:
 
 
 def _is_known(kind: Any) -> bool:
-    """Tell whether a type is one that is looked at here."""
+    """Return whether a type can be checked."""
     return kind is None or isinstance(kind, type) or typing.get_origin(kind) in _SEVERAL
 
 
@@ -97,11 +97,11 @@ _SEVERAL = (Mapping, Sequence, tuple)
 
 
 class _UnfitError(Exception):
-    """A value is not of a type."""
+    """A value does not have a type."""
 
 
 def _taken(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
-    """Give a value as the first of some types that it fits, or refuse it."""
+    """Return a value as the first of some types that it fits, or raise an `ArgumentTypeError`."""
     if not kinds or type(value) in kinds:
         return value
     with contextlib.suppress(_UnfitError):
@@ -111,7 +111,7 @@ def _taken(name: str, value: Any, kinds: tuple[Any, ...]) -> Any:
 
 
 def _fitted_to_one(value: Any, kinds: tuple[Any, ...]) -> Any:
-    """Give a value as the first of some types that it fits, or raise an `_UnfitError`."""
+    """Return a value as the first of some types that it fits, or raise an `_UnfitError`."""
     for kind in kinds:
         with contextlib.suppress(_UnfitError):
             return _fitted(value, kind)
@@ -119,7 +119,7 @@ def _fitted_to_one(value: Any, kinds: tuple[Any, ...]) -> Any:
 
 
 def _fitted(value: Any, kind: Any) -> Any:
-    """Give a value as a type, or raise an `_UnfitError`."""
+    """Return a value as a type, or raise an `_UnfitError`."""
     if isinstance(kind, types.UnionType):
         return _fitted_to_one(value, typing.get_args(kind))
     if kind in _NUMBERS:
@@ -142,7 +142,7 @@ _NUMBERS = {bool: numbers.Integral, int: numbers.Integral, float: numbers.Real}
 
 def _number(value: Any, kind: Any) -> Any:
     if getattr(value, "shape", None) == () and not hasattr(value, "mask"):
-        value = value.item()  # a number of NumPy
+        value = value.item()  # a NumPy scalar
     if kind is bool and isinstance(value, numbers.Integral) and value in (0, 1):
         return bool(value)
     if isinstance(value, bool) or not isinstance(value, _NUMBERS[kind]):
@@ -178,7 +178,7 @@ def _shown(value: Any) -> str:
 
 
 def _named(name: str, kinds: tuple[Any, ...]) -> str:
-    """Say what is expected."""
+    """Describe the expected types."""
     if name in RANGES and set(kinds) & {int, float}:
         return described(RANGES[name])
     kinds = tuple(kind for kind in kinds if kind is not str) if Path in kinds else kinds

@@ -1,4 +1,4 @@
-"""Types of arrays that the library speaks of, and what is taken for numbers."""
+"""Array types of the library, and validation of numbers in arrays."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ LongArray = NDArray[np.longdouble]
 
 
 def real_numbers(name: str, values: ArrayLike) -> NDArray[np.generic]:
-    """Take an array of integers or floating-point numbers, whatever their size.
+    """Return an array of integers or floating-point numbers of any size.
 
     Raises
     ------
     ValueError
-        One sentence, if it is masked, or holds anything else: complex numbers, text, dates, objects.
+        If it is masked, or holds anything else: complex numbers, text, dates, objects.
 
     Examples
     --------
@@ -28,8 +28,8 @@ def real_numbers(name: str, values: ArrayLike) -> NDArray[np.generic]:
     ValueError: size has dtype complex128, expected real numbers
     """
     if isinstance(values, np.ma.MaskedArray):
-        msg = f"{name} is a masked array, expected plain numbers: fill what is masked, or leave it out"
-        raise ValueError(msg)  # noqa: TRY004 - as for what is wrong with other arrays
+        msg = f"{name} is a masked array, expected plain numbers: fill or remove masked values"
+        raise ValueError(msg)  # noqa: TRY004 - the same for all faults of arrays
     try:
         array = np.asarray(values)
     except ValueError:
@@ -42,7 +42,7 @@ def real_numbers(name: str, values: ArrayLike) -> NDArray[np.generic]:
 
 
 def whole_numbers(name: str, values: ArrayLike) -> NDArray[np.generic]:
-    """Take an array of integers, whatever their size; errors as `real_numbers`."""
+    """Return an array of integers of any size; errors as `real_numbers`."""
     array = real_numbers(name, values)
     if array.dtype.kind == "f":
         msg = f"{name} has dtype {array.dtype}, expected integers"

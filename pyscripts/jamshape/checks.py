@@ -1,6 +1,6 @@
-"""Checks of numbers, names and paths that come from options, files and Python.
+"""Checks of numbers, names and paths from options, files and Python.
 
-Each refuses with one sentence: what was found, what was expected. The standard library is all that it needs.
+Messages are one sentence: what was found, what was expected. Needs only the standard library.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from typing import Any, NamedTuple
 
 
 class Range(NamedTuple):
-    """Numbers that a setting may have."""
+    """Allowed values of a setting."""
 
     low: float
     high: float
     meaning: str = "a number"
     also: tuple[float, ...] = ()
-    """What else it may be, such as 0."""
+    """Further values, such as 0."""
     whole: bool = False
-    """Whether it counts something."""
+    """Whether it is an integer."""
 
 
 class _Typed(NamedTuple):
-    """An argument in a sentence."""
+    """An argument in a message."""
 
     name: str
     value: Any
     is_option: bool
 
     def __format__(self, spec: str) -> str:
-        """Write it with its value, or with the spec ``name`` without; options that are true need no value."""
+        """Format with the value, or with the spec ``name`` without; true options need no value."""
         if self.is_option:
             option = f"--{_OPTIONS.get(self.name, self.name).replace('_', '-')}"
             return option if spec == "name" or self.value is True else f"{option} {self.value}"
@@ -42,19 +42,19 @@ class _Typed(NamedTuple):
         return self.name if spec == "name" else f"{self.name}={_shown(value)}"
 
 
-# Arguments whose options are called otherwise.
+# Arguments whose options have another name.
 _OPTIONS = {"file": "out"}
 
 
 class Sentence(Exception):  # noqa: N818 - warnings are of this kind as well
-    """A sentence of an exception or a warning that names arguments as they were typed.
+    """Message of an exception or a warning that names arguments as they were typed.
 
     Parameters
     ----------
     template : str
-        With ``{name}`` for an argument with its value and ``{name:name}`` for its name.
+        Text with ``{name}`` for an argument with its value and ``{name:name}`` for its name.
     given : mapping of str to Any
-        The values of the arguments.
+        Values of the arguments.
     """
 
     def __init__(self, template: str, given: Mapping[str, Any]) -> None:
@@ -66,7 +66,7 @@ class Sentence(Exception):  # noqa: N818 - warnings are of this kind as well
 
     @property
     def with_options(self) -> str:
-        """The sentence for a command line."""
+        """The message for a command line."""
         return self._written(is_option=True)
 
     def _written(self, *, is_option: bool) -> str:
@@ -75,7 +75,7 @@ class Sentence(Exception):  # noqa: N818 - warnings are of this kind as well
 
 
 class ArgumentError(Sentence, ValueError):
-    """Arguments that contradict each other, or have no effect; parameters as of `Sentence`.
+    """Arguments that contradict each other, or have no effect; parameters as in `Sentence`.
 
     Examples
     --------
@@ -88,9 +88,9 @@ class ArgumentError(Sentence, ValueError):
 
 
 class NotReachedWarning(Sentence, UserWarning):
-    """A result that did not reach its goal: what was reached, and what to try; parameters as of `Sentence`.
+    """A result that did not reach its goal: state and advice; parameters as in `Sentence`.
 
-    A command that has said so ends with the exit code 1.
+    A command that issues it exits with code 1.
 
     Examples
     --------
@@ -110,9 +110,9 @@ def require_no_effect(beside: str, value: Any, **given: Any) -> None:
     beside : str
         Name of the other one.
     value : Any
-        That was given for it; nothing is refused where it is None.
+        Its value; None disables the check.
     **given
-        The arguments, None where they were left out.
+        The arguments, None where not given.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def require_no_effect(beside: str, value: Any, **given: Any) -> None:
 
 
 def require_with(needed: str, value: Any, **given: Any) -> None:
-    """Refuse arguments that have no effect without another one; parameters as of `require_no_effect`.
+    """Refuse arguments that have no effect without another one; parameters as in `require_no_effect`.
 
     Raises
     ------
@@ -173,7 +173,7 @@ RANGES = {
     "tolerance": Range(1e-14, 1.0, "an error"),
     "accuracy": Range(1e-15, 0.5, "an error"),
     "u0": Range(1e-20, 0.01, "an energy density", also=(0.0,)),
-    "largest_drop": Range(1e-6, 1.0, "a part of the energy", also=(math.inf,)),
+    "largest_drop": Range(1e-6, 1.0, "a fraction of the energy", also=(math.inf,)),
     "phi_thermal": Range(1e-6, 0.999, "a packing fraction"),
     "n_sweeps": Range(0, 10**9, "sweeps", whole=True),
     "delta_phi": Range(1e-8, 0.1, "a step of the packing fraction"),
@@ -188,15 +188,15 @@ RANGES = {
     "follow": Range(0, _COUNT, "modes", whole=True),
     "largest": Range(0.0, 100.0, "a bound"),
 }
-"""What users may ask for, in the units of the papers: the ranges in which it was tried; those of shapes are their
-`Parameter`s. Decks have the same."""
+"""Allowed ranges, in the units of the papers: those that were tested; shapes have theirs in `Parameter`. Decks use
+the same."""
 
 MOST_STEPS = 10**12
-"""Of a run: more would not end in a year, whatever the machine."""
+"""Most steps of a run: more would not end in a year on any machine."""
 
 
 def require_number(name: str, value: Any) -> float:
-    """Refuse what is no finite number; return it as a float.
+    """Return a finite number as a float, or raise.
 
     Examples
     --------
@@ -213,7 +213,7 @@ def require_number(name: str, value: Any) -> float:
 
 
 def require_positive(**values: Any) -> None:
-    """Refuse what is no finite number above 0.
+    """Raise unless all are finite numbers above 0.
 
     Examples
     --------
@@ -228,7 +228,7 @@ def require_positive(**values: Any) -> None:
 
 
 def require_stated(**values: Any) -> None:
-    """Refuse numbers that are out of their `RANGES`, by their names there.
+    """Raise if a number is out of its range in `RANGES`, by name.
 
     Raises
     ------
@@ -246,12 +246,12 @@ def require_stated(**values: Any) -> None:
 
 
 def require_given(**values: Any) -> None:
-    """Refuse numbers as `require_stated` does, those that are None left out."""
+    """Check numbers like `require_stated`, skipping None."""
     require_stated(**{name: value for name, value in values.items() if value is not None})
 
 
 def require_options(given: Mapping[str, Any]) -> None:
-    """Refuse options that are out of the range of their name, and numbers that are none whatever their name.
+    """Check options against the range of their name, and all numbers for NaN.
 
     Raises
     ------
@@ -274,7 +274,7 @@ def require_options(given: Mapping[str, Any]) -> None:
 
 
 def require_in(name: str, value: Any, allowed: Range) -> None:
-    """Refuse a number that is out of a range, or none.
+    """Raise unless a number is in a range.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def require_in(name: str, value: Any, allowed: Range) -> None:
 
 
 def require_rising(phi_start: Any, phi_end: Any) -> None:
-    """Refuse a compression that would not compress.
+    """Raise unless a compression increases phi.
 
     Examples
     --------
@@ -303,7 +303,7 @@ def require_rising(phi_start: Any, phi_end: Any) -> None:
 
 
 def require_one_of(name: str, value: Any, table: Iterable[Any]) -> None:
-    """Refuse what is not in a table.
+    """Raise unless a value is in a table.
 
     Examples
     --------
@@ -320,7 +320,7 @@ def require_one_of(name: str, value: Any, table: Iterable[Any]) -> None:
 
 
 def require_path(path: Path) -> None:
-    r"""Refuse a path with characters that end a line or are none.
+    r"""Refuse a path with control characters.
 
     Examples
     --------
@@ -328,7 +328,7 @@ def require_path(path: Path) -> None:
     Traceback (most recent call last):
     ValueError: the path 'a\nb' holds a control character, expected letters and signs; choose another name
     """
-    # Bytes of a name that the locale cannot read are no control characters, and files may have them.
+    # Bytes of a name that the locale cannot decode are allowed.
     if any(unicodedata.category(sign) == "Cc" for sign in str(path)):
         msg = (
             f"the path {str(path)!r} holds a control character, expected letters and signs;"
@@ -338,7 +338,7 @@ def require_path(path: Path) -> None:
 
 
 def require_other_file(out: Path, inputs: Sequence[Path]) -> None:
-    """Refuse to write over a file that is read.
+    """Refuse to write to an input file.
 
     Raises
     ------
@@ -350,20 +350,20 @@ def require_other_file(out: Path, inputs: Sequence[Path]) -> None:
         raise ValueError(msg)
     for path in inputs:
         if out.exists() and path.exists() and out.samefile(path):
-            msg = f"{out} is what is read and would be replaced, expected another file to write to"
+            msg = f"{out} is an input and would be replaced, expected another output file"
             raise ValueError(msg)
 
 
 def require_free(out: Path, *, again: bool, go_on: str = "") -> None:
-    """Refuse to replace a file that nobody said to replace.
+    """Refuse to replace a file without permission.
 
     Parameters
     ----------
     out : Path
     again : bool
-        Whether somebody did, by the option ``--again``.
+        Whether ``--again`` permits it.
     go_on : str
-        What else may be done with a file that is there.
+        Alternatives for an existing file.
 
     Raises
     ------
@@ -371,17 +371,17 @@ def require_free(out: Path, *, again: bool, go_on: str = "") -> None:
     """
     require_path(out)
     if out.exists() and not again:
-        msg = f"{out} is there, expected another --out, {go_on}or --again to replace it"
+        msg = f"{out} exists, expected another --out, {go_on}or --again to replace it"
         raise ValueError(msg)
 
 
 def _is_a(kind: type, value: Any) -> bool:
-    """Whether it is a number of a kind; what is true or false is none."""
+    """Whether it is a number of a kind; booleans are not."""
     return isinstance(value, kind) and type(value) is not bool
 
 
 def described(allowed: Range) -> str:
-    """Say which numbers are in a range."""
+    """Describe the numbers in a range."""
     words = [f"{value:g} or" for value in allowed.also]
     low, high = (f"{v}" if allowed.whole else f"{v:g}" for v in (allowed.low, allowed.high))
     whole = "a whole number of " if allowed.whole and not allowed.meaning.startswith("a ") else ""
@@ -389,33 +389,33 @@ def described(allowed: Range) -> str:
 
 
 def _shown(value: Any) -> str:
-    """Show the value of an argument in one line, numbers of NumPy as those of Python."""
+    """Format the value of an argument in one line, NumPy scalars as Python numbers."""
     return said(value.item() if hasattr(value, "item") else value)
 
 
 def said(value: Any) -> str:
-    """Show a value in one line."""
+    """Format a value in one line."""
     text = " ".join(str(value if isinstance(value, numbers.Real) else repr(value)).split("\n"))
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 RANKS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
-"""What mpirun of Open MPI, of MPICH, and srun tell each process that they start: how many there are. (SLURM_NTASKS is
-what a job was given, in which one process may run.)"""
+"""Variables for the number of processes, set by mpirun of Open MPI and MPICH, and by srun. (SLURM_NTASKS is
+the allocation of a job, in which one process may run.)"""
 
 
 def require_one_process(why: str = "", instead: str = "") -> None:
-    """Refuse to be one of several ranks, which were all told to write the same file.
+    """Refuse to run as one of several ranks, which would all write the same file.
 
     Parameters
     ----------
     why, instead : str
-        In place of these words, why not, and what to do.
+        Other reason, and other advice.
 
     Raises
     ------
     RuntimeError
-        One sentence, if mpirun or srun started several.
+        If mpirun or srun started several.
 
     Examples
     --------

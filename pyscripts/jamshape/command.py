@@ -1,7 +1,7 @@
-"""How scripts and commands parse, report and end; the standard library is all that it needs.
+"""Parsing, reporting and exit of scripts and commands; needs only the standard library.
 
-A script's docstring is its help, the last line of its standard output one JSON object, and what it says of wrong
-input one sentence on standard error after its name::
+A script's docstring is its help, the last line of its standard output one JSON object, and an error
+one sentence on standard error after its name::
 
     def main(options: Namespace) -> None:
         report({"out": options.out, "phi_J": measured(options.files)})
@@ -26,27 +26,27 @@ from typing import Any, NoReturn
 
 from jamshape.checks import NotReachedWarning, Sentence, require_options
 
-# What wrong input, missing files and searches without an end raise, each with one sentence.
+# Exceptions for wrong input, missing files and failed searches, each with one sentence.
 PROBLEMS = (OSError, ValueError, RuntimeError)
 
 SET_UP = "run ./run setup in the repository, then use .venv/bin/python"
-"""What to do where something that jamshape needs is not there."""
+"""Advice if a requirement of jamshape is missing."""
 
-_INTERRUPTED = 130  # as shells tell that a program was ended by Ctrl-C
-_BROKEN_PIPE = 141  # and that nobody reads what it writes
+_INTERRUPTED = 130  # the shell's exit code after Ctrl-C
+_BROKEN_PIPE = 141  # and for a closed output pipe
 
 
 def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser:
-    """Make a parser whose help is a script's docstring, with --out and files if these are named.
+    """Make a parser whose help is a script's docstring, optionally with --out and files.
 
     Parameters
     ----------
     doc : str or None
-        Of the script, shown as it is.
+        Docstring of the script, shown as it is.
     out : str
-        What is written if nothing else is asked for.
+        Default output.
     files : str
-        What the files are that the script reads, one or more, called `files` among the options.
+        Metavar of the input files, one or more, stored as `files`.
     """
     parser = ArgumentParser(description=doc, formatter_class=RawDescriptionHelpFormatter)
     if files:
@@ -57,33 +57,33 @@ def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser
 
 
 def add_numbers(parser: ArgumentParser, *rows: tuple[str, int | float, str]) -> None:
-    """Add options that are numbers, each with its name, what it is where it is left out, and what it means.
+    """Add numeric options, each with its name, default and meaning.
 
-    What is left out is None: the function that the command calls knows what is usual, and what was not typed cannot
-    contradict anything.
+    Options that were not typed are None: the called function knows the defaults, and absent options cannot contradict
+    anything.
     """
     for name, default, meaning in rows:
         parser.add_argument(name, type=type(default), help=f"{meaning} ({default})")
 
 
 def typed(options: Namespace, *names: str) -> dict[str, Any]:
-    """Pick the options of these names that were typed."""
+    """Return the options of these names that were typed."""
     found = {name: getattr(options, name) for name in names}
     return {name: value for name, value in found.items() if value is not None}
 
 
 def report(found: Mapping[str, Any]) -> None:
-    """Print one line of JSON with what `plain` makes of it."""
+    """Print one line of JSON, converted by `plain`."""
     print(json.dumps(plain(found), allow_nan=False))
 
 
 def plain(value: Any) -> Any:
-    """Turn a value into what JSON knows.
+    """Convert a value for JSON.
 
-    NaN and infinity become null, what has a method ``as_json`` what that returns, named tuples objects, arrays and other
+    NaN and infinity become null, objects with ``as_json`` its result, named tuples objects, arrays and other
     tuples lists, paths text.
     """
-    if hasattr(value, "tolist"):  # arrays and numbers of numpy
+    if hasattr(value, "tolist"):  # NumPy arrays and scalars
         return plain(value.tolist())
     if hasattr(value, "as_json"):
         return plain(value.as_json())
@@ -99,9 +99,9 @@ def plain(value: Any) -> Any:
 
 
 def run(parser: ArgumentParser, main: Callable[[Namespace], int | None]) -> NoReturn:
-    """Parse the command line, run a script and end with the exit code that it returns.
+    """Parse the command line, run a script and exit with the code that it returns.
 
-    Numbers are checked by their names before. Problems end as `sentences` tells.
+    Numbers are checked by their names first. Errors exit as in `sentences`.
     """
     options = parser.parse_args()
     with sentences(parser.prog):
@@ -111,17 +111,17 @@ def run(parser: ArgumentParser, main: Callable[[Namespace], int | None]) -> NoRe
 
 @contextmanager
 def sentences(name: str, go_on: str = "it may be started again") -> Iterator[None]:
-    """End the program with one sentence after its name where its body raises what users may meet; warn in one, too.
+    """Turn expected errors of the body into one sentence after the program's name, and exit; likewise warnings.
 
-    The exit code is 1 after one of `PROBLEMS`, where a module is missing, and where a result did not reach its goal
+    The exit code is 1 after one of `PROBLEMS`, a missing module, or a result that did not reach its goal
     (`checks.NotReachedWarning`), and 130 after Ctrl-C.
 
     Parameters
     ----------
     name : str
-        Of the program, as it was called.
+        Program, as it was called.
     go_on : str
-        How to go on after Ctrl-C.
+        Advice after Ctrl-C.
     """
     short: list[Warning | str] = []
 
@@ -137,7 +137,7 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
                 yield
             finally:
                 sys.stdout.flush()
-    except BrokenPipeError:  # whoever reads has seen enough, as `head` has
+    except BrokenPipeError:  # the reader has closed the pipe, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(_BROKEN_PIPE)
     except SystemExit as end:
@@ -149,28 +149,30 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
     except ImportError as error:
         sys.exit(f"{name}: {what_is_missing(error)}")
     except KeyboardInterrupt:
-        # Pressed again, it would cut the end of LAMMPS and MPI off, which takes a while on a busy machine.
+        # A second Ctrl-C would interrupt the shutdown of LAMMPS and MPI, which takes a while on a busy machine.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        # Below a bar of progress.
+        # Below a progress bar.
         print(f"\n{name}: interrupted; {go_on}", file=sys.stderr)
         sys.exit(_INTERRUPTED)
 
 
 def _typed(said: BaseException | str) -> str:
-    """Write a sentence with the options of a command in place of the arguments of a function."""
+    """Format a message with the options of a command in place of the arguments of a function."""
     return said.with_options if isinstance(said, Sentence) else str(said)
 
 
 def what_is_missing(error: ImportError) -> str:
-    """Say in one sentence what could not be imported and what to do.
+    """Describe in one sentence which import failed and what to do.
 
     Examples
     --------
     >>> what_is_missing(ModuleNotFoundError("No module named 'numpy'", name="numpy"))  # doctest: +ELLIPSIS
-    "No module named 'numpy' in ..., expected a Python with all that jamshape needs; run ./run setup ..."
+    "No module named 'numpy' in ..., expected a Python with the requirements of jamshape; run ./run setup ..."
     """
-    # Sentences of our own say what to do themselves.
+    # Our own messages contain advice.
     said = " ".join(str(error).split())
     if not (error.name or error.path):
         return said
-    return f"{said} in {sys.executable}, expected a Python with all that jamshape needs; {SET_UP}"
+    return (
+        f"{said} in {sys.executable}, expected a Python with the requirements of jamshape; {SET_UP}"
+    )

@@ -1,4 +1,4 @@
-"""Base of records, which pickles and copies reduce to their fields."""
+"""Base of records whose pickles and copies hold only their fields."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 
 class Record:
-    """Base of dataclasses whose pickles and copies hold their fields alone.
+    """Base of dataclasses whose pickles and copies hold only their fields.
 
-    Compiled objects and properties that were computed on the way stay behind, so that a record is pickled to the same
-    bytes before and after use. Arrays that were read-only are so again.
+    Compiled objects and cached properties are dropped, so that a record is pickled to the same
+    bytes before and after use. Read-only arrays stay read-only.
 
     Examples
     --------

@@ -79,7 +79,7 @@ DECK = ("-var", "out", "deck", "-var", "n", "24", "-var", "kappa", "2e-4", "-var
 
 
 class UnexpectedError(Exception):
-    """What was found, what was expected."""
+    """Unexpected result: found and expected value."""
 
 
 def say(text):

@@ -16,7 +16,7 @@ STEP_IN_FADE = 1e-4
 
 
 def fit_weights():
-    """Of the slopes in their value at step zero; a slope's rounding is inverse to its step."""
+    """Weights of the slopes in their value at step zero; a slope's rounding is inverse to its step."""
     columns = np.column_stack([np.ones_like(MULTIPLES), MULTIPLES**2])
     return np.linalg.pinv(columns * MULTIPLES[:, None])[0] * MULTIPLES
 
@@ -108,7 +108,7 @@ def one_sided_differences(pairs, sides, k_e):
 
 
 def outside(gradient, left, right):
-    """How far each component of `gradient` lies outside the interval of the one-sided ones."""
+    """Distance of each component of `gradient` from the interval of the one-sided ones."""
     above = gradient - np.maximum(left, right)
     below = np.minimum(left, right) - gradient
     return np.maximum(np.maximum(above, below), 0.0)

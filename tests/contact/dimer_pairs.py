@@ -14,7 +14,7 @@ LONG = np.longdouble
 
 
 def dimer_packing(rng, pairs):
-    """Of M pairs, poses in long double, with the second particles in other images."""
+    """Packing of M pairs, poses in long double, with the second particles in other images."""
     return PairPacking.of(rng, pairs, _contact.Dimers)
 
 
@@ -30,7 +30,7 @@ def dimer_pairs(rng, n, dimension, overlap=(1e-3, 1 / 3), alpha=(0.05, 10.0)):
 
 
 def discs(pairs):
-    """For each two discs: arms (M, D) from the centres, and the vector from that of j to that of i."""
+    """Arms (M, D) from the centres for each two discs, and the vector from that of j to that of i."""
     for a, b in itertools.product((1, -1), (1, -1)):
         arm_i, arm_j = scaled(a * pairs.A_i, pairs.u_i), scaled(b * pairs.A_j, pairs.u_j)
         yield arm_i, arm_j, pairs.r + arm_i - arm_j
@@ -42,7 +42,7 @@ def overlaps(pairs):
 
 
 def clear_of_edges(pairs, margin=1e-3):
-    """Those of which no two discs just begin to touch, or nearly coincide."""
+    """Pairs of which no two discs just begin to touch, or nearly coincide."""
     x = overlaps(pairs).astype(float)
     return pairs[(np.abs(x) > margin).all(axis=1) & (x < 0.9).all(axis=1)]
 

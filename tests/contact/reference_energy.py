@@ -120,7 +120,7 @@ def fade_length(pairs):
 
 
 def least_fade_length(pairs):
-    """Of shallow overlaps, the least of all."""
+    """Fade length of shallow overlaps, the least of all."""
     return FADE_LENGTH * shorter_or(pairs, np.inf)
 
 
@@ -133,7 +133,7 @@ class Approach:
 
     @cached_property
     def closest(self):
-        """Of crossing spines in 2D that of a tip, as there is no energy to take."""
+        """Closest points; of crossing spines in 2D that of a tip, as there is no energy to take."""
         return closest_foot(self.pairs, self.plus, self.minus)
 
     @cached_property
@@ -164,7 +164,7 @@ class Approach:
 
     @cached_property
     def steps(self):
-        """What the two steps are taken of: by length and by cosine."""
+        """Quantities that the two steps depend on: length and cosine."""
         pairs, length = self.pairs, self.fade_length
         cosine = absolute(row_dot(pairs.u_i, pairs.u_j))
         return self.opposite / length, 2.0 * np.minimum(pairs.A_i, pairs.A_j) * cosine / length

@@ -29,7 +29,7 @@ def growth_of(depth):
 
 
 def length_of_fade(shorter, depth):
-    """Of what lies opposite of spines, over which the second bond fades in."""
+    """Length of opposite spines over which the second bond fades in."""
     square = (FADE_GROWTH * growth_of(depth)) ** 2
     return shorter * np.sqrt((FADE_LENGTH**2 + square) / (1.0 + square))
 
@@ -40,7 +40,7 @@ def least_whole(shorter, depth):
 
 
 def least_whole_of(pairs):
-    """Of pairs as they were built."""
+    """Least length of the pairs as they were built."""
     shapes = (pairs.A_i, pairs.A_j, pairs.R_i, pairs.R_j)
     return least_whole(np.minimum(pairs.A_i, pairs.A_j), depth_of(shapes, pairs.overlap))
 

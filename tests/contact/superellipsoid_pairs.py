@@ -103,7 +103,7 @@ def contacts(i, j, epsilon=1.0):
 
 
 def power_norm(ratio, order):
-    """Of the last axis; order broadcasts against the others."""
+    """Norm over the last axis; order broadcasts against the others."""
     most = ratio.max(-1)
     relative = ratio / most[..., None]
     return most * (relative ** np.asarray(order)[..., None]).sum(-1) ** (1.0 / order)

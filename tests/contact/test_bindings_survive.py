@@ -13,7 +13,7 @@ ROUNDS = 60
 
 
 def fuzzed(seed, rounds):
-    """How many calls of each name returned and were refused, of a process that lived to its end."""
+    """Number of calls of each name that returned and were refused, in a process that survived."""
     done = subprocess.run(
         [sys.executable, PROGRAM, str(seed), str(rounds)],
         capture_output=True, text=True, timeout=600, check=False,

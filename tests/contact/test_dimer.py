@@ -6,7 +6,6 @@ import mpmath
 import numpy as np
 import pytest
 from dimer_pairs import (
-    LONG,
     clear_of_edges,
     dimer_packing,
     dimer_pairs,
@@ -37,11 +36,6 @@ def contacts_of(packing):
     assert np.array_equal(found["pair"], np.arange(len(packing)))
     assert (found["status"] == TOUCHING).all()
     return found
-
-
-def relative(error, size):
-    axes = tuple(range(1, error.ndim))
-    return (np.abs(error).max(axis=axes) / np.abs(size).max(axis=axes)).astype(float).max()
 
 
 # --- energy, forces, bonds -----------------------------------------------------------------------
@@ -120,57 +114,6 @@ def test_bonds_sit_between_the_discs_and_add_up(dimension):
 
 
 @IN_BOTH
-def test_force_and_torques_are_derivatives_of_the_energy(dimension, measured):
-    packing, pairs = pairs_in(dimension, seed=2)
-    gradient = packing.gradient(1, K_E)
-    step = (3e-7 * pairs.d).astype(LONG)
-    by_differences = np.stack([
-        (energy(packing.moved(k, step).plain(), K_E) - energy(packing.moved(k, -step).plain(), K_E))
-        / (2 * step)
-        for k in range(gradient.shape[1])
-    ], axis=1)  # fmt: skip
-    error = relative(gradient - by_differences, gradient)
-    measured(worst=error)
-    assert error < 1e-6
-
-
-@pytest.mark.parametrize("extended", [False, True])
-@IN_BOTH
-def test_second_derivatives_are_those_of_the_energy(dimension, extended, measured):
-    packing, pairs = pairs_in(dimension, seed=3)
-    found = packing.derivatives(1, K_E, extended=extended)
-    assert np.array_equal(found["pair"], np.arange(len(packing)))
-    gradient = found["gradient"]
-    along = found["stiffness"][..., None, None] * gradient[..., :, None] * gradient[..., None, :]
-    hessian = along.sum(axis=1) + found["curvature"]
-    step = (3e-7 * pairs.d).astype(LONG)
-    by_differences = np.stack([
-        (packing.moved(k, step).gradient(1, K_E) - packing.moved(k, -step).gradient(1, K_E))
-        / (2 * step)[:, None]
-        for k in range(hessian.shape[1])
-    ], axis=2)  # fmt: skip
-    # A rotation vector's second derivatives are the mean of those by one turn after the other.
-    by_differences = 0.5 * (by_differences + by_differences.transpose(0, 2, 1))
-    error = relative(hessian - by_differences, hessian)
-    measured(worst=error)
-    assert error < 1e-6
-    assert not gradient[found["n_bonds"] < 4, 3].any()
-
-
-@IN_BOTH
-def test_exchange_of_i_and_j(dimension):
-    rng = np.random.default_rng([4, dimension])
-    pairs = clear_of_edges(dimer_pairs(rng, 300, dimension))
-    one, other = (contacts_of(dimer_packing(rng, x)) for x in (pairs, pairs.swapped()))
-    assert np.array_equal(one["n_bonds"], other["n_bonds"])
-    np.testing.assert_allclose(one["energy"], other["energy"], rtol=1e-10)
-    for name, of_other, sign in (("force", "force", -1), ("torque_i", "torque_j", 1)):
-        if dimension == 2 or name == "force":
-            size = np.abs(one[name]).max()
-            np.testing.assert_allclose(one[name], sign * other[of_other], atol=1e-11 * size)
-
-
-@IN_BOTH
 def test_discs_on_each_other_are_four_times_one(dimension):
     rng = np.random.default_rng([5, dimension])
     pairs = dimer_pairs(rng, 100, dimension)
@@ -246,25 +189,6 @@ def test_near_and_overlapping_are_gaps_of_discs(dimension):
         clear = np.abs(gap - margin) > 1e-12
         assert np.array_equal(shape.near(*arguments, margin)[clear], (gap < margin)[clear])
     assert 0.2 < (gap < 0).mean() < 0.8
-
-
-@IN_BOTH
-def test_hard_dimers_stay_apart(dimension):
-    side = np.arange(4 if dimension == 2 else 3) * 3.1
-    position = np.stack(np.meshgrid(*[side] * dimension), -1).reshape(-1, dimension)
-    n = len(position)
-    shape = _contact.Dimers(np.tile([3.0, 1.2, 1.2], (n, 1)), np.ones(n), dimension, 1.0, 1)
-    orientation = np.zeros((n, 1)) if dimension == 2 else np.eye(4)[np.zeros(n, int)]
-    edges = np.full(dimension, 3.1 * len(side))
-    found = shape.sweeps(position, orientation, edges, 0.5, 0.5, 50, 1)
-    assert 0.1 < found["accepted"] / found["tried"] < 0.99
-    assert np.abs(found["position"] - position).max() > 0.3
-    pairs = np.array([(i, j) for i in range(n) for j in range(i)])
-    apart = found["position"][pairs[:, 0]] - found["position"][pairs[:, 1]]
-    shift = np.round(apart / edges).astype(np.int64)
-    doubles = (found["position"], found["orientation"], np.diag(edges))
-    poses = [np.stack([x, 0 * x]) for x in doubles]
-    assert not shape.overlaps(*poses, pairs, shift).any()
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,7 @@ def rods_of_every_kind(rng, times, n, dimension, **depths):
 
 
 def kinds_of_rods(rng, n, dimension, least=1e-14, least_twist=1e-12):
-    """Of every class and of what is between the classes."""
+    """Rods of every class and between the classes."""
     any_depth = overlaps(rng, n, least)
     yield tip_to_tip(rng, n, dimension, any_depth)
     yield tip_to_side(rng, n, dimension, any_depth)
@@ -136,7 +136,7 @@ def energy_of_bonds(result):
 def test_energies_of_rods_are_finite_bounded_and_whoever_looks_sees_the_same(
     dimension, sides, times, measured
 ):
-    """What rounding of poses does is the force, at most 2.5 times that of one bond, times that."""
+    """Rounding of poses changes the energy by at most 2.5 times the force of one bond, times the rounding."""
     rng, worst = np.random.default_rng([1600, dimension, sides]), Worst()
     for pairs in rods_of_every_kind(rng, times, BATCH, dimension):
         result = contacts(pairs, sides)
@@ -182,7 +182,7 @@ def slope_along(result, way):
 
 
 def with_steps(pairs, sides):
-    """Those whose overlaps change along a step by much more than they round, steps and overlaps.
+    """Pairs whose overlaps change along a step by much more than they round, steps and overlaps.
 
     Without rods in 2D that count as parallel, which have one bond in their middle.
     """
@@ -199,7 +199,7 @@ def with_steps(pairs, sides):
 @in_each_space
 @pytest.mark.parametrize("sides", [1, 2])
 def test_forces_of_rods_lie_between_the_slopes_to_either_side(dimension, sides, times, measured):
-    """Where these agree, in all places but the documented kinks, it is the gradient.
+    """The force is the gradient where these agree, everywhere but at the documented kinks.
 
     Rods in space that pass each other at a small twist have kinks closer together than any step.
     """
@@ -245,7 +245,7 @@ GAP = 64.0 * EPS
 
 
 def anywhere(rng, n, dimension):
-    """Of any exponents, axis ratios to 10, size ratios to 10 and overlaps from 1e-13 to a third."""
+    """Bodies of any exponents, axis ratios to 10, size ratios to 10 and overlaps from 1e-13 to a third."""
     p_i, p_j = rng.choice([0.55, 0.8, 1.0, 1.5, 3.0, 6.0, 10.0], (2, n))
     i, j = bodies.random_pairs(rng, n, dimension, p_i, p_j)
     return bodies.at_scale(i, j, np.sqrt(1.0 - log_uniform(rng, 1e-13, 1.0 / 3.0, n))), j
@@ -271,7 +271,7 @@ def lever(i, j):
 
 
 def open_point(i, j):
-    """How far over a lever the gap leaves open where two bodies touch."""
+    """Range over a lever that the gap leaves for the point of contact of two bodies."""
     return GAP ** (0.5 / np.maximum(np.maximum(i.p, j.p), 1.0))
 
 

@@ -35,7 +35,7 @@ def exponent(p):
 
 
 def superellipsoids(rng, dimension, p=1.0):
-    """Of the sizes and separations of those pairs: long, flat, of three axes, and all axes alike."""
+    """Bodies with the sizes and separations of those pairs: long, flat, of three axes, and all axes alike."""
     packing = PairPacking.of(rng, every_kind(rng, dimension), exponent(p))
     diameters = packing.diameters * (1.0 if p >= 1.0 else 1.5)  # so that corners touch, too
     diameters[0::5] = diameters[0::5, ::-1]
@@ -96,7 +96,7 @@ def test_packs_of_superellipsoids_give_what_pairs_give_alone(
 @pytest.mark.skipif(len(PACKS) < 2, reason="one set of instructions")
 @pytest.mark.parametrize("p", [0, 0.7, 1.5, 2.3])
 def test_all_sets_round_alike(p, monkeypatch):
-    """Of rods (p = 0) and superellipsoids: what a packing is does not depend on the machine."""
+    """Packs of rods (p = 0) and superellipsoids do not depend on the machine."""
     rng = np.random.default_rng(5)
     packing = superellipsoids(rng, 3, p) if p else PairPacking.of(rng, every_kind(rng, 3))
     first, *others = [sums(monkeypatch, name, packing, 2) for name in PACKS]

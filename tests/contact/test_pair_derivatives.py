@@ -83,7 +83,7 @@ def at_an_angle(rng, dimension):
 
 
 def parallel_in_the_plane(rng, dimension):
-    """Of all depths; in space the second derivatives by a twist have two sides."""
+    """Pairs of all depths; in space the second derivatives by a twist have two sides."""
     assert dimension == 2
     pairs, half = parallel(rng, 2 * N, 2, overlaps(rng, 2 * N, 1e-4), (0.01, 100.0))
     return pairs[2.0 * half > 1.01 * least_whole_of(pairs)]
@@ -344,7 +344,7 @@ def test_second_derivatives_come_with_the_forces_of_the_same_contacts(case, dime
 
 @EVERY_CASE
 def test_second_derivatives_do_not_see_motion_of_the_whole(case, dimension, sides, measured):
-    """Of the pair as one body: V(r, i, j) does not change, its first derivatives turn along.
+    """Motion of the pair as one body keeps V(r, i, j), and rotates its first derivatives.
 
     With exp(t w) before exp(s v) as in `commuted`, M (w x r, w, w) = (w x V_r, w x V_i / 2,
     w x V_j / 2), and no bond changes its distance.
@@ -402,7 +402,7 @@ def test_curvature_is_symmetric_and_that_of_the_pair_seen_from_the_other_particl
 
 
 def rounding_of_second_derivatives(packing):
-    """Of coordinates in double precision, relative to the largest second derivative.
+    """Error due to coordinates in double precision, relative to the largest second derivative.
 
     Through what feet of skew spines slide by, and what the steps of the weights are taken of, whose
     third derivatives are tens of the second.

@@ -231,7 +231,7 @@ def test_precisions_agree_to_the_rounding_of_doubles(mixture, dimension, measure
 
 
 def sums(*, diameters, k_e, sides, cell, **poses):
-    """Of new particles; the dimension is that of the box."""
+    """Sums over new particles; the dimension is that of the box."""
     return rods(diameters, cell.shape[1], k_e, sides).sums(cell=cell, **poses)
 
 
@@ -355,7 +355,7 @@ def test_centres_on_each_other_are_crossing(dimension):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize(("images", "tilted"), [(0, 0), (1, 0), (3, 0), (1, 1), (3, 1)])
 def test_separations_are_right_to_the_last_bit_of_doubles(images, tilted, dimension):
-    """Of particles 40 diameters out, from 1e-9 to 1 apart, in the same image and in others."""
+    """Particles are 40 diameters out, from 1e-9 to 1 apart, in the same image and in others."""
     rng, n = np.random.default_rng(17), 300
     cell = LONG(1) * np.triu(rng.uniform(-20.0, 20.0, (dimension, dimension)), 1) * tilted
     cell += np.diag(LONG(1) * rng.uniform(35.0, 45.0, dimension))

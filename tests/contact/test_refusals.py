@@ -1,4 +1,4 @@
-"""What the compiled module is given is checked: sizes, indices and that numbers are numbers.
+"""Arguments of the compiled module are checked: sizes, indices and that numbers are numbers.
 
 What passes unchecked ends in SIGSEGV, or in contacts that are dropped in silence.
 """

@@ -1,4 +1,4 @@
-"""What the class of each shape tells of its particles, against formulas written a second time."""
+"""Particle properties from the class of each shape, against formulas written a second time."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_force_and_torques_are_central_differences_of_the_energy(dimension, side
 
 
 def one_sided_comparison(pairs, sides):
-    """How far the answer lies outside the one-sided derivatives, and how far these are apart."""
+    """Distance of the answer from the one-sided derivatives, and the distance between these."""
     result = contacts(pairs, sides, K_E)
     left, right = one_sided_differences(pairs, sides, K_E)
     answer = -result["force"], -result["torque_i"], -result["torque_j"]
@@ -90,7 +90,7 @@ def test_force_and_torques_are_derivatives_of_the_energy_written_a_second_time(
 
 
 def energy_rounding(pairs, sides, energy):
-    """What the rounding of coordinates leaves uncertain in the energy at k_e = 1."""
+    """Uncertainty of the energy at k_e = 1 due to rounding of coordinates."""
     rounding = EPS * pairs.extent
     result = np.sqrt(2.0 * energy) * rounding / pairs.d
     if sides == 2:

@@ -44,7 +44,7 @@ def over_space(weight, A, R):
 
 
 def drag_of(A, R, dimension):
-    """Of many; A and R as the diameters round them."""
+    """Drag of many particles; A and R as the diameters round them."""
     diameters = 2 * np.column_stack([A + R, R, R])
     found = Spherocylinders(diameters, np.ones(len(diameters)), dimension, 1.0, 1)
     return found.measure, found.moment

@@ -225,7 +225,7 @@ def every_pair(dimension, sides):
 
 
 def relative_rounding(pairs, sides, result):
-    """Of the force, from the rounding of coordinates: in the overlap, and in what a bond fades by."""
+    """Rounding of the force due to coordinates: in the overlap, and in the fade factor of a bond."""
     rounding = EPS * pairs.extent
     unit = rounding / (pairs.d * pairs.overlap)
     if sides == 2:

@@ -11,16 +11,19 @@ import pytest
 
 import jamshape
 from jamshape import _contact
+from jamshape.shapes.table import SHAPES
 
 STUB = ast.parse(Path(jamshape.__file__).with_name("_contact.pyi").read_text(encoding="utf-8"))
 CLASSES = {x.name: x for x in STUB.body if isinstance(x, ast.ClassDef)}
 FUNCTIONS = {x.name: x for x in STUB.body if isinstance(x, ast.FunctionDef)}
-CONSTANTS = {x.target.id for x in STUB.body if isinstance(x, ast.AnnAssign)}
+NAMES = {x.target.id for x in STUB.body if isinstance(x, ast.AnnAssign)}
+CONSTANTS = {name for name in NAMES if not name.startswith("_")}
 OPEN = {name: x for name, x in CLASSES.items() if not name.startswith("_")}
+OPEN |= {shape.compiled_name: CLASSES["_Shape"] for shape in SHAPES.values()}
 
 
 def members(stub):
-    """Of a class with those it inherits: name to definition."""
+    """Members of a class with inherited ones: name to definition."""
     found = {}
     for base in stub.bases:
         found |= members(CLASSES[base.id])

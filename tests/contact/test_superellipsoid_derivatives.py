@@ -34,7 +34,7 @@ def cross(a, b):
 
 
 def differences(function, i, j):
-    """By r and by rotations of i and j, last axis."""
+    """Differences by r and by rotations of i and j, last axis."""
     rotations = 1 if i.dimension == 2 else 3
     columns = []
     for k in range(i.dimension):

@@ -227,7 +227,7 @@ def test_energy_has_no_jumps(shapes, dimension, sides, measured):
 
 @pytest.mark.parametrize("shapes", SHAPES, ids=lambda shapes: shapes.__name__)
 def test_kinks_of_two_bonds_in_the_plane_are_small(shapes, measured):
-    """Where the far end goes over from a tip to the other's; a weighted second bond has 0.13."""
+    """At these the far end passes from a tip to the other's; a weighted second bond has 0.13."""
     kinks, _ = largest_jump(paths_of(shapes, 2), forces_of_two_bonds)
     measured(largest=kinks.max(), of_90_in_100=np.quantile(kinks, 0.9))
     assert kinks.max() < 0.06
@@ -472,7 +472,7 @@ def test_fading_second_bonds_have_no_kink_where_rods_are_parallel(dimension, dep
     pairs, half, w = (y[chosen] for y in (pairs, half, w))
 
     def jump(fraction):
-        """Of the torque about the middle of the contact, which i is turned about."""
+        """Jump of the torque about the middle of the contact, about which i is rotated."""
         sine = fraction * w * pairs.overlap * pairs.d / (2.0 * half)
         torque = []
         for turn in (sine, -sine):
@@ -549,7 +549,7 @@ def test_staggered_rods_are_held_at_a_tip_of_each(angle, head):
 
 @pytest.mark.parametrize("angle", [0.0, 0.004, -0.004])
 def test_nested_rods_are_held_at_both_tips_of_the_shorter(angle):
-    """Where Eq. 29 as printed does not apply: both tips of i lie over the spine of j."""
+    """Eq. 29 as printed does not apply here: both tips of i lie over the spine of j."""
     pairs, result = bonds_of_tilted_rods(3.0, 8.0, 1.0, angle)
     tips = 0.9 + 3.0 * np.sin(angle) * np.array([1.0, -1.0])
     assert result["n_bonds"] == 2

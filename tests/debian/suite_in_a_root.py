@@ -53,7 +53,7 @@ VERSIONS = (
 
 
 class UnexpectedError(Exception):
-    """What was found, what was expected, what to do."""
+    """Unexpected result: found, expected, and what to do."""
 
 
 def require(condition, sentence):

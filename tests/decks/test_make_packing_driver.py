@@ -94,7 +94,7 @@ def test_the_usual_way_leaves_the_packing_and_nothing_else(tmp_path):
     for path in (out, tmp_path / "none.h5"):
         refused = run(*USUAL, "--kappa", "1e-5", "--out", path)
         assert refused.returncode == 1
-        assert "kappa is no setting of the way by quasistatic" in refused.stderr
+        assert "kappa does not apply to the way by quasistatic" in refused.stderr
 
 
 def test_a_finished_file_is_left_alone(made):
@@ -121,7 +121,7 @@ def assert_one_sentence(failed, words):
         (("--u0", "-1"), "u0 is -1.0, expected 0 or an energy density from 1e-20 to 0.01"),
         (
             ("--u0", "0"),
-            "there is no energy to reach, expected one after a compression by dynamics (u0)",
+            "--u0 0 does not work with the way by dynamics, expected a positive one",
         ),
         (("--u0", "nan"), "u0 is nan, expected 0 or an energy density"),
         (("--n", "0"), "n is 0, expected a whole number of particles from 1"),

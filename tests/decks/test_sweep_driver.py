@@ -182,9 +182,9 @@ def test_a_sample_that_another_process_makes_is_told(tmp_path):
         (("--first-seed", "-1"), "--first-seed is -1, expected at least 0"),
         (
             ("--seed", "3"),
-            "--seed is 3, which means nothing to a sweep: its samples have the seeds",
+            "--seed is 3, which has no effect on a sweep: its samples have the seeds",
         ),
-        (("--see", "1"), "--seed is 1, which means nothing to a sweep"),
+        (("--see", "1"), "--seed is 1, which has no effect on a sweep"),
         (("--no-such", "1"), "unrecognized arguments: --no-such 1"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What is done in the place of the programs that pages show: to run them in this process, or to look at their words."""
+"""Replacements of programs on pages: calls in this process, or a check of their words."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import io
 import re
 import runpy
 import shlex
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
 from unittest import mock
 
 from code_blocks import ROOT
-from lammps_scenes import MPIRUN, environment
+from lammps_runs import MPIRUN, run_program
 from sessions import make_clone, make_programs
 
 from jamshape.commands import COMMANDS, main, options_of
@@ -28,7 +27,7 @@ SCRIPTS = ("analysis/", "pyscripts/")
 """Folders of scripts that a test may run; others change the machine."""
 
 NEEDED = {".gsd": "gsd", ".ovito": "ovito", ".h5md": "MDAnalysis"}
-"""What must be importable to write files that end so."""
+"""Modules required to write files with this suffix."""
 
 
 # --- to run them ----------------------------------------------------------------------------------
@@ -65,10 +64,7 @@ def run_script(place, words):
 
 def run_lammps(place, program, words):
     line = [*MPIRUN, *words] if program == "mpirun" else [program, *words]
-    done = subprocess.run(
-        line, cwd=place, env=environment(), text=True, stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, timeout=300, check=False,
-    )  # fmt: skip
+    done = run_program(line, place)
     assert done.returncode == 0, done.stdout[-3000:]
     return 0
 

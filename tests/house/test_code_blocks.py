@@ -85,7 +85,7 @@ QUICK = [
     Told("*", "jamshape reproduce", "--dry-run"),
     Told("*", "-in inputs/compress_spherocylinder.in", DECK),
 ]  # fmt: skip
-"""What makes a command quick: of those on such a page that have all these words, the first that fits."""
+"""Changes that make a command quick: the first on such a page that has all these words."""
 
 SHORTER = {"docs/how-to/shear.md": {"n": 16, "strain": 1}}
 """Words of calls in Python and what they are in a test."""

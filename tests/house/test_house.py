@@ -7,6 +7,7 @@ from pathlib import Path
 from statistics import median, quantiles
 
 import pytest
+from stubs import stubs
 
 from jamshape.shapes.table import SHAPES
 
@@ -17,8 +18,8 @@ NAMES = re.compile("|".join(SHAPES), re.IGNORECASE)
 
 # The places that may know which shapes there are.
 OF_A_SHAPE = re.compile(
-    rf"jamshape/shapes/|_contact\.pyi$|contact/({'|'.join(SHAPES)})/|/pair_({'|'.join(SHAPES)})_"
-    r"|styles/register\.cpp$|(contact/shapes\.hpp|bindings/(shapes|probes)\.cpp)$"
+    rf"jamshape/shapes/|contact/({'|'.join(SHAPES)})/|/pair_({'|'.join(SHAPES)})_"
+    r"|(contact/shapes\.hpp|bindings/probes\.cpp)$"
 )
 
 LONGEST, MOST_PARAMETERS = 60, 5
@@ -77,6 +78,11 @@ def test_no_file_outside_the_places_of_shapes_knows_which_there_are(measured):
     assert found == []
 
 
+@pytest.mark.parametrize(("path", "text"), stubs().items(), ids=["names", "functions"])
+def test_stubs_are_those_of_the_table_of_shapes(path, text):
+    assert path.read_text(encoding="utf-8") == text, "run tests/house/stubs.py"
+
+
 def functions(*folders):
     for path in python_files(*folders):
         for node in ast.walk(tree_of(path)):
@@ -94,7 +100,7 @@ def positional(node):
 
 
 def lines(node):
-    """Of a function, its docstring included."""
+    """Count the lines of a function, its docstring included."""
     return node.end_lineno - node.lineno + 1
 
 

@@ -1,9 +1,6 @@
 """Packings of rods that many tests look at."""
 
-from functools import cache, partial
-
 import numpy as np
-from mixtures import bidisperse, monodisperse
 
 from jamshape.contacts import (
     find_contacts,
@@ -48,53 +45,9 @@ def pressed(n=24, dimension=2, seed=3, mixture=None, phi=None):
     raise AssertionError
 
 
-def quaternion_product(p, q):
-    w = p[0] * q[0] - p[1:] @ q[1:]
-    return np.array([w, *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))])
-
-
-def turned(packing, particle, axis, angle):
-    orientation = np.array(packing.orientation)
-    if packing.dimension == 2:
-        orientation[particle] += angle
-    else:
-        turn = np.zeros(4)
-        turn[0], turn[1 + axis] = np.cos(angle / 2), np.sin(angle / 2)
-        orientation[particle] = quaternion_product(turn, orientation[particle])
-    return packing.with_(orientation=orientation)
-
-
-def moved(packing, particle, axis, step):
-    position = np.array(packing.position)
-    position[particle, axis] += step
-    return packing.with_(position=position)
-
-
 def tiny_box():
     """Two rods that wind around a box half as long, side to side and tip to own tip."""
     along, half_length = np.array([2, 1]) / np.sqrt(5), np.full(2, 4.05)
     shift = 0.7 * along + 0.88 * np.array([-along[1], along[0]])
     angle = np.arctan2(1, 2) + np.array([0.01, -0.015])
     return make([[0, 0], shift], angle, half_length, edges=(4.02, 4.02))
-
-
-PRESSED = {
-    "rods": pressed,
-    "short rods": partial(pressed, mixture=bidisperse(0.01)),
-    "discs": partial(pressed, mixture=bidisperse(0)),
-    "size ratio 5": partial(pressed, mixture=bidisperse(2, 5)),
-    "rods in a tiny box": tiny_box,
-    "rod alone": partial(pressed, n=1, mixture=monodisperse(20), phi=0.3),
-    "rods in space": partial(pressed, n=16, dimension=3),
-    "rods in a tiny cube": partial(pressed, n=2, dimension=3, mixture=bidisperse(2)),
-}
-
-
-@cache
-def pressed_named(name):
-    return PRESSED[name]()
-
-
-def assert_same_forces(a, b):
-    for name in ("energy", "force", "torque", "virial", "pressure"):
-        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-9, atol=1e-12)

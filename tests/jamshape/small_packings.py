@@ -75,7 +75,7 @@ def synthetic(n=48, m=40, size=1e-8, n_sliding=2, seed=0):
 
 
 def as_matrix(C, S, translations=None):
-    """What the modes need of a dynamical matrix."""
+    """Dynamical matrix as `modes` requires it."""
     n = C.shape[1]
     C, S = map(scipy.sparse.csr_matrix, (C, S))
     return SimpleNamespace(
@@ -102,7 +102,7 @@ def exact_eigenvalues(matrix, digits=DIGITS):
 
 
 def errors(found, exact, digits=DIGITS):
-    """Of ascending eigenvalues (k,), in double but without cancellation."""
+    """Errors of ascending eigenvalues (k,), in double but without cancellation."""
     with mpmath.workdps(digits):
         pairs = zip(found.tolist(), exact, strict=True)
         return np.array([float(abs(mpmath.mpf(a) - b)) for a, b in pairs])

@@ -6,6 +6,7 @@ from jamshape.contacts import find_contacts
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Outcome, Stop, minimise
 from jamshape.packing import Box, Packing
+from methods.lbfgs import lbfgs
 
 
 def scattered(diameters, exponent, phi, seed=3, dimension=3):
@@ -33,7 +34,7 @@ def pressed_superellipsoids(diameters, exponent, phi=0.25, dimension=3):
     packing = scattered(
         np.asarray(diameters, float), np.asarray(exponent, float), phi, 3, dimension
     )
-    found = minimise(Landscape(packing), State.of(packing), "lbfgs", Stop(lowest=1e-12))
+    found = minimise(Landscape(packing), State.of(packing), lbfgs, Stop(lowest=1e-12))
     assert found.outcome is Outcome.UNJAMMED
     state = found.state
     for _ in range(300):
@@ -45,7 +46,7 @@ def pressed_superellipsoids(diameters, exponent, phi=0.25, dimension=3):
 
 
 def ellipsoids():
-    """Of several shapes and sizes, one of them a sphere."""
+    """Ellipsoids of several shapes and sizes, one of them a sphere."""
     n = 12
     diameters = np.column_stack([np.ones(n), 1 + np.arange(n) / n, 1 + 2 * (np.arange(n) % 3)])
     diameters[0] = 1.0

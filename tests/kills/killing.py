@@ -14,7 +14,6 @@ import signal
 import sys
 import time
 import warnings
-from pathlib import Path
 
 import h5py
 import numpy as np

@@ -27,7 +27,7 @@ STEPS = (*PACK, "--way", "steps", "--delta-phi", 5e-3)
 PUBLISHED = (*RODS, "--phi-start", 0.55, "--u0", 1.5e-6, "--protocol", "marschall-2018")
 
 Given = Mapping[str, Callable[[Path], None]]
-"""How to write the files that a run is given, by name."""
+"""Functions that write the input files of a run, by name."""
 
 # --- what is given --------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""What tests of scripts share: running them in this process, which saves the time of starting them."""
+"""Fixtures for tests of scripts: scripts run in this process, which saves the time of starting them."""
 
 import json
 import runpy

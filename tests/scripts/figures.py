@@ -1,4 +1,4 @@
-"""What a finished figure says: its text, and which colours of its lines and points have no name."""
+"""Checks of finished figures: their text, and colours of lines and points without a name."""
 
 import re
 

@@ -5,6 +5,7 @@ from jamshape.measures.minimum import write_minimum
 from jamshape.minima import Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.protocols.random_start import random_packing
+from methods.lbfgs import lbfgs
 
 
 def jam(particles, n, phi, u0=1e-12, dimension=2, seed=1):
@@ -13,7 +14,7 @@ def jam(particles, n, phi, u0=1e-12, dimension=2, seed=1):
     landscape, state = Landscape(packing), State.of(packing)
     rough = Stop(tolerance=1e-2, lowest=1e-10, evaluations=200)
     while state.packing(packing).phi < phi:
-        state = minimise(landscape, state.strained(-0.01), "lbfgs", rough).state
+        state = minimise(landscape, state.strained(-0.01), lbfgs, rough).state
     return landscape, find(landscape, state, Target(u0))
 
 

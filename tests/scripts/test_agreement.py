@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from jamshape.measures import published
+from common import published
 
 ANALYSIS = Path(__file__).parents[2] / "analysis"
 SCRIPT = "agreement.py"
@@ -67,7 +67,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def made(folder, report):
-    """What is said, the page, and the rows of the table by quantity."""
+    """Return the output, the page, and the rows of the table by quantity."""
     out = folder / "agreement.md"
     said = report(SCRIPT, folder, "--paper", PAPER, "--out", out)
     with (folder / "agreement.csv").open(newline="") as file:
@@ -179,7 +179,7 @@ def test_a_paper_that_cannot_be_read_is_refused(tmp_path, line, words):
 
 
 def test_numbers_are_those_that_figures_draw():
-    """What jamshape.measures.published knows stands in the table with the same values."""
+    """The table has the values of common/published.py."""
     script = runpy.run_path(str(ANALYSIS / SCRIPT))
     rows = {p.result: p for p in script["read_paper"](ANALYSIS / PAPER / "paper.csv")}
     usual = "[protocol=quasistatic]"

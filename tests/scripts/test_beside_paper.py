@@ -5,8 +5,8 @@ from jamming import write_jammed
 from test_figures_of_runs import PHI_J, compression
 
 import jamshape as js
+from common import published
 from jamshape.files.h5md import read_attributes
-from jamshape.measures import published
 from jamshape.shapes.particles import Particles
 
 BESIDE = "marschall_2018/beside_paper.py"

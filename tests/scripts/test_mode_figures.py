@@ -15,12 +15,13 @@ from mixtures import bidisperse, superellipsoids
 from numpy.testing import assert_allclose
 from pictures import image
 
-from jamshape.drawing.mode_axes import bin_edges
+from common.mode_axes import bin_edges
+from common.mode_tables import read_tables
 from jamshape.files.h5md import read_attributes, read_packing, write_packing
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
 from jamshape.vibration.hessian import Coordinates, dynamical_matrix
-from jamshape.vibration.sets import read_tables, to_store
+from jamshape.vibration.sets import to_store
 from jamshape.vibration.spectrum import spectrum
 from jamshape.vibration.table import ModeTable, tabulate, write_modes
 
@@ -111,7 +112,7 @@ def with_modes(folder, particles, phi):
 
 @pytest.fixture(scope="module")
 def jammed(tmp_path_factory):
-    """Of rods."""
+    """Jammed packing of rods."""
     folder = tmp_path_factory.mktemp("jammed")
     return folder, with_modes(folder, bidisperse(1), 0.84)
 
@@ -311,7 +312,7 @@ def test_user_errors_are_one_sentence(problem, modes, tmp_path, script):
     assert "no modes, expected files" in problem(script, tmp_path / "empty", "--out", out)
     assert "no modes have alpha = 7" in problem(script, modes, "--alpha", 7, "--out", out)
     packing = modes / "packing.h5"
-    assert "packing.h5: is no complete file of modes" in problem(script, packing, "--out", out)
+    assert "packing.h5: is not a complete file of modes" in problem(script, packing, "--out", out)
     more = write(tmp_path, 4.0, U0, 3, n=N + 1)
     assert "expected one ensemble" in problem(script, modes, more, "--out", out)
     assert not out.exists()

@@ -110,7 +110,7 @@ def test_a_state_that_is_no_minimum_needs_force(packing, tmp_path):
     assert done.stderr.startswith(
         "modes.py: the state is not at a minimum: its largest net force is "
     )
-    assert done.stderr.endswith("or force it (--force)\n")
+    assert done.stderr.endswith("or use force (--force)\n")
     assert done.stderr.count("\n") == 1
     assert run(path, "--out", out, "--force").returncode == 0
     assert out.exists()
@@ -130,15 +130,15 @@ def test_problems_are_one_sentence(packing, tmp_path):
         assert words in done.stderr
         assert done.stderr.count("\n") == 1
     done = run(packing, "--out", tmp_path / "m.h5", "--lowest", 1000)
-    assert "1000 modes were asked for" in done.stderr
+    assert "1000 modes were requested" in done.stderr
 
 
 def test_files_that_are_not_of_modes_are_refused(packing, tmp_path):
-    with pytest.raises(FileFormatError, match="is no complete file of modes"):
+    with pytest.raises(FileFormatError, match="is not a complete file of modes"):
         read_modes(packing)
     with h5py.File(tmp_path / "empty.h5", "w"):
         pass
-    with pytest.raises(FileFormatError, match="is no complete file of modes"):
+    with pytest.raises(FileFormatError, match="is not a complete file of modes"):
         read_modes(tmp_path / "empty.h5")
 
 

@@ -5,9 +5,9 @@ import csv
 import pytest
 
 import jamshape as js
+from common.ensembles import read_groups
 from jamshape.files.h5md import read_attributes
 from jamshape.files.run_writer import RunWriter
-from jamshape.files.sets import read_groups
 
 SCRIPT = "sample_tables.py"
 

@@ -5,7 +5,7 @@ import pytest
 from pictures import image
 
 import jamshape as js
-from jamshape.measures.flow_curves import fit_flow_curve, shear_onset
+from common.flow_curves import fit_flow_curve, shear_onset
 
 pytestmark = pytest.mark.lammps
 

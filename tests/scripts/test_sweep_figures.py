@@ -8,11 +8,12 @@ import pytest
 from mixtures import bidisperse
 from pictures import image, is_color
 
+from common.contact_angles import contact_angles
+from common.contact_classes import class_fractions, flat_fraction
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import read_packing, write_packing
 from jamshape.files.run_writer import RunWriter
 from jamshape.measures.averages import Mean
-from jamshape.measures.contact_statistics import class_fractions, contact_angles, flat_fraction
 from jamshape.packing import Box
 from jamshape.protocols.random_start import random_packing
 

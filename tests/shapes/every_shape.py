@@ -15,6 +15,7 @@ from jamshape.packing import Box, State
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Kind, Particles
 from jamshape.shapes.table import SHAPES
+from methods.lbfgs import lbfgs
 
 EPS = float(np.finfo(float).eps)
 
@@ -94,7 +95,7 @@ def squeezed(case, n=None, overlap=_DEEPEST, seed=1):
 def _squeezed(packing, overlap):
     landscape, state = Landscape(packing, sides=SIDES), State.of(packing)
     for _ in range(300):
-        found = minimise(landscape, state, "lbfgs", ROUGH)
+        found = minimise(landscape, state, lbfgs, ROUGH)
         if deepest(found.state.packing(packing)) > overlap:
             return in_doubles(found.state.packing(packing))
         step = 0.03 if found.outcome is Outcome.UNJAMMED else 0.01
@@ -120,7 +121,7 @@ def tilted(case):
     for step in range(steps):
         before, there = there, np.eye(D) + (step + 1) / steps * shear
         state = sheared(state, there @ np.linalg.inv(before))
-        state = minimise(landscape, state, "lbfgs", ROUGH).state
+        state = minimise(landscape, state, lbfgs, ROUGH).state
     return kicked(_squeezed(in_doubles(state.packing(packing)), _DEEPEST), 0.031)
 
 
@@ -144,7 +145,7 @@ def in_a_small_box(case):
     packing = scattered(case, 2)
     landscape, state = Landscape(packing, sides=SIDES), State.of(packing)
     for _ in range(300):
-        state = minimise(landscape, state, "lbfgs", ROUGH).state
+        state = minimise(landscape, state, lbfgs, ROUGH).state
         found = in_doubles(state.packing(packing))
         i, j = find_contacts(found, sides=SIDES).pairs.T
         if (

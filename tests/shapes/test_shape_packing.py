@@ -18,6 +18,8 @@ from every_shape import (
     taken,
 )
 
+from common.energy_along import AlongModes
+from common.ladder import climb
 from jamshape.contacts import coordination, find_contacts, find_rattlers
 from jamshape.files.h5md import (
     read_attributes,
@@ -34,14 +36,14 @@ from jamshape.minima.target import Target, find
 from jamshape.packing import State
 from jamshape.protocols import by_dynamics, by_steps
 from jamshape.protocols.approach import Approach
-from jamshape.protocols.ladder import climb
 from jamshape.protocols.make import Dynamics, Recipe, Steps, Thermalisation, is_done, make
 from jamshape.protocols.quasistatic import Quasistatic
 from jamshape.vibration.elasticity import moduli
-from jamshape.vibration.energy_along import AlongModes
 from jamshape.vibration.hessian import dynamical_matrix
 from jamshape.vibration.spectrum import spectrum, state_error
 from jamshape.vibration.statistics import components, count, participation
+from methods.lammps_cg import lammps_cg
+from methods.lbfgs import lbfgs
 
 # What is asked for: the energy density, how well it is met, and what may be left of the forces.
 U0, ACCURACY, RESIDUAL = 1e-10, 1e-7, 1e-8
@@ -260,7 +262,7 @@ def test_files_hold_packings_to_the_last_bit(case, made, tmp_path):
 
 @pytest.mark.lammps
 @TYPICAL_ONES
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [*METHODS, lbfgs, lammps_cg])
 def test_every_minimiser_finds_a_minimum(case, method, made, measured):
     packing = read_packing(made(case))
     landscape = Landscape(packing, sides=SIDES)
@@ -273,7 +275,7 @@ def test_every_minimiser_finds_a_minimum(case, method, made, measured):
     again = Landscape(packing, sides=SIDES).evaluate(found.state)
     assert again.energy == close_to(found.evaluation.energy, 1e-9)
     assert found.outcome is Outcome.STALLED or found.residual.largest <= 1e-4
-    assert found.outcome is not Outcome.STALLED or method in {"paper", "lammps", "lbfgs"}
+    assert found.outcome is not Outcome.STALLED or method in {"cg_marschall", lammps_cg, lbfgs}
 
 
 @EVERY

@@ -52,8 +52,8 @@ def test_parameters_make_particles_that_fit_and_come_back(case):
     np.testing.assert_allclose(diameters, size[:, None] * diameters[1], rtol=4 * EPS)
     for k in range(3):
         found, its_size = shape.parameters_of(diameters[k], float(exponent[k]))
-        assert found == pytest.approx(parameters, rel=1e-13, abs=1e-13)
-        assert its_size == close_to(size[k], 1e-13)
+        assert found == pytest.approx(parameters, rel=1e-14, abs=1e-14)
+        assert its_size == close_to(size[k], 1e-15)
     assert SHAPES[guess_shape_style(diameters)].fits(diameters)
     assert shape.has_exponent or (exponent == 1).all()
     assert "$" in shape.label(parameters)

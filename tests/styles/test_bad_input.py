@@ -8,18 +8,20 @@ import sys
 
 import numpy as np
 import pytest
-from lammps_scenes import (
-    after_box,
+from lammps_runs import (
+    after_restart,
     before_box,
     environment,
     error_of,
     load_plugin,
+    refusal_of,
     refusals,
-    rods,
-    rods_3d,
     run_lmp,
+    run_lmp_well,
     scene,
 )
+from lammps_scenes import rods, rods_3d
+from superellipsoid_scenes import particles
 
 from jamshape.files.lammps_text import write_data
 
@@ -35,14 +37,22 @@ def two_rods(**changes):
     return rods(**(fields | changes))
 
 
+def two_bodies(**changes):
+    """Superellipsoids of two types, in contact."""
+    fields = {"position": [[0.0, 0, 0], [0.9, 0.3, 0.2]], "orientation": [1.0, 0.2, 0.1, -0.3],
+              "semi_axes": [0.5, 0.6, 0.8], "exponent": [1.0, 1.5], "edges": [9.0] * 3}  # fmt: skip
+    return particles(**(fields | changes))
+
+
 @pytest.fixture
 def sentence_of(tmp_path):
     """The error of an input that follows the set-up of two rods, or of other particles."""
 
     def run(commands, packing=None, ranks=1):
-        text = scene(packing or two_rods(), tmp_path / "s.data")
-        done = run_lmp(f"{load_plugin()}\n{text}\n{commands}", tmp_path, ranks)
-        return error_of(done)
+        text = f"{scene(packing or two_rods(), tmp_path / 's.data')}\n{commands}"
+        if ranks == 1:
+            return refusal_of(text)
+        return error_of(run_lmp(f"{load_plugin()}\n{text}", tmp_path, ranks))
 
     return run
 
@@ -50,21 +60,33 @@ def sentence_of(tmp_path):
 # --- commands ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("value", ["0.0", "-1.0", "-0.0"])
-def test_stiffness_must_be_positive(value, sentence_of):
-    assert sentence_of(f"pair_coeff 1 1 {value}") == (
-        f"pair_coeff of spherocylinder/harmonic found k_e = {value}, expected a positive energy: "
-        "give the contacts a stiffness such as 1.0."
+@pytest.mark.parametrize(
+    ("value", "packing", "name"),
+    [(value, two_rods(), "k_e") for value in ("0.0", "-1.0", "-0.0")]
+    + [(value, two_bodies(), "epsilon") for value in ("0.0", "-1.0", "1e400")],
+)
+def test_stiffness_must_be_positive(value, packing, name, sentence_of):
+    expected = (
+        f"pair_coeff of {packing.shape.name}/harmonic found {name} = {value}, expected a positive "
+        "energy: give the contacts a stiffness such as 1.0."
     )
+    assert sentence_of(f"pair_coeff 1 1 {value}", packing) in refusals(value, expected)
 
 
 @pytest.mark.parametrize(
-    "command", ["pair_coeff 1 1 {}", FIX.replace("1.0", "{}"), FIX.replace("1e-3", "{}")]
+    "command",
+    [
+        "pair_coeff 1 1 {}",
+        "pair_coeff 1 1 1.0 {}",
+        FIX.replace("1.0", "{}"),
+        FIX.replace("1e-3", "{}"),
+    ],
 )
 @pytest.mark.parametrize("word", ["strong", "nan", "inf", "1,5"])
 def test_what_is_not_a_number_is_named(command, word, sentence_of):
     """LAMMPS's own sentence."""
-    assert sentence_of(command.format(word)) == (
+    packing = two_bodies() if "1.0 {}" in command else None
+    assert sentence_of(command.format(word), packing) == (
         f"Expected floating point parameter instead of '{word}' in input script or data file"
     )
 
@@ -183,9 +205,44 @@ def test_fix_needs_a_pair_style_of_ours(sentence_of):
 def test_unset_coefficients_are_noticed(tmp_path):
     packing = two_rods(species=np.array([1, 2]))
     text = scene(packing, tmp_path / "s.data").replace("pair_coeff * *", "pair_coeff 1 1")
-    done = run_lmp(f"{load_plugin()}\n{text}\nrun 0", tmp_path)
     # Newer LAMMPS lists them below.
-    assert re.fullmatch(r"All pair coeffs are not set(\. Status:)?", error_of(done))
+    assert re.fullmatch(r"All pair coeffs are not set(\. Status:)?", refusal_of(f"{text}\nrun 0"))
+
+
+# --- exponents of superellipsoids ------------------------------------------------------------------
+
+OF_BODIES = "pair_coeff of superellipsoid/harmonic found "
+
+
+@pytest.mark.parametrize(
+    ("command", "sentence"),
+    [
+        (
+            "pair_style superellipsoid/harmonic p 1.5",
+            ("pair_style superellipsoid/harmonic found 'p 1.5', expected no arguments: give exponents "
+            "with 'pair_coeff I I epsilon p'."),
+        ),
+        *((f"pair_coeff {words}",
+           f"{OF_BODIES}{number} arguments, expected 'I J epsilon' or 'I I epsilon p'.")
+          for words, number in (("1 1", 2), ("1 1 1.0 1.5 2", 5))),
+        *((f"pair_coeff 1 1 1.0 {value}",
+           (f"{OF_BODIES}p = {value}, expected a finite number above 0.5: particles of other exponents "
+           "are not convex."))
+          for value in ("0.5", "0.0", "-2", "1e400")),
+        *((f"pair_coeff {types} 1.0 1.5",
+           (f"{OF_BODIES}p = 1.5 for types {' and '.join(types.split())}, expected it where both are the "
+           "same: an exponent belongs to a type, give it with 'pair_coeff I I epsilon p'."))
+          for types in ("1 2", "1 *", "* 2", "1*2 2")),
+    ],
+)  # fmt: skip
+def test_exponents_are_convex_and_belong_to_types(command, sentence, sentence_of):
+    assert sentence_of(command, two_bodies()) in refusals(command.split()[-1], sentence)
+
+
+@pytest.mark.parametrize("words", ["p 1.5", "general", "general turns"])
+def test_words_that_no_dimer_style_knows(words, sentence_of):
+    found = sentence_of(f"pair_style dimer/harmonic {words}")
+    assert found.startswith(f"pair_style dimer/harmonic found '{words}', expected ")
 
 
 # --- particles that are nowhere --------------------------------------------------------------------
@@ -215,19 +272,16 @@ def test_a_particle_that_is_nowhere_stops_the_run(change, run, found, sentence_o
 # --- particles -----------------------------------------------------------------------------------
 
 
-def test_atom_style_must_be_ellipsoid(tmp_path):
-    done = run_lmp(
-        f"""{load_plugin()}
+def test_atom_style_must_be_ellipsoid():
+    sentence = refusal_of(f"""
         {before_box(2).replace("atom_style ellipsoid", "atom_style sphere")}
         region box block -5 5 -5 5 -0.5 0.5
         create_box 1 box
         create_atoms 1 single 0 0 0
         pair_style spherocylinder/harmonic sides one
         pair_coeff * * 1.0
-        run 0""",
-        tmp_path,
-    )
-    assert error_of(done) == (
+        run 0""")
+    assert sentence == (
         "pair_style spherocylinder/harmonic found atom_style sphere, expected ellipsoid: use "
         "'atom_style ellipsoid' and give every atom a shape."
     )
@@ -256,17 +310,21 @@ def test_shapes_must_be_spherocylinders(diameters, sentence_of):
 
 
 def plane_of_tilted(tmp_path, tilt):
-    """What LAMMPS says of two rods of which one is rotated out of the plane, by twice this."""
+    """Input for two rods of which one is rotated out of the plane, by twice this."""
     packing = rods_3d([[0, 0, 0], [0, 2, 0]], [[1, 0, 0, 0], [1, 0, tilt, 0]], 1.0, 0.5, [12] * 3)
     packing = packing.with_(box=type(packing.box)(lo=[-6, -6, -0.5], edges=[12, 12, 1]))
     write_data(tmp_path / "s.data", packing)
-    text = f"{before_box(2)}\nread_data {tmp_path / 's.data'}\n{after_box()}\nrun 0"
-    return run_lmp(f"{load_plugin()}\n{text}", tmp_path)
+    return f"""{before_box(2)}
+        read_data {tmp_path / "s.data"}
+        pair_style spherocylinder/harmonic sides one
+        pair_coeff * * 1.0
+        {after_restart()}
+        run 0"""
 
 
 @pytest.mark.parametrize("tilt", [0.1, 1e-6])
 def test_plane_needs_quaternions_about_z(tilt, tmp_path):
-    assert error_of(plane_of_tilted(tmp_path, tilt)) == (
+    assert refusal_of(plane_of_tilted(tmp_path, tilt)) == (
         "pair_style spherocylinder/harmonic found atom 2 rotated out of the plane, expected a "
         "quaternion (w, 0, 0, k) in dimension 2: rotate it about z only."
     )
@@ -275,7 +333,7 @@ def test_plane_needs_quaternions_about_z(tilt, tmp_path):
 @pytest.mark.parametrize("tilt", [6e-17, 1e-9])
 def test_quaternions_that_rounding_leaves_out_of_the_plane_are_taken(tilt, tmp_path):
     """As those of `fix rigid`; a tilt of 2e-9 changes lengths by 2e-18."""
-    assert plane_of_tilted(tmp_path, tilt).returncode == 0
+    run_lmp_well(f"{load_plugin()}\n{plane_of_tilted(tmp_path, tilt)}", tmp_path)
 
 
 CROSSING = (
@@ -317,23 +375,24 @@ def test_fix_needs_a_periodic_box(boundary, sentence_of):
 
 def test_pair_style_alone_needs_no_periodic_box(tmp_path):
     text = scene(two_rods(), tmp_path / "s.data")
-    done = run_lmp(
-        f"{load_plugin()}\n{text}\nchange_box all boundary f p p\nrun 0", tmp_path
-    )  # fmt: skip
-    assert done.returncode == 0
+    run_lmp_well(f"{load_plugin()}\n{text}\nchange_box all boundary f p p\nrun 0", tmp_path)
 
 
-def test_shapes_that_grow_behind_our_back_are_noticed(sentence_of):
-    """`run ... pre no` leaves out the set-up that measures shapes and cutoffs."""
+@pytest.mark.parametrize(
+    ("packing", "shape"), [(two_rods(), "9.0 1.0 1.0"), (two_bodies(), "1.61 1.2 1.0")]
+)
+def test_shapes_that_grow_behind_our_back_are_noticed(packing, shape, sentence_of):
+    """`run ... pre no` leaves out the set-up that measures shapes, by their corners, and cutoffs."""
     found = sentence_of(
-        """neigh_modify every 1 delay 0 check no
+        f"""neigh_modify every 1 delay 0 check no
         run 0
-        set atom 2 shape 9.0 1.0 1.0
-        run 1 pre no"""
+        set atom 2 shape {shape}
+        run 1 pre no""",
+        packing,
     )
     assert found == (
-        "pair_style spherocylinder/harmonic found atom 2 larger than at the start of the run, so "
-        "the ghost cutoff is too short: do not use 'pre no' in the run after changing shapes."
+        f"pair_style {packing.shape.name}/harmonic found atom 2 larger than at the start of the run, "
+        "so the ghost cutoff is too short: do not use 'pre no' in the run after changing shapes."
     )
 
 

@@ -6,18 +6,8 @@ import functools
 
 import numpy as np
 import pytest
-from lammps_scenes import (
-    SIDES,
-    bindings_forces,
-    dense,
-    difference_from_bindings,
-    fix_vector,
-    loaded,
-    rods,
-    rods_3d,
-    squeezed,
-    state_of,
-)
+from lammps_runs import SIDES, difference_from_library, fix_vector, library_forces, loaded, state_of
+from lammps_scenes import dense, rods, rods_3d, squeezed
 from mixtures import bidisperse
 
 from jamshape import contacts
@@ -88,13 +78,13 @@ def test_extreme_scenes_run_and_equal_the_bindings(name, sides, tmp_path, measur
         after = state_of(session)
     n_contacts = len(contacts.find_contacts(packing, sides=1).pairs)
     assert n_contacts > 3
-    differences = [difference_from_bindings(state, sides) for state in (before, after)]
+    differences = [difference_from_library(state, sides) for state in (before, after)]
     measured(contacts=n_contacts, before=differences[0], after=differences[1])
     assert np.isfinite(after.force).all()
     assert np.isfinite(after.torque).all()
     assert max(differences) < 1e-12
     # The box shrinks by 0.06 %: what does not relax gains little.
-    assert bindings_forces(after, sides).energy < 1.1 * bindings_forces(before, sides).energy
+    assert library_forces(after, sides).energy < 1.1 * library_forces(before, sides).energy
 
 
 def test_scenes_hold_what_they_stand_for():
@@ -151,7 +141,7 @@ def test_overlaps_from_rounding_to_a_third(dimension, sides, tmp_path, measured)
     with loaded(packing, tmp_path, sides=sides) as session:
         session.commands("run 0")
         state = state_of(session)
-    expected = bindings_forces(state, sides)
+    expected = library_forces(state, sides)
     size = np.linalg.norm(state.force, axis=1)
     # No boundary is crossed, so both see the same separations, and agree pair by pair.
     difference = np.abs(state.force - expected.force).max(axis=1)
@@ -182,6 +172,6 @@ def test_rates(kappa, sides, tmp_path, measured):
     np.testing.assert_allclose(strain, kappa * dt * steps, rtol=1e-14)
     shrunk = state.packing.box.edges - packing.box.edges * np.exp(-kappa * dt * steps)
     assert np.abs(shrunk).max() <= 2 * np.spacing(packing.box.edges.max())
-    difference = difference_from_bindings(state, sides)
+    difference = difference_from_library(state, sides)
     measured(difference=difference)
     assert difference < 1e-12

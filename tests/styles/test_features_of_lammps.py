@@ -8,13 +8,11 @@ import sys
 
 import numpy as np
 import pytest
-from lammps_scenes import (
+from lammps_runs import (
     REPOSITORY,
     SHOW,
     Session,
     before_box,
-    dense,
-    dense_mixture,
     environment,
     global_vector,
     load_plugin,
@@ -22,10 +20,7 @@ from lammps_scenes import (
     run_lmp_well,
     state_of,
 )
-
-sys.path.insert(0, str(REPOSITORY / "analysis" / "stability"))
-from features.contacts import CONTACTS
-from features.feature import judge
+from lammps_scenes import dense, dense_mixture
 
 from jamshape import contacts
 
@@ -47,28 +42,6 @@ def two_rods(more=""):
     return f"{before_box(2)}\n{load_plugin()}\n{TWO_RODS}\n{more}"
 
 
-# A process each: of the others, the daily ones are those that have failed users.
-DAILY = {
-    "`atom_style hybrid ellipsoid molecular`", "`units real`", "`pair_style hybrid`, `minimize`",
-    "`pair_style hybrid`, other atoms without a shape", "`special_bonds lj 0.5`", "`write_coeff`",
-    "`write_data`, `read_data`", "restart file to data file, in a deck", "`rerun` of rods",
-    "`fix setforce 0 0 0`, `minimize`", "`fix freeze`, `minimize`", "`fix adapt` of mixed k_e",
-    "`fix deposit`", "`set shape` before `run pre no`", "`fix rigid` in the plane",
-}  # fmt: skip
-
-
-def marked(feature):
-    marks = () if feature.name in DAILY else (pytest.mark.validate,)
-    return pytest.param(feature, marks=marks, id=feature.name)
-
-
-@pytest.mark.parametrize("feature", [marked(feature) for feature in CONTACTS])
-def test_a_feature_works_or_is_refused(feature):
-    """Each row of the table of docs/results/stability.md."""
-    outcome = judge(feature)
-    assert outcome.holds, outcome.found
-
-
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_hybrid_pair_style_has_the_forces_of_the_types_that_are_ours(dimension, tmp_path):
     """Those of a crowd from which all other particles are taken."""
@@ -80,8 +53,8 @@ def test_a_hybrid_pair_style_has_the_forces_of_the_types_that_are_ours(dimension
             run 0""")
         state, energy = state_of(session), session.lmp.get_thermo("pe")
     ours = state.packing.species == 1
-    arrays = {k: v for k, v in vars(state.exact).items() if np.shape(v)[:1] == ours.shape}
-    alone = state.exact.with_(**{name: values[ours] for name, values in arrays.items()})
+    arrays = {k: v for k, v in vars(state.packing).items() if np.shape(v)[:1] == ours.shape}
+    alone = state.packing.with_(**{name: values[ours] for name, values in arrays.items()})
     expected = contacts.forces(alone, 1.0, 2)
     assert energy == pytest.approx(expected.energy, rel=1e-12)
     scale = np.abs(expected.force).max()

@@ -6,24 +6,19 @@ import functools
 
 import numpy as np
 import pytest
-from lammps_scenes import (
+from lammps_runs import (
     SIDES,
     after_restart,
-    angle_between,
-    dense,
-    difference_from_bindings,
+    difference_from_library,
     fix_vector,
     load_plugin,
     loaded,
-    nearest_image,
-    pose_differences,
     restarted,
-    rods,
-    rods_3d,
     run_lmp_well,
     scene,
     state_of,
 )
+from lammps_scenes import angle_between, dense, nearest_image, pose_differences, rods, rods_3d
 from scipy.integrate import solve_ivp
 from test_extremes import SCENES
 
@@ -263,7 +258,7 @@ def test_the_rate_jumps_between_runs(method, tmp_path, measured):
     assert error <= 1e-4
     assert after < before
     assert strain == pytest.approx(2e-5 + 0.02, rel=1e-13)
-    assert difference_from_bindings(state, "two") < 1e-12
+    assert difference_from_library(state, "two") < 1e-12
 
 
 def test_fix_halt_ends_a_run_at_a_density(tmp_path):
@@ -290,7 +285,7 @@ def test_fix_halt_ends_a_run_at_a_density(tmp_path):
 def test_extreme_scenes(name, method, sides, tmp_path, measured):
     packing = SCENES[name]()
     state, vector = end_of(packing, tmp_path, fix(method, 1e-3, 1e-3, 1.0), "run 3", sides=sides)
-    difference = difference_from_bindings(state, sides)  # refuses NaN
+    difference = difference_from_library(state, sides)  # refuses NaN
     measured(difference=difference, substeps=vector[SUBSTEPS], forced=vector[FORCED])
     assert difference < 1e-11
     assert np.isfinite(vector[1:]).all()
@@ -307,5 +302,5 @@ def test_deep_overlaps_relax(method, tmp_path):
     position = 3.0 * (np.stack(np.unravel_index(np.arange(16), (4, 4)), axis=1) - 1.5) * 0.45
     packing = rods(position, 0.1 * rng.uniform(-1, 1, 16), 0.2, 0.9, [5.4, 5.4])
     state, vector = end_of(packing, tmp_path, fix(method, 1e-3, 0.0, 5.0), "run 3", sides="two")
-    assert difference_from_bindings(state, "two") < 1e-12
+    assert difference_from_library(state, "two") < 1e-12
     assert vector[ERROR] <= 1e-3 or vector[FORCED] > 0

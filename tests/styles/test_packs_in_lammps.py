@@ -1,20 +1,14 @@
 """Pair styles with every set of instructions: the forces of one pair at a time, and the same dynamics."""
 
+import os
+from functools import cache
+from unittest import mock
+
 import numpy as np
 import pytest
-from lammps_scenes import (
-    dense,
-    dense_mixture,
-    dump,
-    load_plugin,
-    pose_differences,
-    run_lmp,
-    run_lmp_well,
-    scene,
-    states_from_dump,
-)
+from lammps_runs import dump, load_plugin, run_lmp, run_lmp_well, scene, states_from_dump
+from lammps_scenes import dense, dense_mixture, pose_differences
 from superellipsoid_scenes import crowd
-from superellipsoid_scenes import scene as scene_of_superellipsoids
 
 from jamshape import _contact
 
@@ -35,30 +29,41 @@ SCENES = {
 }
 
 
+CASES = [(name, "two") for name in SCENES]
+CASES += [(name, "one") for name in ("discs", "rods", "mixture", "rods in space")]
+
+
+@pytest.fixture(scope="module")
+def found_with(tmp_path_factory):
+    """States of a case at the start and after 20 steps; a set of instructions has a process for all cases."""
+
+    @cache
+    def run(instructions, ranks):
+        folder = tmp_path_factory.mktemp(instructions)
+        newton, text = "on" if ranks == 1 else "off", ""
+        for k, (name, sides) in enumerate(CASES):
+            start = scene(SCENES[name](), folder / f"{k}.data", newton=newton, sides=sides)
+            text += f"clear\n{load_plugin()}\n{start}\n{dump(folder / f'{k}.dump', 20)}\n{FLOW}\nrun 20\n"
+        with mock.patch.dict(os.environ, JAMSHAPE_SIMD=instructions):
+            run_lmp_well(text, folder, ranks)
+        return folder
+
+    def found(case, instructions, ranks):
+        path = run(instructions, ranks) / f"{CASES.index(case)}.dump"
+        return states_from_dump(path, SCENES[case[0]]())
+
+    return found
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("sides", ["one", "two"])
-@pytest.mark.parametrize("name", SCENES)
-def test_forces_do_not_depend_on_the_instructions(name, sides, ranks, tmp_path, monkeypatch):
-    packing = SCENES[name]()
-    is_rods = packing.shape.name == "spherocylinder"
-    if not is_rods and sides == "one":
-        pytest.skip("no sides")
-    data, newton = tmp_path / "s.data", "on" if ranks == 1 else "off"
-    if is_rods:
-        text = scene(packing, data, newton=newton, sides=sides)
-    else:
-        text = scene_of_superellipsoids(packing, data, newton=newton)
-    ends = []
-    for instructions in ("scalar", *PACKS):
-        monkeypatch.setenv("JAMSHAPE_SIMD", instructions)
-        path = tmp_path / f"{instructions}.dump"
-        run_lmp_well(f"{load_plugin()}\n{text}\n{dump(path, 20)}\n{FLOW}\nrun 20", tmp_path, ranks)
-        ends.append(states_from_dump(path, None if is_rods else packing.exponent))
-    (start, end), *others = ends
+@pytest.mark.parametrize("case", CASES, ids="-".join)
+def test_forces_do_not_depend_on_the_instructions(case, ranks, found_with):
+    packing = SCENES[case[0]]()
+    (start, end), *others = (found_with(case, x, ranks) for x in ("scalar", *PACKS))
     largest = np.abs(start.force).max()
     assert largest > 0
     # Near faces a torque is known to the root of what the tangency is.
-    rounding = 1e-14 if is_rods or np.all(packing.exponent == 1.0) else 1e-11
+    rounding = 1e-14 if np.all(packing.exponent == 1.0) else 1e-11
     for start_there, end_there in others:
         assert np.abs(start.force - start_there.force).max() < rounding * largest
         assert np.abs(start.torque - start_there.torque).max() < rounding * largest

@@ -3,11 +3,13 @@
 import re
 
 import pytest
-from lammps_scenes import REPOSITORY, before_box, dense, load_plugin, run_lmp_well
+from lammps_runs import REPOSITORY, before_box, load_plugin, run_lmp_well
+from lammps_scenes import dense
 
 from jamshape.files.lammps_text import write_data
 from jamshape.flow.motion import Motion
 from jamshape.flow.shear import Shear
+from jamshape.shapes.table import SHAPES
 
 PAGES = REPOSITORY / "docs" / "reference"
 STYLES = [page.stem for kind in ("pair", "fix", "compute") for page in PAGES.glob(f"{kind}_*.md")]
@@ -37,7 +39,7 @@ def test_a_page_has_the_sections_of_lammps(name):
 
 def test_every_style_that_is_registered_has_a_page():
     register = (REPOSITORY / "lammps_plugin" / "styles" / "register.cpp").read_text()
-    registered = re.findall(r'add\("([\w/]+)"', register)
+    registered = re.findall(r'add\("([\w/]+)"', register) + [f"{name}/harmonic" for name in SHAPES]
     pages = {re.sub(r"^(pair|fix|compute)_", "", name).replace("_", "/") for name in STYLES}
     assert set(registered) - {"create_random"} == pages
 
@@ -59,7 +61,9 @@ def test_examples_run(name, text, tmp_path):
 
 
 @pytest.mark.lammps
-@pytest.mark.parametrize("text", part_of("create_random", "Examples").split("```")[1].strip().splitlines())
+@pytest.mark.parametrize(
+    "text", part_of("create_random", "Examples").split("```")[1].strip().splitlines()
+)
 def test_examples_of_the_command_run(text, tmp_path):
     dimension = 2 if "spherocylinder" in text else 3
     said = run_lmp_well(f"{before_box(dimension)}\n{load_plugin()}\n{text}", tmp_path)

@@ -32,7 +32,7 @@ class Style(NamedTuple):
     write: Callable[[Path, Packing], None]
     """Writes the data file."""
     nve: str
-    """What moves the particles without drag."""
+    """Fix that moves the particles without drag."""
     skin: float = SKIN
     is_ours: bool = False
     instead: str = ""
@@ -49,7 +49,7 @@ class Case(NamedTuple):
 
 
 class Bench(NamedTuple):
-    """What is measured of one shape."""
+    """Benchmark of one shape."""
 
     dimension: int
     cases: tuple[Case, ...]
@@ -69,7 +69,7 @@ class Bench(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What LAMMPS and the kernel tell of one run."""
+    """Measurements of one run, from LAMMPS and the kernel."""
 
     n: float
     peak_bytes: int

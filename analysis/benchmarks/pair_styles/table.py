@@ -1,4 +1,4 @@
-"""What is compared, for each shape."""
+"""Comparisons for each shape."""
 
 from __future__ import annotations
 

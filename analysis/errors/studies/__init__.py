@@ -1,1 +1,1 @@
-"""What the studies of error share: finished runs that are kept, starts, curves of error against time, tables."""
+"""Common parts of the studies of error: finished runs on disk, starts, curves of error against time, tables."""

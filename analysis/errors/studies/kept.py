@@ -1,4 +1,4 @@
-"""What a study has finished is kept in its folder, and taken from there the next time."""
+"""Results of finished parts of a study, kept in its folder and reused the next time."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ class Point(NamedTuple):
     """One run of a study."""
 
     name: str
-    """Of its curve: 'method, case'."""
+    """Name of its curve: 'method, case'."""
     seconds: float
     error: float
 
@@ -51,7 +51,7 @@ def median_and_largest(axis: Any, color: str, points: Sequence[tuple[float, floa
 
 
 def name_median_and_largest(axis: Any) -> None:
-    """Say which is which."""
+    """Add a legend for median and largest."""
     axis.xaxis.set_minor_formatter("")  # within a decade they would run into each other
     axis.plot([], [], "o-", color="0.3", label="median")
     axis.plot([], [], "s--", color="0.3", mfc="none", label="largest")

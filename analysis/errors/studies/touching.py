@@ -34,7 +34,7 @@ class Couples(NamedTuple):
 
 
 class Bodies(NamedTuple):
-    """What is drawn of one particle each: semi-axes (M, D), exponents (M,), a point and a normal there (M, 3)."""
+    """One particle each: semi-axes (M, D), exponents (M,), a point and a normal there (M, 3)."""
 
     axes: FloatArray
     p: FloatArray

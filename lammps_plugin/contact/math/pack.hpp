@@ -14,7 +14,7 @@
 namespace jamshape {
 inline namespace JAMSHAPE_SET {
 
-/// As many doubles as a register holds.
+/// Number of doubles in a register.
 #if defined(__AVX512F__)
 inline constexpr int LANES = 8;
 #elif defined(__AVX__)

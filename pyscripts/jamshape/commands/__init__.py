@@ -1,9 +1,9 @@
-"""The command ``jamshape``: one module here for each subcommand, loaded when it is asked for.
+"""The command ``jamshape``: one module for each subcommand, loaded on demand.
 
 Each module has ``options_of()``, which makes the parser, ``main(options)``, which returns the exit code, and may
-have ``GO_ON``, which says how to go on after Ctrl-C. What is in this file needs the standard library alone, and
-knows no words that an old Python does not, so that ``jamshape --help`` is quick and a Python in which nothing is
-set up is told what to do.
+have ``GO_ON``, advice after Ctrl-C. This file needs only the standard library and
+avoids recent syntax, so that ``jamshape --help`` is quick and an old or bare Python
+gets advice.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ COMMANDS = {
     "shear": "shear at a constant rate; record stress, order and snapshots",
     "aqs": "shear by small steps with a minimisation after each; record stress and its drops",
     "sweep": "make many packings on all cores",
-    "reproduce": "make all data and every figure of a paper, its numbers beside ours",
-    "modes": "find the modes of vibration of a packing, and its moduli",
+    "reproduce": "make all data and figures of a paper, with its numbers beside ours",
+    "modes": "compute vibrational modes and elastic moduli of a packing",
     "draw": "draw packings",
-    "info": "tell what a file is, what is in it and how to go on with it",
-    "export": "write packings for other programs, such as OVITO and MDAnalysis",
+    "info": "describe a file: its kind, its content, and how to continue it",
+    "export": "export packings to other programs, such as OVITO and MDAnalysis",
     "initial": "make a random start without overlaps, for a deck or for Python",
-    "plugin": "tell where the LAMMPS plugin is, and how a deck loads it",
+    "plugin": "locate the LAMMPS plugin, and show how a deck loads it",
 }
-"""Subcommands, each a module of this package, and what they do."""
+"""Subcommands, each a module of this package, with their descriptions."""
 
 OLDEST_PYTHON = (3, 11)
 
 _NAME = "jamshape"
-_WRONG_USE = 2  # as of argparse
+_WRONG_USE = 2  # as in argparse
 
 _HELP = """\
 usage: {name} COMMAND [OPTIONS]
@@ -54,17 +54,17 @@ options:
   -h, --help  show this text
   --version   show the version
 
-{name} COMMAND --help tells the options of a command, with examples. The last line that most commands print is one
-JSON object; what takes long goes on when it is started again."""
+{name} COMMAND --help explains the options of a command, with examples. The last line that most commands print is one
+JSON object; interrupted long commands continue when started again."""
 
 
 class _Called(NamedTuple):
-    """How a subcommand was called."""
+    """Invocation of a subcommand."""
 
     name: str
-    """Before its sentences."""
+    """Prefix of its messages."""
     words: str
-    """In the examples of its help."""
+    """Words in the examples of its help."""
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
@@ -82,7 +82,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 
 def start(command: str) -> NoReturn:
-    """Run a script that is a subcommand with a name of its own."""
+    """Run a script that is a subcommand with its own name."""
     script = sys.argv[0]
     _run(command, sys.argv[1:], _Called(Path(script).name, f"python {script}"))
 
@@ -98,7 +98,7 @@ def _run(command: str, arguments: list[str], called: _Called) -> NoReturn:
     with sentences(called.name):
         _require_python()
         module = importlib.import_module(f"{__name__}.{command}")
-        # The rest ends in a moment, and a rank of something else may ask for it, as decks do for `initial`.
+        # Decks run `initial` on one rank; all other commands refuse several ranks.
         if hasattr(module, "GO_ON"):
             importlib.import_module("jamshape.checks").require_one_process()
     parser = options_of(command)
@@ -112,7 +112,7 @@ def _run(command: str, arguments: list[str], called: _Called) -> NoReturn:
 
 
 def _require_python() -> None:
-    """Refuse a Python that is too old for the rest."""
+    """Refuse a Python that is too old."""
     if sys.version_info < OLDEST_PYTHON:
         found, least = (".".join(map(str, v[:2])) for v in (sys.version_info, OLDEST_PYTHON))
         msg = f"{sys.executable} is Python {found}, expected {least} or newer; {SET_UP}"
@@ -133,6 +133,6 @@ def _version() -> str:
 
 
 def _unknown(command: str) -> str:
-    """Say that there is no such command, and which were meant."""
+    """Describe an unknown command, with similar ones."""
     close = difflib.get_close_matches(command, COMMANDS) or list(COMMANDS)
     return f"there is no command {command!r}, expected {' or '.join(close)}; see {_NAME} --help"

@@ -2,11 +2,12 @@
 
     jamshape aqs --alpha 4 --n 256 --phi 0.9 --step 1e-3 --strain 0.5 --out aqs.h5
 
-Starts from the last frame of a packing or run file (--start), or compresses a random packing to --phi by such steps, too.
-The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the stress at
-the end, the modulus of the first step, averages over the steady state, and the drops of the stress, each with the strain and the
-stress before it, and the energy over the volume that is lost. not_at_rest counts rows in which forces do not balance to
---tolerance; the exit code is 0 only if there is none. Needs no LAMMPS. Run again after a kill, it goes on; a finished run is left alone.
+Starts from the last frame of a packing or run file (--start), or compresses a random packing quasistatically to
+--phi. The volume is held, or with --pressure the pressure. The last line of standard output is one JSON object: the
+final stress, the modulus of the first step, averages over the steady state, and the stress drops, each with the
+strain and the stress before it, and the dissipated energy over the volume. not_at_rest counts rows in which forces do
+not balance to --tolerance; the exit code is 0 only if there are none. Needs no LAMMPS. The same command resumes an
+interrupted run, and leaves a finished one alone.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from jamshape.front.run import QuasistaticShearFile
 from jamshape.front.shearing import quasistatic_shear
 from jamshape.shapes.command_line import add_particle_options, particles_beside
 
-GO_ON = "the same command goes on from the last frame"
+GO_ON = "the same command resumes from the last frame"
 
 
 def options_of() -> ArgumentParser:
@@ -35,25 +36,27 @@ def options_of() -> ArgumentParser:
         ("--dimension", 2, "2 or 3"),
         ("--phi", 0.9, "packing fraction"),
         ("--step", 1e-3, "strain of each step"),
-        ("--strain", 0.5, "strain to reach"),
-        ("--pressure", 0.0, "pressure to hold; the volume where it is 0"),
+        ("--strain", 0.5, "final strain"),
+        ("--pressure", 0.0, "pressure to hold; 0 holds the volume"),
         ("--tolerance", 1e-8, "largest net force over the mean bond force"),
-        ("--seed", 1, "of the random start"),
+        ("--seed", 1, "random seed of the start"),
         ("--frames", 20, "snapshots"),
     )
     parser.add_argument("--flow", choices=FLOWS, default=FLOWS[0], help="(%(default)s)")
-    least = "leave drops below this part of the largest stress out of the list (%(default)s)"
+    least = "omit drops below this fraction of the largest stress (%(default)s)"
     parser.add_argument("--least-drop", type=float, default=1e-2, help=least)
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
     parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
-    parser.add_argument("--again", action="store_true", help="begin anew where --out is there")
+    parser.add_argument("--again", action="store_true", help="start over if --out exists")
     return parser
 
 
 def main(options: Namespace) -> None:
-    """Begin, or go on; a finished run is left alone."""
+    """Begin or resume; a finished run is left alone."""
     require_in(
-        "--least-drop", options.least_drop, RANGES["share"]._replace(meaning="a part", also=(0.0,))
+        "--least-drop",
+        options.least_drop,
+        RANGES["share"]._replace(meaning="a fraction", also=(0.0,)),
     )
     names = ("n", "dimension", "phi", "step", "strain", "flow", "pressure", "tolerance", "seed",
              "start", "frames", "again")  # fmt: skip
@@ -68,7 +71,7 @@ def main(options: Namespace) -> None:
 
 
 def _steady(run: QuasistaticShearFile) -> dict[str, Any]:
-    """Average over the steady state, or say why there is none."""
+    """Average over the steady state, or report why there is none."""
     try:
         return run.steady().report()
     except ValueError as error:  # too short

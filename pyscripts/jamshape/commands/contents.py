@@ -1,4 +1,4 @@
-"""What is in a file, whatever it is: found by its content, never by its name."""
+"""Content of any file, recognised by content and never by name."""
 
 from __future__ import annotations
 
@@ -37,58 +37,58 @@ _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",
 
 
 class _Stored(NamedTuple):
-    """How a file of particles is called, what tells it from others, and how to go on with it."""
+    """Name, mark and continuation of a kind of file with particles."""
 
     kind: str
     mark: str
-    """An attribute that only files of this kind have."""
+    """Attribute that only files of this kind have."""
     go_on: str
-    """Where it is not finished."""
+    """Advice for continuing, if not finished."""
 
 
-_SAME_COMMAND = "start the command that began it again"
-_OTHER_COMMAND = "start the command that makes {result} again, which goes on from this file"
+_SAME_COMMAND = "repeat the command that began it"
+_OTHER_COMMAND = "repeat the command for {result}, which continues from this file"
 
-# The first that fits.
+# The first match counts.
 _STORED = (
     _Stored("search for an energy", "search_step", _OTHER_COMMAND),
     _Stored("search for a strict minimum", "strict_search", _OTHER_COMMAND),
-    _Stored("second try of a packing", "retry_budget", _OTHER_COMMAND),
-    _Stored("steps on the way to a packing", "loose_phi", _OTHER_COMMAND),
+    _Stored("second attempt at a packing", "retry_budget", _OTHER_COMMAND),
+    _Stored("quasistatic compression for a packing", "loose_phi", _OTHER_COMMAND),
     _Stored("slow run", "flow_steps", _SAME_COMMAND),
-    _Stored("compression on the way to a packing", "restart_step", _OTHER_COMMAND),
-    _Stored("compression on the way to a packing", "of_packing", _OTHER_COMMAND),
+    _Stored("compression for a packing", "restart_step", _OTHER_COMMAND),
+    _Stored("compression for a packing", "of_packing", _OTHER_COMMAND),
     _Stored("quasistatic shear", "shear_steps", _SAME_COMMAND),
     _Stored("shear", "gdot", _SAME_COMMAND),
     _Stored("run", "finished", "jamshape compress --resume --out {path}"),
     _Stored("packing", "", ""),
 )
 
-# Of files beside a packing that is not made yet.
+# Suffixes of files beside an unfinished packing.
 _ENDS = (".search.h5", ".path.h5", ".run.h5", ".strict.h5")
 
 
 def contents_of(path: Path, wanted: Wanted = NOTHING) -> dict[str, Any]:
-    """Tell what is in a file.
+    """Describe the content of a file.
 
     Parameters
     ----------
     path : Path
     wanted : Wanted
-        Dimension and shape of a data or dump file that does not say them.
+        Dimension and shape of a data or dump file that does not state them.
 
     Returns
     -------
     dict
-        ``kind``, and what is known of it: names of the shape, numbers, ``kinds`` with how many there are
-        of each, ``finished``, ``go_on`` with what to do where it is not finished.
+        ``kind``, and known properties: name of the shape, numbers, ``kinds`` with the number
+        of each, ``finished``, ``go_on`` with advice if not finished.
 
     Raises
     ------
     FileFormatError
         If it is damaged.
     ValueError
-        If it is none of ours.
+        If its format is unknown.
     OSError
         If it cannot be read.
     """
@@ -103,7 +103,7 @@ def contents_of(path: Path, wanted: Wanted = NOTHING) -> dict[str, Any]:
         msg = f"{path} {REFUSED[found]}"
         raise FileFormatError(msg)
     msg = (
-        f"{path} is no file that jamshape knows, expected a packing, a run or modes in HDF5, a data, dump"
+        f"{path} has no known format, expected a packing, a run or modes in HDF5, a data, dump"
         " or restart file of LAMMPS, or a GSD file"
     )
     raise ValueError(msg)
@@ -114,7 +114,7 @@ def _hdf5(path: Path) -> dict[str, Any]:
 
 
 def _particles(path: Path) -> dict[str, Any]:
-    """Tell of H5MD."""
+    """Describe an H5MD file."""
     known, packing = read_attributes(path), read_packing(path)
     stored = next(one for one in _STORED if not one.mark or one.mark in known)
     found: dict[str, Any] = {"kind": stored.kind, **_of_packing(packing)}
@@ -134,7 +134,7 @@ def _particles(path: Path) -> dict[str, Any]:
 
 
 def _of_packing(packing: Packing) -> dict[str, Any]:
-    """Tell of the particles and the box."""
+    """Describe the particles and the box."""
     kinds = kinds_of(packing)
     numbers = range(kinds.of.max() + 1) if len(kinds.parameters) else ()
     rows = []
@@ -151,7 +151,7 @@ def _of_packing(packing: Packing) -> dict[str, Any]:
 
 
 def _measured(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
-    """Read the numbers of a state that a file holds: the last ones of a run."""
+    """Read the stored numbers of a state: the last ones of a run."""
     rows = {name: value for name, value in read_observables(path).items() if value.ndim == 1}
     found = {name: float(value[-1]) for name, value in rows.items() if len(value)}
     return _picked(found | dict(known) | {"rattlers": _rattlers(found, known)}, _STATE)
@@ -163,7 +163,7 @@ def _rattlers(found: Mapping[str, Any], known: Mapping[str, Any]) -> int | None:
 
 
 def _state(packing: Packing, measured: Mapping[str, Any]) -> dict[str, Any]:
-    """Give the numbers of a state, those that are not stored from its contacts."""
+    """Return the numbers of a state, computing missing ones from its contacts."""
     if all(name in measured for name in _STATE):
         return dict(measured)
     of = MeasuredPacking.of(packing)
@@ -172,7 +172,7 @@ def _state(packing: Packing, measured: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
-    """Tell the error reached and the time it took."""
+    """Return the error reached and the time taken."""
     report = read_report(path)
     found: dict[str, Any] = {}
     if len(report.step):
@@ -184,7 +184,7 @@ def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _result_of(path: Path) -> Path:
-    """Name the packing that a file lies beside."""
+    """Name the packing beside which a file lies."""
     for end in _ENDS:
         if path.name.endswith(end):
             return path.with_name(path.name.removesuffix(end))
@@ -192,7 +192,7 @@ def _result_of(path: Path) -> Path:
 
 
 def _modes(table: ModeTable) -> dict[str, Any]:
-    """Tell of modes."""
+    """Describe modes."""
     known, own = of_packing(table), table.attributes
     found: dict[str, Any] = {"kind": "modes", "dimension": table.coordinates.dimension}
     found |= _picked(known, ("shape", "phi", "u", *_MADE))
@@ -203,10 +203,10 @@ def _modes(table: ModeTable) -> dict[str, Any]:
 
 
 def _require_told(told: Mapping[str, Any], wanted: Wanted) -> None:
-    """Refuse a dimension or shape that is not that of a file that says it."""
+    """Refuse a dimension or shape that differs from that stated in a file."""
     for name, asked in wanted._asdict().items():
         if asked and told.get(name, asked) != asked:
-            msg = f"{told['file']} says {name} {told[name]}, expected --{name} to be the same; leave it out"
+            msg = f"{told['file']} has {name} {told[name]}, expected --{name} to be the same; leave it out"
             raise ValueError(msg)
 
 
@@ -229,12 +229,12 @@ def _text(kind: str, packing: Packing) -> dict[str, Any]:
 
 
 def _restart(path: Path) -> dict[str, Any]:
-    """Read the head of a restart file: numbered entries, of which the first are always these."""
+    """Read the head of a restart file: numbered entries, the first of which are always these."""
     content = path.read_bytes()[len(SIGNATURES[RESTART]) :]
     entries: list[Any] = []
-    at = 8  # behind the order of bytes and the version of the format
+    at = 8  # after byte order and format version
     for kind in "siiiisqi":
-        at += 4  # the number of the entry
+        at += 4  # number of the entry
         if kind == "s":
             (length,) = struct.unpack_from("=i", content, at)
             entries.append(content[at + 4 : at + 3 + length].decode())
@@ -254,9 +254,5 @@ def _picked(known: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     return {name: known[name] for name in names if known.get(name) is not None}
 
 
-_READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
-    HDF5: _hdf5,
-    RESTART: _restart,
-    GSD: _gsd,
-}
+_READERS: dict[str, Callable[[Path], dict[str, Any]]] = {HDF5: _hdf5, RESTART: _restart, GSD: _gsd}
 _TEXTS: dict[str, Callable[[Path, Wanted], dict[str, Any]]] = {DUMP: _dump, DATA: _data}

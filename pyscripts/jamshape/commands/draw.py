@@ -2,13 +2,13 @@
 
     jamshape draw FILE [MORE ...] [--frame -1] [--color kind] --out packing.png
 
-FILE is H5MD, a LAMMPS dump or a data file. In the plane black lines are along the spines, red dots where particles
-touch; in space each particle whose centre is in the box is drawn whole, seen from afar. Colours tell the kinds of
-particles, with rattlers in grey (unless all are); the order of the particles in contact with each, green to red as it
+FILE is H5MD, a LAMMPS dump or a data file. In the plane black lines show the spines and red dots the
+contacts; in space each particle whose centre is in the box is drawn whole, in parallel projection. Colours show the
+kinds of particles, with rattlers in grey (unless all are); the order of the neighbours in contact, green to red as it
 grows and grey without contacts: nematic (S2), tetratic (S4, in the plane), cubatic (C4, in space); the orientation;
-or the packing (one). As Fig. 7 of Marschall & Teitel, PRE 97, 012905, and Figs. 2, 4 b, c and 8 b of Yuan,
-VanderWerf, Shattuck & O'Hern, Soft Matter (2019). The last line of standard output is one JSON object with what
-was counted.
+or the packing (one). As in Fig. 7 of Marschall & Teitel, PRE 97, 012905, and Figs. 2, 4 b, c and 8 b of Yuan,
+VanderWerf, Shattuck & O'Hern, Soft Matter (2019). The last line of standard output is one JSON object with the
+counts.
 """
 
 from __future__ import annotations
@@ -18,13 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jamshape.checks import (
-    ArgumentError,
-    Range,
-    require_in,
-    require_other_file,
-    require_stated,
-)
+from jamshape.checks import ArgumentError, Range, require_in, require_other_file, require_stated
 from jamshape.command import parser_of, report, typed
 from jamshape.drawing.colors import CHOICES
 from jamshape.drawing.packing import Look
@@ -34,7 +28,7 @@ from jamshape.shapes.command_line import add_meaning_options
 
 _ANGLE = Range(-360.0, 360.0, "degrees")
 
-_HEIGHT, _TURN = 22, -58  # where nobody says others
+_HEIGHT, _TURN = 22, -58  # default view
 
 
 def options_of() -> ArgumentParser:
@@ -43,14 +37,23 @@ def options_of() -> ArgumentParser:
     parser.add_argument(
         "files", type=Path, nargs="+", metavar="FILE", help="H5MD, dumps, data files"
     )
-    parser.add_argument("--frame", type=int, default=-1, help="negative: from the end (-1)")
-    parser.add_argument("--color", choices=CHOICES, default="kind", help="by what (%(default)s)")
-    sides = "points of a side-to-side contact; auto: as the file says, or else 2 (auto)"
+    parser.add_argument(
+        "--frame", type=int, default=-1, help="frame; negative counts from the end (-1)"
+    )
+    parser.add_argument(
+        "--color", choices=CHOICES, default="kind", help="quantity shown by colour (%(default)s)"
+    )
+    sides = "points of a side-to-side contact; auto: as in the file, or else 2 (auto)"
     parser.add_argument("--sides", choices=("auto", "1", "2"), default="auto", help=sides)
-    up, around = f"of the eye in space, degrees ({_HEIGHT})", f"of it about z ({_TURN})"
+    up, around = (
+        f"elevation of the view in space, degrees ({_HEIGHT})",
+        f"azimuth of the view ({_TURN})",
+    )
     parser.add_argument("--height", type=float, help=up)
     parser.add_argument("--turn", type=float, help=around)
-    finer = "of meshes in space, 1 to 4; each makes four triangles of one (3, or 2 for many)"
+    finer = (
+        "refinement of meshes in space, 1 to 4; each makes four triangles of one (3, or 2 for many)"
+    )
     parser.add_argument("--level", type=int, choices=range(1, 5), help=finer)
     parser.add_argument("--dpi", type=int, default=200, help="dots per inch (%(default)s)")
     add_meaning_options(parser)
@@ -58,7 +61,7 @@ def options_of() -> ArgumentParser:
 
 
 def _look(options: Namespace, *, in_space: bool) -> Look:
-    """Read how packings are to look, and refuse what has no effect in the plane."""
+    """Read the look of packings, and refuse options without effect in the plane."""
     asked = typed(options, "height", "turn", "level")
     if asked and not in_space:
         name, value = next(iter(asked.items()))
@@ -87,5 +90,5 @@ def main(options: Namespace) -> None:
             row["mean_local"] = (
                 np.nanmean(colors.values) if np.isfinite(colors.values).any() else None
             )
-    # The numbers of a single packing stand at the top.
+    # Numbers of a single packing go to the top level.
     report({"out": options.out, **(rows[0] if len(rows) == 1 else {}), "packings": rows})

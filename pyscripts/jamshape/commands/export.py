@@ -1,12 +1,12 @@
-"""Write packings for other programs.
+"""Export packings to other programs.
 
     jamshape export run.h5 --out run.gsd
     jamshape export packing.h5 --out packing.ovito
     jamshape export run.h5 --frame 3 --out start.data
 
-FILE is a packing or a run, a LAMMPS dump or data file, or a GSD file. What is written is told by --to or by how --out
-ends. All frames are written where the format holds several, unless --frame names one; else the last. The last line of
-standard output is one JSON object. `jamshape draw` makes pictures.
+FILE is a packing or a run, a LAMMPS dump or data file, or a GSD file. The format is given by --to or by the suffix
+of --out. All frames are written if the format holds several, unless --frame selects one; else the last. The last
+line of standard output is one JSON object. `jamshape draw` makes pictures.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ _PICTURES = {".png", ".pdf", ".svg", ".jpg"}
 
 
 class _Format(NamedTuple):
-    """How to write packings."""
+    """An export format."""
 
     end: str
-    """Of a file's name."""
+    """Suffix."""
     holds_many: bool
     write: Callable[[Path, Sequence[Packing]], object]
     meaning: str
 
 
 def _write_session(path: Path, packings: Sequence[Packing]) -> None:
-    """Write what OVITO opens: its bodies are exact, rods spherocylinders and no meshes."""
+    """Write a session for OVITO, with exact bodies: rods are spherocylinders, not meshes."""
     (packing,) = packings
     ovito, pipeline = tool("ovito", "ovito"), tool("ovito.pipeline", "ovito")
     data = to_ovito(packing, Contacts.of(packing).rattlers)
@@ -88,13 +88,15 @@ def options_of() -> ArgumentParser:
     parser = ArgumentParser(
         description=__doc__,
         formatter_class=RawDescriptionHelpFormatter,
-        epilog="\n".join(["formats, and how --out ends then:", *rows]),
+        epilog="\n".join(["formats, with suffixes of --out:", *rows]),
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="what to read")
-    parser.add_argument("--to", choices=FORMATS, help="format (as --out ends)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="input file")
+    parser.add_argument("--to", choices=FORMATS, help="format (by the suffix of --out)")
     parser.add_argument("--out", type=Path, required=True, help="file to write")
-    parser.add_argument("--frame", type=int, help="one frame, negative: from the end (all)")
-    parser.add_argument("--again", action="store_true", help="replace an H5MD file that is there")
+    parser.add_argument(
+        "--frame", type=int, help="single frame, negative counts from the end (all)"
+    )
+    parser.add_argument("--again", action="store_true", help="replace an existing H5MD file")
     add_meaning_options(parser)
     return parser
 
@@ -103,7 +105,7 @@ def main(options: Namespace) -> None:
     """Read, write, report."""
     require_other_file(options.out, [options.file])
     name = options.to or _format_of(options.out)
-    # What other programs read is made again in a moment; a packing may be the work of hours.
+    # Files for other programs are quickly made again; a packing may be the work of hours.
     require_free(options.out, again=options.again or name != "h5")
     chosen = FORMATS[name]
     frame = -1 if options.frame is None and not chosen.holds_many else options.frame
@@ -121,9 +123,9 @@ def frames_of(path: Path, frame: int | None, wanted: Wanted = NOTHING) -> Sequen
     Raises
     ------
     FileFormatError, OSError
-        As `load`.
+        As in `load`.
     ValueError
-        If there is no such frame, or it holds modes.
+        If the frame does not exist, or the file holds modes.
     """
     if frame is None and format_of(path) == DUMP:
         return read_dump(path, *wanted)
@@ -137,11 +139,11 @@ def frames_of(path: Path, frame: int | None, wanted: Wanted = NOTHING) -> Sequen
 
 
 def _format_of(out: Path) -> str:
-    """Tell a format by the end of a file's name."""
+    """Return a format by the suffix of a file."""
     for name, one in FORMATS.items():
         if out.suffix == one.end:
             return name
     known = ", ".join(one.end for one in FORMATS.values())
     hint = "use jamshape draw for pictures" if out.suffix in _PICTURES else "or give --to"
-    msg = f"--out is {out}, expected a name that ends in one of {known}; {hint}"
+    msg = f"--out is {out}, expected a suffix out of {known}; {hint}"
     raise ValueError(msg)

@@ -1,9 +1,9 @@
-"""Tell what a file is: a packing, a run, modes, a data, dump or restart file of LAMMPS, or a GSD file.
+"""Describe a file: a packing, a run, modes, a data, dump or restart file of LAMMPS, or a GSD file.
 
     jamshape info packing.h5
 
-Says which particles are in it, how they were made and how good the result is, whether it is finished, and how to go
-on where it is not. The last line of standard output is one JSON object.
+Reports the particles, how they were made and how accurate the result is, whether it is finished, and how to
+continue if not. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from jamshape.commands.contents import contents_of
 from jamshape.files.meaning import Wanted
 from jamshape.shapes.command_line import add_meaning_options
 
-# Lines of what is known; each part is said where its number is there.
+# Lines of the output; each part is printed if its number is known.
 _LINES = {
     "particles": ("{n} {shape}s in {dimension}D", "{kinds_text}"),
     "box": ("{box_text}", "tilt {tilt_text}"),
@@ -45,17 +45,13 @@ _LINES = {
     "holds": ("{frames} frames", "{rows} rows of error and time", "step {step}", "time {time:.6g}"),
     "error": ("{error_of} {error:.2g}",),
     "took": ("{wall_seconds:.3g} s",),
-    "written by": (
-        "LAMMPS of {lammps}",
-        "jamshape {jamshape_version}",
-        "format {format_version}",
-    ),
+    "written by": ("LAMMPS of {lammps}", "jamshape {jamshape_version}", "format {format_version}"),
     "not reached": ("{shortfall}",),
     "made on": ("{origin}",),
-    "go on with": ("{go_on}",),
+    "continue with": ("{go_on}",),
 }
 
-_NET_FORCE = "largest net force over the mean force of a bond:"
+_NET_FORCE = "largest net force over the mean bond force:"
 _ERRORS = {"packing": _NET_FORCE, "modes": _NET_FORCE}
 
 
@@ -68,7 +64,7 @@ def options_of() -> ArgumentParser:
 
 
 def main(options: Namespace) -> None:
-    """Read, tell, report."""
+    """Read, print, report."""
     found = contents_of(options.file, Wanted(options.dimension, options.shape))
     print(f"{options.file}: {_title(found)}")
     for line in lines_of(found):
@@ -77,7 +73,7 @@ def main(options: Namespace) -> None:
 
 
 def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
-    """Say what is known, a line for each subject."""
+    """Yield a line for each known subject."""
     known = {name: value for name, value in found.items() if value is not None}
     known["error_of"] = _ERRORS.get(found["kind"], "of the last step:")
     known |= {
@@ -100,7 +96,7 @@ def lines_of(found: Mapping[str, Any]) -> Iterator[str]:
 def _filled(part: str, known: Mapping[str, Any]) -> str:
     try:
         return part.format_map(known)
-    except KeyError:  # it is not known
+    except KeyError:  # unknown
         return ""
 
 

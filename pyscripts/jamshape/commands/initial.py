@@ -1,4 +1,4 @@
-"""Make a random initial state of particles of any shape without overlaps, for LAMMPS or for Python.
+"""Make a random initial state without overlaps, of particles of any shape, for LAMMPS or Python.
 
     jamshape initial --alpha 4 --n 256 --phi 0.4 --out start.data
 
@@ -28,7 +28,7 @@ def options_of() -> ArgumentParser:
     add_particle_options(parser)
     parser.add_argument("--n", type=int, default=256, help="number of particles (256)")
     parser.add_argument("--phi", type=float, default=0.4, help="packing fraction (0.4)")
-    parser.add_argument("--seed", type=int, default=1, help="of the random numbers (1)")
+    parser.add_argument("--seed", type=int, default=1, help="random seed (1)")
     parser.add_argument("--dimension", type=int, choices=(2, 3), default=2, help="(2)")
     parser.add_argument(
         "--out",
@@ -36,7 +36,7 @@ def options_of() -> ArgumentParser:
         required=True,
         help=".data for a LAMMPS data file, .h5 for an H5MD packing",
     )
-    parser.add_argument("--again", action="store_true", help="replace an H5MD file that is there")
+    parser.add_argument("--again", action="store_true", help="replace an existing H5MD file")
     return parser
 
 
@@ -44,9 +44,9 @@ def main(options: Namespace) -> None:
     """Make the packing and write it."""
     writer = WRITERS.get(options.out.suffix)
     if writer is None:
-        msg = f"--out is {options.out}, expected a name that ends in .data or .h5"
+        msg = f"--out is {options.out}, expected a suffix .data or .h5"
         raise ValueError(msg)
-    # A data file may be written anew; a packing in H5MD may be the work of hours.
+    # A data file is quickly made again; a packing in H5MD may be the work of hours.
     require_free(options.out, again=options.again or options.out.suffix == ".data")
     particles, dimension = particles_of(options), options.dimension
     packing = random_packing(options.n, options.phi, options.seed, particles, dimension)

@@ -1,10 +1,10 @@
-"""Find the modes of a packing: Sec. III D of Marschall & Teitel, PRE 97, 012905.
+"""Compute the vibrational modes of a packing: Sec. III D of Marschall & Teitel, PRE 97, 012905.
 
     jamshape modes PACKING.h5 --out modes.h5
 
 Eigenvalues of the dynamical matrix with signs and error bounds, bands and their counts, participation,
-kinds of motion and elastic moduli, to HDF5 (see jamshape.vibration.table). PACKING is H5MD as `jamshape pack`
-writes it, of any shape. Needs no LAMMPS. The last line of standard output is one JSON object.
+kinds of motion and elastic moduli, to HDF5 (see jamshape.vibration.table). PACKING is H5MD from `jamshape pack`,
+of any shape. Needs no LAMMPS. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import numpy as np
 
 from jamshape.checks import require_other_file
 from jamshape.command import parser_of, report
-from jamshape.drawing.mode_axes import packing_text
 from jamshape.drawing.modes import mode_figure
 from jamshape.drawing.saving import save_figure
+from jamshape.drawing.text import packing_text
 from jamshape.files.sets import PackingFile
 from jamshape.front.modes import modes, require_modes_file
 from jamshape.vibration.sets import TOLD
@@ -40,23 +40,25 @@ def options_of() -> ArgumentParser:
     usual = "(projected; sparse with --lowest and --near)"
     parser.add_argument("--method", choices=[*METHODS, "sparse"], help=usual)
     parser.add_argument("--lowest", type=int, metavar="K", help="only the K softest, sparse")
-    parser.add_argument("--near", type=float, metavar="OMEGA", help="K modes near it instead")
-    counts = "what a radian counts for (%(default)s)"
+    parser.add_argument(
+        "--near", type=float, metavar="OMEGA", help="the K modes nearest to this frequency"
+    )
+    counts = "length that scales radians (%(default)s)"
     scales = ("half_length", "radius")
     parser.add_argument("--rotation", choices=scales, default=scales[0], help=counts)
-    weak = (
-        "leave out contacts weaker than X mean bond forces; 1e-4 leaves out those that only graze"
-    )
+    weak = "omit contacts weaker than X mean bond forces; 1e-4 omits grazing ones"
     parser.add_argument("--least-force", type=float, default=0.0, metavar="X", help=weak)
-    parser.add_argument("--vectors", action="store_true", help="store the modes themselves")
-    parser.add_argument("--force", action="store_true", help="also where the state is no minimum")
+    parser.add_argument("--vectors", action="store_true", help="store eigenvectors")
+    parser.add_argument(
+        "--force", action="store_true", help="compute even if the state is not a minimum"
+    )
     return parser
 
 
 def summary_of(table: ModeTable) -> dict[str, Any]:
-    """Count the bands and average their frequencies: of modes that are stable beyond doubt.
+    """Count the bands and average their frequencies, over definitely stable modes.
 
-    None for bands that are not apart from each other.
+    None for bands that do not separate.
     """
     found: dict[str, Any] = dict.fromkeys(TOLD)
     for name in filter(table.has_band, TOLD):
@@ -98,9 +100,9 @@ def show_moduli(table: ModeTable) -> None:
     """Print moduli with their bounds."""
     found = table.moduli
     if found.n_floppy:
-        print(f"floppy modes, left out of moduli: {found.n_floppy}")
+        print(f"floppy modes, omitted from moduli: {found.n_floppy}")
     if found.n_unsettled:
-        print(f"modes along which the packing has not settled, left out too: {found.n_unsettled}")
+        print(f"unsettled modes, also omitted: {found.n_unsettled}")
     if found.n_negative:
         print(
             f"a saddle, with {found.n_negative} negative eigenvalues: moduli hold as long as it stays"
@@ -116,11 +118,14 @@ def show_moduli(table: ModeTable) -> None:
 
 
 def show_bands(table: ModeTable, bands: dict[str, Any]) -> None:
-    """Print the counts of a whole spectrum, beside those that are expected; fractions are of all modes but translations."""
+    """Print the counts of a whole spectrum, with expected ones; fractions are of all modes but translations."""
     a = table.attributes
     print(f"rank of H {a['rank']} = N_c - {a['n_self_stress']}; N z / 2 = {a['high_expected']:g}")
-    print(f"modes below: {a['n_floppy']} and {a['n_translations']} translations;", end=" ")
-    print(f"N (z_iso - z) / 2 = {a['low_expected']:g}; {a['n_grazing']} bonds only graze")
+    print(
+        f"modes below the high band: {a['n_floppy']}, plus {a['n_translations']} translations;",
+        end=" ",
+    )
+    print(f"N (z_iso - z) / 2 = {a['low_expected']:g}; grazing bonds: {a['n_grazing']}")
     print("band      modes  fraction  negative  unsure  mean omega")
     for name, b in bands.items():
         if b is None:
@@ -131,10 +136,12 @@ def show_bands(table: ModeTable, bands: dict[str, Any]) -> None:
 
 
 def tell_redundant(sets: list[Redundancy], ids: Any) -> list[list[int]]:
-    """Print where bonds are redundant; return the IDs of the particles."""
+    """Print redundant bonds; return the IDs of their particles."""
     found = [[int(ids[p]) for p in one.particles] for one in sets]
     for one, own in zip(sets, found, strict=True):
-        print(f"redundant bonds among particles {own}: {one.n_states} more states of self stress")
+        print(
+            f"redundant bonds among particles {own}: {one.n_states} further states of self stress"
+        )
     return found
 
 

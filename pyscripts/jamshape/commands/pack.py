@@ -6,14 +6,14 @@
     jamshape pack --protocol marschall-2018 --start slow.h5 --search halving --out packing.h5
     jamshape pack --kind alpha=0,share=0.5 --kind alpha=4,size=1.4,share=0.5 --n 256 --out mixture.h5
 
-Compressed by quasistatic steps, large far from jamming, to the first jammed packing, and led to the energy
-density u0. --way takes slow compression in LAMMPS or equal steps instead; --protocol makes it as a paper did, with the
-paper's numbers: marschall-2018 by a compression at one rate and the energy of Sec. III C, yuan-2019-1 and
-yuan-2019-2 by the steps of Sec. 2.2.
+Compresses quasistatically, in steps that are large far from jamming, to the first jammed packing, then relaxes it at
+the energy density u0. --way selects slow compression in LAMMPS or equal steps instead; --protocol follows a paper,
+with its values as defaults: marschall-2018 with a compression at one rate and the energy of Sec. III C, yuan-2019-1
+and yuan-2019-2 with the steps of Sec. 2.2.
 
-The last line of standard output is one JSON object; the exit code is 0 only if forces balance to --tolerance. Where they
-do not at first, there is a second try, as long as the first one. Beside the result lies, until it is done, all that is needed to go on: a run that was killed does
-so when started again.
+The last line of standard output is one JSON object; the exit code is 0 only if forces balance to --tolerance. If not,
+there is a second attempt, as long as the first one. Until it is done, files beside the result hold its state, from
+which the same command resumes.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from jamshape.protocols.command_line import add_recipe_options, settings_of
 from jamshape.protocols.make import summary_of
 from jamshape.shapes.command_line import particles_beside
 
-GO_ON = "the same command goes on from the files beside the result"
+GO_ON = "the same command resumes from the files beside the result"
 
 
 def options_of() -> ArgumentParser:
@@ -36,14 +36,17 @@ def options_of() -> ArgumentParser:
     add_recipe_options(parser)
     parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
     parser.add_argument(
-        "--threads", type=int, default=1, help="for the contacts of thousands of particles (1)"
+        "--threads",
+        type=int,
+        default=1,
+        help="number of threads; worth it from thousands of particles on (1)",
     )
-    parser.add_argument("--again", action="store_true", help="make it anew if it is there")
+    parser.add_argument("--again", action="store_true", help="start over if --out exists")
     return parser
 
 
 def main(options: Namespace) -> int:
-    """Make the packing unless it is there; return the exit code."""
+    """Make the packing unless it exists; return the exit code."""
     settings = settings_of(options)
     make_packing(
         particles_beside(options), **settings, threads=options.threads, file=options.out,
@@ -51,4 +54,4 @@ def main(options: Namespace) -> int:
     )  # fmt: skip
     found = summary_of(options.out)
     report(found)
-    return 0 if found["reached"] else 1  # a warning has said so
+    return 0 if found["reached"] else 1  # a warning was issued

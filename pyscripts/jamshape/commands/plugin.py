@@ -1,13 +1,13 @@
-"""Tell where the LAMMPS plugin is, which LAMMPS it was built for, and which lines load it in a deck.
+"""Locate the LAMMPS plugin, and print the LAMMPS it was built for and the lines that load it in a deck.
 
     jamshape plugin
     jamshape plugin --folder
     jamshape plugin --path
 
-Beside it stands which LAMMPS the command lmp and the Python module lammps bring here, as far as they are there: the
-plugin loads into the version that it was built for and into no other. The last line of standard output is one JSON
-object; with --folder it is the folder that decks take with -var jamshape, with --path the path of the plugin, and
-nothing else.
+Also prints the versions of LAMMPS that the command lmp and the Python module lammps run, if installed: the
+plugin loads only into the version that it was built for. The last line of standard output is one JSON
+object; --folder prints only the folder for -var jamshape in decks, --path only the path of the
+plugin.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_of(__doc__)
     alone = parser.add_mutually_exclusive_group()
-    alone.add_argument("--folder", action="store_true", help="print the folder with inputs/ alone")
-    alone.add_argument("--path", action="store_true", help="print the path of the plugin alone")
+    alone.add_argument("--folder", action="store_true", help="print only the folder with inputs/")
+    alone.add_argument("--path", action="store_true", help="print only the path of the plugin")
     return parser
 
 
 def main(options: Namespace) -> None:
-    """Look, tell, report."""
+    """Look, print, report."""
     plugin = plugin_path()
     if options.folder:
         print(decks_path().parent)
@@ -76,22 +76,22 @@ def main(options: Namespace) -> None:
 
 
 def version_of_lmp() -> int | None:
-    """Version of the LAMMPS that `lmp` starts, beside this Python or in PATH, such as 20210929; None without one.
+    """Return the version of LAMMPS that `lmp` starts, beside this Python or in PATH, such as 20210929, or None.
 
     Examples
     --------
     >>> (version_of_lmp() or 20210929) > 20200000
     True
     """
-    # First that of this environment, which need not be active where `environment/bin/jamshape` is run.
+    # First that of this environment, which need not be active.
     lmp = shutil.which("lmp", path=Path(sys.executable).parent) or shutil.which("lmp")
     found = re.search(r"(\d+ \w{3} \d{4})", _said_by([lmp, "-h"])) if lmp else None
     return int(f"{datetime.strptime(found[1], '%d %b %Y'):%Y%m%d}") if found else None
 
 
 def version_of_module() -> int | None:
-    """Version of the LAMMPS that ``import lammps`` brings to this Python; None without one."""
-    # In a process of its own: a library that does not fit ends it.
+    """Return the version of LAMMPS that ``import lammps`` loads in this Python, or None."""
+    # In a separate process, which a mismatched library may crash.
     found = re.search(r"LAMMPS version (\d+)", _said_by([sys.executable, "-c", _ASK_MODULE]))
     return int(found[1]) if found else None
 
@@ -108,7 +108,7 @@ def _said_by(command: Sequence[str]) -> str:
 
 def _compared(found: int | None, version: int) -> str:
     if not found:
-        return "is not there"
+        return "is not installed"
     if found == version:
         return f"is LAMMPS {found}: it loads"
     return f"is LAMMPS {found}: it does not load; install jamshape again beside this one"

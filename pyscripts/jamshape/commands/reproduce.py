@@ -1,14 +1,14 @@
-"""Reproduce a paper: make all its data, draw every figure, and put its numbers beside those of the paper.
+"""Reproduce a paper: make all its data and figures, and compare its numbers with ours.
 
     jamshape reproduce marschall-2018
     jamshape reproduce yuan-2019 --scale small --jobs 2 --out runs/yuan
     jamshape reproduce yuan-2019 --scale full --samples 2 --figures fig03 fig05
 
-At the scale `demo` it takes minutes on two cores, `small` an hour, and `full`, of the papers' sizes, several hours.
-The last that is made is agreement.md, a page with every number beside the paper's, the figures, and what was run where.
-Needs Snakemake and a clone of the repository, whose folder analysis/ has the workflows. Run again after a kill, it makes
-what is not there yet. The last line of standard output is one JSON object; the exit code is 0 only if every figure
-is there.
+The scale `demo` takes minutes on two cores, `small` an hour, and `full`, with the papers' sizes, several hours.
+The last output is agreement.md, a page with every number beside the paper's, the figures, and a list of runs.
+Needs Snakemake and a clone of the repository, whose folder analysis/ has the workflows. The same command resumes
+after a kill. The last line of standard output is one JSON object; the exit code is 0 only if every figure
+exists.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from jamshape.front.progress import Told, follow
 PAPERS = ("marschall-2018", "yuan-2019")
 SCALES = ("demo", "small", "full")
 
-GO_ON = "the same command makes what is not there yet"
+GO_ON = "the same command makes what is missing"
 
 _PAGE, _TABLE = "agreement.md", "agreement.csv"
 _DONE = re.compile(r"^(\d+) of (\d+) steps")
@@ -46,36 +46,38 @@ _PATIENCE = 60  # seconds, for jobs to end after Ctrl-C
 
 
 class Step(NamedTuple):
-    """What Snakemake has said."""
+    """Progress of Snakemake."""
 
     done: int = 0
     of: int = 0
     failed: str = ""
-    """A job that failed, and its last words."""
+    """A failed job, and its last line."""
 
 
 def options_of() -> ArgumentParser:
     """Make the parser."""
     parser = parser_of(__doc__)
     parser.add_argument("paper", choices=PAPERS)
-    parser.add_argument("--scale", choices=SCALES, default="demo", help="how large (%(default)s)")
-    more = "at most so many packings or runs of each sort; more of them later go on from these"
+    parser.add_argument(
+        "--scale", choices=SCALES, default="demo", help="size of the study (%(default)s)"
+    )
+    more = "largest number of packings or runs of each kind; can be raised later"
     parser.add_argument("--samples", type=int, metavar="N", help=f"{more} (those of the scale)")
-    chosen = "only these figures, with what they need (all)"
+    chosen = "only these figures, with their data (all)"
     parser.add_argument("--figures", nargs="+", default=[], metavar="NAME", help=chosen)
     parser.add_argument("--jobs", type=int, default=cores(), help="processes (all cores)")
     parser.add_argument("--out", type=Path, help="folder (runs/PAPER_SCALE)")
-    parser.add_argument("--dry-run", action="store_true", help="list the jobs, and run none")
+    parser.add_argument("--dry-run", action="store_true", help="list the jobs without running them")
     return parser
 
 
 def workflow_of(paper: str) -> Path:
-    """Find the workflow of a paper: beside this package in a clone, or in the clone that one stands in.
+    """Find the workflow of a paper: beside this package in a clone, or in the clone around the working folder.
 
     Raises
     ------
     ValueError
-        If it is in neither.
+        If there is neither.
     """
     name = Path("analysis") / paper.replace("-", "_") / "reproduce.smk"
     roots = (Path(__file__).parents[3], Path.cwd())
@@ -84,13 +86,13 @@ def workflow_of(paper: str) -> Path:
             return root / name
     msg = (
         f"found no {name} in {' nor in '.join(map(str, dict.fromkeys(roots)))}, expected a clone of the"
-        " repository, since an installed package has no workflows; start it in the clone"
+        " repository, since an installed package has no workflows; run it in the clone"
     )
     raise ValueError(msg)
 
 
 def with_samples(settings: Mapping[str, Any], samples: int | None) -> dict[str, Any]:
-    """Take at most so many samples of each sort in the settings of a scale; None takes those of the scale.
+    """Limit the number of samples of each kind in the settings of a scale; None keeps them.
 
     Examples
     --------
@@ -112,9 +114,9 @@ def require_snakemake() -> None:
 
 
 def command_of(workflow: Path, options: Namespace) -> list[str]:
-    """Write the command line of Snakemake.
+    """Return the command line of Snakemake.
 
-    It does not lock the folder, which would stay locked after a kill: `held` does.
+    It does not lock the folder, which would stay locked after a kill; `held` does.
     """
     words = ["-s", str(workflow), "--directory", str(options.out), "--cores", str(options.jobs)]
     words += ["--config", f"scale={options.scale}"]
@@ -122,12 +124,12 @@ def command_of(workflow: Path, options: Namespace) -> list[str]:
     words += [f"figures={','.join(options.figures)}"] if options.figures else []
     words += ["--keep-going", "--rerun-incomplete", "--nolock"]
     words += ["--dry-run"] if options.dry_run else []
-    # -P: what lies in the working directory is no module.
+    # -P: files in the working directory are not modules.
     return [sys.executable, "-P", "-m", "snakemake", *words]
 
 
 def require_same(options: Namespace) -> None:
-    """Note in the folder what is made there, and refuse one in which something else is.
+    """Record the settings in the folder, and refuse a folder with other ones.
 
     Raises
     ------
@@ -140,8 +142,8 @@ def require_same(options: Namespace) -> None:
         if found != asked:
             told = " at the scale ".join(map(str, found.values()))
             msg = (
-                f"{options.out} is of {told}, expected {options.paper} at the scale {options.scale};"
-                " choose another folder by --out"
+                f"{options.out} holds {told}, expected {options.paper} at the scale {options.scale};"
+                " choose another --out"
             )
             raise ValueError(msg)
     note.write_text(json.dumps(asked) + "\n", encoding="utf-8")
@@ -149,7 +151,7 @@ def require_same(options: Namespace) -> None:
 
 @contextmanager
 def held(folder: Path) -> Iterator[IO[str]]:
-    """Hold a folder for as long as the file that is yielded is open, here or in a process that inherits it.
+    """Hold a folder while the yielded file is open, here or in a process that inherits it.
 
     Raises
     ------
@@ -168,12 +170,12 @@ def held(folder: Path) -> Iterator[IO[str]]:
 
 
 def steps(command: list[str], options: Namespace, lock: IO[str]) -> Iterator[Step]:
-    """Run Snakemake, keep what it says in a file, and yield how far it is.
+    """Run Snakemake, log its output, and yield its progress.
 
     Raises
     ------
     RuntimeError
-        If it ends badly, and not because of a job.
+        If it fails for another reason than a job.
     """
     going = subprocess.Popen(
         command,
@@ -198,17 +200,17 @@ def steps(command: list[str], options: Namespace, lock: IO[str]) -> Iterator[Ste
                     failed += 1
                     yield at._replace(failed=f"{found[1]}: {last_words(options.out, found[1])}")
         except BaseException:
-            # Snakemake ends its jobs then, which go on from their own files.
+            # Snakemake then ends its jobs, which resume from their own files.
             going.send_signal(signal.SIGINT)
             going.wait(_PATIENCE)
             raise
     if going.returncode and not failed:
-        msg = f"Snakemake ended with exit code {going.returncode} and said: {last}; see {log.name}"
+        msg = f"Snakemake ended with exit code {going.returncode} with the message: {last}; see {log.name}"
         raise RuntimeError(msg)
 
 
 def planned(command: list[str]) -> list[str]:
-    """List the jobs that would be run.
+    """List the jobs to run.
 
     Raises
     ------
@@ -219,21 +221,21 @@ def planned(command: list[str]) -> list[str]:
     done = subprocess.run(command, check=False, capture_output=True, text=True, env=env)
     said = (done.stdout + done.stderr).strip().splitlines()
     if done.returncode:
-        msg = f"Snakemake ended with exit code {done.returncode} and said: {said[-1]}"
+        msg = f"Snakemake ended with exit code {done.returncode} with the message: {said[-1]}"
         raise RuntimeError(msg)
     return sorted(found[1] for found in map(_OUTPUT.match, said) if found)
 
 
 def last_words(folder: Path, job: str) -> str:
-    """Tell what a job said last."""
+    """Return the last line that a job printed."""
     log = folder / "logs" / f"{job}.err"
     lines = log.read_text(encoding="utf-8", errors="replace").replace("\r", "\n").split("\n")
     said = [line for line in lines if line.strip()]
-    return said[-1] if said else f"nothing was said in {log}"
+    return said[-1] if said else f"no message in {log}"
 
 
 def page_of_what_is_there(workflow: Path, options: Namespace) -> None:
-    """Write the page although figures are missing."""
+    """Write the page even if figures are missing."""
     script = workflow.parents[1] / "agreement.py"
     words = [str(options.out), "--paper", workflow.parent.name, "--scale", options.scale]
     words += ["--samples", str(options.samples)] if options.samples else []
@@ -254,7 +256,7 @@ def verdicts(table: Path) -> dict[str, int]:
 
 
 def main(options: Namespace) -> int:
-    """Make what is not there yet; return the exit code."""
+    """Make all missing results; return the exit code."""
     if options.jobs < 1:
         msg = f"--jobs is {options.jobs}, expected at least 1"
         raise ValueError(msg)

@@ -2,11 +2,11 @@
 
     jamshape shear --alpha 4 --n 256 --phi 0.8 --gdot 1e-4 --strain 5 --out shear.h5
 
-Starts from a random packing that is compressed fast to --phi, or from the last frame of a run or packing file
+Starts from a random packing compressed fast to --phi, or from the last frame of a run or packing file
 (--start). The last line of standard output is one JSON object with averages over the steady state, each with its
-error and the strain over which the packing remembers (memory); what comes before (startup) is left out of them, but not
-of the file. --after says from which strain on to average. Run again after a kill, it goes on; a finished run is left
-alone, and its averages are told again.
+error and its correlation strain (memory); they exclude the start-up, which the file
+includes. --after sets the strain at which averaging begins. The same command resumes an interrupted run, and reports
+a finished one.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from jamshape.front.shearing import shear
 from jamshape.measures.shears import shear_report
 from jamshape.shapes.command_line import add_particle_options, particles_beside
 
-GO_ON = "the same command goes on from the last restart file"
+GO_ON = "the same command resumes from the last restart file"
 
 
 def options_of() -> ArgumentParser:
@@ -36,9 +36,9 @@ def options_of() -> ArgumentParser:
         ("--dimension", 2, "2 or 3"),
         ("--phi", 0.8, "packing fraction"),
         ("--gdot", 1e-4, "shear rate"),
-        ("--strain", 5.0, "strain to reach"),
+        ("--strain", 5.0, "final strain"),
         ("--sides", 2, "bonds of a side-to-side contact"),
-        ("--seed", 1, "of the random start"),
+        ("--seed", 1, "random seed of the start"),
         ("--rows", 1000, "samples of stress and order"),
         ("--frames", 20, "snapshots"),
     )
@@ -46,18 +46,18 @@ def options_of() -> ArgumentParser:
     usual = "heun with --dt or --sides 1, tr-bdf2 in the plane up to --gdot 3e-7, else rkc2"
     names = f"{', '.join(INTEGRATORS)}; implicit: {', '.join(METHODS)}"
     parser.add_argument("--integrator", help=f"{names} ({usual})")
-    error = "local error over the typical overlap, but of heun (1e-4; of implicit steps 1e-3)"
+    error = "local error over the typical overlap, except heun (1e-4; implicit steps 1e-3)"
     parser.add_argument("--tolerance", type=float, help=error)
     parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
-    parser.add_argument("--after", type=float, help="strain from which to average (chosen)")
+    parser.add_argument("--after", type=float, help="strain at which averaging begins (automatic)")
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
     parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
-    parser.add_argument("--again", action="store_true", help="begin anew where --out is there")
+    parser.add_argument("--again", action="store_true", help="start over if --out exists")
     return parser
 
 
 def main(options: Namespace) -> None:
-    """Begin, or go on; a finished run is left alone."""
+    """Begin or resume; a finished run is left alone."""
     if options.after is not None:
         require_in("--after", options.after, RANGES["strain"]._replace(also=(0.0,)))
     names = ("n", "dimension", "phi", "gdot", "strain", "flow", "seed", "start", "sides",

@@ -3,9 +3,9 @@
     jamshape slow --alpha 4 --n 256 --kappa 1e-9 --phi-end 0.88 --out slow.h5
 
 Starts from the last frame of a run or packing file (--start), or compresses a random packing fast in
-LAMMPS first. At the end frames are minimised: p(phi) of a flow rises, too, and its onset phi_J(kappa) is that of
-jamming only where states stay jammed when nothing drives them; --no-minimising leaves that out. Run again after a
-kill, it goes on; a finished run is left alone. The last line of standard output is one JSON object.
+LAMMPS first. At the end frames are minimised, since p(phi) of a flow rises, too: its onset phi_J(kappa) is that of
+jamming only if states there stay jammed without driving; --no-minimising skips this. The same command resumes
+an interrupted run, and leaves a finished one alone. The last line of standard output is one JSON object.
 """
 
 from __future__ import annotations
@@ -15,13 +15,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
-from jamshape.checks import (
-    RANGES,
-    ArgumentError,
-    require_in,
-    require_no_effect,
-    require_with,
-)
+from jamshape.checks import RANGES, ArgumentError, require_in, require_no_effect, require_with
 from jamshape.command import add_numbers, parser_of, report, typed
 from jamshape.commands.onset import add_onset_options, tell_onset
 from jamshape.flow.implicit import METHODS
@@ -29,10 +23,10 @@ from jamshape.flow.slow_recording import summary_of
 from jamshape.front.compressing import slow_compress
 from jamshape.shapes.command_line import add_particle_options, particles_beside
 
-GO_ON = "the same command goes on from the last frame"
+GO_ON = "the same command resumes from the last frame"
 
 
-_PHI_END, _KAPPA, _KAPPA_BEFORE = 0.9, 1e-8, 1e-6  # where nobody says others
+_PHI_END, _KAPPA, _KAPPA_BEFORE = 0.9, 1e-8, 1e-6  # defaults
 
 
 def options_of() -> ArgumentParser:
@@ -43,14 +37,22 @@ def options_of() -> ArgumentParser:
         parser,
         ("--n", 256, "particles"),
         ("--kappa", _KAPPA, "compression rate"),
-        ("--phi-start", 0.8, "packing fraction where the fast compression ends"),
-        ("--phi-slow", 0.0, "packing fraction from which --kappa holds; before it --kappa-before"),
+        ("--phi-start", 0.8, "packing fraction at the end of the fast compression"),
+        (
+            "--phi-slow",
+            0.0,
+            "packing fraction from which --kappa applies; before it --kappa-before",
+        ),
         ("--kappa-before", _KAPPA_BEFORE, "compression rate up to --phi-slow"),
-        ("--phi-end", _PHI_END, "packing fraction to reach"),
-        ("--p-end", math.inf, "pressure to reach"),
-        ("--seed", 1, "of the random start"),
+        ("--phi-end", _PHI_END, "final packing fraction"),
+        ("--p-end", math.inf, "final pressure"),
+        ("--seed", 1, "random seed of the start"),
         ("--tolerance", 1e-3, "local error of a step over the typical overlap"),
-        ("--largest-drop", math.inf, "part of the energy that a step may lose (plastic events)"),
+        (
+            "--largest-drop",
+            math.inf,
+            "fraction of the energy that a step may lose (plastic events)",
+        ),
     )
     parser.add_argument("--method", choices=METHODS, default="tr-bdf2")
     add_onset_options(parser)
@@ -60,7 +62,7 @@ def options_of() -> ArgumentParser:
 
 
 def _rates(options: Namespace) -> dict[str, Any]:
-    """Read the rate, or the packing fraction from which it holds and the one before."""
+    """Read the rate, or the packing fraction from which it applies and the rate before."""
     slow, before = options.phi_slow or None, options.kappa_before
     require_with("phi_slow", slow, kappa_before=before)
     if slow is None:
@@ -70,13 +72,13 @@ def _rates(options: Namespace) -> dict[str, Any]:
     before = _KAPPA_BEFORE if before is None else before
     require_in("--kappa-before", before, RANGES["kappa"])
     if slow >= (_PHI_END if options.phi_end is None else options.phi_end):
-        said = "{phi_slow} is not below {phi_end:name}, so that the rate from there on has no effect, expected a smaller one"
+        said = "{phi_slow} is not below {phi_end:name}, so its rate has no effect, expected a smaller one"
         raise ArgumentError(said, {"phi_slow": slow, "phi_end": None})
     return {"kappa": ((0.0, before), (slow, kappa))}
 
 
 def main(options: Namespace) -> None:
-    """Begin, or go on; a finished run is left alone."""
+    """Begin or resume; a finished run is left alone."""
     require_no_effect("start", options.start, phi_start=options.phi_start)
     names = ("n", "p_end", "seed", "start", "method", "tolerance", "largest_drop")
     given = typed(options, *names) | _rates(options)

@@ -1,15 +1,16 @@
-"""Make many packings on all cores, several samples of all particles that are asked for.
+"""Make many packings on all cores, several samples for each choice of particles.
 
     jamshape sweep --alpha 0 0.01 1 4 --samples 6 --n 256 --out sweep/
     jamshape sweep --superellipsoid 1 0.6 1 --superellipsoid 1.5 1 1 --samples 5 --n 400 --out sweep3d/
     jamshape sweep --kind alpha=0 --kind alpha=4,size=1.4 --samples 5 --n 256 --out mixtures/
     jamshape sweep --alpha 4 --first-seed 101 --samples 20 --n 256 --out sweep/
 
-Each sample is one run of `jamshape pack` in a process of its own, one a core, which ends with the sweep,
-however that ends. Started again after a kill it goes on: packings that are there are not made again, those under way go on from their own files, and those of
-other parameters are refused. A sample that fails, or whose forces do not balance, is listed as failed, and the others go on; of the latter
-the packing is there. The last line of standard output is one JSON object: made and not_made count packings, not_reached those of them
-whose forces do not balance. The exit code is 0 only if nothing failed. For clusters see docs/how-to/cluster.md.
+Each sample is one run of `jamshape pack` in its own process, one a core, which ends with the sweep,
+however that ends. The same command resumes after a kill: finished packings are kept, unfinished ones continue from
+their files, and those of other parameters are refused. A sample that fails, or whose forces do not balance, is listed
+as failed, and the others continue. The last line of standard output is one JSON object: made and not_made count
+packings, not_reached those whose forces do not balance. The exit code is 0 only if nothing failed. For clusters see
+docs/how-to/cluster.md.
 """
 
 from __future__ import annotations
@@ -34,20 +35,20 @@ from jamshape.front.progress import Told, follow
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import DEFAULT, SHAPES, shape_named
 
-# -P: what lies in the working directory is no module of ours.
+# -P: files in the working directory are not modules of ours.
 _PACK = (sys.executable, "-P", "-c", "from jamshape.commands.sweep import sample; sample()")
 
-# One core a process: threads of BLAS would only wait for each other.
+# One core a process: BLAS threads would only compete.
 _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
-# How long a sample waits for another process that is making it, such as one whose sweep was just killed.
+# How long a sample waits for another process that makes it, such as one of a killed sweep.
 _PATIENCE = 5.0
 
-GO_ON = "the same command goes on from the files of the packings"
+GO_ON = "the same command resumes from the files of the packings"
 
 
 class _Parser(ArgumentParser):
-    """Keeps the options that it does not know, which are those of a packing."""
+    """Passes unknown options on to each packing."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         options, extra = super().parse_known_args(args, namespace)
@@ -65,25 +66,25 @@ class _Parser(ArgumentParser):
         return options, []
 
     def _require_options_of_a_packing(self, options: Namespace) -> None:
-        """Refuse what no packing can be made with, before many are begun."""
+        """Refuse invalid options of a packing before many are begun."""
         parser = pack.options_of()
         parser.prog = self.prog
         given = parser.parse_args(["--out", "of a sample", *options.extra], Namespace(seed=None))
         if given.seed is not None:
             self.error(
-                f"--seed is {given.seed}, which means nothing to a sweep: its samples have the"
-                " seeds from --first-seed on, as many as --samples"
+                f"--seed is {given.seed}, which has no effect on a sweep: its samples have the"
+                " seeds from --first-seed on, one for each of --samples"
             )
         if given.start is not None:
             self.error(
-                f"--start is {given.start}, which means nothing to a sweep: its samples differ in their seed"
+                f"--start is {given.start}, which has no effect on a sweep: its samples differ in their seed"
             )
         for particle in particles(options):
             parser.parse_args(arguments_of(particle, 1, options))
 
 
 def options_of() -> ArgumentParser:
-    """Make the parser; what it does not know goes to each packing."""
+    """Make the parser; unknown options go to each packing."""
     parser = _Parser(
         description=__doc__,
         formatter_class=RawDescriptionHelpFormatter,
@@ -92,8 +93,8 @@ def options_of() -> ArgumentParser:
     parser.add_argument(
         "--alpha", type=float, nargs="+", action="extend", default=[], help="aspect ratios A/R"
     )
-    parser.add_argument("--shape", choices=SHAPES, help=f"of --alpha and --kind ({DEFAULT})")
-    parser.add_argument("--kind", action="append", default=[], help="one mixture, of these kinds")
+    parser.add_argument("--shape", choices=SHAPES, help=f"shape for --alpha and --kind ({DEFAULT})")
+    parser.add_argument("--kind", action="append", default=[], help="kinds of one mixture")
     for shape in SHAPES.values():
         parser.add_argument(
             f"--{shape.name}",
@@ -104,30 +105,37 @@ def options_of() -> ArgumentParser:
             metavar=tuple(p.option.upper() for p in shape.parameters),
             help=f"{', '.join(p.meaning for p in shape.parameters)}; may be given several times",
         )
-    parser.add_argument("--samples", type=int, default=6, help="of each, one for a seed (6)")
-    parser.add_argument("--first-seed", type=int, default=1, help="the next has one more (1)")
+    parser.add_argument(
+        "--samples", type=int, default=6, help="samples of each, with one seed each (6)"
+    )
+    parser.add_argument(
+        "--first-seed",
+        type=int,
+        default=1,
+        help="seed of the first sample; the next has one more (1)",
+    )
     parser.add_argument("--jobs", type=int, default=cores(), help="processes (all cores)")
     parser.add_argument("--out", type=Path, required=True, help="folder")
     return parser
 
 
 def cores() -> int:
-    """Count the cores that this process may use, which in a job of a cluster are not all of the machine."""
+    """Count the cores available to this process, in a cluster job possibly fewer than those of the machine."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Particle(NamedTuple):
-    """What packings are of: how their files are called, and which options ask for it."""
+    """Particles of packings: name of their files, and options that specify them."""
 
     name: str
     arguments: list[str]
-    """Of its packing."""
+    """Options for a packing."""
     asked: list[str]
-    """Of a sweep of it alone."""
+    """Options for a sweep of these particles alone."""
 
 
 def particles(options: Namespace) -> list[Particle]:
-    """List the particles that are asked for, each once."""
+    """List the requested particles, each once."""
     shape = shape_named(options.shape or DEFAULT)
     found = [particle_of(shape, {"alpha": alpha}) for alpha in options.alpha]
     for other in SHAPES.values():
@@ -168,14 +176,14 @@ def arguments_of(particle: Particle, seed: int, options: Namespace) -> list[str]
 
 
 class Leash(NamedTuple):
-    """A pipe that nobody writes to: it ends for the samples, which read it, when the sweep does."""
+    """A pipe without writer: when the sweep ends, the samples, which read it, see its end."""
 
     read: int
     write: int
 
     @classmethod
     def new(cls) -> Leash:
-        """Make one."""
+        """Create the pipe."""
         return cls(*os.pipe())
 
     def let_go(self) -> None:
@@ -195,11 +203,11 @@ def sample() -> None:
 
 
 class Complaint(NamedTuple):
-    """Name the fault of a sample."""
+    """Fault of a sample."""
 
     said: str
     is_made: bool = False
-    """Whether its packing is there, but did not reach its goal."""
+    """Whether its packing exists, but did not reach its goal."""
 
 
 def make(particle: Particle, seed: int, options: Namespace, leash: Leash) -> Complaint | None:
@@ -242,7 +250,7 @@ def _is_ours(log: IO[str]) -> bool:
 
 
 def python_path() -> str:
-    """Folders in which a process finds this jamshape before any other."""
+    """Return the search path on which a process finds this jamshape first."""
     before = os.environ.get("PYTHONPATH")
     return os.pathsep.join([str(Path(__file__).parents[2]), *([before] if before else [])])
 

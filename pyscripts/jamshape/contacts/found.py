@@ -1,4 +1,4 @@
-"""A packing with its contacts and rattlers, and the numbers that follow from them."""
+"""A packing with its contacts and rattlers, and derived numbers."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from jamshape.records import Record
 
 @dataclass(frozen=True, eq=False)
 class Contacts(Record):
-    """A packing with its M contacts, and which of its N particles are rattlers.
+    """A packing of N particles with its M contacts and its rattlers.
 
     Parameters
     ----------
     packing : Packing
     network : ContactNetwork
     rattlers : (N,) array of bool
-        Particles that their contacts do not hold in place.
+        Whether the particle is a rattler, not held in place by its contacts.
     """
 
     packing: Packing
@@ -30,7 +30,7 @@ class Contacts(Record):
 
     @classmethod
     def of(cls, packing: Packing, k_e: float | None = None, sides: int | None = None) -> Contacts:
-        """Find them; arguments and errors as `find_contacts`."""
+        """Find the contacts; arguments and errors as `find_contacts`."""
         network = find_contacts(packing, k_e, sides)
         return cls(packing, network, find_rattlers(packing, network))
 
@@ -41,12 +41,12 @@ class Contacts(Record):
 
     @property
     def z(self) -> float:
-        """Bonds per particle that is no rattler."""
+        """Bonds per particle, rattlers excluded."""
         return self.counts.z
 
     @property
     def z_single(self) -> float:
-        """Contacts per particle that is no rattler."""
+        """Contacts per particle, rattlers excluded."""
         return self.counts.z_single
 
     @property
@@ -69,8 +69,7 @@ class Contacts(Record):
 
     def __repr__(self) -> str:
         c = self.counts
-        held = self.packing.n - c.n_rattlers
         return (
-            f"<{len(self)} contacts of {self.packing.n} particles: z = {c.z:.4g} bonds for each of"
-            f" the {held} that are no rattlers>"
+            f"<{len(self)} contacts of {self.packing.n} particles: z = {c.z:.4g} bonds per particle,"
+            f" {c.n_rattlers} rattlers left out>"
         )

@@ -11,12 +11,12 @@ from scipy.spatial import cKDTree
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.packing import Box, Packing, State
 
-# Bounding spheres are larger by this fraction, so that rounding never drops a contact.
+# Bounding spheres are larger by this fraction, so that rounding never loses a contact.
 _BOUNDING_MARGIN = 1e-9
 
 
 class Spheres(NamedTuple):
-    """Spheres (discs) around bodies, anywhere, in the box or not."""
+    """Bounding spheres (discs) of bodies, inside or outside the box."""
 
     centre: FloatArray
     """(M, D)"""
@@ -25,7 +25,7 @@ class Spheres(NamedTuple):
 
 
 class NearPairs(NamedTuple):
-    """Pairs of bodies, one row for each image of the second that is near enough."""
+    """Pairs of bodies, one row for each image of the second that is close enough."""
 
     first: IntArray
     second: IntArray
@@ -38,10 +38,10 @@ class NearPairs(NamedTuple):
 
 
 class PairArrays(NamedTuple):
-    """Poses and pairs as the classes of `jamshape._contact` take them."""
+    """Poses and pairs as arguments of the classes of `jamshape._contact`."""
 
     position: FloatArray
-    """(2, N, D) doubles and their small rests."""
+    """(2, N, D) high and low parts."""
     orientation: FloatArray
     """(2, N, 1) or (2, N, 4)"""
     cell: FloatArray
@@ -64,12 +64,12 @@ def near_pairs(first: Spheres, second: Spheres, box: Box) -> NearPairs:
     ----------
     first, second : Spheres
     box : Box
-        Of any size; a pair is there several times when it is shorter than the bodies.
+        Box of any size; if it is smaller than the bodies, a pair occurs several times.
 
     Returns
     -------
     NearPairs
-        In no particular order; a row of `first` that also stands in `second` meets itself.
+        In no particular order; a row of `first` that is also in `second` pairs with itself.
     """
     bound_first, bound_second = (
         (1 + _BOUNDING_MARGIN) * spheres.radius for spheres in (first, second)
@@ -87,12 +87,12 @@ def near_pairs(first: Spheres, second: Spheres, box: Box) -> NearPairs:
 
 
 def each_once(near: NearPairs) -> NearPairs:
-    """Of the `near_pairs` of bodies among themselves, keep one of (i, j) and (j, i), and sort.
+    """Keep one of (i, j) and (j, i) in the `near_pairs` of bodies among themselves, sorted.
 
     Returns
     -------
     NearPairs
-        i <= j, ascending; of a body and its own images one of each two that are opposite.
+        i <= j, ascending; of the images of a body itself, one of two opposite ones.
     """
     i, j, shift = near
     leading = np.take_along_axis(shift, np.argmax(shift != 0, axis=1)[:, None], axis=1)[:, 0]
@@ -112,7 +112,7 @@ def near_particles(packing: Packing, bodies: Any, margin: float = 0.0) -> NearPa
     Returns
     -------
     NearPairs
-        And perhaps some that are not so close.
+        May include pairs somewhat farther apart.
     """
     around = Spheres(packing.position, bodies.outer_radius + 0.5 * margin)
     near = each_once(near_pairs(around, around, packing.box))
@@ -121,16 +121,16 @@ def near_particles(packing: Packing, bodies: Any, margin: float = 0.0) -> NearPa
 
 
 def nearer(state: State, bodies: Any, near: NearPairs, margin: float) -> NearPairs:
-    """Select those of some pairs whose surfaces are closer than a margin."""
+    """Select the pairs whose surfaces are closer than a margin."""
     is_near: BoolArray = bodies.near(*PairArrays.of(state, near), margin)
     return near.take(is_near)
 
 
 def _images_near_box(inside: FloatArray, box: Box, reach: float) -> tuple[IntArray, IntArray]:
-    """List all images of points in the box within `reach` of its faces: their owner, their shift."""
+    """List images of points in the box within `reach` of its faces: their owner and shift."""
     owner = np.arange(len(inside))
     shift = np.zeros((len(inside), 0), dtype=np.int64)
-    # A cell vector moves points along its own direction between faces, and along no other.
+    # A cell vector moves points between its own two faces, and parallel to all others.
     heights = box.heights(inside)
     for d, spacing in enumerate(box.spacings):
         turns = np.arange(-np.ceil(reach / spacing), np.ceil(reach / spacing) + 1, dtype=np.int64)

@@ -20,7 +20,7 @@ _CROSSING, _UNCONVERGED = 2, 3  # ContactStatus of contact/contact.hpp
 
 
 class CrossingError(ValueError):
-    """What must not cross of two particles does (spines, or centres): their contact has no energy."""
+    """The cores (spines or centres) of two particles cross: their contact has no energy."""
 
 
 class ContactKind(IntEnum):
@@ -38,15 +38,15 @@ class Bonds:
     Parameters
     ----------
     contact : (B,) array of int64
-        Row of `ContactNetwork` that the bond belongs to, ascending.
+        Row of the `ContactNetwork`, ascending.
     normal : (B, D) array of float64
         Unit vectors into particle i.
     force : (B, D) array of float64, [energy / length]
         On particle i.
     point : (B, D) array of float64, [length]
-        Where the surfaces interpenetrate, next to the position of i as the packing gives it.
+        Point of interpenetration of the surfaces, next to the position of i as given in the packing.
     distance, reach : (B,) array of float64, [length]
-        r and d of the overlap 1 - r/d: R_i + R_j, or such lengths that it is 1 - eta^2.
+        r and d of the overlap 1 - r/d: R_i + R_j, or lengths that make it 1 - eta^2.
     energy : (B,) array of float64, [energy]
     on_side : (B, 2) array of bool
         Whether the point lies on the flat part of i, of j.
@@ -68,16 +68,16 @@ class Bonds:
 
 @dataclass(frozen=True, eq=False)
 class ContactErrors:
-    """Bounds of how far M contacts are from those of exactly these particles.
+    """Error bounds of M contacts, for exactly these particles.
 
     Parameters
     ----------
     energy : (M,) array of float64, [energy]
-        By the error of the overlap.
+        From the error of the overlap.
     force : (M,) array of float64, [energy / length]
-        Length of the difference, by the errors of the overlap and of the normal.
+        Magnitude of the difference, from the errors of overlap and normal.
     torque : (M,) array of float64, [energy]
-        Of the larger of both, by these and by the error of the point of contact.
+        For the larger of both torques, from these and the error of the contact point.
     """
 
     energy: FloatArray
@@ -96,7 +96,7 @@ class ContactNetwork:
     shift : (M, D) array of int64
         Cell vectors of the box that bring j next to i: r_ij = x_i - (x_j + matrix shift), of `Box.matrix`.
     separation : (M, D) array of float64, [length]
-        That r_ij.
+        The vector r_ij.
     kind : (M,) array of int64
         `ContactKind`.
     n_bonds : (M,) array of int64
@@ -107,10 +107,10 @@ class ContactNetwork:
     torque_i, torque_j : (M,) array in 2D, (M, 3) in 3D, of float64, [energy]
     bonds : Bonds
     bonds_are_contacts : bool
-        Whether each bond holds a particle by itself, as a contact of its own: where particles are made of
+        Whether each bond counts as a contact of its own for stability: for particles made of
         several round parts.
     errors : ContactErrors or None
-        If they were asked for.
+        If requested.
     """
 
     pairs: IntArray
@@ -153,7 +153,7 @@ class Forces:
 def find_contacts(
     packing: Packing, k_e: float | None = None, sides: int | None = None, *, errors: bool = False
 ) -> ContactNetwork:
-    """Find all contacts, with all periodic images in reach.
+    """Find all contacts, including those with periodic images.
 
     Parameters
     ----------
@@ -162,9 +162,9 @@ def find_contacts(
     k_e : float, [energy], optional
     sides : {1, 2}, optional
         Bonds of a side-to-side contact, of shapes that have both laws: one in the dynamics of Marschall
-        & Teitel, two for minima and modes. Both are those of the packing's law when left out.
+        & Teitel, two for minima and modes. Both are those of the packing's law by default.
     errors : bool
-        Bound the error of each contact as well, which takes many times as long as the contacts.
+        Also bound the error of each contact, which takes many times as long.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def find_contacts(
     Raises
     ------
     CrossingError
-        If what must not cross of two particles does.
+        If the cores (spines or centres) of two particles cross.
     ValueError
         If a contact did not converge, or an argument is out of its range.
 
@@ -231,7 +231,7 @@ def sum_forces(packing: Packing, network: ContactNetwork) -> Forces:
 
 
 def refuse_crossing(packing: Packing, core: str, crossing: NearPairs) -> None:
-    """Refuse pairs of which there must be none, whose `core` crosses.
+    """Raise for pairs whose `core` crosses.
 
     Raises
     ------
@@ -249,7 +249,7 @@ def refuse_crossing(packing: Packing, core: str, crossing: NearPairs) -> None:
 
 
 def refuse_unconverged(packing: Packing, failed: NearPairs) -> None:
-    """Refuse pairs whose contact is ContactStatus::UNCONVERGED.
+    """Raise for pairs whose contact is ContactStatus::UNCONVERGED.
 
     Raises
     ------
@@ -258,7 +258,7 @@ def refuse_unconverged(packing: Packing, failed: NearPairs) -> None:
     if len(failed.first):
         first, second = packing.id[failed.first[0]], packing.id[failed.second[0]]
         msg = (
-            f"the contact of particles {first} and {second} did not converge; use semi-axes within a"
+            f"the contact of particles {first} and {second} did not converge; keep semi-axes within a"
             " factor 100 and exponents from 0.55 to 10"
         )
         raise ValueError(msg)

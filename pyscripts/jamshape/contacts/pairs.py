@@ -1,4 +1,4 @@
-"""A list of pairs that may touch, which holds until particles have moved too far."""
+"""A Verlet list: pairs that may touch, valid until particles have moved too far."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jamshape.packing import State, affine_change
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Pairs of particles whose surfaces were closer than a skin at a state."""
+    """Pairs of particles whose surfaces were within a skin at a state."""
 
     particles: IntArray
     """(M, 2)"""
@@ -22,21 +22,21 @@ class Pairs:
     then: State
     skin: float
     reach: float
-    """How far apart their centres may be."""
+    """Largest distance of their centres."""
 
     @classmethod
     def of(cls, near: NearPairs, state: State, skin: float, reach: float) -> Pairs:
-        """Of surfaces that are closer than a skin, and centres than a reach beside that skin."""
+        """Select pairs with surfaces within a skin, and centres within a reach plus that skin."""
         pairs = np.column_stack([near.first, near.second])
         return cls(pairs, near.shift, state, skin, reach + skin)
 
     @property
     def near(self) -> NearPairs:
-        """As the functions of `contacts` take them."""
+        """The pairs as arguments of the functions of `contacts`."""
         return NearPairs(self.particles[:, 0], self.particles[:, 1], self.shift)
 
     def outrun_by(self, now: State, turning_radius: FloatArray, kept: float = 0.0) -> bool:
-        """Whether two surfaces may have come closer by `skin`, or by what is left of it."""
+        """Whether two surfaces may have approached by `skin`, or by `skin` minus `kept`."""
         position, orientation, cell = (part[0] for part in now.split)
         position_then, orientation_then, cell_then = (part[0] for part in self.then.split)
         grown = affine_change(cell_then, cell)
@@ -51,6 +51,6 @@ class Pairs:
 
 
 def _strain_of(change: FloatArray) -> float:
-    """By what part of its length an upper triangular map changes a vector at most, or a little more."""
+    """Bound the relative change of length of a vector under an upper triangular map."""
     stretched = np.abs(np.diagonal(change) - 1).max()
     return float(stretched + np.linalg.norm(np.triu(change, 1)))

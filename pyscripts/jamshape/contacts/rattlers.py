@@ -16,7 +16,7 @@ class Coordination(NamedTuple):
     """Contact numbers without rattlers (Marschall & Teitel 2018, Sec. III C)."""
 
     z: float
-    """Bonds per particle, a side-to-side contact of two rods in the plane counted as two."""
+    """Bonds per particle, a side-to-side contact of two rods in the plane counting as two."""
     z_single: float
     """Contacts per particle."""
     n_rattlers: int
@@ -25,11 +25,11 @@ class Coordination(NamedTuple):
 
 
 def find_rattlers(packing: Packing, network: ContactNetwork) -> BoolArray:
-    """Flag the particles that no contacts hold in place.
+    """Flag particles that contacts do not hold in place.
 
-    Marschall & Teitel 2018, Sec. III C, for any shape and dimension D: fewer than two contacts, or fewer
-    than 3 in the plane that is not two on opposite flat sides; in space fewer than four, unless two of
-    them lie on opposite faces. Repeated until none is left.
+    Marschall & Teitel 2018, Sec. III C, for any shape and dimension D: in the plane, fewer than two contacts, or
+    two that are not on opposite flat sides; in space fewer than four, unless two of
+    them lie on opposite faces. Repeated until no more are found.
 
     Returns
     -------
@@ -51,13 +51,13 @@ def find_rattlers(packing: Packing, network: ContactNetwork) -> BoolArray:
 def coordination(packing: Packing, network: ContactNetwork) -> Coordination:
     """Count bonds and contacts per particle, without rattlers and their contacts.
 
-    In the plane a side-to-side contact is two bonds, also where `find_contacts` was asked for one;
+    In the plane a side-to-side contact is two bonds, even if `find_contacts` was called with sides=1;
     in 3D bonds are counted as they are, since skew rods touch side to side at one point.
 
     Returns
     -------
     Coordination
-        With z = 0 where all particles are rattlers.
+        With z = 0 if all particles are rattlers.
     """
     rattlers = find_rattlers(packing, network)
     held = ~rattlers[network.pairs].any(axis=1)

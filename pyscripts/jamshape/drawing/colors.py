@@ -1,4 +1,4 @@
-"""What the colours of particles tell: their kind, the order around them, their direction."""
+"""Colours of particles by kind, local order or direction."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ ORDER = {
 _UNKNOWN = 0.75  # grey
 _LEAST = 0.1  # end of a scale of order
 _SMALLEST, _LARGEST = KINDS[0], KINDS[1]
-_ALONE = KINDS[1]  # of particles that are all of one kind
+_ALONE = KINDS[1]  # for particles of a single kind
 
 
 class Coloring(NamedTuple):
-    """Colours of the particles of a packing and what they mean."""
+    """Colours of the particles of a packing and their meaning."""
 
     rgb: FloatArray
     """(N, 3)"""
     legend: list[tuple[str, FloatArray]]
     """Names of kinds with their colours."""
     values: FloatArray
-    """(N,) local order, NaN without neighbours; empty if colours tell something else."""
+    """(N,) local order, NaN without neighbours; empty for other colourings."""
 
 
 class Scale(NamedTuple):
@@ -49,7 +49,7 @@ class Scale(NamedTuple):
 
     @classmethod
     def of(cls, name: str, values: FloatArray) -> Scale:
-        """From green to red as order grows, up to the largest of these values."""
+        """Map order up to the largest of these values from green to red."""
         from matplotlib.cm import ScalarMappable  # noqa: PLC0415 - not needed for --help
         from matplotlib.colors import LinearSegmentedColormap, Normalize  # noqa: PLC0415
 
@@ -60,7 +60,7 @@ class Scale(NamedTuple):
         return cls(ORDER[name] + grey, ScalarMappable(Normalize(0.0, end), colors))
 
     def rgb(self, values: FloatArray) -> FloatArray:
-        """(N, 3) colours, grey where order is not known."""
+        """(N, 3) colours, grey where order is undefined."""
         known = np.isfinite(values)
         colors: Any = self.mapped.to_rgba(np.where(known, values, 0.0))
         return np.where(known[:, None], colors[:, :3], _UNKNOWN)
@@ -72,7 +72,7 @@ def order_of(found: Contacts, name: str) -> FloatArray:
     Raises
     ------
     ValueError
-        If the packing's dimension knows no such order.
+        If the order is undefined in the packing's dimension.
     """
     names = NAMES[found.packing.dimension]
     if name not in names:
@@ -83,12 +83,12 @@ def order_of(found: Contacts, name: str) -> FloatArray:
 
 
 def by_kind(found: Contacts) -> Coloring:
-    """Colour by kind; rattlers are grey, unless all are."""
+    """Colour by kind; rattlers are grey, unless all are rattlers."""
     return of_kinds(found.packing, found.rattlers)
 
 
 def of_kinds(packing: Packing, rattlers: BoolArray) -> Coloring:
-    """Colour by kind; the (N,) rattlers are grey, unless all are."""
+    """Colour by kind; the (N,) rattlers are grey, unless all are rattlers."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgb  # noqa: PLC0415 - not for --help
 
     kinds = kinds_of(packing)
@@ -110,7 +110,7 @@ def of_kinds(packing: Packing, rattlers: BoolArray) -> Coloring:
 
 
 def _ends(size: FloatArray, palette: FloatArray) -> list[tuple[str, FloatArray]]:
-    """Name the smallest and the largest of many sizes."""
+    """Label the smallest and the largest of many sizes."""
     texts = (f"smallest: {size.min():.3g} across", f"largest: {size.max():.3g}, {len(size)} sizes")
     return list(zip(texts, palette, strict=False))
 

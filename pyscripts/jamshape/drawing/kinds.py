@@ -1,4 +1,4 @@
-"""The kinds of particles of a packing, found from the particles alone, for colours and legends."""
+"""Kinds of particles of a packing, from the particles alone, for colours and legends."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from jamshape.arrays import BoolArray, IntArray
 from jamshape.packing import Packing
 
-MOST = 8  # kinds that colours can tell apart
+MOST = 8  # kinds that colours can distinguish
 
-_DIGITS = 9  # what is equal to so many is of one kind
+_DIGITS = 9  # in which particles of one kind agree
 
 
 class Kinds(NamedTuple):
@@ -20,30 +20,30 @@ class Kinds(NamedTuple):
     of: IntArray
     """(N,)"""
     parameters: list[str]
-    """In TeX, those of each kind; empty if there are too many kinds."""
+    """TeX labels of each kind; empty if there are too many kinds."""
     sizes: list[str]
-    """In TeX."""
+    """TeX."""
 
     @property
     def labels(self) -> list[str]:
-        """Name them by parameters, size and how many there are."""
+        """Label the kinds by parameters, size and number."""
         counts = np.bincount(self.of)
         rows = zip(self.parameters, self.sizes, counts, strict=False)
         return [f"{parameters}, {size} ({count})" for parameters, size, count in rows]
 
     @property
     def title(self) -> str:
-        """Name the parameters that there are; empty if there are too many kinds."""
+        """List the parameters; empty if there are too many kinds."""
         return "; ".join(dict.fromkeys(self.parameters))
 
 
 def kinds_of(packing: Packing) -> Kinds:
-    """Tell the kinds of particles: those that are equal, or of one species where most are different.
+    """Find the kinds of particles: equal particles, or one species if most are different.
 
     Returns
     -------
     Kinds
-        Without labels, each particle a kind, where there are more than `MOST`.
+        Without labels, with each particle a kind, if there are more than `MOST`.
     """
     rows = np.column_stack([packing.diameters, packing.exponent])
     rounded = np.round(rows / rows.max(axis=0), _DIGITS)
@@ -62,7 +62,7 @@ def kinds_of(packing: Packing) -> Kinds:
 
 
 def _named(packing: Packing, own: BoolArray) -> tuple[str, str]:
-    """Name the parameters and the sizes of the particles of one kind."""
+    """Return labels of parameters and sizes for the particles of one kind."""
     shape, rows = packing.shape, zip(packing.diameters[own], packing.exponent[own], strict=True)
     known = [shape.parameters_of(*row) for row in rows]
     sizes = np.array([size for _, size in known])

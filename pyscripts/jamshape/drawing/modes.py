@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from jamshape.drawing.mode_axes import COMPONENTS, frequency_unit
-from jamshape.vibration.sets import key_of
+from jamshape.drawing.styles import BLUE, GREEN, ORANGE, RED
+from jamshape.drawing.text import unit_text
+from jamshape.vibration.sets import Key, key_of
 from jamshape.vibration.statistics import density_of_states, mean_in_bins
 from jamshape.vibration.table import ModeTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+# Style and label of each kind of motion.
+COMPONENTS = {
+    "rotation": ("o-", BLUE, r"$u_\theta^2$, rotation"),
+    "parallel": ("s-", RED, r"$u_\parallel^2$, along the axis"),
+    "perpendicular": ("D-", GREEN, r"$u_\perp^2$, across it"),
+    "of_round": ("^-", ORANGE, r"$u^2$ of particles without such an axis"),
+}
+
+
+def frequency_unit(keys: Iterable[Key]) -> str:
+    """Return the unit of frequencies in TeX, without dollars."""
+    return rf"[\sqrt{{k_e}}\,/\,{unit_text(key.system for key in keys)}]"
 
 
 def draw_density(axes: Axes, table: ModeTable) -> None:

@@ -9,15 +9,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.contacts import Contacts
 from jamshape.drawing import plane, space
-from jamshape.drawing.colors import (
-    ORDER,
-    Coloring,
-    Scale,
-    all_one,
-    by_direction,
-    by_kind,
-    order_of,
-)
+from jamshape.drawing.colors import ORDER, Coloring, Scale, all_one, by_direction, by_kind, order_of
 from jamshape.drawing.styles import KINDS
 
 if TYPE_CHECKING:
@@ -25,29 +17,29 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-MANY = 250  # particles in space from which on meshes are coarser
+MANY = 250  # number of particles in space above which meshes are coarser
 
 
 class Look(NamedTuple):
-    """How packings are drawn."""
+    """Settings of pictures of packings."""
 
     color: str = "kind"
     """One of `jamshape.drawing.colors.CHOICES`."""
     height: float = 22.0
-    """Of the eye in space, degrees."""
+    """Elevation of the view in space, degrees."""
     turn: float = -58.0
-    """Of the eye about z, degrees."""
+    """Azimuth of the view about z, degrees."""
     level: int = 0
-    """Of meshes in space, each four times as many triangles as the one before; 0 for what suits N."""
+    """Refinement of meshes in space, with four times as many triangles per level; 0 adapts to N."""
 
 
 def colorings(found: Sequence[Contacts], color: str) -> tuple[list[Coloring], Scale | None]:
-    """Colour the particles of packings; local order by one scale for all.
+    """Colour the particles of packings, with a common scale of local order.
 
     Raises
     ------
     ValueError
-        If a packing's dimension knows no such order.
+        If the order is undefined in a packing's dimension.
     """
     if color in ORDER:
         values = [order_of(one, color) for one in found]
@@ -66,10 +58,10 @@ def draw_packing(axes: Axes, found: Contacts, colored: Coloring, look: Look | No
     Parameters
     ----------
     axes : Axes
-        Of a figure that has its size: lines are thin where particles are small.
+        Axes of a figure of final size: lines are thin where particles are small.
     found : Contacts
     colored : Coloring
-        From `colorings`.
+        Result of `colorings`.
     look : Look
     """
     look, packing = look or Look(), found.packing
@@ -86,7 +78,7 @@ def draw_packing(axes: Axes, found: Contacts, colored: Coloring, look: Look | No
 
 
 def shown_at(axes: Axes, found: Contacts) -> plane.Shown:
-    """Tell how thick lines are where a packing fills the axes."""
+    """Return the thickness of lines for a packing that fills the axes."""
     low, high = found.packing.box.bounds
     inch = float(((high - low) / inches_of(axes)).max())
     return plane.Shown(inch, float(found.packing.diameters[:, :2].min()))
@@ -99,14 +91,14 @@ def inches_of(axes: Axes) -> FloatArray:
 
 
 def add_legend(axes: Axes, colored: Coloring) -> None:
-    """Name below a picture what its lines and dots are, and its colours but those of a scale."""
+    """Add a legend below a picture, for its lines and dots, and its colours except those of a scale."""
     from matplotlib.patches import Patch  # noqa: PLC0415 - not needed for --help
 
     handles: list[Any] = [Patch(fc=rgb, ec="k", lw=0.5, label=text) for text, rgb in colored.legend]
     handles += axes.get_legend_handles_labels()[0]
     if not handles:
         return
-    # A sign is about 0.055 inch wide, and TeX has more signs than are seen.
+    # A character is about 0.055 inch wide, and TeX source is longer than its output.
     longest = 0.04 * max(len(handle.get_label()) for handle in handles) + 0.6
     columns = max(1, min(len(handles), int(inches_of(axes)[0] / longest)))
     place: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""Figures of packings side by side, each with what was counted of it."""
+"""Figures of packings side by side, each with its counts."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMNS = 3
-INCHES = (7.0, 5.0, 4.0)  # of the longer edge of a panel, for one column, two, three
-MANY_KINDS = 3  # of which the title names no parameters
-ROOM = (0.75, 1.4)  # above and below a panel, for words, of one and of several
+INCHES = (7.0, 5.0, 4.0)  # longer edge of a panel, for one column, two, three
+MANY_KINDS = 3  # number from which on the title omits parameters
+ROOM = (0.75, 1.4)  # for text above and below a panel, single or one of several
 
 
 class Picture(NamedTuple):
-    """A packing with what is said of it."""
+    """A packing with its description."""
 
     found: Contacts
     more: list[str]
-    """For the title, beside what is said of every packing."""
+    """Further entries of the title."""
     report: dict[str, Any]
 
 
@@ -47,11 +47,7 @@ class Drawn(NamedTuple):
 
 
 def read_picture(
-    path: Path,
-    frame: int = -1,
-    sides: int | None = None,
-    color: str = "",
-    wanted: Wanted = NOTHING,
+    path: Path, frame: int = -1, sides: int | None = None, color: str = "", wanted: Wanted = NOTHING
 ) -> Picture:
     """Read a packing, find its contacts and count.
 
@@ -60,18 +56,18 @@ def read_picture(
     path : Path
         H5MD, a LAMMPS dump or a data file.
     frame : int
-        From 0; negative ones count from the end.
+        Counted from 0 or, if negative, from the end.
     sides : int, optional
         Bonds of a side-to-side contact; None for those of the packing's law.
     color : str
-        What it will be coloured by; kinds of order are told with the numbers.
+        Colouring; kinds of order are also reported as numbers.
     wanted : Wanted
-        Dimension and shape of a data or dump file that does not say them.
+        Dimension and shape of a data or dump file that does not state them.
 
     Raises
     ------
     FileFormatError, ValueError, OSError
-        As `read_any`.
+        As in `read_any`.
     """
     packing = read_any(path, frame, *wanted)
     known: dict[str, Any] = {}
@@ -91,12 +87,12 @@ def read_picture(
 
 
 def draw_pictures(pictures: Sequence[Picture], look: Look) -> Drawn:
-    """Draw packings in panels of one figure, with one scale of order.
+    """Draw packings in panels of one figure, with a common scale of order.
 
     Raises
     ------
     ValueError
-        If a packing's dimension knows no such order.
+        If the order is undefined in a packing's dimension.
     """
     colored, scale = colorings([one.found for one in pictures], look.color)
     figure, panels = _make_panels(pictures, with_bar=scale is not None)
@@ -113,7 +109,7 @@ def draw_pictures(pictures: Sequence[Picture], look: Look) -> Drawn:
 
 
 def save_pictures(figure: Figure, pictures: Sequence[Picture], out: PathLike, dpi: int) -> None:
-    """Write a figure of packings; those in space with smooth edges."""
+    """Save a figure of packings; those in space with smooth edges."""
     if any(one.found.packing.dimension == 3 for one in pictures):
         save_smooth(figure, Path(out), dpi)
     else:
@@ -121,15 +117,15 @@ def save_pictures(figure: Figure, pictures: Sequence[Picture], out: PathLike, dp
 
 
 def title_of(found: Contacts, more: Sequence[str] = (), *, narrow: bool = False) -> str:
-    """Name the particles, if they are few kinds, and what was counted.
+    """Describe the particles, if they are few kinds, and the counts.
 
     Parameters
     ----------
     found : Contacts
     more : sequence of str
-        To say at its end.
+        Further entries, at the end.
     narrow : bool
-        Whether it stands above a narrow panel, and so in more lines.
+        Whether to use more lines, for a narrow panel.
     """
     packing, gap = found.packing, "    "
     u = float(found.energy.sum()) / packing.box.volume
@@ -145,7 +141,7 @@ def title_of(found: Contacts, more: Sequence[str] = (), *, narrow: bool = False)
 
 
 def _make_panels(pictures: Sequence[Picture], *, with_bar: bool) -> tuple[Figure, Any]:
-    """Make a figure with a panel for each packing, as long and wide as the rectangle around its box."""
+    """Make a figure with a panel for each packing, with the proportions of the rectangle around its box."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed for --help and for errors
 
     columns = min(COLUMNS, len(pictures))
@@ -161,6 +157,6 @@ def _make_panels(pictures: Sequence[Picture], *, with_bar: bool) -> tuple[Figure
 
 
 def _add_bar(figure: Figure, panels: Any, scale: Scale) -> None:
-    """Explain the colours of local order."""
+    """Add a colour bar of local order."""
     bar = figure.colorbar(scale.mapped, ax=list(panels), fraction=0.04, pad=0.02, shrink=0.8)
     bar.set_label(scale.label)

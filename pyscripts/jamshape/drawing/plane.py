@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import PolyCollection
 
-SHORTEST = 0.6  # half length of a line along a spine where it is shorter, over the particle's width
+SHORTEST = 0.6  # smallest half length of the line along a spine, over the particle's width
 
-# Corners of an outline: so many over the root of the number of particles, within these.
-_CORNERS, _FEWEST, _MOST = 800, 16, 128
+_CORNERS = 800  # vertices of an outline, over the square root of the number of particles
+_FEWEST, _MOST = 16, 128  # limits of that number
 
 
 class Images(NamedTuple):
@@ -32,7 +32,7 @@ class Images(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """How large things are drawn in a box of this scale."""
+    """Sizes of lines and dots in a box of this scale."""
 
     inch: float
     """[length]"""
@@ -78,7 +78,7 @@ def outlines(packing: Packing, at: Images) -> list[FloatArray]:
 
 
 def spines(packing: Packing, at: Images) -> FloatArray:
-    """(S, 2, 2) ends of lines along the spines of what has one, long enough to be seen."""
+    """(S, 2, 2) ends of lines along the spines, extended if too short to be seen."""
     length = np.array([packing.shape.spine(row) for row in packing.diameters])
     width = packing.diameters[:, :2].min(axis=1) / 2
     half = (np.maximum(length, SHORTEST * width) * (length > 0))[:, None] * packing.axes
@@ -95,7 +95,7 @@ def discs(center: FloatArray, radius: float) -> list[FloatArray]:
 
 
 def draw_bodies(axes: Axes, packing: Packing, box: Box, **style: Any) -> PolyCollection:
-    """Draw particles as far as they are in or around a box, which may be another part of the periodic packing.
+    """Draw particles in or around a box, which may be another part of the periodic packing.
 
     Parameters
     ----------
@@ -103,9 +103,9 @@ def draw_bodies(axes: Axes, packing: Packing, box: Box, **style: Any) -> PolyCol
     packing : Packing
         In two dimensions.
     box : Box
-        Its edges are those of the packing's box or longer than what is seen.
+        Box with the edges of the packing's box, or longer than the visible part.
     **style
-        Of the collection; arrays of length N are taken image by image.
+        Properties of the collection; arrays of length N are taken image by image.
     """
     from matplotlib.collections import PolyCollection  # noqa: PLC0415 - not needed for --help
 
@@ -144,7 +144,7 @@ def draw_contacts(axes: Axes, packing: Packing, network: ContactNetwork, dot: fl
 
 
 def show_box(axes: Axes, box: Box) -> None:
-    """Show the rectangle around a box, at equal scales and without ticks; in it the box, if it is tilted."""
+    """Set the view to the rectangle around a box, at equal scales and without ticks; draw the box if it is tilted."""
     if box.is_tilted:
         corners = box.lo + box.vectors(np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]))
         axes.plot(*corners.T, color="k", lw=1.2, ls="--")

@@ -1,4 +1,4 @@
-"""Pressure against packing fraction, with its onset and where frames stay jammed."""
+"""Pressure against packing fraction, with its onset and the bracket of jamming."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 def draw_pressure(axes: Axes, run: Run, color: str = "C0") -> None:
-    """Draw the pressure of a run and the line that leads to its onset, and say what they are."""
+    """Draw the pressure of a run and the line that defines its onset, with a legend."""
     axes.plot(run.phi, run.pressure, ".-", color=color, ms=3, lw=0.5, label="pressure")
     draw_onset(axes, run, color, f"line to the onset at this rate, {onset_text(run)}")
     draw_jamming(axes, run, "C2")
-    # What a fast start leaves relaxes first, and may be higher than all that follows.
+    # Overlaps of a fast start relax first, with a pressure that may exceed all later ones.
     begun = run.pressure[int(np.argmin(run.pressure)) :]
     if begun.max() > 0:
         axes.set_ylim(-0.03 * begun.max(), 1.3 * begun.max())
@@ -32,7 +32,7 @@ def draw_pressure(axes: Axes, run: Run, color: str = "C0") -> None:
 
 
 def draw_onset(axes: Axes, run: Run, color: str, label: str = "") -> None:
-    """Draw the onset of a run, if it has one, and the line from there through its pressure."""
+    """Draw the onset of a run, if it has one, and the line fitted to its pressure."""
     fit = run.fit
     if fit:
         rise = fit.slope * (run.phi[fit.last] - fit.phi_J)
@@ -41,7 +41,7 @@ def draw_onset(axes: Axes, run: Run, color: str, label: str = "") -> None:
 
 
 def draw_jamming(axes: Axes, run: Run, color: str, name: str = "") -> None:
-    """Draw between which packing fractions frames begin to stay jammed when they are minimised, if that is known."""
+    """Draw the packing fractions between which minimised frames begin to stay jammed, if known."""
     found = run.jamming
     if found is None or math.isnan(found.unjams) or math.isnan(found.jams):
         return

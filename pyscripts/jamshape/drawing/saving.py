@@ -1,4 +1,4 @@
-"""Pictures in files, which a kill or a full disk leaves whole or as they were."""
+"""Saving of figures; a kill or a full disk leaves files complete or unchanged."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ if TYPE_CHECKING:
 
 
 def save_figure(figure: Figure, path: PathLike, **how: Any) -> None:
-    """Draw a figure into a file, which replaces what was there only when all is drawn.
+    """Save a figure; an existing file is replaced only when writing is complete.
 
     Parameters
     ----------
     figure : Figure
     path : path-like
-        Its end tells the format; ``.png`` is put there if it has none.
+        The suffix selects the format; ``.png`` is added if there is none.
     **how
-        To ``Figure.savefig``.
+        Arguments of ``Figure.savefig``.
 
     Raises
     ------
     ValueError
-        If matplotlib knows no such format.
+        If matplotlib does not support the format.
     OSError
-        One sentence, if the file cannot be written.
+        If the file cannot be written; the message is one sentence.
 
     Examples
     --------
@@ -41,6 +41,6 @@ def save_figure(figure: Figure, path: PathLike, **how: Any) -> None:
 
 
 def with_end(path: PathLike) -> Path:
-    """Give the path of a picture, with an end that tells its format."""
+    """Return the path of a picture, with a suffix for its format."""
     place = Path(path)
     return place if place.suffix else place.with_name(f"{place.name}.png")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def draw_stress(axes: Axes, run: ShearOf) -> None:
-    """Draw pressure and shear stress of a run, and their means where it has become steady."""
+    """Draw pressure and shear stress of a run, and their means over the steady state."""
     steady, strain = run.steady, run.strain
     series = (
         ("pressure", "C0", run.observables["pressure"], "pressure $p$"),
@@ -32,7 +32,7 @@ def draw_stress(axes: Axes, run: ShearOf) -> None:
                 [steady.startup, steady.strain], [steady[name].value] * 2, "k", lw=1, zorder=3
             )
     if steady:
-        axes.axvspan(0, steady.startup, color="0.85", lw=0, label="start-up, left out of means")
+        axes.axvspan(0, steady.startup, color="0.85", lw=0, label="start-up, not averaged")
     unit = pressure_unit([run.ensemble.system])
     axes.set(xlabel=r"strain $\gamma$", ylabel=rf"stress  ${unit}$", xlim=(0, strain[-1]))
     axes.set_title(title_of(run), size=9)
@@ -40,7 +40,7 @@ def draw_stress(axes: Axes, run: ShearOf) -> None:
 
 
 def draw_steps(axes: Axes, observables: Mapping[str, FloatArray], system: System) -> None:
-    """Draw pressure and shear stress of a quasistatic shear, with a mark where the stress begins to drop."""
+    """Draw pressure and shear stress of a quasistatic shear, with a mark where each stress drop begins."""
     strain, stress = observables["strain"], observables["stress"]
     axes.plot(strain, observables["pressure"], color="C0", lw=0.8, label="pressure $p$")
     axes.plot(strain, stress, color="C1", lw=0.8, label=r"shear stress $\sigma$")
@@ -55,5 +55,5 @@ def draw_steps(axes: Axes, observables: Mapping[str, FloatArray], system: System
 
 
 def title_of(run: ShearOf) -> str:
-    """Write what is sheared, and how."""
+    """Describe the system and the shear."""
     return f"{ensemble_text(run.ensemble, ('n', 'phi', 'gdot'))}, {run.ensemble.flow} shear"

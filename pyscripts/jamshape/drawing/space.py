@@ -1,4 +1,4 @@
-"""Pictures of bodies in space: the view from afar, the light, and what hides what."""
+"""Pictures of bodies in space: parallel projection, light, and hidden surfaces."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AMBIENT, DIFFUSE, SHINE, GLOSS = 0.42, 0.62, 0.4, 28
-RIM = 0.35  # cosine to the eye below which a surface darkens, so that outlines are seen
-FINER = 2  # pictures are drawn with so many times more dots, and these averaged
+RIM = 0.35  # cosine to the view below which a surface darkens, to show outlines
+FINER = 2  # factor of oversampling before averaging
 
 
 class View(NamedTuple):
-    """Unit vectors to the eye, to its right and up."""
+    """Unit vectors to the viewer, to its right and up."""
 
     eye: FloatArray
     right: FloatArray
     up: FloatArray
 
     def flat(self, points: FloatArray) -> FloatArray:
-        """Project (..., 3) points to (..., 2) as they look from afar."""
+        """Project (..., 3) points to (..., 2) in parallel projection."""
         return np.asarray(points @ np.array([self.right, self.up]).T)
 
 
@@ -46,7 +46,7 @@ class Faces(NamedTuple):
 
 
 def view(height: float, turn: float) -> View:
-    """Look from degrees above the x-y plane, and from degrees around z."""
+    """Return the view from an elevation above the x-y plane and an azimuth about z, in degrees."""
     a, b = np.radians([height, turn])
     eye = np.array([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
     right = np.array([-np.sin(b), np.cos(b), 0])
@@ -54,7 +54,7 @@ def view(height: float, turn: float) -> View:
 
 
 def lit(color: FloatArray, normals: FloatArray, seen_from: View) -> FloatArray:
-    """Color (T, 3) faces with these normals by a light at the left above the eye (Blinn 1977).
+    """Colour (T, 3) faces with these normals under a light at the left above the viewer (Blinn 1977).
 
     `color` is (3,), or (T, 3) with one for each face.
     """
@@ -69,15 +69,15 @@ def lit(color: FloatArray, normals: FloatArray, seen_from: View) -> FloatArray:
 
 
 def mean_normals(mesh: SurfaceMesh) -> FloatArray:
-    """(T, 3) unit normals of triangles, from those at their corners."""
+    """(T, 3) unit normals of triangles, from those at their vertices."""
     normals = mesh.normals[mesh.triangles].mean(axis=1)
     return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 def faces_of(packing: Packing, level: int, seen_from: View) -> Faces:
-    """Cover particles with triangles and keep those that face the eye.
+    """Cover particles with triangles and keep those that face the viewer.
 
-    Particles stand where their centres are in the box; equal shapes share one mesh.
+    Particles are drawn where their centres are in the box; equal shapes share one mesh.
     """
     box = packing.box
     centers = box.lo + box.wrapped(packing.position)[0]
@@ -98,18 +98,18 @@ def faces_of(packing: Packing, level: int, seen_from: View) -> Faces:
 def painted(faces: Faces, colors: FloatArray, seen_from: View) -> tuple[FloatArray, FloatArray]:
     """Sort faces from the farthest to the nearest, and light them.
 
-    Bodies that hardly overlap are told apart by the depth of their small faces.
+    Small faces resolve the depth of bodies that hardly overlap.
 
     Parameters
     ----------
     faces : Faces
     colors : (N, 3) array of float64
-        Of the bodies.
+        Colours of the bodies.
     seen_from : View
 
     Returns
     -------
-    (T, 3, 2) polygons and (T, 3) their colors
+    (T, 3, 2) polygons and (T, 3) their colours
     """
     order = np.argsort(faces.corners.mean(axis=1) @ seen_from.eye)
     normals = faces.normals[order]
@@ -144,7 +144,7 @@ def draw_bodies(axes: Axes, packing: Packing, colors: FloatArray, seen: tuple[Vi
         In three dimensions.
     colors : (N, 3) array of float64
     seen : View and int
-        From where, and the level of the meshes (`faces_of`).
+        View, and the level of the meshes (`faces_of`).
     """
     from matplotlib.collections import LineCollection, PolyCollection  # noqa: PLC0415
 
@@ -152,7 +152,7 @@ def draw_bodies(axes: Axes, packing: Packing, colors: FloatArray, seen: tuple[Vi
     polygons, shades = painted(faces_of(packing, level, seen_from), colors, seen_from)
     back, front = box_edges(packing, seen_from)
     axes.add_collection(LineCollection(list(back), colors="0.45", lw=0.8, zorder=1))
-    # Smoothed, neighbours would leave a line between them.
+    # With antialiasing, neighbours would leave a line between them.
     shown = PolyCollection(list(polygons), facecolors=shades, lw=0, antialiaseds=False, zorder=2)
     axes.add_collection(shown)
     axes.add_collection(LineCollection(list(front), colors="0.15", lw=0.9, zorder=3))
@@ -164,7 +164,7 @@ def draw_bodies(axes: Axes, packing: Packing, colors: FloatArray, seen: tuple[Vi
 
 
 def save_smooth(figure: Figure, out: Path, dpi: int) -> None:
-    """Save with the steps between faces smoothed; PNG only, other formats as they are."""
+    """Save with antialiased faces; PNG only, other formats unchanged."""
     if out.suffix.lower() != ".png":
         save_figure(figure, out, dpi=dpi)
         return

@@ -1,10 +1,8 @@
-"""Colours and marks that all figures share."""
+"""Colours and marks of all figures."""
 
 from __future__ import annotations
 
-from typing import Any
-
-# Okabe & Ito: colours that are told apart with any colour vision.
+# Okabe & Ito: colours distinguishable with any colour vision.
 BLACK, ORANGE, SKY, GREEN, BLUE, RED = (
     "#000000",
     "#E69F00",
@@ -14,31 +12,7 @@ BLACK, ORANGE, SKY, GREEN, BLUE, RED = (
     "#D55E00",
 )
 YELLOW = "#F0E442"
-COLORS = (BLUE, RED, GREEN, ORANGE, SKY, BLACK)
-MARKERS = "oDs^v*"
 
-# How numbers of the paper are drawn, behind our own.
-PAPER_STYLE: dict[str, Any] = {"fmt": "*", "color": BLACK, "mfc": YELLOW, "ms": 11, "zorder": 1.5}
-PAPER_STYLE |= {"label": "paper, $N=1024$"}
-PAPER_LINE: dict[str, Any] = {"color": "0.5", "lw": 1, "ls": "--", "zorder": 0}
-
-# Of particles in pictures: rattlers, points of contact, and kinds by ascending size.
+# Colours in pictures: rattlers, points of contact, and kinds by ascending size.
 RATTLER, CONTACT = "#cfcfcf", "#d7191c"
 KINDS = ("#86c98a", "#6ea6dc", "#e9b04d", "#c76f9b", "#9a7fc0", "#e07b53", "#4fa3a5", "#b5b04a")
-
-# Of single bodies.
-BODIES = (
-    *("#4fa3a5", "#e07b53", "#7b8fc7", "#c76f9b", "#8ab54a"),
-    *("#d9a832", "#5c9ad1", "#9a7fc0", "#d0685f"),
-)
-
-
-def color(k: int) -> str:
-    """Colour of the curve with that number, from 0."""
-    return COLORS[k % len(COLORS)]
-
-
-def marked(k: int, line: str = "") -> dict[str, Any]:
-    """Give the curve with that number, from 0, its colour and mark, open, with a thin line or none."""
-    style: dict[str, Any] = {"fmt": f"{MARKERS[k % len(MARKERS)]}{line}", "color": color(k)}
-    return style | {"mfc": "none", "ms": 4, "lw": 0.8, "elinewidth": 0.8, "capsize": 1.5}

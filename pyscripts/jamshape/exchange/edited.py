@@ -1,7 +1,7 @@
-"""GSD frames of ours that another program has changed: what it saw and changed counts, not our doubles beside it.
+"""Detection of changes that another program made in our GSD frames, which override our doubles.
 
-Another program knows the single numbers of a frame and neither reads nor changes what is logged. So where both
-disagree by more than single precision rounds, it was changed, and the doubles are of an earlier state.
+Other programs know the single-precision numbers of a frame and neither read nor change logged data. So if the two
+differ by more than rounding to single precision, the frame was changed, and the doubles are outdated.
 """
 
 from __future__ import annotations
@@ -13,31 +13,31 @@ import numpy as np
 from jamshape.arrays import BoolArray, FloatArray
 from jamshape.packing import Box, Packing, angle_from_quaternion
 
-# Of a number in single precision; a program may have gone through other units and back.
+# Relative, in single precision; a program may have converted units back and forth.
 _ROUNDING = 4 * 2.0**-24
 
 
 def as_edited(packing: Packing, ours: Any, frame: Any) -> Packing:
-    """Take from a frame what another program has changed in it.
+    """Apply the changes of another program to a packing.
 
     Parameters
     ----------
     packing : Packing
-        As its doubles in the frame have it.
+        Packing from the doubles of the frame.
     ours : gsd.hoomd.Frame
-        As `write_gsd` writes that packing.
+        The frame that `write_gsd` writes for that packing.
     frame : gsd.hoomd.Frame
-        As it was read.
+        The frame as it was read.
 
     Returns
     -------
     Packing
-        The same object where nothing was changed.
+        The same object if nothing was changed.
 
     Raises
     ------
     ValueError
-        If numbers or kinds of particles were changed, of which the frame does not tell all.
+        If numbers or kinds of particles were changed, which the frame does not fully describe.
     """
     _require_same_particles(ours, frame)
     changes: dict[str, Any] = {}
@@ -57,11 +57,11 @@ def as_edited(packing: Packing, ours: Any, frame: Any) -> Packing:
 
 
 def _require_same_particles(ours: Any, frame: Any) -> None:
-    """Refuse other types: not all of a particle can be read from them."""
+    """Refuse other types, from which particles cannot be fully reconstructed."""
     if frame.particles.N != ours.particles.N:
         found, expected = frame.particles.N, ours.particles.N
         msg = (
-            f"holds {found} particles and the doubles of {expected}: another program has added or removed"
+            f"holds {found} particles but doubles of {expected}: another program has added or removed"
             " some, expected the particles that write_gsd wrote"
         )
         raise ValueError(msg)
@@ -86,7 +86,7 @@ def _agrees(found: Any, expected: Any, scale: float) -> bool:
 
 
 def _box(sizes: FloatArray, dimension: int) -> Box:
-    """Make the box around 0 of edges and tilt factors."""
+    """Make the box around 0 from edges and tilt factors."""
     factors = np.eye(3)
     factors[np.triu_indices(3, 1)] = sizes[3:]
     matrix = (factors * sizes[:3])[:dimension, :dimension]
@@ -94,7 +94,7 @@ def _box(sizes: FloatArray, dimension: int) -> Box:
 
 
 def _moved(packing: Packing, ours: Any, frame: Any, box: Box) -> dict[str, Any]:
-    """Give positions and images where they changed; a particle in another image of the box is where it was."""
+    """Return changed positions and images; a particle in another image of the box has not moved."""
     D = packing.dimension
     found, before = (np.asarray(x.particles.position, np.float64)[:, :D] for x in (frame, ours))
     turns = np.rint(box.fractions(found - before))
@@ -116,7 +116,7 @@ def _moved(packing: Packing, ours: Any, frame: Any, box: Box) -> dict[str, Any]:
 
 
 def _turned(ours: Any, frame: Any) -> BoolArray:
-    """(N,) which particles were turned; q and -q are one rotation."""
+    """(N,) whether each particle was rotated; q and -q are one rotation."""
     found, before = (np.asarray(x.particles.orientation, np.float64) for x in (frame, ours))
     sign = np.where((found * before).sum(axis=1, keepdims=True) < 0, -1, 1)
     return np.asarray((np.abs(found - sign * before) > _ROUNDING).any(axis=1))
@@ -131,7 +131,7 @@ def _orientation(packing: Packing, frame: Any, turned: BoolArray) -> FloatArray:
 
 
 def _with_rests(packing: Packing, changes: dict[str, Any]) -> dict[str, Any]:
-    """Keep what doubles leave out of numbers that stay."""
+    """Keep the low parts of unchanged numbers."""
     for name in ("position", "orientation"):
         if name in changes:
             stays = changes[name] == getattr(packing, name)

@@ -1,4 +1,4 @@
-"""All that a packing holds as arrays under names, and as programs with a box around 0 see it."""
+"""Contents of a packing as named arrays, also for programs with a box around 0."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _INT32 = np.iinfo(np.int32)
 
 
 def particle_fields(packing: Packing, *, rests: bool) -> Fields:
-    """Give arrays with a row for each particle."""
+    """Return arrays with a row for each particle."""
     return {name: getattr(packing, name) for name in PARTICLES + PARTICLE_RESTS * rests}
 
 
 def box_fields(packing: Packing, *, rests: bool, tilted: bool) -> Fields:
-    """Give the arrays of the box; without its tilt where no box has one."""
+    """Return the arrays of the box; without tilt if no box is tilted."""
     fields = {"lo": packing.box.lo, "edges": packing.box.edges}
     fields |= {"tilt": packing.box.tilt} if tilted else {}
     fields |= {"edges_rest": packing.edges_rest} if rests else {}
@@ -33,7 +33,7 @@ def box_fields(packing: Packing, *, rests: bool, tilted: bool) -> Fields:
 
 
 def packing_of(fields: Mapping[str, Any], shape_style: str, step: int, time: float) -> Packing:
-    """Put a packing together from the fields of particles and box; errors as `Packing`."""
+    """Build a packing from the fields of particles and box; errors as `Packing`."""
     known = dict(fields)
     box = Box(known.pop("lo"), known.pop("edges"), known.pop("tilt", np.empty(0)))
     return Packing(box=box, shape_style=shape_style, step=step, time=time, **known)
@@ -45,7 +45,7 @@ class Centered(NamedTuple):
     position: FloatArray
     """(N, 3), [length], each from minus half a cell vector to half a cell vector."""
     image: IntArray
-    """(N, 3) cell vectors that lead from there to where the particle has come."""
+    """(N, 3) cell vectors from there to the unwrapped position."""
     box: FloatArray
     """(6,) edges, [length], and tilt factors xy, xz, yz; 0 along z in 2D."""
 
@@ -67,16 +67,16 @@ def in_space(vectors: NDArray[Any]) -> NDArray[Any]:
 
 
 class Alike(NamedTuple):
-    """Particles that are alike."""
+    """Groups of equal particles."""
 
     first: IntArray
-    """(K,) a row of each."""
+    """(K,) a row of each group."""
     of: IntArray
-    """(N,) from 0 to K - 1."""
+    """(N,) group, from 0 to K - 1."""
 
 
 def alike(packing: Packing, *more: NDArray[Any]) -> Alike:
-    """Tell which particles have the same diameters, exponent and whatever else (N,) counts."""
+    """Group particles with equal diameters, exponent and further (N,) values."""
     rows = np.column_stack([*more, packing.diameters, packing.exponent])
     _, first, of = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     return Alike(first, of.ravel())

@@ -1,4 +1,4 @@
-"""Packings as freud takes them: a box around 0, points in it, orientations, and our contacts as neighbours."""
+"""Packings for freud: a box around 0, points in it, orientations, and our contacts as neighbours."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jamshape.packing import Packing
 
 
 class FreudSystem(NamedTuple):
-    """What freud's functions ask for."""
+    """Arguments of freud's functions."""
 
     box: Any
     """`freud.box.Box` around 0, two-dimensional for packings in the plane."""
@@ -23,8 +23,8 @@ class FreudSystem(NamedTuple):
     orientations: FloatArray
     """(N, 4) float32 quaternions w i j k, in 2D about z."""
     directors: FloatArray
-    """(N, 3) float32 unit vectors along `Packing.directors`, as `freud.order.Nematic` takes them; NaN where there
-    is none."""
+    """(N, 3) float32 unit vectors along `Packing.directors`, as for `freud.order.Nematic`; NaN where
+    undefined."""
 
     @property
     def system(self) -> tuple[Any, FloatArray]:
@@ -33,7 +33,7 @@ class FreudSystem(NamedTuple):
 
 
 def to_freud(packing: Packing) -> FreudSystem:
-    """Hand a packing to freud.
+    """Convert a packing for freud.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def to_freud(packing: Packing) -> FreudSystem:
     Returns
     -------
     FreudSystem
-        In single precision, as freud computes.
+        In single precision, as used by freud.
 
     Raises
     ------
@@ -67,13 +67,13 @@ def to_freud(packing: Packing) -> FreudSystem:
 
 
 def to_neighbors(packing: Packing, network: ContactNetwork) -> Any:
-    """Hand contacts to freud, which then averages over touching particles instead of near ones.
+    """Convert contacts for freud, to average over touching particles instead of near ones.
 
     Parameters
     ----------
     packing : Packing
     network : ContactNetwork
-        Of that packing, as `find_contacts` gives it.
+        Its contacts, from `find_contacts`.
 
     Returns
     -------

@@ -1,13 +1,13 @@
-"""GSD files of the HOOMD schema, which HOOMD-blue, freud, OVITO, fresnel and MDAnalysis read.
+"""GSD files of the HOOMD schema, readable by HOOMD-blue, freud, OVITO, fresnel and MDAnalysis.
 
-A frame is a packing in a box around 0, which is 0 high in 2D. Every species is a type, or several where its
-particles differ; `particles/type_shapes` says what each looks like: a sphere, an ellipsoid, a union of spheres,
-or else a mesh whose corners lie on the surface. (GSD could call a rod a polyhedron of two corners with a rounding
-radius. OVITO reads that only along z, which is not where the orientation of our rods points.)
+A frame is a packing in a box around 0, of height 0 in 2D. Every species is a type, or several if its
+particles differ; `particles/type_shapes` describes each: a sphere, an ellipsoid, a union of spheres,
+or else a mesh with vertices on the surface. (GSD can describe a rod as a polyhedron of two vertices with a rounding
+radius, but OVITO reads that only along z, not along the axis of our rods.)
 
-GSD keeps single precision. So a frame logs all that the packing holds once more under `log/jamshape` and
-`log/particles/jamshape`, and is read back from there to the last bit. Where another program has since changed the
-single numbers, which are all that it knows, these count: see `jamshape.exchange.edited`.
+GSD uses single precision. So a frame also logs the whole packing under `log/jamshape` and
+`log/particles/jamshape`, and is read back from there to the last bit. If another program has since changed the
+single-precision numbers, these take precedence: see `jamshape.exchange.edited`.
 """
 
 from __future__ import annotations
@@ -19,16 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.exchange.edited import as_edited
-from jamshape.exchange.fields import (
-    alike,
-    box_fields,
-    centered,
-    packing_of,
-    particle_fields,
-)
+from jamshape.exchange.fields import alike, box_fields, centered, packing_of, particle_fields
 from jamshape.exchange.tools import tool
 from jamshape.files.disk import PathLike, replacing
-from jamshape.files.frames import Form
+from jamshape.files.frames import Form, row_of
 from jamshape.files.layout import FileFormatError
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
@@ -38,23 +32,23 @@ from jamshape.shapes.table import shape_named
 
 _LOG, _PARTICLES = "jamshape/", "particles/jamshape/"
 
-# Levels of meshes: fine for a few types, coarse for many, so that files stay small.
-_FINE, _FEW, _COARSE, _MANY = 3, 8, 1, 64
+_FINE, _COARSE = 3, 1  # levels of meshes, so that files stay small
+_FEW, _MANY = 8, 64  # numbers of types up to which meshes are fine and medium
 
 
 def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
-    """Write packings as the frames of a GSD file, replacing it only when all is written.
+    """Write packings as the frames of a GSD file; an existing file is replaced only when writing is complete.
 
     Parameters
     ----------
     path : path-like
     packings : Packing or iterable of Packing
-        Frame by frame, all in 2D or all in 3D; a run that `jamshape.load` gave is one.
+        Frames, all in 2D or all in 3D; a run from `jamshape.load` is one.
 
     Raises
     ------
     ValueError
-        If there is no packing, or some are in 2D and some in 3D.
+        If there is no packing, or dimensions differ.
     ImportError
         If gsd is not installed.
     OSError
@@ -84,23 +78,23 @@ def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
 
 
 def read_gsd(path: PathLike, frame: int = -1) -> Packing:
-    """Read one frame of a file that `write_gsd` wrote, to the last bit.
+    """Read one frame of a file from `write_gsd`, to the last bit.
 
-    Positions, orientations and box that another program has changed since are read in single precision,
-    as it left them.
+    Positions, orientations and box that another program has changed since are read in single
+    precision.
 
     Parameters
     ----------
     path : path-like
     frame : int
-        From 0; negative ones count from the end.
+        Counted from 0 or, if negative, from the end.
 
     Raises
     ------
     FileFormatError
-        If it is no such file, or another program has changed the kinds of particles or their number.
+        If the file has another origin, or another program has changed the kinds of particles or their number.
     ValueError
-        If there is no such frame.
+        If the frame does not exist.
     ImportError
         If gsd is not installed.
     OSError
@@ -113,14 +107,11 @@ def read_gsd(path: PathLike, frame: int = -1) -> Packing:
         msg = f"{path}: {error}, expected a GSD file; write it with write_gsd"
         raise FileFormatError(msg) from error
     with file:
-        if not -len(file) <= frame < len(file):
-            msg = f"{path}: has {len(file)} frames, expected frame {frame} to be one of them"
-            raise ValueError(msg)
-        return _packing(path, hoomd, file[frame % len(file)])
+        return _packing(path, hoomd, file[row_of(frame, len(file), path)])
 
 
 def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
-    """Make a frame, with what another frame of the file has: what one lacks is read from the first."""
+    """Make a frame, with all fields of the other frames: GSD reads missing ones from the first."""
     seen, frame = centered(packing), hoomd.Frame()
     kinds = alike(packing, packing.species)
     frame.configuration.step = packing.step
@@ -147,7 +138,7 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
 
 
 def _names(species: list[str]) -> list[str]:
-    """Name types by their species, with a number where a species has several."""
+    """Name types by their species, with a number if a species has several."""
     seen: dict[str, int] = {}
     names = []
     for name in species:
@@ -157,7 +148,7 @@ def _names(species: list[str]) -> list[str]:
 
 
 class _Body(NamedTuple):
-    """What the words for a body depend on."""
+    """Properties that determine the description of a body."""
 
     style: str
     diameters: tuple[float, ...]
@@ -174,7 +165,7 @@ class _Body(NamedTuple):
 
 @lru_cache(maxsize=4096)  # frames of a run have the same particles
 def _type_shape(body: _Body) -> dict[str, Any]:
-    """Describe a particle by the words of `particles/type_shapes`."""
+    """Describe a particle in the terms of `particles/type_shapes`."""
     if body.is_round:
         return {"type": "Sphere", "diameter": body.diameters[0]}
     shape, diameters = shape_named(body.style), np.array(body.diameters)
@@ -184,7 +175,7 @@ def _type_shape(body: _Body) -> dict[str, Any]:
 
 @singledispatch
 def _described(solid: Solid) -> dict[str, Any]:
-    """Describe a body exactly; empty where GSD cannot."""
+    """Describe a body exactly; empty if GSD cannot."""
     del solid
     return {}
 
@@ -218,7 +209,7 @@ def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
     }
     try:
         style, time = bytes(found.pop("shape_style")).decode(), float(found.pop("time")[0])
-        if "law" in found:  # files of 0.1.0 have none
+        if "law" in found:  # missing in files of 0.1.0
             k_e, sides = found["law"].tolist()
             found["law"] = Interaction(k_e, sides)
         packing = packing_of(found, style, int(frame.configuration.step), time)

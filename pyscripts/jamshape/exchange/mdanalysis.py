@@ -1,8 +1,8 @@
-"""Packings and runs in MDAnalysis, which knows three dimensions only.
+"""Packings and runs in MDAnalysis, which supports only three dimensions.
 
 Planar packings lie at z = 0 of a box of unit height. The file is H5MD like ours, with its particles under the name
-that MDAnalysis looks for, and says that a length is an Angstrom and a time a picosecond: MDAnalysis knows no others,
-and so takes our numbers as they are.
+that MDAnalysis expects, and with lengths in Angstrom and times in picoseconds: MDAnalysis supports no others,
+and so takes our numbers unchanged.
 """
 
 from __future__ import annotations
@@ -34,26 +34,26 @@ Source = Packing | Iterable[Packing] | PathLike
 _HEIGHT = 1.0  # of planar boxes, [length]
 _ELEMENTS = ("position", "box/edges")
 _numbers = itertools.count()  # of temporary files
-_GROUP = "particles/trajectory"  # the name with which MDAnalysis needs no topology to count
+_GROUP = "particles/trajectory"  # with this name MDAnalysis needs no topology to count atoms
 
 
 def to_mdanalysis(source: Source, path: PathLike | None = None) -> Any:
-    """Hand packings to MDAnalysis.
+    """Convert packings for MDAnalysis.
 
     Parameters
     ----------
     source : Packing, iterable of Packing, or path of one of our H5MD files
         A run gives a trajectory of all its frames.
     path : path-like, optional
-        Where `write_mdanalysis` shall write the trajectory; in a temporary folder, until this process ends, when
-        left out.
+        Path of the trajectory for `write_mdanalysis`; by default in a temporary folder, until this process
+        ends.
 
     Returns
     -------
     MDAnalysis.Universe
-        An atom a particle, each a residue of its own, in the order of the packing: `ids` and `resids` are our IDs,
-        `types` our species, `names` and `resnames` the shape, `radii` those of the spheres around the particles,
-        [length], `masses` their areas (volumes). `trajectory.ts.data` holds `orientation`, (N, 4) quaternions
+        One atom per particle, each a residue of its own, in the order of the packing: `ids` and `resids` are our IDs,
+        `types` our species, `names` and `resnames` the shape, `radii` those of the circumscribed spheres,
+        [length], `masses` the areas (volumes). `trajectory.ts.data` holds `orientation`, (N, 4) quaternions
         w i j k, and the step.
 
     Raises
@@ -61,7 +61,7 @@ def to_mdanalysis(source: Source, path: PathLike | None = None) -> Any:
     ImportError
         If MDAnalysis is not installed.
     FileFormatError, OSError
-        As `read_packing`.
+        As in `read_packing`.
     ValueError
         If there is no packing, or frames differ in their particles.
 
@@ -92,8 +92,8 @@ def write_mdanalysis(path: PathLike, source: Source) -> Packing:
     Parameters
     ----------
     path : path-like
-        Replaced only when all is written; the ending ``.h5md`` tells MDAnalysis the format.
-    source : as `to_mdanalysis`
+        Replaced only when writing is complete; the suffix ``.h5md`` selects the format in MDAnalysis.
+    source : see `to_mdanalysis`
 
     Returns
     -------
@@ -103,7 +103,7 @@ def write_mdanalysis(path: PathLike, source: Source) -> Packing:
     Raises
     ------
     FileFormatError, OSError, ValueError
-        As `to_mdanalysis`.
+        As in `to_mdanalysis`.
     """
     with layout.written(path) as file:
         return _write(file, source)
@@ -111,7 +111,7 @@ def write_mdanalysis(path: PathLike, source: Source) -> Packing:
 
 @cache
 def _temporary_folder() -> Path:
-    """Make a folder that is removed when the process ends: MDAnalysis opens a file anew for each loop over it."""
+    """Make a folder that is removed when the process ends: MDAnalysis reopens a file for each loop over it."""
     folder = tempfile.mkdtemp(prefix="jamshape-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
@@ -158,8 +158,8 @@ def _write(file: h5py.File, source: Source) -> Packing:
 
 
 def _values(packing: Packing) -> dict[str, Any]:
-    """Give what a frame holds; the box begins at 0, as MDAnalysis has it."""
-    # Always edge vectors as rows: frames with and without a tilt are of one form.
+    """Return the data of a frame; the box begins at 0, as in MDAnalysis."""
+    # Always edge vectors as rows: frames with and without tilt have one layout.
     edges = _HEIGHT * np.eye(3)
     edges[: packing.dimension, : packing.dimension] = packing.box.matrix.T
     return {

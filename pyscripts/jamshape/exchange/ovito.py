@@ -1,9 +1,9 @@
-"""Packings in OVITO, each particle drawn as the body that it is and coloured by its kind.
+"""Packings in OVITO, with exact bodies coloured by kind.
 
-Rods are spherocylinders there, whose axis is the body's z: their orientation is ours after a quarter turn that brings
+Rods are spherocylinders there, with the body's z as axis: their orientation is ours after a quarter rotation that takes
 z to x. Superellipsoids are superquadrics, other bodies meshes in units of their size. OVITO keeps orientations and
-shapes in single precision; so the doubles go along as properties whose names begin with "Jamshape", and
-`from_ovito` reads them.
+shapes in single precision; so the doubles are attached as properties whose names begin with "Jamshape", which
+`from_ovito` reads.
 """
 
 from __future__ import annotations
@@ -17,13 +17,7 @@ import numpy as np
 from jamshape.arrays import BoolArray, FloatArray, IntArray
 from jamshape.drawing.colors import of_kinds
 from jamshape.drawing.kinds import kinds_of
-from jamshape.exchange.fields import (
-    PARTICLE_RESTS,
-    alike,
-    in_space,
-    packing_of,
-    particle_fields,
-)
+from jamshape.exchange.fields import PARTICLE_RESTS, alike, in_space, packing_of, particle_fields
 from jamshape.exchange.tools import tool
 from jamshape.files.frames import as_rest
 from jamshape.files.layout import FileFormatError
@@ -33,22 +27,22 @@ from jamshape.shapes.shape import Interaction
 from jamshape.shapes.solid import RoundedSegment, Solid, Superquadric
 
 _PREFIX = "Jamshape "
-_OWN = ("position", "id")  # what OVITO holds in full itself
+_OWN = ("position", "id")  # held by OVITO in full precision
 
-_ROUNDING = 4 * 2.0**-24  # of a number in single precision
+_ROUNDING = 4 * 2.0**-24  # relative, in single precision
 
 _Z_TO_X = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)  # w i j k
 _STILL = (1.0, 0.0, 0.0, 0.0)
 
 _LEVEL = 4  # of meshes
-_DIGITS = 9  # in which bodies of one mesh agree
+_DIGITS = 9  # in which bodies with a common mesh agree
 
 
 class _Glyph(NamedTuple):
-    """How OVITO draws a body."""
+    """Representation of a body in OVITO."""
 
     name: str
-    """Of `ParticlesVis.Shape`."""
+    """Name in `ParticlesVis.Shape`."""
     aspherical_shape: tuple[float, ...] = ()
     roundness: float | None = None
     first_turned: tuple[float, float, float, float] = _STILL
@@ -56,7 +50,7 @@ class _Glyph(NamedTuple):
 
 @singledispatch
 def _glyph(solid: Solid) -> _Glyph:
-    """Tell how OVITO draws a body: by triangles unless it has a glyph for it."""
+    """Choose the representation of a body: triangles unless OVITO has a glyph for it."""
     del solid
     return _Glyph("Mesh")
 
@@ -73,19 +67,19 @@ def _(solid: Superquadric) -> _Glyph:
 
 
 def to_ovito(packing: Packing, rattlers: BoolArray | None = None) -> Any:
-    """Hand a packing to OVITO.
+    """Convert a packing for OVITO.
 
     Parameters
     ----------
     packing : Packing
     rattlers : (N,) array of bool, optional
-        Drawn in grey, as `find_rattlers` finds them.
+        Drawn in grey, such as from `find_rattlers`.
 
     Returns
     -------
     ovito.data.DataCollection
         To draw it, make it the source of a pipeline:
-        ``Pipeline(source=StaticSource(data=to_ovito(packing)))``. Particle types are the kinds of our pictures,
+        ``Pipeline(source=StaticSource(data=to_ovito(packing)))``. Particle types are the kinds in our pictures,
         with their colours.
 
     Raises
@@ -117,9 +111,9 @@ def to_ovito(packing: Packing, rattlers: BoolArray | None = None) -> Any:
 
 
 def from_ovito(data: Any) -> Packing:
-    """Read a packing that `to_ovito` made back, with positions, orientations and box as they are in OVITO now.
+    """Convert the data of `to_ovito` back to a packing, with positions, orientations and box as they are in OVITO now.
 
-    Orientations that were changed there are in single precision.
+    Orientations changed there are in single precision.
 
     Parameters
     ----------
@@ -128,7 +122,7 @@ def from_ovito(data: Any) -> Packing:
     Raises
     ------
     FileFormatError
-        If it lacks what `to_ovito` writes, or is no packing any more.
+        If it lacks data of `to_ovito`, or is no longer a valid packing.
     """
     particles, cell = data.particles, data.cell
     try:
@@ -160,12 +154,12 @@ def from_ovito(data: Any) -> Packing:
         packing = packing_of(fields, style, int(known["Timestep"]), float(known["Time"]))
         return _as_turned(packing, np.asarray(particles["Orientation"][...]))
     except (KeyError, AttributeError, TypeError) as error:
-        msg = f"the data of OVITO lack {error}, expected what to_ovito made"
+        msg = f"the data of OVITO lack {error}, expected data from to_ovito"
         raise FileFormatError(msg) from error
 
 
 def _as_turned(packing: Packing, found: FloatArray) -> Packing:
-    """Take orientations x y z w that were changed in OVITO, where our doubles are of an earlier state."""
+    """Apply orientations x y z w that were changed in OVITO, where our doubles are outdated."""
     glyphs, _ = _glyphs(packing)
     before = product(packing.quaternions, glyphs[0].first_turned)
     now = np.asarray(found, np.float64)[:, [3, 0, 1, 2]]
@@ -185,7 +179,7 @@ def _as_turned(packing: Packing, found: FloatArray) -> Packing:
 
 
 def _rests_of_box(dimension: int) -> dict[str, list[str]]:
-    """Name the attributes that hold what the doubles of the box leave out, by the field of a packing."""
+    """Name the attributes for the low parts of the box, by the field of a packing."""
     axes = "xyz"[:dimension]
     tilts = ["".join(two) for two in itertools.combinations(axes, 2)]
     return {
@@ -195,7 +189,7 @@ def _rests_of_box(dimension: int) -> dict[str, list[str]]:
 
 
 def _add_cell(data: Any, packing: Packing) -> None:
-    """Add the box; planar ones are as high as they are drawn, around z = 0."""
+    """Add the box; planar ones extend around z = 0 to their drawn height."""
     D = packing.dimension
     matrix = np.zeros((3, 4))
     matrix[2, 2:] = 1.0, -0.5
@@ -206,7 +200,7 @@ def _add_cell(data: Any, packing: Packing) -> None:
 
 
 def _glyphs(packing: Packing) -> tuple[list[_Glyph], IntArray]:
-    """Give the glyph of each body, and which one a particle has."""
+    """Return the glyph of each body, and the index of the body of each particle."""
     bodies = alike(packing)
     rows = zip(packing.diameters[bodies.first], packing.exponent[bodies.first], strict=True)
     return [_glyph(packing.shape.solid(d, float(p))) for d, p in rows], bodies.of
@@ -228,12 +222,12 @@ def _add_bodies(particles: Any, packing: Packing) -> None:
 
 
 class _Known(NamedTuple):
-    """What tells the particles of a shape."""
+    """Parameters and sizes of the particles of a shape."""
 
     parameters: FloatArray
-    """(N, P), as many digits as tell bodies of one mesh."""
+    """(N, P), rounded to the digits in which bodies with a common mesh agree."""
     size: FloatArray
-    """(N,), [length], in whose units those of equal parameters are one body."""
+    """(N,), [length], unit in which particles of equal parameters are one body."""
 
 
 def _known_sizes(packing: Packing) -> _Known:
@@ -247,7 +241,7 @@ def _known_sizes(packing: Packing) -> _Known:
 
 
 def _add_types(particles: Any, packing: Packing, vis: Any) -> None:
-    """Add a type for each kind, or for each species where there are too many kinds, and each mesh."""
+    """Add a type for each kind, or for each species if there are too many kinds, and each mesh."""
     known = _known_sizes(packing)
     kinds = kinds_of(packing)
     key = np.column_stack([kinds.of if kinds.labels else packing.species, known.parameters])
@@ -281,6 +275,6 @@ def _mesh(packing: Packing, i: int, size: float) -> Any:
 
 
 def _add_colors(particles: Any, packing: Packing, rattlers: BoolArray) -> None:
-    """Add colours of particles where types do not tell them."""
+    """Add colours of particles where types do not determine them."""
     if rattlers.any() or not kinds_of(packing).labels:
         particles.create_property("Color", data=of_kinds(packing, rattlers).rgb)

@@ -1,4 +1,4 @@
-"""The packages of other programs, which need not be installed."""
+"""Import of optional packages of other programs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ def tool(module: str, package: str) -> Any:
     Raises
     ------
     ImportError
-        If it is not installed, or lacks a library of the system.
+        If it is not installed, or lacks a system library.
     """
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        msg = f"{module} cannot be imported ({error}), expected it; run pip install '{package}'"
+        msg = f"{module} cannot be imported ({error}), expected it to be installed; run pip install '{package}'"
         raise ImportError(msg) from error

@@ -1,1 +1,1 @@
-"""Reading and writing: H5MD, LAMMPS's text files, sets of files."""
+"""Reading and writing: H5MD, LAMMPS's text files, ensembles of files."""

@@ -1,7 +1,7 @@
-"""Files that are replaced as a whole: what stood there before stands until the new one is safe on the disk.
+"""Atomic replacement of files: the previous content stays until the new one is safe on the disk.
 
 A file is written under a temporary name in the same folder, ``.NAME.HOST.PID.tmp``, and takes its place by a
-rename. A process that is killed leaves its temporary file behind; the next one that writes the same file
+rename. A killed process leaves its temporary file behind; the next writer of the same file
 removes it.
 """
 
@@ -15,26 +15,26 @@ from pathlib import Path
 
 PathLike = str | os.PathLike[str]
 
-# What a disk or a folder may have against being written to.
+# Reasons of a disk or a folder to refuse writing.
 _REFUSALS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO}
 
 _END = ".tmp"
 
-# Ends of names that say what a file is, and not HDF5.
+# Suffixes of formats other than HDF5.
 _OTHERS = {".data", ".gsd", ".dump", ".png", ".pdf", ".csv", ".json", ".txt"}
 
 
 @contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """Give a temporary path in the folder of `path`, which takes its place if the body succeeds.
+    """Yield a temporary path in the folder of `path`, which takes its place if the body succeeds.
 
-    If the body raises, the temporary file is removed and what stood at `path` still stands. Where `path`
-    is a link, what it leads to is replaced.
+    If the body raises, the temporary file is removed and `path` is unchanged. If `path`
+    is a link, its target is replaced.
 
     Raises
     ------
     OSError
-        One sentence, if the disk is full, or the folder is not there or not to be written to.
+        If the disk is full, or the folder is missing or not writable; the message is one sentence.
     """
     place = real(path)
     remove_leftovers(place)
@@ -49,9 +49,9 @@ def replacing(path: PathLike) -> Iterator[Path]:
 
 
 def store(path: PathLike, data: bytes | memoryview, *, wait: bool = True) -> None:
-    """Write a whole file, on the disk before it takes its place; errors as `replacing`.
+    """Write a whole file, synced to disk before it takes its place; errors as `replacing`.
 
-    What is of use for a short time only need not wait for the disk, and survives kills just as well.
+    Short-lived files need not wait for the disk, and survive kills just as well.
     """
     with replacing(path) as temporary, temporary.open("wb") as file:
         file.write(data)
@@ -62,28 +62,28 @@ def store(path: PathLike, data: bytes | memoryview, *, wait: bool = True) -> Non
 
 @contextmanager
 def refusals(path: PathLike, temporary: Path) -> Iterator[None]:
-    """Say in one sentence that a disk or a folder refuses to take a file."""
+    """Turn errors of a disk or a folder that refuses a file into one sentence."""
     try:
         yield
     except OSError as error:
         if error.errno not in _REFUSALS and error.filename != str(temporary):
             raise
         msg = (
-            f"{path}: cannot be written ({error.strerror}), expected a folder with room that may be"
-            " written to; make room or choose another, what was there before is as it was"
+            f"{path}: cannot be written ({error.strerror}), expected a writable folder with room;"
+            " make room or choose another, the previous content is unchanged"
         )
         refusal = OSError(msg)
-        refusal.errno = error.errno  # for those who ask; the sentence is all that is printed
+        refusal.errno = error.errno  # for callers; only the message is printed
         raise refusal from error
 
 
 def settled(path: PathLike | None) -> Path | None:
-    """Make a path absolute, so that it leads to the same file wherever the process goes."""
+    """Make a path absolute, so that it stays valid when the working folder changes."""
     return None if path is None else Path(path).absolute()
 
 
 def named(path: Path) -> str:
-    """Name a file as one would type it here: from the working folder on, if it lies in it.
+    """Shorten a path for messages: relative to the working folder, if inside it.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def named(path: Path) -> str:
 
 
 def require_hdf5_name(path: Path) -> None:
-    """Refuse to write HDF5 under a name that says another format.
+    """Refuse to write HDF5 under a suffix of another format.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def require_hdf5_name(path: Path) -> None:
 
 
 def real(path: PathLike) -> Path:
-    """Follow links, so that all names of a file have the same temporary files and journal beside it."""
+    """Resolve links, so that all names of a file share temporary files and journal."""
     return Path(os.path.realpath(path))
 
 
@@ -116,10 +116,10 @@ def _prefix(place: Path) -> str:
 
 
 def remove_leftovers(path: PathLike) -> None:
-    """Remove temporary files for `path` of processes of this machine that are no more."""
+    """Remove temporary files for `path` left by dead processes of this machine."""
     place = real(path)
     prefix = _prefix(place)
-    with suppress(OSError):  # of folders that are not there, of which the writer tells
+    with suppress(OSError):  # missing folders, which the writer reports
         for name in (path.name for path in place.parent.iterdir()):
             pid = name.removeprefix(prefix).removesuffix(_END)
             if name == f"{prefix}{pid}{_END}" and pid.isdecimal() and not _is_alive(int(pid)):

@@ -1,4 +1,4 @@
-"""What a frame of a file holds, and how its box lies there."""
+"""Elements of a frame in a file, and the layout of its box."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from jamshape.packing import Lengths, Packing
 if TYPE_CHECKING:
     import h5py
 
+    from jamshape.files.disk import PathLike
+
 # Elements under /particles/all, some by the fields of a packing.
 RESTS = {"position_rest": "position_rest", "orientation_rest": "orientation_rest"}
 EDGES, EDGES_REST = "box/edges", "box/edges_rest"
@@ -21,31 +23,39 @@ _MATRICES = 3  # dimensions of a dataset (T, D, D)
 
 
 class Form(NamedTuple):
-    """What the frames of a file hold beside what all do."""
+    """Optional content of the frames of a file."""
 
     rests: bool = False
-    """What doubles leave out."""
+    """Low parts of coordinates."""
     tilted: bool = False
-    """Boxes as matrices, whether they have a tilt or not."""
+    """Boxes as matrices, with or without tilt."""
 
     @classmethod
     def of(cls, packing: Packing) -> Form:
-        """Of a file of this frame alone."""
+        """Return the form of a file with this frame alone."""
         return cls(packing.has_rests, packing.box.is_tilted or bool(packing.tilt_rest.any()))
 
     @classmethod
     def found(cls, file: h5py.File) -> Form:
-        """Look into a file."""
+        """Detect the form of a file."""
         frames = file["particles/all"]
         return cls("position_rest" in frames, frames[EDGES]["value"].ndim == _MATRICES)
 
     def joined(self, other: Form) -> Form:
-        """Of a file of all these frames."""
+        """Return the form of a file with frames of both."""
         return Form(self.rests or other.rests, self.tilted or other.tilted)
 
 
+def row_of(frame: int, n_frames: int, path: PathLike) -> int:
+    """Count a frame from 0, a negative one from the end; ValueError if there is none."""
+    if not -n_frames <= frame < n_frames:
+        msg = f"{path}: has {n_frames} frames, expected frame {frame} to be one of them"
+        raise ValueError(msg)
+    return frame % n_frames
+
+
 def frame_values(packing: Packing, form: Form) -> dict[str, NDArray[Any]]:
-    """Give what a frame holds, by element."""
+    """Return the elements of a frame by name."""
 
     def stored(edges: FloatArray, tilt: FloatArray) -> FloatArray:
         # H5MD has edge vectors as rows.
@@ -65,14 +75,14 @@ def frame_values(packing: Packing, form: Form) -> dict[str, NDArray[Any]]:
 
 
 def lengths_of(edges: FloatArray) -> Lengths:
-    """Take a box as H5MD has it: edges (D,), or (D, D) edge vectors as rows."""
+    """Read a box in the layout of H5MD: edges (D,), or (D, D) edge vectors as rows."""
     return Lengths.of(edges.T) if edges.ndim > 1 else Lengths(edges, np.empty(0))
 
 
 def as_rest(rest: NDArray[Any], whole: NDArray[Any]) -> NDArray[Any]:
-    """Take what doubles leave out; 0 where it is more than that, after another program has changed the doubles."""
+    """Return low parts; 0 where they are too large, after another program has changed the doubles."""
     if rest.shape != whole.shape or {rest.dtype.kind, whole.dtype.kind} != {"f"}:
-        return rest  # which a packing refuses
+        return rest  # refused by Packing
     with np.errstate(over="ignore"):
         is_more = np.abs(rest) > np.spacing(np.abs(whole))
     return np.where(is_more & np.isfinite(rest), 0.0, rest)

@@ -2,38 +2,38 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
 
 ::
 
-    /h5md               +version [1, 1]   author/+name   creator/+name, version, format_version (2; 1 where
-                        it is not there), origin (what the last bits depend on: `jamshape.files.origin`)
-    /particles/all      +shape_style   +k_e, sides: the law of the contacts (where they are not there, those
-                        of /parameters, or else 1 and 2)
+    /h5md               +version [1, 1]   author/+name   creator/+name, version, format_version (2; 1 if
+    missing), origin (platform that determines the last bits: `jamshape.files.origin`)
+    /particles/all      +shape_style   +k_e, sides: the law of the contacts (if missing, those
+    of /parameters, or else 1 and 2)
         box             +dimension D   +boundary D times "periodic"
-            edges       {step, time, value (T, D), or (T, D, D) with the edge vectors as rows: of all
+            edges       {step, time, value (T, D), or (T, D, D) with the edge vectors as rows: for all
                         frames of a file that has a tilted box, the transposes of `Box.matrix`}
             lo          {step, time, value (T, D)}, the lower corner (not in H5MD)
         position        {step, time, value (T, N, D)}
         orientation     {step, time, value (T, N) angles in 2D, (T, N, 4) quaternions w i j k in 3D}
         image           {step, time, value (T, N, D)}
-        position_rest, orientation_rest, box/edges_rest    what the doubles of these leave out, as more
-                        doubles of their shapes, in files of states that are known to more digits (not
-                        in H5MD)
+        position_rest, orientation_rest, box/edges_rest    low parts of these, as more
+        doubles of their shapes, in files of states with extended precision (not
+        in H5MD)
         species, id     (N,)
         diameters       (N, 3), the shape columns of LAMMPS (not in H5MD)
-        exponent        (N,), of shapes that have one (not in H5MD)
-        half_length, radius (N,), A and R of the others, as contacts are computed with them (not in H5MD)
-    /observables/NAME   {step, time, value (T', ...)}, each sampled when its caller likes
-    /parameters         +every attribute that the caller gives, results too
+        exponent        (N,), for shapes that have one (not in H5MD)
+        half_length, radius (N,), A and R of the others, as used for contacts (not in H5MD)
+    /observables/NAME   {step, time, value (T', ...)}, each sampled at its own steps
+    /parameters         +every attribute given by the caller, including results
     /report             step, wall_seconds, error (T'',): the convergence history
 
 `step` and `time` of all elements under /particles/all are hard links to those of `position`, as
-H5MD asks. `step` is written last and counts the rows: what an interrupted append has left beyond
-it is neither read nor kept.
+H5MD requires. `step` is written last and counts the rows: rows beyond it, from an interrupted append,
+are ignored and overwritten.
 
 MDAnalysis refuses any box that is not three-dimensional, pairs row i of each observable with frame
 i, whatever their steps, and fails on an observable with fewer rows than there are frames;
 `jamshape.exchange.mdanalysis` writes what it opens.
 
 Names are those of `jamshape.files.vocabulary`: files of earlier versions, which called a pressure or an
-exponent `p`, are read as if they were written today, and gone on with under the new names.
+exponent `p`, are read under today's names, and continued under these.
 
 The specification: https://nongnu.org/h5md/h5md.html
 """
@@ -50,13 +50,9 @@ from numpy.typing import ArrayLike, NDArray
 from jamshape.checks import require_other_file
 from jamshape.files import layout
 from jamshape.files.disk import PathLike, replacing
-from jamshape.files.frames import Form
+from jamshape.files.frames import Form, row_of
 from jamshape.files.journal import read_journal
-from jamshape.files.layout import (
-    FileFormatError,
-    Report,
-    Series,
-)
+from jamshape.files.layout import FileFormatError, Report, Series
 from jamshape.files.rows import check_after, check_same_particles
 from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, renamed
 from jamshape.packing import Packing
@@ -93,7 +89,7 @@ def write_packing(
     observables: Mapping[str, ArrayLike] | None = None,
     report: tuple[ArrayLike, ArrayLike, ArrayLike] | None = None,
 ) -> None:
-    """Write a packing, replacing the file at `path` only when all is written.
+    """Write a packing; an existing file is replaced only when writing is complete.
 
     Parameters
     ----------
@@ -101,10 +97,10 @@ def write_packing(
     packing : Packing
     attributes : mapping of str to bool, int, float, str or small array, optional
     observables : mapping of str to array_like of numbers, optional
-        Each is stored as one row at the packing's step and time: scalars as float64, arrays in
-        their own type. NaN may stand for what is not defined.
+        Each is stored as one row at the packing's step and time: scalars as float64, arrays with
+        their own type. NaN marks undefined values.
     report : three array_like of (T,) numbers, optional
-        The convergence history: step, wall seconds, error.
+        Convergence history: step, wall seconds, error.
 
     Raises
     ------
@@ -125,7 +121,7 @@ def write_frames(
 ) -> None:
     """Write packings of the same particles as the frames of a run, with the steps 0, 1, 2, ...
 
-    Errors are those of `write_run`.
+    For errors see `write_run`.
     """
     write_run(path, [frame.with_(step=step) for step, frame in enumerate(frames)], attributes)
 
@@ -133,13 +129,13 @@ def write_frames(
 def write_run(
     path: PathLike, frames: Sequence[Packing], attributes: Mapping[str, Any] | None = None
 ) -> None:
-    """Write packings as the frames of a run, replacing the file at `path` only when all are written.
+    """Write packings as the frames of a run; an existing file is replaced only when writing is complete.
 
     Parameters
     ----------
     path : path-like
     frames : sequence of Packing
-        Of the same particles, at steps that ascend.
+        Frames with the same particles, at ascending steps.
     attributes : mapping of str to bool, int, float, str or small array, optional
 
     Raises
@@ -170,12 +166,12 @@ def write_run(
 
 
 def copy_run(path: PathLike, out: PathLike) -> None:
-    """Write a copy of a run, with the rows that are in its journal still, to another file.
+    """Copy a run to another file, including rows that are still in its journal.
 
     Raises
     ------
     FileFormatError
-        As `read_packing`.
+        As in `read_packing`.
     ValueError
         If both are the same file.
     OSError
@@ -195,23 +191,20 @@ def read_packing(path: PathLike, frame: int = -1) -> Packing:
     ----------
     path : path-like
     frame : int
-        From 0; negative ones count from the end.
+        Counted from 0 or, if negative, from the end.
 
     Raises
     ------
     FileFormatError
         If the file is not a complete H5MD file of this module, or a value is not finite.
     ValueError
-        If there is no such frame.
+        If the frame does not exist.
     OSError
         If the file cannot be opened.
     """
     with layout.opened(path) as file:
         n_frames = layout.count(file, "particles/all/position")
-        if not -n_frames <= frame < n_frames:
-            msg = f"{path}: has {n_frames} frames, expected frame {frame} to be one of them"
-            raise ValueError(msg)
-        return layout.read_frame(file, frame % n_frames)
+        return layout.read_frame(file, row_of(frame, n_frames, path))
 
 
 def count_frames(path: PathLike) -> int:
@@ -229,7 +222,7 @@ def read_attributes(path: PathLike) -> dict[str, Any]:
 
 
 def require_attributes(out: Path, expected: Mapping[str, Any], what: str = "a packing") -> None:
-    """Refuse a file with other attributes than expected; one of an earlier version may lack some.
+    """Raise if a file has other attributes than expected; older files may lack some.
 
     Raises
     ------
@@ -243,7 +236,7 @@ def require_attributes(out: Path, expected: Mapping[str, Any], what: str = "a pa
         if not np.array_equal(stored.get(name, np.nan), value):
             msg = (
                 f"{out} holds {what} with {name} = {stored.get(name)}, expected {value};"
-                " write to another file, or make it again"
+                " write to another file, or use again to replace it"
             )
             raise ValueError(msg)
 
@@ -256,18 +249,18 @@ def read_style(path: PathLike) -> tuple[str, int]:
 
 
 def read_format_version(path: PathLike) -> int:
-    """Read which names a file uses; errors as `read_packing`."""
+    """Read the version of the names in a file; errors as `read_packing`."""
     with layout.opened(path) as file:
         return int(layout.require_item(file, "h5md/creator").attrs.get("format_version", 1))
 
 
 def read_creator(path: PathLike) -> str:
-    """Read which version of jamshape wrote a file; errors as `read_packing`."""
+    """Read the version of jamshape that wrote a file; errors as `read_packing`."""
     return _of_creator(path, "version", "unknown")
 
 
 def read_origin(path: PathLike) -> str:
-    """Read what the bits of a file depend on, as `jamshape.files.origin.origin` names it, "" where it is not told; errors as `read_packing`."""
+    """Read the `jamshape.files.origin.origin` stored in a file, "" if missing; errors as `read_packing`."""
     return _of_creator(path, "origin", "")
 
 

@@ -11,7 +11,7 @@ then, and at the end, the rows are folded into a copy of the HDF5 file, which re
     TOKEN\n                       32 digits: of the HDF5 file that these rows go on from, its attribute `journal`
     record, record, ...
 
-    record = length (8 bytes), CRC-32 (4 bytes), and so many bytes:
+    record = length (8 bytes), CRC-32 (4 bytes), and its bytes:
         length of the head (4 bytes), the head as JSON, the rows of all tables, bytes of NumPy
         head = {"tables": [[name, dtype, number of rows], ...], "texts": {attribute: text}}
 
@@ -54,15 +54,15 @@ _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP}
 
 
 class Record(NamedTuple):
-    """What one call appends."""
+    """Content of one append."""
 
     tables: dict[str, Table]
     texts: dict[str, str]
-    """Attributes that are text; those that are numbers are a table."""
+    """Attributes that are text; numeric ones are a table."""
 
 
 class Pending(NamedTuple):
-    """What a journal holds."""
+    """Content of a journal."""
 
     token: str
     records: list[Record]
@@ -82,7 +82,7 @@ def new_token() -> str:
 
 
 def read_journal(path: PathLike) -> Pending | None:
-    """Read what is whole of the journal of a run; None if there is no row in it."""
+    """Read the complete rows of the journal of a run; None without rows."""
     try:
         data = journal_of(path).read_bytes()
     except FileNotFoundError:
@@ -92,9 +92,9 @@ def read_journal(path: PathLike) -> Pending | None:
 
 
 def remove_run(path: PathLike) -> None:
-    """Remove the file of a run and its journal, whatever is there of them."""
+    """Remove the file of a run and its journal, if they exist."""
     for place in (Path(path), journal_of(path)):
-        if place.exists():  # a disk that is read-only does not even unlink what is not there
+        if place.exists():  # unlink fails on a read-only disk even for missing files
             place.unlink()
 
 
@@ -158,7 +158,7 @@ class Journal:
     Parameters
     ----------
     path : path-like
-        Of the run's HDF5 file.
+        Path of the run's HDF5 file.
 
     Raises
     ------
@@ -182,7 +182,7 @@ class Journal:
             self._write(_TITLE + token.encode() + b"\n")
 
     def read(self) -> Pending | None:
-        """Read what is there, of this writer or of one before it."""
+        """Read all rows, of this writer or an earlier one."""
         return parse(self.path.read_bytes())
 
     @property
@@ -203,7 +203,7 @@ class Journal:
     def close(self, *, and_remove: bool) -> None:
         """Release the lock, of a journal that is needed no more or one to go on from."""
         if self._close.alive and and_remove:
-            with suppress(OSError):  # of no harm: its token is that of no file any more
+            with suppress(OSError):  # harmless: its token matches no file any more
                 self.path.unlink()
         self._close()
 

@@ -1,18 +1,18 @@
 """LAMMPS data files and text dumps of ellipsoids.
 
 Numbers are written with 17 significant digits and read back to the last bit. Two numbers of a
-`Packing` are not among those of the files and may change in the last bit: an angle in 2D, which
-goes through its quaternion, and an edge of the box, which goes through its upper end (and is
-exact where the lower corner is 0 or half an edge below it). Dumps of a box with a tilt tell the bounds of
-the cuboid around it, from which its own are found with as much rounding.
+`Packing` may change in the last bit, since files hold others: an angle in 2D, converted
+through its quaternion, and an edge of the box, computed from its upper end (exact
+if the lower corner is 0 or half an edge below it). Dumps of a tilted box hold the bounds of
+the surrounding cuboid, from which the box follows with similar rounding.
 
-Neither format has a place for the shape and the law of contacts. In data files of ours the first line, which LAMMPS does
-not read, tells them with the dimension, and a comment behind each row of Ellipsoids its exponent. Of other files
-`jamshape.files.meaning` says what they are taken for.
+Neither format stores the shape and the law of contacts. In our data files the first line, which LAMMPS does
+not read, states them with the dimension, and a comment behind each row of Ellipsoids its exponent. For other files
+`jamshape.files.meaning` decides.
 
-Dumps tell the exponent p twice: in a column ``exponent``, to all digits, and as 1/p in
-``SuperquadricRoundness.Phi`` and ``.Theta``, which OVITO draws the bodies from. Data files of LAMMPS from 2026 on may tell
-2p twice, behind each row of Ellipsoids.
+Dumps hold the exponent p twice: in a column ``exponent``, in full precision, and as 1/p in
+``SuperquadricRoundness.Phi`` and ``.Theta``, with which OVITO draws the bodies. Data files of LAMMPS from 2026 on may
+hold 2p twice, behind each row of Ellipsoids.
 """
 
 from __future__ import annotations
@@ -49,25 +49,25 @@ _IMAGE = ("ix", "iy", "iz")
 _QUATERNION = ("quatw", "quati", "quatj", "quatk")
 _DIAMETERS = ("shapex", "shapey", "shapez")
 _EXPONENT = ("exponent",)
-_ROUNDNESS = ("SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta")  # names that OVITO knows
+_ROUNDNESS = ("SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta")  # OVITO's names
 _DUMP_COLUMNS = ("id", "type", *_POSITION, *_QUATERNION, *_DIAMETERS)
 _ATOMS = ("id", "type", "ellipsoidflag", "density", *_POSITION)
 _ELLIPSOIDS = ("id", *_DIAMETERS, *_QUATERNION)
 _BLOCKS = ("block1", "block2")  # 2p each, of atom_style ellipsoid superellipsoid
 _ATOM_STYLE = "ellipsoid"
-# Columns that other styles have behind those of ellipsoids in an atom style hybrid.
+# Number of columns behind those of ellipsoids, by other styles in an atom style hybrid.
 _HYBRID = {"atomic": 0, "molecular": 1, "bond": 1, "angle": 1, "charge": 1, "full": 2}
 _ATOMS_OF_HYBRID = ("id", "type", "x", "y", "z", "ellipsoidflag", "density")
 _PAIRS = {"Pair Coeffs": 1, "PairIJ Coeffs": 2}  # types in a row
 _ALIKE = 1e-9  # relative difference of exponents that rounding leaves
-_COUNTED = 200  # rows whose digits tell those of a file
-# TIMESTEP stands before TIME because the one begins with the other.
+_COUNTED = 200  # rows from which the number of digits is determined
+# TIMESTEP precedes TIME, which is its prefix.
 _ITEM_ROWS = {"UNITS": 1, "TIMESTEP": 1, "TIME": 1, "NUMBER OF ATOMS": 1, "BOX BOUNDS": 3}
 
 
 class _Frame(NamedTuple):
     columns: Mapping[str, FloatArray]
-    """Under the names of a dump's columns, each (N,), in the order of the ids."""
+    """Columns by their names in a dump, each (N,), in the order of the ids."""
     bounds: FloatArray
     """(3, 2) lower and upper ends."""
     tilt: FloatArray
@@ -78,16 +78,16 @@ class _Frame(NamedTuple):
 
 
 def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
-    """Write a data file for ``atom_style ellipsoid``, replacing `path` only when all is written.
+    """Write a data file for ``atom_style ellipsoid``; `path` is replaced only when writing is complete.
 
     Parameters
     ----------
     path : path-like
     packing : Packing
-        Every particle, discs too, is written as an ellipsoid. In 2D, z is 0 and the box reaches
+        All particles, including discs, are written as ellipsoids. In 2D, z is 0 and the box reaches
         from -0.5 to 0.5 in z. Shape, law and exponents go along as comments.
     density : float, [mass / length^3]
-        LAMMPS makes the mass of it.
+        Mass density, from which LAMMPS computes masses.
 
     Raises
     ------
@@ -116,17 +116,17 @@ def write_data(path: PathLike, packing: Packing, density: float = 1.0) -> None:
 
 
 def read_data(path: PathLike, dimension: int | None = None, shape: str | None = None) -> Packing:
-    """Read a data file of ``atom_style ellipsoid``, ours or one of LAMMPS's ``write_data``.
+    """Read a data file of ``atom_style ellipsoid``, ours or from LAMMPS's ``write_data``.
 
     Parameters
     ----------
     path : path-like
     dimension : {2, 3}, optional
-        What the file says when left out, or else 2 if all particles lie at one z and are turned about z;
-        a warning says where that is doubtful.
+        By default that of the file, or else 2 if all particles have the same z and rotate about z;
+        a warning reports doubtful cases.
     shape : str, optional
-        A name of `jamshape.shapes.table.SHAPES`; what the file says when left out, or else the first shape of
-        that table that can have such diameters, with a warning.
+        A name of `jamshape.shapes.table.SHAPES`; by default that of the file, or else the first shape of
+        that table that fits the diameters, with a warning.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def read_data(path: PathLike, dimension: int | None = None, shape: str | None = 
     Raises
     ------
     FileFormatError
-        If the file is cut short, is not of that style, what it holds is not a packing, or it says another
+        If the file is truncated, is not of that style, does not hold a packing, or states another
         dimension or shape.
     OSError
         If the file cannot be opened.
@@ -157,13 +157,13 @@ def iter_dump(
     Parameters
     ----------
     path : path-like
-        Of ``dump custom`` with the columns ``id type x y z quatw quati quatj quatk shapex shapey
-        shapez`` in any order, ``ix iy iz`` and ``exponent`` if wanted, and others, which are ignored.
+        A ``dump custom`` with the columns ``id type x y z quatw quati quatj quatk shapex shapey
+        shapez`` in any order, optionally ``ix iy iz`` and ``exponent``, and others, which are ignored.
         Quaternions and shapes may come from a compute of their name, ``compute quatw all
         property/atom quatw`` and the column ``c_quatw``, and so on; the exponent from a variable.
-        Without it, p is 1 over ``SuperquadricRoundness.Phi``, if that is there.
+        Without it, p is 1 over ``SuperquadricRoundness.Phi``, if present.
     dimension, shape
-        As of `read_data`; those of the first frame hold for all.
+        See `read_data`; those of the first frame apply to all.
 
     Yields
     ------
@@ -173,7 +173,7 @@ def iter_dump(
     Raises
     ------
     FileFormatError
-        If a frame is cut short or is not such a dump, after the frames before it.
+        If a frame is truncated or not of such a dump; earlier frames are yielded before.
     OSError
         If the file cannot be opened.
     """
@@ -202,22 +202,22 @@ def read_dump(
 def read_any(
     path: PathLike, frame: int = -1, dimension: int | None = None, shape: str | None = None
 ) -> Packing:
-    """Read one packing from an H5MD file, a text dump or a data file, told by their content.
+    """Read one packing from an H5MD file, a text dump or a data file, distinguished by their content.
 
     Parameters
     ----------
     path : path-like
     frame : int
-        From 0; negative ones count from the end.
+        Counted from 0 or, if negative, from the end.
     dimension, shape
-        As of `read_data`; an H5MD file says both itself.
+        See `read_data`; an H5MD file states both itself.
 
     Raises
     ------
     FileFormatError
-        If the file, as far as it was read, is damaged or none of the three.
+        If the file, as far as it was read, is damaged or has none of these formats.
     ValueError
-        If there is no such frame.
+        If the frame does not exist.
     OSError
         If the file cannot be opened.
     """
@@ -297,7 +297,7 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
 
 
 def _exponent(columns: Mapping[str, FloatArray]) -> FloatArray:
-    """(N,) exponents; empty if the file tells none."""
+    """(N,) exponents; empty if the file has none."""
     if set(_EXPONENT) <= set(columns):
         return columns["exponent"]
     if not set(_ROUNDNESS) <= set(columns):
@@ -319,7 +319,7 @@ def _whole(column: FloatArray) -> IntArray:
 def _columns(
     rows: Sequence[str], names: Sequence[str], wanted: Sequence[str]
 ) -> dict[str, FloatArray]:
-    """Parse rows under names; return the wanted columns in the order of the ids."""
+    """Parse rows with column names; return the wanted columns in the order of the ids."""
     words = [row.split() for row in rows]
     for row in words:
         if len(row) != len(names):
@@ -362,15 +362,15 @@ class _Section(NamedTuple):
     """Rows of a data file under a title."""
 
     title: str
-    """The comment behind it, such as the atom style."""
+    """Comment behind it, such as the atom style."""
     rows: list[str]
-    """Without comments and blank lines."""
+    """Rows without comments and blank lines."""
     comments: list[str]
-    """Behind each row."""
+    """Comments behind the rows."""
 
 
 def _sections(text: str) -> dict[str, _Section]:
-    """Rows under their section's title; the header's is ''."""
+    """Return rows by the title of their section, '' for the header."""
     sections = {"": _Section("", [], [])}
     here = sections[""]
     for line in text.splitlines()[1:]:
@@ -384,7 +384,7 @@ def _sections(text: str) -> dict[str, _Section]:
 
 
 def _numbered(rows: list[str], labels: _Section | None) -> list[str]:
-    """Put numbers of types for their labels, where a file has some."""
+    """Replace type labels by numbers, if the file has labels."""
     if labels is None:
         return rows
     numbers = {words[1]: words[0] for words in (row.split() for row in labels.rows)}
@@ -393,7 +393,7 @@ def _numbered(rows: list[str], labels: _Section | None) -> list[str]:
 
 
 def _atom_columns(title: str, count: int) -> tuple[str, ...]:
-    """Name the columns of Atoms by the atom style that its title names; "" where nobody needs one."""
+    """Name the columns of Atoms by the atom style in its title; "" for unneeded ones."""
     style, *others = title.split() or [_ATOM_STYLE]
     if style == _ATOM_STYLE:
         return _ATOMS if count == len(_ATOMS) else (*_ATOMS, *_IMAGE)
@@ -406,7 +406,7 @@ def _atom_columns(title: str, count: int) -> tuple[str, ...]:
     plain = (*_ATOMS_OF_HYBRID, *[""] * more)
     if not known or count not in {len(plain), len(plain) + len(_IMAGE)}:
         msg = (
-            f"the section is titled 'Atoms # {title}', which does not tell its {count} columns, {what}, or"
+            f"the section is titled 'Atoms # {title}', which does not define its {count} columns, {what}, or"
             " name the styles of the hybrid in the title, ellipsoid first, such as"
             " 'Atoms # hybrid ellipsoid molecular'"
         )
@@ -415,7 +415,7 @@ def _atom_columns(title: str, count: int) -> tuple[str, ...]:
 
 
 def _require_ellipsoids(atoms: Mapping[str, FloatArray]) -> None:
-    """Refuse columns of another atom style, and atoms that are no ellipsoids."""
+    """Refuse columns of another atom style, and atoms that are not ellipsoids."""
     if not ((atoms["ellipsoidflag"] == 1) & (atoms["density"] > 0)).all():
         msg = (
             "columns of Atoms are not those of atom_style ellipsoid, expected 1 as ellipsoidflag and a"
@@ -425,7 +425,7 @@ def _require_ellipsoids(atoms: Mapping[str, FloatArray]) -> None:
 
 
 def _ellipsoids(rows: Sequence[str], comments: Sequence[str]) -> dict[str, FloatArray]:
-    """Read the section Ellipsoids, with exponents where they are told."""
+    """Read the section Ellipsoids, with exponents if present."""
     if len(rows[0].split()) == len(_ELLIPSOIDS) + len(_BLOCKS):
         wide = (*_ELLIPSOIDS, *_BLOCKS)
         found = _columns(rows, wide, wide)
@@ -445,7 +445,7 @@ def _ellipsoids(rows: Sequence[str], comments: Sequence[str]) -> dict[str, Float
 
 
 def _said(text: str, sections: Mapping[str, _Section], columns: dict[str, FloatArray]) -> Said:
-    """Collect what a data file says beside its columns; exponents of types go to the columns."""
+    """Collect the metadata of a data file; exponents of types go to the columns."""
     first = text.partition("\n")[0]
     if first.startswith(_TITLE) and "#" in first:
         words = dict(word.split("=", 1) for word in first.split("#")[1].split() if "=" in word)
@@ -462,12 +462,12 @@ def _said(text: str, sections: Mapping[str, _Section], columns: dict[str, FloatA
 def _of_pairs(
     shape: str, rows: Sequence[Sequence[str]], n_types: int, columns: dict[str, FloatArray]
 ) -> Said:
-    """Read the coefficients of our pair styles, as `write_data` of LAMMPS writes them."""
+    """Read the coefficients of our pair styles, as LAMMPS's `write_data` writes them."""
     stiffness = {float(row[n_types]) for row in rows}
     if len(stiffness) != 1:
         msg = (
-            f"pairs of types have the stiffnesses k_e {sorted(stiffness)}, expected a single one, which a packing"
-            " holds; remove the section Pair Coeffs to read the particles alone"
+            f"pair coefficients have the stiffnesses k_e {sorted(stiffness)}, expected a single one for all;"
+            " remove the section Pair Coeffs to read only the particles"
         )
         raise ValueError(msg)
     own = {int(row[0]): row for row in rows if len(set(row[:n_types])) == 1}
@@ -484,7 +484,7 @@ def _digits(rows: Sequence[str], names: Sequence[str]) -> int:
 
 
 def _header(lines: Sequence[str]) -> dict[str, list[str]]:
-    """Numbers under the keyword that follows them on their line."""
+    """Return numbers by the keyword that follows them on their line."""
     header = {}
     for line in lines:
         words = line.split()
@@ -506,8 +506,8 @@ def _bounds(header: Mapping[str, list[str]]) -> tuple[FloatArray, FloatArray]:
     tilt = header.get("xy xz yz", ["0"] * 3)
     if any(len(ends) != 2 for ends in bounds) or len(tilt) != 3:
         msg = (
-            "the header describes no box, expected 'xlo xhi', 'ylo yhi', 'zlo zhi', and 'xy xz yz' of"
-            " one with a tilt"
+            "the header describes no box, expected 'xlo xhi', 'ylo yhi', 'zlo zhi', and 'xy xz yz' if"
+            " it is tilted"
         )
         raise ValueError(msg)
     return np.array(bounds, dtype=np.float64), np.array(tilt, dtype=np.float64)
@@ -536,7 +536,7 @@ def _dump_frame(title: str, lines: TextIO, *, is_first: bool) -> _Frame:
 
 
 def _plain_name(column: str) -> str:
-    """`quatw` for `c_quatw`, the only name that a LAMMPS before ``dump_modify colname`` can give."""
+    """Return `quatw` for `c_quatw`, the only possible name in LAMMPS before ``dump_modify colname``."""
     name = column[2:] if column[:2] in {"c_", "f_", "v_"} else column
     return name if name in (*_QUATERNION, *_DIAMETERS, *_EXPONENT) else column
 
@@ -544,7 +544,7 @@ def _plain_name(column: str) -> str:
 def _take(lines: TextIO, n: int) -> list[str]:
     rows = list(itertools.islice(lines, n))
     if len(rows) < n or not all(row.endswith("\n") for row in rows):
-        msg = "the file ends within the frame, expected a complete one; leave the frame out"
+        msg = "the file ends within the frame, expected a complete one; remove the frame"
         raise ValueError(msg)
     return rows
 
@@ -570,6 +570,6 @@ def _dump_bounds(item: Sequence[str]) -> tuple[FloatArray, FloatArray]:
         raise ValueError(msg)
     if not is_tilted:
         return columns, np.zeros(3)
-    # LAMMPS tells the cuboid around the box.
+    # LAMMPS writes the bounds of the surrounding cuboid.
     around, tilt = columns[:, :2], columns[:, 2]
     return around - np.transpose(cuboid_around(Lengths(np.zeros(3), tilt).matrix)), tilt

@@ -1,4 +1,4 @@
-"""How packings and runs lie in HDF5: groups, datasets, rows. See `jamshape.files.h5md` for the layout."""
+"""HDF5 layout of packings and runs: groups, datasets, rows. See `jamshape.files.h5md`."""
 
 from __future__ import annotations
 
@@ -15,15 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.disk import PathLike, store
-from jamshape.files.frames import (
-    EDGES,
-    EDGES_REST,
-    RESTS,
-    Form,
-    as_rest,
-    frame_values,
-    lengths_of,
-)
+from jamshape.files.frames import EDGES, EDGES_REST, RESTS, Form, as_rest, frame_values, lengths_of
 from jamshape.files.journal import Pending, Table, read_journal
 from jamshape.files.origin import origin
 from jamshape.files.rows import Columns, Stored, as_column, gathered, table
@@ -36,18 +28,17 @@ if TYPE_CHECKING:
     import h5py
 
 
-# Large enough for a long series to be a few chunks, small enough to keep a packing's file small.
-_CHUNK_BYTES = 1024
+_CHUNK_BYTES = 1024  # a long series has few chunks, yet the file of a packing stays small
 _ATTRIBUTE_BYTES = 60_000  # HDF5 refuses attributes of 64 kB and more
 REPORT = {"step": np.int64, "wall_seconds": np.float64, "error": np.float64}
-_SAME_SIZE = 1e-12  # of a diameter: what rounding leaves between two copies of a size
+_SAME_SIZE = 1e-12  # relative rounding difference between two copies of a size
 # Tables of a journal.
 FRAMES, OBSERVABLES, REPORT_TABLE = "frames", "observables", "report"
-_TOKEN = "journal"  # the attribute of a file that has one
+_TOKEN = "journal"  # attribute of a file with a journal
 
 
 class FileFormatError(ValueError):
-    """A file's content is not what it should be; the sentence names the file."""
+    """A file has unexpected content; the message names the file."""
 
 
 class Series(NamedTuple):
@@ -69,20 +60,20 @@ class Report(NamedTuple):
     wall_seconds: FloatArray
     """(T,)"""
     error: FloatArray
-    """(T,) relative errors, in the meaning of whoever wrote them."""
+    """(T,) relative errors, as defined by the writer."""
 
 
 def hdf5() -> Any:
-    """Import h5py here, so that text files and the rest of the library need no HDF5."""
+    """Import h5py lazily, so that text files and the rest of the library need no HDF5."""
     import h5py  # noqa: PLC0415
 
     return h5py
 
 
 class Image(io.BytesIO):
-    """An HDF5 file in memory, which HDF5 cannot fail to write.
+    """An HDF5 file in memory, so that writing by HDF5 cannot fail.
 
-    Its closing crashes where a disk is full; so it never writes to one.
+    HDF5 crashes on closing a file on a full disk, so it never writes to one.
     """
 
     def __init__(self, path: PathLike, data: bytes = b"") -> None:
@@ -90,13 +81,13 @@ class Image(io.BytesIO):
         self._path = path
 
     def __repr__(self) -> str:
-        """Give the path, which h5py takes as the name of the file."""
+        """Return the path, which h5py takes as the name of the file."""
         return str(self._path)
 
     def store(self) -> None:
-        """Write it to its path; errors as `replacing`.
+        """Write the image to its path; errors as `replacing`.
 
-        An error that keeps a view of what is in memory would be told a second time where that is freed.
+        An error that holds a view of the buffer would be reported again when that is freed.
         """
         with self.getbuffer() as whole:
             store(self._path, whole)
@@ -104,12 +95,12 @@ class Image(io.BytesIO):
 
 @contextmanager
 def written(path: PathLike) -> Iterator[h5py.File]:
-    """Give an empty HDF5 file, which replaces the one at `path` if the body succeeds.
+    """Yield an empty HDF5 file, which replaces the one at `path` if the body succeeds.
 
     Raises
     ------
     OSError
-        One sentence, if it cannot be written.
+        If it cannot be written; the message is one sentence.
     """
     image = Image(path)
     with hdf5().File(image, "w") as file:
@@ -119,14 +110,14 @@ def written(path: PathLike) -> Iterator[h5py.File]:
 
 @contextmanager
 def rewritten(path: PathLike) -> Iterator[h5py.File]:
-    """Give a copy of an HDF5 file to change, which replaces it if the body succeeds; errors as `opened`."""
+    """Yield a copy of an HDF5 file to change, which replaces it if the body succeeds; errors as `opened`."""
     with changed(path, path) as file:
         yield file
 
 
 @contextmanager
 def changed(path: PathLike, out: PathLike) -> Iterator[h5py.File]:
-    """Give a copy of an HDF5 file to change, which is written to `out` if the body succeeds; errors as `opened`."""
+    """Yield a copy of an HDF5 file to change, which is written to `out` if the body succeeds; errors as `opened`."""
     with readable(path):
         image = Image(out, Path(path).read_bytes())
         with hdf5().File(image, "r+") as file:
@@ -137,9 +128,9 @@ def changed(path: PathLike, out: PathLike) -> Iterator[h5py.File]:
 
 @contextmanager
 def opened(path: PathLike) -> Iterator[h5py.File]:
-    """Open for reading, with the rows that are in the journal still.
+    """Open for reading, including rows that are still in the journal.
 
-    What HDF5 says of damaged content becomes a FileFormatError, what it says of locks a sentence.
+    HDF5 errors on damaged content become a FileFormatError, those on locks one sentence.
     """
     with readable(path), _with_journal(path) as file:
         check_h5md(file)
@@ -148,18 +139,20 @@ def opened(path: PathLike) -> Iterator[h5py.File]:
 
 @contextmanager
 def readable(path: PathLike) -> Iterator[None]:
-    """Refuse what is no HDF5 file, and turn what HDF5 says of damaged ones into a FileFormatError."""
+    """Refuse files other than HDF5, and turn HDF5 errors on damaged ones into a FileFormatError."""
     if format_of(path) != HDF5:
         msg = f"{path}: is not an HDF5 file, expected one written by jamshape"
         raise FileFormatError(msg)
     try:
         yield
     except BlockingIOError as error:
-        msg = f"{path}: another program has it open to write, expected to read it; close it there"
+        msg = (
+            f"{path}: another program has it open for writing, expected read access; close it there"
+        )
         raise OSError(errno.EAGAIN, msg) from error
     except (OSError, RuntimeError, KeyError) as error:
         if isinstance(error, OSError) and error.errno is not None:
-            raise  # the system's own, and not a matter of content
+            raise  # from the system, not about content
         msg = f"{path}: is truncated or damaged, expected a complete HDF5 file; write it again"
         raise FileFormatError(msg) from error
 
@@ -188,7 +181,7 @@ def check_h5md(file: h5py.File) -> None:
 
 
 def require_item(file: h5py.File, name: str) -> Any:
-    """Look a group or dataset up, or refuse the file."""
+    """Return a group or dataset, or refuse the file."""
     item = file.get(name)
     if item is None:
         msg = f"{file.filename}: has no /{name}, expected an H5MD file written by jamshape"
@@ -197,7 +190,7 @@ def require_item(file: h5py.File, name: str) -> Any:
 
 
 def require_dataset(file: h5py.File, name: str) -> Any:
-    """Look a dataset up, or refuse the file."""
+    """Return a dataset, or refuse the file."""
     dataset = require_item(file, name)
     if not hasattr(dataset, "shape"):
         msg = f"{file.filename}: /{name} is a group, expected a dataset"
@@ -229,7 +222,7 @@ def stored_name(file: h5py.File, name: str) -> str:
 
 
 def rename_observables(file: h5py.File) -> None:
-    """Give the observables of a file of an earlier version their names of today."""
+    """Give the observables of an older file their current names."""
     for new, old in ((new, stored_name(file, new)) for new in RENAMED):
         if old != new and old in require_item(file, "observables"):
             file.move(f"observables/{old}", f"observables/{new}")
@@ -237,7 +230,7 @@ def rename_observables(file: h5py.File) -> None:
 
 
 def has_todays_names(file: h5py.File) -> bool:
-    """Whether a file is not one of an earlier version."""
+    """Whether a file uses the current names."""
     version = require_item(file, "h5md/creator").attrs.get("format_version", 1)
     return bool(version >= FORMAT_VERSION)
 
@@ -250,12 +243,12 @@ def read_rows(file: h5py.File, name: str) -> Series:
 
 
 def plain(value: Any) -> Any:
-    """Turn a number of NumPy into one of Python."""
+    """Convert NumPy scalars to Python."""
     return value.item() if isinstance(value, np.generic) else value
 
 
 def write_metadata(file: h5py.File) -> None:
-    """Write what H5MD asks for."""
+    """Write the metadata that H5MD requires."""
     try:
         version = importlib.metadata.version("jamshape")
     except importlib.metadata.PackageNotFoundError:
@@ -290,14 +283,14 @@ def create_file(
 
 
 def create_particles(group: h5py.Group, packing: Packing) -> None:
-    """Create the elements of particles, still without frames."""
+    """Create the elements of particles, without frames."""
     group.attrs["shape_style"] = packing.shape_style
     group.attrs.update(packing.law._asdict())
     for name in ("species", "id", "diameters"):
         group[name] = getattr(packing, name)
     if packing.shape.has_exponent:
         group["exponent"] = packing.exponent
-    else:  # to form overlaps as exactly as they were, without the rounding of 2(A + R)
+    else:  # reproduces overlaps without the rounding of 2(A + R)
         group["half_length"], group["radius"] = packing.half_length, packing.radius
     for name, value in frame_values(packing, Form.of(packing)).items():
         element = group.create_group(name)
@@ -311,7 +304,7 @@ def create_particles(group: h5py.Group, packing: Packing) -> None:
 
 
 def create_rest(group: h5py.Group, path: str, row: NDArray[Any], n: int) -> None:
-    """Create an element of rests, zero in the n frames that are there."""
+    """Create an element of low parts, zero in the n existing frames."""
     element = group.create_group(path)
     create_rows(element, "value", row)
     element["value"].resize(n, axis=0)
@@ -319,26 +312,26 @@ def create_rest(group: h5py.Group, path: str, row: NDArray[Any], n: int) -> None
 
 
 def create_clock(group: h5py.Group) -> None:
-    """Create steps and times, still without rows."""
+    """Create steps and times, without rows."""
     create_rows(group, "step", np.zeros((), np.int64))
     create_rows(group, "time", np.zeros((), np.float64))
 
 
 def create_rows(group: h5py.Group, name: str, row: NDArray[Any]) -> None:
-    """Create an extensible dataset, still without rows, for rows like `row`."""
+    """Create an extensible dataset for rows like `row`, without rows."""
     per_chunk = max(1, _CHUNK_BYTES // max(1, row.nbytes))
     group.create_dataset(
         name,
         shape=(0, *row.shape),
         dtype=row.dtype,
-        # HDF5 wants chunks of at least 1 within the maximum: an empty extent gets no maximum.
+        # HDF5 requires chunks of at least 1 within the maximum: an empty extent gets no maximum.
         maxshape=(None, *(extent or None for extent in row.shape)),
         chunks=(per_chunk, *(extent or 1 for extent in row.shape)),
     )
 
 
 def fold(file: h5py.File, pending: Pending | None) -> bool:
-    """Append the rows of a journal, if it goes on from this file."""
+    """Append the rows of a journal, if it continues this file."""
     if not pending or token_of(file) != pending.token:
         return False
     tables, attributes = gathered(pending.records)
@@ -349,13 +342,13 @@ def fold(file: h5py.File, pending: Pending | None) -> bool:
 
 
 def token_of(file: h5py.File) -> str | None:
-    """Tell the name of the state of a file, if it has one."""
+    """Return the token of a file's state, or None."""
     token: str | None = file.attrs.get(_TOKEN)
     return token
 
 
 def set_token(file: h5py.File, token: str | None) -> None:
-    """Name the state of a file from which a journal goes on; None where there is no journal."""
+    """Set the token of the file's state that a journal continues; None without a journal."""
     if token:
         file.attrs[_TOKEN] = token
     elif _TOKEN in file.attrs:
@@ -363,7 +356,7 @@ def set_token(file: h5py.File, token: str | None) -> None:
 
 
 def append_table(file: h5py.File, name: str, rows: Table) -> None:
-    """Write rows after the last ones of the frames, the observables or the report."""
+    """Append rows to the frames, the observables or the report."""
     columns = {key: rows[key] for key in rows.dtype.names or ()}
     if name == REPORT_TABLE:
         extend(file["report"], columns)
@@ -392,7 +385,7 @@ def _append_frames(group: h5py.Group, clock: Columns, columns: Columns) -> None:
 
 
 def _make_matrices(element: h5py.Group) -> None:
-    """Turn edges (T, D) of boxes without tilt into matrices (T, D, D)."""
+    """Convert edges (T, D) of boxes without tilt to matrices (T, D, D)."""
     edges = element["value"][()]
     matrices = edges[:, :, None] * np.eye(edges.shape[1])
     del element["value"]
@@ -401,13 +394,13 @@ def _make_matrices(element: h5py.Group) -> None:
 
 
 def frames_table(packing: Packing, form: Form) -> Table:
-    """Put a frame into a table of one row."""
+    """Convert a frame to a table of one row."""
     columns = {name: value[None] for name, value in frame_values(packing, form).items()}
     return table([packing.step], [packing.time], columns)
 
 
 def extend(group: h5py.Group, columns: Columns) -> None:
-    """Write rows after the last one, over what an interrupted writer of earlier versions left there."""
+    """Append rows, overwriting remains of an interrupted writer of earlier versions."""
     n = len(group["step"])
     for name, column in columns.items():
         extend_dataset(group[name], n, column)
@@ -437,7 +430,7 @@ def truncate(step: int, clock: h5py.Group, others: Iterable[h5py.Dataset] = ()) 
 
 
 def check_attributes(attributes: Mapping[str, Any]) -> None:
-    """Refuse what HDF5 cannot hold as an attribute."""
+    """Refuse values that HDF5 cannot hold as attributes."""
     for name, value in attributes.items():
         array = np.asarray(value)
         if array.dtype.kind not in "biuf" and not isinstance(value, str):
@@ -464,20 +457,20 @@ def _require_one_size(file: h5py.File, packing: Packing) -> None:
         is_size = stored.shape == own.shape and stored.dtype.kind in "fiu"
         if not is_size or not (np.abs(stored - own) <= bound).all():
             msg = (
-                f"{file.filename}: {name} is not that of diameters, which are (2(A+R), 2R, 2R), expected both to"
-                " say the same; change both"
+                f"{file.filename}: {name} differs from that of diameters, which are (2(A+R), 2R, 2R), expected both to"
+                " agree; change both"
             )
             raise FileFormatError(msg)
 
 
 def _read_law(file: h5py.File) -> Interaction:
-    """Read the law of the particles; files of 0.1.0 have it among the attributes of runs only."""
+    """Read the law of the particles; files of 0.1.0 store it only among the attributes of runs."""
     known = dict(file["parameters"].attrs) if "parameters" in file else {}
     known |= dict(require_item(file, "particles/all").attrs)
     try:
         return Interaction.told(known)
     except (TypeError, ValueError) as error:
-        msg = f"{file.filename}: k_e and sides are no numbers ({error}), expected those of the contacts"
+        msg = f"{file.filename}: k_e and sides are not numbers ({error}), expected those of the contacts"
         raise FileFormatError(msg) from error
 
 

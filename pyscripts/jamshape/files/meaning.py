@@ -1,7 +1,7 @@
-"""Meaning of a text file of LAMMPS: dimension, shape and law, which its columns do not hold.
+"""Meaning of a LAMMPS text file: dimension, shape and law, which its columns do not state.
 
-They are those that the file says, or the user; what neither says is the most plausible one, with a warning of one
-sentence. Numbers that rounding can reach decide nothing: a plane holds all particles to within `_ROUNDING`.
+The user or the file may state them; otherwise the most plausible one is assumed, with a warning of one
+sentence. Decisions are robust to rounding: a plane holds all particles to within `_ROUNDING`.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from jamshape.packing.rotation import product
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import SHAPES, Fitted, fitted, shape_named
 
-_ROUNDING = 1e-9  # of a length over a diameter, of a quaternion over its length
-PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional system, as LAMMPS has it when nobody says
-# Rotations that bring the body's x to its axis k, w i j k.
+_ROUNDING = 1e-9  # of a length over a diameter, of a quaternion over its norm
+PLANE = (-0.5, 0.5)  # extent in z of a two-dimensional system, LAMMPS's default
+# Rotations w i j k that take the body's x to its axis k.
 _FROM_X = np.array([[1, 0, 0, 0], [0.5**0.5, 0, 0, 0.5**0.5], [0.5**0.5, 0, -(0.5**0.5), 0]])
-_EXACT, _FEW = 15, 5  # digits: of numbers as good as doubles; most that a person writes
+_EXACT, _FEW = 15, 5  # digits: full double precision; most in hand-written files
 
 
 class Wanted(NamedTuple):
-    """Meaning that the user gives to a file; None where nothing is given."""
+    """Meaning given by the user; None where unspecified."""
 
     dimension: int | None = None
     shape: str | None = None
@@ -40,44 +40,44 @@ NOTHING = Wanted()
 
 @dataclass(frozen=True)
 class Said:
-    """Statements of a file beside its columns; None and "" where there are none."""
+    """Statements of a file beside its columns; None and "" where unspecified."""
 
     dimension: int | None = None
     shape: str = ""
     law: Mapping[str, float] = field(default_factory=dict)
-    """k_e and sides, as far as they are told."""
+    """k_e and sides, if stated."""
     has_exponent: bool = False
-    """Whether exponents are told."""
+    """Whether the file has exponents."""
     digits: int = 0
-    """The largest number of significant digits of a coordinate; 0 if nobody counted."""
+    """Largest number of significant digits of a coordinate; 0 if not counted."""
     is_ours: bool = False
-    """Whether sizes are those that we wrote, to the last bit."""
+    """Whether sizes were written by us, exact to the last bit."""
     is_later: bool = False
-    """Whether it is a frame after the first one, of which all is said already."""
+    """Whether it is a frame after the first one, which needs no more warnings."""
 
 
 class Geometry(NamedTuple):
-    """Positions, orientations and sizes, as a file has them."""
+    """Positions, orientations and sizes in a file."""
 
     position: FloatArray
     """(N, 3), [length]"""
     quaternion: FloatArray
-    """(N, 4) w i j k of any length."""
+    """(N, 4) w i j k of any norm."""
     diameters: FloatArray
     """(N, 3), [length]"""
     bounds: FloatArray
-    """(3, 2) ends of the box, [length]."""
+    """(3, 2) lower and upper ends of the box, [length]."""
     tilt: FloatArray
     """(3,) xy, xz, yz, [length]."""
 
     @property
     def size(self) -> float:
-        """The smallest diameter."""
+        """Smallest diameter."""
         return float(self.diameters.min())
 
     @property
     def is_flat(self) -> bool:
-        """Whether all lies in a plane of one z, but for rounding."""
+        """Whether everything lies in a plane of one z up to rounding."""
         z, q = self.position[:, 2], self.quaternion
         tilt = np.abs(self.tilt[1:]).max()
         is_level = bool((np.abs(z - z[0]) <= _ROUNDING * self.size).all())
@@ -93,7 +93,7 @@ class Geometry(NamedTuple):
 
     @property
     def is_usual_plane(self) -> bool:
-        """Whether the box is as high as that of two-dimensional systems is where nobody says otherwise."""
+        """Whether the box has the default height of two-dimensional systems."""
         return bool((np.abs(self.bounds[2] - PLANE) <= _ROUNDING).all())
 
     @property
@@ -116,21 +116,21 @@ class Meaning(NamedTuple):
     law: Interaction
 
     def turned(self, quaternion: FloatArray) -> FloatArray:
-        """Give (N, 4) quaternions of bodies whose axes are named as the shape names them."""
+        """Reorder (N, 4) quaternions of bodies to the axes of the shape."""
         if not self.shape.first.any():
             return quaternion
         return product(quaternion, _FROM_X[self.shape.first])
 
 
 def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> Meaning:
-    """Tell dimension, shape and law of the particles of a file, with warnings of what is doubtful.
+    """Determine dimension, shape and law of the particles of a file, with warnings where doubtful.
 
-    What the user says comes first, then what the file says.
+    The user's statements take precedence over those of the file.
 
     Parameters
     ----------
     path : path-like
-        Named in warnings.
+        Path for warnings.
     there : Geometry
     said : Said
     wanted : Wanted
@@ -138,17 +138,17 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
     Raises
     ------
     ValueError
-        If particles cannot be what the user or the file says.
+        If particles do not fit the statements of the user or the file.
     """
     if not len(there.position):
         msg = "packing has no particles, expected at least one"
         raise ValueError(msg)
     dimension, why = _dimension(there, wanted.dimension or said.dimension)
     name = wanted.shape or said.shape
-    # Of a file that tells exponents, the only shape that has them.
+    # Only one shape has exponents.
     able = [shape.name for shape in SHAPES.values() if shape.has_exponent >= said.has_exponent]
     if name and shape_named(name).name not in able:
-        msg = f"there are exponents, which no {name} has, expected one of {', '.join(able)}"
+        msg = f"the file has exponents, which no {name} has, expected one of {', '.join(able)}"
         raise ValueError(msg)
     if name and said.is_ours:
         found = Fitted(name, there.diameters, np.zeros(len(there.diameters), np.int64))
@@ -160,13 +160,13 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
     if not name and len(able) > 1:
         doubt = "shape= and dimension= (--shape, --dimension)" if why else "shape= (--shape)"
         said_so = _of_shape(path, found.name, dimension, law)
-        warnings.warn(f"{said_so}; say {doubt}, a shape of {', '.join(able)}", stacklevel=2)
+        warnings.warn(f"{said_so}; give {doubt}, a shape of {', '.join(able)}", stacklevel=2)
     elif why:
-        say = "say dimension= or --dimension if it is another"
+        say = "give dimension= or --dimension if it is another"
         warnings.warn(f"{path} {why}: it is read as {dimension}D; {say}", stacklevel=2)
     if shape_named(found.name).has_exponent and not said.has_exponent:
         warnings.warn(
-            f"{path} does not say the exponents of its particles: they are read as p = 1, ellipsoids; use"
+            f"{path} does not state the exponents of its particles: they are read as p = 1, ellipsoids; use"
             " packing.with_(exponent=...) for others",
             stacklevel=2,
         )
@@ -176,7 +176,7 @@ def meaning_of(path: PathLike, there: Geometry, said: Said, wanted: Wanted) -> M
 
 
 def require_told(path: PathLike, packing: Packing, wanted: Wanted) -> None:
-    """Refuse what the user says of a file that says itself what it holds, unless it says the same.
+    """Refuse a user's statement that differs from that of the file.
 
     Raises
     ------
@@ -185,12 +185,12 @@ def require_told(path: PathLike, packing: Packing, wanted: Wanted) -> None:
     for name, own in (("dimension", packing.dimension), ("shape", packing.shape_style)):
         asked = getattr(wanted, name)
         if asked and asked != own:
-            msg = f"{path} says {name} {own} and {asked} was asked for, expected the same; leave {name} out"
+            msg = f"{path} has {name} {own}, expected {asked}; leave {name} out"
             raise ValueError(msg)
 
 
 def _dimension(there: Geometry, told: int | None) -> tuple[int, str]:
-    """Tell the dimension, and why it is doubtful."""
+    """Return the dimension, and why it is doubtful."""
     if told is not None:
         if told == 2 and not there.is_flat:
             msg = "a z, a rotation or a tilt out of the plane is not 0, expected a two-dimensional packing"
@@ -202,14 +202,14 @@ def _dimension(there: Geometry, told: int | None) -> tuple[int, str]:
         return 2, ""
     is_plane = not there.is_tall and (there.is_at_zero or there.is_thin)
     low, high = there.bounds[2].tolist()
-    why = f"does not say its dimension, has all particles in one plane and a box from {low:g} to {high:g} in z"
+    why = f"does not state its dimension, has all particles in one plane and a box from {low:g} to {high:g} in z"
     return (2 if is_plane else 3), why
 
 
 def _of_shape(path: PathLike, name: str, dimension: int, law: Interaction) -> str:
     bonds = {1: "one bond", 2: "two bonds"}[law.sides]
     return (
-        f"{path} does not say which shape its particles have: they are read as {name}s in {dimension}D with"
+        f"{path} does not state the shape of its particles: they are read as {name}s in {dimension}D with"
         f" k_e = {law.k_e:g} and {bonds} side to side"
     )
 
@@ -218,8 +218,8 @@ def _of_digits(path: PathLike, there: Geometry, digits: int) -> str:
     largest = float(np.abs(there.position).max())
     off = 0.5 * 10.0 ** (math.floor(math.log10(largest)) + 1 - digits)
     return (
-        f"{path} has coordinates of {digits} digits, which are off by up to {off:.1g},"
-        f" {off / there.size:.1g} of the smallest diameter: overlaps of that size are not what they were;"
+        f"{path} has coordinates of {digits} digits, with errors up to {off:.1g},"
+        f" {off / there.size:.1g} of the smallest diameter: overlaps of that size are lost;"
         " write them with 17 digits (dump_modify ... format float %.17g)"
     )
 

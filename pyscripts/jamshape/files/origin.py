@@ -1,4 +1,4 @@
-"""What the last bits of results depend on beside their settings: the processor and the libraries."""
+"""Platform on which the last bits of results depend: the processor and the libraries."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from collections.abc import Iterable
 import numpy as np
 
 _ARGUMENTS = np.linspace(0.1, 3.1, 301)
-_SIZE = 48  # of the matrix whose eigenvalues are found
+_SIZE = 48  # of the matrix to diagonalise
 
 
 @functools.cache
 def origin() -> str:
-    """Name the processor's kind and the libraries, with what they make of fixed numbers.
+    """Name the kind of processor and the libraries, with digests of their results for fixed numbers.
 
-    Mathematical functions and linear algebra choose their code by the processor: two machines whose texts are equal
-    give the same bits, as far as the numbers tried here show it.
+    Mathematical functions and linear algebra select code by processor: machines with equal texts
+    give the same bits, as far as the tested numbers show.
 
     Returns
     -------
@@ -45,12 +45,12 @@ def origin() -> str:
 
 
 def _digest(values: Iterable[float]) -> str:
-    """Eight hexadecimal digits of the bits of numbers."""
+    """Return eight hexadecimal digits from the bits of numbers."""
     return hashlib.blake2b(np.array(list(values)).tobytes(), digest_size=4).hexdigest()
 
 
 def _of_c() -> Iterable[float]:
-    """Functions of the C library, which the compiled module calls as well."""
+    """Evaluate functions of the C library, which the compiled module calls as well."""
     for x in _ARGUMENTS.tolist():
         yield from (math.sin(x), math.cos(x), math.exp(x), math.log(x), math.atan2(x, 2.0))
         yield from (math.tan(x), math.pow(x, 1.7), math.acos(x / 4))

@@ -1,7 +1,7 @@
-"""Whether a packing reached its goal, by what its file says of it, and the warning where it did not.
+"""Whether a packing reached its goal, from the attributes of its file, with a warning if not.
 
-The goal is that forces balance to the tolerance, be it on a kink of the energy, and of a strict packing also that no mode
-has a negative eigenvalue. Everything that says so, and whatever averages over packings, asks here.
+The goal is force balance to the tolerance, possibly on a kink of the energy, and for a strict packing also no mode
+with a negative eigenvalue. This is the only definition, used by all reports and averages.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from jamshape.checks import NotReachedWarning
 AT_REST = ("converged", "corner")
 """Outcomes of minimisations after which forces balance."""
 
-_SLIDING = "sliding"  # forces that are left lie along what slides: they may be below the tolerance
+_SLIDING = "sliding"  # remaining forces lie along sliding modes; they may be below the tolerance
 
 _ADVICE = "{strict}, another {u0:name} or another {seed:name}"
 _ADVICE_OF_STRICT = "another {u0:name} or another {seed:name}"
@@ -24,7 +24,7 @@ _ADVICE_OF_DIGITS = "a larger {u0:name} or {tolerance:name}, since rounding leav
 
 
 def is_reached(known: Mapping[str, Any]) -> bool:
-    """Tell whether a packing reached its goal.
+    """Return whether a packing reached its goal.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def is_reached(known: Mapping[str, Any]) -> bool:
 
 
 def shortfall(known: Mapping[str, Any]) -> str:
-    """Say in what a packing falls short of its goal; empty where it does not.
+    """Describe how a packing falls short of its goal; empty if it does not.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def shortfall(known: Mapping[str, Any]) -> str:
     if not _is_balanced(known):
         found = f"with net forces up to {_residual(known):.2g} of the mean force of a bond"
         most = f", expected at most {_tolerance(known):g}" if "tolerance" in known else ""
-        again = " after a second try" if "retry_of" in known else ""
+        again = " after a second attempt" if "retry_of" in known else ""
         return f"it ended {known['outcome']}{again}, {found}{most}"
     if n := _n_negative(known):
         return f"{n} of its modes have a negative eigenvalue, expected none"
@@ -60,14 +60,14 @@ def shortfall(known: Mapping[str, Any]) -> str:
 
 
 def warn_unless_reached(known: Mapping[str, Any], stacklevel: int = 2) -> None:
-    """Warn where a packing did not reach its goal.
+    """Warn if a packing did not reach its goal.
 
     Parameters
     ----------
     known : mapping of str to Any
         Attributes of its file.
     stacklevel : int
-        As of `warnings.warn`, counted from the caller.
+        See `warnings.warn`, counted from the caller.
 
     Warns
     -----
@@ -92,12 +92,12 @@ def _n_negative(known: Mapping[str, Any]) -> int:
 
 
 def _residual(known: Mapping[str, Any]) -> float:
-    """Give the largest net force or torque; NaN where nobody knows."""
+    """Return the largest net force or torque; NaN if unknown."""
     if "residual" in known:
         return float(known["residual"])
     return max(float(known.get(f"residual_{name}", math.nan)) for name in ("force", "torque"))
 
 
 def _tolerance(known: Mapping[str, Any]) -> float:
-    """Give what forces were to balance to; NaN where nobody knows, which nothing is below."""
+    """Return the tolerance of force balance; NaN if unknown, which no residual is below."""
     return float(known.get("tolerance", known.get("quasistatic_tolerance", math.nan)))

@@ -1,4 +1,4 @@
-"""Restart files of LAMMPS, two in turn: one of them is whole at every moment."""
+"""LAMMPS restart files, two in turn: one of them is complete at any time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _MAGIC = SIGNATURES[RESTART]
 
 
 def is_whole(path: Path) -> bool:
-    """Whether a restart file is there, from its beginning to its end."""
+    """Whether a restart file exists and is complete."""
     try:
         with path.open("rb") as file:
             head = file.read(len(_MAGIC))
@@ -36,19 +36,19 @@ class RestartFiles:
     prefix: Path
 
     def newest(self) -> Path | None:
-        """Find the newest one that is whole."""
+        """Find the newest complete file."""
         found = [path for path in self._paths() if is_whole(path)]
         return max(found, key=lambda path: path.stat().st_mtime_ns, default=None)
 
     def next(self) -> Path:
-        """Name the one to write next: not the newest."""
+        """Return the path to write next: not the newest."""
         newest = self.newest()
         return next(path for path in self._paths() if path != newest)
 
     def forget(self) -> None:
         """Remove them."""
         for path in self._paths():
-            if path.exists():  # a disk that is read-only does not even unlink what is not there
+            if path.exists():  # unlink fails on a read-only disk even for missing files
                 path.unlink()
 
     def _paths(self) -> list[Path]:

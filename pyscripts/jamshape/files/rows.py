@@ -1,4 +1,4 @@
-"""Rows on their way to the file of a run: checked against what is stored, and as tables for the journal."""
+"""Rows for the file of a run: checked against stored ones, and arranged as tables of the journal."""
 
 from __future__ import annotations
 
@@ -22,37 +22,37 @@ Columns = Mapping[str, NDArray[Any]]
 
 
 class Kind(NamedTuple):
-    """What a row of an observable is."""
+    """Type and shape of a row of an observable."""
 
     dtype: np.dtype[Any]
     shape: tuple[int, ...]
 
 
 class Scalars(NamedTuple):
-    """Observables that were last stored in one row, all of them numbers."""
+    """Scalar observables stored last in one row."""
 
     names: tuple[str, ...]
     dtype: np.dtype[Any]
-    """Of the row."""
+    """Type of the row."""
 
 
 @dataclass
 class Stored:
-    """What is in the file of a run so far, as far as it decides which rows may follow."""
+    """State of a run's file that determines which rows may follow."""
 
     frame: int | None = None
-    """Step of the last one."""
+    """Step of the last frame."""
     report: int | None = None
     observables: dict[str, Kind] = field(default_factory=dict)
     last: dict[str, int] = field(default_factory=dict)
-    """Step of the last row of each observable that has one."""
+    """Step of the last row of each observable."""
     form: Form = field(default_factory=Form)
-    """Of the frames."""
+    """Form of the frames."""
     scalars: Scalars | None = None
 
     @classmethod
     def of(cls, file: h5py.File) -> Stored:
-        """Look into a file."""
+        """Read the state of a file."""
 
         def last(group: h5py.Group) -> int | None:
             steps = group["step"]
@@ -73,7 +73,7 @@ class Stored:
         )
 
     def check_observables(self, step: int, columns: Columns) -> None:
-        """Refuse rows that begin at a step unless they can follow.
+        """Raise unless rows can follow at a step.
 
         Raises
         ------
@@ -84,7 +84,7 @@ class Stored:
             check_after(name, self.last.get(name), step)
 
     def add_observables(self, step: int, columns: Columns) -> None:
-        """Note that these are stored up to a step."""
+        """Note that observables are stored up to a step."""
         for name, column in columns.items():
             self.observables[name] = Kind(column.dtype, column.shape[1:])
         self.note(step, columns)
@@ -97,13 +97,13 @@ class Stored:
             )
 
     def note(self, step: int, names: Iterable[str]) -> None:
-        """Note the last step of observables whose kinds are known."""
+        """Note the last step of known observables."""
         self.last.update(dict.fromkeys(names, step))
 
     def next_row(
         self, step: int, time: float, observables: Mapping[str, ArrayLike]
     ) -> Table | None:
-        """Make the row that is as the last one, of a later step; None if it is another one.
+        """Return a row like the last one, at a later step; None if it differs.
 
         The rows of a compression are all of this kind, and checking each anew would take longer than a
         small run may.
@@ -149,21 +149,21 @@ def check_same_particles(path: PathLike, first: Packing, packing: Packing) -> No
 
 
 def as_column(value: ArrayLike) -> NDArray[Any]:
-    """Turn the value of an observable into a column of one row."""
+    """Convert the value of an observable to a column of one row."""
     array = np.asarray(value)
-    # A first value that happens to be an integer must not make a series of integers.
+    # A first value that happens to be an integer must not make an integer series.
     if array.ndim == 0 and array.dtype.kind in "biuf":
         array = array.astype(np.float64)
     return array[None]
 
 
 def table(steps: ArrayLike, times: ArrayLike, columns: Columns) -> Table:
-    """Put columns side by side, after their steps and times."""
+    """Join columns into a table, after their steps and times."""
     return beside({"step": np.asarray(steps, np.int64), "time": np.asarray(times), **columns})
 
 
 def beside(columns: Columns, types: Mapping[str, Any] | None = None) -> Table:
-    """Put columns side by side, of their own types or of others."""
+    """Join columns, with their own types or others."""
     dtype = np.dtype(
         [(name, (types or {}).get(name, c.dtype), c.shape[1:]) for name, c in columns.items()]
     )
@@ -174,14 +174,14 @@ def beside(columns: Columns, types: Mapping[str, Any] | None = None) -> Table:
 
 
 class Gathered(NamedTuple):
-    """All rows of a journal, in tables as long as may be."""
+    """All rows of a journal, in tables as long as possible."""
 
     tables: list[tuple[str, Table]]
     attributes: dict[str, Any]
 
 
 ATTRIBUTES = "attributes"
-"""The table of attributes that are numbers; it has one row."""
+"""Table of numeric attributes, with one row."""
 
 
 def gathered(records: Iterable[Record]) -> Gathered:

@@ -1,4 +1,4 @@
-"""Appending to the file of a run, which survives whatever ends the process."""
+"""Crash-safe appending to the file of a run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import perf_counter
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -32,21 +31,19 @@ from jamshape.packing import Packing
 if TYPE_CHECKING:
     import h5py
 
-# Rows are folded into the HDF5 file when they are this part of it, so that all folding together writes
-# a few times its final size; and only after so many times the seconds that folding took last.
-_PART = 0.25
-_PAUSE = 200
-_SECONDS = 0.05  # about what it takes, where it was not measured yet
+_PART = 0.25  # of the HDF5 file, at which rows are folded into it: a few times its final size is written in all
+_PAUSE = 200  # time between foldings, over the time of the last one
+_SECONDS = 0.05  # typical time of one, used until measured
 _REPORT = np.dtype(list(layout.REPORT.items()))
 
 
 def fold(path: PathLike) -> None:
-    """Bring into the file of a finished run the rows that a kill left in its journal.
+    """Fold rows left in the journal by a killed process into the file of a finished run.
 
     Raises
     ------
     FileFormatError, OSError
-        As `RunWriter`.
+        As in `RunWriter`.
     """
     if journal_of(path).exists():
         RunWriter.open(path).close()
@@ -55,14 +52,14 @@ def fold(path: PathLike) -> None:
 class RunWriter:
     """Appends to the file of a run: rows to its journal, which are folded into the file now and then.
 
-    The file is whole at every moment, and what is read with `jamshape.files.h5md` has all rows; other
+    The file is complete at any time, and reading with `jamshape.files.h5md` returns all rows; other
     programs see those that were folded, all of them once the writer is closed. Nobody else can write the
     run until then. It is a context manager, which closes it.
 
     Parameters
     ----------
     path : path-like
-        A file that `write_packing` or `RunWriter.create` made.
+        A file made by `write_packing` or `RunWriter.create`.
 
     Raises
     ------
@@ -104,22 +101,17 @@ class RunWriter:
 
     @classmethod
     def open(cls, path: PathLike) -> Self:
-        """Return a writer that appends to an existing file, under today's names."""
+        """Return a writer that appends to an existing file, under current names."""
         return cls(path)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is None:
             self.close()
             return
-        with suppress(OSError):  # rows are safe in the journal; the first error is the one to tell
+        with suppress(OSError):  # rows are safe in the journal; report the first error
             self.close()
 
     def close(self) -> None:
@@ -292,7 +284,7 @@ class RunWriter:
         return True
 
     def _begin(self, token: str, seconds: float) -> None:
-        """Begin an empty journal, after so many seconds of writing the file."""
+        """Begin an empty journal, after writing the file in some seconds."""
         self._journal.begin(token)
         self._bytes = self.path.stat().st_size
         self._fold_after = perf_counter() + _PAUSE * seconds
@@ -309,7 +301,7 @@ class RunWriter:
 
     @contextmanager
     def _replacing(self, change: Any, *, is_last: bool = False) -> Iterator[h5py.File]:
-        """Replace the file by a changed one, from which an empty journal goes on."""
+        """Replace the file by a changed one, continued by an empty journal."""
         began, token = perf_counter(), None if is_last else new_token()
         with change as file:
             yield file

@@ -1,4 +1,4 @@
-"""What a file is, by its first bytes and never by its name."""
+"""Detection of file formats by their first bytes, never by name."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ SIGNATURES = {
     GZIP: b"\x1f\x8b",
     ZSTD: b"\x28\xb5\x2f\xfd",
 }
-"""The first bytes of files by their format; data files of LAMMPS begin with any line."""
+"""First bytes of files by format; data files of LAMMPS begin with any line."""
 
 REFUSED = {
     RESTART: (
-        "is a restart file of LAMMPS, expected a state that is told to other programs; read it in a deck"
+        "is a restart file of LAMMPS, expected a format that other programs read; read it in a deck"
         " (read_restart) and write a data file (write_data)"
     ),
     GZIP: "is compressed, expected the file itself; unpack it with gunzip",
     ZSTD: "is compressed, expected the file itself; unpack it with unzstd",
     EMPTY: "is empty, expected a packing, a run or modes in HDF5, a LAMMPS dump or data file, or a GSD file",
 }
-"""What to say of files whose format is known and that nothing reads as a state."""
+"""Messages for known formats that cannot be read as a state."""
 
-_HEAD = 4096  # bytes within which a data file of LAMMPS has named its box
+_HEAD = 4096  # bytes within which a LAMMPS data file states its box
 
 
 def format_of(path: PathLike) -> str:
-    """Tell the format of a file: HDF5, GSD, a dump, restart or data file of LAMMPS, compressed; "" for others.
+    """Detect the format of a file: HDF5, GSD, a dump, restart or data file of LAMMPS, compressed; "" for others.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Names of attributes and observables: files of earlier versions speak today's language.
+"""Names of attributes and observables, and their translation from earlier versions.
 
-Earlier, `p` was the pressure, and in files of bodies with the axis ratios `w1` and `w2` the exponent; the
-protocols of Yuan et al. 2019 were the numbers 1 and 2.
+Earlier, `p` was the pressure, and in files of bodies with axis ratios `w1` and `w2` the exponent; the
+protocols of Yuan et al. 2019 were numbered 1 and 2.
 """
 
 from __future__ import annotations
@@ -12,26 +12,26 @@ from typing import Any, TypeVar
 _Value = TypeVar("_Value")
 
 FORMAT_VERSION = 2
-"""Of files whose names are these; 1 is that of files that do not say."""
+"""Version of these names; 1 for files that do not state one."""
 
 _OLD, _PRESSURE = "p", "pressure"
 
 RENAMED = (_PRESSURE,)
-"""Observables that had another name."""
+"""Observables with former names."""
 
 COMPRESSED, ATHERMAL, THERMAL = "marschall-2018", "yuan-2019-1", "yuan-2019-2"
-"""Protocols as published, by name."""
+"""Published protocols, by name."""
 
 NUMBERED: Mapping[int, str] = {1: ATHERMAL, 2: THERMAL}
-"""Those that earlier versions called by numbers."""
+"""Protocols that earlier versions numbered."""
 
-_RATIO = "w1"  # only files of bodies with an exponent have it
+_RATIO = "w1"  # only in files of bodies with an exponent
 
 
 def renamed(found: Mapping[str, _Value]) -> dict[str, _Value]:
-    """Give attributes or observables of a file the names that they have today.
+    """Return attributes or observables of a file under their current names.
 
-    What has such a name already stays as it is.
+    Entries with a current name stay as they are.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def renamed(found: Mapping[str, _Value]) -> dict[str, _Value]:
 
 
 def protocol_named(value: Any) -> Any:
-    """Give a protocol its name; what is no number of one stays as it is.
+    """Return the name of a numbered protocol; other values stay as they are.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def protocol_named(value: Any) -> Any:
 
 
 def read_protocol(text: str) -> str:
-    """Read a protocol from the words of a command: its name, or its number.
+    """Parse a protocol from the command line: its name, or its number.
 
     Examples
     --------
@@ -68,5 +68,5 @@ def read_protocol(text: str) -> str:
 
 
 def former(name: str, stored: Container[str]) -> str:
-    """Name under which a file holds an observable: today's, or that of earlier versions."""
+    """Return the name under which a file holds an observable: the current one, or that of earlier versions."""
     return _OLD if name == _PRESSURE and name not in stored else name

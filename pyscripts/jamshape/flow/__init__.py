@@ -1,1 +1,1 @@
-"""Overdamped motion: by LAMMPS, and implicit."""
+"""Overdamped motion, in LAMMPS and implicit."""

@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Compression(Motion):
-    """How to compress.
+    """Settings of a compression.
 
     Parameters
     ----------
     kappa
         Rate, dL/dt = -kappa L, [1/time]; negative to open the box.
     phi_end
-        Packing fraction to reach.
+        Final packing fraction.
 
-    Others as of `Motion`.
+    Others as in `Motion`.
 
     Raises
     ------
@@ -49,11 +49,11 @@ class Compression(Motion):
 
     @property
     def gradient(self) -> str:
-        """The flow in the words of `fix overdamped/affine`."""
+        """Velocity gradient in the syntax of `fix overdamped/affine`."""
         return f"compress {self.kappa!r}"
 
     def in_steps(self, phi: float, steps: int, dimension: int = 2) -> Compression:
-        """Return the same with a time step of which so many lead from `phi` to the end."""
+        """Return the same with a time step such that this number of them leads from `phi` to the end."""
         strain = math.log(self.phi_end / phi) / dimension
         return dataclasses.replace(self, dt=strain / (self.kappa * steps))
 
@@ -79,19 +79,19 @@ class Compression(Motion):
         return self.steps(start.phi, start.dimension)
 
     def steps_left(self, found: Mapping[str, float], dimension: int) -> int:
-        """Count those from where observables were found to the end; errors as of `Motion`."""
+        """Count the time steps from observed values to the end; errors as in `Motion`."""
         phi = found["phi"]
         if phi > self.phi_end:
-            msg = f"The state has phi = {phi:.6g}, expected one below phi_end = {self.phi_end}."
+            msg = f"The state has phi = {phi:.6g}, expected less than phi_end = {self.phi_end}."
             raise ValueError(msg)
         return self.steps(phi, dimension)
 
     def where(self, found: Mapping[str, float]) -> str:
-        """Say where it is, and where it ends."""
+        """Describe the position and the end."""
         return f"phi {found['phi']:.4f} of {self.phi_end:g}"
 
     def part(self, found: Mapping[str, float], phi_start: float) -> float:
-        """Give the part of the whole strain that is done."""
+        """Return the completed fraction of the strain."""
         done = math.log(found["phi"] / phi_start) / math.log(self.phi_end / phi_start)
         return min(1.0, done)
 

@@ -1,7 +1,7 @@
-"""The flow of the host: how it deforms the box, and how it turns particles on which no torque acts.
+"""Flow of the host medium: deformation of the box, and rotation of torque-free particles.
 
-The host moves as u(r) = G r with a constant velocity gradient G, an upper triangular matrix, so that after a time t what moves
-with it is where exp(G t) takes it. In two dimensions.
+The host moves as u(r) = G r with a constant velocity gradient G, an upper triangular matrix, so that in a time t it
+deforms by exp(G t). In two dimensions.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ class Host:
 
     @property
     def rate(self) -> float:
-        """The largest of the rates, [1/time]."""
+        """Largest of the rates, [1/time]."""
         return float(np.abs(self.gradient).max())
 
     def deformation(self, time: float) -> LongArray:
         """(2, 2) exp(G t)."""
         a, d = (np.longdouble(self.gradient[k, k]) * time for k in (0, 1))
         mean, half = (a + d) / 2, (a - d) / 2
-        # (exp(a) - exp(d)) / (a - d), which is exp(a) where they agree.
+        # (exp(a) - exp(d)) / (a - d), with limit exp(a).
         slope = np.exp(mean) * (np.sinh(half) / half if half else np.longdouble(1))
         corner = np.longdouble(self.gradient[0, 1]) * time * slope
         return np.array([[np.exp(a), corner], [np.longdouble(0), np.exp(d)]])
 
     @property
     def turns_particles(self) -> bool:
-        """Whether it does; a host that shrinks alike in all directions turns nothing."""
+        """Whether it rotates particles; isotropic compression does not."""
         (a, b), (_, d) = self.gradient
         return bool(a != d or b != 0.0)
 
@@ -64,9 +64,9 @@ class Host:
         return found[:, 0]
 
     def turns(self, bodies: Any, angle: FloatArray, time: float) -> FloatArray:
-        """(N,) by how much such particles turn in a time in which the host deforms by little.
+        """(N,) rotations of torque-free particles in a time in which the host deforms little.
 
-        One step of the Runge-Kutta method of fourth order: its error is of the fifth order of the strain.
+        One step of the fourth-order Runge-Kutta method, with an error of fifth order in the strain.
         """
         k1 = self.spin(bodies, angle)
         k2 = self.spin(bodies, angle + 0.5 * time * k1)

@@ -1,10 +1,10 @@
 """Overdamped flow at any rate, however slow: adaptive, implicit and L-stable.
 
-The motion of Marschall & Teitel 2018, Eqs. 6-13, for compression and shear. In coordinates that move with the host the affine
-part is exact, and what is left is mobility times force: a gradient flow, stiff as soon as particles touch. Each stage of a
-step begins where the host alone would take particles, box and angles in the time of the stage. Explicit
-methods must resolve the relaxation of a contact whatever the rate; here the step follows the path of the
-packing, and its cost hardly depends on the rate. Where a packing rearranges, the step falls to the
+The motion of Marschall & Teitel 2018, Eqs. 6-13, for compression and shear. In coordinates that move with the host the
+affine part is exact, and the remainder is mobility times force: a gradient flow, stiff as soon as particles touch.
+Each stage of a step begins where the host alone would take particles, box and angles in its time. Explicit
+methods must resolve the relaxation of a contact at any rate; here the step follows the path of the
+packing, and its cost hardly depends on the rate. When a packing rearranges, the step falls to the
 relaxation time and grows again. In two dimensions; needs no LAMMPS.
 """
 
@@ -25,41 +25,41 @@ from jamshape.flow.host import Host
 from jamshape.landscape import CrossingError, Evaluation, Landscape, State
 from jamshape.landscape.vicinity import Stage, StageFactors, Units, Vicinity
 
-# Stages are solved to this fraction of the local error that is allowed. Ten times as much leaves velocities on kinks
-# that have the next steps rejected: packings of nearly round rods then cost ten times as many.
+# Accuracy of stages, over the allowed local error. A tenfold one would leave velocities on kinks
+# that cause rejections: packings of nearly round rods then cost ten times as much.
 _STAGE_ACCURACY = 0.003
 
-# Steps change by these factors, and aim at this fraction of the error that is allowed.
-_LARGEST_GROWTH, _LEAST_GROWTH, _SAFETY = 3.0, 0.2, 0.85
+_LARGEST_GROWTH, _LEAST_GROWTH = 3.0, 0.2  # limits of the change of the step
+_SAFETY = 0.85  # fraction of the allowed error to aim at
 
-# After a stage without a solution, and after one where the energy falls too far.
-_RETREAT, _FALLING = 0.25, 0.5
+_RETREAT = 0.25  # change of the step after a stage without a solution
+_FALLING = 0.5  # change of the step if the energy falls too far
 
-# Velocities are extrapolated after a step whose change of velocity the acceleration told to this fraction.
+# Velocities are extrapolated if the acceleration predicted the last change of velocity to this fraction.
 _TOLD = 0.5
 
-# Steps that do not grow after one that was rejected.
+# Number of steps without growth after a rejected one.
 _HELD = 2
 
-# Factors of a step serve another one whose size differs by less than this factor.
+# Factors are reused for steps whose size differs by less than this factor.
 _SAME_STEP = 1.5
 
-# A box that is tilted by more takes other cell vectors.
+# Tilt above which a box gets other cell vectors.
 _LARGEST_TILT = 0.6
 
-# Below this fraction of drag over stiffness steps are explicit, so many in a row.
-_EXPLICIT_BELOW, _EXPLICIT_IN_A_ROW = 0.5, 20
-_LEAST_STEP = 1e-3
+_EXPLICIT_BELOW = 0.5  # longest explicit step, in drag over stiffness
+_EXPLICIT_IN_A_ROW = 20
+_LEAST_STEP = 1e-3  # shortest explicit step, over the longest
 
-# Spines that cross within so small a fraction of the times of contacts and of the box cross whatever the step.
+# Spines that cross within this fraction of the times of contacts and of the box cross at any step.
 _AT_ONCE = 1e-9
 
-# Doubles are too short where their rounding is above this fraction of the accuracy of a stage.
+# Extended precision is used if the rounding of doubles exceeds this fraction of the accuracy of a stage.
 _ROUNDING = 0.1
 
 
 _AT_REST = np.stack([np.eye(2), np.zeros((2, 2))])
-"""A host that has not moved."""
+"""Identity: a host that has not moved."""
 
 
 class Method(NamedTuple):
@@ -68,7 +68,7 @@ class Method(NamedTuple):
     weights: tuple[tuple[float, ...], ...]
     """Lower triangle of the tableau; an explicit stage has 0 on the diagonal."""
     error: tuple[float, ...]
-    """Weights of the estimate of the local error."""
+    """Weights of the local error estimate."""
     order_of_error: int
 
     @property
@@ -81,9 +81,9 @@ _G = 1 - math.sqrt(0.5)
 _W = math.sqrt(0.125)
 
 METHODS = {
-    # Alexander 1977, SIAM J. Numer. Anal. 14, 1006; beside it a method of first order.
+    # Alexander 1977, SIAM J. Numer. Anal. 14, 1006; embedded method of first order.
     "sdirk2": Method(((_G,), (1 - _G, _G)), (0.5 - _G, _G - 0.5), 2),
-    # Hosea & Shampine 1996, Appl. Numer. Math. 20, 21; beside it a method of third order.
+    # Hosea & Shampine 1996, Appl. Numer. Math. 20, 21; embedded method of third order.
     "tr-bdf2": Method(((0.0,), (_G, _G), (_W, _W, _G)), ((4 * _W - 1) / 3, -1 / 3, 2 * _G / 3), 3),
 }
 
@@ -91,7 +91,7 @@ _HEUN_EULER = Method(((0.0,), (1.0, 0.0), (0.5, 0.5, 0.0)), (-0.5, 0.5, 0.0), 2)
 
 
 class Leg(NamedTuple):
-    """A host that does not change for a while."""
+    """A period of constant host flow."""
 
     host: Host
     time: float
@@ -99,25 +99,25 @@ class Leg(NamedTuple):
 
 @dataclass(frozen=True)
 class Protocol:
-    """How to compress.
+    """Settings of a compression.
 
     Parameters
     ----------
     kappa
-        Rate, dL/dt = -kappa L, [1/time]; or rates and the packing fractions from which they hold,
+        Rate, dL/dt = -kappa L, [1/time]; or rates with the packing fractions from which they apply,
         ``((phi, kappa), ...)``, ascending in phi.
     phi_end, p_end
-        It ends at this packing fraction, or at the first step with this pressure.
+        Final packing fraction, and pressure at whose first occurrence it ends.
     tolerance
         Local error of a step over the typical overlap.
     k_d
         Drag, [energy time / length^(D + 2)].
     largest_strain
-        Of the box in a step.
+        Largest strain of the box in a step.
     largest_drop
-        Part of the elastic energy that a step may lose: plastic events, where particles move by
-        themselves and the energy falls, are resolved in time by so many steps. Not of energies
-        below that to which the drag on the particles pushes them.
+        Fraction of the elastic energy that a step may lose, which resolves plastic events, where particles move
+        spontaneously and the energy falls, in time. Not applied to energies
+        below those caused by drag.
     method
         One of `METHODS`.
 
@@ -138,7 +138,7 @@ class Protocol:
 
     def __post_init__(self) -> None:
         names = ("phi_end", "tolerance", "k_d", "largest_strain")
-        # What is infinite is no bound.
+        # Infinite values are not bounds.
         bounds = [name for name in ("p_end", "largest_drop") if getattr(self, name) != math.inf]
         require_positive(**{name: getattr(self, name) for name in (*names, *bounds)})
         self._require_rates()
@@ -160,13 +160,13 @@ class Protocol:
 
     @property
     def rates(self) -> tuple[tuple[float, float], ...]:
-        """Packing fractions and the rates from there on."""
+        """Packing fractions and the rates that apply from there on."""
         if isinstance(self.kappa, tuple):
             return self.kappa
         return ((0.0, self.kappa),)
 
     def leg(self, flow: Flow, phi: float) -> Leg:
-        """Give the host at a packing fraction, and how long it moves like this."""
+        """Return the host at a packing fraction, and for how long it applies."""
         del flow
         kappa, end = self._rate_at(phi)
         return Leg(Host.compressing(kappa), 0.5 * math.log(end / phi) / kappa)
@@ -177,17 +177,17 @@ class Protocol:
         return phi >= self.phi_end * (1 - 1e-12)
 
     def measured(self, landscape: Landscape, flow: Flow) -> dict[str, float]:
-        """Measure more than a `Step` has: nothing."""
+        """Return measurements beyond a `Step`: none."""
         del landscape, flow
         return {}
 
     def where(self, phi: float) -> str:
-        """Say where it is, for sentences."""
+        """Describe the position, for messages."""
         kappa, _ = self._rate_at(phi)
         return f"at phi = {phi:.6g} at the rate kappa = {kappa:g}"
 
     def _rate_at(self, phi: float) -> tuple[float, float]:
-        """Give the rate at phi, and the packing fraction up to which it holds."""
+        """Return the rate at phi, and the packing fraction up to which it applies."""
         nearly = phi * (1 + 1e-13)
         kappa = next((rate for start, rate in reversed(self.rates) if start <= nearly),
                      self.rates[0][1])  # fmt: skip
@@ -197,18 +197,18 @@ class Protocol:
 
 @dataclass(eq=False)
 class Flow:
-    """A compression between two steps: all that is needed to go on from here.
+    """State of a flow between two steps, with all that is needed to resume it.
 
     Parameters
     ----------
     state : State
     dt : float, [time]
-        Size of the next step; 0 to choose one.
+        Next step; 0 to choose one.
     velocity : (n,) array, [length / time]
-        Of the non-affine motion, at the end of the last step, in the coordinates of the landscape;
-        empty to find it.
+        Nonaffine velocity at the end of the last step, in the coordinates of the landscape;
+        empty to compute it.
     acceleration : (n,) array, [length / time^2]
-        Its change over the last step; both only predict, unless the method has an explicit stage.
+        Its change over the last step; both are only predictors, unless the method has an explicit stage.
     """
 
     state: State
@@ -217,9 +217,9 @@ class Flow:
     acceleration: FloatArray = field(default_factory=lambda: np.empty(0))
     time: float = 0.0
     strain: float = 0.0
-    """Of the box since the start: -ln L / L_0 of compression."""
+    """Strain of the box since the start: -ln L / L_0 of compression."""
     turned: float = 0.0
-    """Mean angle by which particles have turned since the start."""
+    """Mean rotation angle of particles since the start."""
     steps: int = 0
     rejected: int = 0
     explicit: int = 0
@@ -228,17 +228,17 @@ class Flow:
     wall_seconds: float = 0.0
     explicit_left: int = 0
     held: int = 0
-    """Steps that are not to grow any more."""
+    """Number of steps before growth is allowed again."""
     extrapolates: int = 1
-    """Whether velocities are, rather than held: the acceleration told the last one."""
+    """Whether velocities are extrapolated, as the acceleration predicted the last one."""
     _factors: StageFactors | None = field(default=None, repr=False)
     _dt_of_factors: float = 0.0
     _here: Evaluation | None = field(default=None, repr=False)
-    """At the end of the last step, before the last correction of its last stage."""
+    """Evaluation at the end of the last step, before the last correction of its last stage."""
     _is_fresh: bool = True
 
     def forget(self) -> None:
-        """Drop what is kept for speed, so that what follows depends on the public fields alone."""
+        """Drop cached data, so that the continuation depends only on the public fields."""
         self._factors, self._here, self._is_fresh = None, None, True
 
 
@@ -267,9 +267,9 @@ def compress(landscape: Landscape, flow: Flow, protocol: Protocol) -> Iterator[S
     Parameters
     ----------
     landscape : Landscape
-        Of particles in two dimensions.
+        Landscape of particles in two dimensions.
     flow : Flow
-        Where to begin, or to go on; moved along.
+        Initial or resumed state; updated.
     protocol : Protocol
 
     Yields
@@ -282,7 +282,7 @@ def compress(landscape: Landscape, flow: Flow, protocol: Protocol) -> Iterator[S
     ValueError
         If the particles are not in two dimensions.
     CrossingError
-        If spines cross at the start, or at a rate that their contacts do not withstand.
+        If spines cross at the start, or at a rate that exceeds the strength of contacts.
     """
     for step in follow(landscape, flow, protocol):
         yield step
@@ -314,7 +314,7 @@ def follow(landscape: Landscape, flow: Flow, how: Course) -> Iterator[Step]:
 
 
 class Course(Proto):
-    """What a flow follows: its host, how far it goes, and how well."""
+    """Driving of a flow: host, end, and accuracy."""
 
     @property
     def tolerance(self) -> float:
@@ -326,31 +326,31 @@ class Course(Proto):
 
     @property
     def largest_strain(self) -> float:
-        """Of the box in a step."""
+        """Largest strain of the box in a step."""
 
     @property
     def largest_drop(self) -> float:
-        """Part of the elastic energy that a step may lose."""
+        """Fraction of the elastic energy that a step may lose."""
 
     @property
     def method(self) -> str:
         """One of `METHODS`."""
 
     def leg(self, flow: Flow, phi: float) -> Leg:
-        """Give the host, and how long it moves like this."""
+        """Return the host, and for how long it applies."""
 
     def is_over(self, flow: Flow, phi: float) -> bool:
         """Whether the end is reached."""
 
     def measured(self, landscape: Landscape, flow: Flow) -> dict[str, float]:
-        """Measure more than a `Step` has, by name."""
+        """Return measurements beyond a `Step`, by name."""
 
     def where(self, phi: float) -> str:
-        """Say where it is, for sentences."""
+        """Describe the position, for messages."""
 
 
 def drag_coefficients(landscape: Landscape, k_d: float = 1.0) -> FloatArray:
-    """(n,) drag over velocity: k_d Area, and k_d Area I / A^2 for rotations, as lengths A theta.
+    """(n,) drag coefficients: k_d Area, and k_d Area I / A^2 for rotations, scaled to lengths A theta.
 
     Marschall & Teitel 2018, Eqs. 11 and 12.
 
@@ -370,16 +370,16 @@ def drag_coefficients(landscape: Landscape, k_d: float = 1.0) -> FloatArray:
 
 
 class _Trial(NamedTuple):
-    """A step to be tried."""
+    """A step to try."""
 
     dt: float
     clipped: bool
-    """Whether it ends where the rate does."""
+    """Whether it ends with the period of the host."""
     explicit: bool
 
 
 class _Attempt(NamedTuple):
-    """A step that was tried."""
+    """Result of a trial step."""
 
     x: FloatArray
     path: _Path
@@ -409,7 +409,7 @@ class _Run:
         return self.area / self.flow.state.volume
 
     def step(self) -> tuple[Evaluation, float, float]:
-        """Take a step; give the evaluation at its end, its error and size."""
+        """Take a step; return the evaluation at its end, its error and size."""
         flow = self.flow
         if flow._is_fresh:
             flow.state = flow.state.with_least_tilt()
@@ -419,7 +419,7 @@ class _Run:
         self.vicinity.hold()
         self.angle = flow.state.orientation[:, 0].astype(np.float64)
         self.host, longest = self.protocol.leg(flow, self.phi)
-        # What units and energies are taken from may be as little off as stages are.
+        # Stage accuracy suffices for units and energies.
         here = flow._here or self._evaluated()
         if not flow.velocity.size:
             self._begin(here)
@@ -437,7 +437,7 @@ class _Run:
         return attempt.evaluation, attempt.error, trial.dt
 
     def _next_trial(self, longest: float) -> _Trial:
-        """Choose the step to try, not beyond the end of this rate."""
+        """Choose the step to try, within the period of the host."""
         flow = self.flow
         dt = min(flow.dt, self.protocol.largest_strain / self.host.rate)
         clipped = dt >= 0.999 * longest
@@ -470,7 +470,7 @@ class _Run:
         if relative <= 1 or is_least:
             return True
         flow.rejected += 1
-        # Contacts that open or close within the step leave errors of first order.
+        # Contacts that open or close within the step cause errors of first order.
         flow.dt = trial.dt * max(_SAFETY / relative, _LEAST_GROWTH)
         return False
 
@@ -509,7 +509,7 @@ class _Run:
         raise CrossingError(msg)
 
     def _falls_too_far(self, now: Evaluation, before: Evaluation) -> bool:
-        # Contacts no stronger than what the box's motion pushes come and go without an event.
+        # Contacts no stronger than the drag of the box motion open and close without an event.
         push = self.host.rate * self._least_drag * float(self.flow.state.edges.max())
         least = self.landscape.particles.n * (push * self.size) ** 2 / self.landscape.k_e
         return before.energy - now.energy > self.protocol.largest_drop * max(before.energy, least)
@@ -520,7 +520,7 @@ class _Run:
 
     @property
     def _stable(self) -> float:
-        """About the longest explicit step, [time]: drag over stiffness of a contact or two."""
+        """Estimate the longest explicit step, [time]: drag over stiffness of a contact or two."""
         return _EXPLICIT_BELOW * self._least_drag * self.size**2 / self.landscape.k_e
 
     def _begin(self, here: Evaluation) -> None:
@@ -535,7 +535,7 @@ class _Run:
             )
 
     def _unit(self, evaluation: Evaluation) -> float:
-        """Typical overlap, at least what the drag on a particle a diameter from the centre makes."""
+        """Typical overlap, at least that caused by drag on a particle a diameter from the centre."""
         least = self.host.rate * self._least_drag * self.size
         return max(evaluation.bond_force, least) * self.size**2 / self.landscape.k_e
 
@@ -597,7 +597,7 @@ class _Run:
         return _Attempt(found.x, path, size, evaluation)
 
     def _predicted(self, path: _Path) -> FloatArray:
-        """Extrapolate the velocity to the next stage, or hold it."""
+        """Extrapolate the velocity to the next stage, or keep it."""
         flow, known = self.flow, len(path.velocities)
         last = path.velocity(known - 1) if known else path.carried(flow.velocity, 0.0)
         if not flow.extrapolates:
@@ -626,7 +626,7 @@ class _Run:
         begun, acceleration = (path.carried(v, 0.0) for v in (flow.velocity, flow.acceleration))
         self.vicinity.move(attempt.x, 0.0)
         flow.state, flow._here = self.vicinity.base, attempt.evaluation
-        # Contacts that open and close make velocities jump: then what extrapolates them is farther off.
+        # Velocities jump when contacts open or close: extrapolation is then less accurate.
         jump = path.velocities[-1] - begun
         missed = np.linalg.norm(jump - dt * acceleration)
         flow.extrapolates = int(missed < _TOLD * np.linalg.norm(jump))
@@ -636,12 +636,12 @@ class _Run:
         flow.turned += path.mean_turn(attempt.x)
         flow.strain += self.host.rate * dt
         cell = flow.state.cell
-        if abs(cell[0, 1]) > _LARGEST_TILT * cell[0, 0]:  # shifts of pairs count other cell vectors
+        if abs(cell[0, 1]) > _LARGEST_TILT * cell[0, 0]:  # pair shifts refer to other cell vectors
             flow._is_fresh = True
 
 
 def _as_slice(numbers: IntArray) -> slice | IntArray:
-    """Give numbers at equal distances, as those of particles that all turn or none, as a slice: it is faster."""
+    """Return equally spaced indices, as when all or no particles rotate, as a slice, which is faster."""
     apart = np.diff(numbers)
     if len(apart) and (apart == apart[0]).all() and apart[0] > 0:
         return slice(int(numbers[0]), int(numbers[-1]) + 1, int(apart[0]))
@@ -649,9 +649,9 @@ def _as_slice(numbers: IntArray) -> slice | IntArray:
 
 
 class _Path:
-    """A step that is tried: where the host is at each stage, and the velocities there.
+    """Trial step: host deformation and velocities at each stage.
 
-    Velocities and displacements are those that forces give, in the box at their stage; the host carries them to others.
+    Velocities and displacements due to forces refer to the box at their stage; the host transports them to others.
     """
 
     def __init__(self, run: _Run, times: list[float]) -> None:
@@ -662,19 +662,19 @@ class _Path:
 
     @property
     def next_time(self) -> float:
-        """Of the stage to come, since the start of the step; of the last one at the end."""
+        """Time of the next stage since the start of the step; of the last stage at the end."""
         return self.times[min(len(self.velocities), len(self.times) - 1)]
 
     def add(self, velocity: FloatArray) -> None:
-        """Keep the velocity of a stage."""
+        """Store the velocity of a stage."""
         self.velocities.append(velocity)
 
     def velocity(self, stage: int) -> FloatArray:
-        """Give a velocity, as it is carried to the next stage."""
+        """Return a velocity, transported to the next stage."""
         return self.carried(self.velocities[stage], self.times[stage])
 
     def carried(self, vector: FloatArray, begun: float) -> FloatArray:
-        """Carry displacements, or velocities, of a time of the step to the next stage."""
+        """Transport displacements or velocities from a time in the step to the next stage."""
         after = self.next_time - begun
         if after == 0.0:
             return vector
@@ -691,13 +691,13 @@ class _Path:
         return self._deformations[after]
 
     def combined(self, weights: tuple[float, ...], dt: float) -> FloatArray:
-        """Displacement at the next stage by the velocities that there are so far."""
+        """Displacement at the next stage from the velocities so far."""
         used = zip(range(len(self.velocities)), weights, strict=False)
         parts = (dt * weight * self.velocity(k) for k, weight in used if weight)
         return sum(parts, start=self.run.still)
 
     def go_to_stage(self) -> None:
-        """Take box, positions and angles to where the host alone has them at the next stage."""
+        """Move box, positions and angles with the host to the next stage."""
         run, after = self.run, self.next_time
         matrix = self._deformation(after)
         double = matrix.astype(np.float64)
@@ -710,13 +710,13 @@ class _Path:
         run.vicinity.deform(np.stack([double, rest]), turns[:, None])
 
     def mean_turn(self, x: FloatArray) -> float:
-        """Average by how much host and forces have turned particles by the end."""
+        """Average the rotation of particles by host and forces up to the end."""
         forces = self.run.landscape.motion(x)[1][:, 0]
         host = self._turned - self.run.angle if self.run.host.turns_particles else self._turned
         return float((host + forces).mean())
 
     def excess_spin(self, x: FloatArray) -> FloatArray:
-        """(n,) what the host turns particles by that forces have turned by x, beyond what it turns others."""
+        """(n,) host rotation of particles that forces have rotated by x, in excess of that of others."""
         run, landscape = self.run, self.run.landscape
         if not run.host.turns_particles:
             return run.still

@@ -1,4 +1,4 @@
-"""Overdamped motion of particles in a host that flows, driven in LAMMPS: what every flow shares."""
+"""Overdamped motion of particles in a flowing host, driven in LAMMPS: the common part of all flows."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from jamshape.lammps.session import Session
 
-# Columns of `compute packing` and elements of `fix overdamped/affine`, as their doc comments list them.
+# Columns of `compute packing` and elements of `fix overdamped/affine`, as in their doc comments.
 _PACKING = {
     "phi": 0, "u": 1, "pressure": 2, "z": 3, "S_2": 4, "S_4": 5, "fmax": 6, "frms": 7,
     "z_single": 8, "rattlers": 9, "bonds": 10, "overlap": 11, "tmax": 12,
@@ -29,19 +29,19 @@ _SUBSTEPS = {"substeps": 8, "rejected": 9, "forced": 10, "substep": 11, "substep
              "local_error": 13, "stages": 14, "overlap_length": 15}  # fmt: skip
 
 INTEGRATORS = ("heun", "heun/adaptive", "rkc2")
-"""Those that `fix overdamped/affine` knows; all but the first choose their own steps."""
+"""Integrators of `fix overdamped/affine`; all but the first choose their own steps."""
 
 _LONGEST_RUN = 1_000_000_000  # steps in one `run` command, which counts in 32 bits
 
 
 @dataclass(frozen=True, kw_only=True)
 class Motion(ABC):
-    """How particles move in a host: what a flow has beside its rate.
+    """Settings of motion in a host, apart from its rate.
 
     Parameters
     ----------
     dt
-        Time step, [time]; an integrator that chooses its own steps divides it as it needs.
+        Time step, [time]; an adaptive integrator divides it as needed.
     sides
         Bonds of a side-to-side contact, 1 or 2.
     k_e, k_d
@@ -49,13 +49,13 @@ class Motion(ABC):
     integrator
         One of `INTEGRATORS`.
     tolerance
-        Of those that choose their own steps: local error over the typical overlap.
+        Local error over the typical overlap, for adaptive integrators.
 
     Raises
     ------
     ValueError
-        If a step, stiffness, drag or tolerance is not positive, `sides` neither 1 nor 2, or there is no
-        such integrator.
+        If a step, stiffness, drag or tolerance is not positive, `sides` is neither 1 nor 2, or the integrator is
+        unknown.
     """
 
     dt: float = 0.05
@@ -66,34 +66,34 @@ class Motion(ABC):
     tolerance: float = 1e-4
 
     of_packing: ClassVar[Mapping[str, int]] = _PACKING
-    """Observables, and where `compute packing` has them."""
+    """Observables, with their columns in `compute packing`."""
     of_fix: ClassVar[Mapping[str, int]] = _FLOW
-    """The same of `fix overdamped/affine`."""
+    """The same for `fix overdamped/affine`."""
     tilts: ClassVar[bool] = False
-    """Whether the box does."""
+    """Whether the box tilts."""
     name: ClassVar[str] = "flow"
-    """What it is called in sentences."""
+    """Name in messages."""
 
     def __post_init__(self) -> None:
         require_positive(
             **{name: getattr(self, name) for name in ("dt", "k_e", "k_d", "tolerance")}
         )
         require_one_of("sides", self.sides, (1, 2))
-        # It is a word of LAMMPS's input, and may come from a file.
+        # It becomes LAMMPS input, and may come from a file.
         require_one_of("integrator", self.integrator, INTEGRATORS)
         for f in dataclasses.fields(self):
-            if isinstance(f.default, float):  # not a number of numpy, which LAMMPS cannot read
+            if isinstance(f.default, float):  # not a NumPy scalar, which LAMMPS cannot read
                 object.__setattr__(self, f.name, float(getattr(self, f.name)))
 
     @property
     def chooses_steps(self) -> bool:
-        """Whether the integrator divides the time step as accuracy asks."""
+        """Whether the integrator is adaptive and divides the time step."""
         return self.integrator != "heun"
 
     @property
     @abstractmethod
     def gradient(self) -> str:
-        """The flow in the words of `fix overdamped/affine`."""
+        """Velocity gradient in the syntax of `fix overdamped/affine`."""
 
     @abstractmethod
     def all_steps(self, start: Packing) -> int:
@@ -101,26 +101,26 @@ class Motion(ABC):
 
     @abstractmethod
     def steps_left(self, found: Mapping[str, float], dimension: int) -> int:
-        """Count those from where observables were found to the end.
+        """Count the time steps from observed values to the end.
 
         Raises
         ------
         ValueError
-            If the end lies behind.
+            If the end is already passed.
         """
 
     @abstractmethod
     def where(self, found: Mapping[str, float]) -> str:
-        """Say where it is, and where it ends."""
+        """Describe the position and the end."""
 
     @abstractmethod
     def part(self, found: Mapping[str, float], phi_start: float) -> float:
-        """Give the part that is done where observables were found, from 0 to 1."""
+        """Return the completed fraction, from 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One row of a run: where it is and what it measures."""
+    """One row of a run: position and observables."""
 
     step: int
     time: float
@@ -137,19 +137,19 @@ class FlowRun(Generic[_Motion]):
     Parameters
     ----------
     session
-        A fresh one.
+        Fresh session.
     settings
     start
-        The state to begin with; of an earlier run, any state of it.
+        Initial state; of an earlier run, any of its states.
     restart
-        Restart file of an earlier run, to go on from.
+        Restart file of an earlier run to resume.
     time
-        Of that state; step times time step when left out.
+        Time of that state; step times time step by default.
 
     Raises
     ------
     ValueError
-        If the end lies behind the state.
+        If the end is before the state.
     """
 
     def __init__(
@@ -175,7 +175,7 @@ class FlowRun(Generic[_Motion]):
     def _set_up(self) -> None:
         s = self.settings
         self.session.interact(Interaction(s.k_e, s.sides))
-        # That of a restart file tilts if it did.
+        # A box from a restart file tilts if it did.
         tilt = "change_box all triclinic" if s.tilts and not self.session.is_tilted else ""
         self.session.commands(f"""
             {tilt}
@@ -197,7 +197,7 @@ class FlowRun(Generic[_Motion]):
         )
 
     def change(self, **changes: Any) -> None:
-        """Go on with another rate or time step, by their names in the settings."""
+        """Continue with other settings, such as another rate or time step."""
         self._time, self._step_of_time = self.time, self.session.step
         self._evaluations = self.measure()["evaluations"]
         self.settings = dataclasses.replace(self.settings, **changes)
@@ -206,18 +206,18 @@ class FlowRun(Generic[_Motion]):
         )
 
     def count_from(self, evaluations: float) -> None:
-        """Go on counting evaluations of the forces from those of an earlier process."""
+        """Continue the count of force evaluations from an earlier process."""
         self._evaluations = evaluations
 
     @property
     def time(self) -> float:
-        """Since the start, also if the time step has changed."""
+        """Time since the start, valid after changes of the time step."""
         return self._time + (self.session.step - self._step_of_time) * self.settings.dt
 
     def write_restart(self, path: Path) -> None:
-        """Write a LAMMPS restart file of the present state; errors as `Session.write_restart`."""
+        """Write a LAMMPS restart file of the present state; errors as in `Session.write_restart`."""
         self.session.write_restart(path)
-        # That moves atoms into the box and orders them anew, which neighbour lists must follow.
+        # It wraps and reorders atoms, which neighbour lists must follow.
         self.session.commands("run 0 post no")
 
     def samples(self, every: int) -> Iterator[Row]:

@@ -1,9 +1,9 @@
 """Athermal quasistatic shear: small steps of the strain, each followed by a minimisation.
 
-The limit of shear at a rate as the rate goes to zero: between two rearrangements a packing stays in one minimum that
-moves with the box, and where that minimum ends the packing falls to another one. Maloney & Lemaitre, Phys. Rev. E 74,
-016118 (2006). At constant volume, or at constant pressure, where the box is also strained equally in all directions. Of any
-shape and dimension; needs no LAMMPS.
+The limit of shear at vanishing rate: between two rearrangements a packing stays in one minimum that
+moves with the box, and where that minimum vanishes the packing falls to another one. Maloney & Lemaitre, Phys. Rev. E
+74, 016118 (2006). At constant volume, or at constant pressure, where the box is also strained isotropically.
+Independent of shape and dimension; needs no LAMMPS.
 """
 
 from __future__ import annotations
@@ -28,45 +28,45 @@ from jamshape.minima import Minimum, Stop, minimise
 from jamshape.minima.target import followed
 from jamshape.packing import Packing
 
-# Pressures are led to the asked one to this part, by at most so many minimisations.
-_ACCURACY, _MOST_MINIMA = 1e-6, 60
+_ACCURACY = 1e-6  # relative, of the pressure
+_MOST_MINIMA = 60  # to reach it
 
-# The box is strained by at most the first part, and where there is no pressure by the second, and twice as much each time.
-_LARGEST_STRAIN, _FIRST_STRAIN = 2e-3, 1e-5
+_LARGEST_STRAIN = 2e-3  # of the box, isotropic
+_FIRST_STRAIN = 1e-5  # without pressure; doubled each time
 
-# Below this part of the asked pressure a packing is unjammed.
+# Fraction of the target pressure below which a packing is unjammed.
 _UNJAMMED = 0.01
 
-# Strain from which the stiffness is taken.
+# Strain to measure the stiffness.
 _TRIED = 1e-8
 
 
 class PressureError(RuntimeError):
-    """The pressure could not be held; the sentence says where it was."""
+    """The pressure could not be held; the message gives its value."""
 
 
 @dataclass(frozen=True)
 class QuasistaticShear:
-    """How to shear.
+    """Settings of a quasistatic shear.
 
     Parameters
     ----------
     strain_step
         Strain of each step.
     strain_end
-        Strain to reach.
+        Final strain.
     flow
         One of `jamshape.flow.shear.FLOWS`; pure shear by gamma stretches x by exp(gamma).
     hold_pressure
-        Pressure to hold, [energy / length^D]; the volume is held where it is left out or 0.
+        Pressure to hold, [energy / length^D]; the volume is held by default or if it is 0.
     tolerance
         Largest net force and torque of a particle over the mean bond force.
 
     Raises
     ------
     ValueError
-        If a number is not positive, the step longer than the strain, pure shear goes beyond 3, or there is no
-        such flow.
+        If a number is not positive, the step is longer than the strain, pure shear goes beyond 3, or the flow is
+        unknown.
     """
 
     strain_step: float = 1e-3
@@ -85,32 +85,32 @@ class QuasistaticShear:
         if self.flow == "pure":
             require_in("strain", self.strain_end, RANGES["pure_strain"])
         if self.strain_step > self.strain_end:
-            msg = f"the step is {self.strain_step:g}, expected at most the strain to reach, {self.strain_end:g}"
+            msg = f"the step is {self.strain_step:g}, expected at most the final strain, {self.strain_end:g}"
             raise ValueError(msg)
 
     @property
     def steps(self) -> int:
-        """How many lead to the end."""
+        """Number of steps to the end."""
         return math.ceil(self.strain_end / self.strain_step - 1e-9)
 
     def gradient(self, dimension: int, strain: float) -> LongArray:
-        """(D, D) matrix that shears by a strain."""
+        """Return the (D, D) matrix of a shear strain."""
         found: LongArray = np.eye(dimension, dtype=np.longdouble)
         found[:2, :2] = self._host.deformation(strain)
         return found
 
     def resisted(self, pressure: FloatArray) -> float:
-        """Give the energy's derivative by the strain over the volume, of a pressure tensor (D, D)."""
+        """Return the derivative of the energy by strain over the volume, from a pressure tensor (D, D)."""
         return -float((pressure[:2, :2] * self._host.gradient).sum())
 
     @property
     def _host(self) -> Host:
-        """One that shears by the strain 1 in the time 1."""
+        """Host with shear strain 1 in the time 1."""
         return Host.shearing(1.0, self.flow)
 
 
 class Row(NamedTuple):
-    """A minimum on the way."""
+    """A minimum of the run."""
 
     step: int
     strain: float
@@ -127,9 +127,9 @@ class Row(NamedTuple):
     S_2: float
     director: float
     stress: float
-    """The energy's derivative by the strain over the volume: -p_xy of simple shear."""
+    """Derivative of the energy by strain over the volume: -p_xy of simple shear."""
     lost: float
-    """Energy over the volume that the step dissipated: what stress and pressure gave less what is still there."""
+    """Energy over the volume dissipated by the step: work of stress and pressure minus the change of energy."""
     residual: float
     evaluations: int
     wall_seconds: float
@@ -137,18 +137,18 @@ class Row(NamedTuple):
 
 @dataclass(eq=False)
 class Sheared:
-    """A packing on its way: all that is needed to go on.
+    """State of a sheared packing, with all that is needed to resume.
 
     Parameters
     ----------
     state : State
-        A minimum, once there was a step.
+        A minimum, after the first step.
     steps
-        How many were made; -1 before the first minimisation.
+        Steps so far; -1 before the first minimisation.
     u, stress, pressure
-        Energy, resisting stress and pressure there, [energy / length^D].
+        Energy, resisting stress and pressure, [energy / length^D].
     volume
-        Of its box.
+        Volume of the box.
     """
 
     state: State
@@ -168,26 +168,26 @@ def shear(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Iterator
     ----------
     landscape : Landscape
     run : Sheared
-        Where to begin, or to go on; moved along.
+        Initial or resumed state; updated.
     how : QuasistaticShear
 
     Yields
     ------
     Row
-        Of the first minimum, and of that after each step.
+        Row of the first minimum, and after each step.
 
     Raises
     ------
     PressureError
-        If no packing has the pressure that is to be held.
+        If no packing has the pressure to hold.
     CrossingError
-        If spines cross in a step: it is too long.
+        If spines cross in a step, which is then too long.
     """
     while run.steps < how.steps:
         began, evaluations = time.perf_counter(), landscape.evaluations
         strain = 0.0 if run.steps < 0 else _strain_of(how, run.steps)
         state = run.state.deformed(how.gradient(run.state.dimension, strain))
-        # What follows depends on the state alone, also where it is read from a file.
+        # The continuation depends on the state alone, also after reading it from a file.
         landscape.forget_pairs()
         found = _minimum(landscape, state.with_least_tilt(), how)
         run.state = found.state
@@ -201,7 +201,7 @@ def shear(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Iterator
 
 
 def _strain_of(how: QuasistaticShear, done: int) -> float:
-    """Give the strain of the step after so many: the last one may be shorter."""
+    """Return the strain of the step after `done`; the last one may be shorter."""
     return min(how.strain_end, (done + 1) * how.strain_step) - done * how.strain_step
 
 
@@ -212,13 +212,13 @@ def _minimum(landscape: Landscape, state: State, how: QuasistaticShear) -> Minim
 
 
 def pressure_of(found: Minimum) -> float:
-    """Give the pressure of a minimum, [energy / length^D]."""
+    """Return the pressure of a minimum, [energy / length^D]."""
     D = found.state.dimension
     return -found.evaluation.strain_gradient / (D * found.state.volume)
 
 
 def _at_pressure(landscape: Landscape, found: Minimum, stop: Stop, asked: float) -> Minimum:
-    """Strain the box equally in all directions until a minimum has the pressure that is asked for."""
+    """Strain the box isotropically until a minimum has the target pressure."""
     tried = _FIRST_STRAIN
     for _ in range(_MOST_MINIMA):
         pressure = pressure_of(found)
@@ -237,14 +237,14 @@ def _at_pressure(landscape: Landscape, found: Minimum, stop: Stop, asked: float)
 
 
 def _strain_to(landscape: Landscape, found: Minimum, asked: float) -> float:
-    """Give the strain that takes the pressure to the asked one, as far as contacts stay."""
+    """Return the strain that reaches the target pressure, as long as contacts stay."""
     pressure = pressure_of(found)
     there = followed(landscape, found, -_TRIED)
     evaluation = landscape.evaluate(there)
     stiffness = (
         pressure_of(replace(found, state=there, evaluation=evaluation)) - pressure
     ) / _TRIED
-    if stiffness <= 0:  # it slides
+    if stiffness <= 0:  # sliding
         return math.copysign(_TRIED, pressure - asked)
     return float(np.clip((pressure - asked) / stiffness, -_LARGEST_STRAIN, _LARGEST_STRAIN))
 
@@ -271,7 +271,7 @@ def _row(landscape: Landscape, found: Minimum, run: Sheared, how: QuasistaticShe
 
 
 def _order(packing: Packing) -> OrientationalOrder:
-    """Nematic order in the plane; of bodies in space it is found from frames."""
+    """Nematic order in the plane; that of bodies in space follows from frames."""
     if packing.dimension == 2:
         return planar_order(packing)
     return OrientationalOrder(math.nan, math.nan)

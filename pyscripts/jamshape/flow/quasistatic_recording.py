@@ -1,4 +1,4 @@
-"""Quasistatic shears in files: a run of `jamshape.flow.quasistatic` recorded in H5MD, which goes on after a kill."""
+"""Quasistatic shears in files: a run of `jamshape.flow.quasistatic` recorded in H5MD, resumed after a kill."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jamshape.flow.quasistatic import QuasistaticShear, Row, Sheared, shear
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
 
-# Steps between two frames, from which a run goes on, where --frames would have more.
+# Largest number of steps between frames, from which a run resumes.
 MOST_STEPS_PER_FRAME = 50
 
 _ROW = tuple(name for name in Row._fields if name not in {"step", "wall_seconds", "residual"})
@@ -29,7 +29,7 @@ def begin(
     start = start.with_(law=start.law.but(sides=2))
     stored = dataclasses.asdict(how) | start.law._asdict() | dict(attributes or {})
     stored |= {"phi_start": start.phi, "finished": False} | _counts(Sheared(State.of(start)))
-    # Images would count cell vectors that are not there any more.
+    # Images would count cell vectors that no longer exist.
     first = start.with_(step=0, time=0.0, image=np.zeros_like(start.image))
     RunWriter.create(path, State.of(start).packing(first), stored).close()
 

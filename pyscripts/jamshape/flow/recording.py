@@ -1,4 +1,4 @@
-"""Flows in files: a run of `jamshape.flow.motion` recorded in H5MD, which goes on after a kill."""
+"""Flows in files: a run of `jamshape.flow.motion` recorded in H5MD, resumed after a kill."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ _SUMMARY = ("phi", "pressure", "z", "S_2", "S_4")
 
 @dataclass(frozen=True)
 class Recording:
-    """What a run leaves in its H5MD file.
+    """Settings of the recording of a run in an H5MD file.
 
     Parameters
     ----------
     path
         The file; until the run is finished restart files lie beside it, as ``path.restart.a`` and ``.b``, and its journal.
     rows, frames
-        How many samples of the observables and how many snapshots, over the whole run.
+        Numbers of samples of the observables and of snapshots over the whole run.
     attributes
-        Stored with the run, beside its settings: what made the initial state.
+        Further attributes to store: the origin of the initial state.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def require_same(to: Recording, settings: Motion, dimension: int) -> None:
     """
     what = f"a {settings.name}"
     if "finished" not in read_attributes(to.path):
-        msg = f"{to.path} holds no {settings.name}, expected one; write to another file, or make it again"
+        msg = f"{to.path} holds no {settings.name}, expected one; write to another file, or use again to replace it"
         raise ValueError(msg)
     expected = dataclasses.asdict(settings) | dict(to.attributes)
     require_attributes(to.path, expected | {"rows": to.rows, "frames": to.frames}, what)
@@ -104,7 +104,7 @@ def require_same(to: Recording, settings: Motion, dimension: int) -> None:
     if found != dimension:
         msg = (
             f"{to.path} holds {what} in {found} dimensions, expected {dimension};"
-            " write to another file, or make it again"
+            " write to another file, or use again to replace it"
         )
         raise ValueError(msg)
 
@@ -112,7 +112,7 @@ def require_same(to: Recording, settings: Motion, dimension: int) -> None:
 def begin(session: Session, settings: Motion, start: Packing, to: Recording) -> FlowRun[Motion]:
     """Start a run and its file."""
     run = FlowRun(session, settings, start)
-    to.restarts.forget()  # of another run, which was cut off and is begun anew
+    to.restarts.forget()  # of another run, interrupted, and started over
     first = run.measure()
     run.write_restart(to.restarts.next())
     attributes = dataclasses.asdict(settings) | dict(to.attributes)
@@ -123,16 +123,16 @@ def begin(session: Session, settings: Motion, start: Packing, to: Recording) -> 
 
 
 def settings_of(stored: Mapping[str, Any]) -> Motion:
-    """Read how a run was set from the attributes of its file."""
+    """Read the settings of a run from the attributes of its file."""
     kind = Shear if "gdot" in stored else Compression
     names = {f.name for f in dataclasses.fields(kind)} & set(stored)
     return kind(**{name: stored[name] for name in names})
 
 
 def resume(session: Session, path: Path) -> tuple[FlowRun[Motion], Recording]:
-    """Go on with a run that was killed, from its newest whole restart file, as it was set.
+    """Resume a killed run from its newest whole restart file, with its settings.
 
-    Without any it begins anew from its first frame.
+    Without any it starts over from its first frame.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def resume(session: Session, path: Path) -> tuple[FlowRun[Motion], Recording]:
         if session.step > last + _every(run, to, writer.first):
             msg = (
                 f"{path}: has rows up to step {last}, expected those up to step {session.step} of its"
-                " restart file; bring its journal back beside it, or make it again"
+                " restart file; bring its journal back beside it, or use again to replace it"
             )
             raise FileFormatError(msg)
         writer.truncate(session.step)
@@ -160,7 +160,7 @@ def resume(session: Session, path: Path) -> tuple[FlowRun[Motion], Recording]:
 def record(run: FlowRun[Motion], to: Recording) -> Iterator[Row]:
     """Run to the end and yield each sample, which is in the file by then.
 
-    What a restart file goes on from is there before it: all samples up to its step.
+    The file holds all samples up to the step of a restart file before that is written.
     """
     last = read_series(to.path, "pressure").step[-1]
     with RunWriter.open(to.path) as writer:

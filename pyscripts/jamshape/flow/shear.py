@@ -20,10 +20,10 @@ _WORDS = {"simple": "shear", "pure": "pure"}
 FLOWS = tuple(_WORDS)
 """Simple shear, u_x = gdot y, and pure shear, which stretches x and shrinks y."""
 
-# In one time step, the box may shear by so much: neighbours pass each other in steps.
+# Largest shear of the box in a time step: neighbours pass each other in discrete steps.
 _LARGEST_STRAIN = 0.01
 
-# A particle that others hold is dragged along by this part of what a contact bears, or more, where rods begin to cross.
+# Drag on a particle held by others, over the strength of a contact, above which rods may begin to cross.
 _BEARABLE = 0.5
 
 _STRAINS = {"simple": "shear_strain", "pure": "pure_strain"}
@@ -31,24 +31,24 @@ _STRAINS = {"simple": "shear_strain", "pure": "pure_strain"}
 
 @dataclass(frozen=True)
 class Shear(Motion):
-    """How to shear.
+    """Settings of a shear.
 
     Parameters
     ----------
     gdot
         Rate, [1/time]: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
     strain_end
-        Strain to reach, the rate times the time since the start.
+        Final strain, the rate times the time since the start.
     flow
         One of `FLOWS`.
 
-    Others as of `Motion`.
+    Others as in `Motion`.
 
     Raises
     ------
     ValueError
-        If a number is not positive, there is no such flow, pure shear goes beyond 3, the box would shear by more than 0.01 in a
-        time step, or as `Motion`.
+        If a number is not positive, the flow is unknown, pure shear goes beyond 3, the box would shear by more than 0.01
+        in a time step, or as `Motion`.
     """
 
     gdot: float = 1e-4
@@ -73,31 +73,31 @@ class Shear(Motion):
         if self.gdot * self.dt > _LARGEST_STRAIN * (1 + 1e-9):
             msg = (
                 f"gdot = {self.gdot:g} and dt = {self.dt:g} shear by {self.gdot * self.dt:g} in a step,"
-                f" expected at most {_LARGEST_STRAIN:g}; take a smaller time step"
+                f" expected at most {_LARGEST_STRAIN:g}; use a smaller time step"
             )
             raise ValueError(msg)
 
     @property
     def gradient(self) -> str:
-        """The flow in the words of `fix overdamped/affine`."""
+        """Velocity gradient in the syntax of `fix overdamped/affine`."""
         return f"{_WORDS[self.flow]} {self.gdot!r}"
 
     def in_steps(self, rows: int) -> Shear:
-        """Return the same with a time step that goes from row to row, or a whole part of that."""
+        """Return the same with a time step equal to the interval of rows, or a divisor of it."""
         steps = rows * math.ceil(self.strain_end / (rows * _LARGEST_STRAIN))
         return dataclasses.replace(self, dt=self.strain_end / (self.gdot * steps))
 
     def drag_over_force(self, packing: Packing) -> float:
-        """Return how hard the host pulls at a particle that others hold, over what one contact bears.
+        """Estimate the drag on a particle held by others, over the strength of one contact.
 
-        The pull is the drag of the particle times the host's velocity at its outer radius; a harmonic contact bears its
+        The drag is that at the host's velocity at its outer radius; a harmonic contact bears its
         stiffness over the distance of first touch.
         """
         pull = self.k_d * packing.measures * self.gdot * packing.outer_radius
         return float((2 * pull * packing.inner_radius).max() / self.k_e)
 
     def warning(self, packing: Packing) -> str:
-        """Say that the rate may drive particles through each other; nothing where contacts bear it."""
+        """Return a warning if the rate may drive particles through each other, else an empty text."""
         ratio = self.drag_over_force(packing)
         if ratio < _BEARABLE:
             return ""
@@ -112,21 +112,21 @@ class Shear(Motion):
         return self._steps(self.strain_end)
 
     def steps_left(self, found: Mapping[str, float], dimension: int) -> int:
-        """Count those from where observables were found to the end."""
+        """Count the time steps from observed values to the end."""
         del dimension
         return self._steps(self.strain_end - self.strained(found))
 
     def strained(self, found: Mapping[str, float]) -> float:
-        """Look the strain up among observables."""
+        """Return the strain among observables."""
         return found[_STRAINS[self.flow]]
 
     def where(self, found: Mapping[str, float]) -> str:
-        """Say where it is, and where it ends."""
+        """Describe the position and the end."""
         strain = f"strain {self.strained(found):.4f} of {self.strain_end:g}"
         return f"{strain}, shear stress {-found['p_xy']:.2e}"
 
     def part(self, found: Mapping[str, float], phi_start: float) -> float:
-        """Give the part of the whole strain that is done."""
+        """Return the completed fraction of the strain."""
         del phi_start
         return min(1.0, self.strained(found) / self.strain_end)
 

@@ -1,4 +1,4 @@
-"""Slow flows in files: a run of `jamshape.flow.implicit` recorded in H5MD, which goes on after a kill."""
+"""Slow flows in files: a run of `jamshape.flow.implicit` recorded in H5MD, resumed after a kill."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jamshape.landscape import Landscape, State
 from jamshape.measures.runs import onset_report
 from jamshape.packing import Packing
 
-# Steps between two frames, from which a run goes on.
+# Steps between two frames, from which a run resumes.
 STEPS_PER_FRAME = 100
 
 _ROW = (
@@ -65,11 +65,6 @@ def require_same(
     require_attributes(path, _as_attributes(protocol) | dict(attributes or {}), what)
 
 
-def is_finished(path: Path) -> bool:
-    """Whether the file holds a run that reached its end."""
-    return path.exists() and bool(read_attributes(path).get("finished"))
-
-
 def summary_of(path: Path) -> dict[str, object]:
     """Summarise a run: its end, its cost, phi_J(kappa) where p rises, and where frames stay jammed."""
     observables, stored = read_observables(path), read_attributes(path)
@@ -81,7 +76,7 @@ def summary_of(path: Path) -> dict[str, object]:
 
 
 def record(path: Path) -> Iterator[Step]:
-    """Go on from the last frame to the end, writing rows and frames.
+    """Resume from the last frame to the end, writing rows and frames.
 
     Yields
     ------
@@ -111,12 +106,12 @@ class _Row(NamedTuple):
 
 def _steps(landscape: Landscape, flow: Flow, course: Protocol | SlowShear) -> Iterator[Step]:
     if isinstance(course, Protocol):
-        return compress(landscape, flow, course)  # which ends at a pressure, too
+        return compress(landscape, flow, course)  # may also end at a pressure
     return follow(landscape, flow, course)
 
 
 def _keep(writer: RunWriter, rows: list[_Row], flow: Flow, like: Packing) -> None:
-    """Write a frame, and the rows up to it; what follows depends on the frame alone."""
+    """Write a frame, and the rows up to it; the continuation depends on the frame alone."""
     flow.forget()
     steps, times = [row.step.step for row in rows], [row.step.time for row in rows]
     series = {name: [getattr(row.step, name) for row in rows] for name in _ROW}
@@ -154,7 +149,7 @@ def _flow(path: Path, stored: Mapping[str, Any]) -> Flow:
 
 
 def course_of(stored: Mapping[str, Any]) -> Protocol | SlowShear:
-    """Read what a run follows from the attributes of its file."""
+    """Read the driving of a run from the attributes of its file."""
     kind = SlowShear if "gdot" in stored else Protocol
     values = {field.name: stored[field.name] for field in dataclasses.fields(kind)}
     if kind is SlowShear:

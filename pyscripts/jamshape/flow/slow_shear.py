@@ -1,4 +1,4 @@
-"""Shear at any rate, however slow: the course of implicit steps. In two dimensions; needs no LAMMPS."""
+"""Shear at any rate, however slow, by implicit steps. In two dimensions; needs no LAMMPS."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from jamshape.measures.stress import ShearStress
 
 @dataclass(frozen=True)
 class SlowShear:
-    """How to shear by implicit steps.
+    """Settings of a shear by implicit steps.
 
     Parameters
     ----------
     gdot, strain_end, flow
-        As of `jamshape.flow.shear.Shear`.
+        See `jamshape.flow.shear.Shear`.
     tolerance, k_d, largest_strain, largest_drop, method
-        As of `jamshape.flow.implicit.Protocol`.
+        See `jamshape.flow.implicit.Protocol`.
 
     Raises
     ------
     ValueError
-        If a number is out of its range, or there is no such flow or method.
+        If a number is out of its range, or the flow or method is unknown.
     """
 
     gdot: float = 1e-7
@@ -52,7 +52,7 @@ class SlowShear:
             require_in("strain", self.strain_end, RANGES["pure_strain"])
 
     def leg(self, flow: Flow, phi: float) -> Leg:
-        """Give the host, and how long it moves like this."""
+        """Return the host, and for how long it applies."""
         del phi
         return Leg(Host.shearing(self.gdot, self.flow), (self.strain_end - flow.strain) / self.gdot)
 
@@ -62,7 +62,7 @@ class SlowShear:
         return flow.strain >= self.strain_end * (1 - 1e-12)
 
     def measured(self, landscape: Landscape, flow: Flow) -> dict[str, float]:
-        """Measure stress, contacts, order and rotation, named as those of `jamshape.flow.shear`."""
+        """Return stress, contacts, order and rotation, named as those of `jamshape.flow.shear`."""
         state = flow.state
         packing = state.packing(landscape.particles)
         stress = ShearStress.of(landscape.stress(state))._asdict()
@@ -76,5 +76,5 @@ class SlowShear:
         }
 
     def where(self, phi: float) -> str:
-        """Say where it is, for sentences."""
+        """Describe the position, for messages."""
         return f"at phi = {phi:.6g} at the rate gdot = {self.gdot:g}"

@@ -1,1 +1,1 @@
-"""The front door: what `import jamshape as js` offers, in words of its own."""
+"""Public interface: the names that `import jamshape as js` offers."""

@@ -1,11 +1,10 @@
-"""Compressions at a rate: in LAMMPS, and implicit ones as slow as one likes."""
+"""Compression at a finite rate: explicit in LAMMPS, or implicit and arbitrarily slow."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
 
 from jamshape.arguments import checked
 from jamshape.checks import (
@@ -27,17 +26,16 @@ from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import place
 from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import RunFile
-from jamshape.front.starts import start_of, told_of
+from jamshape.front.starts import Asked, Start
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.random_start import random_packing
 from jamshape.shapes.particles import Particles
 
 PHI = (0.4, 0.9)
-"""Packing fractions of the random start and of the end of a compression, where nobody says others."""
+"""Default packing fractions of the random start and of the end of a compression."""
 
 _PHI_SLOW_USUAL = (0.8, 0.9)
-_N, _SEED = 256, 1
 _SAME = 1e-9  # of packing fractions, up to rounding
 _DT, _ERROR = 0.05, 1e-4
 
@@ -78,26 +76,26 @@ def compress(
     kappa : float, [1/time]
         Rate: the box shrinks with dL/dt = -kappa L.
     seed : int
-        Of the random start.
+        Random seed of the start.
     sides : {1, 2}
         Bonds of a side-to-side contact of rods. The paper's dynamics has one, on which parallel rods
-        chatter, so that small steps are needed; with two they rest, as in minima and modes.
+        chatter, which needs small steps; with two they come to rest, as in minima and modes.
     integrator : {"rkc2", "heun/adaptive", "heun"}, optional
         The paper's is ``heun``, with equal time steps; the others choose their own. ``rkc2``, the
-        fastest, when left out, and ``heun`` where there is one bond or `dt` is given.
+        fastest, by default, and ``heun`` where there is one bond or `dt` is given.
     dt : float, [time], optional
-        Time step of ``heun``; 0.05 when left out.
+        Time step of ``heun``; 0.05 by default.
     tolerance : float, optional
-        Of the others: local error of a step over the typical overlap; 1e-4 when left out.
+        Local error of a step over the typical overlap, for the other integrators; 1e-4 by default.
     rows, frames : int
-        How many samples of p(phi) and how many snapshots to keep.
+        Numbers of samples of p(phi) and of snapshots to keep.
     file : path, optional
-        H5MD file of the run. A finished run of these settings is loaded from it, one that was cut off
-        goes on, and one of other settings is refused. Without it the run is gone with its result.
+        H5MD file of the run. A finished run with the same settings is loaded, an interrupted one resumed, and one
+        with other settings refused. Without a file, the run is deleted together with its result.
     again : bool
-        Begin anew, whatever the file holds.
+        Start over, whatever the file holds.
     progress : bool
-        Whether a bar on standard error says how far it is.
+        Whether to show progress on standard error.
 
     Returns
     -------
@@ -163,34 +161,34 @@ def slow_compress(
     again: bool = False,
     progress: bool = True,
 ) -> RunFile:
-    """Compress particles in the plane through jamming at any rate, however slow, by implicit steps.
+    """Compress particles in the plane through jamming at any rate, however slow, with implicit time steps.
 
     Parameters
     ----------
     particles : Particles
-        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     phi : (float, float), optional
-        Packing fractions at which a fast compression in LAMMPS ends and this one begins, and to reach; (0.8, 0.9)
-        when left out. A start has its own: the first is then that, or None.
+        Packing fraction at which a fast compression in LAMMPS hands over, and the final one; (0.8, 0.9) by default.
+        With a start, the first must be that of the start, or None.
     kappa : float, [1/time], or sequence of (float, float)
-        Rate: the box shrinks with dL/dt = -kappa L. Or pairs of a packing fraction and the rate from
+        Rate: the box shrinks with dL/dt = -kappa L. Or pairs of a packing fraction and the rate used from
         there on, ascending.
     p_end : float, [energy / length^2]
-        It also ends where this pressure is reached.
+        Stop also when this pressure is reached.
     seed : int, optional
-        Of the random start; 1 when left out.
+        Random seed of the start; 1 by default.
     start : Packing or path, optional
-        What to begin with; of a path, its last frame.
+        Initial packing; the last frame of a file.
     method : {"tr-bdf2", "sdirk2", ...}
         A name of `jamshape.flow.implicit.METHODS`.
     tolerance : float
         Local error of a step over the typical overlap.
     largest_drop : float
-        Part of the elastic energy that one step may lose, so that plastic events are resolved in time.
+        Fraction of the elastic energy that one step may lose, so that plastic events are resolved in time.
     file, again, progress
-        As of `compress`.
+        See `compress`.
 
     Returns
     -------
@@ -227,79 +225,36 @@ def slow_compress(
     for _, rate in protocol.rates:
         require_stated(kappa=rate)
     at = place(file, "slow.h5")
-    if start is not None:
-        of: _Known | _Random = _Known.of(start, phi_start)
-    else:
-        of = _Random.of(particles, n=n, phi=phi_start, seed=seed)
-        require_rising(of.phi, phi_end)
+    if start is None:
+        phi_start = _PHI_SLOW_USUAL[0] if phi_start is None else phi_start
+        require_in("phi_start", phi_start, _PHI_SLOW)
+        require_rising(phi_start, phi_end)
+    asked = Asked(n, None if start is not None else phi_start, seed)
+    of = Start.of(particles, asked, start, usual_phi=_PHI_SLOW_USUAL[0])
+    _require_own(of.known, phi_start)
     if at.path.exists() and not again:
         slow_recording.require_same(at.path, protocol, of.made_from)
     else:
-        first = of.packing()
+        first = of.known or compressed_start(of.random(_PHI_RANDOM), of.phi)
         _require_end_ahead(first, protocol)
         slow_recording.begin(at.path, first, protocol, of.made_from)
     resume(at.path, progress=progress)
     return RunFile(*at)
 
 
+def _require_own(start: Packing | None, phi: float | None) -> None:
+    """Refuse a packing fraction that differs from that of a start."""
+    if start and phi is not None and not math.isclose(phi, start.phi, rel_tol=_SAME):
+        said = f"{{phi_start}} differs from that of the start, {start.phi:.6g}, expected no value beside a start; leave it out"
+        raise ArgumentError(said, {"phi_start": phi})
+
+
 def _require_end_ahead(first: Packing, protocol: Protocol) -> None:
-    """Refuse a start that is beyond the end."""
+    """Refuse a start beyond the final packing fraction or pressure."""
     if not first.phi < protocol.phi_end:
-        msg = f"the start has phi = {first.phi:.6g}, expected one below phi_end = {protocol.phi_end:g}"
+        msg = f"the start has phi = {first.phi:.6g}, expected less than phi_end = {protocol.phi_end:g}"
         raise ValueError(msg)
     pressure = MeasuredPacking.of(first).pressure
     if pressure >= protocol.p_end:
         said = f"{{p_end}} is not above the pressure of the start, {pressure:.4g}, expected a larger one"
         raise ArgumentError(said, {"p_end": protocol.p_end})
-
-
-class _Known(NamedTuple):
-    """A start that was given."""
-
-    start: MeasuredPacking
-
-    @classmethod
-    def of(cls, start: Packing | str | Path, phi: float | None) -> _Known:
-        """Take it, and refuse another packing fraction than its own."""
-        found = start_of(start)
-        if phi is not None and not math.isclose(phi, found.phi, rel_tol=_SAME):
-            said = f"{{phi_start}} is not that of the start, {found.phi:.6g}, which has its own, expected None in its place"
-            raise ArgumentError(said, {"phi_start": phi})
-        return cls(found)
-
-    @property
-    def made_from(self) -> dict[str, Any]:
-        return told_of(self.start)
-
-    def packing(self) -> Packing:
-        return self.start
-
-
-class _Random(NamedTuple):
-    """A random start, compressed fast."""
-
-    particles: Particles
-    n: int
-    phi: float
-    seed: int
-
-    @classmethod
-    def of(cls, particles: Particles | None, **asked: Any) -> _Random:
-        """Take what was asked for, n, phi and seed, and what is usual for those that are None."""
-        if particles is None:
-            msg = "there are neither particles nor a start, expected one of them"
-            raise ValueError(msg)
-        given = {name: value for name, value in asked.items() if value is not None}
-        found = cls(particles, **{"n": _N, "phi": _PHI_SLOW_USUAL[0], "seed": _SEED} | given)
-        require_stated(n=found.n, seed=found.seed)
-        require_in("phi_start", found.phi, _PHI_SLOW)
-        return found
-
-    @property
-    def made_from(self) -> dict[str, Any]:
-        return dict(self.particles.told) | {"n": self.n, "seed": self.seed}
-
-    def packing(self) -> Packing:
-        return compressed_start(
-            random_packing(self.n, _PHI_RANDOM, self.seed, self.particles), self.phi
-        )

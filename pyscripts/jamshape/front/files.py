@@ -1,4 +1,4 @@
-"""Loading and saving, whatever a file holds."""
+"""Load and save packings, runs and modes in any supported format."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ def load(
     dimension: int | None = None,
     shape: str | None = None,
 ) -> MeasuredPacking | Recorded | Modes:
-    """Load what is in a file.
+    """Load a packing, a run or modes from a file.
 
     Parameters
     ----------
     path : path
         H5MD of a packing or a run, HDF5 of modes, a LAMMPS dump or data file, or a GSD file.
     frame : int, optional
-        Which frame of a run, a dump or a GSD file to take as a packing, from 0 or, if negative, from
-        the end; a whole run, or the last frame of the others, when left out.
+        Frame of a run, a dump or a GSD file to return as a packing, counted from 0 or, if negative, from
+        the end. By default a whole run, or the last frame of other files.
     dimension : {2, 3}, optional
-        Of a dump or data file that does not say it; what is most plausible when left out, with a warning.
+        Dimension, for a dump or data file that does not state it; guessed by default, with a warning.
     shape : str, optional
-        The same of the shape: ``"spherocylinder"``, ``"superellipsoid"`` or ``"dimer"``. The law of such a
-        file is the usual one; use ``packing.with_(law=js.Interaction(k_e, sides))`` for another one.
+        Likewise the shape: ``"spherocylinder"``, ``"superellipsoid"`` or ``"dimer"``. The default law is assumed
+        for such a file; use ``packing.with_(law=js.Interaction(k_e, sides))`` for another one.
 
     Returns
     -------
@@ -86,20 +86,20 @@ def load(
 
 @checked
 def save(path: str | Path, thing: Packing | Recorded | Modes) -> None:
-    """Write a packing, a run or modes, replacing the file that is there only when all is written.
+    """Write a packing, a run or modes; an existing file is replaced only when writing is complete.
 
     Parameters
     ----------
     path : path
-        Its end says how: ``.h5`` (HDF5, to all digits and with the results), ``.data`` (a LAMMPS data
-        file of one packing, in doubles), ``.gsd`` (HOOMD-blue, OVITO; of a run all frames).
+        The suffix selects the format: ``.h5`` (HDF5, full precision, with results), ``.data`` (LAMMPS data
+        file of one packing, in doubles), ``.gsd`` (HOOMD-blue, OVITO; all frames of a run).
     thing : Packing, RunFile, ShearFile, QuasistaticShearFile or Modes
-        Of a run in ``.h5`` the copy holds all that its file does. It cannot be resumed if the run is not finished.
+        A run in ``.h5`` is copied whole; the copy of an unfinished run cannot be resumed.
 
     Raises
     ------
     ValueError
-        If the end of the name is none of these, or the format holds no such thing.
+        If the suffix is none of these, or the format cannot hold such an object.
     OSError
         If the file cannot be written.
 
@@ -148,4 +148,4 @@ _WRITERS: dict[str, dict[type, Callable[[Path, Any], None]]] = {
     ".data": {Packing: write_data},
     ".gsd": {Packing: _save_gsd, Recorded: _save_gsd},
 }
-"""What a file holds, by the end of its name, and how it is written."""
+"""Content and writer, by suffix."""

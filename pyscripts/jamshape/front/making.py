@@ -43,90 +43,89 @@ def make_packing(
     again: bool = False,
     progress: bool = True,
 ) -> MeasuredPacking:
-    """Make one mechanically stable packing: compress, lead it to an energy, measure.
+    """Make one mechanically stable packing: compress, relax to a target energy, measure.
 
     Parameters
     ----------
     particles : Particles, optional
-        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given, which has its own.
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 in 2D, 400 in 3D when left out, or that of the protocol.
+        Number of particles; 256 in 2D, 400 in 3D by default, or that of the protocol's paper.
     dimension : {2, 3}, optional
-        That of the shape's paper when left out.
+        By default that of the shape's paper.
     seed : int, optional
-        Of all that is random; 1 when left out.
+        Random seed; 1 by default.
     u0 : float, [energy / length^D], optional
-        Elastic energy over the box's area (volume) to lead the packing to, which says how far above
-        jamming it is; 1e-15 in 2D and 1e-12 in 3D when left out. 0, usual for equal steps, is the first
-        jammed packing as it is.
+        Target elastic energy over the area (volume) of the box, a measure of the distance to jamming;
+        1e-15 in 2D and 1e-12 in 3D by default. 0, the default of equal steps, keeps the first jammed
+        packing as it is.
     accuracy : float, optional
-        Of the energy, (u - u0) / u0; 1e-7 when left out.
+        Relative error of the energy, (u - u0) / u0; 1e-7 by default.
     tolerance : float, optional
-        Largest net force and torque on a particle over the mean force of a bond; 1e-8 when left out, or
+        Largest net force and torque on a particle over the mean force of a bond; 1e-8 by default, or
         1e-4 for equal steps.
     way : {"quasistatic", "dynamics", "steps"}, optional
-        To jamming: by quasistatic steps that are large far from it, the fastest way and the usual one, by
-        slow compression in LAMMPS (Marschall & Teitel 2018, Sec. III B), or by equal quasistatic steps
+        Route to jamming: quasistatic steps that are large far from jamming (default, fastest),
+        slow compression in LAMMPS (Marschall & Teitel 2018, Sec. III B), or equal quasistatic steps
         (Yuan et al. 2019, Sec. 2.2).
     phi_start : float, optional
-        Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D when left out.
+        Packing fraction of the random start; 0.4 in 2D, 0.1 in 3D by default.
     kappa : float, [1/time], optional
-        Of the way by dynamics the slowest compression rate, 4e-7 when left out; of marschall-2018 the
-        only one, 1e-6 when left out.
+        Slowest compression rate of ``dynamics``, 4e-7 by default, or the only rate of marschall-2018,
+        1e-6 by default.
     p_end : float, [energy / length^D], optional
-        Of the way by dynamics: the pressure to compress to at that rate; 1e-3 when left out.
+        Pressure at which compression at that rate ends, for ``dynamics``; 1e-3 by default.
     phi_end : float, optional
-        Of marschall-2018: the packing fraction to compress to, beyond jamming; 0.95 in 2D, 0.8 in 3D when
-        left out.
+        Final packing fraction of marschall-2018, beyond jamming; 0.95 in 2D, 0.8 in 3D by default.
     protocol : {"marschall-2018", "yuan-2019-1", "yuan-2019-2"}, optional
-        In place of a way: as published, with the paper's numbers for what is left out (Marschall & Teitel
-        2018, Sec. II and III B-C; Yuan et al. 2019, Sec. 2.2, where 2 has Monte Carlo of hard particles on
-        the way, which orders them). 1 and 2 are short for the last two.
+        Published protocol, in place of `way`, with the paper's values as defaults (Marschall & Teitel
+        2018, Sec. II and III B-C; Yuan et al. 2019, Sec. 2.2, where 2 adds Monte Carlo of hard particles,
+        which orders them). 1 and 2 are short for the last two.
     phi_thermal, n_sweeps : float, int, optional
-        Of yuan-2019-2: packing fraction and sweeps of the Monte Carlo; 0.55 and 100000 when left out.
+        Packing fraction and sweeps of the Monte Carlo of yuan-2019-2; 0.55 and 100000 by default.
     delta_phi : float, optional
-        The step of the packing fraction near jamming, 2e-3 when left out, or of equal steps, 1e-3.
+        Step of the packing fraction near jamming, 2e-3 by default, or of equal steps, 1e-3.
     start : path, optional
-        Of marschall-2018: a file of `compress` or `slow_compress` in place of the compression. The search
-        begins at its first frame that stays jammed when it is minimised; particles, n and seed are its own.
+        File of `compress` or `slow_compress` that replaces the compression of marschall-2018. The search begins at
+        its first frame that stays jammed when minimised; particles, n and seed are those of the file.
     search : {"direct", "halving"}, optional
-        Of marschall-2018: how u0 is found; by ours, which leads box and particles at once (usual), or by
-        the paper's steps of the box, 1e-6 at first and halved where u crosses u0 (Sec. III C, Eq. 20).
-    minimiser : {"auto", "paper", "newton", "lbfgs", "lammps"}, optional
-        Of the halving search: "paper" is the conjugate gradients of its App. A; "auto" when left out.
+        Search for u0 in marschall-2018: on box and particles at once (default), or with the paper's
+        steps of the box, 1e-6 at first and halved where u crosses u0 (Sec. III C, Eq. 20).
+    minimiser : {"auto", "near", "newton", "cg_marschall"}, optional
+        Minimiser of the halving search: "cg_marschall" is the conjugate gradients of its App. A; "auto" by default.
     strict : bool
-        Go on at the energy, along what slides, until no mode has an eigenvalue below zero by more than its
-        bound; ``results["n_negative"]`` says how many have. Rods of alpha = 4 end at saddles otherwise.
+        Continue at fixed u, along floppy modes, until no mode has an eigenvalue below minus its error bound;
+        ``results["n_negative"]`` counts those that do. Rods of alpha = 4 end at saddles otherwise.
     threads : int
-        By which the contacts of a large packing are evaluated, thousands of particles on cores that are free.
-        Last bits depend on it, and with them which of many minima is found; a packing that was
-        cut off goes on with any number. Many packings take less time one beside the other, each in a process.
+        Number of threads; worth it from thousands of particles on. The last bits depend on it, and with them
+        which of many minima is found; an interrupted packing resumes with any number. Many packings take less
+        time in separate processes.
     file : path, optional
-        H5MD file of the packing. One of this recipe is loaded from it, one that was cut off goes on from
-        files beside it, and one of another recipe is refused. Without it nothing is kept but the result.
+        H5MD file of the packing. A packing of this recipe is loaded from it, an interrupted one resumed from
+        files beside it, and one of another recipe refused. Without a file only the result is kept.
     again : bool
-        Make it anew, whatever is there.
+        Start over, whatever the file holds.
     progress : bool
-        Whether a bar on standard error says how far it is.
+        Whether to show progress on standard error.
 
     Returns
     -------
     MeasuredPacking
-        Its ``reached`` says whether forces balance to the tolerance, and ``results["outcome"]`` how it ended.
+        ``reached`` is true if forces balance to the tolerance; ``results["outcome"]`` says how it ended.
 
     Raises
     ------
     ValueError
-        If a number is out of its range or none of the way, or the file holds another packing.
+        If a number is out of its range or does not belong to the protocol, or the file holds another packing.
     TargetError
         If the energy is not reached.
     PluginError
-        If the way by dynamics finds no LAMMPS or no plugin for it.
+        If ``dynamics`` finds no LAMMPS or no plugin for it.
 
     Warns
     -----
     NotReachedWarning
-        If forces do not balance to the tolerance, after a second try as long as the first one.
+        If forces do not balance to the tolerance, even after a second attempt of equal length.
 
     Examples
     --------
@@ -154,7 +153,7 @@ def make_packing(
         tidy(recipe, at.path)
     packing = MeasuredPacking.read(at.path)
     warn_unless_reached(packing.results)
-    # A file that goes with its folder is nothing to name.
+    # A temporary file is not named in messages.
     return packing if at.folder is None else MeasuredPacking.of(packing, packing.results)
 
 

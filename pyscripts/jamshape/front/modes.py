@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.arguments import checked
 from jamshape.arrays import FloatArray, IntArray
-from jamshape.checks import (
-    Range,
-    require_in,
-    require_no_effect,
-    require_one_of,
-    require_other_file,
-)
+from jamshape.checks import Range, require_in, require_no_effect, require_one_of, require_other_file
 from jamshape.files.disk import require_hdf5_name, settled
 from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
@@ -45,25 +39,25 @@ _LOWEST = Range(1, 10**6, "modes", whole=True)
 _NEAR = Range(0.0, 1e6, "a frequency")
 _LEAST_FORCE = Range(0.0, 100.0, "mean forces of a bond")
 
-FEW = 20  # modes that the sparse method finds where nobody says how many
+FEW = 20  # default number of modes of the sparse method
 
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes of a packing by ascending eigenvalue, with what is known of each.
+    """Modes of a packing by ascending eigenvalue, with their properties.
 
     Parameters
     ----------
     table : ModeTable
         All columns; ``modes["participation"]`` looks one up.
     about : mapping of str to number or str
-        What is known of the packing.
+        Properties of the packing.
     packing : MeasuredPacking, optional
-        None of modes that were read from a file.
+        None for modes that were read from a file.
     file : Path, optional
-        Where they were read from.
+        File they were read from.
     matrix : DynamicalMatrix, optional
-        Whose modes they are; None of modes that were read from a file.
+        The matrix that was diagonalised; None for modes that were read from a file.
 
     Examples
     --------
@@ -94,7 +88,7 @@ class Modes:
 
     @property
     def told(self) -> ModeTable:
-        """The table with all that is known of the packing among its attributes, as in a file."""
+        """The table, with the properties of the packing among its attributes as in a file."""
         return replace(self.table, attributes=self.about | self.table.attributes)
 
     @property
@@ -104,12 +98,12 @@ class Modes:
 
     @property
     def omega(self) -> FloatArray:
-        """(k,) frequencies, the roots of the eigenvalues' sizes with the eigenvalues' signs."""
+        """(k,) frequencies sign(lambda) sqrt(|lambda|)."""
         return self.table["omega"]
 
     @property
     def participation(self) -> FloatArray:
-        """(k,) participation ratios: 3 where all of x, y and turns take part alike (2D), 1/N where one coordinate does."""
+        """(k,) participation ratios; in 2D 3 if x, y and rotation share equally, 1/N for one coordinate."""
         return self.table["participation"]
 
     @property
@@ -126,7 +120,7 @@ class Modes:
     def in_band(self, name: str) -> IntArray:
         """Rows of the modes of a band: translation, low, middle or high.
 
-        There are none where bands are not apart, as far above jamming; ``repr(modes)`` says why.
+        Empty where bands do not separate, as far above jamming; ``repr(modes)`` gives the reason.
         """
         require_one_of("band", name, BANDS.values())
         return self.table.in_band(name)
@@ -152,19 +146,19 @@ class Modes:
         return self.table.moduli
 
     def plot(self, axes: Axes | None = None, **look: Any) -> Axes:
-        """Draw the density of their frequencies; arguments as `jamshape.plot`."""
+        """Draw the density of their frequencies; arguments as in `jamshape.plot`."""
         from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows modes
 
         return plot(self, axes, **look)
 
     @checked
     def save(self, path: str | Path, *, vectors: bool = True) -> None:
-        """Write them to an HDF5 file, with or without their vectors, replacing modes that are there.
+        """Write the modes to an HDF5 file, with or without eigenvectors, replacing modes in it.
 
         Raises
         ------
         ValueError
-            If the file is there and holds anything else, such as the packing.
+            If the file exists and holds anything else, such as the packing.
         """
         read = [self.packing.file] if self.packing and self.packing.file else []
         require_hdf5_name(Path(path))
@@ -188,14 +182,14 @@ class Modes:
 
 
 def require_modes_file(out: Path, read: Sequence[Path] = ()) -> None:
-    """Refuse to write modes over anything but modes.
+    """Refuse to overwrite anything but modes.
 
     Parameters
     ----------
     out : Path
-        Where to write.
+        Output file.
     read : sequence of Path
-        What they are found from.
+        Input files.
 
     Raises
     ------
@@ -203,7 +197,7 @@ def require_modes_file(out: Path, read: Sequence[Path] = ()) -> None:
     """
     require_other_file(out, read)
     if out.exists() and not holds_modes(out):
-        msg = f"{out} is there and holds no modes, expected another file to write to, or remove it"
+        msg = f"{out} exists and holds no modes, expected another output file; choose one or remove it"
         raise ValueError(msg)
 
 
@@ -223,26 +217,26 @@ def modes(
     Parameters
     ----------
     packing : Packing or path
-        At a minimum of its energy, as `make_packing` leaves it; the energy is that of its law, ``packing.law``.
+        At a minimum of its energy, as from `make_packing`, under its law, ``packing.law``.
     lowest : int, optional
-        Only this number of softest modes, by a sparse method; all when left out. Translations do not count
-        and come in addition, flagged, as in the whole spectrum.
+        Number of softest modes to find, by a sparse method; all by default. Translations are
+        added, flagged, as in the whole spectrum.
     near : float, [sqrt(energy) / length], optional
-        As many modes as `lowest` says, or 20, whose frequencies are nearest to this one.
+        Frequency around which to find `lowest` (or 20) modes.
     method : {"projected", "refined", "plain", "first_order", "sparse"}, optional
-        Of the whole spectrum; see `jamshape.vibration.spectrum.spectrum`. ``sparse`` finds 20 modes
-        where nobody says how many. When left out ``sparse`` where only some modes are asked for, and else ``projected``.
+        Method for the whole spectrum; see `jamshape.vibration.spectrum.spectrum`. ``sparse`` finds 20 modes
+        by default. The default is ``sparse`` where only some modes are requested, and else ``projected``.
     rotation : {"half_length", "radius"}
-        What a radian counts for as a length.
+        Length by which rotations in radians are scaled.
     least_force : float
-        Leave out contacts weaker than so many mean bond forces; 1e-4 leaves out those that only graze.
+        Omit contacts weaker than this many mean bond forces; 1e-4 omits grazing contacts.
     force : bool
-        Also where the packing is no minimum.
+        Compute even if the packing is not at a minimum.
 
     Returns
     -------
     Modes
-        Each eigenvalue with its sign, the bound of its error, participation, kind of motion and band;
+        Signed eigenvalues with error bounds, participation, kind of motion and band;
         translations have the eigenvalue 0.
 
     Raises
@@ -296,7 +290,7 @@ def modes(
 def _found(
     matrix: DynamicalMatrix, method: str, lowest: int | None, near: float | None
 ) -> Spectrum:
-    """Find the modes that were asked for, by the method that was, and translations."""
+    """Find the requested modes and translations."""
     few = lowest or min(FEW, max(1, matrix.size - matrix.translations.shape[1]))
     if near is not None:
         return with_translations(matrix, modes_near(matrix, few, near**2))

@@ -1,4 +1,4 @@
-"""A packing with what one asks of it: contacts, pressure, pictures, files of other tools."""
+"""A packing with its contacts, pressure, pictures and exports."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ if TYPE_CHECKING:
 @checked_fields
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuredPacking(Packing):
-    """A `Packing` with what is known of it and what can be asked of it.
+    """A `Packing` with its metadata and everything that can be computed from it.
 
-    Its contacts have the law that it carries, ``packing.law``, as its copies and files do.
+    Contacts follow its law, ``packing.law``, which copies and files keep.
 
     Parameters
     ----------
     results : mapping of str to number or str
-        What its file says of it: how it was made and what was measured.
+        Attributes of its file: how it was made and what was measured.
     file : Path, optional
-        Where it was read from.
+        File it was read from.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class MeasuredPacking(Packing):
     >>> packing.z, packing.results["outcome"]
     (5..., 'converged')
     >>> packing.contacts()
-    <4... contacts of 16 particles: z = 5... bonds for each of the 16 that are no rattlers>
+    <4... contacts of 16 particles: z = 5... bonds per particle, 0 rattlers left out>
     """
 
     results: Mapping[str, Any] = field(default_factory=dict)
@@ -64,7 +64,7 @@ class MeasuredPacking(Packing):
     def of(
         cls, packing: Packing, results: Mapping[str, Any] | None = None, file: Path | None = None
     ) -> Self:
-        """Take the particles of any packing."""
+        """Convert any packing."""
         known = {name: getattr(packing, name) for name in Packing.__dataclass_fields__}
         return cls(**known, results=dict(results or {}), file=file)
 
@@ -75,7 +75,7 @@ class MeasuredPacking(Packing):
         return cls.of(packing, results_of(path, packing), path)
 
     def with_(self, **changes: Any) -> Self:
-        """Return a packing with the named fields replaced, of which its file says nothing any more."""
+        """Return a packing with the named fields replaced, and without results and file."""
         return super().with_(**({"results": {}, "file": None} | changes))  # type: ignore[return-value]
 
     @cached_property
@@ -83,7 +83,7 @@ class MeasuredPacking(Packing):
         return Contacts.of(self)
 
     def contacts(self) -> Contacts:
-        """Find its contacts.
+        """Find the contacts.
 
         Returns
         -------
@@ -93,23 +93,23 @@ class MeasuredPacking(Packing):
         Raises
         ------
         CrossingError
-            If what must not cross of two particles does.
+            If the cores (spines or centres) of two particles cross.
         """
         return self._contacts
 
     @property
     def reached(self) -> bool:
-        """Whether it reached its goal, forces that balance; True where its file says nothing of that."""
+        """Whether forces balance to the tolerance; True where the file does not say."""
         return "outcome" not in self.results or is_reached(self.results)
 
     @property
     def z(self) -> float:
-        """Bonds per particle that is no rattler (Marschall & Teitel 2018, Sec. III C)."""
+        """Bonds per particle, rattlers excluded (Marschall & Teitel 2018, Sec. III C)."""
         return self._contacts.z
 
     @property
     def rattlers(self) -> BoolArray:
-        """(N,) which particles their contacts do not hold in place."""
+        """(N,) whether the particle is a rattler, not held in place by its contacts."""
         return self._contacts.rattlers
 
     @property
@@ -119,54 +119,54 @@ class MeasuredPacking(Packing):
 
     @property
     def pressure(self) -> float:
-        """-dU/dV of affine changes of the box, [energy / length^D]."""
+        """-dU/dV under affine changes of the box, [energy / length^D]."""
         return sum_forces(self, self._contacts.network).pressure
 
     def modes(self, **how: Any) -> Modes:
-        """Find its modes of vibration; arguments and errors as `jamshape.modes`."""
+        """Find the modes of vibration; arguments and errors as in `jamshape.modes`."""
         from jamshape.front.modes import modes  # noqa: PLC0415 - which knows packings
 
         return modes(self, **how)
 
     def plot(self, axes: Axes | None = None, **look: Any) -> Axes:
-        """Draw it; arguments as `jamshape.plot`."""
+        """Draw the packing; arguments as in `jamshape.plot`."""
         from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows packings
 
         return plot(self, axes, **look)
 
     @checked
     def save(self, path: str | Path) -> None:
-        """Write it, as `jamshape.save`: how says the end of the name."""
+        """Write the packing to a file; see `jamshape.save`."""
         from jamshape.front.files import save  # noqa: PLC0415 - which knows packings
 
         save(path, self)
 
     @property
     def to_store(self) -> dict[str, Any]:
-        """Give the results without what tells of a run: a frame is not that run, which could be gone on with."""
+        """Return the results without attributes of a run: a single frame cannot be continued as a run."""
         return {k: v for k, v in self.results.items() if k != "finished"}
 
     @checked
     def to_gsd(self, path: str | Path) -> None:
-        """Write it for HOOMD-blue, OVITO and freud; needs the package gsd."""
+        """Write the packing as GSD for HOOMD-blue, OVITO and freud; needs the package gsd."""
         from jamshape.exchange.gsd import write_gsd  # noqa: PLC0415 - gsd may be missing
 
         write_gsd(path, self)
 
     def to_freud(self) -> Any:
-        """Give what freud's functions take; see `jamshape.exchange.freud.to_freud`."""
+        """Return arguments of freud's functions; see `jamshape.exchange.freud.to_freud`."""
         from jamshape.exchange.freud import to_freud  # noqa: PLC0415 - freud may be missing
 
         return to_freud(self)
 
     def to_ovito(self) -> Any:
-        """Give an `ovito.data.DataCollection`; see `jamshape.exchange.ovito.to_ovito`."""
+        """Return an `ovito.data.DataCollection`; see `jamshape.exchange.ovito.to_ovito`."""
         from jamshape.exchange.ovito import to_ovito  # noqa: PLC0415 - ovito may be missing
 
         return to_ovito(self, self.rattlers)
 
     def to_mdanalysis(self) -> Any:
-        """Give an `MDAnalysis.Universe`; see `jamshape.exchange.mdanalysis.to_mdanalysis`."""
+        """Return an `MDAnalysis.Universe`; see `jamshape.exchange.mdanalysis.to_mdanalysis`."""
         from jamshape.exchange.mdanalysis import (  # noqa: PLC0415 - MDAnalysis may be missing
             to_mdanalysis,
         )
@@ -193,7 +193,7 @@ class MeasuredPacking(Packing):
 
 
 def results_of(path: Path, packing: Packing) -> dict[str, Any]:
-    """Read what a file says of a packing in it; nothing, with a warning, if its particles were changed since.
+    """Read the results stored with a packing; none, with a warning, if its particles were changed since.
 
     Errors are those of `read_packing`.
     """
@@ -204,8 +204,8 @@ def results_of(path: Path, packing: Packing) -> dict[str, Any]:
     if abs(phi - packing.phi) <= _SAME_PHI * packing.phi:
         return known
     said = (
-        f"{path}: its attributes say phi = {phi:.8g} and its particles have phi = {packing.phi:.8g}: another program has"
-        " changed them, and what the file says of its packing is left out"
+        f"{path}: its attributes state phi = {phi:.8g} but its particles have phi = {packing.phi:.8g}; another program"
+        " changed them, so the stored results are ignored"
     )
     warnings.warn(said, stacklevel=3)
     return {}

@@ -41,10 +41,10 @@ def plot(
     ----------
     thing : Packing, RunFile, ShearFile, QuasistaticShearFile or Modes
     axes : matplotlib Axes, optional
-        Where to draw, without a projection, also packings in space, whose picture is computed; a new figure of
-        `matplotlib.pyplot` when left out.
+        Axes without a projection, for packings in space too; by default a new figure of
+        `matplotlib.pyplot`.
     color : {"kind", "orientation", "one", "nematic", "tetratic", "cubatic"}, optional
-        What the colours of a packing's particles tell; "kind" when left out.
+        Quantity that colours the particles of a packing; "kind" by default.
 
     Returns
     -------
@@ -53,9 +53,9 @@ def plot(
     Raises
     ------
     TypeError
-        If it is none of these, or axes are no such axes.
+        If it is none of these, or axes are not such axes.
     ValueError
-        If the packing's dimension knows no such order, or there is a colour for what is no packing.
+        If the order is undefined in the packing's dimension, or a colour is given for anything but a packing.
 
     Examples
     --------
@@ -83,7 +83,7 @@ def plot(
 
 
 def html(thing: MeasuredPacking | Recorded | Modes) -> str:
-    """Show it in a notebook: what it is, and a picture."""
+    """Return HTML for notebooks: the repr and a picture."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - only notebooks ask
 
     figure = Figure(figsize=_size(thing), layout="constrained")

@@ -1,4 +1,4 @@
-"""What a long run says of how far it is, in terminals, notebooks and logs, and where runs without a file live."""
+"""Progress of long runs in terminals, notebooks and logs, and temporary files."""
 
 from __future__ import annotations
 
@@ -17,45 +17,44 @@ from jamshape.checks import require_one_process
 
 _Step = TypeVar("_Step")
 
-# Between two lines of a log, and between two looks of a bar, in seconds.
-_LOG_SECONDS = 10.0
-_BAR_SECONDS = 1.0
+_LOG_SECONDS = 10.0  # between two lines of a log
+_BAR_SECONDS = 1.0  # between two updates of a bar
 
-# What a bar says where it is known how much remains, and where it is not.
+# Layout of a bar when the remaining time is known, and when it is not.
 _WITH_REST = "{desc}:{percentage:5.1f} %|{bar}| [{elapsed}, remain {remaining}]{postfix}"
 _WITHOUT_REST = "{desc} [{elapsed}]{postfix}"
 
 
 class Told(NamedTuple):
-    """How far a run is."""
+    """Progress of a run."""
 
     phase: str
-    """In words, such as ``compression``."""
+    """Name, such as ``compression``."""
     text: str
-    """Where it is."""
+    """Current state."""
     part: float | None = None
-    """Of the phase, from 0 to 1; None where nobody can tell."""
+    """Completed fraction of the phase, from 0 to 1; None if unknown."""
     aside: str | None = None
-    """A sentence to say once."""
+    """Note to print once."""
 
 
 def follow(
     steps: Iterator[_Step], told: Callable[[_Step], Told], *, shown: bool = True, begun: float = 0.0
 ) -> None:
-    """Go through all steps of a run and say on standard error how far it is.
+    """Iterate over all steps of a run and report progress on standard error.
 
-    There is a bar in terminals and notebooks, and elsewhere, as in the log of a batch job, a line every ten
-    seconds. What remains is estimated where the part that is done is known.
+    Terminals and notebooks show a bar, other outputs, such as the log of a batch job, a line every ten
+    seconds. The remaining time is estimated where the completed fraction is known.
 
     Parameters
     ----------
     steps : iterator
     told : callable
-        Says of a step how far it is.
+        Returns the progress at a step.
     shown : bool
-        Whether anything is said at all.
+        Whether to report anything.
     begun : float
-        The part of the first phase that was done before.
+        Fraction of the first phase that was completed before.
     """
     line = (_Bar if _is_looked_at() else _Log)(begun) if shown else None
     try:
@@ -76,7 +75,7 @@ def _is_looked_at() -> bool:
 
 def _tqdm() -> Any:
     with warnings.catch_warnings():
-        # Its word on notebooks without widgets; it writes text there.
+        # Silences tqdm's warning about notebooks without widgets; it writes text there.
         warnings.simplefilter("ignore")
         from tqdm.auto import tqdm  # noqa: PLC0415 - not needed without a run
 
@@ -116,7 +115,7 @@ class _Bar:
 
 
 class _Log:
-    """Lines, the first at once, then one in a while, and the last."""
+    """Log lines: the first at once, then at intervals, and the last."""
 
     def __init__(self, begun: float) -> None:
         self._first, self._phase = begun, ""
@@ -148,7 +147,7 @@ class _Log:
 
 
 def _how_far(at: Told, first: float, seconds: float) -> str:
-    """Say the part that is done, how long it took, and how long the rest will if it goes on like this."""
+    """Format the completed fraction, the elapsed time and the remaining time at this pace."""
     interval = _tqdm().format_interval
     if at.part is None:
         return f"[{interval(seconds)}] "
@@ -158,7 +157,7 @@ def _how_far(at: Told, first: float, seconds: float) -> str:
 
 
 class Folder:
-    """A temporary folder that goes with the last who holds this, in the process that made it."""
+    """A temporary folder, removed with its last reference, in the process that made it."""
 
     def __init__(self) -> None:
         self.path = Path(tempfile.mkdtemp(prefix="jamshape-"))
@@ -172,14 +171,14 @@ def _remove_if_own(folder: Path, maker: int) -> None:
 
 
 class Place(NamedTuple):
-    """A file, and the folder that goes when nobody needs it any more."""
+    """A file, and its temporary folder, if any."""
 
     path: Path
     folder: Folder | None = None
 
 
 def place(file: str | Path | None, name: str) -> Place:
-    """Make room for a file; without one, in a folder of its own that goes with the result."""
+    """Return the place of a file; without one, in a temporary folder removed with the result."""
     if file is None:
         folder = Folder()
         return Place(folder.path / name, folder)

@@ -1,4 +1,4 @@
-"""Runs in files: recorded as they go, and gone on with after they were cut off, whatever their flow."""
+"""Record runs into files, and resume interrupted ones."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from jamshape.lammps.session import Session
 
 @checked
 def resume(file: str | Path, *, progress: bool = True) -> Recorded:
-    """Go on with a run that was cut off, as it was set; a finished one is loaded.
+    """Resume an interrupted run with its settings; load a finished one.
 
     Parameters
     ----------
     file : path
-        Of a run of `compress`, `slow_compress`, `shear` or `quasistatic_shear`.
+        File of `compress`, `slow_compress`, `shear` or `quasistatic_shear`.
     progress : bool
-        Whether a bar on standard error says how far it is.
+        Whether to show progress on standard error.
 
     Returns
     -------
@@ -38,12 +38,12 @@ def resume(file: str | Path, *, progress: bool = True) -> Recorded:
     Raises
     ------
     FileFormatError, OSError
-        If it is no such file, or not to be read.
+        If it is not such a file, or cannot be read.
 
     Warns
     -----
     NotReachedWarning
-        If the run did not reach its goal: forces that balance after each step of a quasistatic shear, or the pressure
+        If the run did not reach its goal: force balance after each step of a quasistatic shear, or the pressure
         ``p_end`` of a slow compression.
 
     Examples
@@ -57,7 +57,7 @@ def resume(file: str | Path, *, progress: bool = True) -> Recorded:
     path = Path(file)
     stored = read_attributes(path)
     if "finished" not in stored or not stored.keys() & {"rows", *_OTHERS}:
-        msg = f"{path} holds no run, expected a file of compress, slow_compress or shear"
+        msg = f"{path} holds no run, expected a file of compress, slow_compress, shear or quasistatic_shear"
         raise FileFormatError(msg)
     if not stored.get("finished"):
         record = next((record for mark, record in _OTHERS.items() if mark in stored), None)
@@ -83,7 +83,7 @@ def record_flow(start: Callable[[Session], FlowRun[Motion]], to: Recording, prog
 
 
 def _told(settings: Motion, phi_start: float) -> Callable[[Row], Told]:
-    """Return what says how far a run is: the strain that is done of the whole one."""
+    """Return a function that reports the completed fraction of the strain."""
 
     def told(row: Row) -> Told:
         found = row.observables
@@ -104,7 +104,7 @@ def _record_slowly(path: Path, progress: bool) -> None:
 
 
 def _of_compression(stored: Mapping[str, Any], phi: float) -> tuple[Callable[[Step], Told], float]:
-    """Return what says how far a slow compression is, and the part that is done at phi."""
+    """Return a function that reports progress of a slow compression, and the fraction completed at phi."""
     first, end = float(stored["phi_start"]), float(stored["phi_end"])
     until = f" or {stored['p_end']:.3g}" if math.isfinite(stored["p_end"]) else ""
 
@@ -143,4 +143,4 @@ _OTHERS: dict[str, Callable[[Path, bool], None]] = {
     "flow_steps": _record_slowly,
     "shear_steps": _record_steps,
 }
-"""What goes on with runs that are not LAMMPS's, by an attribute that only these have."""
+"""Functions that resume runs outside LAMMPS, by an attribute that only these have."""

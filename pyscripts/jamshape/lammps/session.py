@@ -25,33 +25,32 @@ from jamshape.shapes.table import guess_shape_style
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from types import TracebackType
 
     from jamshape.arrays import FloatArray, IntArray
 
-# Styles need a dimension and an atom style before the state; a restart file brings both.
+# Styles need a dimension and an atom style before the state; a restart file contains both.
 _ATOMS = "units lj\natom_style ellipsoid\natom_modify map array"
 _POSES = """compute orient all property/atom quatw quati quatj quatk
             compute shape all property/atom shapex shapey shapez"""
 
-# Of the smallest diameter.
+# Skin, over the smallest diameter.
 _SKIN = 0.3
 _WIDEST_BIN = 50.0
 
 
-# By these Open MPI tells that srun began a process.
+# Variables by which Open MPI detects a process started by srun.
 _STEP = ("SLURM_STEP_ID", "SLURM_STEPID")
 
-# A folder of temporary files whose name has anything else ends Open MPI 4 in a segmentation fault.
+# Open MPI 4 crashes if the name of its temporary folder has other characters.
 _PLAIN_NAME = re.compile(r"[\w./+-]*", re.ASCII)
 
 
 @contextmanager
 def _as_one_process() -> Iterator[None]:
-    """Hide from MPI, while it starts, what ends it.
+    """Hide from MPI, while it starts, variables that would abort it.
 
-    Open MPI ends a step of one process that Slurm's srun began, as Snakemake's jobs are, unless srun told it, too,
-    how to find other processes (PMIX_RANK); here there are none to find.
+    Open MPI aborts a single-process step started by Slurm's srun, as Snakemake's jobs are, unless srun also
+    provides PMI (PMIX_RANK); here it is not needed.
     """
     names: tuple[str, ...] = ()
     if os.environ.get("SLURM_STEP_NUM_TASKS") == "1" and "PMIX_RANK" not in os.environ:
@@ -66,7 +65,7 @@ def _as_one_process() -> Iterator[None]:
 
 
 class Session:
-    """One LAMMPS instance that knows our styles; a context manager.
+    """A LAMMPS instance with our styles; a context manager.
 
     Raises
     ------
@@ -84,24 +83,24 @@ class Session:
     screen
         Whether LAMMPS writes to standard output.
     arguments
-        More command-line arguments of `lmp`, such as ``("-var", "alpha", "4")``.
+        Further command-line arguments of `lmp`, such as ``("-var", "alpha", "4")``.
 
     Notes
     -----
-    An error in a command raises `LammpsError`, also where LAMMPS itself would end the process. Without `screen`, warnings
+    An error in a command raises `LammpsError`, even where LAMMPS itself would end the process. Without `screen`, warnings
     still reach standard error, through a filter that outlives the process. Threads take turns, command by command.
     """
 
     def __init__(
         self, log: str | Path | None = None, *, screen: bool = False, arguments: Sequence[str] = ()
     ) -> None:
-        lammps_class()  # says what is missing before anything is started
+        lammps_class()  # reports missing parts before anything is started
         require_one_process(
             "they would share each run, and each make its own copy of the result",
             ", or give mpirun the command lmp and a deck",
         )
         if log:
-            Path(log).open("a").close()  # where LAMMPS cannot, it ends the process
+            Path(log).open("a").close()  # LAMMPS would end the process on failure
         self._like: Packing | None = None
         self._law: Interaction | None = None
         plugin = plugin_path()
@@ -125,12 +124,7 @@ class Session:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -144,7 +138,7 @@ class Session:
             self._complaints.communicate()
 
     def _load(self, plugin: Path) -> ctypes.CDLL:
-        """Add our styles, after seeing to it that they were built for this LAMMPS."""
+        """Load our styles, after checking that they were built for this LAMMPS."""
         try:
             library = self._checked(plugin)
         except PluginError:
@@ -178,20 +172,20 @@ class Session:
         Raises
         ------
         LammpsError
-            Where LAMMPS refuses one.
+            If LAMMPS refuses one.
         """
         for line in text.strip().splitlines():
             with one_at_a_time():
                 run_command(self.lmp, line.strip())
 
     def left_out(self) -> str:
-        """Say what the last run spared this scene, as the log does."""
+        """Return the log's note on calculations skipped in the last run."""
         function = self._library.jamshape_left_out
         function.argtypes, function.restype = [ctypes.c_void_p], ctypes.c_char_p
         return str(function(self.lmp.lmp).decode())
 
     def load(self, packing: Packing) -> None:
-        """Read a packing into a fresh instance; LAMMPS types are those of `Shape.style`, its IDs 1 to N."""
+        """Load a packing into a fresh instance; LAMMPS types are those of `Shape.style`, its IDs 1 to N."""
         self.commands(f"{_ATOMS}\ndimension {packing.dimension}")
         self._like = packing
         types = packing.shape.style(packing, Interaction()).types
@@ -201,32 +195,32 @@ class Session:
             write_data(path, packing.with_(species=types, id=rank))
             if packing.box.is_tilted:
                 self.commands("box tilt large")
-            # Through a descriptor, as LAMMPS reads `$`, `*` and quotes in names in ways of its own.
+            # Through a descriptor, since LAMMPS interprets `$`, `*` and quotes in names.
             with path.open("rb") as file:
                 self.commands(f"read_data /dev/fd/{file.fileno()}")
         self.commands(_POSES)
 
     def load_restart(self, path: str | Path, like: Packing | None = None) -> None:
-        """Read a restart file into a fresh instance, of the particles of a packing."""
+        """Load a restart file into a fresh instance, with the particles of a packing."""
         self._like = like
         with Path(path).open("rb") as file:
             self.commands(f"{_ATOMS}\nread_restart /dev/fd/{file.fileno()}\n{_POSES}")
 
     def write_restart(self, path: Path) -> None:
-        """Write a restart file of the present state, which takes its place when it is whole.
+        """Write a restart file of the present state, which takes its place when complete.
 
         Raises
         ------
         OSError
-            One sentence, if it cannot be written.
+            If it cannot be written; the message is one sentence.
         """
-        # First in memory: on a full disk LAMMPS would end this process.
-        with open(os.memfd_create("restart"), "rb") as file:  # noqa: PTH123 - it has no path
+        # In memory first: on a full disk LAMMPS would end this process.
+        with open(os.memfd_create("restart"), "rb") as file:  # noqa: PTH123 - a descriptor
             self.commands(f"write_restart /dev/fd/{file.fileno()}")
             store(path, file.read(), wait=False)
 
     def interact(self, law: Interaction) -> None:
-        """Set the pair style of the particles that were loaded; packings carry this law from then on."""
+        """Set the pair style of the loaded particles; packings carry this law from then on."""
         self._law = law
         self.commands(self._loaded.shape.style(self._loaded, law).commands)
 
@@ -238,10 +232,10 @@ class Session:
         return self._like
 
     def packing(self, time: float = 0.0) -> Packing:
-        """Return the present state, sorted by ID, with the time that it is told.
+        """Return the present state, sorted by ID, with a given time.
 
-        Shapes, exponents and species are those of the packing that was loaded; without one, shapes are
-        guessed from diameters, as of files.
+        Shapes, exponents and species are those of the loaded packing; without one, shapes are
+        guessed from diameters, as for files.
         """
         with one_at_a_time():
             return self._packing(time)
@@ -272,7 +266,7 @@ class Session:
         )
 
     def _known(self, diameters: FloatArray, types: IntArray) -> dict[str, Any]:
-        """Give what LAMMPS does not know of its particles."""
+        """Return properties that LAMMPS does not store of its particles."""
         if self._like is None:
             known = {"shape_style": guess_shape_style(diameters), "species": types}
             return known | {"id": np.arange(1, len(types) + 1)}
@@ -281,9 +275,9 @@ class Session:
         return {name: getattr(like, name) for name in names} | {"law": self._law or like.law}
 
     def neighbours(self) -> str:
-        """Input that sets the neighbour list up in the unit of length of the particles."""
+        """Return input that sets up the neighbour list in the particles' unit of length."""
         diameters = self.packing().diameters
-        # Bins of a plane, which is one unit thick, may not be a hundred times wider than that.
+        # Bins of a plane, which is one unit thick, may be at most a hundred times wider.
         style = "bin" if diameters.max() < _WIDEST_BIN else "nsq"
         skin = _SKIN * float(diameters.min())
         return (
@@ -293,12 +287,12 @@ class Session:
 
     @property
     def is_tilted(self) -> bool:
-        """Whether the box may tilt (LAMMPS: is triclinic)."""
+        """Whether the box may tilt (triclinic in LAMMPS)."""
         return bool(self.lmp.extract_setting("triclinic"))
 
     @property
     def version(self) -> int:
-        """Version of LAMMPS, such as 20210929."""
+        """LAMMPS version, such as 20210929."""
         return int(self.lmp.version())
 
     @property

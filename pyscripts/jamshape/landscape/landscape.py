@@ -1,8 +1,8 @@
 """The energy landscape of a packing: energy, forces and Hessian as functions of its coordinates.
 
-Coordinates are displacements and rotations of a `State`, in one vector. Angles enter it as lengths: A theta
-(Marschall & Teitel 2018, Eq. 23), or a times the three angles (Yuan et al. 2019), so that all its
-components are alike; what no contact can turn, discs and spheres, has no rotation in it. Needs no LAMMPS.
+Coordinates are displacements and rotations of a `State`, in one vector. Angles are scaled to lengths: A theta
+(Marschall & Teitel 2018, Eq. 23), or a times the three angles (Yuan et al. 2019), so that all
+components are comparable; rotations without torque, as of discs and spheres, are left out. Needs no LAMMPS.
 """
 
 from __future__ import annotations
@@ -20,9 +20,8 @@ from jamshape.contacts.near import near_particles, nearer
 from jamshape.contacts.network import refuse_crossing, refuse_unconverged
 from jamshape.packing import Packing, State
 
-# Pairs whose surfaces are closer than this fraction of the smallest radius are looked at; they are looked for among
-# those that are closer than so many times as much.
-_SKIN, _WIDE = 0.3, 5.0
+_SKIN = 0.3  # of the pair list, over the smallest radius
+_WIDE = 5.0  # skin of the wide list over that
 
 
 class Evaluation(NamedTuple):
@@ -42,28 +41,28 @@ class Curvature(NamedTuple):
     """Second derivatives of the energy at one state."""
 
     hessian: Any
-    """(n, n) scipy.sparse CSC matrix in the coordinates of the landscape; its whole diagonal is stored."""
+    """(n, n) scipy.sparse CSC matrix in the coordinates of the landscape; the whole diagonal is stored."""
     coupling: FloatArray
     """(n,) d(gradient)/d(strain)."""
     strain_hessian: float
-    """Second derivative of the energy by the strain."""
+    """Second derivative of the energy with respect to the strain."""
 
 
 class Landscape:
-    """Elastic energy of the particles of a packing, with all periodic images.
+    """Elastic energy of the particles of a packing, including periodic images.
 
     Parameters
     ----------
     packing : Packing
-        The shapes of its particles and their law are taken.
+        Provides shapes and law.
     k_e : float, [energy], optional
     sides : {1, 2}, optional
         Bonds of a side-to-side contact, of shapes that have both laws; minima exist for 2 only. Both are
-        those of the packing's law when left out.
+        those of the packing's law by default.
 
     Notes
     -----
-    Keeps the list of pairs that may touch and makes it anew when particles have moved too far.
+    Keeps a list of pairs that may touch and rebuilds it when particles have moved too far.
     """
 
     def __init__(
@@ -81,7 +80,7 @@ class Landscape:
 
     @cached_property
     def rotation_length(self) -> FloatArray:
-        """(N,) lengths that a radian counts for: A, or a; 0 where nothing can turn."""
+        """(N,) lengths that scale radians: A, or a; 0 where nothing can rotate."""
         return np.asarray(self.bodies.rotation_length)
 
     @cached_property
@@ -91,7 +90,7 @@ class Landscape:
 
     @cached_property
     def turning_radius(self) -> FloatArray:
-        """(N,) how far a rotation by a radian moves a particle's surface at most."""
+        """(N,) largest displacement of a particle's surface by a rotation of one radian."""
         return np.asarray(self.bodies.turning_radius)
 
     @cached_property
@@ -101,7 +100,7 @@ class Landscape:
 
     @cached_property
     def _free(self) -> NDArray[np.bool_]:
-        """(N, D + rotations) which components are coordinates."""
+        """(N, D + rotations) whether each component is a coordinate."""
         D = self.particles.dimension
         turns = self.rotation_length > 0
         n_turns = 1 if D == 2 else 3
@@ -122,21 +121,21 @@ class Landscape:
         return components[:, :D], components[:, D:] / self._length_or_1[:, None]
 
     def forget_pairs(self) -> None:
-        """Look for pairs anew, so that what follows depends on the state alone, to the last bit."""
+        """Rebuild the pair list, so that results depend on the state alone, to the last bit."""
         self._pairs = self._wide = None
 
     def components(self, vector: FloatArray) -> FloatArray:
-        """Spread an (n,) vector over (N, D + rotations), 0 where there is no coordinate."""
+        """Scatter an (n,) vector to (N, D + rotations), with 0 where there is no coordinate."""
         full = np.zeros(self._free.shape)
         full[self._free] = vector
         return full
 
     def coordinates(self, components: FloatArray) -> FloatArray:
-        """Gather an (n,) vector from (N, D + rotations), as `components` spreads it."""
+        """Gather an (n,) vector from (N, D + rotations), the inverse of `components`."""
         return components[self._free]
 
     def particle_of_coordinate(self) -> IntArray:
-        """(n,) the particle that each coordinate belongs to."""
+        """(n,) index of the particle of each coordinate."""
         return np.nonzero(self._free)[0]
 
     def evaluate(self, state: State, *, extended: bool = True) -> Evaluation:
@@ -146,7 +145,7 @@ class Landscape:
         ----------
         state : State
         extended : bool
-            Sum in long double: three times slower, and two thousand times less rounding.
+            Sum in long double: three times slower, with two thousand times less rounding.
 
         Raises
         ------
@@ -170,9 +169,9 @@ class Landscape:
         )
 
     def stress(self, state: State) -> FloatArray:
-        """(D, D) pressure tensor, p_kl the sum of r_l f_k over contacts and volume; errors as `evaluate`.
+        """(D, D) pressure tensor, p_kl the sum of r_l f_k over contacts, over the volume; errors as `evaluate`.
 
-        -p_xy is the energy's derivative by a simple shear that moves x by gamma y, at fixed orientations.
+        -p_xy is the derivative of the energy under simple shear, x displaced by gamma y, at fixed orientations.
         """
         pairs = self.pairs_at(state)
         found = self.bodies.sums(*self._arrays(state, pairs), True)
@@ -180,7 +179,7 @@ class Landscape:
         return np.asarray(found["virial"].T / state.volume, np.float64)
 
     def refuse(self, pairs: Pairs, crossing: int, unconverged: int) -> None:
-        """Raise as `evaluate` does for a pair that crosses or is unconverged, unless it is -1."""
+        """Raise like `evaluate` for a crossing or unconverged pair; -1 means none."""
         if crossing >= 0:
             refuse_crossing(self.particles, self.bodies.core, pairs.near.take(np.array([crossing])))
         if unconverged >= 0:
@@ -192,7 +191,7 @@ class Landscape:
         blocks, places = _contracted(found), self._places(found)
         r, D = found["separation"], self.particles.dimension
 
-        # The affine strain moves i from j by r_ij.
+        # The affine strain displaces i relative to j by r_ij.
         by_strain = np.einsum("cij,cj->ci", blocks[:, :, :D], r)
         pulled, used = by_strain[:, places.variable] * places.scale, places.column >= 0
         coupling = np.bincount(places.column[used], pulled[used], self.size).astype(np.float64)
@@ -201,14 +200,14 @@ class Landscape:
         return Curvature(hessian, coupling, strain_hessian)
 
     def rattlers(self, state: State) -> BoolArray:
-        """(N,) particles that no contacts hold in place (`jamshape.contacts.find_rattlers`)."""
+        """(N,) whether the particle is a rattler (`jamshape.contacts.find_rattlers`)."""
         packing = state.packing(self.particles)
         return find_rattlers(packing, find_contacts(packing, self.k_e, self.sides))
 
     def derivatives(self, state: State, *, extended: bool = False) -> dict[str, NDArray[Any]]:
-        """Give second derivatives contact by contact, as the class of `jamshape._contact` does.
+        """Return second derivatives of each contact, as the class of `jamshape._contact` does.
 
-        Its rows `pair` are those of `particles`, an array (C, 2) that is added here.
+        Rows `pair` refer to `particles`, an array (C, 2) that is added here.
         """
         pairs = self.pairs_at(state)
         found: dict[str, NDArray[Any]] = self.bodies.derivatives(
@@ -224,7 +223,7 @@ class Landscape:
 
     @cached_property
     def column(self) -> IntArray:
-        """(N, D + rotations) number of each coordinate, -1 for none."""
+        """(N, D + rotations) index of each coordinate, -1 for none."""
         column = np.full(self._free.shape, -1)
         column[self._free] = np.arange(self.size)
         return column
@@ -243,7 +242,7 @@ class Landscape:
         return _Places(variable, scale, column)
 
     def _summed(self, blocks: FloatArray, places: _Places) -> Any:
-        """Put the blocks (C, v, v) of contacts, v their variables, into one matrix."""
+        """Assemble the blocks (C, v, v) of contacts, v their variables, into one matrix."""
         scale, n = places.scale, self.size
         entries = blocks[:, places.variable[:, None], places.variable]
         entries = entries * scale[:, :, None] * scale[:, None, :]
@@ -259,20 +258,20 @@ class Landscape:
         return PairArrays(*state.split, pairs.particles, pairs.shift)
 
     def pairs_at(self, state: State) -> Pairs:
-        """Give the pairs that may touch at a state: the list that there is, or a new one."""
+        """Return the pairs that may touch at a state, rebuilding the list if needed."""
         if self._pairs is None or self._pairs.outrun_by(state, self.turning_radius):
             return self.renewed_pairs(state)
         return self._pairs
 
     def renewed_pairs(self, state: State) -> Pairs:
-        """Find the pairs that may touch at a state, among those of a wider skin, which hold for longer."""
+        """Find the pairs that may touch at a state, among those of a wider skin, valid for longer."""
         wide = self.wide_pairs(state)
         near = nearer(state, self.bodies, wide.near, self.skin)
         self._pairs = Pairs.of(near, state, self.skin, self._reach)
         return self._pairs
 
     def wide_pairs(self, state: State) -> Pairs:
-        """Give the pairs of a wider skin, as long as all that may touch at a state are among them."""
+        """Return the pairs of a wider skin, rebuilt once some that may touch could be missing."""
         wide = self._wide
         if wide is None or wide.outrun_by(state, self.turning_radius, self.skin):
             skin = _WIDE * self.skin
@@ -282,24 +281,24 @@ class Landscape:
 
     @cached_property
     def skin(self) -> float:
-        """How close the surfaces of pairs are that may touch, [length]."""
+        """Surface distance of pairs that may touch, [length]."""
         return _SKIN * float(self.inner_radius.min())
 
     @cached_property
     def _reach(self) -> float:
-        """How far apart the centres of touching particles may be."""
+        """Largest distance of the centres of touching particles."""
         return 2 * float(self.bodies.outer_radius.max())
 
 
 class _Places(NamedTuple):
-    """Where the derivatives by the variables of C contacts belong among the coordinates."""
+    """Map from the variables of C contacts to the coordinates."""
 
     variable: IntArray
-    """(v,) the variable of each coordinate of two particles."""
+    """(v,) variable of each coordinate of two particles."""
     scale: FloatArray
-    """(C, v) its derivative by the coordinate."""
+    """(C, v) derivative of the variable by the coordinate."""
     column: IntArray
-    """(C, v) the coordinate, -1 for none."""
+    """(C, v) index of the coordinate, -1 for none."""
 
 
 def _contracted(found: dict[str, NDArray[Any]]) -> FloatArray:

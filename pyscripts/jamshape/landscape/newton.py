@@ -1,4 +1,4 @@
-"""Newton steps on an energy landscape: factors, shifts, and how far a step may go."""
+"""Newton steps on an energy landscape: factorisation, shift, and trust radius."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.landscape.landscape import Evaluation, Landscape
 
-# A Newton step moves no particle by more than this fraction of the smallest radius, and turns none
-# by more than this angle.
-LONGEST_STEP = 0.1
-WIDEST_TURN = 0.2
+# Trust radius of a Newton step.
+LONGEST_STEP = 0.1  # displacement over the smallest radius
+WIDEST_TURN = 0.2  # rotation angle
 
-# The first shift of a Hessian's diagonal, in units of k_e and `Landscape.length`.
+# Initial shift of a Hessian's diagonal, in units of k_e and `Landscape.length`.
 _FIRST_SHIFT = 1e-6
 
 
@@ -24,7 +23,7 @@ class Factorisation:
     Parameters
     ----------
     factors : jamshape._contact.Factors
-        By blocks of particles.
+        Block-sparse, by particles.
     """
 
     def __init__(self, factors: Any) -> None:
@@ -40,10 +39,10 @@ class Factorisation:
 
 
 def least_shift(landscape: Landscape, evaluation: Evaluation) -> float:
-    """Give the shift of a Hessian's diagonal that forces as large as these ask for, [energy / length^2].
+    """Return the shift of a Hessian's diagonal appropriate for forces this large, [energy / length^2].
 
-    It falls with the forces, as the Levenberg-Marquardt method has it, so that Newton's method converges
-    faster than linearly, and is no larger than the first one.
+    It falls with the forces, as in the Levenberg-Marquardt method, so that Newton's method converges
+    superlinearly, and never exceeds the initial one.
     """
     force = float(np.abs(evaluation.gradient).max(initial=0.0))
     first = _FIRST_SHIFT * landscape.k_e / landscape.length**2

@@ -1,4 +1,4 @@
-"""By how many threads the contacts of a large packing are evaluated."""
+"""Number of threads that evaluate the contacts of a large packing."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ _THREADS = ContextVar("threads", default=1)
 
 
 def threads() -> int:
-    """Give their number where this is called: 1 if nobody said another."""
+    """Return the number of threads in this context; 1 by default."""
     return _THREADS.get()
 
 
 @contextmanager
 def sharing(number: int) -> Iterator[None]:
-    """Share the contacts of what is minimised or compressed inside among so many threads.
+    """Evaluate contacts inside the context with a number of threads.
 
     Parameters
     ----------
     number : int
-        At least 1. The last bits of results depend on it, not on which thread is faster. Packings of
-        fewer than some thousand contacts are evaluated by one, which takes no longer.
+        At least 1. The last bits of results depend on it, but not on which thread is faster. Packings of
+        fewer than some thousand contacts use one thread, which is as fast.
 
     Raises
     ------
     ValueError
-        If it is no number of threads.
+        If the number is out of its range.
 
     Examples
     --------

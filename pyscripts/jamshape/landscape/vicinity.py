@@ -1,7 +1,7 @@
-"""The energy landscape about one state, compiled: what integrators and minimisers ask for thousands of times.
+"""The energy landscape around one state, compiled: for the inner loops of integrators and minimisers.
 
 The same energy as `Landscape`, as a function of displacements from a base and of a strain; evaluations
-and factors of the Hessian cost a small part of those there.
+and factorisations cost a fraction of those there.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from jamshape.landscape.newton import LONGEST_STEP, WIDEST_TURN, Factorisation
 from jamshape.landscape.threads import threads
 from jamshape.packing import State
 
-# Force, energy and length in which errors of displacements are measured.
+# Units of force, energy and length for errors of displacements.
 Units = _contact.StageUnits
 
 
-# When a minimisation ends, and Newton's equations.
+# Stopping criteria of a minimisation, and Newton's equations.
 DescentStop = _contact.DescentStop
 NewtonSystem = _contact.NewtonSystem
 
 
 class DescentEnd(NamedTuple):
-    """Where a minimisation ended: at the base of its vicinity."""
+    """End of a minimisation, at the base of its vicinity."""
 
     outcome: str
     evaluation: Evaluation
@@ -37,18 +37,18 @@ class DescentEnd(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """One stage of an implicit step: drag (x - centre) + dU/dx = 0, with x from the base.
+    """One stage of an implicit step: drag (x - centre) + dU/dx = 0, with x relative to the base.
 
     Parameters
     ----------
     drag : (n,) array
-        Drag coefficients in these coordinates, over the time: [energy / length^2].
+        Drag coefficients in these coordinates over the time: [energy / length^2].
     centre : (n,) array
         [length]
     guesses : two (n,) arrays
-        Where to begin; the second is for when particles collide at the first.
+        Initial guesses; the second is used if particles collide at the first.
     extended : bool
-        Whether doubles are too short.
+        Whether to use extended precision.
     """
 
     drag: FloatArray
@@ -62,15 +62,15 @@ class StageFactors(NamedTuple):
 
     factors: Factorisation
     n_bonds: int
-    """How many there were at that point."""
+    """Number of bonds at that point."""
 
 
 class Solution(NamedTuple):
-    """Where the solution of a stage ended."""
+    """End of the iteration for a stage."""
 
     x: FloatArray
     evaluation: Evaluation
-    """Before the last correction."""
+    """Evaluation before the last correction."""
     factors: StageFactors | None
     factorisations: int
     directions: int
@@ -78,18 +78,18 @@ class Solution(NamedTuple):
 
 
 class Vicinity:
-    """Energy, gradient and Hessian of a landscape about a base that moves along.
+    """Energy, gradient and Hessian of a landscape around a movable base.
 
     Parameters
     ----------
     landscape : Landscape
-        Whose pairs it uses and whose evaluations it counts.
+        Landscape whose pair list and evaluation counter are used.
     base : State
-        From where coordinates count.
+        Origin of coordinates.
 
     Notes
     -----
-    Contacts are shared by the `threads` there are where it is made.
+    Uses the number of `threads` at construction.
     """
 
     def __init__(self, landscape: Landscape, base: State) -> None:
@@ -102,33 +102,33 @@ class Vicinity:
         self._take(landscape.wide_pairs(base))
 
     def move_to(self, base: State) -> None:
-        """Count coordinates from another state."""
+        """Move the base to another state."""
         self.base = base
         self._compiled.move_to(*base.split)
 
     def hold(self) -> None:
-        """Keep the base, from which `deform` begins."""
+        """Store the base as the origin of `deform`."""
         self._compiled.hold()
 
     def deform(self, matrix: FloatArray, turns: FloatArray) -> None:
-        """Count coordinates from where a matrix takes the base that was kept; `base` follows with the next `move`.
+        """Move the origin to the stored base deformed by a matrix; `base` follows with the next `move`.
 
         Parameters
         ----------
         matrix : (2, D, D) array of float64
-            Upper triangular, doubles and their small rests: for positions and cell vectors.
+            Upper triangular, high and low parts: for positions and cell vectors.
         turns : (N, 1) or (N, 3) array of float64
             Rotation vectors.
         """
         self._compiled.deform(matrix, turns)
 
     def forget_pairs(self) -> None:
-        """Look for pairs anew, so that what follows depends on the base alone, to the last bit."""
+        """Rebuild the pair list, so that results depend on the base alone, to the last bit."""
         self.landscape.forget_pairs()
         self._take(self.landscape.wide_pairs(self.base))
 
     def move(self, x: FloatArray, strain: float) -> None:
-        """Count coordinates from the state `at(x, strain)`."""
+        """Move the base to the state `at(x, strain)`."""
         self.base = State.joined(*self._compiled.move(x, strain))
 
     def at(self, x: FloatArray, strain: float) -> State:
@@ -136,7 +136,7 @@ class Vicinity:
         return self.landscape.displaced(self.base, x).strained(strain)
 
     def evaluate(self, x: FloatArray, strain: float, *, extended: bool) -> Evaluation:
-        """Evaluate as `Landscape.evaluate` does at `at(x, strain)`, with its errors."""
+        """Evaluate the state `at(x, strain)`, with the errors of `Landscape.evaluate`."""
         self.landscape.evaluations += 1
         found = self._compiled.evaluate(x, strain, extended)
         if found is None:
@@ -145,9 +145,9 @@ class Vicinity:
         return self._accepted(found)
 
     def factorise(self, x: FloatArray, strain: float, diagonal: FloatArray) -> Factorisation:
-        """Factorise the Hessian by x plus a diagonal; with a shift if it is not positive definite.
+        """Factorise the Hessian at x plus a diagonal, shifted if it is not positive definite.
 
-        For an x where it was evaluated.
+        The state at x must have been evaluated.
         """
         return Factorisation(self._compiled.factorise(x, strain, diagonal))
 
@@ -156,7 +156,7 @@ class Vicinity:
     ) -> Solution:
         """Solve a stage until the next correction is smaller than an accuracy in these units.
 
-        Factors of an earlier, similar stage spare others.
+        Reuses factors of an earlier, similar stage.
 
         Raises
         ------
@@ -184,7 +184,7 @@ class Vicinity:
         ----------
         stop : DescentStop
         shift : float, [energy / length^2]
-            The first one of the Hessian's diagonal.
+            Initial shift of the Hessian's diagonal.
 
         Raises
         ------
@@ -199,11 +199,11 @@ class Vicinity:
         return DescentEnd(end.outcome, self._accepted(end.sums), end.rows)
 
     def newton(self, shift: float) -> NewtonSystem:
-        """Give Newton's equations at the base, with a first shift of the Hessian's diagonal."""
+        """Return Newton's equations at the base, with an initial shift of the Hessian's diagonal."""
         return NewtonSystem(self._compiled, shift)
 
     def part_within(self, x: FloatArray) -> float:
-        """Give the part, at most 1, of a step along (n,) coordinates that is as long as a step may be."""
+        """Return the fraction, at most 1, of a step along (n,) coordinates within the trust radius."""
         return float(self._compiled.part_within(x, self._longest_step, WIDEST_TURN))
 
     @property

@@ -1,1 +1,1 @@
-"""What is measured of a packing or a run: order, contact statistics, the onset of jamming."""
+"""Measurements on packings and runs: order, contact statistics, onset of jamming."""

@@ -1,42 +1,12 @@
-"""Averages over samples, with their standard errors."""
+"""Average over samples, with its standard error."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from jamshape.arrays import FloatArray
-
-# Digits after the point that a number is written with, at least and at most.
+# Smallest and largest number of digits after the decimal point.
 _DIGITS = (3, 9)
-
-
-_Group = TypeVar("_Group")
-
-
-class Measured(Protocol):
-    """A sample with numbers by name, such as `jamshape.files.sets.PackingFile`."""
-
-    @property
-    def reached(self) -> bool:
-        """Whether it reached its goal."""
-
-    def number(self, name: str) -> float:
-        """Look up a number."""
-
-
-class Reported(Protocol):
-    """A group that names itself in JSON, such as `jamshape.files.sets.System`."""
-
-    def report(self) -> dict[str, Any]:
-        """Name it."""
-
-
-_Named = TypeVar("_Named", bound=Reported)
 
 
 class Mean(NamedTuple):
@@ -46,22 +16,22 @@ class Mean(NamedTuple):
     error: float = math.nan
     """NaN for one sample."""
     samples: int = 0
-    """0 where that is not known."""
+    """0 if unknown."""
     reached: Mean | None = None
-    """The same without samples that did not reach their goal, where there are some."""
+    """Average over samples that reached their goal, if some did not."""
 
     def as_json(self) -> dict[str, Any]:
-        """Name its numbers for JSON; `reached` only where there are two averages."""
+        """Return the fields for JSON; `reached` only where there are two averages."""
         found = self._asdict()
         return found if self.reached else {k: v for k, v in found.items() if k != "reached"}
 
     @property
     def tex(self) -> str:
-        """Write it in TeX, without dollars."""
+        """Format in TeX, without dollars."""
         return self.text(r"\pm")
 
     def text(self, plus_minus: str = "+-") -> str:
-        """Write the digits that the error leaves; empty for NaN."""
+        """Format to the digits that the error supports; empty for NaN."""
         if not math.isfinite(self.value):
             return ""
         if not math.isfinite(self.error):
@@ -69,54 +39,3 @@ class Mean(NamedTuple):
         digits = math.ceil(-math.log10(self.error)) if self.error > 0 else _DIGITS[1]
         digits = min(max(digits, _DIGITS[0]), _DIGITS[1])
         return f"{self.value:.{digits}f} {plus_minus} {self.error:.{digits}f}"
-
-
-def mean(values: ArrayLike) -> Mean:
-    """Average over samples; NaN are left out, and an average of none is NaN.
-
-    Examples
-    --------
-    >>> mean([1.0, 3.0, float("nan")])
-    Mean(value=2.0, error=1.0, samples=2, reached=None)
-    """
-    array = np.asarray(values, np.float64)
-    array = array[np.isfinite(array)]
-    n = len(array)
-    error = float(np.std(array, ddof=1) / np.sqrt(n)) if n > 1 else math.nan
-    return Mean(float(array.mean()) if n else math.nan, error, n)
-
-
-def mean_over(samples: Sequence[Measured], values: Sequence[float]) -> Mean:
-    """Average a number of each sample, with and without samples that did not reach their goal."""
-    found = mean(values)
-    of = zip(samples, values, strict=True)
-    reached = [value for sample, value in of if sample.reached]
-    return found if len(reached) == len(values) else found._replace(reached=mean(reached))
-
-
-def standard_error(values: ArrayLike) -> FloatArray:
-    """Return the standard error of the mean over the first axis; 0 for one sample."""
-    array = np.asarray(values, np.float64)
-    return np.asarray(array.std(axis=0) / np.sqrt(max(len(array) - 1, 1)))
-
-
-def averages(groups: Mapping[_Group, Sequence[Measured]], name: str) -> dict[_Group, Mean]:
-    """Average one number over the samples of each group, as `mean_over`."""
-    return {group: mean_over(of, [s.number(name) for s in of]) for group, of in groups.items()}
-
-
-def exactly(
-    groups: Mapping[_Group, Sequence[Any]], value: Callable[[_Group], float]
-) -> dict[_Group, Mean]:
-    """Give each group a number that needs no average."""
-    return {group: Mean(value(group), math.nan, len(samples)) for group, samples in groups.items()}
-
-
-def rows(
-    groups: Mapping[_Named, Any], columns: Mapping[str, Mapping[_Named, Mean]]
-) -> list[dict[str, Any]]:
-    """Report averages for JSON, a row for each group."""
-    return [
-        group.report() | {name: values[group] for name, values in columns.items()}
-        for group in groups
-    ]

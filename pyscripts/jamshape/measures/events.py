@@ -11,31 +11,31 @@ from jamshape.arrays import FloatArray
 
 
 class Event(NamedTuple):
-    """A drop of the stress, over one step of the strain or several in a row."""
+    """A stress drop, over one step of the strain or several in a row."""
 
     strain: float
-    """After which it begins."""
+    """Strain after which it begins."""
     stress: float
-    """Before it, [energy / length^D]."""
+    """Stress before it, [energy / length^D]."""
     drop: float
-    """By so much it falls, [energy / length^D]."""
+    """Decrease of the stress, [energy / length^D]."""
     lost: float
-    """Energy over the volume that went, [energy / length^D]."""
+    """Dissipated energy over the volume, [energy / length^D]."""
     steps: int
 
 
 def stress_drops(observables: Mapping[str, FloatArray], least: float = 1e-2) -> list[Event]:
-    """List where the stress falls from one minimum to the next.
+    """List the drops of the stress from one minimum to the next.
 
-    A packing that is sheared resists more and more until its minimum ends, or slides; steps in a row in which the stress
-    falls are one event.
+    A sheared packing resists increasingly until its minimum vanishes, or slides; consecutive steps in which the
+    stress falls are one event.
 
     Parameters
     ----------
     observables
         (T,) arrays ``strain``, ``stress`` and ``lost`` of a run of `jamshape.flow.quasistatic`.
     least : float
-        Drops below this part of the largest stress are left out.
+        Omit drops below this fraction of the largest stress.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Where frames of a compression stay jammed: each is minimised, and keeps its energy or loses it.
+"""Packing fractions at which frames of a compression stay jammed when they are minimised.
 
-The pressure of a flowing state rises much like that of a jammed one, so a line through p(phi) leads to an onset
-of jamming only if states there stay jammed when nothing drives them any more.
+The pressure of a flowing state rises much like that of a jammed one, so a line fitted to p(phi) finds an onset
+of jamming only if states there stay jammed without driving.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from jamshape.measures.onset import OnsetFit
 from jamshape.minima import Outcome, Stop, minimise
 from jamshape.packing import Packing, State
 
-# Of so many frames, at most, evenly spread, one after the other is minimised; then those around the change.
+# Largest number of evenly spread frames that are minimised first; then those around the change.
 _MOST = 32
 
-# Minimisations end at this residual, that of packings, or this energy density, in units of k_e and
-# `Landscape.length`, which harmonic contacts have some 1e-8 above phi_J, or after so many evaluations.
-_TOLERANCE, _LOWEST, _EVALUATIONS = 1e-8, 1e-16, 20_000
+_TOLERANCE = 1e-8  # residual at which minimisations stop, that of packings
+_LOWEST = 1e-16  # energy density likewise, in units of k_e and length, of harmonic contacts some 1e-8 above phi_J
+_EVALUATIONS = 20_000
 
 _VERDICTS = {
     Outcome.UNJAMMED: False,
@@ -38,12 +38,12 @@ _UNDECIDED = "frames_undecided"  # files of earlier versions do not have it
 
 
 class Tried(NamedTuple):
-    """A frame that was minimised."""
+    """A minimised frame."""
 
     frame: int
     phi: float
     stays: bool | None
-    """Whether it stays jammed; None where the minimisation did not end."""
+    """Whether it stays jammed; None if the minimisation did not finish."""
 
     def __str__(self) -> str:
         said = {True: "stays jammed", False: "unjams", None: "is undecided"}[self.stays]
@@ -51,16 +51,16 @@ class Tried(NamedTuple):
 
 
 class Jamming(NamedTuple):
-    """Between which packing fractions frames of a run begin to stay jammed when they are minimised."""
+    """Bracket of the packing fraction at which frames of a run stay jammed when minimised."""
 
     unjams: float
-    """Of the densest frame that unjams; NaN if none does."""
+    """Packing fraction of the densest frame that unjams; NaN if none does."""
     jams: float
-    """Of the first frame from there on that stays jammed; NaN if none does."""
+    """Packing fraction of the first denser frame that stays jammed; NaN if none does."""
     tried: int = 0
-    """How many frames were minimised."""
+    """Number of minimised frames."""
     undecided: int = 0
-    """How many of these came to no end, neither at rest nor without energy; they count for nothing."""
+    """Number of them neither at rest nor without energy at the end; they are ignored."""
 
     @classmethod
     def of(cls, tried: Iterable[Tried]) -> Jamming:
@@ -79,7 +79,7 @@ class Jamming(NamedTuple):
 
     @classmethod
     def stored(cls, attributes: Mapping[str, Any]) -> Jamming | None:
-        """Read it from the attributes of a run that keeps it; else None."""
+        """Read it from the attributes of a run, if stored; else None."""
         if not set(_NAMES.values()) <= attributes.keys():
             return None
         unjams, jams, tried = (attributes[name] for name in _NAMES.values())
@@ -87,12 +87,12 @@ class Jamming(NamedTuple):
 
     @property
     def phi_J(self) -> float:
-        """The middle of the bracket; NaN if one of its ends is not known."""
+        """Middle of the bracket; NaN if one end is unknown."""
         return (self.unjams + self.jams) / 2
 
     @property
     def phi_J_error(self) -> float:
-        """Standard deviation of a number that may be anywhere in the bracket: its width over the root of 12.
+        """Standard deviation of a uniform distribution in the bracket: its width over sqrt(12).
 
         Examples
         --------
@@ -102,12 +102,12 @@ class Jamming(NamedTuple):
         return (self.jams - self.unjams) / math.sqrt(12)
 
     def attributes(self) -> dict[str, Any]:
-        """Name its numbers as they are stored."""
+        """Return its numbers as attributes."""
         found = {name: getattr(self, own) for own, name in _NAMES.items()}
         return found | {_UNDECIDED: self.undecided}
 
     def text(self) -> str:
-        """Say it in words, up to the end of a sentence."""
+        """Describe the bracket, as the end of a sentence."""
         if math.isnan(self.unjams):
             none = "none of the frames unjams"
             return none if math.isnan(self.jams) else f"{none}, down to phi = {self.jams:.5f}"
@@ -117,11 +117,11 @@ class Jamming(NamedTuple):
         return f"{low} and that at phi = {self.jams:.5f} stays jammed"
 
     def warn_if_undecided(self) -> None:
-        """Warn where minimisations came to no end."""
+        """Warn if minimisations did not finish."""
         if self.undecided:
             said = (
-                f"{self.undecided} of {self.tried} frames that were minimised came to no end, neither at rest nor"
-                f" without energy, and count for nothing: {self.text()}; record more {{frames:name}}"
+                f"{self.undecided} of {self.tried} minimised frames ended neither at rest nor without energy"
+                f" and are ignored: {self.text()}; record more {{frames:name}}"
             )
             warnings.warn(NotReachedWarning(said, {"frames": None}), stacklevel=3)
 
@@ -131,7 +131,7 @@ class Jamming(NamedTuple):
         return high < self.unjams or low > self.jams  # comparisons with NaN are false
 
     def verdict(self, fit: OnsetFit | None, kappa: float) -> str:
-        """Say in one sentence whether frames that are minimised bear out the onset of p(phi).
+        """Compare the onset of p(phi) with minimised frames, in one sentence.
 
         Examples
         --------
@@ -151,19 +151,19 @@ class Jamming(NamedTuple):
 
 
 def stays_jammed(packing: Packing, k_e: float | None = None) -> bool | None:
-    """Tell whether a state keeps energy in balanced contacts when it is minimised at fixed box.
+    """Return whether a state keeps energy in balanced contacts when minimised at fixed box.
 
     Parameters
     ----------
     packing : Packing
         Minimised with two bonds side to side, whatever its law: with one there are no minima.
     k_e : float, [energy], optional
-        That of the packing's law when left out.
+        That of the packing's law by default.
 
     Returns
     -------
     bool or None
-        None where the minimisation does not end at either.
+        None if the minimisation does not decide.
 
     Examples
     --------
@@ -180,7 +180,7 @@ def stays_jammed(packing: Packing, k_e: float | None = None) -> bool | None:
         found = minimise(landscape, state, "auto", stop)
         if found.outcome is Outcome.STALLED:
             found = minimise(landscape, found.state, "newton", stop)
-    except CrossingError:  # of deep overlaps, which have no gradient to go down
+    except CrossingError:  # deep overlaps have no gradient to follow
         return None
     return _VERDICTS.get(found.outcome)
 
@@ -188,19 +188,19 @@ def stays_jammed(packing: Packing, k_e: float | None = None) -> bool | None:
 def minimised_frames(
     count: int, read: Callable[[int], Packing], k_e: float | None = None
 ) -> Iterator[Tried]:
-    """Minimise frames of a compression from the densest on, until one unjams.
+    """Minimise frames of a compression from the densest down, until one unjams.
 
-    Of more than 32 frames it takes some that are evenly spread first, then those around the change: so what
-    it finds is the densest frame that unjams, up to rearrangements that others skip.
+    Of more than 32 frames, evenly spread ones come first, then those around the change: so the result
+    is the densest frame that unjams, up to rearrangements of frames in between.
 
     Parameters
     ----------
     count : int
-        How many frames there are.
+        Number of frames.
     read : callable
-        Reads one by its number, from 0.
+        Returns a frame by its number, from 0.
     k_e : float, [energy], optional
-        That of the law of each frame when left out.
+        By default that of the law of each frame.
 
     Yields
     ------

@@ -12,11 +12,11 @@ NAMES = {2: ("S2", "S4"), 3: ("S2", "C4")}  # by dimension
 
 
 def local_order(packing: Packing, pairs: IntArray) -> dict[str, FloatArray]:
-    """Measure the order of the neighbours of each particle, itself left out.
+    """Measure the order of the neighbours of each particle, excluding the particle.
 
     In space nematic S_2 and cubatic C_4 (Yuan et al. 2019, Appendix B), in the plane nematic S_2 and
-    tetratic S_4, the magnitudes of the means of exp(2 i theta) and exp(4 i theta). What has no direction
-    is nobody's neighbour: for S_2 bodies without a longest or shortest axis, for the others discs and spheres.
+    tetratic S_4, the magnitudes of the means of exp(2 i theta) and exp(4 i theta). Particles without direction
+    are excluded: for S_2 bodies without a longest or shortest axis, for the others discs and spheres.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def local_order(packing: Packing, pairs: IntArray) -> dict[str, FloatArray]:
     Returns
     -------
     dict of str to (N,) array of float64
-        By the `NAMES` of the dimension; NaN for particles without such neighbours.
+        Keys are the `NAMES` of the dimension; NaN for particles without such neighbours.
     """
     directors = packing.directors
     tells = np.asarray(np.isfinite(directors).all(axis=1))
@@ -37,7 +37,7 @@ def local_order(packing: Packing, pairs: IntArray) -> dict[str, FloatArray]:
             "S2": _of_angles(2 * np.arctan2(directors[:, 1], directors[:, 0]), nematic),
             "S4": _of_angles(4 * packing.orientation, other),
         }
-    directors[~tells] = [1.0, 0.0, 0.0]  # of no pair
+    directors[~tells] = [1.0, 0.0, 0.0]  # in no pair
     return {
         "S2": local_nematic_order(directors, nematic),
         "C4": local_cubatic_order(body_axes(packing.quaternions), other),
@@ -45,7 +45,7 @@ def local_order(packing: Packing, pairs: IntArray) -> dict[str, FloatArray]:
 
 
 def _among(chosen: BoolArray, pairs: IntArray) -> IntArray:
-    """Select the pairs of which both are chosen."""
+    """Select the pairs with both particles chosen."""
     return np.asarray(pairs[chosen[pairs].all(axis=1)])
 
 

@@ -1,4 +1,4 @@
-"""What is written about a minimum, of any shape and dimension: the attributes of a packing's file."""
+"""Results stored with a minimum, of any shape and dimension: attributes of a packing's file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from jamshape.measures.order3d import cubatic_order, nematic_order
 from jamshape.minima import History, Minimum, residual_of, rounding_floor
 from jamshape.packing import Packing, body_axes
 
-# Rows of the convergence history that are kept in a packing's file.
+# Rows of the convergence history stored in a packing's file.
 _REPORT_ROWS = 2000
 
 _SUMMARY = (
@@ -40,7 +40,7 @@ _SUMMARY = (
 
 
 class Measured(NamedTuple):
-    """Of a minimum: numbers, and arrays over particles."""
+    """Measurements of a minimum: numbers, and arrays over particles."""
 
     attributes: dict[str, float | str]
     observables: dict[str, FloatArray]
@@ -49,7 +49,7 @@ class Measured(NamedTuple):
 def write_minimum(
     path: Path, landscape: Landscape, minimum: Minimum, attributes: Mapping[str, Any]
 ) -> None:
-    """Write a packing with everything that was measured on it."""
+    """Write a packing with all its measurements."""
     packing = minimum.state.packing(landscape.particles)
     measured = measure(landscape, minimum)
     told, report = dict(attributes) | measured.attributes, thinned(minimum.history)
@@ -67,8 +67,8 @@ def measure(landscape: Landscape, minimum: Minimum) -> Measured:
     Returns
     -------
     Measured
-        `residual_force` and `residual_torque` are the largest of a particle that is no rattler over the
-        mean force of a bond (torques over the length that counts for a radian, too); `residual` is the
+        `residual_force` and `residual_torque` are the largest of all non-rattlers over the
+        mean bond force (torques also over the length that scales radians); `residual` is the
         largest of all particles. z counts bonds, z_single contacts.
     """
     packing = minimum.state.packing(landscape.particles)
@@ -123,7 +123,7 @@ def _net(landscape: Landscape, minimum: Minimum, found: Contacts) -> dict[str, F
 
 
 def order(packing: Packing) -> dict[str, float]:
-    """Orientational order of the particles that have a direction; NaN without any.
+    """Orientational order of the particles with a direction; NaN without any.
 
     S2 and S4 in two dimensions (Marschall & Teitel 2018, Eq. 16), S2 and C4 in three (Yuan et al. 2019,
     Eqs. 6 and 7).
@@ -141,7 +141,7 @@ def order(packing: Packing) -> dict[str, float]:
 
 
 def energy_onset(phi: float, u: float, pressure: float) -> float:
-    """Phi where sqrt(u), linear in phi, vanishes: du/dphi = p / phi - u / phi at fixed particles.
+    """Extrapolate phi to where sqrt(u), linear in phi, vanishes: du/dphi = p / phi - u / phi at fixed particles.
 
     u = U / V and dU/dV = -p; with V = const / phi, d sqrt(u)/dphi = (p + u) / (2 phi sqrt(u)).
     """
@@ -149,7 +149,7 @@ def energy_onset(phi: float, u: float, pressure: float) -> float:
 
 
 def thinned(history: History) -> tuple[list[int], list[float], list[float]]:
-    """Pick rows of a history for a report: evaluations, seconds, residuals."""
+    """Thin out a history for a report: evaluations, seconds, residuals."""
     rows = np.unique(np.linspace(0, len(history.residual) - 1, _REPORT_ROWS).astype(int))
     picked = zip(
         *((history.evaluations[r], history.wall_seconds[r], history.residual[r]) for r in rows),
@@ -160,7 +160,7 @@ def thinned(history: History) -> tuple[list[int], list[float], list[float]]:
 
 
 def summary_of(out: Path, names: Iterable[str] = _SUMMARY) -> dict[str, Any]:
-    """Pick attributes of a finished packing, None for NaN, and say whether it reached its goal."""
+    """Return attributes of a finished packing, None for NaN, and whether it reached its goal."""
     stored = read_attributes(out)
     found = {name: stored[name] for name in names if name in stored}
     tidy = {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in found.items()}

@@ -1,4 +1,4 @@
-"""The onset of jamming, read off the pressure of a compression."""
+"""The onset of jamming from the pressure of a compression."""
 
 from __future__ import annotations
 
@@ -11,55 +11,43 @@ from numpy.typing import ArrayLike
 
 from jamshape.arrays import FloatArray
 
-# Up to this fraction of the largest pressure counts as none.
+# Pressures up to this fraction of the largest count as zero.
 _FLOOR = 1e-4
 
-# A fall by more than this fraction of the pressure is a drop; by more than that one, a collapse.
-_DROP = 0.02
-_COLLAPSE = 0.5
+_DROP = 0.02  # relative fall of the pressure that counts as a drop
+_COLLAPSE = 0.5  # likewise, as a collapse
 
-# A line has this many rows, rises by this fraction of the largest pressure,
-_MIN_ROWS = 5
-_MIN_RISE = 0.02
+_MIN_ROWS = 5  # of a line
+_MIN_RISE = 0.02  # of a line, over the largest pressure
+_MIN_GROWTH = 1.5  # pressure at the end of a line over that at its start
+_MAX_ERROR = 0.15  # of the zero of a line, over the distance from there to its end
+_MIN_SLOPES = (0.7, 0.5)  # of a line over the steepest chord: preferred, and acceptable
+_CHORD_RISE = 0.25  # of a chord, over the pressure at its end
+_CHORD_END = 10.0  # largest pressure at the end of a chord over that at the end of the line
 
-# ends at this multiple of the pressure where it starts,
-_MIN_GROWTH = 1.5
-
-# knows its zero to this fraction of the way from there to its end,
-_MAX_ERROR = 0.15
-
-# and has the first of these fractions of the slope of the steepest chord, or if no line does, the
-# second. Chords rise by that fraction of the pressure where they end, which is up to
-# this multiple of where the line does.
-_MIN_SLOPES = (0.7, 0.5)
-_CHORD_RISE = 0.25
-_CHORD_END = 10.0
-
-# Of the lines with an error up to this multiple of the smallest one the lowest is taken.
+# Among lines with an error up to this multiple of the smallest one the lowest is chosen.
 _NEARLY_BEST = 2.0
 
-# Other windows that might have been taken begin below this multiple of the pressure where the line ends.
+# Alternative windows begin below this multiple of the pressure where the line ends.
 _REACH = 10.0
 
-# Smaller drops and smaller rises are noise, in its standard deviations.
-_NOISE_DROP = 6
-_NOISE_RISE = 10
+_NOISE_DROP, _NOISE_RISE = 6, 10  # smaller drops and rises are noise, in its standard deviations
 
-# Scatter that persists from row to row counts for fewer rows; this is the largest correlation.
+# Correlated scatter counts for fewer rows; this is the largest correlation.
 _MAX_MEMORY = 0.9
 
-# Ends of lines that are tried, evenly spread in pressure; more only cost time.
+# Number of line ends to try, evenly spread in pressure.
 _TRIED_ENDS = 40
 
 _ROUNDING = 1e-14
 
 
 class OnsetFit(NamedTuple):
-    """The line p = slope (phi - phi_J) through the rows from `first` to `last`, both included."""
+    """The line p = slope (phi - phi_J) through the rows from `first` to `last`, inclusive."""
 
     phi_J: float  # noqa: N815 - the paper's symbol
     phi_J_error: float  # noqa: N815
-    """From scatter, curvature and the choice of the rows, added in squares."""
+    """Contributions from scatter, curvature and the choice of rows, added in squares."""
     slope: float
     first: int
     last: int
@@ -72,16 +60,16 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
     first develops a linear behavior upon increasing phi, before there occurs any plastic
     rearrangements". Here:
 
-    1. The curve after its last row without pressure is cut into parts wherever the pressure drops.
-       Parts are left out if more than half of their pressure is lost later: they were no onset.
-    2. Lines are fitted between all pairs of ends within each part. A line counts if it rises out
-       of the noise, if a quadratic term hardly moves its zero, and if the curve is not much steeper
-       soon after. So the rounded foot that a finite rate of compression makes is left out: lines
-       through it fail the last two.
-    3. Of the first part that has such lines the one with the smallest error is taken, or the one
-       that starts first of those nearly as good. Its error holds the choice of the window: it adds how
-       far off the others put phi_J, of all parts, that begin below ten times the pressure where it ends,
-       the root of the mean square, in which each counts with its number of rows, straight or not.
+    1. The curve after its last row without pressure is split into parts at drops of the pressure.
+    Parts that later lose more than half of their pressure are discarded: they were not the onset.
+    2. Lines are fitted between all pairs of ends within each part. A line is valid if it rises out
+    of the noise, if a quadratic term hardly moves its zero, and if the curve is not much steeper
+    soon after. The last two exclude the rounded foot due to a finite
+    compression rate.
+    3. In the first part with valid lines, the one with the smallest error is chosen, or the
+    lowest of those nearly as good. Its error includes the choice of the window: the root mean square
+    deviation of phi_J over the others, of all parts, that begin below ten times the pressure where it ends,
+    each weighted with its number of rows, valid or not.
 
     Parameters
     ----------
@@ -89,22 +77,21 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
         Packing fractions of a compression, ascending.
     p : (T,) array_like, [energy / length^D]
     p_error : (T,) array_like, optional
-        Standard errors, such as those of a mean over samples. Only their ratios matter, as weights
-        of the rows; the scatter about the line tells the error of the fit.
+        Standard errors, such as those of a mean over samples. Only their ratios matter, as weights;
+        the scatter about the line gives the error of the fit.
 
     Returns
     -------
     OnsetFit
-        It is phi_J(kappa), that of the rate of this compression: it rises as kappa falls, until kappa is about
-        1e-9. Whether states there stay jammed `jamshape.measures.jamming` tells. The error says nothing of that, and nothing of other samples, which differ by more. Nor
-        does it know of stretches with fewer rows than a line needs: where samples of p are so far
-        apart that the first of them is missed, phi_J is that of a later one.
+        phi_J(kappa), at the rate of this compression: it rises as kappa falls, until kappa is about
+        1e-9. `jamshape.measures.jamming` finds whether states there stay jammed. The error covers neither that nor
+        differences between samples, which are larger, nor stretches with fewer rows than a line needs: if sampling of
+        p is so sparse that it misses the first, phi_J is that of a later one.
 
     Raises
     ------
     ValueError
-        If there is no onset in the data, nothing above it is linear, or an argument is out of its
-        range.
+        If the data have no onset, no linear part above it, or an argument is out of its range.
     """
     x, y, weight = _checked(phi, p, p_error)
     scale = float(np.abs(y).max()) or 1.0
@@ -130,7 +117,7 @@ def fit_onset(phi: ArrayLike, p: ArrayLike, p_error: ArrayLike | None = None) ->
 def _first_best(
     data: tuple[FloatArray, FloatArray, FloatArray], parts: Sequence[slice], min_rise: float
 ) -> OnsetFit | None:
-    """Choose among the lines of the first part that has any; None if none has."""
+    """Choose among the lines of the first part that has any; None if there are none."""
     x, y, weight = data
     chords = _Chords(x, y, [pair for part in parts for pair in _pairs(y, part)])
     found = [
@@ -162,7 +149,7 @@ class _Chords:
         self._steepest = np.maximum.accumulate(slope)
 
     def steepest(self, end: float) -> float:
-        """Return the largest slope of those that end at or below that pressure."""
+        """Return the largest slope of chords that end at or below that pressure."""
         n = int(np.searchsorted(self._end, end, side="right"))
         return float(self._steepest[n - 1]) if n else 0.0
 
@@ -183,12 +170,12 @@ def _checked(
 
 
 def _noise(y: FloatArray) -> float:
-    """Estimate the standard deviation of white noise on a smooth curve, by its second differences."""
+    """Estimate the standard deviation of white noise on a smooth curve from its second differences."""
     return float(np.median(np.abs(np.diff(y, 2))) / (0.6745 * np.sqrt(6)))
 
 
 def _lasting_rises(y: FloatArray) -> tuple[list[slice], float]:
-    """Find the parts of y that rise without drops or later collapse, by at least what follows."""
+    """Find the parts of y that rise without drops or later collapse, and the smallest significant rise."""
     quiet = np.flatnonzero(y <= _FLOOR * y.max())
     onset = int(quiet[-1]) + 1 if len(quiet) else 0
     noise = _noise(y[:onset] if onset > 2 * _MIN_ROWS else y)
@@ -215,7 +202,7 @@ def _between_drops(y: FloatArray, onset: int, min_drop: float) -> Iterator[slice
 
 
 def _pairs(y: FloatArray, part: slice) -> Iterator[tuple[int, int]]:
-    """Yield the ends of all lines that are tried in one part."""
+    """Yield the ends of all lines to try in one part."""
     highest = np.maximum.accumulate(y[part])
     levels = np.linspace(highest[0], highest[-1], _TRIED_ENDS)
     tried = np.unique([*(part.start + np.searchsorted(highest, levels)), part.stop - 1])
@@ -239,7 +226,7 @@ def _line(
         return None
     zero = -y_mean / slope
 
-    # The parabola is y_mean + slope t + c q with q orthogonal to 1 and t, so a + b t + c t^2.
+    # The quadratic fit is y_mean + slope t + c q with q orthogonal to 1 and t, so a + b t + c t^2.
     t_3 = float(w @ t**3) / t_2
     q = t**2 - t_3 * t - t_2
     c = float(w @ (q * y)) / float(w @ q**2)
@@ -260,14 +247,14 @@ def _line(
 
 
 def _chosen(lines: Sequence[OnsetFit]) -> OnsetFit:
-    """Choose among lines the first of the best ones."""
+    """Choose the first of the best lines."""
     smallest = min(line.phi_J_error for line in lines)
     good = [line for line in lines if line.phi_J_error <= _NEARLY_BEST * smallest]
     return min(good, key=lambda line: (line.first, -line.last))
 
 
 def _with_spread(best: OnsetFit, others: Sequence[OnsetFit]) -> OnsetFit:
-    """Add to the error of a line how far off the others put phi_J."""
+    """Add the spread of phi_J among other lines to the error of a line."""
     squares = [(line.phi_J - best.phi_J) ** 2 for line in others]
     spread = np.sqrt(np.average(squares, weights=[line.last - line.first + 1 for line in others]))
     return best._replace(phi_J_error=float(np.hypot(best.phi_J_error, spread)))

@@ -14,7 +14,7 @@ class OrientationalOrder(NamedTuple):
     """Magnitude and direction of n-fold orientational order."""
 
     S_n: float
-    """0 for none (1 / sqrt(N) at random), 1 for perfect order."""
+    """0 for none (1 / sqrt(N) for random angles), 1 for perfect order."""
     theta_n: float
     """Ordering direction, radians in [-pi/n, pi/n]; arbitrary when S_n is 0."""
 
@@ -55,9 +55,9 @@ def orientational_order(angles: ArrayLike, n: int) -> OrientationalOrder:
 
 
 def planar_order(packing: Packing, n: int = 2) -> OrientationalOrder:
-    """Order of those particles of a packing in the plane that have a direction; 0 where none has one.
+    """Order of the particles of a planar packing that have a direction; 0 without any.
 
-    As `compute packing` has it in LAMMPS.
+    The same as in LAMMPS's `compute packing`.
     """
     directors = packing.directors[~np.isnan(packing.directors[:, 0])]
     if not len(directors):

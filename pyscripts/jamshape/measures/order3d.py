@@ -1,4 +1,4 @@
-"""Orientational order in three dimensions: nematic S_2 and cubatic C_4, of all particles and around each.
+"""Orientational order in three dimensions: global and local nematic S_2 and cubatic C_4.
 
 Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019), Sec. 2.4 and Appendix B. Particles are numbered by
 row; `pairs` are (M, 2) rows of particles in contact, each pair once.
@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import UNIT_QUATERNION_TOLERANCE
 
-# So many cosines are held at a time, 16 MB.
+# Number of cosines in memory at a time, 16 MB.
 _BLOCK = 2_000_000
 
-# As loose as that of the quaternions of a packing.
+# The same tolerance as for quaternions of a packing.
 _UNIT_TOLERANCE = 2 * UNIT_QUATERNION_TOLERANCE
 
 
@@ -25,9 +25,9 @@ class Order(NamedTuple):
     """Magnitude and direction of orientational order."""
 
     magnitude: float
-    """S_2 or C_4: 1 for perfect order; at random 0.044 or 0.064 for N = 400."""
+    """S_2 or C_4: 1 for perfect order; for random orientations 0.044 or 0.064 at N = 400."""
     direction: FloatArray
-    """(3,) unit vector, of either sign; arbitrary where there is no order."""
+    """(3,) unit vector, of either sign; arbitrary without order."""
 
 
 def nematic_order(directors: ArrayLike) -> Order:
@@ -48,7 +48,7 @@ def nematic_order(directors: ArrayLike) -> Order:
     Raises
     ------
     ValueError
-        If there is no particle, the shape is another, or a length is not 1.
+        If there is no particle, the array has another shape, or a norm is not 1.
     """
     s = _units("directors", directors, 2)
     values, vectors = np.linalg.eigh(_tensors(s.T @ s / len(s)))
@@ -59,14 +59,14 @@ def cubatic_order(axes: ArrayLike) -> Order:
     r"""C_4, the largest :math:`\langle P_4(t \cdot u_i) \rangle` over all axes t of all particles.
 
     u_i is the axis of particle i nearest to t (Yuan et al. 2019, Eq. 7). That is not always the one that
-    maximises P_4, as they say: P_4 is 3/8 also for an axis square to t, with which random
-    orientations would have C_4 = 0.29 instead of their 0.07 (N = 400). The average of P_4 over
-    all directions t is 0.015 and not 0, which is the least that C_4 falls to for many particles.
+    maximises P_4, as they say: P_4 is 3/8 also for an axis perpendicular to t, with which random
+    orientations would have C_4 = 0.29 instead of their 0.07 (N = 400). For many particles C_4 is at least
+    0.015, the average of P_4 over all directions t.
 
     Parameters
     ----------
     axes : (N, 3, 3) array_like
-        Unit vectors u along the rows, from `jamshape.packing.body_axes`; neither order nor signs matter.
+        Unit vectors u along the rows, from `jamshape.packing.body_axes`, of any order and sign.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def cubatic_order(axes: ArrayLike) -> Order:
     Raises
     ------
     ValueError
-        If there is no particle, the shape is another, or a length is not 1.
+        If there is no particle, the array has another shape, or a norm is not 1.
     """
     u = _units("axes", axes, 3)
     tried = u.reshape(-1, 3)
@@ -88,10 +88,10 @@ def cubatic_order(axes: ArrayLike) -> Order:
 
 
 def local_nematic_order(directors: ArrayLike, pairs: IntArray) -> FloatArray:
-    """S_2 of the particles in contact with each particle, itself left out.
+    """S_2 of the particles in contact with each particle, excluding the particle.
 
     Yuan et al. 2019, Eq. 10, with the average over single particles as in `nematic_order`. Few
-    neighbours seem ordered: one alone has S_2 = 1, ten random ones 0.27 on average.
+    neighbours appear ordered: one has S_2 = 1, ten random ones 0.27 on average.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def local_nematic_order(directors: ArrayLike, pairs: IntArray) -> FloatArray:
     Raises
     ------
     ValueError
-        As in `nematic_order`, or if pairs are no pairs of rows.
+        As in `nematic_order`, or if pairs are invalid.
     """
     s = _units("directors", directors, 2)
     of, neighbour = _both_ways(pairs, len(s))
@@ -119,7 +119,7 @@ def local_cubatic_order(axes: ArrayLike, pairs: IntArray) -> FloatArray:
     """C_4 about each particle: the best of its axes t, averaged over the particles in contact.
 
     Yuan et al. 2019, Appendix B, with the nearest axis of each neighbour as in `cubatic_order`. (Their
-    text lets t run over the axes of the neighbours, of which there are three for each and no one
+    text lets t run over the axes of the neighbours, which are not a single
     set.) Ten random neighbours have 0.11 on average.
 
     Parameters
@@ -136,7 +136,7 @@ def local_cubatic_order(axes: ArrayLike, pairs: IntArray) -> FloatArray:
     Raises
     ------
     ValueError
-        As in `cubatic_order`, or if pairs are no pairs of rows.
+        As in `cubatic_order`, or if pairs are invalid.
     """
     u = _units("axes", axes, 3)
     of, neighbour = _both_ways(pairs, len(u))
@@ -154,13 +154,13 @@ def _units(name: str, vectors: ArrayLike, dimensions: int) -> FloatArray:
         raise ValueError(msg)
     error = np.abs(np.linalg.norm(v, axis=-1) - 1).max()
     if not error < _UNIT_TOLERANCE:
-        msg = f"the length of one of the {name} is off 1 by {error:.2g}, expected unit vectors"
+        msg = f"the norm of one of the {name} differs from 1 by {error:.2g}, expected unit vectors"
         raise ValueError(msg)
     return v
 
 
 def _both_ways(pairs: IntArray, n: int) -> tuple[IntArray, IntArray]:
-    """Each contact seen from i and from j: (2M,) particles and (2M,) their neighbours."""
+    """Return each contact from i and from j: (2M,) particles and (2M,) their neighbours."""
     given = np.asarray(pairs)
     if given.ndim != 2 or given.shape[1] != 2 or given.dtype.kind not in "iu":
         msg = f"pairs have shape {given.shape} and dtype {given.dtype}, expected (M, 2) integers"
@@ -173,7 +173,7 @@ def _both_ways(pairs: IntArray, n: int) -> tuple[IntArray, IntArray]:
 
 
 def _averaged(values: FloatArray, of: IntArray, n: int) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Average the (M, ...) values of neighbours over each of n particles, and tell which have any."""
+    """Average the (M, ...) values of neighbours over each of n particles, and flag those with neighbours."""
     total = np.zeros((n, *values.shape[1:]))
     np.add.at(total, of, values)
     count = np.bincount(of, minlength=n)
@@ -185,6 +185,6 @@ def _tensors(mean: FloatArray) -> FloatArray:
 
 
 def _of_nearest(cosines: FloatArray) -> FloatArray:
-    """P_4 of the largest of three cosines (..., 3), whatever their signs."""
+    """P_4 of the largest of three cosines (..., 3), of either sign."""
     square = (cosines**2).max(axis=-1)
     return np.asarray((35 * square**2 - 30 * square + 3) / 8)

@@ -1,4 +1,4 @@
-"""Compressions in files: p(phi) with the onset of jamming, grouped by what they are samples of."""
+"""Stored compressions: p(phi) with the onset of jamming, grouped into ensembles."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from jamshape.measures.onset import OnsetFit, fit_onset
 
 
 class Ensemble(NamedTuple):
-    """What compressions that differ in their seed only have in common."""
+    """Common settings of compressions that differ only in their seed."""
 
     system: System
     n: int
     size_ratio: float
-    """1 where it is not told."""
+    """1 if not stored."""
     kappa: float
     """Last compression rate."""
 
     def report(self) -> dict[str, Any]:
-        """Name it in JSON."""
+        """Return a description for JSON."""
         own = {name: getattr(self, name) for name in ("n", "size_ratio", "kappa")}
         return self.system.report() | own
 
 
 class Run(NamedTuple):
-    """A compression and its onset phi_J(kappa), or the sentence that says why there is none."""
+    """A compression and its onset phi_J(kappa), or one sentence on why there is none."""
 
     path: Path
     ensemble: Ensemble
@@ -42,16 +42,16 @@ class Run(NamedTuple):
     fit: OnsetFit | None
     problem: str = ""
     jamming: Jamming | None = None
-    """Where its frames stay jammed, if they were minimised."""
+    """Bracket of jamming, if its frames were minimised."""
 
 
 def ensemble_of(file: PackingFile) -> Ensemble:
-    """Tell what a compression is a sample of.
+    """Return the ensemble of a compression.
 
     Raises
     ------
     ValueError
-        If its file does not tell N or the rate.
+        If its file lacks N or the rate.
     """
     missing = [name for name in ("n", "kappa") if name not in file.attributes]
     if missing:
@@ -79,7 +79,7 @@ def observables_of(file: PackingFile, names: Iterable[str]) -> dict[str, FloatAr
     Raises
     ------
     ValueError
-        If one is not there.
+        If one is missing.
     """
     names, found = list(names), read_observables(file.path)
     if not set(names) <= found.keys():
@@ -102,7 +102,7 @@ def read_run(path: Path) -> Run:
 
 
 def onset_report(path: Path) -> dict[str, Any]:
-    """Report where p(phi) begins, phi_J(kappa), and where frames stay jammed, as far as that is known."""
+    """Report phi_J(kappa), the onset of p(phi), and the bracket of jamming, if known."""
     found, stored = read_observables(path), read_attributes(path)
     names, kappa = ("phi_J(kappa)", "phi_J(kappa)_error"), rate_of(stored)
     try:

@@ -1,4 +1,4 @@
-"""Shears in files: stress against strain and steady states, grouped by what they are samples of."""
+"""Stored shears: stress against strain and steady states, grouped into ensembles."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from jamshape.measures.steady import SteadyState, steady_state
 
 
 class Sheared(NamedTuple):
-    """What shears that differ in their seed only have in common."""
+    """Common settings of shears that differ only in their seed."""
 
     system: System
     n: int
     size_ratio: float
-    """1 where it is not told."""
+    """1 if not stored."""
     phi: float
     gdot: float
     flow: str
 
     def report(self) -> dict[str, Any]:
-        """Name it in JSON."""
+        """Return a description for JSON."""
         own = {name: getattr(self, name) for name in ("n", "size_ratio", "phi", "gdot", "flow")}
         return self.system.report() | own
 
 
 class ShearOf(NamedTuple):
-    """A shear and its steady state, or the sentence that says why there is none."""
+    """A shear and its steady state, or one sentence on why there is none."""
 
     path: Path
     ensemble: Sheared
@@ -48,12 +48,12 @@ def strain_of(observables: dict[str, FloatArray], flow: str) -> FloatArray:
 
 
 def read_shear(path: Path, after: float | None = None) -> ShearOf:
-    """Read a shear and average over its steady state, from a strain on or as `steady_state` chooses.
+    """Read a shear and average over its steady state, from a given strain or as `steady_state` chooses.
 
     Raises
     ------
     ValueError
-        If the file holds none.
+        If the file holds no shear.
     """
     file = PackingFile.read(path)
     known = file.attributes

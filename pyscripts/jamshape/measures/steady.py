@@ -1,4 +1,4 @@
-"""Averages over the steady state of a sheared packing: where it begins, and errors that know its memory."""
+"""Averages over the steady state of a shear, with start-up detection and errors for correlated samples."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.measures.averages import Mean
 
-# Where the start-up may end, in parts of a run: so many places between these are tried.
-_EARLIEST, _LATEST, _TRIED = 1 / 16, 0.5, 16
+_EARLIEST, _LATEST = 1 / 16, 0.5  # where the start-up may end, in fractions of a run
+_TRIED = 16  # places to try between them
 
-# Series shorter than this have no error that means anything.
+# Fewest samples for a meaningful error.
 _FEWEST = 8
 
-# What changes by less than this part of itself does not.
+# Relative changes below this count as none.
 _ROUNDING = 1e-13
 
-# What tells where the steady state begins.
+# Series that determine the end of the start-up.
 _SLOW = ("pressure", "shear_stress", "S_2_x", "S_2_y")
 
 
@@ -30,34 +30,34 @@ class SteadyMean(NamedTuple):
 
     value: float
     error: float
-    """Standard error, of blocks longer than the memory."""
+    """Standard error, from blocks longer than the memory."""
     memory: float
-    """Strain over which samples count once: twice the integral of their autocorrelation."""
+    """Correlation strain: twice the integral of the autocorrelation."""
     independent: float
-    """How many such strains the average is over."""
+    """Number of correlation strains averaged over."""
 
     @property
     def mean(self) -> Mean:
-        """The value with its error, as figures show it."""
+        """Value and error, for figures."""
         return Mean(self.value, self.error, max(1, round(self.independent)))
 
 
 @dataclass(frozen=True)
 class SteadyState:
-    """What a sheared packing is like once it has forgotten its start.
+    """Averages over the steady state of a shear.
 
     Parameters
     ----------
     startup
-        Strain before which nothing is averaged.
+        Strain at which averaging begins.
     strain
-        Strain at the end.
+        Final strain.
     averages
         By name: ``pressure``, ``sigma``, ``mu``, ``shear_stress`` (-p_xy), ``normal_difference``
-        (p_xx - p_yy), ``z``, and where particles are not round ``S_2`` and ``rotation`` (-dtheta/dgamma); ``sigma``
-        and ``S_2`` are those of the mean tensors, so that fluctuations of few particles do not add to them.
+        (p_xx - p_yy), ``z``, and for nonround particles ``S_2`` and ``rotation`` (-dtheta/dgamma); ``sigma``
+        and ``S_2`` are those of the mean tensors, so that fluctuations of few particles do not bias them.
     director
-        Angle of the mean nematic director to x, from -pi/2 to pi/2.
+        Angle of the mean nematic director from x, from -pi/2 to pi/2.
     """
 
     startup: float
@@ -70,7 +70,7 @@ class SteadyState:
         return self.averages[name]
 
     def report(self) -> dict[str, Any]:
-        """Return all of it by name, for JSON and attributes of files."""
+        """Return all results by name, for JSON and attributes of files."""
         found: dict[str, Any] = {"startup": self.startup, "director": self.director}
         for name, one in self.averages.items():
             parts = ("", "_error", "_memory", "_independent")
@@ -79,20 +79,20 @@ class SteadyState:
 
 
 class Blocks(NamedTuple):
-    """The mean of a series whose samples know of each other."""
+    """The mean of a correlated series."""
 
     mean: float
     error: float
     inefficiency: float
-    """So many samples count for one."""
+    """Statistical inefficiency: samples per independent sample."""
 
 
 def block_average(values: FloatArray) -> Blocks:
-    """Average a series, with an error from blocks that are long enough.
+    """Average a correlated series, with an error from blocks.
 
-    Neighbours are averaged in pairs again and again (Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989)); of
-    the errors that these blocks tell the first one is taken with B^3 > 2 n g^2, of B samples a block and the inefficiency g
-    that they tell (Lee et al., Phys. Rev. E 83, 066706 (2011)), and where no blocks are so long, the largest one.
+    Neighbours are averaged in pairs again and again (Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989)). The error
+    is from the first blocking with B^3 > 2 n g^2, for B samples a block and its inefficiency g (Lee et al., Phys.
+    Rev. E 83, 066706 (2011)), or else the largest one.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def block_average(values: FloatArray) -> Blocks:
     Returns
     -------
     Blocks
-        With an error of NaN where there are fewer than 8 values.
+        The error is NaN for fewer than 8 values.
 
     Examples
     --------
@@ -137,12 +137,13 @@ def steady_state(
     Parameters
     ----------
     observables
-        (T,) arrays by name, as a run of `jamshape.flow.shear` has them.
+        (T,) arrays by name, from a run of `jamshape.flow.shear`.
     strain : (T,) array of float64
         Ascending; steps may differ.
     after : float, optional
-        Strain from which to average. When left out it is chosen so that as many independent samples as can be
-        are left of the slowest of pressure, shear stress and order, a sixteenth of the run at least (Chodera, J. Chem. Theory Comput. 12, 1799 (2016)).
+        Strain from which to average. By default, it maximises the number of independent samples of the slowest of
+        pressure, shear stress and order, after at least a sixteenth of the run (Chodera, J. Chem. Theory Comput. 12, 1799
+        (2016)).
 
     Returns
     -------
@@ -160,7 +161,7 @@ def steady_state(
     left = len(strain) - 1 - first
     if left < _FEWEST:
         msg = (
-            f"{max(left, 0)} samples were found after a strain of {edges[min(first, len(edges) - 1)]:.4g}, expected"
+            f"{max(left, 0)} samples remain after a strain of {edges[min(first, len(edges) - 1)]:.4g}, expected"
             f" {_FEWEST} or more; shear further, or average from an earlier strain on"
         )
         raise ValueError(msg)
@@ -172,7 +173,7 @@ def steady_state(
 
 
 def _series_of(observables: Mapping[str, FloatArray], strain: FloatArray) -> dict[str, FloatArray]:
-    """Pick (T - 1,) series, means over as many equal strains."""
+    """Return (T - 1,) series, means over as many equal strains."""
     known = {name: np.array(values, np.float64) for name, values in observables.items()}
     for name in known.keys() - {"turned"}:
         known[name][0] = known[name][1]  # the start itself was not sheared
@@ -190,9 +191,9 @@ def _series_of(observables: Mapping[str, FloatArray], strain: FloatArray) -> dic
 
 
 def _means_between(edges: FloatArray, strain: FloatArray, values: FloatArray) -> FloatArray:
-    """Average lines through samples over the parts between edges."""
+    """Average piecewise linear samples over the intervals between edges."""
     done = np.concatenate([[0.0], np.cumsum(np.diff(strain) * (values[1:] + values[:-1]) / 2)])
-    # The integral within a piece is a parabola.
+    # The integral within a piece is quadratic.
     piece = np.clip(np.searchsorted(strain, edges, side="right") - 1, 0, len(strain) - 2)
     into, width = edges - strain[piece], np.diff(strain)[piece]
     slope = np.diff(values)[piece] / width
@@ -201,7 +202,7 @@ def _means_between(edges: FloatArray, strain: FloatArray, values: FloatArray) ->
 
 
 def _begin(series: Mapping[str, FloatArray]) -> int:
-    """Choose the sample at which the slowest of them has become steady."""
+    """Choose the sample at which the slowest series has become steady."""
     n = len(series["pressure"])
     tried = np.unique(np.linspace(_EARLIEST * n, _LATEST * n, _TRIED).astype(int))
 
@@ -213,16 +214,16 @@ def _begin(series: Mapping[str, FloatArray]) -> int:
 
 
 def _projected(part: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Turn tensors into their components along the axes of their means."""
+    """Project tensors on the axes of their means."""
     half, stress = part["normal_difference"] / 2, part["shear_stress"]
     sigma, pressure = _along_mean(half, stress), part["pressure"]
     found = {name: part[name] for name in ("pressure", "shear_stress", "normal_difference", "z")}
     found["sigma"] = sigma
-    if part["S_2_x"].any():  # that of round particles is left out
+    if part["S_2_x"].any():  # undefined for round particles
         found["S_2"] = _along_mean(part["S_2_x"], part["S_2_y"])
         found |= {"rotation": part["rotation"]} if "rotation" in part else {}
     if pressure.mean() > 0:
-        # The ratio of means, whose error is that of what is left of sigma - mu p.
+        # The ratio of means has the error of the mean of sigma - mu p.
         mu = sigma.mean() / pressure.mean()
         found["mu"] = mu + (sigma - mu * pressure) / pressure.mean()
     return found

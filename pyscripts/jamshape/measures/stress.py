@@ -1,4 +1,4 @@
-"""What a pressure tensor says of shear, by the names that `compute packing` has."""
+"""Shear stress from a pressure tensor, by the names of `compute packing`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from jamshape.arrays import FloatArray
 
 
 class ShearStress(NamedTuple):
-    """Of the plane of x and y, [energy / length^D] but for mu."""
+    """Components in the plane of x and y, [energy / length^D] except mu."""
 
     p_xy: float
     normal_difference: float
@@ -17,11 +17,11 @@ class ShearStress(NamedTuple):
     sigma: float
     """Half the difference of the eigenvalues in the plane."""
     mu: float
-    """sigma over the pressure; 0 where there is none."""
+    """sigma over the pressure; 0 without pressure."""
 
     @classmethod
     def of(cls, tensor: FloatArray) -> ShearStress:
-        """Take it from a pressure tensor (D, D).
+        """Derive the components from a pressure tensor (D, D).
 
         Examples
         --------

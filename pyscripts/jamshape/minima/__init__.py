@@ -1,4 +1,4 @@
-"""Minimisers, and packings at a chosen energy."""
+"""Energy minimisation, and packings at a target energy."""
 
 from jamshape.minima.descent import (
     Descent,

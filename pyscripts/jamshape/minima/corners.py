@@ -1,12 +1,12 @@
-"""Minima on corners of the energy, where no forces are zero but a mixture of those around.
+"""Minima on kinks of the energy, where a convex combination of one-sided gradients vanishes.
 
 The bond at the farther end of two nearly parallel rods passes from one tip to another where both are level
-(`jamshape.vibration.kinks`). Its energy is the larger one of two there, and its force jumps. A packing may come to rest on
-such a corner: on each side the forces push back to it, so that none is at rest, and yet no motion lowers the energy. That
-is so where some average of the gradients next to the corner, with weights that are not negative, is zero: 0 is in the
-subdifferential of Clarke. A method of Newton's kind finds such points by keeping several gradients and the energy's second
-derivatives, and going to the minimum of the largest of all these parabolas (L. Lukšan and J. Vlček, Math. Program. 83, 373
-(1998)). General in the shape; needs no LAMMPS.
+(`jamshape.vibration.kinks`). Its energy is the larger of two there, and its force jumps. A packing may come to rest
+on such a kink: forces on both sides push towards it, so neither side is at rest, yet no motion lowers the energy.
+That is the case if some convex combination of the gradients around the kink is zero: 0 is in the Clarke
+subdifferential. A bundle-Newton method finds such points: it keeps several gradients and the Hessian, and minimises
+the largest of the resulting quadratic models (L. Lukšan and J. Vlček, Math. Program. 83, 373 (1998)). Independent of
+the shape; needs no LAMMPS.
 """
 
 from __future__ import annotations
@@ -24,69 +24,69 @@ from jamshape.landscape.newton import least_shift
 from jamshape.landscape.vicinity import Vicinity
 from jamshape.minima.descent import residual_of
 
-# Steps to a corner: a handful near jamming, some forty where overlaps are a third of a particle.
+# Largest number of steps: a handful suffice near jamming, some forty where overlaps are a third of a particle.
 _STEPS = 100
 
-# It is none if the residual has not halved in so many steps, as where rods slide.
+# No kink is found if the residual has not halved in this number of steps, as where rods slide.
 _PATIENCE = 15
 
-# Parabolas that are kept: one more than corners that are met at once.
+# Size of the bundle: one more than kinks that meet.
 _MOST = 7
 
-# Parabolas are those of points so near to each other that what second derivatives miss is this part of the tolerance.
+# Points of the bundle are so close that the error of the quadratic models is below this fraction of the tolerance.
 _NEAR = 0.3
 
-# How much farther from the lowest point the next one is looked at, until it is on another side.
+# Factor by which the distance to the next trial point grows until it is on another side.
 _FARTHER = 4.0
 
-# Two gradients are of one side if they differ by no more than this part of how much others differ.
+# Two gradients belong to one side if they differ by no more than this fraction of the difference to others.
 _SAME_SIDE = 1e-2
 
-# Second derivatives are found anew after a step of more than this part of the overlap.
+# The Hessian is updated after a step of more than this fraction of the overlap.
 _RENEW = 1e-2
 
-_ACCURACY = 1e-9  # of Newton's equations, where these are iterated
+_ACCURACY = 1e-9  # of the iterative solution of Newton's equations
 _EPS = float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """The energy's parabola about a point near the corner."""
+    """Quadratic model of the energy about a point near the kink."""
 
     x: FloatArray
-    """(n,) from the base of the corner, [length]."""
+    """(n,) point relative to the base of the kink, [length]."""
     evaluation: Evaluation
     relaxed: FloatArray
-    """(n,) the gradient by the inverse of the second derivatives: a Newton step back, [length]."""
+    """(n,) inverse Hessian times gradient: a Newton step back, [length]."""
 
 
 class Rest(NamedTuple):
-    """A state at rest, maybe on a corner of the energy."""
+    """A state at rest, possibly on a kink of the energy."""
 
     state: State
     evaluation: Evaluation
-    """Its gradient is the mixture."""
+    """Evaluation with the convex combination as gradient."""
     n_sides: int
-    """Whose gradients are mixed; 1 where there is no corner."""
+    """Number of gradients combined; 1 without a kink."""
 
 
 @dataclass(eq=False)
 class Corner:
-    """Parabolas about a point, the largest of which is taken for the energy.
+    """Bundle of quadratic models about a point, the largest of which approximates the energy.
 
     Parameters
     ----------
     landscape : Landscape
     base : State
     tolerance
-        Of the residual.
+        Largest residual.
     """
 
     landscape: Landscape
     base: State
     tolerance: float
     pieces: list[Piece] = field(default_factory=list)
-    """The first is the lowest point so far."""
+    """The first is at the lowest point so far."""
 
     def __post_init__(self) -> None:
         self._differentiate(self.landscape.evaluate(self.base))
@@ -94,13 +94,13 @@ class Corner:
 
     @property
     def overlap(self) -> float:
-        """Of a bond, [length]."""
+        """Mean overlap of a bond, [length]."""
         unit = self.landscape.length**2 / self.landscape.k_e
         return self.pieces[0].evaluation.bond_force * unit
 
     @property
     def near(self) -> float:
-        """How near points are to be to each other, [length]."""
+        """Required distance of the points, [length]."""
         return _NEAR * self.tolerance * self.overlap
 
     def _differentiate(self, here: Evaluation) -> None:
@@ -110,7 +110,7 @@ class Corner:
         self._hessian: Any = self.landscape.curvature(self.base).hessian
 
     def add(self, x: FloatArray) -> None:
-        """Take the parabola about a point; put it first if its energy is the lowest, to rounding."""
+        """Add the model about a point; put it first if its energy is the lowest, up to rounding."""
         piece = self._piece(x)
         lowest = self.pieces[0].evaluation.energy if self.pieces else np.inf
         at = 0 if piece.evaluation.energy <= lowest * (1 + 2 * _EPS) else len(self.pieces)
@@ -122,17 +122,17 @@ class Corner:
         return Piece(x, found, relaxed)
 
     def times(self, x: FloatArray) -> FloatArray:
-        """Multiply by the second derivatives, with the shift that makes them positive."""
+        """Multiply by the Hessian, shifted to be positive definite."""
         product: FloatArray = self._hessian @ x + self._newton.shift * x
         return product
 
     def gradients(self) -> FloatArray:
-        """(k, n) gradients of the parabolas at the lowest point."""
+        """(k, n) gradients of the models at the lowest point."""
         first = self.pieces[0]
         return np.array([p.evaluation.gradient + self.times(first.x - p.x) for p in self.pieces])
 
     def below(self) -> FloatArray:
-        """(k,) how far each parabola is below the energy at the lowest point."""
+        """(k,) depth of each model below the energy at the lowest point."""
         first = self.pieces[0]
         found = []
         for piece in self.pieces:
@@ -142,18 +142,18 @@ class Corner:
         return np.maximum(found, 0.0)
 
     def mixed(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Find the weights of the gradients at the minimum of the largest parabola, their mixture, and the step there."""
+        """Return weights of the gradients at the minimum of the largest model, their combination, and the step."""
         first, gradients = self.pieces[0], self.gradients()
         steps = np.array([p.relaxed + first.x - p.x for p in self.pieces])
         products = gradients @ steps.T
         if not np.isfinite(products).all():
-            msg = "second derivatives without an inverse"  # such as of flat faces, where they jump
+            msg = "second derivatives without an inverse"  # as for flat faces, where they jump
             raise RuntimeError(msg)
         weights = weights_of(products, self.below())
         return weights, weights @ gradients, -(weights @ steps)
 
     def draw_near(self, weights: FloatArray) -> None:
-        """Take parabolas that count at points nearer to the lowest one, on the way that leads to their side: that of the jump."""
+        """Move models with nonzero weight to points closer to the lowest one, on their side of the kink."""
         first, gradients = self.pieces[0], self.gradients()
         for k in range(1, len(self.pieces)):
             far = np.abs(self.pieces[k].x - first.x).max()
@@ -171,7 +171,7 @@ class Corner:
                 distance *= _FARTHER
 
     def is_near(self, weights: FloatArray) -> bool:
-        """Whether the points of all parabolas that count are so near that second derivatives add nothing."""
+        """Whether the points of all models with nonzero weight are so close that the Hessian is negligible."""
         far = (
             np.abs(p.x - self.pieces[0].x).max()
             for p, w in zip(self.pieces, weights, strict=True)
@@ -180,7 +180,7 @@ class Corner:
         return bool(max(far) <= _FARTHER * self.near)
 
     def forget(self, weights: FloatArray) -> None:
-        """Leave out parabolas that do not count, those of a side that a nearer one has, and the least of too many."""
+        """Drop models without weight, those of a side with a closer model, and the smallest weights of too many."""
         first, gradients = self.pieces[0], self.gradients()
         far = [np.abs(piece.x - first.x).max() for piece in self.pieces]
         kept: list[int] = []
@@ -198,7 +198,7 @@ class Corner:
         return Rest(state, evaluation, n_sides)
 
     def renew(self) -> None:
-        """Find second derivatives at the lowest point, if it is far from where they were found."""
+        """Update the Hessian at the lowest point, if it is far from where it was evaluated."""
         first = self.pieces[0]
         if np.abs(first.x).max() <= _RENEW * self.overlap:
             return
@@ -208,12 +208,12 @@ class Corner:
 
 
 def weights_of(products: FloatArray, below: FloatArray) -> FloatArray:
-    """Find the weights, not negative and of sum 1, that make half their square in `products` and `below` least.
+    """Find the convex weights that minimise half their square in `products` plus `below`.
 
     Parameters
     ----------
     products : (k, k) array
-        Of gradients, by the inverse of the second derivatives; k is small, since all subsets are tried.
+        Products of gradients with the inverse Hessian; k is small, since all subsets are tried.
     below : (k,) array
 
     Returns
@@ -242,19 +242,19 @@ def weights_of(products: FloatArray, below: FloatArray) -> FloatArray:
 
 
 def at_rest(landscape: Landscape, state: State, tolerance: float) -> Rest | None:
-    """Lead a state at which a minimisation stalled to the corner of the energy beside it.
+    """Relax a state at which a minimisation stalled onto the adjacent kink of the energy.
 
     Parameters
     ----------
     landscape : Landscape
     state : State
     tolerance : float
-        Largest residual of the mixture.
+        Largest residual of the combined gradient.
 
     Returns
     -------
     Rest or None
-        None if forces do not come to balance near by, such as where particles slide.
+        None if forces do not balance nearby, as where particles slide.
     """
     try:
         corner = Corner(landscape, state, tolerance)

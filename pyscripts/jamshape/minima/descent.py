@@ -1,4 +1,4 @@
-"""What all minimisers share: how a minimisation ends, its history, and the state so far."""
+"""Common parts of all minimisers: outcome, stopping criteria, history and current state."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jamshape.landscape import Evaluation, Landscape
 from jamshape.landscape.vicinity import DescentEnd
 from jamshape.packing import State
 
-# A method no longer gains if residual times energy did not fall by this factor in so many evaluations.
+# A method stalls if residual times energy did not fall by this factor in a number of evaluations.
 _GAIN = 0.7
 
 # In units of k_e and `Landscape.length`.
@@ -21,11 +21,11 @@ _LOWEST = 1e-24
 
 
 class Outcome(Enum):
-    """How a minimisation ended.
+    """Outcome of a minimisation.
 
-    SLIDING: what is left of the forces lies along modes softer than the prestress, rods that slide
-    along flat sides, and does not fall any more; all the rest is below the tolerance.
-    CORNER: at rest where the slope of the energy jumps; a mixture of the forces around is below the tolerance.
+    SLIDING: the remaining forces lie along modes softer than the prestress, rods sliding along flat sides,
+    and do not fall any more; all others are below the tolerance.
+    CORNER: at rest on a kink of the energy; a convex combination of the forces around is below the tolerance.
     STALLED: no progress.
     """
 
@@ -40,7 +40,7 @@ class Outcome(Enum):
 class Residual(NamedTuple):
     """Largest net force and torque of a particle, over the mean force of a bond.
 
-    Torques are divided by the length that counts for a radian, the half length A of a spherocylinder.
+    Torques are divided by the length that scales radians, the half length A of a spherocylinder.
     """
 
     force: float
@@ -54,19 +54,19 @@ class Residual(NamedTuple):
 
 @dataclass(frozen=True)
 class Stop:
-    """When a minimisation ends.
+    """Stopping criteria of a minimisation.
 
     Parameters
     ----------
     tolerance
-        Converged when the residual is below.
+        Converged when the residual is smaller.
     lowest
-        Unjammed when the energy density is below, [energy / length^D]; when left out 1e-24 in units of
+        Unjammed when the energy density is smaller, [energy / length^D]; by default 1e-24 in units of
         k_e and `Landscape.length`.
     evaluations
-        Exhausted after so many evaluations of all forces.
+        Exhausted after this number of evaluations of all forces.
     seconds
-        Exhausted after so much time.
+        Exhausted after this time.
     """
 
     tolerance: float = 1e-8
@@ -77,7 +77,7 @@ class Stop:
 
 @dataclass
 class History:
-    """Convergence: one row for each evaluation that was accepted or tried."""
+    """Convergence history: one row for each accepted or trial evaluation."""
 
     began: float = field(default_factory=time.perf_counter)
     wall_seconds: list[float] = field(default_factory=list)
@@ -86,7 +86,7 @@ class History:
     energy_density: list[float] = field(default_factory=list)
 
     def add(self, evaluations: int, residual: float, energy_density: float) -> None:
-        """Append a row, now."""
+        """Append a row with the present time."""
         self.put(time.perf_counter() - self.began, evaluations, residual, energy_density)
 
     def put(self, seconds: float, evaluations: int, residual: float, energy_density: float) -> None:
@@ -99,11 +99,11 @@ class History:
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """Where a minimisation ended."""
+    """Result of a minimisation."""
 
     state: State
     evaluation: Evaluation
-    """On a corner its gradient is the mixture of those around that balances."""
+    """Evaluation there; on a kink its gradient is the balanced combination of those around."""
     outcome: Outcome
     residual: Residual
     history: History
@@ -115,12 +115,12 @@ class Minimum:
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether forces balance, be it on a corner of the energy."""
+        """Whether forces balance, possibly on a kink of the energy."""
         return self.outcome in (Outcome.CONVERGED, Outcome.CORNER)
 
 
 def residual_of(landscape: Landscape, evaluation: Evaluation) -> Residual:
-    """Measure how far from mechanical equilibrium a state is (Marschall & Teitel 2018, App. A)."""
+    """Measure the distance of a state from mechanical equilibrium (Marschall & Teitel 2018, App. A)."""
     if evaluation.bond_force == 0.0:
         return Residual(0.0, 0.0)
     components = landscape.components(evaluation.gradient) / evaluation.bond_force
@@ -130,18 +130,18 @@ def residual_of(landscape: Landscape, evaluation: Evaluation) -> Residual:
 
 
 def rounding_floor(evaluation: Evaluation, landscape: Landscape, *, extended: bool = True) -> float:
-    """Residual that rounding of the coordinates alone leaves: about eps / overlap."""
+    """Residual due to rounding of the coordinates alone: about eps / overlap."""
     return rounding_of_a_bond(landscape, extended=extended) / max(evaluation.bond_force, 1e-300)
 
 
 def rounding_of_a_bond(landscape: Landscape, *, extended: bool = True) -> float:
-    """Force that rounding of the coordinates makes, [energy / length]."""
+    """Force error due to rounding of the coordinates, [energy / length]."""
     eps = float(np.finfo(np.longdouble if extended else np.float64).eps)
     return 8 * eps * landscape.k_e / float(landscape.inner_radius.max())
 
 
 class Descent:
-    """What the methods share: counts, history, the best state so far, and when to stop."""
+    """State of a minimisation, whatever the method: counts, history, current state, stopping criteria."""
 
     def __init__(
         self, landscape: Landscape, start: State, stop: Stop, history: History | None = None
@@ -174,7 +174,7 @@ class Descent:
         return residual_of(self.landscape, self.evaluation).largest
 
     def be_patient(self, evaluations: int) -> None:
-        """From now on call it a stall if so many evaluations in a row gain nothing."""
+        """Stall only after this number of evaluations in a row without gain."""
         self._patience, self._last_gain, self._gained = evaluations, self.evaluations, np.inf
 
     def move_to(self, state: State, evaluation: Evaluation) -> None:
@@ -183,9 +183,9 @@ class Descent:
         self.record(evaluation)
 
     def take(self, state: State, end: DescentEnd) -> None:
-        """Accept where a compiled minimisation ended, with its history."""
+        """Accept the end of a compiled minimisation, with its history."""
         self.state, self.evaluation = state, end.evaluation
-        if len(end.rows) < 2:  # the first one is there
+        if len(end.rows) < 2:  # the first row is present already
             return
         begin = time.perf_counter() - self.history.began - end.rows[-1][0]
         before = self.landscape.evaluations - end.rows[-1][1]
@@ -204,7 +204,7 @@ class Descent:
             self._gained, self._last_gain = gain, self.evaluations
 
     def outcome(self) -> Outcome | None:
-        """Say whether it ends here, and how."""
+        """Return the outcome if the minimisation ends here."""
         if self.evaluation.energy <= self.lowest * self.state.volume:
             return Outcome.UNJAMMED
         if self.residual <= self.stop.tolerance:

@@ -1,7 +1,7 @@
-"""Minimisers of the energy of a packing: one interface, four methods and an automatic one.
+"""Minimisers of the energy of a packing: one interface for all methods.
 
-All work on the coordinates of a `Landscape` (positions and, as lengths, rotations), start from a `State`
-and return a `Minimum` that says how it ended and how the residual fell with run time.
+All work on the coordinates of a `Landscape` (positions and, scaled to lengths, rotations), start from a `State`
+and return a `Minimum` with the outcome and the history of the residual.
 """
 
 from __future__ import annotations
@@ -9,17 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from jamshape.landscape import Landscape
+from jamshape.minima.cg_marschall import cg_marschall
 from jamshape.minima.descent import Descent, History, Minimum, Outcome, Stop
-from jamshape.minima.lbfgs import lbfgs
 from jamshape.minima.newton import auto, near, newton
-from jamshape.minima.paper import paper
 from jamshape.packing import State
+
+Method = Callable[[Descent], Outcome]
 
 
 def minimise(
     landscape: Landscape,
     start: State,
-    method: str = "auto",
+    method: str | Method = "auto",
     stop: Stop | None = None,
     history: History | None = None,
 ) -> Minimum:
@@ -29,43 +30,37 @@ def minimise(
     ----------
     landscape : Landscape
     start : State
-    method : str
-        One of `METHODS`: ``auto``, ``near``, ``newton``, ``lbfgs``, ``paper``, ``lammps``.
+    method : str or callable
+        One of `METHODS`: ``auto``, ``near``, ``newton``, ``cg_marschall``; or a function that moves a
+        `Descent` along and returns how it ended.
     stop : Stop, optional
     history : History, optional
-        One to append to.
+        History to append to.
 
     Returns
     -------
     Minimum
-        Look at its outcome. There is no warning: many who call this want no more than a few evaluations.
+        Check its outcome; there is no warning, since many callers want no more than a few evaluations.
 
     Raises
     ------
     ValueError
-        If there is no such method.
+        If the method is unknown.
     CrossingError
         If spines cross at the start.
     """
-    if method not in METHODS:
-        msg = f"the method is {method!r}, expected one of {', '.join(METHODS)}"
-        raise ValueError(msg)
+    if isinstance(method, str):
+        if method not in METHODS:
+            msg = f"the method is {method!r}, expected one of {', '.join(METHODS)}"
+            raise ValueError(msg)
+        method = METHODS[method]
     descent = Descent(landscape, start, stop or Stop(), history)
-    return descent.minimum(METHODS[method](descent))
+    return descent.minimum(method(descent))
 
 
-def _lammps(descent: Descent) -> Outcome:
-    """LAMMPS's conjugate gradients; LAMMPS is started only here."""
-    from jamshape.minima.lammps_cg import descend  # noqa: PLC0415
-
-    return descend(descent) or Outcome.STALLED
-
-
-METHODS: dict[str, Callable[[Descent], Outcome]] = {
+METHODS: dict[str, Method] = {
     "auto": auto,
     "near": near,
     "newton": newton,
-    "lbfgs": lbfgs,
-    "paper": paper,
-    "lammps": _lammps,
+    "cg_marschall": cg_marschall,
 }

@@ -9,22 +9,22 @@ from jamshape.landscape.vicinity import DescentStop, Vicinity
 from jamshape.minima.corners import at_rest
 from jamshape.minima.descent import Descent, Outcome, rounding_of_a_bond
 
-# L-BFGS, cheap while contacts come and go, gives way to Newton's method below this residual.
+# L-BFGS, cheap while contacts open and close, hands over to Newton's method below this residual.
 _NEWTON_BELOW = 1e-2
 
 
 def auto(descent: Descent) -> Outcome:
-    """L-BFGS, and Newton's method near a minimum."""
+    """Use L-BFGS, then Newton's method near a minimum."""
     return _descend(descent, _NEWTON_BELOW)
 
 
 def near(descent: Descent) -> Outcome:
-    """As `auto`, but begin with Newton's method: for a start that is thought to be near a minimum."""
+    """Begin with Newton's method, then as `auto`: for a start close to a minimum."""
     return _descend(descent, _NEWTON_BELOW, is_near=True)
 
 
 def newton(descent: Descent) -> Outcome:
-    """Newton steps with the analytic Hessian, shifted where it is not positive definite."""
+    """Take Newton steps with the analytic Hessian, shifted where it is not positive definite."""
     return _descend(descent, math.inf)
 
 
@@ -50,7 +50,7 @@ def _descend(descent: Descent, newton_below: float, *, is_near: bool = False) ->
 
 
 def _on_a_corner(descent: Descent) -> Outcome | None:
-    """Lead a state beside a corner, from whose sides steps turn round for ever, to rest on it; None if it is none."""
+    """Relax a state that oscillates across a kink onto it; None without a kink."""
     if descent.outcome() is not None:
         return None
     found = at_rest(descent.landscape, descent.state, descent.stop.tolerance)

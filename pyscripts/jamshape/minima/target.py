@@ -1,4 +1,4 @@
-"""Packings at a chosen energy density: the box and the coordinates of a minimum with u = u0."""
+"""Packings at a target energy density: box and coordinates of a minimum with u = u0."""
 
 from __future__ import annotations
 
@@ -15,68 +15,66 @@ from jamshape.minima.descent import History, Minimum, Outcome, Stop, residual_of
 from jamshape.minima.minimise import minimise
 from jamshape.packing import State
 
-# A minimum this good is jammed.
+# A minimum with this residual is jammed.
 _GOOD = 1e-2
 
-# One this good can follow a change of the box: rods that slide along flat sides, the faster the
-# higher the energy, have found where they stop. A move is not made if it leaves a residual above.
+# Residual at which linear response holds: rods that slide along flat sides, the faster the
+# higher the energy, have come to rest. A move is undone if it leaves a larger residual.
 _GOOD_TO_MOVE = 1e-4
 
-# What slides leaves less than this.
+# Residual left by sliding is smaller than this.
 _SLIDING = 1e-5
 
-# A minimum is led to u0 through at most so many, which are as good as asked for where
-# sqrt(u) is so near, or, where one stalls, as good as that one but for this factor.
-_MOST_MINIMA = 60
-_GAIN = 1.5
-_NEAR = 0.1
-_TRIES = 2
-_SOFT = 1e-6
-_CLOSE = 1e-3
-_CYCLES, _HIGHER = 3, 2.0
-_STIFF_STEPS = 4
-_ACCURACY = 1e-9
+_MOST_MINIMA = 60  # on the way to u0
+_GAIN = 1.5  # relaxation of the tolerance after a stall that leaves only sliding
+_NEAR = 0.1  # relative distance of sqrt(u) to its target below which minima have the full tolerance
+_TRIES = 2  # fractions of a strain to try where the whole one unjams the packing
+_SOFT = 1e-6  # stiffness, in k_e / length^2, below which modes count as sliding
+_CLOSE = 1e-3  # relative distance of u to u0 below which losses by minimising are compensated
+_CYCLES = 3  # approaches to u0 after stalls
+_HIGHER = 2.0  # energy over u0 from which they start again
+_STIFF_STEPS = 4  # Newton steps that relax stiff modes
+_ACCURACY = 1e-9  # of the solutions of Newton's equations
 
-# At most this factor in sqrt(u), which is linear in phi - phi_J, from one step to the next.
+# Largest factor in sqrt(u), which is linear in phi - phi_J, between two steps.
 _LARGEST_FACTOR = 4.0
 
-# A minimisation whose energy falls below this part of what it was to be is falling to nothing: the box was opened
-# too far. So is one below this part of what a step of compression adds to a jammed packing.
+# A minimisation whose energy falls below this fraction of its target is unjamming: the box was opened too far.
 _FALLEN = 1e-2
+
+# Likewise for this fraction of the energy that a compression step adds to a jammed packing.
 _UNJAMMED = 1e-3
 
-# Where particles go as the box is strained is predicted to this part.
+# Relative accuracy of the predicted displacements as the box is strained.
 _PREDICTION = 1e-3
 
-# Steps grow again after so many that left the state unjammed, and at once while they are finer than
-# the strain from jamming to u0; a search whose steps fall below this fraction of that strain has failed.
-_GROW_AFTER = 4
-_SMALLEST_STEP = 1e-3
+_GROW_AFTER = (
+    4  # unjammed states in a row; steps finer than the strain from jamming to u0 grow at once
+)
+_SMALLEST_STEP = 1e-3  # over that strain; a search with finer steps has failed
 
-# Overlaps that can be balanced in long doubles to a residual of 1e-5, and those of soft particles
-# that still are particles.
-_LEAST_OVERLAP = 1e-13
-_LARGEST_OVERLAP = 0.05
+_LEAST_OVERLAP = 1e-13  # long doubles balance it to a residual of 1e-5
+_LARGEST_OVERLAP = 0.05  # of soft particles
 
 
 class TargetError(RuntimeError):
-    """No minimum of the asked energy was found; the sentence says what was."""
+    """No minimum of the target energy was found; the message says what was."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """What to look for.
+    """Goal of a search.
 
     Parameters
     ----------
     u0
         Energy density U / L^D, [energy / length^D].
     accuracy
-        Of |u - u0| / u0.
+        Largest |u - u0| / u0.
     tolerance
-        Of the residual of the minimum.
+        Largest residual of the minimum.
     step
-        Strain of the box by which unjammed states are compressed, at first.
+        Initial strain of the box by which unjammed states are compressed.
     method
         Minimiser of the halving search.
 
@@ -97,7 +95,7 @@ class Target:
         require_positive(**{name: getattr(self, name) for name in numbers})
 
     def is_met(self, u: float) -> bool:
-        """Whether an energy density is u0."""
+        """Whether an energy density equals u0 to the accuracy."""
         return abs(u - self.u0) <= self.accuracy * self.u0
 
     def strain_above_jamming(self, landscape: Landscape) -> float:
@@ -106,26 +104,26 @@ class Target:
 
 
 def _stiffness(landscape: Landscape) -> float:
-    """Estimate the energy density of a jammed packing over the square of its strain from jamming."""
+    """Estimate the energy density of a jammed packing over the squared strain from jamming."""
     return landscape.k_e / float(landscape.inner_radius.max()) ** landscape.particles.dimension
 
 
 @dataclass(eq=False)
 class Search:
-    """A search between two minimisations: all that is needed to go on from here.
+    """A search between two minimisations, with all that is needed to resume it.
 
     Parameters
     ----------
     state
-        To be minimised next.
+        State to minimise next.
     step
-        Strain by which to compress or open the box next.
+        Strain of the next compression or opening of the box.
     loose, loose_in_a_row
-        The densest state known to be unjammed, if any; how many were found one after another.
+        Densest state known to be unjammed, if any; number of unjammed states in a row.
     opening
         Whether the last step opened the box.
     minimum
-        The result, once it is found.
+        Result, once it is found.
     """
 
     state: State
@@ -137,9 +135,9 @@ class Search:
     history: History = field(default_factory=History)
 
     def lowest(self, landscape: Landscape, target: Target) -> float | None:
-        """Give the energy density below which the state, once it is minimised, is unjammed.
+        """Return the energy density below which the state, once minimised, is unjammed.
 
-        That of a jammed one which was compressed is far above; a start may be a packing at any energy.
+        The energy of a compressed jammed state is far above; a start may have any energy.
         """
         if self.opening is None:
             return None
@@ -148,7 +146,7 @@ class Search:
         return least if self.opening else max(least, added)
 
     def close_further(self, unjammed: State, fine: float, target: Target) -> None:
-        """Go on from an unjammed state, in finer steps if the last one opened the box too far."""
+        """Continue from an unjammed state, in finer steps if the last one opened the box too far."""
         self.loose, self.loose_in_a_row = unjammed, self.loose_in_a_row + 1
         if self.opening:
             self.step /= 4
@@ -158,7 +156,7 @@ class Search:
         self.state = unjammed.strained(-self.step)
 
     def leave(self, jammed: State) -> None:
-        """Go on from a jammed state too far above: in a smaller step to it, or by opening the box."""
+        """Continue from a jammed state too far above: in a smaller step to it, or by opening the box."""
         if self.loose is not None:
             self.step /= 4
             self.state = self.loose.strained(-self.step)
@@ -173,20 +171,20 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
     """Find the packing by straining the box to where the energy is u0, and minimising.
 
     Unjammed states are compressed by small strains and minimised, until one stays jammed. From
-    there sqrt(u), which is linear in the strain, is led to sqrt(u0) minimum by minimum. A box opened
+    there sqrt(u), which is linear in the strain, is extrapolated to sqrt(u0) minimum by minimum. A box opened
     too far is closed in finer steps.
 
     Parameters
     ----------
     landscape : Landscape
     search : Search
-        Where to begin, or to go on.
+        Initial or resumed state of the search.
     target : Target
 
     Yields
     ------
     Search
-        The same object between minimisations. The last one has a minimum.
+        The same object between minimisations; the last one has a minimum.
 
     Raises
     ------
@@ -217,7 +215,7 @@ def direct(landscape: Landscape, search: Search, target: Target) -> Iterator[Sea
         if search.step < _SMALLEST_STEP * fine:
             u = found.energy_density
             msg = (
-                f"the search ended between an unjammed state and one of u = {u:.3g} that has a"
+                f"the search ended between an unjammed state and one with u = {u:.3g} and a"
                 f" residual of {found.residual.largest:.2g}, expected a minimum with u = {target.u0:.3g};"
                 " take another u0 or another start"
             )
@@ -244,10 +242,10 @@ def require_reachable(landscape: Landscape, target: Target) -> None:
 def _lead_to(
     landscape: Landscape, search: Search, start: Minimum, target: Target
 ) -> Generator[Search, None, Minimum]:
-    """Lead a minimum to u0, minimum by minimum; unjammed if the energy falls to nothing.
+    """Relax a minimum at u0, minimum by minimum; unjammed if the energy vanishes.
 
-    One that stalls at u0, where a contact is about to open or to close, is led there again from a higher energy.
-    Yields the search before each minimisation: from its state a killed one goes on.
+    A minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
+    Yields the search before each minimisation, where a killed run resumes.
     """
     best = None
     jammed = start
@@ -273,15 +271,15 @@ def _lead_to(
 class _Led:
     """A minimum on its way to u0.
 
-    The box is strained to where sqrt(u), which is linear in the strain, is that of u0. Where that opens the
-    packing, parts of the strain are tried.
+    The box is strained to where sqrt(u), which is linear in the strain, reaches that of u0. Where that opens the
+    packing, fractions of the strain are tried.
     """
 
     landscape: Landscape
     target: Target
     jammed: Minimum
     lost: Minimum | None = None
-    """What is left of it if it falls apart on the way."""
+    """Last state, if it unjams on the way."""
 
     def minima(self) -> Iterator[None]:
         """Yield before each minimisation on the way."""
@@ -293,11 +291,11 @@ class _Led:
         for _ in range(_MOST_MINIMA):
             left, u = self.jammed.residual.largest, self.jammed.energy_density
             if self.jammed.outcome is Outcome.STALLED and left < _SLIDING:
-                tolerance = max(tolerance, _GAIN * left)  # the next ones need be no better
+                tolerance = max(tolerance, _GAIN * left)  # the next ones need not be better
             if left <= tolerance and target.is_met(u):
                 return
             if abs(u / target.u0 - 1) < _CLOSE:
-                aim *= target.u0 / u  # what minimising takes from it, as rods slide, is added
+                aim *= target.u0 / u  # compensates what minimisation removes, as rods slide
             root = _towards(self.jammed, aim, part)
             strain = _strain_to(self.jammed, root)
             wanted = replace(target, tolerance=tolerance)
@@ -314,16 +312,16 @@ class _Led:
 
 
 def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float) -> Minimum:
-    """Minimise, well only where u, the energy density that is expected, is nearly u0."""
+    """Minimise, to full tolerance only if u, the expected energy density, is nearly u0."""
     near = abs(math.sqrt(u / target.u0) - 1) < _NEAR
     tolerance = target.tolerance if near else max(target.tolerance, _GOOD_TO_MOVE)
     return minimise(landscape, at.state, "near", Stop(tolerance, lowest=_FALLEN * u), at.history)
 
 
 def nearer(landscape: Landscape, at: Minimum, u0: float) -> State:
-    """Move a jammed minimum to where its energy density is to be u0, or a bounded factor nearer to it.
+    """Move a jammed minimum to u0 by linear response, or a bounded factor towards it.
 
-    The box is strained, and particles go where linear response says that forces balance.
+    The box is strained, and particles follow the linear response that balances forces.
 
     Parameters
     ----------
@@ -341,14 +339,14 @@ def nearer(landscape: Landscape, at: Minimum, u0: float) -> State:
 
 
 def followed(landscape: Landscape, at: Minimum, strain: float) -> State:
-    """Strain the box of a minimum, and move particles to where forces balance as long as contacts stay.
+    """Strain the box of a minimum, and move particles by linear response, at fixed contacts.
 
     Parameters
     ----------
     landscape : Landscape
     at : Minimum
     strain : float
-        As of `State.strained`.
+        See `State.strained`.
 
     Returns
     -------
@@ -364,16 +362,16 @@ def followed(landscape: Landscape, at: Minimum, strain: float) -> State:
 
 
 def _towards(at: Minimum, u0: float, part: float = 1.0) -> float:
-    """Give sqrt(u) after a part of the way to u0, which is a bounded factor at most."""
+    """Return sqrt(u) after a fraction of the way to u0, limited to a bounded factor."""
     now, aim = math.sqrt(at.energy_density), math.sqrt(u0)
     aim = min(max(aim, now / _LARGEST_FACTOR), now * _LARGEST_FACTOR)
     return now + part * (aim - now)
 
 
 def _strain_to(at: Minimum, root: float) -> float:
-    """Strain after which sqrt(u) is this root.
+    """Return the strain at which sqrt(u) has this value.
 
-    The energy of a minimum changes with the strain as if the particles did not move.
+    The energy of a minimum changes with strain as if the particles did not move, to first order.
     """
     energy, volume = at.evaluation.energy, at.state.volume
     now = math.sqrt(energy / volume)
@@ -382,15 +380,15 @@ def _strain_to(at: Minimum, root: float) -> float:
 
 
 def _judged(landscape: Landscape, at: Minimum, target: Target) -> Minimum:
-    """Say of a minimum that is not good enough whether all that is left of its forces slides.
+    """Decide whether the remaining forces of an imperfect minimum are all due to sliding.
 
-    That is so where nothing is left without what lies along modes softer than a small shift, once all
-    stiffer ones are relaxed.
+    They are if, once all stiffer modes are relaxed, nothing remains beside forces along modes softer than a
+    small shift.
     """
     if at.residual.largest <= target.tolerance:
         return at
     if at.residual.largest > _SLIDING:
-        return replace(at, outcome=Outcome.STALLED)  # of a step on the way it may have been enough
+        return replace(at, outcome=Outcome.STALLED)  # sufficient only for a step on the way
     vicinity = Vicinity(landscape, at.state)
     newton = vicinity.newton(_SOFT * landscape.k_e / landscape.length**2)
     evaluation = at.evaluation
@@ -416,14 +414,14 @@ def halving(
     """Find the packing by the halving search of Marschall & Teitel 2018, Sec. III C, as written.
 
     L and r are scaled by 1 -+ lambda and minimised until U crosses U0; then lambda is halved and
-    the direction reversed. `Search.step` is lambda, 1e-6 to begin with in the paper.
+    the direction reversed. `Search.step` is lambda, initially 1e-6 in the paper.
 
-    Arguments and results as of `direct`.
+    Arguments and results as in `direct`.
 
     Raises
     ------
     TargetError
-        If lambda falls below `shortest` before u is u0.
+        If lambda falls below `shortest` before u reaches u0.
     """
     while search.minimum is None:
         stop = Stop(tolerance=target.tolerance)
@@ -448,7 +446,7 @@ def halving(
 
 
 def find(landscape: Landscape, start: State, target: Target) -> Minimum:
-    """Run the direct search from a state to its end; errors as `direct`."""
+    """Run the direct search to its end; errors as `direct`."""
     search = Search(start, target.step)
     collections.deque(direct(landscape, search, target), maxlen=0)
     assert search.minimum is not None

@@ -1,8 +1,8 @@
 """The periodic box: a rectangle (cuboid), or with a tilt a parallelogram (parallelepiped).
 
 Its cell vectors are the columns of an upper triangular matrix, as in LAMMPS: [[lx, xy], [0, ly]] in the plane,
-[[lx, xy, xz], [0, ly, yz], [0, 0, lz]] in space. What is computed of a box without tilt has the bits that the edges
-alone would give: all that is added is zero.
+[[lx, xy, xz], [0, ly, yz], [0, 0, lz]] in space. Without tilt, results have the same bits as from the edges
+alone: only zeros are added.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from jamshape.arrays import FloatArray, IntArray, real_numbers
 from jamshape.packing.given import as_floats
 from jamshape.records import Record
 
-# Of the largest entry of a matrix: entries that are left where a program turns a box and back.
+# Relative size of entries that rounding leaves when a program rotates a box forth and back.
 _ROUNDING = 1e-13
 
 
@@ -29,12 +29,11 @@ class Box(Record):
     Parameters
     ----------
     lo : (D,) array of float64, [length]
-        Corner from which the cell vectors begin.
+        Origin of the cell vectors.
     edges : (D,) array of float64, [length]
-        The diagonal of the matrix: lx, ly, lz. They are the lengths of the edges where there is no tilt.
+        Diagonal of the matrix: lx, ly, lz; the lengths of the edges if there is no tilt.
     tilt : (D (D - 1) / 2,) array of float64, [length], optional
-        The matrix above its diagonal, in the order of LAMMPS: (xy,) in 2D, (xy, xz, yz) in 3D; zeros when
-        left out.
+        The matrix above its diagonal, in the order of LAMMPS: (xy,) in 2D, (xy, xz, yz) in 3D; zeros by default.
 
     Raises
     ------
@@ -71,7 +70,7 @@ class Box(Record):
 
     @classmethod
     def of(cls, lo: ArrayLike, matrix: ArrayLike) -> Box:
-        """Make a box of its cell vectors.
+        """Make a box from its cell vectors.
 
         Parameters
         ----------
@@ -82,7 +81,7 @@ class Box(Record):
         Raises
         ------
         ValueError
-            As `Box`, or if the matrix is not upper triangular, but for rounding.
+            As for `Box`, or if the matrix is not upper triangular up to rounding.
         """
         return cls(np.asarray(lo), *Lengths.of(np.asarray(matrix, np.float64)))
 
@@ -119,7 +118,7 @@ class Box(Record):
 
     @property
     def center(self) -> FloatArray:
-        """(D,) where the diagonals cross, [length]."""
+        """(D,) centre, [length]."""
         return np.asarray(self.lo + self.matrix.sum(axis=1) / 2)
 
     @property
@@ -128,12 +127,12 @@ class Box(Record):
         return np.asarray(self.edges / np.linalg.norm(self._unsheared, axis=1))
 
     def heights(self, offset: FloatArray) -> FloatArray:
-        """Distances of points from the faces through the lower corner, each between 0 and a spacing in the box.
+        """Distances of points from the faces through the lower corner; in the box from 0 to the spacing.
 
         Parameters
         ----------
         offset : (..., D) array of float64, [length]
-            From the lower corner.
+            Measured from the lower corner.
 
         Returns
         -------
@@ -147,7 +146,7 @@ class Box(Record):
         return np.asarray(offset @ self._unsheared.T / self.edges)
 
     def vectors(self, turns: NDArray[Any]) -> FloatArray:
-        """Add up so many (..., D) cell vectors, [length]."""
+        """Add up (..., D) multiples of the cell vectors, [length]."""
         return np.asarray(turns @ self.matrix.T)
 
     def wrapped(self, position: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -155,7 +154,7 @@ class Box(Record):
 
         Returns
         -------
-        (M, D) offsets from the lower corner, and (M, D) the cell vectors that were taken away
+        (M, D) offsets from the lower corner, and (M, D) numbers of cell vectors subtracted
         """
         offset = position - self.lo
         turns = np.floor(self.fractions(offset)).astype(np.int64)
@@ -163,12 +162,12 @@ class Box(Record):
 
     @cached_property
     def _unsheared(self) -> FloatArray:
-        """(D, D) what takes the tilt out of vectors and leaves the last component; 1 without tilt."""
+        """(D, D) map that removes the tilt from vectors and keeps the last component; 1 without tilt."""
         return np.asarray(np.linalg.inv(self.matrix / self.edges), np.float64)
 
 
 class Lengths(NamedTuple):
-    """The entries of a matrix of cell vectors that may differ from zero, of any type of numbers."""
+    """Possibly nonzero entries of a matrix of cell vectors, of any number type."""
 
     edges: NDArray[Any]
     """(D,)"""
@@ -177,12 +176,12 @@ class Lengths(NamedTuple):
 
     @classmethod
     def of(cls, matrix: NDArray[Any]) -> Lengths:
-        """Take them out of a matrix (D, D).
+        """Extract the entries of a matrix (D, D).
 
         Raises
         ------
         ValueError
-            If it is no upper triangular matrix, but for rounding.
+            If it is not upper triangular up to rounding.
         """
         below = np.abs(np.tril(matrix, -1)).max(initial=0)
         if matrix.shape not in {(2, 2), (3, 3)} or below > _ROUNDING * np.abs(matrix).max(
@@ -190,7 +189,7 @@ class Lengths(NamedTuple):
         ):
             msg = (
                 f"the cell vectors are the columns of {matrix.tolist()}, expected the first one along x"
-                " and the second one in the x-y plane; turn box and particles"
+                " and the second one in the x-y plane; rotate box and particles"
             )
             raise ValueError(msg)
         return cls(np.diagonal(matrix).copy(), matrix[np.triu_indices(len(matrix), 1)])
@@ -204,7 +203,7 @@ class Lengths(NamedTuple):
 
 
 def cuboid_around(vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give the lower and the upper corner (D,) of what sums of some of the columns (D, D) reach, from 0 on."""
+    """Return lower and upper corner (D,) of the box around all sums of some of the columns (D, D)."""
     return np.minimum(vectors, 0).sum(axis=1), np.maximum(vectors, 0).sum(axis=1)
 
 
@@ -214,6 +213,6 @@ def number_of_tilts(dimension: int) -> int:
 
 
 def affine_change(then: FloatArray, now: FloatArray) -> FloatArray:
-    """Give the (D, D) linear map that takes cell vectors, the columns of (D, D), to others."""
+    """Return the (D, D) linear map from cell vectors, the columns of (D, D), to others."""
     edges = np.diagonal(then)
     return np.asarray(now / edges @ np.linalg.inv(then / edges))

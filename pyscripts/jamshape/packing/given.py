@@ -1,4 +1,4 @@
-"""Arrays as they are given to records: checked, copied and made read-only."""
+"""Validation of array arguments: checked, copied and made read-only."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from jamshape.arrays import FloatArray, IntArray, real_numbers, whole_numbers
 
 
 def as_floats(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    """Take finite numbers of a shape, or raise a ValueError."""
+    """Return finite numbers of a shape, or raise a ValueError."""
     array = np.array(real_numbers(name, values), dtype=np.float64, order="C")
     _check_shape(name, array.shape, shape)
     if not np.isfinite(array).all():
@@ -20,7 +20,7 @@ def as_floats(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArra
 
 
 def as_integers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> IntArray:
-    """Take integers of a shape, or raise a ValueError."""
+    """Return integers of a shape, or raise a ValueError."""
     array = np.array(whole_numbers(name, values), dtype=np.int64, order="C")
     _check_shape(name, array.shape, shape)
     array.flags.writeable = False

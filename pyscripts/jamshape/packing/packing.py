@@ -1,4 +1,4 @@
-"""The state of a packing: one immutable record that every reader returns and every writer takes."""
+"""The state of a packing, an immutable record."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jamshape.records import Record
 from jamshape.shapes.shape import Interaction, Shape
 from jamshape.shapes.table import DEFAULT, shape_named
 
-# What goes with each of these when it is replaced.
+# Fields reset when one of these is replaced.
 _REST_OF = {
     "position": ("position_rest",),
     "orientation": ("orientation_rest",),
@@ -47,26 +47,25 @@ class Packing(Record):
         LAMMPS IDs, from 1, each once.
     box : Box
     image : (N, D) array of int64, optional
-        Periodic image counts; zeros when left out.
+        Periodic image counts; zeros by default.
     shape_style : str
         A name of `jamshape.shapes.table.SHAPES`.
     exponent : (N,) array of float64, optional
-        p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones when left out.
+        p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones by default.
     law : Interaction
-        Constants of the contacts, which energy and forces depend on; k_e = 1 and two bonds side to side
-        when left out.
+        Constants of the contacts, on which energy and forces depend; by default k_e = 1 and two bonds side to
+        side.
     step : int
     time : float, [time]
     position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional
-        What the doubles of position, orientation, edges and tilt of the box leave out of coordinates
-        that are known to more digits; zeros when left out. See `poses`.
+        Low-order parts of position, orientation, edges and tilt in double-double precision; zeros by default.
+        See `poses`.
 
     Raises
     ------
     ValueError
-        If shapes disagree, a number is not finite, a diameter is not positive, an exponent is not
-        above 1/2, an ID is there twice, the diameters are not those of the shape style, or the law
-        is none.
+        If array shapes disagree, a number is not finite, a diameter is not positive, an exponent is not
+        above 1/2, an ID occurs twice, the diameters do not fit the shape style, or the law is invalid.
 
     Examples
     --------
@@ -135,11 +134,11 @@ class Packing(Record):
 
     @property
     def shape(self) -> Shape:
-        """What the library knows of the shape."""
+        """Definition of the shape."""
         return shape_named(self.shape_style)
 
     def compiled(self, law: Interaction | None = None) -> Any:
-        """Make the compiled object that knows these particles' contacts; of their own law if none is given."""
+        """Make the compiled object that evaluates contacts of these particles; under their own law by default."""
         sizes = (self.diameters, self.exponent)
         return self.shape.compiled(sizes, self.dimension, law or self.law)
 
@@ -192,17 +191,17 @@ class Packing(Record):
 
     @property
     def is_round(self) -> BoolArray:
-        """(N,) whether the particle is a disc or a sphere, which no contact can turn."""
+        """(N,) whether the particle is a disc or a sphere, on which contacts exert no torque."""
         return np.asarray(self._bodies.rotation_length == 0)
 
     @property
     def outer_radius(self) -> FloatArray:
-        """(N,) radii of the spheres around the particles, [length]."""
+        """(N,) radii of the circumscribed spheres, [length]."""
         return np.asarray(self._bodies.outer_radius)
 
     @property
     def inner_radius(self) -> FloatArray:
-        """(N,) radii of the spheres in the particles, [length]: R of rods, the shortest semi-axis."""
+        """(N,) radii of the inscribed spheres, [length]: R of rods, the shortest semi-axis."""
         return np.asarray(self._bodies.inner_radius)
 
     @property
@@ -212,14 +211,14 @@ class Packing(Record):
 
     @property
     def freedoms(self) -> IntArray:
-        """(N,) degrees of freedom that contacts can resist: free spins are left out."""
+        """(N,) degrees of freedom that contacts can resist, without free spins."""
         if self.dimension == 2:
             return np.where(self.is_round, 2, 3)
         return np.where(self.is_round, 3, np.where(self.symmetry_axis >= 0, 5, 6))
 
     @property
     def turning_axes(self) -> FloatArray:
-        """(N, T, T) orthogonal unit vectors that contacts can turn particles about, else zeros.
+        """(N, T, T) orthogonal unit vectors about which contacts can rotate particles, else zeros.
 
         T is 1 in the plane, 3 in space, where a body with an axis of symmetry spins about it freely.
         """
@@ -234,7 +233,7 @@ class Packing(Record):
 
     @property
     def directors(self) -> FloatArray:
-        """(N, D) unit vectors along the axis that tells each particle's direction; NaN without one."""
+        """(N, D) unit vectors along the axis that defines each particle's direction; NaN without one."""
         which = np.asarray(self._bodies.director)
         found = np.full((self.n, self.dimension), np.nan)
         for k in range(self.dimension):
@@ -248,13 +247,13 @@ class Packing(Record):
 
     @property
     def has_rests(self) -> bool:
-        """Whether coordinates are known to more digits than doubles hold."""
+        """Whether coordinates are known beyond double precision."""
         return any(getattr(self, rest).any() for rests in _REST_OF.values() for rest in rests)
 
     def poses(self) -> tuple[LongArray, LongArray, LongArray]:
-        """Position, orientation and the box to all digits that are known, as longdouble.
+        """Position, orientation and box in full precision, as longdouble.
 
-        The box is the matrix (D, D) of its cell vectors, the columns.
+        The columns of the box matrix (D, D) are its cell vectors.
         """
         pairs = (
             (self.position, self.position_rest),
@@ -265,7 +264,7 @@ class Packing(Record):
         return position, orientation, cell
 
     def with_poses(self, position: LongArray, orientation: LongArray, cell: LongArray) -> Packing:
-        """Return the packing with poses as `poses` gives them, each number kept as a double and its rest."""
+        """Return the packing with new `poses`, each number stored as a double and its low part."""
         doubles = [np.asarray(x, np.float64) for x in (position, orientation, cell)]
         rests = [
             np.asarray(x - double, np.float64)
@@ -299,7 +298,7 @@ class Packing(Record):
 
 def _check_labels(packing: Packing) -> None:
     if len(np.unique(packing.id)) != packing.n:
-        msg = "an id is there more than once, expected one for each particle"
+        msg = "an id occurs more than once, expected one for each particle"
         raise ValueError(msg)
     for name in ("species", "id"):
         if getattr(packing, name).min() < 1:
@@ -312,7 +311,7 @@ def _check_labels(packing: Packing) -> None:
 
 
 def _checked_law(law: Interaction) -> Interaction:
-    """Take the constants of the contacts, or raise a ValueError."""
+    """Return the constants of the contacts, or raise a ValueError."""
     try:
         k_e, sides = float(law[0]), int(law[1])
         is_law = (
@@ -346,5 +345,7 @@ def _check_shapes(packing: Packing) -> None:
     if packing.dimension == 3:
         error = np.abs(np.linalg.norm(packing.orientation, axis=1) - 1).max()
         if error > UNIT_QUATERNION_TOLERANCE:
-            msg = f"the length of a quaternion is off 1 by {error:.2g}, expected unit quaternions"
+            msg = (
+                f"the norm of a quaternion differs from 1 by {error:.2g}, expected unit quaternions"
+            )
             raise ValueError(msg)

@@ -19,7 +19,7 @@ def angle_from_quaternion(quaternion: ArrayLike) -> FloatArray:
     Parameters
     ----------
     quaternion : (..., 4) array_like
-        w i j k; the length does not matter.
+        w i j k; of any norm.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def body_axes(quaternions: ArrayLike) -> FloatArray:
     Parameters
     ----------
     quaternions : (..., 4) array_like
-        w i j k; the length does not matter.
+        w i j k; of any norm.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def body_axes(quaternions: ArrayLike) -> FloatArray:
     Raises
     ------
     ValueError
-        If the shape is another, or a quaternion is zero or not finite.
+        If the array has another shape, or a quaternion is zero or not finite.
     """
     q = np.asarray(quaternions, np.float64)
     if q.ndim < 1 or q.shape[-1] != 4:
@@ -75,7 +75,7 @@ def across(axis: FloatArray) -> FloatArray:
 
 
 def product(p: ArrayLike, q: ArrayLike) -> NDArray[Any]:
-    """Multiply (N, 4) quaternions w i j k, or one with all: bodies that were turned by q, turned by p."""
+    """Multiply (N, 4) quaternions w i j k, or one with all: rotation q followed by p."""
     pw, pi, pj, pk = np.asarray(p).T
     qw, qi, qj, qk = np.asarray(q).T
     return np.column_stack([

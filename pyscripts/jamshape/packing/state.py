@@ -20,15 +20,15 @@ _TURN = 2 * np.arccos(np.longdouble(-1))
 class State(Record):
     """Poses of particles and the box, in extended precision.
 
-    A double has lost the last eight digits of an overlap of 1e-9 by the time it holds a position in a box
-    of 40; `numpy.longdouble` keeps them. Files hold each number as a double and its small rest.
+    A double has lost the last eight digits of an overlap of 1e-9 when it holds a position in a box
+    of 40; `numpy.longdouble` keeps them. Files hold each number as a double and its low part.
 
     Parameters
     ----------
     position : (N, D) array of longdouble, [length]
     orientation : (N, 1) angles in 2D, (N, 4) quaternions w i j k in 3D, of longdouble
     cell : (D, D) array of longdouble, [length]
-        The box: its cell vectors are the columns, as of `Box.matrix`.
+        The box: its cell vectors are the columns, as in `Box.matrix`.
     """
 
     position: LongArray
@@ -37,19 +37,19 @@ class State(Record):
 
     @classmethod
     def of(cls, packing: Packing) -> State:
-        """Take the poses of a packing, its small rests included."""
+        """Take the poses of a packing, including their low parts."""
         position, orientation, cell = (np.asarray(x, np.longdouble) for x in packing.poses())
         return cls(position, orientation.reshape(packing.n, -1), cell)
 
     @cached_property
     def split(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Position, orientation, cell, each (2, ...): doubles and their small rests."""
+        """Position, orientation, cell, each (2, ...): doubles and their low parts."""
         position, orientation, cell = map(_split, (self.position, self.orientation, self.cell))
         return position, orientation, cell
 
     @classmethod
     def joined(cls, position: FloatArray, orientation: FloatArray, cell: FloatArray) -> State:
-        """Add doubles and their small rests, each array (2, ...) as `split` gives them."""
+        """Add doubles and their low parts, each array (2, ...) as `split` gives them."""
         return cls(*(np.longdouble(x[0]) + x[1] for x in (position, orientation, cell)))
 
     @property
@@ -59,7 +59,7 @@ class State(Record):
 
     @property
     def edges(self) -> LongArray:
-        """(D,) as of `Box.edges`, [length]."""
+        """(D,) as in `Box.edges`, [length]."""
         return np.diagonal(self.cell)
 
     @property
@@ -68,18 +68,18 @@ class State(Record):
         return float(math.prod(self.edges))
 
     def strained(self, strain: float) -> State:
-        """Scale box and positions by 1 + strain; rotations stay (Marschall & Teitel 2018, Eq. 20)."""
+        """Scale box and positions by 1 + strain at fixed rotations (Marschall & Teitel 2018, Eq. 20)."""
         factor = 1 + np.longdouble(strain)
         return replace(self, position=factor * self.position, cell=factor * self.cell)
 
     def deformed(self, gradient: LongArray) -> State:
-        """Move box and positions by an upper triangular matrix (D, D); rotations stay."""
+        """Deform box and positions by an upper triangular matrix (D, D) at fixed rotations."""
         return replace(self, position=self.position @ gradient.T, cell=gradient @ self.cell)
 
     def with_least_tilt(self) -> State:
-        """Choose other cell vectors of the same lattice, each with a tilt of at most half of the edge along it.
+        """Choose cell vectors of the same lattice whose tilts are at most half of the edge along them.
 
-        Every particle and every image stays where it is.
+        All particles and images keep their places.
         """
         cell = self.cell.copy()
         for column in range(1, self.dimension):
@@ -90,7 +90,7 @@ class State(Record):
     def displaced(self, shift: FloatArray, turn: FloatArray) -> State:
         """Add (N, D) displacements and (N, 1) or (N, 3) rotation vectors."""
         if self.dimension == 2:
-            # Whole turns would cost digits: a nearly round particle may make thousands of them.
+            # Full rotations would cost digits: a nearly round particle may make thousands of them.
             orientation = self.orientation + turn
             orientation = orientation - _TURN * np.rint(orientation / _TURN)
         else:
@@ -104,13 +104,13 @@ class State(Record):
 
 
 def _split(values: LongArray) -> FloatArray:
-    """(2, ...) a double and its small rest."""
+    """(2, ...) doubles and their low parts."""
     double = values.astype(np.float64)
     return np.stack([double, (values - double).astype(np.float64)])
 
 
 def _turned(quaternion: LongArray, vector: LongArray) -> LongArray:
-    """Turn (N, 4) quaternions by (N, 3) rotation vectors, in space coordinates."""
+    """Rotate (N, 4) quaternions by (N, 3) rotation vectors, in space coordinates."""
     angle = np.sqrt((vector**2).sum(axis=1, keepdims=True))
     axis = vector / np.where(angle > 0, angle, 1)
     half = np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=1)

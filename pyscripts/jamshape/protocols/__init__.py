@@ -1,1 +1,1 @@
-"""How packings are made: random starts, approaches to jamming, whole paths."""
+"""Protocols: random starts, approaches to jamming, and complete pipelines."""

@@ -1,8 +1,8 @@
 """Slow approach to jamming in LAMMPS: compression at a rate that falls as the pressure rises.
 
 The pressure of a flowing state is the rate times a viscosity that diverges at phi_J. A fixed slow rate wastes
-nearly all of its time far below; here the rate is halved whenever the pressure passes a bound, down to
-the slowest rate, and the run ends when that one no longer keeps the pressure low: the state is jammed.
+nearly all of its time far below; here the rate is halved whenever the pressure exceeds a bound, down to
+the slowest rate, and the run ends when even that rate no longer keeps the pressure low: the state is jammed.
 """
 
 from __future__ import annotations
@@ -19,32 +19,31 @@ from jamshape.flow.motion import Row
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
 
-# Of `compressed_start`.
+# Rate and time step of `compressed_start`.
 _KAPPA_FAST, _DT_FAST = 1e-4, 0.2
 
-# Time steps after which it has failed: days for small packings. Slower rates are those of implicit steps.
+# Largest number of time steps: days for small packings. Slower rates need implicit steps.
 MOST_STEPS = 1_000_000_000
 
 _NO_END = 1e3  # a packing fraction that is never reached
 
-# Time steps stay below this fraction of what is stable; denser states allow less.
+# Time steps stay below this fraction of the stable one; denser states allow less.
 _STABLE = 0.6
 
-# Strain between rows: at most this while the rate is high; this part of the pressure when it falls.
-_LARGEST_STRAIN = 1e-3
-_PART = 0.3
+_LARGEST_STRAIN = 1e-3  # between rows, while the rate is high
+_PART = 0.3  # of the pressure, between rows while it falls
 
 
 @dataclass(frozen=True)
 class Approach:
-    """How to approach jamming.
+    """Settings of an approach to jamming.
 
     Parameters
     ----------
     kappa
-        The slowest rate, with which it ends, [1/time].
+        Slowest and final rate, [1/time].
     kappa_start
-        The rate at the start.
+        Initial rate.
     p_flow
         Pressure above which the rate is halved, [energy / length^D].
     p_end
@@ -52,9 +51,9 @@ class Approach:
     p_open
         Pressure to return to by opening the box at that rate.
     dt
-        Time step; lowered to what the fix says is stable.
+        Time step; reduced to the stable one reported by the fix.
     strain
-        Of the box, from one row to the next, at the slowest rate; more while it is faster.
+        Strain of the box between rows at the slowest rate; larger at faster ones.
 
     Raises
     ------
@@ -80,21 +79,21 @@ class Approach:
         least = self.p_end / (MOST_STEPS * self.dt)
         if self.kappa < least:
             msg = (
-                f"kappa is {self.kappa:g}, expected at least {least:g}: below, {MOST_STEPS:.0e} time steps do"
-                " not lead through jamming; use jamshape slow, whose steps are implicit"
+                f"kappa is {self.kappa:g}, expected at least {least:g}: otherwise {MOST_STEPS:.0e} time steps do"
+                " not reach jamming; use jamshape slow, whose steps are implicit"
             )
             raise ValueError(msg)
 
 
 class ApproachError(RuntimeError):
-    """The state was not jammed in time; the sentence says where it is."""
+    """The state did not jam in time; the message gives its position."""
 
 
 def compressed_start(start: Packing, phi: float) -> Packing:
-    """Compress a random packing fast, in LAMMPS, to where slow compressions begin."""
+    """Compress a random packing fast, in LAMMPS, to the start of slow compressions."""
     with Session() as session:
         fast = Compression(kappa=_KAPPA_FAST, phi_end=phi, dt=_DT_FAST, sides=2)
-        # Whole steps that end where they shall.
+        # Whole steps that end exactly at phi.
         steps = max(1, fast.all_steps(start))
         run = CompressionRun(session, fast.in_steps(start.phi, steps, start.dimension), start)
         run.advance(run.last_step)
@@ -110,32 +109,32 @@ def begin_approach(session: Session, start: Packing, settings: Approach) -> Comp
 def resume_approach(
     session: Session, restart: Path, like: Packing, stored: Mapping[str, Any]
 ) -> CompressionRun:
-    """Go on from a LAMMPS restart file of particles, with the stored `rate`, `dt` and `restart_time`."""
+    """Resume from a LAMMPS restart file of particles, with the stored `rate`, `dt` and `restart_time`."""
     flow = Compression(kappa=stored["rate"], phi_end=_NO_END, dt=stored["dt"], sides=2)
     return CompressionRun(session, flow, like, restart, time=stored["restart_time"])
 
 
 def approach(run: CompressionRun, settings: Approach) -> Iterator[Row]:
-    """Compress until the state is jammed, then open the box until the pressure is nearly gone.
+    """Compress until the state is jammed, then open the box until the pressure nearly vanishes.
 
-    Either ends so, or after `MOST_STEPS` time steps in all.
+    Raises if the total number of time steps exceeds `MOST_STEPS`.
 
     Parameters
     ----------
     run : CompressionRun
-        As `begin_approach` gives it.
+        From `begin_approach`.
     settings : Approach
 
     Yields
     ------
     Row
-        Observables after every `settings.strain`, or less; `kappa` is one of them, negative while
+        Observables after every `settings.strain`, or less; they include `kappa`, negative while
         the box is opened.
 
     Raises
     ------
     ApproachError
-        After so many time steps.
+        After `MOST_STEPS` time steps.
     """
     if run.settings.kappa > 0:
         yield from _compress(run, settings)
@@ -144,12 +143,12 @@ def approach(run: CompressionRun, settings: Approach) -> Iterator[Row]:
 
 def _compress(run: CompressionRun, settings: Approach) -> Iterator[Row]:
     while True:
-        # Fast rates pass states that nobody looks at.
+        # At fast rates no rows are recorded in between.
         finer = math.sqrt(settings.kappa / run.settings.kappa)
         sample = _advance(run, settings, min(settings.strain / finer, _LARGEST_STRAIN))
         kappa, pressure = run.settings.kappa, sample.observables["pressure"]
         is_jammed = kappa == settings.kappa and pressure >= settings.p_end
-        # Before the row is told: a restart file that is written at it goes on with what comes next.
+        # Before the row is yielded: a restart file written at the row resumes with the next step.
         if is_jammed:
             run.change(kappa=-settings.kappa)
         elif kappa > settings.kappa and pressure >= settings.p_flow:
@@ -162,7 +161,7 @@ def _compress(run: CompressionRun, settings: Approach) -> Iterator[Row]:
 def _open(run: CompressionRun, settings: Approach) -> Iterator[Row]:
     pressure = run.measure()["pressure"]
     while pressure > settings.p_open:
-        # Near jamming the pressure is about 0.3 (phi - phi_J): go a part of the way.
+        # Near jamming the pressure is about 0.3 (phi - phi_J): go a fraction of the way.
         sample = _advance(run, settings, min(settings.strain, _PART * pressure))
         yield sample
         pressure = sample.observables["pressure"]
@@ -178,8 +177,8 @@ def _advance(run: CompressionRun, settings: Approach, strain: float) -> Row:
             settings.p_end if run.settings.kappa > 0 else settings.p_open,
         )
         msg = (
-            f"{MOST_STEPS:.0e} time steps have led to phi = {found['phi']:.6g} and a pressure of"
-            f" {found['pressure']:.2g}, expected {aim:g} by then; take a larger kappa"
+            f"after {MOST_STEPS:.0e} time steps phi = {found['phi']:.6g} and a pressure of"
+            f" {found['pressure']:.2g}, expected {aim:g}; use a larger kappa"
         )
         raise ApproachError(msg)
     sample.observables["kappa"] = run.settings.kappa

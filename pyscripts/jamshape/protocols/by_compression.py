@@ -1,8 +1,8 @@
-"""The way to a packing through a compression at one rate: the protocol marschall-2018 (Marschall & Teitel 2018).
+"""Packings from a compression at one rate: the protocol marschall-2018 (Marschall & Teitel 2018).
 
 Sec. II has the compression, and Sec. III C what follows: "we start with a configuration with U > U0 obtained from
-our continuous compression runs at a fixed rate, and energy minimize it". Which one of them is not said. Here it is
-the first frame that stays jammed when it is minimised, which is nearest to the onset; frames before it flow.
+our continuous compression runs at a fixed rate, and energy minimize it". They do not specify which one. Here it is
+the first frame that stays jammed when minimised, which is nearest to the onset; frames before it flow.
 """
 
 from __future__ import annotations
@@ -26,34 +26,34 @@ from jamshape.protocols.making import Progress
 from jamshape.protocols.recipe import Compressed, Recipe
 from jamshape.shapes.shape import Interaction
 
-# Of a compression: frames are about 2e-3 of phi apart at jamming.
+# Rows and frames of a compression; frames are about 2e-3 of phi apart at jamming.
 _ROWS, _FRAMES = 600, 300
 
-# A frame is minimised to this residual, to tell whether it is jammed.
+# Residual to which a frame is minimised to decide whether it is jammed.
 _GOOD = 1e-4
 
-# The file of the compression has the packing fraction that was reached, and is the same for any search.
+# Settings of the search alone; a compression, whose file holds its final packing fraction, serves any search.
 _OF_SEARCH = ("phi_start", "search", "start", "protocol")
 
 
 class Chosen(NamedTuple):
-    """The frame that the search for the energy starts from."""
+    """Frame from which the search for the energy starts."""
 
     packing: Packing
     u: float
     pressure: float
     minimised_u: float
-    """Energy density once forces balance."""
+    """Energy density in force balance."""
 
 
 class ByCompression:
-    """A compression at one rate and its file beside the packing that is to be made, or a file of one.
+    """A compression at one rate and its file beside the target packing, or a given file.
 
     Parameters
     ----------
     recipe : Recipe
     out : Path
-        Of the packing.
+        Path of the packing.
     """
 
     minimum: Minimum | None = None
@@ -62,7 +62,7 @@ class ByCompression:
         assert isinstance(recipe.way, Compressed)
         self.recipe, self.way = recipe, recipe.way
         self.run_file = self.way.source or out.with_name(out.name + ".run.h5")
-        self.evaluations = 0  # of forces, to choose a frame
+        self.evaluations = 0  # of forces, for the choice of a frame
 
     @property
     def is_own(self) -> bool:
@@ -70,13 +70,13 @@ class ByCompression:
         return self.way.source is None
 
     def forget(self) -> None:
-        """Remove what an earlier call has left; a file that was given stays."""
+        """Remove remains of an earlier call, but not a given file."""
         if self.is_own:
             remove_run(self.run_file)
             self._recording().restarts.forget()
 
     def require_own(self) -> None:
-        """Refuse the compression of another recipe.
+        """Raise if the compression belongs to another recipe.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class ByCompression:
             self.recipe.require_particles(self.run_file)
 
     def steps(self) -> Iterator[Progress]:
-        """Compress, going on with what an earlier call has left, and choose the frame to search from."""
+        """Compress, resuming an earlier call, and choose the frame for the search."""
         if self.is_own:
             yield from self._compress()
         yield from self._choose()
@@ -97,11 +97,11 @@ class ByCompression:
         return Landscape(self.chosen.packing)
 
     def state(self) -> State:
-        """Where the search for the energy begins."""
+        """Return the initial state of the search for the energy."""
         return State.of(self.chosen.packing)
 
     def measured(self) -> dict[str, Any]:
-        """Tell the history: the end of the compression, the state that was taken, and what each cost."""
+        """Return the history: end of the compression, chosen state, and the cost of each."""
         packing, u, pressure, minimised = self.chosen
         found: dict[str, Any] = {"start_file": self.run_file.name, "start_step": packing.step}
         found |= {"start_phi": packing.phi, "start_u": u, "start_pressure": pressure}
@@ -113,10 +113,10 @@ class ByCompression:
         return found
 
     def done(self) -> None:
-        """Keep the run, from which other energies may be looked for."""
+        """Keep the run, which serves searches for other energies."""
 
     def _flow(self) -> Compression:
-        """How to compress: two bonds side to side, and an integrator that bounds its error."""
+        """Return the settings of the compression: two bonds side to side, and an integrator with error control."""
         flow = Compression(
             kappa=self.way.kappa, phi_end=self.way.phi_end, sides=2, integrator="rkc2"
         )
@@ -151,14 +151,14 @@ class ByCompression:
         return Progress("compression", "compression", found["phi"], found["u"], text, part)
 
     def _choose(self) -> Iterator[Progress]:
-        """Halve the frames between one that flows and one that is jammed, down to two neighbours."""
+        """Bisect the frames between one that flows and one that is jammed, down to neighbours."""
         assert self.recipe.target is not None
         u0, first, last = self.recipe.target.u0, -1, count_frames(self.run_file) - 1
         chosen = self._minimised(last)
         if chosen.minimised_u <= u0:
             msg = (
-                f"{self.run_file}: its last frame has phi = {chosen.packing.phi:.6g} and comes to u ="
-                f" {chosen.minimised_u:.2g} when it is minimised, expected more than u0 = {u0:g};"
+                f"{self.run_file}: its last frame, at phi = {chosen.packing.phi:.6g}, has u = {chosen.minimised_u:.2g}"
+                f" after minimisation, expected more than u0 = {u0:g};"
                 " compress further, beyond jamming (phi_end)"
             )
             raise ValueError(msg)
@@ -175,9 +175,9 @@ class ByCompression:
         self.chosen = chosen
 
     def _minimised(self, frame: int) -> Chosen:
-        """Minimise a frame until forces balance, or until it is seen to be unjammed."""
+        """Minimise a frame until forces balance, or until it is unjammed."""
         assert self.recipe.target is not None
-        # Minima exist with two bonds side to side, whatever the dynamics had.
+        # Minima exist with two bonds side to side, whatever the law of the dynamics.
         packing = read_packing(self.run_file, frame).with_(law=Interaction())
         landscape, state = Landscape(packing), State.of(packing)
         before = landscape.evaluate(state)

@@ -1,4 +1,4 @@
-"""The way to a packing through a slow compression in LAMMPS (Marschall & Teitel 2018, Sec. III B-C)."""
+"""Packings from slow compression in LAMMPS (Marschall & Teitel 2018, Sec. III B-C)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jamshape.files.h5md import (
-    read_attributes,
-    read_observables,
-    read_packing,
-    require_attributes,
-)
+from jamshape.files.h5md import read_attributes, read_observables, read_packing, require_attributes
 from jamshape.files.journal import remove_run
 from jamshape.files.restarts import is_whole
 from jamshape.files.run_writer import RunWriter, fold
@@ -34,13 +29,13 @@ _OF_RESTART = ("restart_step", "restart_time", "rate", "dt")
 
 
 class ByDynamics:
-    """A compression in LAMMPS and its files beside the packing that is to be made.
+    """A compression in LAMMPS and its files beside the target packing.
 
     Parameters
     ----------
     recipe : Recipe
     out : Path
-        Of the packing.
+        Path of the packing.
     """
 
     minimum: Minimum | None = None
@@ -52,12 +47,12 @@ class ByDynamics:
         self._newest: dict[str, float] = {}
 
     def forget(self) -> None:
-        """Remove what an earlier call has left."""
+        """Remove remains of an earlier call."""
         remove_run(self.run_file)
         self._forget_restarts()
 
     def require_own(self) -> None:
-        """Refuse the compression of another recipe.
+        """Raise if the compression belongs to another recipe.
 
         Raises
         ------
@@ -69,10 +64,10 @@ class ByDynamics:
             self.recipe.require_particles(self.run_file)
 
     def steps(self) -> Iterator[Progress]:
-        """Compress, going on with what an earlier call has left."""
+        """Compress, resuming an earlier call."""
         if is_compressed(self.run_file):
             fold(self.run_file)
-            self._forget_restarts()  # a kill after the end may have left some
+            self._forget_restarts()  # left by a kill after the end
             return
         if self.recipe.target:
             require_reachable(Landscape(self.recipe.start()), self.recipe.target)
@@ -89,7 +84,7 @@ class ByDynamics:
         self._forget_restarts()
 
     def _progress(self, found: Mapping[str, float]) -> Progress:
-        """Tell the pressure and the rate, and where they are to get to."""
+        """Return the pressure and the rate, with their targets."""
         pressure, rate, aim = found["pressure"], found["kappa"], self.approach
         where = (found["phi"], found["u"])
         if rate < 0:
@@ -103,7 +98,7 @@ class ByDynamics:
         return Landscape(read_packing(self.run_file))
 
     def state(self) -> State:
-        """Where the search for the energy begins."""
+        """Return the initial state of the search for the energy."""
         return State.of(read_packing(self.run_file))
 
     def measured(self) -> dict[str, Any]:
@@ -122,13 +117,13 @@ class ByDynamics:
         return found
 
     def done(self) -> None:
-        """Keep the run, from which other energies may be looked for."""
+        """Keep the run, which serves searches for other energies."""
 
     def _restart(self, step: int) -> Path:
         return self.run_file.with_suffix(f".restart{step}")
 
     def _forget_restarts(self, *but: int) -> None:
-        """Remove all restart files, or all but some."""
+        """Remove all restart files, except some."""
         kept = [self._restart(step) for step in but]
         name = glob.escape(self.run_file.with_suffix(".restart").name)
         for path in self.run_file.parent.glob(f"{name}*"):
@@ -136,7 +131,7 @@ class ByDynamics:
                 path.unlink()
 
     def _keep(self, run: CompressionRun, writer: RunWriter) -> None:
-        """Write a restart file; the one before it stays, too."""
+        """Write a restart file, and keep the previous one."""
         run.write_restart(self._restart(run.session.step))
         older, self._newest = self._newest, _of_restart(run)
         writer.set_attributes(self._newest | {f"older_{k}": v for k, v in older.items()})
@@ -153,7 +148,7 @@ class ByDynamics:
         return run
 
     def _resumed(self, session: Session) -> CompressionRun | None:
-        """Go on from the newest restart file that is whole, if there is one."""
+        """Resume from the newest complete restart file, if any."""
         if not self.run_file.exists():
             return None
         stored = read_attributes(self.run_file)
@@ -177,7 +172,7 @@ class ByDynamics:
 
 
 def _of_restart(run: CompressionRun) -> dict[str, float]:
-    """Tell what a restart file does not."""
+    """Return the state that restart files lack."""
     settings = run.settings
     return {
         "restart_step": run.session.step,
@@ -188,5 +183,5 @@ def _of_restart(run: CompressionRun) -> dict[str, float]:
 
 
 def is_compressed(run: Path) -> bool:
-    """Whether the file holds a compression that reached its end."""
+    """Whether the file holds a finished compression."""
     return run.exists() and bool(read_attributes(run).get("finished"))

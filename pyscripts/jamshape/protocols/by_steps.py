@@ -1,4 +1,4 @@
-"""The way to a packing by quasistatic steps, with Monte Carlo if asked for (Yuan et al. 2019, Sec. 2.2)."""
+"""Packings from quasistatic steps, with optional Monte Carlo (Yuan et al. 2019, Sec. 2.2)."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _STORE_SECONDS = 20.0
 
 
 class BySteps:
-    """Where the making of a packing is, in memory and in a file beside the packing.
+    """State of the quasistatic compression, in memory and in a file beside the packing.
 
     Parameters
     ----------
     recipe : Recipe
     out : Path
-        Of the packing.
+        Path of the packing.
     """
 
     def __init__(self, recipe: Recipe, out: Path) -> None:
@@ -44,22 +44,22 @@ class BySteps:
         self._stored = self._began = time.perf_counter()
 
     def forget(self) -> None:
-        """Remove what an earlier call has left."""
+        """Remove remains of an earlier call."""
         self.file.unlink(missing_ok=True)
 
     def require_own(self) -> None:
-        """Refuse the file of another recipe.
+        """Raise if the file belongs to another recipe.
 
         Raises
         ------
         ValueError
         """
-        remove_leftovers(self.file)  # what goes on may be done before it writes the file again
+        remove_leftovers(self.file)  # a resumed run may end without writing the file again
         if self.file.exists():
             require_attributes(self.file, self.recipe.attributes(), "the making of a packing")
 
     def steps(self) -> Iterator[Progress]:
-        """Go on to the first jammed packing."""
+        """Continue to the first jammed packing."""
         start = self.recipe.start()
         self._landscape = Landscape(start)
         self.compression = QuasistaticRun.of(self._landscape, State.of(start), self.protocol)
@@ -82,17 +82,17 @@ class BySteps:
         return self._landscape
 
     def state(self) -> State:
-        """Where the search for an energy begins: the first jammed packing."""
+        """Return the initial state of the search for an energy: the first jammed packing."""
         assert self.minimum is not None
         return self.minimum.state
 
     def measured(self) -> dict[str, Any]:
-        """Return what only this way knows."""
+        """Return results specific to this protocol."""
         acceptance = self.thermal.acceptance if self.thermal else math.nan
         return {"acceptance": acceptance, "seconds_before": self.seconds_before}
 
     def done(self) -> None:
-        """Remove what was there to go on from."""
+        """Remove the files for resuming."""
         self.forget()
 
     def _compress(self, phi: float) -> Iterator[Progress]:
@@ -102,7 +102,7 @@ class BySteps:
             yield self._progress(step, phi)
 
     def _progress(self, step: QuasistaticRun, phi: float) -> Progress:
-        """Tell the energy and the step, and where they are to get to."""
+        """Return the energy and the step, with their targets."""
         u = step.history.energy_density[-1]
         energy = u * step.state.volume / self.recipe.n
         text = f"U/N {energy:.1e} of {self.protocol.energy:.0e}, next step {step.step:.1e}"

@@ -1,4 +1,4 @@
-"""Options that say how to make a packing."""
+"""Options of a recipe."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from typing import Any
 
 from jamshape.files.vocabulary import read_protocol
 from jamshape.minima import METHODS
-from jamshape.protocols.defaults import PROTOCOLS, SETTINGS, WAYS, recipe_for
-from jamshape.protocols.recipe import SEARCHES, Recipe
-from jamshape.shapes.command_line import (
-    add_particle_options,
-    particles_beside,
-)
+from jamshape.protocols.defaults import PROTOCOLS, SETTINGS, WAYS
+from jamshape.protocols.recipe import SEARCHES
+from jamshape.shapes.command_line import add_particle_options
 
 _CHOICES = {"search": tuple(SEARCHES), "minimiser": tuple(METHODS)}
 
@@ -21,16 +18,18 @@ def add_recipe_options(parser: ArgumentParser) -> None:
     """Add all options of a recipe."""
     add_particle_options(parser)
     group = parser.add_argument_group("how to make it")
-    group.add_argument("--dimension", type=int, choices=(2, 3), help="(that of the shape's paper)")
-    group.add_argument("--way", choices=tuple(WAYS), help="to jamming (quasistatic)")
+    group.add_argument(
+        "--dimension", type=int, choices=(2, 3), help="2 or 3 (that of the shape's paper)"
+    )
+    group.add_argument("--way", choices=tuple(WAYS), help="route to jamming (quasistatic)")
     group.add_argument(
         "--protocol", type=read_protocol, choices=tuple(PROTOCOLS),
-        help="as published, in place of --way; 1 and 2 are short for the last two",
+        help="published protocol, in place of --way; 1 and 2 are short for the last two",
     )  # fmt: skip
-    group.add_argument("--seed", type=int, help="of all that is random (1)")
+    group.add_argument("--seed", type=int, help="random seed (1)")
     group.add_argument(
         "--strict", action="store_true",
-        help="go on, at the energy, until no mode has a negative eigenvalue",
+        help="continue at the energy until no mode has a negative eigenvalue",
     )  # fmt: skip
     for one in SETTINGS:
         option = f"--{one.name.replace('_', '-')}"
@@ -43,7 +42,7 @@ def add_recipe_options(parser: ArgumentParser) -> None:
 
 
 def _usual(name: str) -> str:
-    """Tell the defaults of a setting, those of protocols where they are no way's."""
+    """Format the defaults of a setting, of protocols if no way has it."""
     tables = WAYS | {k: v for k, v in PROTOCOLS.items() if v not in WAYS.values()}
     texts = []
     for way, table in tables.items():
@@ -60,17 +59,6 @@ def _said(value: Any) -> str:
 
 
 def settings_of(options: Namespace) -> dict[str, Any]:
-    """Read what was given of a recipe, but for its particles, by the names of `recipe_for`."""
+    """Read the given settings of a recipe, except its particles, by the names of `recipe_for`."""
     names = ("dimension", "way", "seed", "protocol", "strict", *(one.name for one in SETTINGS))
     return {name: getattr(options, name) for name in names}
-
-
-def recipe_of(options: Namespace) -> Recipe:
-    """Read a recipe from the options.
-
-    Raises
-    ------
-    ValueError
-        If an option is none of the shape or the way, or out of its range.
-    """
-    return recipe_for(particles_beside(options), **settings_of(options))

@@ -1,8 +1,9 @@
-"""How packings are usually made: what a recipe has where nothing else was asked for."""
+"""Default recipes of packings."""
 
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -26,20 +27,29 @@ from jamshape.protocols.recipe import (
 from jamshape.protocols.source import Source
 from jamshape.shapes.particles import Particles
 
-# A minimum that is led to an energy is at least so good.
+# Largest residual of a minimum before the search for an energy.
 _TIGHT = 1e-8
 
 Values = Mapping[str, Any]
-"""Numbers of a recipe by their names."""
+"""Settings of a recipe by name."""
 
 
 class Setting(NamedTuple):
-    """What may be asked for of a recipe; the ways and protocols that have it are those with a default."""
+    """A setting of a recipe; it belongs to the ways and protocols with a default for it."""
 
     name: str
     kind: Callable[[str], Any]
-    """Reads it from the words of a command."""
+    """Parses it from the command line."""
     meaning: str
+
+
+def minimiser_named(name: str) -> str:
+    """Return the present name of a minimiser; warn of a former one."""
+    if name != "paper":
+        return name
+    msg = "the minimiser 'paper' is called 'cg_marschall'; the former name will be refused"
+    warnings.warn(msg, FutureWarning, stacklevel=2)
+    return "cg_marschall"
 
 
 SETTINGS = (
@@ -47,41 +57,41 @@ SETTINGS = (
     Setting("phi_start", float, "packing fraction of the random start"),
     Setting("tolerance", float, "largest net force and torque over the mean bond force"),
     Setting("u0", float, "energy density U/L^D; 0: the first jammed packing as it is"),
-    Setting("accuracy", float, "of |u - u0|/u0"),
+    Setting("accuracy", float, "relative error |u - u0|/u0"),
     Setting("kappa", float, "slowest compression rate"),
-    Setting("p_end", float, "pressure to compress to at that rate"),
-    Setting("phi_end", float, "packing fraction to compress to, beyond jamming"),
+    Setting("p_end", float, "final pressure at that rate"),
+    Setting("phi_end", float, "final packing fraction, beyond jamming"),
     Setting("phi_thermal", float, "packing fraction of the Monte Carlo"),
-    Setting("n_sweeps", int, "sweeps of it"),
+    Setting("n_sweeps", int, "Monte Carlo sweeps"),
     Setting("delta_phi", float, "step of the packing fraction"),
     Setting("start", Path, "file of compress or slow, through jamming, instead of a compression"),
-    Setting("search", str, "for u0; halving is the paper's"),
-    Setting("minimiser", str, "of the halving search; auto when left out"),
+    Setting("search", str, "search for u0; halving is the paper's"),
+    Setting("minimiser", minimiser_named, "minimiser of the halving search; auto by default"),
 )
 
-# Steps of the packing fraction grow to this far below jamming. What is led to an energy need not be balanced well before.
-_COARSE, _ROUGH = 1e-2, 1e-2
+_COARSE = 1e-2  # largest step of the packing fraction, far below jamming
+_ROUGH = 1e-2  # residual that suffices before the search for an energy
 
-# Of the square of the step, [energy]: a step adds some ten to a hundred times as much to a jammed packing.
+# Energy tolerance over the squared step, [energy]: a step adds ten to a hundred times as much to a jammed packing.
 _LOOSE = 2.5e-3
 
-_LAMBDA = 1e-6  # of the halving search, to begin with (Marschall & Teitel 2018, Sec. III C)
+_LAMBDA = 1e-6  # initial one of the halving search (Marschall & Teitel 2018, Sec. III C)
 
 
 class UsualWay(NamedTuple):
-    """A way to jamming, or a protocol, by its name: how it is made of its settings, and their defaults.
+    """A way to jamming, or a protocol: its settings with defaults, and its construction from them.
 
-    What has no default is no setting of it, and is refused.
+    Settings without a default are refused.
     """
 
     compose: Callable[[Values], tuple[Way, Target | None]]
-    """From the values of all its settings."""
+    """Builds it from the values of all its settings."""
     usual: Values
     in_plane: Values = MappingProxyType({})
-    """Defaults that are others in 2D."""
+    """Defaults that differ in 2D."""
 
     def defaults(self, dimension: int) -> dict[str, Any]:
-        """Give all its settings as they are where nothing was asked for."""
+        """Return the defaults of all its settings."""
         return dict(self.usual) | (dict(self.in_plane) if dimension == 2 else {})
 
 
@@ -107,18 +117,14 @@ def _by_adaptive_steps(get: Values) -> tuple[Way, Target | None]:
 
 def _by_compression(get: Values) -> tuple[Way, Target | None]:
     way = Compressed(get["kappa"], get["phi_end"], get["search"], get["start"])
-    target, minimiser = _target(get, get["tolerance"]), get["minimiser"]
+    target, minimiser = _target(get, get["tolerance"]), minimiser_named(get["minimiser"] or "auto")
     if way.search == "direct":
-        if minimiser is not None:
-            msg = (
-                f"the minimiser is {minimiser} and the search direct, which has its own; expected a"
-                " halving search, or no minimiser"
-            )
-            raise ValueError(msg)
+        if get["minimiser"] is not None:
+            said = "{minimiser} has no effect with the search direct, expected the search halving"
+            raise ArgumentError(said, {"minimiser": minimiser})
         return way, target
-    require_one_of("minimiser", minimiser or "auto", METHODS)
-    method = minimiser or "auto"
-    return way, target and dataclasses.replace(target, step=_LAMBDA, method=method)
+    require_one_of("minimiser", minimiser, METHODS)
+    return way, target and dataclasses.replace(target, step=_LAMBDA, method=minimiser)
 
 
 def _target(get: Values, tolerance: float) -> Target | None:
@@ -149,7 +155,7 @@ WAYS: dict[str, UsualWay] = {
     ),
     "steps": _ATHERMAL,
 }  # fmt: skip
-"""Quasistatic steps that adapt, the usual way; slow compression in LAMMPS; equal quasistatic steps."""
+"""Adaptive quasistatic steps, the default; slow compression in LAMMPS; equal quasistatic steps."""
 
 PROTOCOLS: dict[str, UsualWay] = {
     COMPRESSED: UsualWay(
@@ -165,13 +171,13 @@ PROTOCOLS: dict[str, UsualWay] = {
         usual=dict(_ATHERMAL.usual) | {"phi_thermal": 0.55, "n_sweeps": 100_000}
     ),
 }  # fmt: skip
-"""As published, with the numbers of the papers where these say them.
+"""Published protocols, with the values of the papers where given.
 
-marschall-2018: N = 1024 and phi_init = 0.4 (Marschall & Teitel 2018, Sec. III B), a fixed rate, of which they have
-1e-6 to 1e-10; U_0/L^2 = 1e-15 to 1e-7 of itself (Sec. III C, Eq. 20). They do not say where a compression ends.
+marschall-2018: N = 1024 and phi_init = 0.4 (Marschall & Teitel 2018, Sec. III B), a fixed rate, theirs being
+1e-6 to 1e-10; U_0/L^2 = 1e-15 to 1e-7 of itself (Sec. III C, Eq. 20). Their final packing fraction is not given.
 yuan-2019-1: N = 400, Delta phi = 1e-3, forces balanced to 1e-4, the first packing with U/N > 1e-10 (Yuan et al.
 2019, Sec. 2.2); yuan-2019-2 with Monte Carlo at phi_i = 0.55, whose N_s they vary.
-Both papers are of one dimension; in the other, N is that of the paper or as usual, and starts are as dense as one can place them.
+Each paper has one dimension; in the other, N is that of the paper or the default, and starts are as dense as possible.
 """
 
 
@@ -183,23 +189,23 @@ def recipe_for(
     protocol: int | str | None = None,
     **given: Any,
 ) -> Recipe:
-    """Make a recipe of what is given, and of what is usual for the rest.
+    """Make a recipe from the given settings and defaults.
 
     Parameters
     ----------
     particles : Particles, optional
-        Needed unless there is a start.
+        Required without a start.
     dimension : {2, 3}, optional
-        That of the shape's paper when left out.
+        By default that of the shape's paper.
     way : str, optional
-        One of `WAYS`: quasistatic steps that adapt ("quasistatic"), usual, slow compression in LAMMPS
+        One of `WAYS`: adaptive quasistatic steps ("quasistatic", default), slow compression in LAMMPS
         ("dynamics"), or equal quasistatic steps ("steps").
     seed : int, optional
-        Of all that is random; 1 when left out.
+        Random seed; 1 by default.
     protocol : str or int, optional
-        One of `PROTOCOLS`, which is a way with the published numbers; 1 and 2 are those of Yuan et al. 2019.
+        One of `PROTOCOLS`, a way with the published values; 1 and 2 are those of Yuan et al. 2019.
     **given
-        Of `SETTINGS` by name, None where they are left out; and `strict`, whether to go on to a minimum
+        `SETTINGS` by name, None for defaults; and `strict`, whether to continue to a minimum
         without negative eigenvalues.
 
     Returns
@@ -209,7 +215,7 @@ def recipe_for(
     Raises
     ------
     ValueError
-        If a setting is none of the way or the protocol, contradicts the start, or is out of its range.
+        If a setting does not belong to the way or the protocol, contradicts the start, or is out of its range.
 
     Examples
     --------
@@ -237,9 +243,9 @@ def recipe_for(
 
 
 def _placed(particles: Particles | None, dimension: int | None) -> tuple[Particles, int]:
-    """Require particles, and give the dimension that they are to be in."""
+    """Require particles, and return them with their dimension."""
     if particles is None:
-        msg = "there are neither particles nor a start, expected one of them"
+        msg = "neither particles nor a start are given, expected one of them"
         raise ValueError(msg)
     dimension = particles.shape.dimension if dimension is None else dimension
     require_one_of("dimension", dimension, (2, 3))
@@ -247,7 +253,7 @@ def _placed(particles: Particles | None, dimension: int | None) -> tuple[Particl
 
 
 def _chosen(way: str | None, protocol: int | str | None) -> tuple[UsualWay, str]:
-    """Find the way or the protocol, and how sentences call it."""
+    """Return the way or the protocol, with its name for messages."""
     if protocol is None:
         way = way or "quasistatic"
         require_one_of("the way", way, WAYS)
@@ -258,20 +264,20 @@ def _chosen(way: str | None, protocol: int | str | None) -> tuple[UsualWay, str]
     if way is not None:
         require_one_of("the way", way, WAYS)
         if WAYS[way].compose is not chosen.compose:
-            msg = f"the way is {way} and the protocol {name}, which has its own; leave the way out"
-            raise ValueError(msg)
+            said = "{way} has no effect with {protocol}, expected one of them; leave the other out"
+            raise ArgumentError(said, {"way": way, "protocol": name})
     return chosen, f"the protocol {name}"
 
 
 def _allowed(given: dict[str, Any], usual: UsualWay, called: str) -> dict[str, Any]:
-    """Leave out what was not given, and refuse what cannot be."""
+    """Drop settings that are None, and refuse invalid ones."""
     known = [setting.name for setting in SETTINGS]
     for name, value in given.items():
         if name not in known:
-            msg = f"{name} is no setting of a recipe, expected one of {', '.join(known)}"
+            msg = f"{name} is not a setting of a recipe, expected one of {', '.join(known)}"
             raise ValueError(msg)
         if value is not None and name not in usual.usual:
-            said = f"{{{name}:name}} is no setting of {called}, expected another way or setting"
+            said = f"{{{name}:name}} does not apply to {called}, expected another way or setting"
             raise ArgumentError(said, {name: value})
     kept = {name: value for name, value in given.items() if value is not None}
     require_stated(**{name: value for name, value in kept.items() if name in RANGES})
@@ -279,10 +285,10 @@ def _allowed(given: dict[str, Any], usual: UsualWay, called: str) -> dict[str, A
 
 
 def _of_source(source: Source, given: dict[str, Any]) -> dict[str, Any]:
-    """Take from a start what it is made of; what was asked for beside it would mean nothing."""
+    """Take settings from a start, and refuse those that would have no effect beside it."""
     for name in ("phi_start", "phi_end", "kappa"):
         if given.get(name) is not None:
-            said = f"{{{name}}} means nothing to a start that is compressed already; leave it out"
+            said = f"{{{name}}} has no effect on a start that is already compressed; leave it out"
             raise ArgumentError(said, {name: given[name]})
     own = {name: getattr(source, name) for name in ("n", "phi_start", "phi_end", "kappa")}
     return own | {"start": source.path}

@@ -1,8 +1,8 @@
-"""The one path of a packing, of any shape and dimension.
+"""The pipeline of a packing, of any shape and dimension.
 
-A random start; a way from there to jamming, by dynamics, by quasistatic steps or by a compression at a rate; the
-energy it is led to, if one is asked for; everything that is measured on it; and the file. Between its steps everything is in files
-beside the result, so that a path that was cut off goes on where it was.
+A random start; compression to jamming, by dynamics, by quasistatic steps or at a fixed rate; the search for the
+target energy, if any; all measurements; and the file. Between its steps everything is in files
+beside the result, so that an interrupted pipeline resumes where it was.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _MAKING: dict[type[Way], Callable[[Recipe, Path], Making]] = {
     Steps: BySteps,
     Compressed: ByCompression,
 }
-"""Who goes each way."""
+"""Implementation of each way."""
 
 __all__ = [
     "Adaptive",
@@ -58,9 +58,9 @@ __all__ = [
 def make(
     recipe: Recipe, out: Path, *, again: bool = False, retry: bool = True
 ) -> Iterator[Progress]:
-    """Make a packing and write it to `out`, going on with what an earlier call has left.
+    """Make a packing and write it to `out`, resuming an earlier call.
 
-    Where forces do not balance at the energy, there is a second try (`protocols.retry`).
+    Where forces do not balance at the energy, there is a second attempt (`protocols.retry`).
 
     Parameters
     ----------
@@ -68,9 +68,9 @@ def make(
     out : Path
         Replaced when the packing is found.
     again : bool
-        Begin anew where files of another recipe, or damaged ones, are in the way.
+        Start over if files are damaged or belong to another recipe.
     retry : bool
-        Whether there is a second try.
+        Whether to make a second attempt.
 
     Yields
     ------
@@ -80,7 +80,7 @@ def make(
     Raises
     ------
     TargetError
-        As `target.direct`.
+        See `target.direct`.
     ValueError
         As `Recipe.start` and `target.direct`, or if another packing was being made there.
     """
@@ -116,7 +116,7 @@ def make(
 
 
 def tidy(recipe: Recipe, out: Path) -> None:
-    """Remove what was there to go on from beside a finished packing, which a kill may have left."""
+    """Remove files for resuming that a kill left beside a finished packing."""
     _search(recipe, out).forget()
     remove_run(_strict_file(out))
     _way(recipe, out).done()
@@ -135,12 +135,12 @@ def _strict_file(out: Path) -> Path:
 
 
 def is_done(out: Path) -> bool:
-    """Whether the file is there, with a finished packing.
+    """Whether the file holds a finished packing.
 
     Raises
     ------
     ValueError
-        If it is there with anything else.
+        If it exists with other content.
     """
     if not out.exists():
         return False
@@ -154,7 +154,7 @@ def is_done(out: Path) -> bool:
 
 
 def require_same(out: Path, recipe: Recipe) -> None:
-    """Refuse a finished packing that is another one than asked for.
+    """Raise if a finished packing belongs to another recipe.
 
     Raises
     ------

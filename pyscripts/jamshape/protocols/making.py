@@ -1,4 +1,4 @@
-"""What all ways to a packing share: what each of them offers, progress, and the search for an energy in a file."""
+"""Common parts of all ways to a packing: interface, progress, and the search for an energy in a file."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from jamshape.packing import Packing, State
 from jamshape.protocols.recipe import SEARCHES, Recipe
 
 MOST_MINIMISATIONS = 20_000
-"""Of a search for an energy: with the steps of 1e-6 of the halving search they change phi by 0.04."""
+"""Limit of a search: with the steps of 1e-6 of the halving search they change phi by 0.04."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the making of a packing is.
+    """Progress of a packing.
 
     Parameters
     ----------
     stage
         "compression", "Monte Carlo", "choice" or "search".
     phase
-        Part of the stage, and what it aims at, in words.
+        Part of the stage, and its goal, in words.
     phi
         Packing fraction.
     energy_density
         u, [energy / length^D].
     text
-        What else there is to say, with what it is to become.
+        Further text, with targets.
     part
-        Of the phase, from 0 to 1; None where nobody can tell.
+        Completed fraction of the phase, from 0 to 1; None if unknown.
     """
 
     stage: str
@@ -50,49 +50,47 @@ class Progress:
 
 
 class Making(Protocol):
-    """A way to jamming that is being gone, in memory and in files beside the packing."""
+    """A way to jamming in progress, in memory and in files beside the packing."""
 
     minimum: Minimum | None
-    """The packing, where it needs no search for an energy."""
+    """The packing, if it needs no search for an energy."""
 
     def require_own(self) -> None:
-        """Refuse what another recipe has left; raises ValueError."""
+        """Refuse remains of another recipe; raises ValueError."""
 
     def forget(self) -> None:
-        """Remove what an earlier call has left."""
+        """Remove remains of an earlier call."""
 
     def steps(self) -> Iterator[Progress]:
-        """Go to the end, from where an earlier call has left it."""
+        """Continue to the end, resuming an earlier call."""
 
     def landscape(self) -> Landscape:
         """Landscape of the packing."""
 
     def state(self) -> State:
-        """Where the search for an energy begins."""
+        """Return the initial state of the search for an energy."""
 
     def measured(self) -> dict[str, Any]:
-        """Return what only this way knows."""
+        """Return results specific to this way."""
 
     def done(self) -> None:
-        """Remove what nobody needs beside a finished packing."""
+        """Remove files not needed beside a finished packing."""
 
 
 @dataclass(eq=False)
 class SearchFile:
-    """The file of a search for an energy, from which it goes on after a kill."""
+    """File of a search for an energy, for resuming after a kill."""
 
     path: Path
     recipe: Recipe
     minimisations: int = 0
-    """That were made so far."""
+    """Number so far."""
 
     def read(self, landscape: Landscape) -> Search | None:
-        """Read the search, if it is there and of this recipe; the landscape goes on counting."""
-        remove_leftovers(self.path)  # what goes on may be done before it writes the file again
-        if not self.path.exists():
-            return None
-        stored = read_attributes(self.path)
-        if not _same(stored, self.recipe.attributes()):
+        """Read the search, if it belongs to this recipe; the landscape continues its count."""
+        remove_leftovers(self.path)  # a resumed run may end without writing the file again
+        stored = stored_of(self.path, self.recipe)
+        if stored is None:
             return None
         landscape.evaluations = int(stored.get("evaluations", 0))
         self.minimisations = int(stored.get("minimisations", 0))
@@ -119,7 +117,7 @@ class SearchFile:
         write_states(self.path, states, landscape.particles, attributes)
 
     def forget(self) -> None:
-        """Remove it, and what a process that was killed meanwhile has left of it."""
+        """Remove the file, and remains of a killed process."""
         remove_run(self.path)
         remove_leftovers(self.path)
 
@@ -127,9 +125,9 @@ class SearchFile:
 def lead(
     landscape: Landscape, start: State, target: Target, file: SearchFile
 ) -> Generator[Progress, None, Minimum]:
-    """Lead a state to an energy, going on with what is in the file; errors as `target.direct`.
+    """Relax a state at an energy, resuming from the file; errors as in `target.direct`.
 
-    The search is that of the recipe's way (`SEARCHES`). Either ends by its own rule when its steps become too
+    The search is that of the recipe's way (`SEARCHES`). It ends when its steps become too
     small, and after `MOST_MINIMISATIONS` at the latest.
 
     Yields
@@ -144,10 +142,10 @@ def lead(
     Raises
     ------
     TargetError
-        As the search, or after so many minimisations.
+        As the search, or after `MOST_MINIMISATIONS`.
     """
     search = file.read(landscape) or Search(start, target.step)
-    # From a state that was written all is done again that had been done from there: it is written once.
+    # Resuming repeats everything since the last written state, so each is written once.
     u, written = math.nan, search.state
     for at in SEARCHES[file.recipe.way.search](landscape, search, target):
         file.minimisations += 1
@@ -163,18 +161,18 @@ def lead(
 
 
 def _require_few(file: SearchFile, search: Search, target: Target) -> None:
-    """End a search that takes too long; what it has reached stays in its file."""
+    """Stop a search that takes too long; its state stays in its file."""
     if file.minimisations >= MOST_MINIMISATIONS:
         msg = (
-            f"the search has made {file.minimisations} minimisations and is at u ="
-            f" {search.history.energy_density[-1]:.3g}, expected u = {target.u0:.3g} by then; take a"
+            f"after {file.minimisations} minimisations the search is at u ="
+            f" {search.history.energy_density[-1]:.3g}, expected u = {target.u0:.3g}; use a"
             " start nearer to jamming, or the direct search"
         )
         raise TargetError(msg)
 
 
 def _searching(search: Search, landscape: Landscape, target: Target, last: float) -> Progress:
-    """Tell where a search is; `last` is u before its last step."""
+    """Return the progress of a search; `last` is u before its last step."""
     phi = float(landscape.particles.measures.sum()) / search.state.volume
     u, residual = search.history.energy_density[-1], search.history.residual[-1]
     ratio = f"u/u0 {u / target.u0:.3g}" if u > 0 else "unjammed"
@@ -184,7 +182,7 @@ def _searching(search: Search, landscape: Landscape, target: Target, last: float
 
 
 def _steps_left(u: float, last: float, target: Target) -> str:
-    """Say how many equal steps lead down to u0, by sqrt(u), which is linear in the strain; nothing if unknown."""
+    """Estimate the number of equal steps down to u0, from sqrt(u), which is linear in the strain."""
     if not target.u0 < u < last:
         return ""
     now, before, aim = map(math.sqrt, (u, last, target.u0))
@@ -194,9 +192,12 @@ def _steps_left(u: float, last: float, target: Target) -> str:
 def write_states(
     path: Path, states: list[State], like: Packing, attributes: Mapping[str, Any]
 ) -> None:
-    """Write states as the frames of one file, which replaces the one that is there when it is whole."""
+    """Write states as the frames of one file, which is replaced when complete."""
     write_frames(path, [state.packing(like) for state in states], attributes)
 
 
-def _same(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:
-    return all(stored.get(name) == value for name, value in expected.items())
+def stored_of(path: Path, recipe: Recipe) -> dict[str, Any] | None:
+    """Read the attributes that an earlier call with this recipe has written, if any."""
+    stored = read_attributes(path) if path.exists() else {}
+    own = recipe.attributes()
+    return stored if stored and all(stored.get(k) == v for k, v in own.items()) else None

@@ -1,9 +1,9 @@
 """Athermal quasistatic compression: protocol 1 of Yuan et al., Soft Matter (2019), Sec. 2.2.
 
-The packing fraction grows by small steps, each followed by a minimisation, until the energy per particle is above
-a small tolerance. The jammed packing is then opened until it is as close to the tolerance as asked. Where it falls
-apart on the way, or its forces are not balanced, the step from the last unjammed state is halved instead, again and
-again. Of any shape; needs no LAMMPS.
+The packing fraction grows by small steps, each followed by a minimisation, until the energy per particle exceeds
+a small tolerance. The jammed packing is then opened until it is as close to the tolerance as requested. If it falls
+apart on the way, or its forces do not balance, the step from the last unjammed state is halved repeatedly
+instead. Independent of the shape; needs no LAMMPS.
 """
 
 from __future__ import annotations
@@ -19,23 +19,22 @@ from jamshape.minima import History, Minimum, Outcome, Stop, minimise
 from jamshape.minima.target import nearer
 from jamshape.packing import State
 
-# A step this small leads nowhere: the energy jumps there, by a rearrangement.
+# Smallest step: the energy jumps there, by a rearrangement.
 _SMALLEST_STEP = 1e-9
 
-# A jammed packing is opened at most so often, each time by at most a factor of 4 in sqrt(U).
+# Most openings of a jammed packing, each by at most a factor of 4 in sqrt(U).
 _MOST_OPENINGS = 30
 
-# A long minimisation is told of and stored after so many evaluations, and given up after so many parts.
-_PART, _MOST_PARTS = 5000, 40
+_PART = 5000  # evaluations after which a long minimisation is reported and stored
+_MOST_PARTS = 40  # of them before it is given up
 
-# Steps grow after minimisations of fewer evaluations than the first, and shrink after more than the second.
-_FEW, _MANY = 40, 150
+_FEW, _MANY = 40, 150  # evaluations of minimisations after which steps grow and shrink
 _GROWTH = 1.5
 
 
 @dataclass(frozen=True)
 class Quasistatic:
-    """How to compress.
+    """Settings of a quasistatic compression.
 
     Parameters
     ----------
@@ -44,15 +43,15 @@ class Quasistatic:
     energy
         U/N above which a packing is jammed, [energy].
     closeness
-        The jammed packing has U/N of at most this factor times `energy`.
+        Bound of U/N in the jammed packing, over `energy`.
     tolerance
         Largest net force and torque of a particle over the mean bond force; the paper has the mean
         net force below 1e-4, which this implies.
     method
         Minimiser.
     coarse
-        Largest step, where minimisations take few evaluations, as they do far below jamming; steps are equal
-        when left out.
+        Largest step, used where minimisations take few evaluations, as far below jamming; by default
+        all steps are equal.
 
     Raises
     ------
@@ -79,29 +78,29 @@ class Quasistatic:
 
 @dataclass(eq=False)
 class QuasistaticRun:
-    """A compression between two minimisations: all that is needed to go on from here.
+    """A compression between two minimisations, with all that is needed to resume it.
 
     Parameters
     ----------
     state
-        To be minimised next.
+        State to minimise next.
     phi
         Its packing fraction.
     step
-        By which phi grows next.
+        Next increment of phi.
     loose, loose_phi
-        The densest unjammed state, if any.
+        Densest unjammed state, if any.
     jammed_phi
-        Of the least dense jammed state, if any.
+        Packing fraction of the least dense jammed state, if any.
     openings
-        How often the jammed packing was opened to get to the state; 0: it was not.
+        Number of openings of the jammed packing that led to the state.
     halves
-        Whether steps are halved instead: a packing that was opened fell apart, was not balanced, or did not
+        Whether steps are halved instead: an opened packing fell apart, was not balanced, or did not
         come close.
     minimum
-        The jammed packing, once it is found.
+        Jammed packing, once found.
     parts
-        Of the present minimisation, if it is a long one, that are done.
+        Completed parts of the present long minimisation.
     """
 
     state: State
@@ -129,11 +128,11 @@ class QuasistaticRun:
         self.state = self.loose.strained(strain)
 
     def halve(self) -> None:
-        """Go on in the middle between the densest unjammed state and the least dense jammed one."""
+        """Continue midway between the densest unjammed state and the least dense jammed one."""
         self.begin((self.jammed_phi - self.loose_phi) / 2)
 
     def open(self, state: State, phi: float) -> None:
-        """Go on with a jammed state that was opened."""
+        """Continue with an opened jammed state."""
         self.state, self.phi, self.openings = state, phi, self.openings + 1
 
 
@@ -146,7 +145,7 @@ def compress(
     ----------
     landscape : Landscape
     compression : QuasistaticRun
-        Where to begin, or to go on.
+        Initial or resumed state.
     protocol : Quasistatic
 
     Yields
@@ -166,7 +165,7 @@ def compress(
         except CrossingError:
             if compression.loose is None:
                 raise
-            if compression.openings == 0:  # a step that was too long
+            if compression.openings == 0:  # the step was too long
                 compression.jammed_phi = compression.phi
             compression.halves = True
             compression.halve()
@@ -199,7 +198,7 @@ def compress(
 
 
 def _is_narrow(compression: QuasistaticRun) -> bool:
-    """Whether nothing is left between the jammed state and the unjammed one."""
+    """Whether the interval between the jammed and the unjammed state is exhausted."""
     left = compression.phi - compression.loose_phi
     return left < _SMALLEST_STEP and compression.halves
 
@@ -212,7 +211,7 @@ def _go_on_from_unjammed(
     if compression.jammed_phi - compression.loose_phi > _SMALLEST_STEP:
         compression.halve()
         return
-    if not math.isnan(compression.jammed_phi):  # it was none, or jams at another phi now
+    if not math.isnan(compression.jammed_phi):  # it was not jammed, or jams at another phi now
         compression.jammed_phi, compression.halves = math.nan, False
         compression.step = protocol.step
     compression.begin(_next_step(compression.step, evaluations, protocol))
@@ -232,7 +231,7 @@ def _go_on_from_jammed(
 
 
 def _next_step(step: float, evaluations: int, protocol: Quasistatic) -> float:
-    """Adapt a step that left the packing unjammed to what its minimisation took."""
+    """Adapt the step to the cost of the last minimisation."""
     if protocol.coarse is None:
         return step
     if evaluations < _FEW:
@@ -241,7 +240,7 @@ def _next_step(step: float, evaluations: int, protocol: Quasistatic) -> float:
 
 
 def _minimised(landscape: Landscape, compression: QuasistaticRun, protocol: Quasistatic) -> Minimum:
-    """Minimise until forces balance, or until the state is seen to be unjammed."""
+    """Minimise until forces balance, or until the state is unjammed."""
     state = compression.state
     lowest = protocol.energy * landscape.particles.n / state.volume
     stop = Stop(tolerance=protocol.tolerance, lowest=lowest, evaluations=_PART)
@@ -264,10 +263,10 @@ def compressed_to(landscape: Landscape, start: State, phi: float, step: float = 
     ----------
     landscape : Landscape
     start : State
-        Below phi.
+        State below phi.
     phi : float
     step : float
-        Of the packing fraction, at most.
+        Largest step of the packing fraction.
 
     Returns
     -------
@@ -277,7 +276,7 @@ def compressed_to(landscape: Landscape, start: State, phi: float, step: float = 
     Raises
     ------
     CrossingError
-        If spines cross in a step: it is too long.
+        If spines cross in a step, which is then too long.
     """
     state, begun = start, _phi(landscape, start)
     n_steps = max(1, math.ceil((phi - begun) / step))

@@ -1,4 +1,4 @@
-"""Initial states: particles at random places in a periodic box, with or without overlaps."""
+"""Random initial states in a periodic box, with or without overlaps."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from jamshape.checks import RANGES, require_in, require_one_of, require_stated
 from jamshape.packing import Box, Packing
 from jamshape.shapes.particles import Particles
 
-# Trial placements in all: a few seconds for 1000 particles.
+# Trial placements: a few seconds for 1000 particles.
 _ATTEMPTS, _ATTEMPTS_PER_PARTICLE = 200_000, 500
 
-# Of the packing fraction where insertion stalls, what it reaches when asked for no more: the long
+# Safe fraction of the packing fraction where insertion stalls: the long
 # particles, placed first, fill their share of a box that is too small better than all do together.
 _SAFE = 0.85
 
 
-# Packing fractions at which starts are tried that are to be compressed.
+# Packing fractions to try for starts of compressions.
 _DENSEST, _LOOSEST = (0.4, 0.2, 0.1, 0.05), 0.02
 
 
@@ -33,29 +33,29 @@ class InsertionError(ValueError):
 def random_packing(
     n: int, phi: float, seed: int, particles: Particles | None = None, dimension: int = 2
 ) -> Packing:
-    """Place particles at random, one after another, wherever they overlap no other.
+    """Place particles at random, one after another, without overlaps.
 
     Parameters
     ----------
     n : int
     phi : float
-        Packing fraction; the periodic box is a square (cube) that has it exactly.
+        Packing fraction; the periodic box is a square (cube) with exactly this value.
     seed : int
-        Of `numpy.random.default_rng`; the same arguments give the same packing.
+        Random seed for `numpy.random.default_rng`; the same arguments give the same packing.
     particles : Particles, optional
-        ``Particles.of()`` when left out.
+        ``Particles.of()`` by default.
     dimension : {2, 3}
 
     Returns
     -------
     Packing
-        No two surfaces overlap and no spines cross, periodic images included. Orientations are
-        uniform on the circle (sphere). IDs tell nothing of the size.
+        No two surfaces overlap and no spines cross, including periodic images. Orientations are
+        uniform on the circle (sphere). IDs are independent of size.
 
     Raises
     ------
     InsertionError
-        If there is no room: random insertion ends far below jamming, at about phi = 0.5 for rods
+        If there is no room: random insertion stops far below jamming, at about phi = 0.5 for rods
         with alpha = 4 in 2D; or if the box is too short for the longest particle.
     ValueError
         If an argument is out of its range.
@@ -77,7 +77,7 @@ def random_packing(
     )
     if found["outcome"] != "all":
         raise _refusal(boxed, found)
-    order = rng.permutation(n)  # nothing in it tells of the insertion
+    order = rng.permutation(n)  # independent of the order of insertion
     names = ("diameters", "exponent", "species")
     return boxed.with_(
         position=found["position"][order],
@@ -89,9 +89,9 @@ def random_packing(
 def start_below(
     phi: float, n: int, seed: int, particles: Particles | None = None, dimension: int = 2
 ) -> Packing:
-    """Make a random packing to compress to phi: as dense as long particles find room at random.
+    """Make a random packing to compress to phi, as dense as random insertion allows.
 
-    Arguments and errors as of `random_packing`.
+    Arguments and errors as in `random_packing`.
     """
     for densest in _DENSEST:
         with suppress(InsertionError):
@@ -102,9 +102,9 @@ def start_below(
 def dilute_packing(
     n: int, phi: float, seed: int, particles: Particles | None = None, dimension: int = 3
 ) -> Packing:
-    """Place particles at random with random orientations, whether they overlap or not.
+    """Place particles at random with random orientations, allowing overlaps.
 
-    Yuan et al. 2019, Sec. 2.2. Arguments and errors as of `random_packing`; in dilute packings overlaps
+    Yuan et al. 2019, Sec. 2.2. Arguments and errors as in `random_packing`; in dilute packings overlaps
     are few and small, and the first minimisation undoes them.
     """
     unplaced, rng = _unplaced(n, phi, seed, (particles or Particles.of(), dimension))
@@ -117,7 +117,7 @@ def dilute_packing(
 def _unplaced(
     n: int, phi: float, seed: int, of: tuple[Particles, int]
 ) -> tuple[Packing, np.random.Generator]:
-    """Draw particles, still without poses, in a box of one unit."""
+    """Draw particles, without poses, in a unit box."""
     particles, dimension = of
     require_in("phi", phi, RANGES["phi_start"])
     require_one_of("dimension", dimension, (2, 3))
@@ -139,25 +139,25 @@ def _unplaced(
 
 
 def _boxed(packing: Packing, area: float, phi: float) -> Packing:
-    """Take the box in which particles of that area (volume) have the packing fraction phi."""
+    """Return the box in which particles of that area (volume) have the packing fraction phi."""
     edge = (area / phi) ** (1 / packing.dimension)
     return packing.with_(box=Box(np.zeros(packing.dimension), np.full(packing.dimension, edge)))
 
 
 def _longest_first(packing: Packing) -> Packing:
-    """Order for insertion: early there is room for the long ones, the short ones fit into gaps."""
+    """Order for insertion: long particles first, while there is room; short ones fit into gaps."""
     order = np.argsort(-packing.outer_radius, kind="stable")
     names = ("diameters", "exponent", "species")
     return packing.with_(**{k: getattr(packing, k)[order] for k in names})
 
 
 def _refusal(particles: Packing, found: Mapping[str, Any]) -> InsertionError:
-    """Say why particles, the longest first, found no room, and where to start instead."""
+    """Explain why particles, the longest first, found no room, and suggest another start."""
     if found["outcome"] == "too short":
         length, edge = 2 * particles.outer_radius[0], particles.box.edges[0]
         fits = particles.phi * (edge / length) ** particles.dimension
         return InsertionError(
-            f"no direction found that keeps the longest particle, of length {length:.3g}, off its"
+            f"no direction keeps the longest particle, of length {length:.3g}, off its"
             f" own periodic images in a box of edge {edge:.3g}: start at phi <= {_SAFE * fits:.2g}"
             " and compress from there, or take more particles"
         )
@@ -166,7 +166,7 @@ def _refusal(particles: Packing, found: Mapping[str, Any]) -> InsertionError:
     reached = measure.sum() / particles.box.volume
     return InsertionError(
         f"random insertion of {particles.n} particles stalled at phi = {reached:.3g} of the"
-        f" {particles.phi:.3g} asked after {found['attempts']} attempts: start at"
+        f" {particles.phi:.3g} requested after {found['attempts']} attempts: start at"
         f" phi <= {_SAFE * reached:.2g} and compress from there"
     )
 

@@ -1,4 +1,4 @@
-"""What a packing is made of, and how."""
+"""Recipes: what a packing is made of, and how."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.checks import require_one_of, require_rising, require_stated
+from jamshape.checks import ArgumentError, require_one_of, require_rising, require_stated
 from jamshape.files.h5md import read_packing
 from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL
 from jamshape.minima.target import Target, direct, halving
@@ -22,15 +22,15 @@ from jamshape.shapes.particles import Particles
 from jamshape.shapes.shape import Interaction
 
 SEARCHES = {"direct": direct, "halving": halving}
-"""Ways to lead a jammed state to an energy: ours, and that of Marschall & Teitel 2018, Sec. III C, as written."""
+"""Searches for a target energy: ours, and that of Marschall & Teitel 2018, Sec. III C, as written."""
 
-# Paper's slowest rate; a slower one in LAMMPS does not end in a time that anybody waits for.
+# The paper's slowest rate; slower ones would not end in LAMMPS in reasonable time.
 _SLOWEST = 1e-10
 
 
 @dataclass(frozen=True)
 class Thermalisation:
-    """Monte Carlo of hard particles on the way: protocol 2 of Yuan et al. 2019, Sec. 2.2.
+    """Monte Carlo of hard particles before jamming: protocol 2 of Yuan et al. 2019, Sec. 2.2.
 
     Parameters
     ----------
@@ -53,17 +53,17 @@ class Thermalisation:
 
 
 class Way(Protocol):
-    """From a random start to jamming."""
+    """A way from a random start to jamming."""
 
     @property
     def search(self) -> str:
-        """How the energy is looked for from there, one of `SEARCHES`."""
+        """Search for the energy from there, one of `SEARCHES`."""
 
     def start(self, recipe: Recipe) -> Packing:
         """Make the random start."""
 
     def attributes(self, target: Target | None) -> dict[str, Any]:
-        """Return what identifies it, to be stored."""
+        """Return its identifying attributes."""
 
     def require(self, recipe: Recipe) -> None:
         """Refuse a recipe that this way cannot follow; raises ValueError."""
@@ -78,9 +78,9 @@ class Steps:
     Parameters
     ----------
     quasistatic
-        How to compress.
+        Settings of the compression.
     thermal
-        Monte Carlo before the last part of it; None for protocol 1.
+        Monte Carlo before its last part; None for protocol 1.
     """
 
     search: ClassVar[str] = "direct"
@@ -89,28 +89,28 @@ class Steps:
     thermal: Thermalisation | None = None
 
     def start(self, recipe: Recipe) -> Packing:
-        """Make the random start, which in space may have overlaps: the first minimisation undoes them."""
+        """Make the random start, which in space may have overlaps: the first minimisation removes them."""
         make = random_packing if recipe.dimension == 2 else dilute_packing
         return make(recipe.n, recipe.phi_start, recipe.seed, recipe.particles, recipe.dimension)
 
     def compression(self, target: Target | None) -> Quasistatic:
-        """How to compress: what is to be led elsewhere need not be close to the tolerance."""
+        """Return the settings of the compression; before a target energy it need not be close to the tolerance."""
         return replace(self.quasistatic, closeness=math.inf) if target else self.quasistatic
 
     def attributes(self, target: Target | None) -> dict[str, Any]:
-        """Return what identifies it, to be stored."""
+        """Return its identifying attributes."""
         found: dict[str, Any] = {"protocol": THERMAL if self.thermal else ATHERMAL}
         if self.thermal:
             found |= {"phi_thermal": self.thermal.phi, "n_sweeps": self.thermal.n_sweeps}
         return found | self.steps(target)
 
     def steps(self, target: Target | None) -> dict[str, Any]:
-        """Return what identifies its compression."""
+        """Return the identifying attributes of its compression."""
         settings = vars(self.compression(target))
         return {f"quasistatic_{k}": v for k, v in settings.items() if v is not None}
 
     def require(self, recipe: Recipe) -> None:
-        """Refuse a start that is denser than the Monte Carlo."""
+        """Refuse a start denser than the Monte Carlo."""
         if self.thermal and not recipe.phi_start < self.thermal.phi:
             found = (
                 f"phi_start is {recipe.phi_start} and the Monte Carlo runs at {self.thermal.phi}"
@@ -121,16 +121,16 @@ class Steps:
 
 @dataclass(frozen=True)
 class Adaptive(Steps):
-    """Quasistatic steps that are large where the packing is far from jamming: the fastest way there.
+    """Quasistatic steps that are large far from jamming: the fastest way there.
 
     Parameters
     ----------
     quasistatic
-        How to compress; its `coarse` says how far steps may grow.
+        Settings of the compression; its `coarse` limits the growth of steps.
     """
 
     def attributes(self, target: Target | None) -> dict[str, Any]:
-        """Return what identifies it, to be stored."""
+        """Return its identifying attributes."""
         return {"way": "quasistatic"} | self.steps(target)
 
 
@@ -141,7 +141,7 @@ class Dynamics:
     Parameters
     ----------
     approach
-        How to compress.
+        Settings of the compression.
     """
 
     search: ClassVar[str] = "direct"
@@ -155,40 +155,40 @@ class Dynamics:
         )
 
     def attributes(self, target: Target | None) -> dict[str, Any]:
-        """Return what identifies it, to be stored."""
+        """Return its identifying attributes."""
         del target
         found = {f"approach_{k}": v for k, v in vars(self.approach).items()}
         return found | {"kappa": self.approach.kappa}
 
     def require(self, recipe: Recipe) -> None:
-        """Refuse a recipe without an energy."""
+        """Refuse a recipe without a target energy."""
         if recipe.target is None:
-            msg = "there is no energy to reach, expected one after a compression by dynamics (u0)"
-            raise ValueError(msg)
+            said = "{u0} does not work with the way by dynamics, expected a positive one"
+            raise ArgumentError(said, {"u0": 0})
 
 
 @dataclass(frozen=True)
 class Compressed:
     """Compression at one rate through jamming: the protocol marschall-2018 (Sec. II and III B-C, App. A).
 
-    The energy is looked for from the first state of it that stays jammed when it is minimised; nothing opens the
-    box before.
+    The search for the energy starts from its first state that stays jammed when minimised; the box is not opened
+    before.
 
     Parameters
     ----------
     kappa
         Rate, dL/dt = -kappa L (Eq. 6), [1/time]; the paper's are 1e-6 to 1e-10.
     phi_end
-        Packing fraction where the compression ends, well above jamming.
+        Final packing fraction, well above jamming.
     search
         One of `SEARCHES`.
     source
-        File with the frames of such a compression, which takes its place.
+        File with the frames of such a compression, used instead.
 
     Raises
     ------
     ValueError
-        If a number is out of its range, the rate below the paper's slowest, or there is no such search.
+        If a number is out of its range, the rate is below the paper's slowest, or the search is unknown.
     """
 
     kappa: float = 1e-6
@@ -217,39 +217,39 @@ class Compressed:
         )
 
     def attributes(self, target: Target | None) -> dict[str, Any]:
-        """Return what identifies it, to be stored."""
+        """Return its identifying attributes."""
         del target
         start = "" if self.source is None else self.source.name
         told = {"kappa": self.kappa, "phi_end": self.phi_end, "start": start}
         return {"protocol": COMPRESSED, "search": self.search} | told
 
     def require(self, recipe: Recipe) -> None:
-        """Refuse a recipe without an energy, or that does not compress."""
+        """Refuse a recipe without a target energy, or that does not compress."""
         if recipe.target is None:
-            msg = "there is no energy to reach, expected one after a compression at a rate (u0)"
-            raise ValueError(msg)
+            said = "{u0} does not work with the protocol marschall-2018, expected a positive one"
+            raise ArgumentError(said, {"u0": 0})
         if self.source is None:
             require_rising(recipe.phi_start, self.phi_end)
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a packing is made of, and how.
+    """Ingredients and protocol of a packing.
 
     Parameters
     ----------
     particles
         Shapes and sizes.
     n, dimension, seed
-        Number of particles, 2 or 3, and the seed of all that is random.
+        Number of particles, 2 or 3, and the random seed.
     phi_start
         Packing fraction of the random start.
     way
-        From there to jamming.
+        Way from there to jamming.
     target
-        Energy density to lead the packing to; None for the first jammed packing of `Steps` as it is.
+        Target energy density; None for the first jammed packing of `Steps` as it is.
     strict
-        Whether to lead it on, at that energy, to a minimum without negative eigenvalues (`protocols.strict`).
+        Whether to continue, at that energy, to a minimum without negative eigenvalues (`protocols.strict`).
 
     Raises
     ------
@@ -278,26 +278,26 @@ class Recipe:
         require_stated(n=self.n, seed=self.seed, phi_start=self.phi_start)
         require_one_of("dimension", self.dimension, (2, 3))
         if self.strict and self.target is None:
-            msg = "there is no energy to reach, expected one for a strict minimum (u0)"
-            raise ValueError(msg)
+            said = "{u0} does not work with a strict minimum, expected a positive one"
+            raise ArgumentError(said, {"u0": 0})
         self.way.require(self)
 
     def start(self) -> Packing:
-        """Make the random start; errors as `random_start.random_packing`."""
+        """Make the random start; errors as in `random_start.random_packing`."""
         return self.way.start(self)
 
     @property
     def is_searched(self) -> bool:
-        """Whether the energy is looked for by our own search, not by one as published."""
+        """Whether the search for the energy is ours, not a published one."""
         return self.target is not None and self.way.search == "direct"
 
     def attributes(self) -> dict[str, Any]:
-        """Return what identifies it, to be stored."""
+        """Return its identifying attributes."""
         strict = {"strict": True} if self.strict else {}
         return self.before_target() | (vars(self.target) if self.target else {}) | strict
 
     def before_target(self) -> dict[str, Any]:
-        """Return what identifies it as far as it is before the energy is led to its target."""
+        """Return the attributes that identify the stages before the energy search."""
         numbers = {"n": self.n, "seed": self.seed, "phi_start": self.phi_start}
         return dict(self.particles.told) | numbers | self.way.attributes(self.target)
 

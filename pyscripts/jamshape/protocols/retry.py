@@ -1,10 +1,10 @@
-"""A second try where forces do not balance: rods that slide are moved on to where something stops them.
+"""A second attempt at unbalanced packings: sliding rods are moved on until new contacts stop them.
 
-Minimisers crawl along flat sides, where no force tells how far it is to the next contact, and give up there. Long steps along
-what slides, those of strict minima (`vibration.sliding`), lead to that contact; forces then balance in some ten steps of
-Newton's method, mostly after one or two long ones. Of any shape and dimension.
+Minimisers crawl along flat sides, where no force indicates the distance to the next contact, and stall there. Long
+steps along sliding modes, those of strict minima (`vibration.sliding`), reach that contact; forces then balance in
+some ten Newton steps, mostly after one or two long ones. Independent of shape and dimension.
 
-The second try is limited by work that is counted, not by time: a seed leads to the same packing on any machine, and after a kill.
+The attempt is limited by counted work, not by time: a seed gives the same packing on any machine, and after a kill.
 """
 
 from __future__ import annotations
@@ -22,45 +22,47 @@ from jamshape.minima.target import Search, Target, TargetError, direct
 from jamshape.packing import State
 from jamshape.vibration.sliding import Sliding
 
-# A step along what slides takes the time of so many evaluations (`analysis/outcomes.py price`).
+# Cost of a step along sliding modes, in evaluations (`analysis/outcomes.py price`).
 _PRICE = 500
 
-# Forces that can balance do so in so many evaluations; those that cannot would take all that one gives.
+# Evaluations in which forces balance if they can; otherwise they would use up any number.
 _EVALUATIONS = 100
 
-# Residuals that leave only what slides: as it is asked for, and what is accepted where the energy falls.
-_RELAXED, _ALMOST, _RELAXING = 1e-6, 1e-5, 400
+_RELAXED, _ALMOST = (
+    1e-6,
+    1e-5,
+)  # residuals with only sliding left: requested, and accepted if the energy falls
+_RELAXING = 400  # evaluations to reach them
 
-# No particle moves by more than the first in one step, over the smallest radius. Steps that fail are a quarter as long, down to
-# the second, where all that slides has been stopped.
-_LONGEST, _SHORTEST = 0.05, 1e-6
-_LESS = 4.0
+_LONGEST = 0.05  # largest displacement of a particle in one step, over the smallest radius
+_SHORTEST = 1e-6  # smallest one, at which all sliding has been stopped
+_LESS = 4.0  # reduction after steps that fail
 
-# The energy falls by a larger part only where particles rearrange, which is believed of shorter steps.
-_SLIDE, _SHORT = 0.05, 0.02
+_SLIDE = 0.05  # relative fall of the energy above which particles rearrange, accepted only in short steps
+_SHORT = 0.02  # length of these
 
-# Below this part of u0 a packing has fallen apart.
+# Fraction of u0 below which a packing has fallen apart.
 _FALLEN = 1e-2
 
 
 @dataclass(eq=False)
 class Retry:
-    """A second try between two steps: all that is needed to go on from here.
+    """A second attempt between two steps, with all that is needed to resume it.
 
     Parameters
     ----------
     state
-        Where it is.
+        Current state.
     budget
-        Work after which it ends, [evaluations].
+        Work limit, [evaluations].
     longest
-        No particle moves by more in the next step, over the smallest radius.
+        Largest displacement of a particle in the next step, over the smallest radius.
     n_steps
-        Steps so far; -1 before forces were first balanced without one.
+        Steps so far; -1 before the initial force balance.
     evaluations
-        Of all forces so far.
+        Evaluations of all forces so far.
     minimum
-        The packing, at u0 and with forces that balance, once it is found.
+        The packing, at u0 in force balance, once it is found.
     """
 
     state: State
@@ -72,7 +74,7 @@ class Retry:
 
     @property
     def work(self) -> int:
-        """Work that is done, [evaluations]."""
+        """Work done, [evaluations]."""
         return self.evaluations + _PRICE * max(self.n_steps, 0)
 
     @property
@@ -81,28 +83,28 @@ class Retry:
         return self.minimum is not None or self.work >= self.budget
 
     def counts(self) -> dict[str, int]:
-        """Return what a file says of its course."""
+        """Return its counts as attributes."""
         return {"retry_steps": max(self.n_steps, 0), "retry_evaluations": self.evaluations}
 
 
 def go_on(landscape: Landscape, retry: Retry, target: Target) -> Iterator[Retry]:
-    """Try again, step by step, until forces balance at u0 or the work is used up.
+    """Continue, step by step, until forces balance at u0 or the work is used up.
 
     Parameters
     ----------
     landscape : Landscape
     retry : Retry
-        Where to begin, or to go on; moved along.
+        Initial or resumed state; updated.
     target : Target
 
     Yields
     ------
     Retry
-        The same object after each step. What follows depends on its numbers alone, to the last bit.
+        The same object after each step. The continuation depends on its numbers alone, to the last bit.
     """
     while not retry.is_over:
         before = landscape.evaluations
-        landscape.forget_pairs()  # as where it is read from a file
+        landscape.forget_pairs()  # as after reading from a file
         if retry.n_steps < 0:
             _balance(landscape, retry, target)
         else:
@@ -112,16 +114,8 @@ def go_on(landscape: Landscape, retry: Retry, target: Target) -> Iterator[Retry]
         yield retry
 
 
-def retried(landscape: Landscape, minimum: Minimum, target: Target, budget: int) -> Minimum:
-    """Try again with a minimum whose forces do not balance; give it back as it is where that is no use."""
-    retry = Retry(minimum.state, budget)
-    for _ in go_on(landscape, retry, target):
-        pass
-    return retry.minimum or minimum
-
-
 def _slide(landscape: Landscape, retry: Retry, target: Target) -> None:
-    """Take a step along what slides, if the energy falls, and see whether forces balance there."""
+    """Take a step along sliding modes, if the energy falls, and check whether forces balance."""
     radius = 0.5 * landscape.length
     reach = retry.longest * radius
     sliding = Sliding.at(landscape, retry.state, reach)
@@ -149,7 +143,7 @@ def _slide(landscape: Landscape, retry: Retry, target: Target) -> None:
 
 
 def _balance(landscape: Landscape, retry: Retry, target: Target) -> None:
-    """Let forces balance at a fixed box, and where they do so lead the packing back to u0."""
+    """Balance forces at a fixed box, and if they do, return the packing to u0."""
     stop = Stop(target.tolerance, lowest=_FALLEN * target.u0, evaluations=_EVALUATIONS)
     found = minimise(landscape, retry.state, "newton", stop)
     if found.is_at_rest:
@@ -157,7 +151,7 @@ def _balance(landscape: Landscape, retry: Retry, target: Target) -> None:
 
 
 def _lead(landscape: Landscape, retry: Retry, start: State, target: Target) -> None:
-    """Lead a state to u0, as far as the work allows, and go on from there with long steps."""
+    """Relax a state at u0, as far as the work allows, and continue with long steps."""
     most = landscape.evaluations + retry.budget - retry.work
     search = Search(start, target.step)
     with suppress(TargetError):
@@ -172,5 +166,5 @@ def _lead(landscape: Landscape, retry: Retry, start: State, target: Target) -> N
 
 
 def _relaxed(landscape: Landscape, state: State) -> Minimum:
-    """Relax all that is stiffer than what slides."""
+    """Relax all modes stiffer than sliding ones."""
     return minimise(landscape, state, "newton", Stop(_RELAXED, evaluations=_RELAXING))

@@ -1,4 +1,4 @@
-"""A second try in a file beside the packing, from which it goes on after a kill to the same packing, to the bit."""
+"""A second attempt in a file beside the packing, resumed after a kill to the same packing, to the bit."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum
 from jamshape.packing import State
-from jamshape.protocols.making import Progress, write_states
+from jamshape.protocols.making import Progress, stored_of, write_states
 from jamshape.protocols.recipe import Recipe
 from jamshape.protocols.retry import Retry, go_on
 
@@ -23,14 +23,14 @@ _NUMBERS = ("budget", "longest", "n_steps", "evaluations")
 
 @dataclass(eq=False)
 class RetryFile:
-    """The file of a second try.
+    """File of a second attempt.
 
     Parameters
     ----------
     path
     recipe
     attributes
-        What the file of the packing says of the second try; empty where there was none.
+        Attributes of the attempt for the file of the packing; empty if there was none.
     """
 
     path: Path
@@ -38,18 +38,15 @@ class RetryFile:
     attributes: dict[str, Any] = field(default_factory=dict)
 
     def read(self) -> Retry | None:
-        """Read where an earlier call has left it, if it was one of this recipe."""
-        if not self.path.exists():
-            return None
-        stored = read_attributes(self.path)
-        known = [stored.get(name) == value for name, value in self.recipe.attributes().items()]
-        if not all(known) or "retry_budget" not in stored:
+        """Read the state of an earlier call with this recipe."""
+        stored = stored_of(self.path, self.recipe)
+        if stored is None or "retry_budget" not in stored:
             return None
         numbers = {name: stored[f"retry_{name}"] for name in _NUMBERS}
         return Retry(State.of(read_packing(self.path)), **numbers)
 
     def write(self, retry: Retry, landscape: Landscape) -> None:
-        """Write a second try between two steps."""
+        """Write a second attempt between two steps."""
         numbers = {f"retry_{name}": getattr(retry, name) for name in _NUMBERS}
         attributes = self.recipe.attributes() | numbers
         write_states(self.path, [retry.state], landscape.particles, attributes)
@@ -58,7 +55,7 @@ class RetryFile:
 def try_again(
     landscape: Landscape, minimum: Minimum, file: RetryFile
 ) -> Generator[Progress, None, Minimum]:
-    """Try again with a minimum whose forces do not balance, for as much work as it has taken so far.
+    """Repeat the search from an unbalanced minimum, for as much work as it has taken so far.
 
     Yields
     ------
@@ -68,7 +65,7 @@ def try_again(
     Returns
     -------
     Minimum
-        That one, where the second try is no use.
+        The given one, if the attempt does not help.
     """
     target = file.recipe.target
     assert target is not None
@@ -93,4 +90,4 @@ def _told(at: Retry, landscape: Landscape, first: Minimum) -> Progress:
         f" ended {first.outcome.value} with a residual of {first.residual.largest:.1e}"
     )
     part = min(1.0, at.work / at.budget)
-    return Progress("retry", "second try", phi, first.energy_density, text, part)
+    return Progress("retry", "second attempt", phi, first.energy_density, text, part)

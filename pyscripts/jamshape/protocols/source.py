@@ -1,4 +1,4 @@
-"""A compression in a file, whose states packings are made from: what it is of."""
+"""A stored compression as the source of packings, with its metadata."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from jamshape.arrays import FloatArray
-from jamshape.checks import RANGES
+from jamshape.checks import RANGES, ArgumentError
 from jamshape.files.disk import named
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.measures.runs import rate_of
@@ -18,20 +18,20 @@ from jamshape.shapes.particles import Particles
 
 
 class Source(NamedTuple):
-    """What a file of a run says that a recipe needs to know."""
+    """Metadata of the file of a run for a recipe."""
 
     path: Path
     particles: Particles
-    """Those of the file, one by one."""
+    """Individual particles of the file."""
     n: int
     dimension: int
     seed: int
-    """1 where the file says none."""
+    """1 if not stored."""
     phi_start: float
     phi_end: float
     """Packing fraction of the last frame."""
     kappa: float
-    """Its last rate, [1/time]; 0 where the file says none."""
+    """Last rate, [1/time]; 0 if not stored."""
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -56,7 +56,7 @@ class Source(NamedTuple):
         )
 
     def require(self, particles: Particles | None, **asked: Any) -> None:
-        """Refuse what was asked for beside the start and is something else there; None was not asked for.
+        """Raise if a setting differs from that of the start; None is not checked.
 
         Raises
         ------
@@ -65,12 +65,12 @@ class Source(NamedTuple):
         for name, value in asked.items():
             own = getattr(self, name)
             if value is not None and value != own:
-                msg = f"{name} is {value} and that of the start {named(self.path)} {own}; leave {name} out"
-                raise ValueError(msg)
+                said = f"{{{name}}} differs from {own} of {{start}}; leave it out"
+                raise ArgumentError(said, {name: value, "start": named(self.path)})
         if particles is not None and not self._has(particles):
             msg = (
                 f"the start {named(self.path)} holds {self.n} particles of {self.particles}, expected those"
-                f" that were asked for, {particles}; leave the particles out"
+                f" requested, {particles}; leave the particles out"
             )
             raise ValueError(msg)
 

@@ -1,11 +1,11 @@
-"""Strict minima: packings led on from where rods slide until no mode has a negative eigenvalue.
+"""Strict minima: packings moved along sliding modes until no mode has a negative eigenvalue.
 
-Minimisers leave packings of long rods at saddles: what slides along flat sides lowers the energy by so little that no
-force tells (Marschall & Teitel 2018, Appendix B). Here all that slides goes downhill in long steps, limited by new contacts
-(`vibration.sliding`); after each step what is stiff is relaxed. A rod that slides off another one unjams the packing, which is
-then led to its energy again. Of any shape and dimension.
+Minimisers leave packings of long rods at saddles: sliding along flat sides lowers the energy by less than
+forces resolve (Marschall & Teitel 2018, Appendix B). Here all sliding modes go downhill in long steps, limited by new
+contacts (`vibration.sliding`); stiff modes are relaxed after each step. A rod that slides off another one unjams the
+packing, which is then relaxed at its energy again. Independent of shape and dimension.
 
-When nothing slides any more, `protocols.strict_proof` tells whether the state is a minimum.
+When nothing slides any more, `protocols.strict_proof` decides whether the state is a minimum.
 """
 
 from __future__ import annotations
@@ -24,63 +24,57 @@ from jamshape.packing import State
 from jamshape.protocols.strict_proof import ModesOffKinks, Proof
 from jamshape.vibration.sliding import Sliding, Step
 
-# No particle moves by more in one step, over the smallest radius; after a minimum that is none, by less.
-_LONGEST, _CAREFUL = 0.1, 1e-4
+_LONGEST = 0.1  # largest displacement of a particle in one step, over the smallest radius
+_CAREFUL = 1e-4  # the same after a state that was not a minimum
 
-# A corner is met where nothing moves by more than this; a step that fails is a quarter as long, down to this.
+# A step has ended at a wall if nothing moves by more than this; a step that fails is shortened down to this.
 _STILL = 1e-8
 
-# Residual that leaves only what slides, and how long to look for it.
-_RELAXED, _EVALUATIONS = 1e-6, 400
+_RELAXED = 1e-6  # residual with only sliding left
+_EVALUATIONS = 400  # to reach it
 
-# Residual at which what slides has met its walls.
+# Residual at which sliding modes have met their walls.
 _SETTLED = 1e-10
 
-# What so few modes have left may lean on walls with less than digits tell. Nudges of so many smallest radii close them;
-# forces then balance to this.
-_FEW_NEGATIVE = 3
-_NUDGES = (1e-10, 1e-9, 1e-8, 1e-7)
-_TOUCHING = 1e-9
+_FEW_NEGATIVE = 3  # such modes may touch walls closer than digits resolve
+_NUDGES = (1e-10, 1e-9, 1e-8, 1e-7)  # in smallest radii, that close such walls
+_TOUCHING = 1e-9  # residual of force balance there
 
-# The energy falls by a larger part only where particles rearrange, which is believed of steps that are so short, and
-# of shorter ones also where the packing unjams.
-_SLIDE = 0.05
-_SHORT, _SHORTER = 0.02, 2e-3
+_SLIDE = 0.05  # relative fall of the energy above which particles rearrange, accepted only in short steps
+_SHORT, _SHORTER = 0.02, 2e-3  # length of these, and of those in which the packing may unjam
 
-# A particle that turns back goes less far, and further if it goes on; by the cosine of two steps.
-_TURNED = 0.3
-_LESS = 4.0
+_TURNED = 0.3  # cosine between steps, of either sign, that counts as going on or turning back
+_LESS = 4.0  # reduction of the limits after failed steps and of particles that turn back
 
-# A search ends after so many steps for each particle, and more, or when so many states were taken for a minimum.
-_STEPS, _MORE_STEPS = 4, 400
-_MOST_CLOSED = 30
+_STEPS, _MORE_STEPS = 4, 400  # largest number of steps, for each particle and in addition
+_MOST_CLOSED = 30  # largest number of candidate minima
 
 
 @dataclass(eq=False)
 class StrictSearch:
-    """A search between two steps: all that is needed to go on from here.
+    """A search between two steps, with all that is needed to resume it.
 
     Parameters
     ----------
     minimum
-        Where it is: stiff modes are relaxed there.
+        Current state, with relaxed stiff modes.
     farthest : (N,) array of float64, [length]
-        How far particles may move in the next step.
+        Largest displacements of particles in the next step.
     most_steps
-        After so many it ends.
+        Largest number of steps.
     n_steps, n_fallen, n_closed
-        Steps so far; how often the energy fell to nothing, so that the packing was led to it again; and how often
-        it was taken for a minimum.
+        Steps so far; times that the packing unjammed and was relaxed again; and
+        candidate minima.
     proof
-        Of the minimum, where the search has ended or takes it for one.
+        Proof for the last candidate minimum.
     done
-        Whether it has ended.
+        Whether the search has ended.
     keeping
-        Whether weak contacts are to stay in the next step, as they do after a state that was taken for a minimum.
+        Whether weak contacts are kept in the next step, as after a candidate minimum.
     last : (N, D + T) array of float64, optional
-        The last step, as `sliding.Step.moved`.
+        The last step, see `sliding.Step.moved`.
     n_free, n_met
-        Of the last step: motions that slide, and how many of them are stopped by new contacts.
+        Sliding modes in the last step, and the number stopped by new contacts.
     """
 
     minimum: Minimum
@@ -97,12 +91,12 @@ class StrictSearch:
     n_met: int = 0
 
     def counts(self) -> dict[str, int]:
-        """Return what a file says of its course."""
+        """Return its counts as attributes."""
         return {"strict_steps": self.n_steps, "strict_fallen": self.n_fallen}
 
 
 def start(landscape: Landscape, state: State) -> StrictSearch:
-    """Begin at a packing of about the energy that is asked for."""
+    """Begin at a packing of about the target energy."""
     minimum = _relaxed(landscape, state)
     most = _MORE_STEPS + _STEPS * landscape.particles.n
     return StrictSearch(minimum, _everywhere(landscape, _LONGEST), most)
@@ -111,16 +105,16 @@ def start(landscape: Landscape, state: State) -> StrictSearch:
 def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Iterator[StrictSearch]:
     """Follow negative curvature until none is left.
 
-    Ends where no eigenvalue is below zero by more than its bound and forces balance, and otherwise after a number of
-    steps that grows with the packing, or where steps become too short; `StrictSearch.proof` tells which.
+    Ends where no eigenvalue is below minus its bound and forces balance, and otherwise after a number of
+    steps that grows with the packing, or when steps become too short; see `StrictSearch.proof`.
 
     Parameters
     ----------
     landscape : Landscape
     search : StrictSearch
-        Where to begin, or to go on.
+        Initial or resumed state.
     target : Target
-        The energy, and how well forces are to balance.
+        Energy, and tolerance of force balance.
 
     Yields
     ------
@@ -130,7 +124,7 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
     Raises
     ------
     TargetError
-        As `target.direct`, where the packing unjams on the way and is led to the energy again.
+        As `target.direct`, if the packing unjams on the way and is relaxed again.
     """
     radius = 0.5 * landscape.length
     while not search.done:
@@ -161,7 +155,7 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
 def _take(
     landscape: Landscape, search: StrictSearch, target: Target, way: tuple[Sliding, Step]
 ) -> None:
-    """Take a step if the energy falls, and judge how far the next one may go."""
+    """Take a step if the energy falls, and adapt the next one."""
     sliding, step = way
     radius, reach = 0.5 * landscape.length, float(search.farthest.max())
     shift, turn = sliding.matrix.coordinates.motion(step.vector)
@@ -187,7 +181,7 @@ def _take(
 
 
 def _next_farthest(search: StrictSearch, moved: FloatArray, longest: float) -> FloatArray:
-    """Let particles go further that go on in their direction, and less far where they turn back."""
+    """Extend the limits of particles that continue in their direction, and reduce those that turn back."""
     if search.last is None:
         return search.farthest
     size, before = (np.linalg.norm(part, axis=1) for part in (moved, search.last))
@@ -198,11 +192,11 @@ def _next_farthest(search: StrictSearch, moved: FloatArray, longest: float) -> F
 
 
 def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
-    """Lead what has met its walls to the energy, and look whether it is a minimum."""
+    """Relax a state that has met its walls at the energy, and check whether it is a minimum."""
     minimum = find(landscape, search.minimum.state, target)
     settled = _settled(landscape, minimum.state)
     is_better = settled.residual.largest < minimum.residual.largest
-    if is_better and target.is_met(settled.energy_density):  # it has not fallen apart
+    if is_better and target.is_met(settled.energy_density):  # still jammed
         minimum = replace(settled, outcome=minimum.outcome)
     search.n_closed += 1
     minimum, search.proof = _against_walls(landscape, minimum, target)
@@ -218,11 +212,11 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
 
 
 def _against_walls(landscape: Landscape, minimum: Minimum, target: Target) -> tuple[Minimum, Proof]:
-    """Bring what leans on a wall with less than digits tell into contact with it.
+    """Close walls that are nearer than digits resolve.
 
-    Whether such a wall is open or closed is decided by rounding; with forces balanced as well, the state in which it is closed
-    is the minimum. Nudges along the mode that it stops, both ways, find that state where there is one. On a kink, which
-    keeps forces from balancing better, they are to balance as well as is asked for.
+    Rounding decides whether such a wall is open or closed; if forces balance equally well, the state with the wall
+    closed is the minimum. Nudges along the stopped mode, both ways, find that state if it exists. On a kink, which
+    limits the force balance, the requested tolerance suffices.
     """
     modes = ModesOffKinks.of(landscape, minimum.state)
     proof = modes.proof()
@@ -242,16 +236,16 @@ def _against_walls(landscape: Landscape, minimum: Minimum, target: Target) -> tu
 
 
 def _settled(landscape: Landscape, state: State) -> Minimum:
-    """Let forces balance at a fixed box as well as digits allow.
+    """Balance forces at a fixed box as well as digits allow.
 
-    What slides is pushed against its wall by so little that forces balance to any usual tolerance before it is there:
-    the wall is still open, and the mode that it would stop has a negative eigenvalue.
+    Sliding modes are pushed against their walls so weakly that forces balance to any usual tolerance before contact:
+    the wall is still open, and its mode has a negative eigenvalue.
     """
     return minimise(landscape, state, "newton", Stop(_SETTLED, evaluations=_EVALUATIONS))
 
 
 def _relaxed(landscape: Landscape, state: State) -> Minimum:
-    """Relax all that is stiffer than what slides."""
+    """Relax all modes stiffer than sliding ones."""
     return minimise(landscape, state, "newton", Stop(_RELAXED, evaluations=_EVALUATIONS))
 
 

@@ -1,4 +1,4 @@
-"""The search for a strict minimum, told of and in a file, from which it goes on after a kill."""
+"""The search for a strict minimum in a file, with progress, resumed after a kill."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from jamshape.files.h5md import read_attributes, read_packing
+from jamshape.files.h5md import read_packing
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum
 from jamshape.packing import State
-from jamshape.protocols.making import Progress, write_states
+from jamshape.protocols.making import Progress, stored_of, write_states
 from jamshape.protocols.recipe import Recipe
 from jamshape.protocols.strict import StrictSearch, descend, start
 
@@ -21,14 +21,14 @@ _STORE_SECONDS = 5.0
 
 @dataclass(eq=False)
 class StrictFile:
-    """The file of a search for a strict minimum.
+    """File of a search for a strict minimum.
 
     Parameters
     ----------
     path
     recipe
     attributes
-        What the search has found, for the file of the packing; empty before its end.
+        Results for the file of the packing; empty before the end.
     """
 
     path: Path
@@ -36,12 +36,10 @@ class StrictFile:
     attributes: dict[str, Any] = field(default_factory=dict)
 
     def read(self, landscape: Landscape) -> StrictSearch | None:
-        """Read where an earlier call has left the search, if it was one of this recipe."""
+        """Read the state of an earlier search with this recipe."""
         assert self.recipe.target is not None
-        if not self.path.exists():
-            return None
-        stored = read_attributes(self.path)
-        if any(stored.get(name) != value for name, value in self.recipe.attributes().items()):
+        stored = stored_of(self.path, self.recipe)
+        if stored is None:
             return None
         search = start(landscape, State.of(read_packing(self.path)))
         search.n_steps, search.n_fallen = int(stored["strict_steps"]), int(stored["strict_fallen"])
@@ -56,7 +54,7 @@ class StrictFile:
 def lead_strictly(
     landscape: Landscape, minimum: Minimum, file: StrictFile
 ) -> Generator[Progress, None, Minimum]:
-    """Lead a minimum on to a strict one, going on with what is in the file; errors as `strict.descend`.
+    """Continue from a minimum to a strict one, resuming from the file; errors as in `strict.descend`.
 
     Yields
     ------

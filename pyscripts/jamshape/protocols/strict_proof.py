@@ -1,8 +1,8 @@
-"""What proves that a state is a strict minimum: its modes, and what kinks of the energy take of them.
+"""Proof that a state is a strict minimum, from its modes and from kinks of the energy.
 
-A minimum may lie on a kink of the energy, where the tips of two rods are level (`vibration.kinks`). Second derivatives of one
-side are then negative, and no step lowers the energy: such a state is a minimum if its energy rises to both sides of the kink
-and no motion along the kink has a negative eigenvalue. What kinks take is counted apart, as `Proof.n_kinked`.
+A minimum may lie on a kink of the energy, where the tips of two rods are level (`vibration.kinks`). Second
+derivatives on one side are then negative although no step lowers the energy: such a state is a minimum if its energy
+rises on both sides and no motion along the kink has a negative eigenvalue. See `Proof.n_kinked` for the count.
 """
 
 from __future__ import annotations
@@ -20,24 +20,23 @@ from jamshape.vibration.kinks import held_at, kinks_across
 from jamshape.vibration.sparse_modes import lowest
 from jamshape.vibration.spectrum import Spectrum, spectrum
 
-# All modes are found up to so many coordinates, beyond only the softest.
-_DENSE = 3000
-_SOFTEST = 60
+_DENSE = 3000  # coordinates up to which all modes are found
+_SOFTEST = 60  # modes found beyond that
 
 
 @dataclass(frozen=True)
 class Proof:
-    """What is known of the modes of a minimum.
+    """Summary of the modes of a minimum.
 
     Parameters
     ----------
     n_negative
-        Number of modes with an eigenvalue below zero by more than its numerical bound, of motions that cross no kink
-        on which the minimum lies.
+        Number of modes with an eigenvalue below minus its numerical bound, for motions that cross no kink
+        of the minimum.
     lowest, bound
-        The lowest eigenvalue of these but those of translations, and the bound of its error, [energy / length^2].
+        Lowest of these eigenvalues, without translations, and its error bound, [energy / length^2].
     n_kinked
-        Number of negative eigenvalues that kinks take: the energy rises to both sides of them (`vibration.kinks`).
+        Number of negative eigenvalues removed by kinks, where the energy rises on both sides (`vibration.kinks`).
     """
 
     n_negative: int
@@ -51,7 +50,7 @@ class Proof:
         return ModesOffKinks.of(landscape, state).proof()
 
     def attributes(self) -> dict[str, Any]:
-        """Return what a packing's file says of it."""
+        """Return its numbers as attributes."""
         return {
             "n_negative": self.n_negative,
             "lowest_eigenvalue": self.lowest,
@@ -62,16 +61,16 @@ class Proof:
 
 @dataclass(frozen=True, eq=False)
 class ModesOffKinks:
-    """Modes of a state, of those motions that cross no kink on which it lies.
+    """Modes of a state for motions that cross none of its kinks.
 
     Parameters
     ----------
     matrix : DynamicalMatrix
-        With a stiff row across each kink.
+        Dynamical matrix with a stiff row across each kink.
     found : Spectrum
-        Its modes: all, or of large packings the softest.
+        All its modes, or the softest ones of large packings.
     n_falling
-        Number of negative eigenvalues before kinks were held.
+        Number of negative eigenvalues before kinks were constrained.
     """
 
     matrix: DynamicalMatrix
@@ -80,7 +79,7 @@ class ModesOffKinks:
 
     @classmethod
     def of(cls, landscape: Landscape, state: State) -> ModesOffKinks:
-        """Find them; where modes have negative eigenvalues, and kinks take some, twice."""
+        """Find the modes; twice, if modes have negative eigenvalues and kinks remove some."""
         matrix = dynamical_matrix(landscape, state, Scope(force=True))
         found = _modes(matrix)
         is_falling = (found.sign < 0) & ~found.is_translation
@@ -91,14 +90,14 @@ class ModesOffKinks:
         return cls(matrix, found, int(is_falling.sum()))
 
     def proof(self) -> Proof:
-        """Tell what they prove."""
+        """Return the proof."""
         first = self._lowest()
         n_negative = int((self.found.sign[~self.found.is_translation] < 0).sum())
         value, bound = float(self.found.eigenvalues[first]), float(self.found.bound[first])
         return Proof(n_negative, value, bound, self.n_falling - n_negative)
 
     def lowest_motion(self) -> tuple[FloatArray, FloatArray]:
-        """Return the displacements and turns of the lowest mode but translations, its largest entry 1."""
+        """Return displacements and rotations of the lowest nontranslational mode, with largest entry 1."""
         mode = self.found.vectors[:, self._lowest()]
         return self.matrix.coordinates.motion(mode / np.abs(mode).max())
 

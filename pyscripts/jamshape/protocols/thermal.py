@@ -1,6 +1,6 @@
 """Monte Carlo of hard particles: the thermal part of protocol 2 of Yuan et al. (2019), Sec. 2.2.
 
-Translations and rotations together, no overlap ever. The moves' sizes are led to an acceptance between runs
+Translations and rotations together, without any overlap. The size of moves is adapted to an acceptance between runs
 of a few sweeps.
 """
 
@@ -15,30 +15,29 @@ import numpy as np
 from jamshape.landscape import Landscape
 from jamshape.packing import Box, Packing, State
 
-# Share of the moves that are accepted, and what a block of sweeps changes of their size at most.
-_ACCEPTANCE = 0.35
-_CHANGE = 1.5
+_ACCEPTANCE = 0.35  # target fraction of accepted moves
+_CHANGE = 1.5  # largest change of their size between blocks
 
 _SWEEPS = 10
 
-# A box is opened by so little at a time until no particles overlap.
+# Increment by which a box is opened until no particles overlap.
 _OPENING = 1e-6
 
 
 @dataclass(eq=False)
 class Thermal:
-    """A simulation between two blocks of sweeps: all that is needed to go on from here.
+    """A simulation between two blocks of sweeps, with all that is needed to resume it.
 
     Parameters
     ----------
     packing
-        Without overlaps.
+        State without overlaps.
     n_done
         Sweeps so far.
     size
-        Of the moves: a shift of so many smallest radii, and a turn by so many radians.
+        Size of moves: displacements in smallest radii, and rotations in radians.
     acceptance
-        Of the last block.
+        Acceptance of the last block.
     """
 
     packing: Packing
@@ -48,16 +47,16 @@ class Thermal:
 
 
 def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]:
-    """Run sweeps, of one move a particle each, to a number of them.
+    """Run sweeps, of one move a particle each, up to a total number.
 
     Parameters
     ----------
     thermal : Thermal
-        Where to begin, or to go on.
+        Initial or resumed state.
     n_sweeps : int
         N_s.
     seed : int
-        The sequence depends on it and on `n_done` alone.
+        The sequence depends only on it and on `n_done`.
 
     Yields
     ------
@@ -67,7 +66,7 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
     Raises
     ------
     ValueError
-        If particles overlap at the start, the box is tilted or shorter than two of them, or moves have no
+        If particles overlap at the start, the box is tilted or shorter than two of them, or moves do not have a
         positive size.
     """
     _check(thermal)
@@ -75,7 +74,7 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
         packing, n = thermal.packing, min(_SWEEPS, n_sweeps - thermal.n_done)
         block = np.random.SeedSequence([seed, thermal.n_done]).generate_state(1, np.uint64)[0]
         bodies = packing.compiled()
-        # Moves that are longer than the box lead nowhere else.
+        # Moves longer than the box are redundant.
         longest = float(packing.box.edges.min())
         found = bodies.sweeps(
             packing.position - packing.box.lo,
@@ -111,7 +110,7 @@ def _check(thermal: Thermal) -> None:
 
 
 def without_overlaps(packing: Packing) -> Packing:
-    """Open the box of a minimised packing until its last overlaps, of rounding size, are gone."""
+    """Open the box of a minimised packing until its last overlaps, of rounding size, vanish."""
     opening = _OPENING
     while True:
         factor = 1 + opening

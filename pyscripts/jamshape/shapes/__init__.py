@@ -1,1 +1,1 @@
-"""What shapes are: one file for each, and the table of them; the only Python that knows which there are."""
+"""Definitions of the shapes: one file for each, and their table; other Python knows no shape by name."""

@@ -1,4 +1,4 @@
-"""Options that say which particles: the same for every driver, whatever the shape."""
+"""Options that specify particles, the same for every command and shape."""
 
 from __future__ import annotations
 
@@ -32,12 +32,10 @@ def add_particle_options(parser: ArgumentParser) -> None:
 
 
 def add_meaning_options(parser: ArgumentParser) -> None:
-    """Add --dimension and --shape, of files that do not say them."""
-    group = parser.add_argument_group(
-        "LAMMPS's data files and dumps that do not say what they hold"
-    )
-    group.add_argument("--dimension", type=int, choices=(2, 3), help="of the file's state")
-    group.add_argument("--shape", choices=SHAPES, help="of the file's particles")
+    """Add --dimension and --shape, for files that do not state them."""
+    group = parser.add_argument_group("LAMMPS's data files and dumps without dimension and shape")
+    group.add_argument("--dimension", type=int, choices=(2, 3), help="dimension of the file")
+    group.add_argument("--shape", choices=SHAPES, help="shape of its particles")
 
 
 def particles_of(options: Namespace) -> Particles:
@@ -46,12 +44,12 @@ def particles_of(options: Namespace) -> Particles:
     Raises
     ------
     ValueError
-        If an option is none of the shape, or out of its range.
+        If an option does not belong to the shape, or is out of its range.
     """
     shape, given = _shape(options), _given(options)
     if options.kind:
         if given or options.size_ratio is not None:
-            msg = "kinds and other sizes were given, expected a mixture's numbers in --kind alone"
+            msg = "--kind excludes --size-ratio and a shape's parameters, expected a mixture's numbers in --kind"
             raise ValueError(msg)
         return Particles.mixture(shape, options.kind)
     return Particles.of(shape, options.size_ratio, **given)
@@ -64,7 +62,7 @@ def are_particles_given(options: Namespace) -> bool:
 
 
 def particles_beside(options: Namespace) -> Particles | None:
-    """Read the particles; None where there is a start, which has its own, and none were asked for."""
+    """Read the particles; None if there is a start and no particles were given."""
     return None if options.start and not are_particles_given(options) else particles_of(options)
 
 
@@ -73,7 +71,7 @@ def _shape(options: Namespace) -> Shape:
 
 
 def _given(options: Namespace) -> dict[str, float]:
-    """Collect the parameters that were given, all of them the shape's."""
+    """Collect the given parameters; raise unless all belong to the shape."""
     shape, found = _shape(options), {}
     own = {parameter.option: parameter.name for parameter in shape.parameters}
     for parameter in _parameters():
@@ -82,14 +80,14 @@ def _given(options: Namespace) -> dict[str, float]:
             continue
         if parameter.option not in own:
             options_of_it = ", ".join(f"--{name}" for name in own)
-            msg = f"--{parameter.option} is no option of {shape.name}s, expected {options_of_it}"
+            msg = f"--{parameter.option} does not apply to {shape.name}s, expected {options_of_it}"
             raise ValueError(msg)
         found[own[parameter.option]] = value
     return found
 
 
 def _parameters() -> dict[Parameter, list[Shape]]:
-    """List all parameters with the shapes that have them; those of one option once."""
+    """List all parameters with the shapes that have them; once per option."""
     found: dict[Parameter, list[Shape]] = {}
     for shape in SHAPES.values():
         for parameter in shape.parameters:

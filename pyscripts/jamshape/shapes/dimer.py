@@ -15,21 +15,23 @@ from jamshape.shapes.solid import Balls
 
 
 class Dimer(ElongatedShape):
-    """Dimers with the harmonic law of the overlap 1 - r/d of every pair of discs."""
+    """Dimers: two equal discs (spheres) of radius R joined rigidly, centres A from the middle.
+
+    Every pair of discs has the harmonic law of the overlap 1 - r/d.
+    """
 
     name = "dimer"
-    compiled_name = "Dimers"
-    # Discs that coincide would count as four bonds with each neighbour.
+    # Coinciding discs would count as four bonds with each neighbour.
     parameters = (
         Parameter(
             "alpha", 1.0, "A/R: 1 where the discs just touch", "alpha",
-            Range(1e-6, 100.0, "A / R above 0, since a disc is a spherocylinder,"),
+            Range(1e-6, 100.0, "A / R above 0, as a disc is a spherocylinder,"),
         ),
     )  # fmt: skip
     examples = ({"alpha": 1.0}, {"alpha": 0.4}, {"alpha": 1.3})
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
-        """As `Shape.outline`."""
+        """See `Shape.outline`."""
         del exponent
         radius, A = diameters[1] / 2, self.spine(diameters)
         waist = self._waist(radius, A)
@@ -37,7 +39,7 @@ class Dimer(ElongatedShape):
         return np.concatenate([right, -right])
 
     def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
-        """As `Shape.surface`."""
+        """See `Shape.surface`."""
         del exponent
         radius, A = diameters[1] / 2, self.spine(diameters)
         part = arc(np.pi, self._waist(radius, A), 2 + 2 * 2**level)  # of the left sphere
@@ -46,12 +48,12 @@ class Dimer(ElongatedShape):
         return revolved(radius * normal + centre, normal, 8 * 2**level)
 
     def solid(self, diameters: FloatArray, exponent: float) -> Balls:
-        """As `Shape.solid`."""
+        """See `Shape.solid`."""
         del exponent
         A = self.spine(diameters)
         return Balls(np.array([[-A, 0.0, 0.0], [A, 0.0, 0.0]]), float(diameters[1]) / 2)
 
     @staticmethod
     def _waist(radius: float, A: float) -> float:
-        """Angle, seen from a disc's centre, between the line to the other one and where they meet."""
+        """Angle at a disc's centre between the line to the other disc and the point where they meet."""
         return float(np.arccos(min(A / radius, 1.0)))

@@ -1,4 +1,4 @@
-"""Triangles on the surface of a body, to draw it."""
+"""Triangle meshes of surfaces, for drawing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class SurfaceMesh(NamedTuple):
     """Triangles on the surface of a body, in body coordinates."""
 
     vertices: FloatArray
-    """(V, 3), [length], on the surface to rounding."""
+    """(V, 3), [length], on the surface up to rounding."""
     triangles: IntArray
     """(T, 3) rows of vertices, counter-clockwise seen from outside."""
     normals: FloatArray
@@ -30,12 +30,12 @@ def revolved(profile: FloatArray, slope: FloatArray, turns: int) -> SurfaceMesh:
     slope : (K, 2) array of float64
         Unit normals along x and away from the axis.
     turns : int
-        Corners of a ring.
+        Vertices of a ring.
 
     Returns
     -------
     SurfaceMesh
-        With K rings.
+        Mesh with K rings.
     """
     angle = 2 * np.pi * np.arange(turns) / turns
     around = np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -1,4 +1,4 @@
-"""Which particles a packing is made of: kinds of one shape, in any mixture."""
+"""Particles of a packing: mixtures of kinds of one shape."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Sizes(NamedTuple):
     """Shapes of n particles."""
 
     diameters: FloatArray
-    """(n, 3), [length], as LAMMPS has them."""
+    """(n, 3), [length], as in LAMMPS."""
     exponent: FloatArray
-    """(n,); ones for shapes without."""
+    """(n,); ones for shapes without exponent."""
     species: IntArray
     """(n,) kinds, LAMMPS types, from 1."""
 
@@ -30,16 +30,16 @@ class Sizes(NamedTuple):
 @checked_fields
 @dataclass(frozen=True)
 class Kind:
-    """Particles of a mixture that are alike.
+    """One kind of particles in a mixture.
 
     Parameters
     ----------
     parameters : mapping of str to float
-        Those of the shape, such as alpha; the shape's defaults where left out.
+        Parameters of the shape, such as alpha; the shape's defaults where missing.
     size : float
-        Over that of the unit of length (2R, or the shortest semi-axis a).
+        Relative to the unit of length (2R, or the shortest semi-axis a).
     share : float
-        Part of the number of particles, over the sum of all shares.
+        Number fraction, up to normalisation.
     spread : float
         Standard deviation of the logarithm of the size; 0 for equal particles.
 
@@ -73,10 +73,10 @@ class Particles:
     ----------
     shape : Shape
     draw : callable
-        ``draw(n, rng)`` returns the `Sizes` of n particles in any order; what is random in it comes
+        ``draw(n, rng)`` returns the `Sizes` of n particles in any order; all randomness comes
         from the `numpy.random.Generator`.
     told : mapping
-        What files say of it.
+        Metadata for files.
 
     Examples
     --------
@@ -99,21 +99,21 @@ class Particles:
     def of(
         cls, shape: str | Shape = DEFAULT, size_ratio: float | None = None, **parameters: float
     ) -> Particles:
-        """Equal particles, or small and big ones 1:1 of the same parameters.
+        """Equal particles, or a 1:1 mixture of small and big ones with the same parameters.
 
         Parameters
         ----------
         shape : str or Shape
         size_ratio : float, optional
-            Big over small, at least 1; what is usual for the shape when left out (1.4 for rods,
+            Size ratio, at least 1; the default depends on the shape (1.4 for rods,
             Marschall & Teitel 2018, Sec. II; 1, equal particles, for superellipsoids).
         **parameters : float
-            Of the shape; its defaults when left out.
+            Parameters of the shape; its defaults where missing.
 
         Raises
         ------
         ValueError
-            If there is no such shape or parameter, or a number is out of its range.
+            If the shape or a parameter is unknown, or a number is out of its range.
         """
         its = shape_named(shape) if isinstance(shape, str) else shape
         ratio = its.size_ratio if size_ratio is None else size_ratio
@@ -127,7 +127,7 @@ class Particles:
     @classmethod
     @checked
     def mixture(cls, shape: str | Shape, kinds: Sequence[Kind]) -> Particles:
-        """Mix kinds that may differ in everything but the shape, such as discs among rods.
+        """Mix kinds of one shape that may differ in all else, such as discs and rods.
 
         Raises
         ------
@@ -153,7 +153,7 @@ class Particles:
         exponent: ArrayLike | None = None,
         species: ArrayLike | None = None,
     ) -> Particles:
-        """Particles one by one: (n, 3) diameters, (n,) exponents and species from 1."""
+        """Specify individual particles: (n, 3) diameters, (n,) exponents and species from 1."""
         its = shape_named(shape) if isinstance(shape, str) else shape
         d = np.atleast_2d(real_numbers("diameters", diameters).astype(np.float64))
         p = (
@@ -171,7 +171,7 @@ class Particles:
         Raises
         ------
         ValueError
-            If n < 1, or the draw is not n particles of the shape.
+            If n < 1, or `draw` does not return n particles of the shape.
         """
         require_stated(n=n)
         sizes = self.draw(n, rng)
@@ -184,18 +184,18 @@ class Particles:
         d = np.asarray(sizes.diameters, np.float64)
         valid = np.isfinite(d).all() and (d > 0).all() and self.shape.fits(d)
         if not valid:
-            msg = f"a particle of the mixture is no {self.shape.name}, expected {self.shape.rule()}"
+            msg = f"a particle of the mixture is not a {self.shape.name}, expected {self.shape.rule()}"
             raise ValueError(msg)
         return Sizes(d, np.asarray(sizes.exponent, np.float64), np.asarray(sizes.species, np.int64))
 
 
 def parse_kind(text: str) -> Kind:
-    """Read a kind as command lines have it, such as ``alpha=4,size=1.4,share=0.5``.
+    """Parse a kind from the command line, such as ``alpha=4,size=1.4,share=0.5``.
 
     Raises
     ------
     ValueError
-        If it is not such a text.
+        If the text has another format.
     """
     try:
         numbers = {k.strip(): float(v) for k, v in (part.split("=") for part in text.split(","))}
@@ -217,7 +217,7 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, f
     given = {by_option.get(name, name): value for name, value in parameters.items()}
     for name in given:
         if name not in known:
-            msg = f"{name} is no parameter of {shape.name}s, expected {', '.join(known)}"
+            msg = f"{name} is not a parameter of {shape.name}s, expected {', '.join(known)}"
             raise ValueError(msg)
     chosen = known | given
     for parameter in shape.parameters:
@@ -227,7 +227,7 @@ def _with_defaults(shape: Shape, parameters: Mapping[str, float]) -> dict[str, f
 
 @dataclass(frozen=True)
 class _Mixture:
-    """Draws particles of kinds by their shares. A class, as pickles do not take functions within functions."""
+    """Draws particles of kinds by their shares. A class, because pickle rejects nested functions."""
 
     shape: Shape
     kinds: Sequence[Kind]
@@ -247,7 +247,7 @@ class _Mixture:
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """Gives particles that are known one by one."""
+    """Returns individually specified particles."""
 
     sizes: Sizes
 
@@ -257,7 +257,7 @@ class _Given:
 
 
 def _numbers(n: int, shares: Sequence[float]) -> IntArray:
-    """Divide n in shares: what is left over goes to the largest remainders, the first of equal ones."""
+    """Divide n by shares; the rest goes to the largest remainders, the first of equal ones."""
     exact = n * np.asarray(shares) / np.sum(shares)
     whole: IntArray = np.floor(exact).astype(np.int64)
     left = n - int(whole.sum())

@@ -1,9 +1,9 @@
-"""How big, how round and how long superellipsoids are.
+"""Volume, surface area, asphericity and aspect ratios of superellipsoids.
 
 Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019), Sec. 2.1. The surface of a superellipsoid with
 semi-axes a, b, c is |x/a|^2p + |y/b|^2p + |z/c|^2p = 1: p = 1 is an ellipsoid, p < 1 is like an octahedron
 (p = 1/2 is one) and p > 1 like a box. Shapes are (..., 3) semi-axes along the body's x, y, z, in any
-order, and an exponent p, a number or (...). What is printed as a, b, c in the paper is their sorted order,
+order, and an exponent p, a number or (...). The paper's a, b, c are the sorted semi-axes,
 a <= b <= c.
 """
 
@@ -19,11 +19,11 @@ from jamshape.arrays import FloatArray
 
 OCTAHEDRON = 0.5  # the least p of a convex body
 
-# Quadrature ends when halving its step changes the area by less than this fraction.
+# Quadrature stops when halving its step changes the area by less than this fraction; steps are tried in turn.
 _CONVERGED = 1e-13
 _STEPS = (1 / 4, 1 / 8, 1 / 16, 1 / 32)
 
-# The integrand is left out where its weight has fallen to exp of minus this.
+# The integrand is truncated where its weight has fallen to exp of minus this.
 _TAIL = 40.0
 
 
@@ -33,11 +33,11 @@ class SurfaceArea(NamedTuple):
     area: FloatArray
     """(...), [length^2]"""
     error: FloatArray
-    """(...), [length^2]: by how much the last halving of the step changed it."""
+    """(...), [length^2]: change by the last halving of the step."""
 
 
 def checked(semi_axes: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Check shapes of convex superellipsoids, and give each its own exponent.
+    """Check shapes of convex superellipsoids, and broadcast the exponents.
 
     Parameters
     ----------
@@ -65,19 +65,19 @@ def checked(semi_axes: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]
     convex = np.isfinite(exponent) & (exponent >= OCTAHEDRON)
     if not convex.all():
         found = f"exponent p is {exponent[~convex][0] if exponent.ndim else exponent}"
-        msg = f"{found}, expected at least 1/2: below that the body is not convex"
+        msg = f"{found}, expected at least 1/2, for which bodies are convex"
         raise ValueError(msg)
     try:
         shape = np.broadcast_shapes(axes.shape[:-1], exponent.shape)
     except ValueError:
         found = f"{axes.shape[:-1]} shapes have {exponent.shape} exponents p"
-        msg = f"{found}, expected one for all or one for each"
+        msg = f"{found}, expected one for all or one each"
         raise ValueError(msg) from None
     return np.broadcast_to(axes, (*shape, 3)), np.broadcast_to(exponent, shape)
 
 
 def axes_from(w1: ArrayLike, w2: ArrayLike) -> FloatArray:
-    """Semi-axes (a, b, c) in units of a, of aspect ratios w1 = a/b and w2 = c/b.
+    """Semi-axes (a, b, c) in units of a from aspect ratios w1 = a/b and w2 = c/b.
 
     Yuan et al. 2019, Sec. 2.1, where lengths are in units of a. Spheroids have one aspect ratio w there:
     oblate, b = c, w = a/c < 1: (w1, w2) = (w, 1); prolate, a = b, w = c/a > 1: (w1, w2) = (1, w).
@@ -109,7 +109,7 @@ def axes_from(w1: ArrayLike, w2: ArrayLike) -> FloatArray:
 def volume(semi_axes: ArrayLike, p: ArrayLike) -> FloatArray:
     """Volume, 8 a b c Gamma(1 + 1/2p)^3 / Gamma(1 + 3/2p).
 
-    Parameters and errors are those of `checked`.
+    See `checked` for parameters and errors.
 
     Returns
     -------
@@ -130,11 +130,11 @@ def surface_area(semi_axes: ArrayLike, p: ArrayLike) -> SurfaceArea:
     .. math:: A = 3 V \left\langle \sqrt{u^m / a^2 + v^m / b^2 + w^m / c^2} \right\rangle,
         \quad m = 2 - 1/p.
 
-    With u = 1/(1 + e^y), v/w = e^z the average over y and z has a bounded integrand that is smooth and
-    dies out exponentially, for all p; and double exponentially in :math:`\sinh^{-1}`, where equal steps
-    are taken. For p = 1, :math:`A = 4 \pi R_G(a^2 b^2, b^2 c^2, c^2 a^2)` (Carlson).
+    With u = 1/(1 + e^y), v/w = e^z the average over y and z has a smooth bounded integrand that
+    decays exponentially, for all p; and double exponentially in :math:`\sinh^{-1}`, which is sampled at equal
+    steps. For p = 1, :math:`A = 4 \pi R_G(a^2 b^2, b^2 c^2, c^2 a^2)` (Carlson).
 
-    Parameters and errors are those of `checked`.
+    See `checked` for parameters and errors.
 
     Returns
     -------
@@ -152,17 +152,17 @@ def surface_area(semi_axes: ArrayLike, p: ArrayLike) -> SurfaceArea:
 def asphericity(semi_axes: ArrayLike, p: ArrayLike) -> FloatArray:
     """Asphericity, 1 - (4 pi)^(1/3) (3 V)^(2/3) / A: 0 for a sphere, 1 for a needle or a sheet.
 
-    Yuan et al. 2019, Eq. 2. (Their text has 1 for spheres, and the right-hand sides of their Eqs. 8
+    Yuan et al. 2019, Eq. 2. (Their text has 1 for spheres; the right-hand sides of their Eqs. 8
     and 9, of oblate and prolate ellipsoids, are 1 minus this.)
 
-    Parameters and errors are those of `checked`.
+    See `checked` for parameters and errors.
 
     Returns
     -------
     (...) array of float64
     """
     of_sphere = np.cbrt(4 * np.pi * (3 * volume(semi_axes, p)) ** 2)
-    # Rounding may leave a sphere just below 0.
+    # Rounding may give a value just below 0 for a sphere.
     return np.maximum(0.0, 1 - of_sphere / surface_area(semi_axes, p).area)
 
 
@@ -210,8 +210,8 @@ def _area_of(axes: FloatArray, p: float) -> tuple[float, float]:
 def _mean_slope(axes: FloatArray, p: float, step: float) -> float:
     """Average of the root in `surface_area`, by the trapezoidal rule.
 
-    Both coordinates are (pi/2) sinh(xi). Everything is kept as logarithms: at p = 10 coordinates go
-    up to 800. The weights' own sum takes the place of their integral, a product of beta functions.
+    Both coordinates are (pi/2) sinh(xi). All is kept as logarithms: at p = 10 coordinates reach
+    800. The sum of the weights replaces their integral, a product of beta functions.
     """
     reach = np.arcsinh(_TAIL * 2 * p / (np.pi / 2))
     n = int(np.ceil(reach / step))
@@ -221,7 +221,7 @@ def _mean_slope(axes: FloatArray, p: float, step: float) -> float:
     power, m = 0.5 / p, 2 - 1 / p
     outer = stretch * np.exp(power * log_more + 2 * power * log_less)
     inner = stretch * np.exp(power * (log_more + log_less))
-    # The one that stands alone is the longest: its corner of the surface is the sharpest.
+    # The longest axis stands alone: its corner of the surface is the sharpest.
     b, c, a = axes
     pair = np.exp(m * log_less) / b**2 + np.exp(m * log_more) / c**2
     slope = np.sqrt(np.exp(m * log_more)[:, None] / a**2 + np.exp(m * log_less)[:, None] * pair)

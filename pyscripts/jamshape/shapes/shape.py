@@ -1,7 +1,7 @@
-"""What the library knows of a shape: one object for each, listed in `jamshape.shapes.table`.
+"""Interface of a shape: one object for each, listed in `jamshape.shapes.table`.
 
-Geometry and energies are those of `lammps_plugin/contact/`; what stands here names them, says which numbers
-describe a particle, and draws it.
+Geometry and energies are those of `lammps_plugin/contact/`; a `Shape` names them, defines the parameters
+of a particle, and draws it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def in_name(number: float) -> str:
-    """Write a number in the name of a file: with six digits if these are all, else with as many as it has.
+    """Format a number for a file name: with six digits if these suffice, else with all.
 
     Examples
     --------
@@ -40,19 +40,19 @@ class Parameter(NamedTuple):
     default: float
     meaning: str
     option: str
-    """Its name on command lines and in names of files."""
+    """Name on command lines and in file names."""
     allowed: Range
-    """What users may ask for: the range in which it was tried."""
+    """Allowed range, in which it was tested."""
 
     @property
     def symbol(self) -> str:
-        """In TeX, without dollars."""
+        """TeX symbol, without dollars."""
         texts = {"alpha": r"\alpha", "exponent": "p", "w1": "w_1", "w2": "w_2"}
         return texts.get(self.name, self.name)
 
 
 class Style(NamedTuple):
-    """How LAMMPS is told of a packing's interactions."""
+    """LAMMPS commands for the interactions of a packing."""
 
     types: IntArray
     """(N,) LAMMPS types of the particles."""
@@ -61,14 +61,14 @@ class Style(NamedTuple):
 
 
 class Interaction(NamedTuple):
-    """The constants of the contacts: what energy and forces of a packing depend on beside its particles.
+    """Constants of the contacts: beside the particles, all that energy and forces of a packing depend on.
 
     Parameters
     ----------
     k_e : float, [energy]
         Stiffness of a contact.
     sides : {1, 2}
-        Bonds of a side-to-side contact, of shapes that have both laws.
+        Bonds of a side-to-side contact, for shapes that have both laws.
 
     Examples
     --------
@@ -85,17 +85,17 @@ class Interaction(NamedTuple):
     k_e: float = 1.0
     """[energy]"""
     sides: int = 2
-    """Bonds of a side-to-side contact, 1 or 2, of shapes that have both laws."""
+    """Bonds of a side-to-side contact, 1 or 2, for shapes that have both laws."""
 
     @classmethod
     def told(cls, known: Mapping[str, Any]) -> Interaction:
-        """Take the constants that a mapping holds under their names; the usual ones where it holds none."""
+        """Read the constants from a mapping by name; defaults where missing."""
         usual = cls()
         k_e, sides = (known.get(name, getattr(usual, name)) for name in cls._fields)
         return cls(float(k_e), int(sides))
 
     def but(self, k_e: float | None = None, sides: int | None = None) -> Interaction:
-        """Replace constants; those that are None stay."""
+        """Replace the constants that are not None."""
         return Interaction(self.k_e if k_e is None else k_e, self.sides if sides is None else sides)
 
 
@@ -103,31 +103,34 @@ class Shape(ABC):
     """A shape of particles."""
 
     name: ClassVar[str]
-    """As files and command lines have it."""
-    compiled_name: ClassVar[str]
-    """Its class in `jamshape._contact`."""
+    """Name in files and on command lines."""
     parameters: ClassVar[tuple[Parameter, ...]]
     unit: ClassVar[str]
-    """The length that is 1 for a particle of size 1."""
+    """Length that equals 1 for a particle of size 1."""
     examples: ClassVar[tuple[Mapping[str, float], ...]]
-    """Parameters that take all paths of its contacts between them, the most typical ones first: to test with."""
+    """Parameters for tests, most typical first; together they take all code paths of its contacts."""
     dimension: ClassVar[int] = 2
-    """Of packings, when nobody says."""
+    """Default dimension of packings."""
     size_ratio: ClassVar[float] = 1.0
-    """Of mixtures, when nobody says; 1 for equal particles."""
+    """Default size ratio; 1 for equal particles."""
     has_exponent: ClassVar[bool] = False
 
     def __eq__(self, other: object) -> bool:
-        """Tell whether it is the same shape; copies and pickles of a shape are."""
+        """Return whether it is the same shape; true for copies and pickles."""
         return type(self) is type(other) and vars(self) == vars(other)
 
     def __hash__(self) -> int:
         return hash(type(self))
 
+    @property
+    def compiled_name(self) -> str:
+        """Name of its class in `jamshape._contact`, and of the function that makes particles."""
+        return f"{self.name.capitalize()}s"
+
     def compiled(
         self, particles: tuple[FloatArray, FloatArray], dimension: int, law: Interaction
     ) -> Any:
-        """Make the object of `jamshape._contact` that knows the contacts of some particles.
+        """Make the object of `jamshape._contact` that evaluates contacts of some particles.
 
         Parameters
         ----------
@@ -139,18 +142,18 @@ class Shape(ABC):
         Raises
         ------
         ValueError
-            If one of them is no such shape.
+            If a particle does not have this shape.
         """
-        # Imported here so that reading and writing files needs no compiled module.
+        # Imported here so that files can be read and written without the compiled module.
         contact = importlib.import_module("jamshape._contact")
         return getattr(contact, self.compiled_name)(*particles, dimension, law.k_e, law.sides)
 
     @abstractmethod
     def fits(self, diameters: FloatArray) -> bool:
-        """Whether (N, 3) diameters can be those of this shape."""
+        """Whether (N, 3) diameters fit this shape."""
 
     def placed(self, diameters: FloatArray, dimension: int) -> tuple[FloatArray, IntArray]:
-        """Name the axes of bodies as this shape names them, where other programs have another order.
+        """Reorder the axes of bodies to this shape's convention; other programs order them otherwise.
 
         Parameters
         ----------
@@ -160,7 +163,7 @@ class Shape(ABC):
         Returns
         -------
         (N, 3) array of float64, (N,) array of int64
-            Diameters of the same bodies, and which of the axes that were given is now the first one, after a
+            Diameters of the same bodies, and which of the given axes is now the first, after a
             rotation about one axis.
         """
         del dimension
@@ -168,13 +171,13 @@ class Shape(ABC):
 
     @abstractmethod
     def rule(self) -> str:
-        """Say what its diameters are."""
+        """Describe its diameters, for messages."""
 
     @abstractmethod
     def sizes(
         self, parameters: Mapping[str, float], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Turn parameters and (n,) sizes into (n, 3) diameters and (n,) exponents.
+        """Convert parameters and (n,) sizes to (n, 3) diameters and (n,) exponents.
 
         Raises
         ------
@@ -186,21 +189,21 @@ class Shape(ABC):
     def parameters_of(
         self, diameters: FloatArray, exponent: float
     ) -> tuple[dict[str, float], float]:
-        """Tell the parameters and the size of one particle, of (3,) diameters: the inverse of `sizes`."""
+        """Return parameters and size of a particle from (3,) diameters: the inverse of `sizes`."""
 
     def style(self, packing: Any, law: Interaction) -> Style:
-        """Tell LAMMPS of a packing of this shape."""
+        """Return the LAMMPS commands for a packing of this shape."""
         command = f"pair_style {self.name}/harmonic\npair_coeff * * {law.k_e!r}"
         return Style(packing.species, command)
 
     def described(self, diameters: FloatArray, exponent: FloatArray) -> dict[str, float]:
-        """Give numbers that describe the first of (N, 3) diameters and (N,) exponents."""
+        """Return descriptors of the first of (N, 3) diameters and (N,) exponents."""
         del diameters, exponent
         return {}
 
     @abstractmethod
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
-        """(K, 2) corners of a polygon around a particle in the plane, in body coordinates."""
+        """(K, 2) vertices of a polygon around a particle in the plane, in body coordinates."""
 
     @abstractmethod
     def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
@@ -208,25 +211,25 @@ class Shape(ABC):
 
     @abstractmethod
     def solid(self, diameters: FloatArray, exponent: float) -> Solid:
-        """Describe a particle to programs that do not know the shape."""
+        """Describe a particle for programs that do not know the shape."""
 
     def spine(self, diameters: FloatArray) -> float:
-        """Half length of the line along the body's x that tells its direction; 0 for none."""
+        """Half length of the line along the body's x that shows its direction; 0 for none."""
         del diameters
         return 0.0
 
     def label(self, parameters: Mapping[str, float]) -> str:
-        """Write parameters in TeX, for a legend."""
+        """Format parameters in TeX, for a legend."""
         told = [f"{p.symbol}={parameters[p.name]:g}" for p in self.parameters]
         return f"${', '.join(told)}$"
 
     def stem(self, parameters: Mapping[str, float]) -> str:
-        """Name files of packings of such particles."""
+        """Return the stem of file names for packings of such particles."""
         numbers = [p.option + in_name(parameters[p.name]) for p in self.parameters]
         return "_".join([self.name, *numbers])
 
 
-# Diameters that differ by less are alike, but for rounding.
+# Diameters that differ by less are equal up to rounding.
 _ROUNDING = 1e-12
 
 
@@ -243,17 +246,17 @@ class ElongatedShape(Shape):
     size_ratio = 1.4
 
     def fits(self, diameters: FloatArray) -> bool:
-        """As `Shape.fits`."""
+        """See `Shape.fits`."""
         long, short, other = diameters.T
         return bool(((short == other) & (long >= short)).all())
 
     def placed(self, diameters: FloatArray, dimension: int) -> tuple[FloatArray, IntArray]:
-        """As `Shape.placed`: the long axis comes first, and diameters that differ by rounding are alike."""
+        """See `Shape.placed`: the long axis comes first; diameters within rounding count as equal."""
         low, middle, high = np.sort(diameters).T
         is_round = high - low <= _ROUNDING * high
         first = np.where(is_round, 0, diameters.argmax(axis=1))
         is_body = (middle - low <= _ROUNDING * high) | is_round
-        # In the plane bodies turn about z only.
+        # In the plane bodies rotate about z only.
         is_body &= (first < 2) | (dimension == 3)
         fits = (diameters[:, 1] == diameters[:, 2]) & (diameters[:, 0] >= diameters[:, 1])
         is_other = is_body & (~fits | (is_round & (high > low)))
@@ -263,13 +266,13 @@ class ElongatedShape(Shape):
         return found, np.where(is_other, first, 0)
 
     def rule(self) -> str:
-        """As `Shape.rule`."""
+        """See `Shape.rule`."""
         return "(2(A+R), 2R, 2R) with A >= 0"
 
     def sizes(
         self, parameters: Mapping[str, float], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """As `Shape.sizes`."""
+        """See `Shape.sizes`."""
         radius = 0.5 * size
         half_length = parameters["alpha"] * radius
         long = 2 * (half_length + radius)
@@ -278,11 +281,11 @@ class ElongatedShape(Shape):
     def parameters_of(
         self, diameters: FloatArray, exponent: float
     ) -> tuple[dict[str, float], float]:
-        """As `Shape.parameters_of`."""
+        """See `Shape.parameters_of`."""
         del exponent
         width = float(diameters[1])
         return {"alpha": float(diameters[0] - width) / width}, width
 
     def spine(self, diameters: FloatArray) -> float:
-        """As `Shape.spine`."""
+        """See `Shape.spine`."""
         return float(diameters[0] - diameters[1]) / 2

@@ -1,7 +1,7 @@
-"""Pairs of bodies one by one, as `lammps_plugin/contact/` sees them: for studies of its errors and of its cost.
+"""Contacts of individual pairs of bodies from `lammps_plugin/contact/`, for studies of error and cost.
 
-Bodies are C-contiguous rows: of spherocylinders centre, unit axis, half length and radius; of superellipsoids centre,
-angle or quaternion, semi-axes and exponent. Packings are evaluated by the classes of each shape instead.
+Bodies are C-contiguous rows: centre, unit axis, half length and radius of spherocylinders; centre,
+angle or quaternion, semi-axes and exponent of superellipsoids. Packings use the classes of each shape instead.
 """
 
 from jamshape._contact import (

@@ -1,4 +1,4 @@
-"""Bodies in the words of other programs, which know none of our shapes: what `Shape.solid` answers.
+"""Bodies in terms of other programs, which do not know our shapes, as `Shape.solid` returns them.
 
 All are in body coordinates, and lengths in those of the packing.
 """
@@ -18,7 +18,7 @@ class RoundedSegment:
     half_length: float
     radius: float
     GLYPH: ClassVar[str] = "Spherocylinder"
-    """As OVITO calls it."""
+    """OVITO's name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Superquadric:
     """(3,)"""
     roundness: float
     GLYPH: ClassVar[str] = "Sphere"
-    """As OVITO calls it, which makes it rounder or less by another property."""
+    """OVITO's name; another property sets its roundness."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,31 +17,33 @@ from jamshape.shapes.solid import RoundedSegment
 
 
 class Spherocylinder(ElongatedShape):
-    """Spherocylinders with the harmonic law of the overlap 1 - r/d (Eqs. 3 and 22)."""
+    """Spherocylinders: segments of length 2A thickened by the radius R (Marschall & Teitel 2018).
+
+    Contacts have the harmonic law of the overlap 1 - r/d (Eqs. 3 and 22).
+    """
 
     name = "spherocylinder"
-    compiled_name = "Spherocylinders"
     examples = ({"alpha": 4.0}, {"alpha": 0.01}, {"alpha": 0.0})
 
     def style(self, packing: Any, law: Interaction) -> Style:
-        """As `Shape.style`; `sides` says how many bonds a side-to-side contact has."""
+        """See `Shape.style`; `sides` is the number of bonds of a side-to-side contact."""
         sides = ("one", "two")[law.sides - 1]
         command = f"pair_style {self.name}/harmonic sides {sides}\npair_coeff * * {law.k_e!r}"
         return Style(packing.species, command)
 
     def stem(self, parameters: Mapping[str, float]) -> str:
-        """As `Shape.stem`."""
+        """See `Shape.stem`."""
         return "alpha" + in_name(parameters["alpha"])
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
-        """As `Shape.outline`."""
+        """See `Shape.outline`."""
         del exponent
         radius, A = diameters[1] / 2, self.spine(diameters)
         right = radius * arc(-np.pi / 2, np.pi / 2, points // 2) + [A, 0.0]
         return np.concatenate([right, -right])
 
     def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
-        """As `Shape.surface`."""
+        """See `Shape.surface`."""
         del exponent
         radius, A = diameters[1] / 2, self.spine(diameters)
         cap = arc(0, np.pi / 2, 2 + 2**level)
@@ -50,6 +52,6 @@ class Spherocylinder(ElongatedShape):
         return revolved(radius * normal + ends, normal, 8 * 2**level)
 
     def solid(self, diameters: FloatArray, exponent: float) -> RoundedSegment:
-        """As `Shape.solid`."""
+        """See `Shape.solid`."""
         del exponent
         return RoundedSegment(self.spine(diameters), float(diameters[1]) / 2)

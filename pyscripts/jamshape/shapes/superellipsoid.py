@@ -20,10 +20,13 @@ from jamshape.shapes.superellipsoid_surface import surface_mesh
 
 
 class Superellipsoid(Shape):
-    """Superellipsoids with U = epsilon/2 (eta^2 - 1)^2 (Eq. 3)."""
+    """Superellipsoids ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1`` (Yuan et al. 2019, Eqs. 1 and 2).
+
+    Contacts have the energy epsilon/2 (eta^2 - 1)^2 (Eq. 3). p is 1 for ellipsoids, more towards boxes, less
+    towards octahedra.
+    """
 
     name = "superellipsoid"
-    compiled_name = "Superellipsoids"
     parameters = (
         Parameter(
             "exponent", 1.0, "p of |x/a|^2p + |y/b|^2p + |z/c|^2p = 1", "p",
@@ -43,33 +46,33 @@ class Superellipsoid(Shape):
     has_exponent = True
 
     def fits(self, diameters: FloatArray) -> bool:
-        """As `Shape.fits`."""
+        """See `Shape.fits`."""
         return bool((diameters > 0).all())
 
     def rule(self) -> str:
-        """As `Shape.rule`."""
+        """See `Shape.rule`."""
         return "(2a, 2b, 2c), all positive"
 
     def sizes(
         self, parameters: Mapping[str, float], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """As `Shape.sizes`."""
+        """See `Shape.sizes`."""
         axes = axes_from(parameters["w1"], parameters["w2"])
         return size[:, None] * (2 * axes), np.full(len(size), parameters["exponent"])
 
     def parameters_of(
         self, diameters: FloatArray, exponent: float
     ) -> tuple[dict[str, float], float]:
-        """As `Shape.parameters_of`; in units of a, the shortest of the semi-axes."""
+        """See `Shape.parameters_of`; in units of the shortest semi-axis a."""
         a, b, c = (float(axis) for axis in np.sort(diameters) / 2)
         return {"exponent": float(exponent), "w1": a / b, "w2": c / b}, a
 
     def style(self, packing: Any, law: Interaction) -> Style:
-        """As `Shape.style`; exponents are per type in LAMMPS."""
+        """See `Shape.style`; exponents are per type in LAMMPS."""
         types = packing.species
         exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
         if any((own != own[0]).any() for own in exponents.values()):
-            # Species hold particles of several exponents: each exponent gets a type.
+            # A species may hold several exponents: each exponent gets a type.
             types = 1 + np.unique(packing.exponent, return_inverse=True)[1].astype(np.int64)
             exponents = {int(k): packing.exponent[types == k] for k in np.unique(types)}
         lines = [f"pair_style {self.name}/harmonic", f"pair_coeff * * {law.k_e!r}"]
@@ -85,20 +88,20 @@ class Superellipsoid(Shape):
         }
 
     def stem(self, parameters: Mapping[str, float]) -> str:
-        """As `Shape.stem`."""
+        """See `Shape.stem`."""
         exponent, w1, w2 = (in_name(parameters[p.name]) for p in self.parameters)
         return f"p{exponent}_w{w1}_{w2}"
 
     def outline(self, diameters: FloatArray, exponent: float, points: int = 64) -> FloatArray:
-        """As `Shape.outline`."""
+        """See `Shape.outline`."""
         turn = arc(0, 2 * np.pi, points + 1)[:-1]
         scaled: FloatArray = np.sign(turn) * np.abs(turn) ** (1 / exponent) * diameters[:2] / 2
         return scaled
 
     def surface(self, diameters: FloatArray, exponent: float, level: int = 3) -> SurfaceMesh:
-        """As `Shape.surface`."""
+        """See `Shape.surface`."""
         return surface_mesh(diameters / 2, exponent, level)
 
     def solid(self, diameters: FloatArray, exponent: float) -> Superquadric:
-        """As `Shape.solid`."""
+        """See `Shape.solid`."""
         return Superquadric(diameters / 2, 1 / exponent)

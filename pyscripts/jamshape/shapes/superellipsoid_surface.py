@@ -1,4 +1,4 @@
-"""Surfaces of superellipsoids as triangles, to draw them."""
+"""Triangle meshes of superellipsoids, for drawing."""
 
 from __future__ import annotations
 
@@ -9,23 +9,22 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.roundness import checked
 
-# Newton's method on logarithms: steps below this are rounding, and it takes about ten.
-_STILL = 1e-12
-_MOST_STEPS = 200
+_STILL = 1e-12  # steps of Newton's method on logarithms below this are rounding
+_MOST_STEPS = 200  # it takes about ten
 
-# Below this exponent 2p normals turn within so little of the surface that triangles there would be
-# slivers; those of this exponent are taken.
+# Below this exponent 2p the normals rotate within so little of the surface that triangles there would be
+# slivers; this exponent is used instead.
 _SHARP = 1.3
 
-# Stands for the logarithm of 0.
+# Replaces the logarithm of 0.
 _NOTHING = -600.0
 
 
 def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
     """Cover a superellipsoid evenly with triangles.
 
-    Seen from the centre of a body in which position and normal count the same, |x|^2p + ... = 1 with
-    x + n instead of x, the vertices are those of a sphere's mesh; so flat sides, edges and tips all get
+    The vertices are those of a sphere's mesh, mapped so that position and normal count equally:
+    |x|^2p + ... = 1 with x + n in place of x. So flat sides, edges and tips all get
     their share, at p from 0.5 to 20. The mesh has the symmetry of the body: edges of a box lie on
     edges of triangles, and so do those of an octahedron.
 
@@ -34,7 +33,7 @@ def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
     semi_axes : (3,) array_like, [length]
     p : float
     level : int
-        Each makes four triangles of one: 48, 192, 768, 3072 ...
+        Each level makes four triangles of one: 48, 192, 768, 3072 ...
 
     Returns
     -------
@@ -43,7 +42,7 @@ def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
     Raises
     ------
     ValueError
-        If level is negative, there are several shapes, or the shape is none (`checked`).
+        If level is negative, there are several shapes, or the shape is invalid (`checked`).
     """
     axes, exponent = checked(semi_axes, p)
     if axes.shape != (3,) or level < 0:
@@ -63,7 +62,7 @@ def surface_mesh(semi_axes: ArrayLike, p: float, level: int = 3) -> SurfaceMesh:
 
 
 def _shares(directions: FloatArray, q: float) -> FloatArray:
-    """Logarithms of u = |x|^q, of sum 1, for which u^(1/q) + u^(1-1/q) has the given directions.
+    """Logarithms of u = |x|^q, of sum 1, such that u^(1/q) + u^(1-1/q) has the given directions.
 
     The two terms are coordinate and slope. Newton's method for log u and the unknown length at once.
     """
@@ -100,7 +99,7 @@ def _sphere(level: int) -> tuple[FloatArray, IntArray]:
         parts = _quartered(parts)
     inward = np.linalg.det(parts) < 0
     parts[inward] = parts[inward, ::-1]
-    # Rounding is taken off to tell which corners are one.
+    # Rounded, so that coinciding corners compare equal.
     key = np.round(parts.reshape(-1, 3), 9) + 0.0
     _, first, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
     return parts.reshape(-1, 3)[first], which.reshape(-1, 3).astype(np.int64)

@@ -1,4 +1,4 @@
-"""The shapes that there are: the only list of them."""
+"""The only list of shapes."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ SHAPES: dict[str, Shape] = {
         Dimer(),
     )
 }
-"""By name; the first is what is meant when nobody says."""
+"""Shapes by name; the first is the default."""
 
 DEFAULT = next(iter(SHAPES))
 
 
 def shape_named(name: str) -> Shape:
-    """Look a shape up.
+    """Return the shape of a name.
 
     Raises
     ------
     ValueError
-        If there is none of that name.
+        If the name is unknown.
     """
     if name not in SHAPES:
         msg = f"shape style is {name!r}, expected one of {', '.join(SHAPES)}"
@@ -41,22 +41,22 @@ def shape_named(name: str) -> Shape:
 
 
 class Fitted(NamedTuple):
-    """A shape with the bodies that it fits, their axes named as it names them."""
+    """A shape and bodies that fit it, with axes in its order."""
 
     name: str
     diameters: FloatArray
     """(N, 3), [length]"""
     first: IntArray
-    """(N,) which of the axes that were given is the body's first one."""
+    """(N,) index of the given axis that is the body's first one."""
 
 
 def fitted(names: Sequence[str], diameters: FloatArray, dimension: int) -> Fitted:
-    """Find the first of some shapes that (N, 3) diameters can be those of, whichever axis is the longest.
+    """Find the first of some shapes that fits (N, 3) diameters, whichever axis is the longest.
 
     Raises
     ------
     ValueError
-        If they are those of none.
+        If none of them fits.
     """
     for name in names:
         shape = shape_named(name)
@@ -69,19 +69,19 @@ def fitted(names: Sequence[str], diameters: FloatArray, dimension: int) -> Fitte
 
 
 def guess_shape_style(diameters: FloatArray, *, has_exponent: bool = False) -> str:
-    """Name the first shape of the table that (N, 3) diameters without a name can be those of.
+    """Name the first shape of the table that fits (N, 3) diameters.
 
-    With `has_exponent` it is the first one that has an exponent.
+    With `has_exponent`, the first one that has an exponent.
 
-    Several shapes may have the same diameters, so that a reader who knows better must say so.
+    Several shapes may have the same diameters, so callers with better knowledge must name the shape.
 
     Raises
     ------
     ValueError
-        If they are those of no shape.
+        If no shape fits.
     """
     for name, shape in SHAPES.items():
         if shape.fits(diameters) and shape.has_exponent >= has_exponent:
             return name
-    msg = f"diameters such as {diameters[0].tolist()} are those of no shape, expected positive lengths"
+    msg = f"diameters such as {diameters[0].tolist()} fit no shape, expected positive lengths"
     raise ValueError(msg)

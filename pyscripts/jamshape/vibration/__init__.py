@@ -1,1 +1,1 @@
-"""The dynamical matrix, its modes, and what follows from them."""
+"""Dynamical matrix, vibrational modes, and derived quantities."""

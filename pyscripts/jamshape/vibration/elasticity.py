@@ -1,17 +1,17 @@
-"""Elastic moduli of a packing from its dynamical matrix: affine strain, and how particles relax from it.
+"""Elastic moduli of a packing from its dynamical matrix: affine strain and nonaffine relaxation.
 
 A strain e moves r_i - r_j of each contact by e (r_i - r_j), at fixed orientations, and then forces balance
-again. With s the change of the bonds' lengths by the strain (times the roots of their stiffness) and f that
-of the forces by the prestress, the energy is to second order half of
+again. With s the strain's change of bond lengths (times square roots of their stiffness) and f the change of
+the forces through the prestress, twice the energy is to second order
 
-    E(x) = |C x + s|^2 - x.S x + 2 x.f + (what the prestress does to the affine strain itself)
+    E(x) = |C x + s|^2 - x.S x + 2 x.f + (prestress term of the affine strain)
 
-for a motion x of the particles, and the modulus is the stationary value of E over the volume. There the
-error of x enters squared, over the eigenvalues.
+for a motion x of the particles, and the modulus is the stationary value of E over the volume. The error
+of x enters it squared, over the eigenvalues.
 
-A floppy mode, of which the eigenvalue is below its bound, is left out where it does not couple to the
-strain. Where one couples, E has no stationary value: the modulus is not defined. Modes along which the state has
-not settled are left out as well; where one couples, the bound is not known.
+A floppy mode, with an eigenvalue below its bound, is left out if it does not couple to the
+strain. If one couples, E has no stationary value: the modulus is undefined. Modes along which the state has
+not settled are left out as well; if one couples, the bound is unknown.
 """
 
 from __future__ import annotations
@@ -29,30 +29,30 @@ from jamshape.vibration.quotients import EPS, ROUNDINGS
 from jamshape.vibration.sparse_modes import ShiftedInverse, softest
 from jamshape.vibration.spectrum import Spectrum, is_unsettled, nearer_minimum
 
-# Corrections of a solution by what it leaves of its equation.
+# Iterative refinements of a solution.
 _REFINEMENTS = 3
 
-# What changes on the way to the minimum is an estimate, of which this multiple is taken.
+# Safety factor for the estimated change on the way to the minimum.
 _SAFETY = 2.0
 
 
 class Modulus(NamedTuple):
-    """An elastic modulus with what bounds its error, [energy / length^D] each."""
+    """An elastic modulus with bounds of its error, [energy / length^D] each."""
 
     relaxed: float
-    """The modulus, with forces balanced; NaN where it is not defined."""
+    """The modulus, with forces balanced; NaN if undefined."""
     affine: float
     """The modulus if particles followed the strain."""
     rounding: float
     """Bound of the numerical error, for the state as it is."""
     of_state: float
-    """Bound of the change up to the minimum, as far as it can be estimated; inf where it is not known."""
+    """Estimated bound of the change up to the minimum; inf if unknown."""
     reason: str = ""
-    """One sentence that says why the modulus is not defined, or its bound not known."""
+    """One sentence on why the modulus is undefined, or its bound unknown."""
 
     @property
     def bound(self) -> float:
-        """Bound of the error; inf where it is not known."""
+        """Bound of the error; inf if unknown."""
         return self.rounding + self.of_state
 
 
@@ -62,34 +62,32 @@ class Moduli(NamedTuple):
     bulk: Modulus
     """-V dp/dV."""
     pure_shear: Modulus
-    """By gamma, x and y stretched by exp(gamma / 2) and exp(-gamma / 2)."""
+    """Modulus for gamma, with x and y stretched by exp(gamma / 2) and exp(-gamma / 2)."""
     simple_shear: Modulus
-    """By gamma, x moved by gamma y."""
+    """Modulus for gamma, with x moved by gamma y."""
     pressure: float
-    """[energy / length^D], of the same state."""
+    """[energy / length^D], in the same state."""
     n_floppy: int = 0
-    """Number of floppy modes: eigenvalues below their bounds. Moduli are those of all other modes."""
+    """Number of floppy modes: eigenvalues below their bounds. They are left out of the moduli."""
     n_unsettled: int = 0
-    """Number of further modes left out: along these the minimum is further away than the mean overlap."""
+    """Number of further modes left out, along which the minimum is farther away than the mean overlap."""
     n_negative: int = 0
-    """Number of negative eigenvalues, as far as modes are known: at a saddle, moduli are not what shear measures."""
+    """Number of negative eigenvalues among known modes: at a saddle, moduli are not what shear measures."""
 
 
 def moduli(
-    matrix: DynamicalMatrix,
-    soft: Spectrum | None = None,
-    at: tuple[Landscape, State] | None = None,
+    matrix: DynamicalMatrix, soft: Spectrum | None = None, at: tuple[Landscape, State] | None = None
 ) -> Moduli:
-    """Compute bulk and shear moduli with bounds of their errors.
+    """Compute bulk and shear moduli with error bounds.
 
     Parameters
     ----------
     matrix : DynamicalMatrix
-        Of a minimum.
+        Dynamical matrix of a minimum.
     soft : Spectrum, optional
-        Modes that are known. The softest ones, all floppy ones among them, are found if these do not hold them.
+        Known modes. The softest ones, including all floppy ones, are computed if missing.
     at : Landscape and State, optional
-        What the matrix is of. Without them the effect of the residual, and so the bound, is not known.
+        State of the matrix. Without it the effect of the residual, and so the bound, is unknown.
 
     Returns
     -------
@@ -138,18 +136,18 @@ def _strains(matrix: DynamicalMatrix) -> FloatArray:
 
 
 def _changed(matrix: DynamicalMatrix, nearer: DynamicalMatrix) -> str:
-    """Say whether other bonds hold the packing nearer to the minimum; an empty text if it is the same ones."""
+    """Report contacts that change towards the minimum; an empty text if there are none."""
     here, there = (np.column_stack([m.bonds.particles, m.bonds.slot]) for m in (matrix, nearer))
     if sorted(here.tolist()) == sorted(there.tolist()):
         return ""
     return (
-        "the bound is not known, as contacts open or close on the way to the minimum; the residual is"
+        "the bound is unknown, as contacts open or close on the way to the minimum; the residual is"
         f" {matrix.residual.largest:.2g}, minimise further or choose another u0"
     )
 
 
 class _Combined(NamedTuple):
-    """Moduli as sums of second derivatives over the volume and of the pressure; (3,) each."""
+    """Moduli as sums of energy second derivatives over the volume and of the pressure; (3,) each."""
 
     value: FloatArray
     scale: FloatArray
@@ -183,22 +181,22 @@ class _Point(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """How the particles of a packing relax from k affine strains.
+    """Relaxation of the particles of a packing after k affine strains.
 
     Parameters
     ----------
     matrix : DynamicalMatrix
     strains : (k, D, D) array of float64
     soft : Spectrum
-        All floppy modes and those along which the state has not settled, and others.
+        All floppy and unsettled modes, and others.
     is_unsettled : (l,) array of bool
-        Which of them these are.
+        Flags of the unsettled modes among them.
     inverse : ShiftedInverse
     motion : (n, k) array of float64
         Without translations and modes that are left out.
     here : _Point
     errors : Strains
-        Bounds of what rounding changes.
+        Bounds of rounding errors.
     """
 
     matrix: DynamicalMatrix
@@ -212,7 +210,7 @@ class Response:
 
     @classmethod
     def of(cls, matrix: DynamicalMatrix, strains: FloatArray, soft: Spectrum) -> Response:
-        """Relax a packing from strains."""
+        """Relax a packing after strains."""
         unsettled = is_unsettled(matrix, soft)
         inverse = ShiftedInverse(matrix, 0.0, soft.vectors[:, soft.is_floppy | unsettled])
         given = matrix.strained(strains)
@@ -237,24 +235,21 @@ class Response:
         return self.soft.is_firm & ~self.is_unsettled
 
     def solved(self, push: FloatArray) -> FloatArray:
-        """(n,) motion under forces, those on translations and modes that are left out not among them."""
+        """(n,) motion under forces, without translations and modes that are left out."""
         found = self.inverse.solve(push - _onto(self.inverse.held, push)).v
         return np.asarray(found - _onto(self.inverse.held, found))
 
     def along(self, left: FloatArray) -> FloatArray:
-        """(l + 1, k) magnitudes of (n, k) columns along l modes that are taken in, and of what is left."""
+        """(l + 1, k) magnitudes of (n, k) columns along the l included modes, and of the remainder."""
         modes = self.soft.vectors[:, self._is_in]
         parts = modes.T @ left
         beside = left - modes @ parts - _onto(self.inverse.held, left)
         return np.asarray(np.abs(np.vstack([parts, np.linalg.norm(beside, axis=0)])))
 
     def squared(self, along: FloatArray) -> FloatArray:
-        """(k,) bound of what such a slope that is left can change E by."""
-        values, bound = (
-            np.abs(self.soft.eigenvalues[self._is_in]),
-            self.soft.bound[self._is_in],
-        )
-        # All modes that are not known are stiffer than those that are; of a whole spectrum there is none.
+        """(k,) bound of the change of E by such a remaining slope."""
+        values, bound = (np.abs(self.soft.eigenvalues[self._is_in]), self.soft.bound[self._is_in])
+        # All unknown modes are stiffer than the known ones; a whole spectrum has no unknown modes.
         beside = 0.5 * values.max(initial=0.0) if values.size else np.inf
         stiffness = np.append(values - bound, beside)
         return np.asarray((along**2 / stiffness[:, None]).sum(axis=0))
@@ -272,7 +267,7 @@ class Response:
         return np.asarray(first + (by_C**2).sum(axis=0) + self.squared(along))
 
     def verdicts(self, drift: FloatArray | None) -> list[_Verdict]:
-        """Say of each strain whether there is a modulus, and why it is not known."""
+        """Decide for each strain whether the modulus is defined, or why not."""
         largest = self.matrix.residual.largest
         if largest > LARGEST_RESIDUAL:
             why = (
@@ -286,7 +281,7 @@ class Response:
         error = np.abs(Z).T @ self._left_error()
         if drift is not None:
             error += _SAFETY * np.abs(Z.T @ drift)
-        if drift is None or unsettled.any():  # what net forces can do to a stress directly
+        if drift is None or unsettled.any():  # direct effect of net forces on a stress
             net = self.matrix.compatibility.T @ self.matrix.bonds.pull
             error[~unsettled] += _SAFETY * np.linalg.norm(net)
         return [
@@ -295,14 +290,14 @@ class Response:
         ]
 
     def _changes(self) -> tuple[FloatArray, FloatArray]:
-        """(m, k) and (n, k) bounds of what rounding changes C x + s and S x by."""
+        """(m, k) and (n, k) bounds of rounding errors of C x + s and S x."""
         x, M = np.abs(self.motion), self.matrix
         by_C = ROUNDINGS * EPS * (abs(M.compatibility) @ x) + self.errors.stretched
         by_S = ROUNDINGS * EPS * (M.prestress_sizes @ x) + M.prestress_rounding @ x
         return np.asarray(by_C), np.asarray(by_S)
 
     def _left_error(self) -> FloatArray:
-        """(n, k) bound of what rounding changes the slope by."""
+        """(n, k) bound of the rounding error of the slope."""
         C, y = abs(self.matrix.compatibility), np.abs(self.here.stretched).astype(np.float64)
         by_C, by_S = self._changes()
         return np.asarray(C.T @ (by_C + ROUNDINGS * EPS * y) + by_S + self.errors.pushed)
@@ -311,7 +306,7 @@ class Response:
 class _Verdict(NamedTuple):
     is_defined: bool
     reason: str
-    """Why there is no modulus, or no bound; an empty text where there are both."""
+    """Reason why there is no modulus, or no bound; an empty text if there are both."""
 
 
 def _verdict(
@@ -322,14 +317,14 @@ def _verdict(
 
     def by(which: BoolArray) -> str:
         worst = int(np.argmax(np.where(which, coupling, 0.0)))
-        return f"to this strain (by {coupling[worst]:.2g}, known to {error[worst]:.1g})"
+        return f"to this strain (by {coupling[worst]:.2g} with an error of {error[worst]:.1g})"
 
     if (floppy := couples & ~is_unsettled).any():
-        why = f"a floppy motion couples {by(floppy)}, so that nothing holds the packing against it"
+        why = f"a floppy mode couples {by(floppy)}, so nothing resists it"
         return _Verdict(False, why)
     if couples.any():
         why = (
-            f"the bound is not known, as the packing has not settled along a motion that couples {by(couples)};"
+            f"the bound is unknown, as the packing has not settled along a mode that couples {by(couples)};"
             f" the residual is {residual:.2g}, minimise further or choose another u0"
         )
         return _Verdict(True, why)
@@ -352,7 +347,7 @@ def _point(matrix: DynamicalMatrix, strains: FloatArray, x: FloatArray) -> _Poin
 
 
 def _errors_of(matrix: DynamicalMatrix, strains: FloatArray) -> Strains:
-    """Bound what rounding changes in what strains do."""
+    """Bound rounding errors of the response to strains."""
     sizes, lost = matrix.strained_sizes(strains)
     return Strains(
         stretched=ROUNDINGS * EPS * sizes.stretched + lost.stretched,

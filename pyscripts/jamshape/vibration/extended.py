@@ -1,7 +1,7 @@
-"""Products of matrices in extended precision: long doubles for sparse ones, slices for dense ones.
+"""Matrix products in extended precision: long doubles for sparse factors, slices for dense ones.
 
-NumPy multiplies long doubles one by one. Sparse factors with few entries a row need no more; dense
-ones are cut into slices of so few bits that BLAS multiplies them without rounding (Ozaki, Ogita, Oishi
+NumPy multiplies long doubles one by one, which suffices for sparse factors with few entries a row. Dense
+factors are cut into slices of so few bits that BLAS multiplies them without rounding (Ozaki, Ogita, Oishi
 and Rump, Numer. Algorithms 59, 95 (2012)).
 """
 
@@ -17,10 +17,10 @@ from jamshape.arrays import FloatArray, IntArray, LongArray
 
 EPS = float(np.finfo(np.longdouble).eps)
 
-# Columns of a dense factor that are taken at once, to bound memory.
+# Columns of a dense factor processed at once, to bound memory.
 _COLUMNS = 128
 
-# Bits of a product that are wanted: those of a long double.
+# Required bits of a product: those of a long double.
 _BITS = 64
 
 
@@ -67,7 +67,7 @@ def dense_product(a: NDArray[Any], b: NDArray[Any]) -> LongArray:
     Returns
     -------
     (m, k) array of longdouble
-        Off by about n 2^-64 times the largest magnitudes in the row of a and the column of b.
+        Error about n 2^-64 times the largest magnitudes in the row of a and the column of b.
     """
     n = a.shape[1]
     bits = (53 - math.ceil(math.log2(max(n, 2)))) // 2
@@ -82,7 +82,7 @@ def dense_product(a: NDArray[Any], b: NDArray[Any]) -> LongArray:
 
 
 def _slices(matrix: NDArray[Any], bits: int) -> list[FloatArray]:
-    """Cut (m, n) into doubles of so many bits relative to the largest of each row; their sum is it."""
+    """Cut (m, n) into a sum of doubles with this number of bits relative to the largest of each row."""
     rest = np.array(matrix, np.longdouble)
     largest = np.abs(rest).max(axis=1, initial=0, keepdims=True).astype(np.float64)
     exponent = np.frexp(largest)[1]

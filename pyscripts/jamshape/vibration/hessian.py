@@ -1,9 +1,9 @@
-"""The dynamical matrix of a packing: M = H - S over the particles that contacts hold in place.
+"""The dynamical matrix of a packing without its rattlers: M = H - S.
 
-Marschall & Teitel 2018, Eqs. 23 and 38-40. The stiffness is kept as its factor C, one row a bond, with
-H = C^T C; the prestress S, smaller by the overlap, apart from it: their sum in doubles has lost the
-modes that are softer than 1e-16. General in the shape: what is taken of a landscape are its second
-derivatives contact by contact. Needs no LAMMPS.
+Marschall & Teitel 2018, Eqs. 23 and 38-40. The stiffness is stored as its factor C, one row a bond, with
+H = C^T C, separate from the prestress S, which is smaller by the overlap: their sum in doubles has lost all
+modes softer than 1e-16. Independent of the shape: only a landscape's second derivatives of each contact enter.
+Needs no LAMMPS.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ from jamshape.minima import Residual, residual_of
 from jamshape.records import Record
 from jamshape.vibration.extended import EPS
 
-# Lengths are off by so many roundings of long doubles at most: sums of squares, roots, and where feet lie.
+# Bound of the error of lengths in roundings of long doubles: sums of squares, roots, and positions of feet.
 _ROUNDINGS = 4.0
 
-# A state with a larger residual is no minimum, and has no modes.
+# A state with a larger residual is not a minimum, and has no modes.
 LARGEST_RESIDUAL = 1e-4
 
 
 class NotAtMinimumError(ValueError):
-    """A state is no minimum of the energy; the sentence gives its residual."""
+    """A state is not a minimum of the energy; the message gives its residual."""
 
 
 @dataclass(frozen=True, eq=False)
 class Coordinates(Record):
-    """What the components of a mode are.
+    """Meaning of the components of a mode.
 
     Parameters
     ----------
     particle : (n,) array of int64
-        Row of the packing that each coordinate belongs to, ascending.
+        Row of the packing, for each coordinate, ascending.
     kind : (n,) array of int64
         0 to D - 1: displacement along that axis. D and up: a rotation.
     direction : (n, D + T) array of float64
-        Displacement and rotation [radian] of that particle for each unit of length; T = 1 in 2D, 3 in
+        Displacement and rotation [radian] of that particle per unit of length; T = 1 in 2D, 3 in
         3D, in space coordinates.
     n_all : int
-        Particles N of the packing, rattlers included.
+        Number of particles N of the packing, rattlers included.
     dimension : int
     """
 
@@ -70,7 +70,7 @@ class Coordinates(Record):
 
     @property
     def is_rotation(self) -> NDArray[np.bool_]:
-        """(n,) which coordinates are rotations."""
+        """(n,) whether each coordinate is a rotation."""
         return self.kind >= self.dimension
 
     @cached_property
@@ -84,7 +84,7 @@ class Coordinates(Record):
         return scipy.sparse.csr_matrix(entries, shape=(self.n_all * width, self.size))
 
     def motion(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Spread an (n,) vector: (N, D) displacements and (N, T) rotations [radian], 0 elsewhere."""
+        """Expand an (n,) vector: (N, D) displacements and (N, T) rotations [radian], 0 elsewhere."""
         components = (self.embedding @ vector).reshape(self.n_all, -1)
         return components[:, : self.dimension], components[:, self.dimension :]
 
@@ -92,29 +92,29 @@ class Coordinates(Record):
 class Bonds(NamedTuple):
     """The m rows of the compatibility matrix.
 
-    Of two bonds whose energies are coupled (`Landscape.derivatives`) the first row is along a sum of both
-    lengths, such that rows are as many as bonds and H is the sum of their squares.
+    For two bonds with coupled energies (`Landscape.derivatives`) the first row is along a sum of both
+    lengths, such that there is one row per bond and H is the sum of their squares.
     """
 
     contact: IntArray
     """(m,) row of `DynamicalMatrix.contacts`."""
     slot: IntArray
-    """(m,) which bond of it, from 0."""
+    """(m,) index of the bond in its contact."""
     particles: IntArray
     """(m, 2) rows of the packing."""
     stiffness: FloatArray
     """(m,) second derivative of the energy along the bond, [energy / length^2]."""
     gradient: FloatArray
-    """(m, v) of its length by the pair's variables: r_i - r_j, rotations of i and of j [radian]."""
+    """(m, v) derivative of its length by the pair's variables: r_i - r_j, rotations of i and of j [radian]."""
     pull: FloatArray
-    """(m,) force over the root of the stiffness: C^T pull are the forces of the bonds."""
+    """(m,) force over the square root of the stiffness: C^T pull are the bond forces."""
 
 
 class Strains(NamedTuple):
-    """What affine strains do to a packing, k of them, with all second derivatives of the energy."""
+    """Response of a packing to k affine strains, with all second derivatives of the energy."""
 
     stretched: FloatArray
-    """(m, k) change of the bonds' lengths, times the roots of their stiffness."""
+    """(m, k) change of the bond lengths, times the square roots of their stiffness."""
     pushed: FloatArray
     """(n, k) change of the forces by the prestress alone: -S between strain and coordinates."""
     affine: LongArray
@@ -125,7 +125,7 @@ class Strains(NamedTuple):
 class DynamicalMatrix(Record):
     """M = C^T C - S of n coordinates and m bonds (Marschall & Teitel 2018, Eqs. 38-40).
 
-    Every entry is a double that is off by a few roundings of the sizes that it was summed of.
+    Every entry is a double with an error of a few roundings of its summands.
 
     Parameters
     ----------
@@ -134,22 +134,22 @@ class DynamicalMatrix(Record):
     prestress : (n, n) scipy.sparse CSR matrix, [energy / length^2]
         S, symmetric to the last bit.
     prestress_sizes : (n, n) scipy.sparse CSR matrix
-        Sums of the magnitudes of what was added to each entry of S.
+        Sums of the magnitudes of the summands of each entry of S.
     coordinates : Coordinates
     bonds : Bonds
     curvature : (C, v, v) array of float64
-        Second derivatives of the contacts' energies, without the bonds' stiffness: S contact by contact.
+        Second derivatives of the contacts' energies, without the bonds' stiffness: S of each contact.
     contacts : dict
-        `Landscape.derivatives` of the contacts between particles that are no rattlers.
+        `Landscape.derivatives` of the contacts between particles other than rattlers.
     gradient : (n,) array of float64, [energy / length]
-        Of the energy; 0 at a minimum.
+        Gradient of the energy; 0 at a minimum.
     residual : Residual
-        Largest net force and torque over the mean bond force; rattlers do not count.
+        Largest net force and torque over the mean bond force, without rattlers.
     bond_force : float, [energy / length]
         Mean magnitude of the force of a bond.
     volume : float, [length^D]
     n_left_out : int
-        Contacts between these particles that are weaker than was asked for.
+        Number of contacts between these particles left out by the force threshold.
     """
 
     compatibility: Any
@@ -177,12 +177,12 @@ class DynamicalMatrix(Record):
 
     @property
     def n_particles(self) -> int:
-        """Number of particles N' that are no rattlers."""
+        """Number of particles N', without rattlers."""
         return len(self.coordinates.backbone)
 
     @property
     def z(self) -> float:
-        """Bonds per particle, each counted at both its ends."""
+        """Bonds per particle, each counted at both ends."""
         return 2 * self.n_bonds / self.n_particles
 
     @property
@@ -192,14 +192,14 @@ class DynamicalMatrix(Record):
 
     @property
     def matrix(self) -> Any:
-        """(n, n) scipy.sparse CSR matrix M = H - S, as far as doubles hold it."""
+        """(n, n) scipy.sparse CSR matrix M = H - S, in double precision."""
         return (self.stiffness - self.prestress).tocsr()
 
     @cached_property
     def overlap_rounding(self) -> FloatArray:
-        """(C,) how far the contacts' forces may be off, relative, as overlaps are small differences of lengths.
+        """(C,) bound of the relative rounding error of the contacts' forces: overlaps are small differences of lengths.
 
-        A force is the stiffness times the overlap, and lengths are of the size of the separation, in long double.
+        A force is stiffness times overlap; lengths are of the order of the separation, in long double.
         """
         distance = np.linalg.norm(self.contacts["separation"], axis=1)
         lost = _ROUNDINGS * EPS * self.contacts["stiffness"].sum(axis=1) * distance
@@ -207,13 +207,13 @@ class DynamicalMatrix(Record):
 
     @cached_property
     def prestress_rounding(self) -> Any:
-        """(n, n) scipy.sparse CSR matrix: how far entries of S may be off by the rounding of overlaps."""
+        """(n, n) scipy.sparse CSR matrix: bound of the error of S by rounding of overlaps."""
         scatter = _Scatter(self.contacts["particles"], self.coordinates)
         return scatter.sizes(self.overlap_rounding[:, None, None] * self.curvature)
 
     @cached_property
     def translations(self) -> FloatArray:
-        """(n, D c) orthonormal columns: M's null modes, D for each of c clusters of particles."""
+        """(n, D c) orthonormal columns: the null modes of M, D for each of c clusters of particles."""
         backbone, D = self.coordinates.backbone, self.coordinates.dimension
         first, second = np.searchsorted(backbone, self.bonds.particles.T)
         n = len(backbone)
@@ -227,7 +227,7 @@ class DynamicalMatrix(Record):
         return unit
 
     def strained(self, strains: FloatArray) -> Strains:
-        """Take in (k, D, D) strains e, r_i - r_j -> (1 + e) (r_i - r_j), at fixed orientations."""
+        """Return the response to (k, D, D) strains e, r_i - r_j -> (1 + e) (r_i - r_j), at fixed orientations."""
         D = self.coordinates.dimension
         moved = np.einsum("kab,cb->cka", strains, self.contacts["separation"])
         rows = np.sqrt(self.bonds.stiffness)[:, None] * self.bonds.gradient[:, :D]
@@ -239,7 +239,7 @@ class DynamicalMatrix(Record):
         return Strains(stretched, pushed, affine)
 
     def strained_sizes(self, strains: FloatArray) -> tuple[Strains, Strains]:
-        """Sum the magnitudes of what `strained` adds up, and what the rounding of overlaps can change in it."""
+        """Sum the magnitudes of the summands in `strained`, and bound the effect of rounding of overlaps."""
         D = self.coordinates.dimension
         moved = np.einsum("kab,cb->cka", np.abs(strains), np.abs(self.contacts["separation"]))
         rows = np.abs(np.sqrt(self.bonds.stiffness)[:, None] * self.bonds.gradient[:, :D])
@@ -258,22 +258,22 @@ class DynamicalMatrix(Record):
 
 @dataclass(frozen=True, eq=False)
 class Scope:
-    """What to take of a packing, and what a rotation counts for.
+    """Options of `dynamical_matrix`: contacts to include and scale of rotations.
 
     Parameters
     ----------
     rotation : str or (N,) array of float64, [length]
-        What a radian counts for: ``half_length`` (A theta, Marschall & Teitel 2018, Eq. 23, or a theta),
-        ``radius`` (R theta, or the shortest semi-axis) or lengths. What no contact can turn, discs, has no rotation in any case. Eigenvalues
-        of modes that rotate depend on this choice; their number, signs and zeros do not.
+        Length that scales radians: ``half_length`` (A theta, Marschall & Teitel 2018, Eq. 23, or a theta),
+        ``radius`` (R theta, or the shortest semi-axis) or lengths. Discs, on which no contact exerts a torque, never have
+        rotations. Eigenvalues of modes with rotation depend on this choice; their number, signs and zeros do not.
     least_force : float
-        Leave out contacts whose force is below this fraction of the mean force of a bond: rods that slid
+        Omit contacts whose force is below this fraction of the mean bond force: rods that slid
         along flat sides up to others touch them with forces of second order in the overlap, which
-        minimisers in doubles do not see.
+        minimisers in doubles do not resolve.
     backbone : (N,) array of bool, optional
-        Particles to take, with the contacts between them; those that are no rattlers if left out.
+        Particles to include, with the contacts between them; by default all but rattlers.
     force : bool
-        Also where the state is no minimum.
+        Proceed even if the state is not a minimum.
     """
 
     rotation: str | FloatArray = "half_length"
@@ -302,7 +302,7 @@ def dynamical_matrix(
     NotAtMinimumError
         If the residual is above `LARGEST_RESIDUAL`, unless forced.
     ValueError
-        If all particles are rattlers, or the scope's rotation is neither.
+        If all particles are rattlers, or the scope's rotation is invalid.
     CrossingError
         If two spines cross.
     """
@@ -311,8 +311,8 @@ def dynamical_matrix(
     taken = ~landscape.rattlers(state) if scope.backbone is None else np.asarray(scope.backbone)
     if not taken.any():
         msg = (
-            f"all {len(taken)} particles are rattlers, so that there is no mode to find,"
-            " expected a packing that is jammed"
+            f"all {len(taken)} particles are rattlers, so there are no modes,"
+            " expected a jammed packing"
         )
         raise ValueError(msg)
     held = np.where(taken[landscape.particle_of_coordinate()], evaluation.gradient, 0.0)
@@ -320,8 +320,8 @@ def dynamical_matrix(
     if residual.largest > LARGEST_RESIDUAL and not scope.force:
         msg = (
             f"the state is not at a minimum: its largest net force is {residual.largest:.2g} of the"
-            f" mean bond force, expected at most {LARGEST_RESIDUAL:g}; minimise it first (what is at rest on a"
-            " corner of the energy has no modes), or force it (--force)"
+            f" mean bond force, expected at most {LARGEST_RESIDUAL:g}; minimise it first (a state at rest on a"
+            " kink of the energy has no modes), or use force (--force)"
         )
         raise NotAtMinimumError(msg)
     coordinates = _coordinates(landscape, state, taken, _lengths(landscape, scope.rotation))
@@ -331,7 +331,7 @@ def dynamical_matrix(
 
 
 def matrix_at(landscape: Landscape, state: State, like: DynamicalMatrix) -> DynamicalMatrix:
-    """Assemble the matrix of a state nearby, in the coordinates of another one; never refuses."""
+    """Assemble the matrix of a nearby state in the coordinates of another one, without checks."""
     evaluation = landscape.evaluate(state)
     parts = _parts(landscape, state, like.coordinates)
     return _matrix(
@@ -340,7 +340,7 @@ def matrix_at(landscape: Landscape, state: State, like: DynamicalMatrix) -> Dyna
 
 
 class BondLengths(NamedTuple):
-    """Lengths of m bonds that are shorter than they would be at rest."""
+    """Lengths of m compressed bonds."""
 
     contact: IntArray
     """(m,) row of the contacts."""
@@ -371,7 +371,7 @@ def _matrix(
 
 
 def _lengths(landscape: Landscape, rotation: str | FloatArray) -> FloatArray:
-    """(N,) lengths that a radian counts for; 0 where nothing turns."""
+    """(N,) lengths that scale radians; 0 where nothing rotates."""
     own = landscape.rotation_length
     if isinstance(rotation, str):
         known = {"half_length": own, "radius": landscape.inner_radius}
@@ -383,7 +383,7 @@ def _lengths(landscape: Landscape, rotation: str | FloatArray) -> FloatArray:
         chosen = np.broadcast_to(np.asarray(rotation, np.float64), own.shape)
     lengths: FloatArray = np.where(own > 0, chosen, 0.0)
     if not (np.isfinite(lengths) & (lengths > 0))[own > 0].all():
-        msg = "rotation lengths are not all positive, expected so for particles that can turn"
+        msg = "rotation lengths are not all positive, expected lengths > 0 for particles that can rotate"
         raise ValueError(msg)
     return lengths
 
@@ -407,7 +407,7 @@ def _coordinates(
 def gradient_in(
     coordinates: Coordinates, landscape: Landscape, evaluation: Evaluation
 ) -> FloatArray:
-    """Express the gradient of a landscape, (n,), in coordinates of modes, [energy / length]."""
+    """Transform the gradient of a landscape, (n,), to coordinates of modes, [energy / length]."""
     D = coordinates.dimension
     components = landscape.components(evaluation.gradient)
     components[:, D:] *= landscape.rotation_length[:, None]  # per radian
@@ -417,7 +417,7 @@ def gradient_in(
 def _parts(
     landscape: Landscape, state: State, coordinates: Coordinates, weakest: float = 0.0
 ) -> dict[str, Any]:
-    """Make those fields of a DynamicalMatrix that come from the contacts, and the coordinates."""
+    """Build the fields of a DynamicalMatrix that follow from contacts and coordinates."""
     every = landscape.derivatives(state, extended=True)
     is_held = np.zeros(coordinates.n_all, bool)
     is_held[coordinates.backbone] = True
@@ -444,8 +444,8 @@ def _parts(
 def _bonds(contacts: dict[str, NDArray[Any]]) -> Bonds:
     """List the bonds.
 
-    The stiffness of a contact's bonds, diag(s) + c c^T in their lengths, c what couples them, is L diag(d) L^T
-    with a lower triangle L: rows of d and L^T gradient. Found column by column, without differences.
+    The stiffness of a contact's bonds, diag(s) + c c^T in their lengths, c their coupling, is L diag(d) L^T
+    with a lower triangle L: rows of d and L^T gradient. Computed column by column, without subtractions.
     """
     stiffness, gradient, force = (
         contacts[name].copy() for name in ("stiffness", "gradient", "bond_force")
@@ -468,7 +468,7 @@ def _bonds(contacts: dict[str, NDArray[Any]]) -> Bonds:
 
 
 class _Scatter:
-    """Puts rows and blocks in a pair's variables into matrices over coordinates."""
+    """Assembles rows and blocks in a pair's variables into matrices over coordinates."""
 
     def __init__(self, particles: IntArray, coordinates: Coordinates) -> None:
         D, T = coordinates.dimension, coordinates.direction.shape[1] - coordinates.dimension
@@ -496,7 +496,7 @@ class _Scatter:
         return np.asarray(self._embedding.T @ full)
 
     def vector_sizes(self, vectors: FloatArray) -> FloatArray:
-        """(n,) sum of the magnitudes of what such vectors add."""
+        """(n,) sum of the magnitudes of the summands of such vectors."""
         full = np.zeros(self._embedding.shape[0])
         np.add.at(full, self._place, np.abs(vectors[:, self._variable]))
         return np.asarray(abs(self._embedding).T @ full)
@@ -508,7 +508,7 @@ class _Scatter:
         return _tidy(0.5 * (matrix + matrix.T))
 
     def sizes(self, blocks: FloatArray) -> Any:
-        """(n, n) CSR matrix of the magnitudes of what such blocks add."""
+        """(n, n) CSR matrix of the magnitudes of the summands of such blocks."""
         return self._assembled(np.abs(blocks), 1.0, abs(self._embedding))
 
     def _assembled(self, blocks: FloatArray, sign: FloatArray | float, embedding: Any) -> Any:
@@ -521,7 +521,7 @@ class _Scatter:
 
 
 def _tidy(matrix: Any) -> Any:
-    """CSR with ascending columns and without stored zeros."""
+    """Return CSR with ascending columns and without stored zeros."""
     matrix = scipy.sparse.csr_matrix(matrix)
     matrix.eliminate_zeros()
     matrix.sort_indices()

@@ -1,4 +1,4 @@
-"""Rayleigh quotients of a dynamical matrix in long double, and bounds of their errors."""
+"""Rayleigh quotients of a dynamical matrix in long double, with error bounds."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from jamshape.vibration.hessian import DynamicalMatrix
 
 EPS = float(np.finfo(np.float64).eps)
 
-# Entries of C and S are off by so many roundings at most: of their factors, and of sums.
+# Error of the entries of C and S in roundings, at most: of their factors, and of sums.
 ROUNDINGS = 4.0
 
-# Columns that are multiplied in long double at once, to bound memory.
+# Columns multiplied in long double at once, to bound memory.
 _COLUMNS = 256
 
-# Two modes that pull on each other by more than this fraction of their gap are close.
+# Two modes coupled by more than this fraction of their gap are close.
 CLOSE = 0.05
 
 
@@ -31,17 +31,17 @@ class Quotients(NamedTuple):
     value: LongArray
     """(k,)"""
     residual: FloatArray
-    """(k,) norms of M v - value v for |v| = 1: no further away than that is an eigenvalue."""
+    """(k,) norms of M v - value v for |v| = 1: an eigenvalue lies within this distance."""
     rounding: FloatArray
-    """(k,) of the value itself."""
+    """(k,) rounding error of the value itself."""
     entries: FloatArray
-    """(k,) how much rounding the entries of C and S can change the value."""
+    """(k,) bound of the change by rounding of the entries of C and S."""
     overlaps: FloatArray
-    """(k,) how much rounding of the overlaps, from which S comes, can change it."""
+    """(k,) bound of the change by rounding of the overlaps, from which S comes."""
 
 
 class Images(NamedTuple):
-    """What a dynamical matrix makes of vectors (n, k), in long double."""
+    """Products of a dynamical matrix with vectors (n, k), in long double."""
 
     stretched: LongArray
     """(m, k) C v."""
@@ -84,17 +84,17 @@ class Products:
         return Images(stretched, pushed, quotients, residual)
 
     def quotients(self, vectors: FloatArray) -> Quotients:
-        """Quotients of unit columns (n, k), a few at a time."""
+        """Quotients of unit columns (n, k), computed a few at a time."""
         parts = np.array_split(vectors, 1 + vectors.shape[1] // _COLUMNS, axis=1)
         found = [self.images(part).quotients for part in parts]
         return Quotients(*map(np.concatenate, zip(*found, strict=True)))
 
 
 def isolated_error(values: FloatArray, residual: FloatArray) -> FloatArray:
-    """Bound the distance to an eigenvalue by the residual or, if less, its square over the gap.
+    """Bound the distance to an eigenvalue by the residual or, if smaller, its square over the gap.
 
-    Kato and Temple. The second where intervals of the first kind are disjoint, so that there is one
-    eigenvalue in each.
+    Kato-Temple. The second bound applies where intervals of the first kind are disjoint, so that each holds
+    one eigenvalue.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def isolated_error(values: FloatArray, residual: FloatArray) -> FloatArray:
     """
     order = np.argsort(values)
     lower, upper = (values - residual)[order], (values + residual)[order]
-    # Neighbours by value are the nearest intervals as long as intervals do not overlap.
+    # Neighbours by value are the nearest intervals if intervals do not overlap.
     below = values[order] - np.concatenate([[-np.inf], np.maximum.accumulate(upper)[:-1]])
     above = np.concatenate([np.minimum.accumulate(lower[::-1])[::-1][1:], [np.inf]]) - values[order]
     gap = np.empty(len(values))
@@ -118,19 +118,19 @@ def isolated_error(values: FloatArray, residual: FloatArray) -> FloatArray:
 
 
 def grouped_error(values: FloatArray, pull: FloatArray, others: FloatArray) -> FloatArray:
-    """Bound the same for modes of which it is known how much they pull on each other.
+    """Bound the same for modes with known couplings.
 
-    Modes that are close to each other are one group, which is off by what is within it and, squared over
-    the gap, what is between it and the rest.
+    Modes that are close to each other form a group, with an error from the couplings within it and, squared over
+    the gap, from those to the rest.
 
     Parameters
     ----------
     values : (k,) array of float64
         Rayleigh quotients.
     pull : (k, k) array of float64
-        Of modes i on modes j, |v_i.M v_j - value_j v_i.v_j|; 0 on the diagonal.
+        Coupling of modes i to modes j, |v_i.M v_j - value_j v_i.v_j|; 0 on the diagonal.
     others : (l,) array of float64
-        Eigenvalues of modes that do not pull.
+        Eigenvalues of uncoupled modes.
 
     Returns
     -------

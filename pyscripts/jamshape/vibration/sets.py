@@ -1,36 +1,23 @@
-"""Sets of modes: tables of files of analysis/modes.py by system and u0, modes picked from a table."""
+"""System, energy and bands of the modes in a file."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from jamshape.arrays import BoolArray, FloatArray, IntArray
-from jamshape.files.h5md import FileFormatError
-from jamshape.files.sets import System, is_among, number, require_one_ensemble, system_of
+from jamshape.files.sets import System, system_of
 from jamshape.files.vocabulary import renamed
-from jamshape.landscape import Landscape, State
-from jamshape.measures.averages import Mean, mean
 from jamshape.packing import Packing
 from jamshape.shapes.table import SHAPES
-from jamshape.vibration.hessian import dynamical_matrix
-from jamshape.vibration.spectrum import spectrum
-from jamshape.vibration.table import ModeTable, read_modes, tabulate
-
-# All packings of a figure agree in these.
-ENSEMBLE = ("n", "size_ratio")
+from jamshape.vibration.table import ModeTable
 
 TOLD = ("low", "middle", "high")  # bands
 
-_PREFIX = "packing_"  # of what the packing's file said
+_PREFIX = "packing_"  # of attributes copied from the packing's file
 
 
 class Key(NamedTuple):
-    """What the packings of one curve have in common."""
+    """Common attributes of the packings of one curve."""
 
     system: System
     u0: float
@@ -40,239 +27,40 @@ class Key(NamedTuple):
         return self.u0 if name == "u0" else self.system.number(name)
 
     def report(self) -> dict[str, Any]:
-        """Name it in JSON."""
+        """Return a description for JSON."""
         return self.system.report() | {"u0": self.u0}
 
 
-Tables = dict[Key, list[ModeTable]]
-
-
-def read_tables(paths: Iterable[Path]) -> Tables:
-    """Read files of modes, and those in folders, by system and u0 in ascending order.
-
-    Parameters
-    ----------
-    paths
-        Folders, of which other files are left out, and files, which must be of modes.py.
-
-    Raises
-    ------
-    ValueError
-        If there is none, a file is none, or they are of several ensembles.
-    OSError
-        If one cannot be read.
-    """
-    paths = list(paths)
-    tables = [table for path in paths for table in _tables(path)]
-    if not tables:
-        msg = f"{', '.join(map(str, paths))}: no modes, expected files of analysis/modes.py"
-        raise ValueError(msg)
-    require_one_ensemble([of_packing(table) for table in tables], ENSEMBLE)
-    grouped: Tables = {}
-    for table in sorted(tables, key=lambda t: (key_of(t), seed_of(t))):
-        grouped.setdefault(key_of(table), []).append(table)
-    return grouped
-
-
-def _tables(path: Path) -> list[ModeTable]:
-    """Read one file, or those of a folder that are of modes."""
-    if not path.is_dir():
-        return [read_modes(path)]
-    found = []
-    for file in sorted(path.glob("*.h5")):
-        try:
-            found.append(read_modes(file))
-        except (FileFormatError, OSError):
-            continue  # packings, and files that are still written
-    return found
-
-
 def of_packing(table: ModeTable) -> dict[str, Any]:
-    """Return what the packing's file said."""
+    """Return the attributes of the packing's file."""
     known = table.attributes.items()
     own = {name.removeprefix(_PREFIX): v for name, v in known if name.startswith(_PREFIX)}
     return renamed(own)
 
 
 def to_store(attributes: Mapping[str, Any], packing: Packing) -> dict[str, Any]:
-    """Return what a file of modes keeps of its packing: what that file said, the shape and the law."""
+    """Return the attributes that a file of modes copies from its packing: those of its file, shape and law."""
     known = dict(attributes) | {"shape": packing.shape_style, **packing.law._asdict()}
     return {f"{_PREFIX}{name}": value for name, value in known.items()}
 
 
 def key_of(table: ModeTable) -> Key:
-    """Tell system and u0 of a packing; 0 of the first jammed one, which was led to no energy."""
+    """Return system and u0 of a packing; 0 for a first jammed packing without a target energy."""
     known = of_packing(table)
     shape = known.get("shape") or _shape_with(known)
     u0 = float(known.get("u0", 0.0))
     return Key(system_of(known, shape, table.coordinates.dimension), u0)
 
 
-def seed_of(table: ModeTable) -> int:
-    """Seed of a packing."""
-    expected = "one of their packing, made by make_packing.py"
-    return int(number(of_packing(table), "seed", "modes have", expected))
-
-
 def _shape_with(known: Mapping[str, Any]) -> str:
-    """Name the first shape of which all parameters are told, as files of old do not name theirs."""
+    """Name the first shape whose parameters are all present, for older files without a shape name."""
     for name, shape in SHAPES.items():
         if all(parameter.name in known for parameter in shape.parameters):
             return name
-    msg = "modes do not tell the shape of their packing, expected modes of a packing of make_packing.py"
+    msg = "modes do not state the shape of their packing, expected modes of a packing of make_packing.py"
     raise ValueError(msg)
 
 
-def selected(tables: Tables, name: str, asked: Sequence[float]) -> Tables:
-    """Select curves by u0 or a parameter of the shape; all where none is asked for.
-
-    Raises
-    ------
-    ValueError
-        If one that is asked for is not there.
-    """
-    if not asked:
-        return tables
-    known = sorted({key.number(name) for key in tables})
-    missing = [value for value in asked if not is_among(value, known)]
-    if missing:
-        there = ", ".join(f"{value:g}" for value in known)
-        msg = f"no modes have {name} = {missing[0]:g}, expected one of {there}"
-        raise ValueError(msg)
-    return {key: of for key, of in tables.items() if is_among(key.number(name), asked)}
-
-
-def n_of(tables: Tables) -> int:
-    """Return the number of particles of the packings."""
-    return every(tables)[0].coordinates.n_all
-
-
-def every(tables: Tables) -> list[ModeTable]:
-    """All tables in one list."""
-    return [table for samples in tables.values() for table in samples]
-
-
-def stable(table: ModeTable) -> BoolArray:
-    """Select modes of positive eigenvalue, beyond doubt."""
-    return np.asarray(~table["is_translation"] & (table["sign"] > 0))
-
-
-def unstable(table: ModeTable) -> BoolArray:
-    """Select modes of negative eigenvalue, beyond doubt."""
-    return np.asarray(~table["is_translation"] & (table["sign"] < 0))
-
-
-def fraction_of(table: ModeTable, name: str) -> float:
-    """Fraction of all modes but translations that is in a band; NaN where bands are not apart."""
-    return len(table.in_band(name)) / table.n_vibrational if table.has_band(name) else math.nan
-
-
 def count_of(table: ModeTable, name: str) -> int | None:
-    """Count the modes of a band; None where bands are not apart."""
+    """Count the modes of a band; None where bands do not separate."""
     return len(table.in_band(name)) if table.has_band(name) else None
-
-
-def sizes(table: ModeTable) -> FloatArray:
-    """Return sqrt(|lambda|) of all modes."""
-    return np.asarray(np.sqrt(np.abs(table["eigenvalues"])))
-
-
-def pooled(
-    tables: Iterable[ModeTable],
-    values: Callable[[ModeTable], FloatArray],
-    chosen: Callable[[ModeTable], BoolArray],
-) -> FloatArray:
-    """Values of the chosen modes of all tables, one after the other."""
-    return np.concatenate([np.asarray(values(t), np.float64)[chosen(t)] for t in tables])
-
-
-def modes_of(packing: Packing) -> ModeTable:
-    """Find the modes of a packing, with their vectors; errors as `dynamical_matrix`."""
-    landscape, state = Landscape(packing), State.of(packing)
-    matrix = dynamical_matrix(landscape, state)
-    return tabulate(landscape, state, matrix, spectrum(matrix))
-
-
-def table_of(packing: Packing, modes: Path | None) -> ModeTable:
-    """Read modes with their vectors from a file, or find those of the packing.
-
-    Raises
-    ------
-    ValueError
-        If the file has no vectors, or is of other particles.
-    """
-    if modes is None:
-        return modes_of(packing)
-    table = read_modes(modes)
-    if not table.vectors.size:
-        msg = f"{modes}: holds no vectors, expected a file of modes.py --vectors"
-        raise ValueError(msg)
-    if table.coordinates.n_all != packing.n:
-        msg = f"{modes}: is of {table.coordinates.n_all} particles, expected {packing.n}"
-        raise ValueError(msg)
-    return table
-
-
-class Wanted(NamedTuple):
-    """Which modes to pick."""
-
-    numbers: Sequence[int] = ()
-    """Rows of the table."""
-    omegas: Sequence[float] = ()
-    """The modes with the nearest frequencies, by ratio; negative ones are sought among modes of
-    negative eigenvalue, at -sqrt(-lambda)."""
-    per_band: Mapping[str, int] = {}
-    """Where neither is asked for: numbers of modes of each band, evenly by rank. Those of a band that is empty
-    come from the next one, and all from the whole spectrum where bands are not apart."""
-
-
-def pick_modes(table: ModeTable, wanted: Wanted) -> list[int]:
-    """Choose modes by number or frequency, or else typical ones of the bands.
-
-    Raises
-    ------
-    ValueError
-        If there is no such mode.
-    """
-    n = len(table["omega"])
-    wrong = [k for k in wanted.numbers if not 0 <= k < n]
-    if wrong:
-        msg = f"there is no mode {wrong[0]}, expected one from 0 to {n - 1}"
-        raise ValueError(msg)
-    chosen = [*wanted.numbers, *(_nearest(table, omega) for omega in wanted.omegas)]
-    if chosen:
-        return chosen
-    if not all(map(table.has_band, TOLD)):
-        return _evenly(table, table.vibrational, sum(wanted.per_band.values()))
-    left = 0
-    for name in TOLD:
-        rows, count = table.in_band(name), wanted.per_band.get(name, 0) + left
-        left = count if not len(rows) else 0
-        chosen += _evenly(table, rows, count - left)
-    return sorted(set(chosen))
-
-
-def _evenly(table: ModeTable, rows: IntArray, count: int) -> list[int]:
-    """Choose modes of some rows evenly by rank."""
-    by_size = rows[np.argsort(sizes(table)[rows])]
-    places = (np.arange(count) + 0.5) / max(count, 1) * len(rows)
-    return [int(by_size[int(place)]) for place in places]
-
-
-def _nearest(table: ModeTable, omega: float) -> int:
-    rows = np.flatnonzero(stable(table) if omega > 0 else unstable(table))
-    if not len(rows):
-        kind = "positive" if omega > 0 else "negative"
-        msg = f"no mode has a {kind} eigenvalue, expected one near omega = {omega:g}"
-        raise ValueError(msg)
-    distance = np.abs(np.log(sizes(table)[rows] / abs(omega))) if omega else sizes(table)[rows]
-    return int(rows[np.argmin(distance)])
-
-
-def band_means(samples: Sequence[ModeTable], name: str) -> dict[str, Mean]:
-    """Average a column over the modes of each band, then over samples; those without are left out."""
-    found = {}
-    for band in TOLD:
-        parts = [table[name][table.in_band(band)] for table in samples]
-        found[band] = mean([part.mean() for part in parts if len(part)])
-    return found

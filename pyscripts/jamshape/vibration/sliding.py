@@ -1,8 +1,8 @@
-"""Motions that the stiff contacts of a packing leave free, and how far they go until something new touches.
+"""Motions that the stiff contacts of a packing leave free, and their range until a new contact forms.
 
-Modes of the dynamical matrix that vanish at first order in the prestress (Marschall & Teitel 2018, Appendix B): rods
-that slide along flat sides. Contacts with forces of second order in the overlap, which stop what slides, are
-taken for what they nearly are: hard walls. General in the shape; needs no LAMMPS.
+These are modes of the dynamical matrix that vanish at first order in the prestress (Marschall & Teitel 2018,
+Appendix B): rods that slide along flat sides. Contacts with forces of second order in the overlap, which stop
+sliding, are approximated as hard walls. Independent of the shape; needs no LAMMPS.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from jamshape.landscape import Landscape, State
 from jamshape.vibration.hessian import DynamicalMatrix, Scope, dynamical_matrix, lengths_of_bonds
 from jamshape.vibration.sparse_modes import lowest, typical_prestress
 
-# Modes softer than this part of the prestress vanish at first order in it.
+# Modes softer than this fraction of the prestress vanish at first order in it.
 _FIRST_ORDER = 1e-2
 
-# Forces below this part of the root of the prestress (over the stiffness) are of second order in the overlap.
+# Forces below this fraction of the root of the prestress (over the stiffness) are of second order in the overlap.
 _WEAK = 0.1
 
-# Where distances between surfaces are measured: where they are this much smaller than the longest step.
+# Scale of the perturbation to measure surface distances, relative to the longest step.
 _LEVELS = (1e-6, 1e-4, 1e-2, 1.0)
 
-# What moves less, for motions of unit size, is not asked how far; a wall is met at this distance over the step.
-_SEEN, _MET = 1e-4, 1e-9
+_SEEN = 1e-4  # smaller components of unit motions are not limited
+_MET = 1e-9  # distance over the step at which a wall is met
 
-# Bonds of contacts that bear force are new ones if they are open by more than this part of the step.
+# Bonds of force-bearing contacts are new if they are open by more than this fraction of the step.
 _OPEN = 0.1
 
 
 class Walls(NamedTuple):
-    """What may not come closer: m distances between surfaces, and how (n,) coordinates change them."""
+    """Constraints: m distances between surfaces, and their derivatives by (n,) coordinates."""
 
     gap: FloatArray
     """(m,) [length]"""
@@ -47,17 +47,17 @@ class Walls(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """The sliding motions of one state.
+    """Sliding motions of one state.
 
     Parameters
     ----------
     matrix : DynamicalMatrix
-        Of the contacts that bear forces of first order.
+        Dynamical matrix of the contacts with forces of first order.
     modes : (n, k) array of float64
         Orthonormal columns.
     eigenvalues : (k,) array of float64, [energy / length^2]
     slope : (k,) array of float64, [energy / length]
-        Of the energy of these contacts along the modes.
+        Slope of the energy of these contacts along the modes.
     walls : Walls
     """
 
@@ -71,16 +71,16 @@ class Sliding:
     def at(
         cls, landscape: Landscape, state: State, reach: float, *, keeping: bool = False
     ) -> Sliding:
-        """Find what slides at a state where stiff modes are relaxed.
+        """Find the sliding modes at a state with relaxed stiff modes.
 
         Parameters
         ----------
         landscape : Landscape
         state : State
         reach : float, [length]
-            How far particles are to move at most.
+            Largest displacement of particles.
         keeping : bool
-            Whether weak contacts are to stay too, rather than be walls: for states where forces balance.
+            Whether to keep weak contacts, rather than treat them as walls: for states in force balance.
         """
         every = dynamical_matrix(landscape, state, Scope(force=True))
         stiffest = float(every.bonds.stiffness.max())
@@ -97,24 +97,24 @@ class Sliding:
         return len(self.eigenvalues)
 
     def step(self, farthest: FloatArray, radius: FloatArray) -> Step:
-        """Find the step that lowers the energy most as far as its slope tells, up to the walls.
+        """Find the step that lowers the energy most to first order, limited by the walls.
 
-        Along negative curvature the energy falls faster than its slope says. So this is a linear programme, and
-        its solution a corner: each motion goes until something touches, or as far as it may.
+        Along negative curvature the energy falls faster than its slope. So this is a linear programme, whose
+        solution is a vertex: each motion goes on to a wall, or to its limit.
 
         Parameters
         ----------
         farthest : (N,) array of float64, [length]
-            How far each particle may move.
+            Largest displacement of each particle.
         radius : (N,) array of float64, [length]
-            How far a radian moves a particle's surface.
+            Largest displacement of a particle's surface per radian.
         """
         if not self.n_free:
             return Step(np.zeros(self.matrix.size), 0.0, 0, self._split(np.zeros(0), radius))
         scale = float(farthest.max())
         bend = 0.5 * scale * np.maximum(-self.eigenvalues, 0.0)
         downhill = np.where(self.slope >= 0, 1.0, -1.0)
-        # From the top of a saddle it goes down on both sides, and there may be a wall on one of them.
+        # From a saddle the energy falls on both sides, one of which may have a wall.
         other = np.where(bend > np.abs(self.slope), -downhill, downhill)
         sides = [downhill] if (other == downhill).all() else [downhill, other]
         limits = self._limits(farthest, radius)
@@ -125,7 +125,7 @@ class Sliding:
         return Step(self.modes @ c, float(min(gains)), n_met, self._split(c, radius))
 
     def _limits(self, farthest: FloatArray, radius: FloatArray) -> _Limits:
-        """Say how far the motions may go, in units of the longest step."""
+        """Return the limits of the motions, in units of the longest step."""
         scale = float(farthest.max())
         moved = scale * self._moved(radius) / farthest[:, None, None]
         moved = moved.reshape(-1, self.n_free)
@@ -136,7 +136,7 @@ class Sliding:
         return _Limits(self.walls.gradient @ self.modes, self.walls.gap / scale, moved, limit)
 
     def _moved(self, radius: FloatArray) -> FloatArray:
-        """(N, D + T, k) how far the modes move and turn the particles' surfaces."""
+        """(N, D + T, k) displacements of the particles' surfaces by translation and rotation in each mode."""
         at, D = self.matrix.coordinates, self.matrix.coordinates.dimension
         moved = (at.embedding @ self.modes).reshape(at.n_all, at.direction.shape[1], self.n_free)
         moved[:, D:] *= radius[:, None, None]
@@ -147,19 +147,19 @@ class Sliding:
 
 
 class _Limits(NamedTuple):
-    """How far k motions may go."""
+    """Limits of k motions."""
 
     walls: FloatArray
-    """(m, k) what they change distances between surfaces by."""
+    """(m, k) derivatives of the surface distances."""
     gap: FloatArray
-    """(m,) these distances."""
+    """(m,) surface distances."""
     moved: FloatArray
-    """(l, k) what they move, by at most 1."""
+    """(l, k) derivatives of displacements, each limited to 1."""
     limit: FloatArray
-    """(k,) of each motion."""
+    """(k,) limit of each motion."""
 
     def corner(self, cost: FloatArray) -> FloatArray:
-        """Go down a slope to the end; nowhere if there is none."""
+        """Move down a slope to the end; nowhere if there is none."""
         rows = np.vstack([-self.walls, self.moved, -self.moved])
         most = np.concatenate([self.gap, np.ones(2 * len(self.moved))])
         bounds = np.column_stack([-self.limit, self.limit])
@@ -174,11 +174,11 @@ class Step(NamedTuple):
     vector: FloatArray
     """(n,)"""
     gain: float
-    """What the energy changes by, as far as slope and curvature tell."""
+    """Change of the energy to second order."""
     n_met: int
-    """How many walls it goes up to."""
+    """Number of walls met."""
     moved: FloatArray
-    """(N, D + T) how far it moves and turns the particles' surfaces."""
+    """(N, D + T) displacements of the particles' surfaces by translation and rotation."""
 
 
 def _softest(matrix: DynamicalMatrix) -> tuple[FloatArray, FloatArray]:
@@ -195,7 +195,7 @@ def _softest(matrix: DynamicalMatrix) -> tuple[FloatArray, FloatArray]:
 
 
 def _walls(landscape: Landscape, state: State, matrix: DynamicalMatrix, reach: float) -> Walls:
-    """Measure distances on particles that are larger, so that they touch, as exactly as these are small."""
+    """Measure distances on enlarged particles, so that they touch, as precisely as overlaps are small."""
     radius = 0.5 * landscape.length
     bearing = _named(matrix.contacts)
     is_held = np.zeros(matrix.coordinates.n_all, bool)
@@ -228,14 +228,14 @@ def _walls(landscape: Landscape, state: State, matrix: DynamicalMatrix, reach: f
 def _are_new(
     names: list[tuple[int, ...]], contact: IntArray, known: dict[tuple[int, ...], int]
 ) -> BoolArray:
-    """Tell bonds of contacts that have more of them than before."""
+    """Flag bonds beyond the previous number in their contact."""
     count = np.bincount(contact, minlength=len(names))
     more = np.array([count[c] > known.get(names[c], 0) for c in range(len(names))], bool)
     return np.asarray(more[contact])
 
 
 def _named(contacts: dict[str, FloatArray]) -> list[tuple[int, ...]]:
-    """Name contacts by their particles and periodic image."""
+    """Key contacts by their particles and periodic image."""
     return [
         tuple(row) for row in np.column_stack([contacts["particles"], contacts["shift"]]).tolist()
     ]

@@ -1,11 +1,11 @@
-"""A few modes of a large packing, without dense matrices: Lanczos iteration on the inverse of M - shift.
+"""The softest modes of a large packing, without dense matrices: Lanczos iteration on the inverse of M - shift.
 
-Neither M nor a factor of it is formed, in which rounding would bury the prestress: what is factorised is
+M and its factors, in which rounding would bury the prestress, are never formed; instead
 
     [ -(S + shift) / s   C^T ] [ v ]   [ b / s ]
     [        C           -s  ] [ y ] = [  0    ]
 
-which has (M - shift) v = b and s y = C v. With s of the size of the prestress its entries are all of
+is factorised, with (M - shift) v = b and s y = C v. With s of the size of the prestress its entries are all of
 order one (but for the small s itself), so that rounding errors in the factors are like those of the
 entries of C and S.
 """
@@ -26,24 +26,22 @@ from jamshape.vibration.hessian import DynamicalMatrix
 from jamshape.vibration.quotients import Products, isolated_error, norms
 from jamshape.vibration.spectrum import COLUMNS, Spectrum, is_unsettled, spectrum
 
-# The shift for the lowest modes, over the square of the prestress that sliding modes come from.
+# Shift for the lowest modes, over the square of the prestress that causes sliding modes.
 _BELOW = -4.0
 
-# Modes are resolved if their relative errors are below the first number. For others, if further away than
-# the second times the shift, the shift moves up, so many times at most.
-_RESOLVED = 1e-9
-_FAR = 100.0
-_CLIMBS = 4
+_RESOLVED = 1e-9  # relative error of resolved modes
+_FAR = 100.0  # distance of others over the shift above which the shift moves up
+_CLIMBS = 4  # of the shift, at most
 
-# Number of softest modes among which floppy ones are sought at first.
+# Initial number of softest modes among which floppy ones are sought.
 _SOME = 8
 
-# Lanczos iteration cannot find the last modes, of this number; dense methods do.
+# Lanczos iteration cannot find the last few modes; dense methods do.
 _BEYOND = 2
 
 
 class Solution(NamedTuple):
-    """Solutions v of (M - shift) v = b, and what is left of both equations."""
+    """Solutions v of (M - shift) v = b, and the residuals of both equations."""
 
     v: FloatArray
     """(n, k)"""
@@ -58,9 +56,9 @@ class ShiftedInverse:
     ----------
     matrix : DynamicalMatrix
     shift : float, [energy / length^2]
-        No eigenvalue, but for that of translations, 0: there, one particle of each cluster is held.
+        Not an eigenvalue, except 0, that of translations: there, one particle of each cluster is fixed.
     floppy : (n, k) array of float64, optional
-        Orthonormal modes of no stiffness beside translations, of which as many coordinates are held at a shift of 0.
+        Orthonormal zero modes beside translations; at a shift of 0 the same number of coordinates are fixed.
     """
 
     def __init__(
@@ -69,21 +67,18 @@ class ShiftedInverse:
         self.matrix, self.shift = matrix, shift
         floppy = np.empty((matrix.size, 0)) if floppy is None else floppy
         self.held = np.column_stack([matrix.translations, floppy])
-        """(n, l) modes that do not move at a shift of 0."""
+        """(n, l) modes that are fixed at a shift of 0."""
         C, S = matrix.compatibility, matrix.prestress
         self.scale = max(typical_prestress(matrix), abs(shift))
         held = shift * np.ones(matrix.size)
         if shift == 0.0:
             held[_supports(matrix.translations, floppy)] = -self.scale
         one = scipy.sparse.identity(C.shape[0])
-        blocks = [
-            [-(S + scipy.sparse.diags(held)) / self.scale, C.T],
-            [C, -self.scale * one],
-        ]
+        blocks = [[-(S + scipy.sparse.diags(held)) / self.scale, C.T], [C, -self.scale * one]]
         self._factors = splu(scipy.sparse.bmat(blocks, format="csc"))
 
     def solve(self, b: FloatArray) -> Solution:
-        """Solve for (n, k) or (n,) right-hand sides, which push no cluster as a whole if shift is 0."""
+        """Solve for (n, k) or (n,) right-hand sides, without net force on any cluster if shift is 0."""
         n_rows = self.matrix.compatibility.shape[0]
         return self._solved(b / self.scale, np.zeros((n_rows, *b.shape[1:])))
 
@@ -98,7 +93,7 @@ class ShiftedInverse:
 
 
 def _supports(translations: FloatArray, floppy: FloatArray) -> IntArray:
-    """Choose as many coordinates as there are modes, such that no mode moves without them."""
+    """Choose as many coordinates as modes, such that fixing them fixes every mode."""
     first = np.abs(translations).argmax(axis=0)
     if not floppy.shape[1]:
         return np.asarray(first)
@@ -119,10 +114,10 @@ def _stiffest(matrix: DynamicalMatrix) -> float:
 
 
 def lowest(matrix: DynamicalMatrix, k: int) -> Spectrum:
-    """Find the k softest modes but translations, from sliding modes up into the high band.
+    """Find the k softest modes without translations, from sliding modes up into the high band.
 
-    Softest are those nearest to a shift a little below zero, of the size of the eigenvalues of sliding
-    modes. Where bands are so far apart that one shift does not resolve the next, it follows them.
+    Softest means nearest to a shift slightly below zero, of the size of the eigenvalues of sliding
+    modes. Where one shift does not resolve the next band, it moves up.
 
     Parameters
     ----------
@@ -132,12 +127,12 @@ def lowest(matrix: DynamicalMatrix, k: int) -> Spectrum:
     Returns
     -------
     Spectrum
-        Without translations. Bounds take it that no mode between those found was missed.
+        Without translations. Bounds assume that no mode between them was missed.
 
     Raises
     ------
     ValueError
-        If k is less than one, or more than there are modes.
+        If k is less than one, or exceeds the number of modes.
     """
     began, known = time.perf_counter(), matrix.translations
     if _is_most(matrix, k):
@@ -159,7 +154,7 @@ def lowest(matrix: DynamicalMatrix, k: int) -> Spectrum:
 
 
 def near(matrix: DynamicalMatrix, k: int, shift: float) -> Spectrum:
-    """Find the k modes whose eigenvalues are nearest to a shift, not exactly one of them.
+    """Find the k modes whose eigenvalues are nearest to a shift that is not an eigenvalue itself.
 
     Arguments, result and errors otherwise as `lowest`.
     """
@@ -169,7 +164,7 @@ def near(matrix: DynamicalMatrix, k: int, shift: float) -> Spectrum:
 
 
 def softest(matrix: DynamicalMatrix, known: Spectrum | None = None) -> Spectrum:
-    """Find the softest modes, up to some that are neither floppy nor unsettled, unless those known hold them."""
+    """Find the softest modes, up to some that are neither floppy nor unsettled, unless already known."""
     most, k = matrix.size - matrix.translations.shape[1], _SOME
     found = known if known is not None and known.has_softest else None
     while found is None or not (found.is_firm & ~is_unsettled(matrix, found)).any():
@@ -192,17 +187,17 @@ def with_translations(matrix: DynamicalMatrix, found: Spectrum) -> Spectrum:
 
 
 def _is_most(matrix: DynamicalMatrix, k: int) -> bool:
-    """Whether k is all modes but a few, which Lanczos iteration leaves to dense methods."""
+    """Whether k is nearly all modes, which dense methods must find."""
     n = matrix.size - matrix.translations.shape[1]
     if n == 0:
         msg = (
-            f"the packing has no modes of vibration, as all its {matrix.size} modes are translations;"
-            " ask for the whole spectrum to see them"
+            f"the packing has no vibrational modes: all its {matrix.size} modes are translations;"
+            " compute the whole spectrum to see them"
         )
         raise ValueError(msg)
     if not 1 <= k <= n:
         msg = (
-            f"{k} modes were asked for, expected from 1 to {n}, the number of modes of vibration;"
+            f"{k} modes were requested, expected from 1 to {n}, the number of vibrational modes;"
             " leave the number out for the whole spectrum"
         )
         raise ValueError(msg)
@@ -210,7 +205,7 @@ def _is_most(matrix: DynamicalMatrix, k: int) -> bool:
 
 
 def _nearest(matrix: DynamicalMatrix, k: int, shift: float) -> Spectrum:
-    """Pick the k modes nearest to a shift from the whole spectrum."""
+    """Select the k modes nearest to a shift from the whole spectrum."""
     whole = spectrum(matrix)
     own = np.flatnonzero(~whole.is_translation)
     nearest = own[np.argsort(np.abs(whole.eigenvalues[own] - shift), kind="stable")[:k]]
@@ -219,7 +214,7 @@ def _nearest(matrix: DynamicalMatrix, k: int, shift: float) -> Spectrum:
 
 
 def _near(matrix: DynamicalMatrix, k: int, shift: float, known: FloatArray) -> Spectrum:
-    """Find k modes besides those known, orthonormal columns."""
+    """Find k modes besides the known ones, orthonormal columns."""
     began = time.perf_counter()
     inverse = ShiftedInverse(matrix, shift)
 
@@ -247,10 +242,10 @@ def _without(T: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 def _bounded(inverse: ShiftedInverse, v: FloatArray, seconds: float) -> Spectrum:
-    """Solve once more, and take the quotients of the solutions w with bounds.
+    """Solve once more, and compute quotients of the solutions w with bounds.
 
-    (M - lambda) w = v - (lambda - shift) w is known without cancellation. What a computed solution
-    leaves of the second equation, r2, is as if C were changed by r2 w^T / |w|^2.
+    (M - lambda) w = v - (lambda - shift) w is known without cancellation. The residual r2 of the second
+    equation is equivalent to a change of C by r2 w^T / |w|^2.
     """
     matrix, shift, scale = inverse.matrix, inverse.shift, np.longdouble(inverse.scale)
     w, y = inverse.solve(v)

@@ -1,7 +1,7 @@
-"""Modes of a dynamical matrix M = C^T C - S, each eigenvalue with a bound of its error.
+"""Modes of a dynamical matrix M = C^T C - S, each eigenvalue with an error bound.
 
 The low bands lie ten to twenty orders of magnitude below the high one, where eigenvalues of M in doubles
-are noise; see `jamshape.vibration.two_levels` for what keeps them, and `jamshape.vibration.sparse_modes` for large packings.
+are noise; `jamshape.vibration.two_levels` resolves them, and `jamshape.vibration.sparse_modes` those of large packings.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from jamshape.vibration.two_levels import Found, rank_of, two_levels
 # To estimate the error of a state, no coordinate moves by more than this fraction of a radius.
 _SHORT = 1e-3
 
-# Modes above this fraction of the largest eigenvalue follow the others on that way.
+# Modes above this fraction of the largest eigenvalue follow the others adiabatically.
 _STIFF = 1e-5
 
 
 COLUMNS = ("eigenvalues", "solver_error", "entry_error", "overlap_error", "is_translation")
-"""Fields of a spectrum with a number for each mode."""
+"""Fields of a spectrum with one number for each mode."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,22 +42,22 @@ class Spectrum:
     vectors : (n, k) array of float64
         Unit columns in the coordinates of the matrix.
     solver_error : (k,) array of float64
-        Bound of the distance to an eigenvalue of the matrix as it is stored.
+        Bound of the distance to an eigenvalue of the stored matrix.
     entry_error : (k,) array of float64
-        Bound of what the rounding of the matrix's entries can change.
+        Bound of the effect of rounding of the matrix entries.
     overlap_error : (k,) array of float64
-        Bound of what the rounding of overlaps can change, small differences of lengths in long double: most of the error
-        of modes that the prestress holds.
+        Bound of the effect of rounding of overlaps, small differences of lengths in long double: most of the error
+        of modes held by prestress.
     is_translation : (k,) array of bool
-        Modes of the packing's clusters as wholes, whose eigenvalues are exactly 0.
+        Rigid translations of the packing's clusters, whose eigenvalues are exactly 0.
     method : str
     wall_seconds : float
     n_before : int
-        Number of modes below the first of these; -1 where unknown.
+        Number of modes below the first of these; -1 if unknown.
     singular_values : (min(m, n),) array of float64, or empty
-        Of C, descending.
+        Singular values of C, descending.
     has_softest : bool
-        Whether no mode is softer than those of these, and soft ones are known to their bounds.
+        Whether these include the softest modes, resolved to their bounds.
     """
 
     eigenvalues: FloatArray
@@ -79,13 +79,13 @@ class Spectrum:
 
     @property
     def sign(self) -> NDArray[np.int64]:
-        """(k,) 1 or -1 where the bound leaves no doubt, 0 elsewhere."""
+        """(k,) 1 or -1 where the bound determines the sign, 0 elsewhere."""
         sure = np.abs(self.eigenvalues) > self.bound
         return np.where(sure, np.sign(self.eigenvalues), 0).astype(np.int64)
 
     @property
     def is_floppy(self) -> NDArray[np.bool_]:
-        """(k,) modes but translations of which not even the sign is known: eigenvalues below their bounds."""
+        """(k,) modes but translations whose eigenvalues are below their bounds, so that even the sign is unknown."""
         return np.asarray((self.sign == 0) & ~self.is_translation)
 
     @property
@@ -94,12 +94,12 @@ class Spectrum:
         return np.asarray((self.sign != 0) & ~self.is_translation)
 
     def picked(self, rows: NDArray[Any]) -> Spectrum:
-        """Choose modes, by rows or by a mask."""
+        """Select modes by rows or by a mask."""
         columns: dict[str, Any] = {name: getattr(self, name)[rows] for name in COLUMNS}
         return replace(self, vectors=self.vectors[:, rows], **columns)
 
     def with_exact_translations(self) -> Spectrum:
-        """Give translations the eigenvalue 0, which they have, without an error."""
+        """Set the eigenvalues of translations to their exact value 0."""
         exact: dict[str, Any] = {
             name: np.where(self.is_translation, 0.0, getattr(self, name)) for name in COLUMNS[:-1]
         }
@@ -113,12 +113,12 @@ class Spectrum:
         return frequency
 
     def rank(self, residual: float = 0.0) -> int:
-        """Rank of C, that is of H; the residual of the state is that of its self stress."""
+        """Rank of C, and so of H; the residual of the state is that of its self stress."""
         return rank_of(self.singular_values, residual)
 
 
 def spectrum(matrix: DynamicalMatrix, method: str = "projected") -> Spectrum:
-    """Find all modes, with dense matrices: for up to a few thousand coordinates.
+    """Find all modes with dense matrices, for up to a few thousand coordinates.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def spectrum(matrix: DynamicalMatrix, method: str = "projected") -> Spectrum:
         ``refined``: the same, and the low modes refined in long double (Ogita and Aishima, Japan J.
         Indust. Appl. Math. 35, 1007 (2018)).
         ``plain``: eigenvalues of M in doubles. ``first_order``: Marschall & Teitel 2018, Appendix B.
-        These two are for comparison: the low bands are noise in the one, sliding modes in both.
+        Both are for comparison: the low bands are noise in the former, sliding modes in both.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def spectrum(matrix: DynamicalMatrix, method: str = "projected") -> Spectrum:
     Raises
     ------
     ValueError
-        If there is no such method.
+        If the method is unknown.
 
     See Also
     --------
@@ -168,9 +168,9 @@ def spectrum(matrix: DynamicalMatrix, method: str = "projected") -> Spectrum:
 
 
 def is_unsettled(matrix: DynamicalMatrix, found: Spectrum) -> NDArray[np.bool_]:
-    """Select modes but translations along which the minimum is further away than the mean overlap.
+    """Select modes but translations along which the minimum is farther away than the mean overlap.
 
-    So far off no eigenvalue tells what is there: often other contacts.
+    At this distance eigenvalues do not describe the minimum, where contacts often differ.
 
     Returns
     -------
@@ -186,13 +186,13 @@ class Nearer(NamedTuple):
 
     matrix: DynamicalMatrix
     part: float
-    """Which part of the way this is."""
+    """Fraction of the way."""
 
 
 def nearer_minimum(
     landscape: Landscape, state: State, matrix: DynamicalMatrix, newton: FloatArray
 ) -> Nearer:
-    """Go (n,) a Newton step, or that part of it which moves nothing by more than a thousandth of a radius."""
+    """Take an (n,) Newton step, or the fraction of it that moves nothing by more than a thousandth of a radius."""
     farthest = float(np.abs(newton).max(initial=0.0))
     part = min(1.0, _SHORT * float(landscape.inner_radius.min()) / max(farthest, 1e-300))
     shift, turn = matrix.coordinates.motion(part * newton)
@@ -202,17 +202,17 @@ def nearer_minimum(
 def state_error(
     landscape: Landscape, state: State, matrix: DynamicalMatrix, found: Spectrum
 ) -> FloatArray:
-    """Estimate how much eigenvalues change on the way to the minimum that the forces point at.
+    """Estimate the change of eigenvalues on the way to the minimum that the forces point at.
 
-    The way is a Newton step, or that part of it which moves nothing by more than a thousandth of the
+    The way is a Newton step, or the fraction of it that moves nothing by more than a thousandth of the
     smallest radius; changes are then extrapolated. Where this estimate exceeds an eigenvalue, as it
-    often does for sliding modes, the packing has not settled along that mode, and not even the sign is
-    that of the minimum.
+    often does for sliding modes, the packing has not settled along that mode, and even the sign at
+    the minimum is unknown.
 
     Parameters
     ----------
     landscape, state
-        What the matrix is of.
+        State of the matrix.
     matrix : DynamicalMatrix
     found : Spectrum
         All its modes.
@@ -244,7 +244,7 @@ def _plain(matrix: DynamicalMatrix) -> Found:
 
 
 def _first_order(matrix: DynamicalMatrix) -> Found:
-    """Marschall & Teitel 2018, Appendix B: -S on the null space of H, and its mean elsewhere."""
+    """Use -S on the null space of H and its mean elsewhere (Marschall & Teitel 2018, Appendix B)."""
     C, S = matrix.compatibility.toarray(), matrix.prestress
     _, sigma, right = scipy.linalg.svd(C)
     rank = rank_of(sigma, matrix.residual.largest)
@@ -258,7 +258,7 @@ def _first_order(matrix: DynamicalMatrix) -> Found:
 def _found_as_is(
     matrix: DynamicalMatrix, values: FloatArray, vectors: FloatArray, sigma: FloatArray
 ) -> Found:
-    """Take eigenvalues as they are; their residuals bound their errors."""
+    """Keep eigenvalues as they are, with their residuals as error bounds."""
     at = Products(matrix).quotients(vectors)
     off = np.abs(values - at.value).astype(np.float64)
     return Found(values, vectors, at.residual + at.rounding + off, at.entries, at.overlaps, sigma)

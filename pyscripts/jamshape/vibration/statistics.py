@@ -1,4 +1,4 @@
-"""What the modes of a packing are like: densities, participation, directions, bands and their counts.
+"""Statistics of the modes of a packing: densities, participation, directions, bands and their counts.
 
 Marschall & Teitel 2018, Sec. III D.
 """
@@ -17,66 +17,65 @@ from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum
 from jamshape.vibration.two_levels import rank_of
 
-# The gap below the high band is the widest within this fraction of all modes, or this number of modes, of
-# where the rank of H says that it is.
+# The gap below the high band is the widest within this fraction of all modes around the rank of H.
 _NEAR_RANK = 0.002
-_NEAR_RANK_MODES = 3
+_NEAR_RANK_MODES = 3  # that fraction in modes, at least
 
-# Where the rank is that of all modes, bonds in excess of this fraction of them leave no band.
+# At full rank, bonds in excess of this fraction of the modes leave no band.
 _EXCESS = 0.02
 
-# Bands are apart if eigenvalues on both sides of the gap between them differ by this factor, as much as
-# `jamshape.vibration.two_levels` asks of modes that only the stiffness holds.
+# Bands separate if eigenvalues on both sides of their gap differ by this factor, the same that
+# `jamshape.vibration.two_levels` requires of modes held by stiffness alone.
 _GAP = 3.0
 
 # Bonds with a larger share than this in further states of self stress belong to them.
 _SHARE = 1e-3
 
-# Bonds weaker than this fraction of the mean force only just touch.
+# Bonds weaker than this fraction of the mean force are grazing.
 _GRAZING = 1e-4
 
 
 class Components(NamedTuple):
-    """How much of each mode is what kind of motion; (k,) each, their sum is 1."""
+    """Shares of the kinds of motion in each mode; (k,) each, their sum is 1."""
 
     parallel: FloatArray
     """Displacement along the long axis (Marschall & Teitel 2018, Eq. 33)."""
     perpendicular: FloatArray
-    """Displacement across it (Eq. 34)."""
+    """Displacement perpendicular to it (Eq. 34)."""
     rotation: FloatArray
     """(Eq. 35)"""
     of_round: FloatArray
-    """Displacement of particles that have no long axis, discs."""
+    """Displacement of particles without long axis, discs."""
 
 
 class Density(NamedTuple):
-    """Density of vibrational states in bins of equal relative width."""
+    """Density of vibrational states in logarithmic bins."""
 
     edges: FloatArray
-    """(B + 1,) of omega, ascending."""
+    """(B + 1,) bin edges in omega, ascending."""
     n_modes: IntArray
     """(B,)"""
     density: FloatArray
-    """(B,) with the integral 1 over all modes that were counted."""
+    """(B,) normalised to integral 1 over all counted modes."""
 
     @property
     def omega(self) -> FloatArray:
-        """(B,) geometric middles of the bins."""
+        """(B,) geometric bin centres."""
         return np.sqrt(self.edges[1:] * self.edges[:-1])
 
 
 class Band(NamedTuple):
-    """Modes between two gaps, by size of their eigenvalues."""
+    """Modes between two gaps, by magnitude of their eigenvalues."""
 
     name: str
-    """low: of second order in the prestress; middle: of first order; high: what bonds constrain."""
+    """low: of second order in the prestress; middle: of first order; high: constrained by bonds."""
     modes: IntArray
     """Rows of the spectrum."""
     n_negative: int
     n_unsure: int
     """Modes whose sign is within the error."""
     mean_omega: float
-    """Mean frequency of those with positive eigenvalues beyond doubt; NaN if there is none."""
+    """Mean frequency of modes with definitely positive eigenvalues; NaN if there is none."""
     gap_below: float
     """Smallest |lambda| of the band over the largest of the band below; inf if there is none."""
 
@@ -87,33 +86,33 @@ class Band(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Modes and bonds counted; n_modes = n_translations + n_floppy + rank."""
+    """Counts of modes and bonds; n_modes = n_translations + n_floppy + rank."""
 
     n_modes: int
     n_translations: int
     n_bonds: int
     rank: int
-    """Of H, by the singular values of C."""
+    """Rank of H, from the singular values of C."""
     n_self_stress: int
     """N_c - rank: one, and one more for each set of redundant bonds."""
     n_floppy: int
     """Modes but translations that H leaves free."""
     n_grazing: int
-    """Bonds that only just touch, such as those that hold rods which slid up to them."""
+    """Grazing bonds, such as those that stop sliding rods."""
     high_expected: float
     """N z / 2 = N_c (Marschall & Teitel 2018, Sec. III D)."""
     low_expected: float
-    """N (z_iso - z) / 2 = n_modes - N_c, translations among them."""
+    """N (z_iso - z) / 2 = n_modes - N_c, including translations."""
     softest_constraint: float
-    """Smallest singular value that counts as one."""
+    """Smallest singular value counted in the rank."""
     largest_of_self_stress: float
-    """Largest that does not."""
+    """Largest singular value not counted in the rank."""
 
 
 class Redundancy(NamedTuple):
-    """A set of bonds that could carry stress by itself, beside that of the packing.
+    """A set of bonds that can carry stress by itself, beside that of the packing.
 
-    Such as a ring of rods with flat contacts; or a single second bond that has all but faded.
+    Examples are a ring of rods with flat contacts, or a second bond of vanishing force.
     """
 
     n_states: int
@@ -122,7 +121,7 @@ class Redundancy(NamedTuple):
     particles: IntArray
     """Rows of the packing."""
     largest_singular_value: float
-    """Of C; 0 would be exactly redundant."""
+    """Largest singular value of C; 0 means exactly redundant."""
 
 
 def participation(coordinates: Coordinates, vectors: FloatArray) -> FloatArray:
@@ -152,7 +151,7 @@ def components(coordinates: Coordinates, packing: Packing, vectors: FloatArray) 
     ----------
     coordinates : Coordinates
     packing : Packing
-        What has no direction (`Packing.directors`) is round.
+        Particles without direction (`Packing.directors`) count as round.
     vectors : (n, k) array of float64
         Unit columns.
 
@@ -176,18 +175,18 @@ def components(coordinates: Coordinates, packing: Packing, vectors: FloatArray) 
 
 
 def density_of_states(omega: FloatArray, per_decade: int = 10) -> Density:
-    """Count frequencies in bins of equal relative width (Marschall & Teitel 2018, Sec. III D).
+    """Count frequencies in logarithmic bins (Marschall & Teitel 2018, Sec. III D).
 
     Parameters
     ----------
     omega : (k,) array of float64
-        Those that are not positive, unstable modes and translations, are left out.
+        Non-positive ones, unstable modes and translations, are left out.
     per_decade : int
 
     Returns
     -------
     Density
-        Without bins where there is no frequency.
+        Without bins if there is no frequency.
     """
     positive = omega[omega > 0]
     if not len(positive):
@@ -201,7 +200,7 @@ def density_of_states(omega: FloatArray, per_decade: int = 10) -> Density:
 
 
 def mean_in_bins(values: FloatArray, omega: FloatArray, edges: FloatArray) -> FloatArray:
-    """Average (k,) values over the modes in bins of frequency: (B,), NaN where there is none."""
+    """Average (k,) values over the modes in bins of frequency: (B,), NaN in empty bins."""
     count = np.histogram(omega, edges)[0]
     total = np.histogram(omega, edges, weights=values)[0]
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
@@ -229,10 +228,10 @@ def count(matrix: DynamicalMatrix, found: Spectrum) -> Counts:
 
 
 def bands(matrix: DynamicalMatrix, found: Spectrum) -> list[Band]:
-    """Split a whole spectrum into its bands, from the lowest, translations left out.
+    """Split a whole spectrum into its bands, from the lowest, without translations.
 
-    The high band begins at the widest gap near where the rank of H says so. Below it, modes of first and
-    of second order in the prestress are distinguished by size: with the mean overlap x and stiffness k of
+    The high band begins at the widest gap near the rank of H. Below it, modes of first and
+    of second order in the prestress are distinguished by magnitude: with the mean overlap x and stiffness k of
     bonds, first order is about k x and second k x^2, and the cut is at k x^(3/2). Far above jamming there
     are no such gaps, and more bonds than modes: see `why_no_bands`.
 
@@ -244,20 +243,20 @@ def bands(matrix: DynamicalMatrix, found: Spectrum) -> list[Band]:
     Returns
     -------
     list of Band
-        Those that are not empty, and apart from the others.
+        The nonempty bands that are separated from the others.
     """
     return _split(matrix, found).bands
 
 
 def why_no_bands(matrix: DynamicalMatrix, found: Spectrum) -> str:
-    """Say why modes of a whole spectrum are in no band; an empty text if all but translations are in one."""
+    """Return why modes of a whole spectrum are in no band; an empty text if all but translations are in one."""
     return _split(matrix, found).reason
 
 
 class _Split(NamedTuple):
     bands: list[Band]
     reason: str
-    """Why other modes are in no band."""
+    """Reason why other modes are in no band."""
 
 
 def _split(matrix: DynamicalMatrix, found: Spectrum) -> _Split:
@@ -271,7 +270,7 @@ def _split(matrix: DynamicalMatrix, found: Spectrum) -> _Split:
     n_low = int((size < _cut(matrix)).sum())
     n_below = _gap_near(size, n_low, n - rank, reach)
     if rank >= n and matrix.n_bonds - n > max(_NEAR_RANK_MODES, _EXCESS * n):
-        held = f"{matrix.n_bonds} bonds, more than the {n} modes of vibration, hold all of them"
+        held = f"{matrix.n_bonds} bonds constrain all of the {n} vibrational modes"
         return _Split([], f"no bands: {held}, as far above jamming")
     gap = _ratio(size, n_below)
     if gap < _GAP or abs(n_below - (n - rank)) > reach:
@@ -280,7 +279,7 @@ def _split(matrix: DynamicalMatrix, found: Spectrum) -> _Split:
         return _Split([], f"no bands: {below}, but {widest} between eigenvalues, expected {_GAP:g}")
     high = [_band(found, "high", order[n_below:], gap)] if n_below < n else []
     if _ratio(size, n_low) < _GAP and n_low < n_below:
-        where = f"the softest {n_below} modes are no low and middle bands"
+        where = f"the softest {n_below} modes do not split into low and middle bands"
         reason = f"{where}: no gap of a factor of {_GAP:g} between first and second order in the prestress"
         return _Split(high, reason)
     limits = {"low": (0, n_low), "middle": (n_low, n_below)}
@@ -300,7 +299,7 @@ def _cut(matrix: DynamicalMatrix) -> float:
 
 
 def _ratio(size: FloatArray, first: int) -> float:
-    """Ratio of a size to the one below; inf if it is the lowest, or there is none."""
+    """Ratio of a value to the one below; inf if it is the lowest, or there is none."""
     return float(size[first] / size[first - 1]) if 0 < first < len(size) else np.inf
 
 
@@ -327,10 +326,10 @@ def _band(found: Spectrum, name: str, modes: IntArray, gap: float) -> Band:
 
 
 def redundancies(matrix: DynamicalMatrix) -> list[Redundancy]:
-    """Find bonds that could carry stress beside that of the whole packing, such as rings of flat rods.
+    """Find bonds that can carry stress beside that of the whole packing, such as rings of flat rods.
 
     These are states of self stress, null vectors of C^T, orthogonal to the forces that balance in the
-    packing. Needs the singular vectors of C: as long as a whole spectrum.
+    packing. Needs the singular vectors of C: as costly as a whole spectrum.
     """
     left, sigma, _ = scipy.linalg.svd(matrix.compatibility.toarray())
     null, own = left[:, rank_of(sigma, matrix.residual.largest) :], _self_stress(matrix)
@@ -339,7 +338,7 @@ def redundancies(matrix: DynamicalMatrix) -> list[Redundancy]:
 
 
 def _self_stress(matrix: DynamicalMatrix) -> FloatArray:
-    """(m,) unit vector of the forces of the bonds over the roots of their stiffness."""
+    """(m,) unit vector of the bond forces over the square roots of their stiffness."""
     own = matrix.bonds.pull
     return np.asarray(own / max(float(np.linalg.norm(own)), 1e-300))
 
@@ -358,7 +357,7 @@ def _grouped(matrix: DynamicalMatrix, states: FloatArray) -> list[Redundancy]:
 
 
 def _redundancy(matrix: DynamicalMatrix, states: FloatArray, bonds: IntArray) -> Redundancy:
-    """Describe those of some states of self stress (m, q) that are on some of the bonds."""
+    """Describe states of self stress (m, q) that involve some of the bonds."""
     _, share, mix = np.linalg.svd(states[bonds], full_matrices=False)
     own = states @ mix[share > 0.5].T
     pushes = matrix.compatibility.T @ own

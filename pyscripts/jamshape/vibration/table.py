@@ -1,14 +1,14 @@
-"""The whole analysis of one packing's modes as one table, and its HDF5 file.
+"""The complete analysis of a packing's modes as one table, and its HDF5 file.
 
 ::
 
     /modes          eigenvalues, omega, sign, solver_error, entry_error, overlap_error (0 of earlier versions),
-                    state_error, is_translation, participation, parallel, perpendicular, rotation, of_round (k,); band (k,) as in `BANDS`;
-                    vectors (n, k) if asked for
+    state_error, is_translation, participation, parallel, perpendicular, rotation, of_round (k,); band (k,), see `BANDS`;
+    vectors (n, k) if requested
     /coordinates    particle, kind (n,), direction (n, D + T): see `jamshape.vibration.hessian.Coordinates`
     /singular_values
-    /parameters     +every result that is one number, and what the packing and the method were: of each modulus
-                    its value (NaN where it is not defined), _affine, _rounding, _of_state and, if needed, _reason
+    /parameters     +every scalar result, and attributes of the packing and the method: for each modulus
+    its value (NaN if undefined), _affine, _rounding, _of_state and, if needed, _reason
 """
 
 from __future__ import annotations
@@ -40,31 +40,23 @@ MODULI = ("bulk", "pure_shear", "simple_shear")
 _COUNTS = ("n_floppy_left_out", "n_unsettled_left_out", "n_negative_modes")
 _PARTS = ("affine", "rounding", "of_state")
 
-# Of each eigenvalue, which together bound it.
+# Contributions to the error bound of each eigenvalue.
 _ERRORS = ("solver_error", "entry_error", "overlap_error")
 
 _COLUMNS = (
-    *("eigenvalues", "omega", "sign", *_ERRORS, "state_error"),
-    *(
-        "is_translation",
-        "participation",
-        "parallel",
-        "perpendicular",
-        "rotation",
-        "of_round",
-        "band",
-    ),
+    *("eigenvalues", "omega", "sign", *_ERRORS, "state_error", "is_translation"),
+    *("participation", "parallel", "perpendicular", "rotation", "of_round", "band"),
 )
 
 
 @dataclass(frozen=True, eq=False)
 class ModeTable:
-    """Modes of a packing, by ascending eigenvalue, with what is known of each.
+    """Modes of a packing, by ascending eigenvalue, with their properties.
 
     Parameters
     ----------
     columns : dict of str to (k,) array
-        Those under /modes of the file.
+        Data sets under /modes of the file.
     vectors : (n, k) array of float64
         Unit columns; (n, 0) if they were not stored.
     coordinates : Coordinates
@@ -84,7 +76,7 @@ class ModeTable:
 
     @property
     def bound(self) -> FloatArray:
-        """(k,) bound of the error of each eigenvalue of the state as it is."""
+        """(k,) bound of the error of each eigenvalue of this state."""
         return np.asarray(np.sum([self[name] for name in _ERRORS], axis=0))
 
     def in_band(self, name: str) -> IntArray:
@@ -93,7 +85,7 @@ class ModeTable:
         return np.flatnonzero(self["band"] == code)
 
     def has_band(self, name: str) -> bool:
-        """Whether modes are known to be in this band or not: not where bands are not apart, or modes are few."""
+        """Whether it is known which modes are in this band: not if bands do not separate or modes are few."""
         is_none = bool((self["band"] == _NONE).any())
         return not is_none or (name == BANDS[_HIGH] and len(self.in_band(name)) > 0)
 
@@ -104,7 +96,7 @@ class ModeTable:
 
     @property
     def n_vibrational(self) -> int:
-        """Number of modes of the packing, translations left out, whether or not they were found."""
+        """Number of modes of the packing without translations, whether or not they were found."""
         n_translations = self.attributes.get("n_translations", self["is_translation"].sum())
         return int(self.attributes["n_modes"] - n_translations)
 
@@ -120,12 +112,12 @@ class ModeTable:
 def tabulate(
     landscape: Landscape, state: State, matrix: DynamicalMatrix, found: Spectrum
 ) -> ModeTable:
-    """Measure everything of modes that were found: a whole spectrum, or a few.
+    """Measure all properties of modes: a whole spectrum, or a few.
 
     Parameters
     ----------
     landscape, state
-        What the matrix is of.
+        State of the matrix.
     matrix : DynamicalMatrix
     found : Spectrum
 
@@ -133,8 +125,8 @@ def tabulate(
     -------
     ModeTable
         Translations have the eigenvalue 0.
-        A few modes have no bands and no errors of the state; nor are these errors, and those of moduli, known
-        where contacts were left out, without which the state is no minimum.
+        A few modes have no bands and no state errors; these errors, and those of moduli, are also unknown
+        if contacts were left out, since the state is then not a minimum.
     """
     found = found.with_exact_translations()
     coordinates, k = matrix.coordinates, len(found.eigenvalues)
@@ -176,11 +168,11 @@ def tabulate(
 
 
 def _moduli(matrix: DynamicalMatrix, found: Spectrum, at: tuple[Landscape, State] | None) -> Moduli:
-    """Compute moduli; where contacts were left out, say that their bounds are not known."""
+    """Compute moduli; if contacts were left out, mark their bounds as unknown."""
     elastic = moduli(matrix, found, at)
     if at is not None:
         return elastic
-    why = f"the bound is not known, as {matrix.n_left_out} contacts were left out"
+    why = f"the bound is unknown, as {matrix.n_left_out} contacts were left out"
     given = {name: getattr(elastic, name) for name in MODULI}
     return elastic._replace(
         **{name: m._replace(reason=m.reason or why) for name, m in given.items()}
@@ -210,7 +202,7 @@ def _stored_modulus(attributes: Mapping[str, Any], key: str) -> Modulus:
 def write_modes(
     path: PathLike, table: ModeTable, attributes: Mapping[str, Any], *, vectors: bool
 ) -> None:
-    """Write a table, replacing the file at `path` only when all is written.
+    """Write a table; an existing file is replaced only when writing is complete.
 
     Parameters
     ----------
@@ -219,7 +211,7 @@ def write_modes(
     attributes : mapping
         More to store, such as those of the packing.
     vectors : bool
-        Whether to store the modes themselves.
+        Whether to store the eigenvectors.
 
     Raises
     ------
@@ -253,12 +245,12 @@ def read_modes(path: PathLike) -> ModeTable:
         with layout.hdf5().File(path, "r") as file:
             return _read(file)
     except (KeyError, RuntimeError) as error:
-        msg = f"{path}: is no complete file of modes, expected one written by analysis/modes.py"
+        msg = f"{path}: is not a complete file of modes, expected one written by analysis/modes.py"
         raise FileFormatError(msg) from error
 
 
 def holds_modes(path: PathLike) -> bool:
-    """Whether an HDF5 file is one of `write_modes`, complete or not; errors as `read_modes`."""
+    """Whether an HDF5 file was written by `write_modes`, complete or not; errors as `read_modes`."""
     with layout.readable(path), layout.hdf5().File(path, "r") as file:
         return "modes" in file
 
@@ -266,15 +258,11 @@ def holds_modes(path: PathLike) -> bool:
 def _read(file: h5py.File) -> ModeTable:
     group, of = file["modes"], file["coordinates"]
     stored_of = {name: group[name][()] for name in _COLUMNS if name in group}
-    # Files of earlier versions do not tell what the rounding of overlaps changes.
+    # Files of earlier versions do not state the effect of rounding of overlaps.
     columns = {"overlap_error": np.zeros(len(stored_of["eigenvalues"]))} | stored_of
     if missing := set(_COLUMNS) - columns.keys():
         raise KeyError(*missing)
-    for name in (
-        "eigenvalues",
-        "omega",
-        *_ERRORS,
-    ):  # files of earlier versions have what rounding left
+    for name in ("eigenvalues", "omega", *_ERRORS):  # earlier versions stored rounding errors here
         columns[name] = np.where(columns["is_translation"], 0.0, columns[name])
     particle, kind, direction = (of[name][()] for name in ("particle", "kind", "direction"))
     n_all, dimension = int(of.attrs["n_all"]), int(of.attrs["dimension"])

@@ -1,7 +1,7 @@
-"""All modes of a dynamical matrix in two levels: what its stiffness holds, and the rest.
+"""All modes of a dynamical matrix in two blocks: modes held by stiffness, and the rest.
 
-The singular vectors of C tell what H = C^T C does not see, without H being formed. There the prestress
-acts alone, to second order (a Schur complement, of which all terms are small), and each eigenvalue is the
+The singular vectors of C give the null space of H = C^T C without forming H. There the prestress
+acts alone, to second order (a Schur complement with small terms only), and each eigenvalue is the
 quotient |C v|^2 - v.S v of its mode, in long double.
 """
 
@@ -29,20 +29,19 @@ from jamshape.vibration.quotients import (
     norms,
 )
 
-# Singular values below this fraction of the largest, or of it times the residual, are those of states of
-# self stress: they vanish where forces balance.
+# Singular values below this fraction of the largest belong to states of self stress, which vanish in force balance.
 RANK_TOLERANCE = 1e-6
-_RESIDUALS = 10.0
+_RESIDUALS = 10.0  # likewise, relative to the largest times the residual
 
-# Modes of H are stiff if they are so many times stiffer than all that the prestress does to the rest:
-# nearly round rods leave a factor of six. Each of the sweeps gains as much.
+# Modes of H are stiff if they are this factor stiffer than all effects of the prestress on the rest:
+# nearly round rods leave a factor of six. Each sweep gains as much.
 _STIFFER = 3.0
 
 _SWEEPS = 30
 
 
 class Found(NamedTuple):
-    """What a method found, in no particular order."""
+    """Result of a method, in no particular order."""
 
     eigenvalues: FloatArray
     vectors: FloatArray
@@ -53,7 +52,7 @@ class Found(NamedTuple):
 
 
 def rank_of(singular_values: FloatArray, residual: float = 0.0) -> int:
-    """Count singular values of C that are not those of states of self stress."""
+    """Count singular values of C that do not belong to states of self stress."""
     largest = singular_values.max(initial=0.0)
     tolerance = max(RANK_TOLERANCE, _RESIDUALS * residual)
     return int((singular_values > tolerance * largest).sum())
@@ -67,7 +66,7 @@ def two_levels(matrix: DynamicalMatrix, *, refine: bool) -> Found:
     high = products.quotients(vectors)
     high_values = high.value.astype(np.float64)
     low = _low_modes(products, np.column_stack([matrix.translations, split.low_vectors()]), refine)
-    # The rest of the space, all of it stiffer, lowers low modes by leak.leak at most.
+    # The rest of the space, which is stiffer, lowers low modes by at most leak.leak.
     leak = low.outside / np.sqrt(0.5 * high_values.min(initial=np.inf))
     pull = low.coupling + np.outer(leak, leak)
     low_error = grouped_error(low.values, pull, high_values) + leak**2
@@ -102,7 +101,7 @@ class _Split:
     singular_values: FloatArray
 
     def low_vectors(self) -> FloatArray:
-        """(n, z) the modes below D, to second order in the prestress.
+        """(n, z) modes below D, to second order in the prestress.
 
         With y = -(D - lambda)^-1 B^T x, the modes (y, x) solve
         (E - B D^-1 B^T) x = lambda (1 + B D^-2 B^T) x + O(lambda^2).
@@ -124,7 +123,7 @@ class _Split:
         return np.asarray(vectors / np.linalg.norm(vectors, axis=0))
 
     def high_vectors(self) -> FloatArray:
-        """(n, r) the modes above."""
+        """(n, r) modes above."""
         r, n = len(self.D), len(self.D) + len(self.E)
         if r == 0:
             return np.empty((self.R.shape[0], 0))
@@ -137,10 +136,10 @@ class _Split:
 
 
 def _split(matrix: DynamicalMatrix) -> _Split:
-    """Split the space by the singular values of C, where D is well above all that is in E."""
+    """Split the space by the singular values of C, where D is well above all of E."""
     C, T = matrix.compatibility.toarray(), matrix.translations
     n, n_moves = T.shape
-    # Rows that make translations by far the stiffest modes: the first, to be left out.
+    # Rows that make translations the stiffest modes by far: the first, to be left out.
     far = 4 * np.sqrt(float(np.max(abs(matrix.stiffness).sum(axis=0))) or 1.0)
     _, sigma, right = scipy.linalg.svd(np.vstack([far * T.T, C]))
     sigma, V = sigma[n_moves:], right[n_moves:].T
@@ -169,19 +168,19 @@ def _split(matrix: DynamicalMatrix) -> _Split:
 
 
 class _LowModes(NamedTuple):
-    """Modes of a subspace, with what bounds their errors."""
+    """Modes of a subspace, with contributions to their errors."""
 
     values: FloatArray
     vectors: FloatArray
     coupling: FloatArray
-    """(k, k) how much modes i of the subspace pull on modes j; 0 on the diagonal."""
+    """(k, k) couplings of modes i of the subspace to modes j; 0 on the diagonal."""
     outside: FloatArray
-    """(k,) and how much the rest of the space does."""
+    """(k,) coupling to the rest of the space."""
     quotients: Quotients
 
 
 def _low_modes(products: Products, vectors: NDArray[Any], refine: bool) -> _LowModes:
-    """Evaluate modes in long double, and refine them within their span if asked."""
+    """Evaluate modes in long double, and optionally refine them within their span."""
     at = products.images(vectors)
     A, N = _within(vectors, at)
     if refine:
@@ -203,9 +202,9 @@ def _within(vectors: NDArray[Any], at: Images) -> tuple[LongArray, LongArray]:
 
 
 def _refined_vectors(A: LongArray, N: LongArray) -> LongArray:
-    """Refine eigenvectors of A x = lambda N x that are about unit vectors (Ogita & Aishima 2018).
+    """Refine eigenvectors of A x = lambda N x that are nearly unit vectors (Ogita & Aishima 2018).
 
-    Each step squares their errors, after those of close eigenvalues were turned among themselves.
+    Each step squares their errors, after rotating close eigenvectors among themselves.
     """
     one = np.eye(len(N), dtype=np.longdouble)
     X, best, best_X = one, np.inf, one
@@ -231,7 +230,7 @@ def _refined_vectors(A: LongArray, N: LongArray) -> LongArray:
 
 
 def _pulls(F: LongArray, G: LongArray) -> tuple[LongArray, LongArray]:
-    """Tell what modes i do to modes j, (F - lambda_j G)_ij, and lambda_j - lambda_i."""
+    """Return the couplings of modes i to j, (F - lambda_j G)_ij, and lambda_j - lambda_i."""
     values = np.diag(F) / np.diag(G)
     off = F - values * G
     np.fill_diagonal(off, 0.0)
@@ -245,7 +244,7 @@ def _are_close(off: LongArray, gap: LongArray) -> NDArray[np.bool_]:
 
 
 def _turn_together(F: LongArray, G: LongArray, close: NDArray[np.bool_]) -> LongArray:
-    """Eigenvectors of the blocks of modes that are close to each other, in doubles."""
+    """Diagonalise the blocks of close modes, in doubles."""
     turn = np.eye(len(F), dtype=np.longdouble)
     n_groups, group = connected_components(close, directed=False)
     for g in np.flatnonzero(np.bincount(group, minlength=n_groups) > 1):

@@ -17,10 +17,10 @@ SLOW = ("--kappa", 1e-4, "--phi-end", 0.64)
 
 
 class Ended(NamedTuple):
-    """How a command ended."""
+    """Result of a command."""
 
     code: int | str | None
-    """As of `SystemExit`: a text is a sentence on standard error."""
+    """The code of `SystemExit`: a text is a sentence on standard error."""
     out: str
     arguments: tuple
     """To end so again."""

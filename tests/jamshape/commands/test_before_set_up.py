@@ -1,4 +1,4 @@
-"""What is said where nothing, or not everything, is set up: one sentence, and no traceback."""
+"""Messages before a complete set-up: one sentence, and no traceback."""
 
 import ast
 import os

@@ -1,6 +1,5 @@
 """Every subcommand, tried once on something tiny."""
 
-import shutil
 import signal
 import subprocess
 import sys
@@ -8,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from lammps_runs import QUIET, bare_environment, start_lmp
 
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.files.lammps_text import read_data
@@ -49,7 +49,9 @@ def test_what_does_not_reach_its_goal_ends_with_the_exit_code_1(jamshape, tmp_pa
     """Forces cannot balance better than rounding lets them."""
     short = ("--n", 8, "--phi-start", 0.5, "--u0", 1e-16, "--tolerance", 1e-14)
     out = tmp_path / "packing.h5"
-    said = "the packing is not at rest: it ended stalled after a second try, with net forces up to"
+    said = (
+        "the packing is not at rest: it ended stalled after a second attempt, with net forces up to"
+    )
     ended = jamshape("pack", "--alpha", 0, *short, "--out", out)
     assert (ended.code, ended.report["reached"], ended.report["outcome"]) == (1, False, "stalled")
     last = capfd.readouterr().err.strip().splitlines()[-1]
@@ -57,7 +59,7 @@ def test_what_does_not_reach_its_goal_ends_with_the_exit_code_1(jamshape, tmp_pa
     assert last.endswith("try a larger --u0 or --tolerance, since rounding leaves more")
     told = jamshape("info", out)
     assert (told.report["reached"], told.code) == (False, None)
-    assert "not reached: it ended stalled after a second try" in told.out
+    assert "not reached: it ended stalled after a second attempt" in told.out
     swept = jamshape("sweep", "--alpha", 0, "--samples", 1, *short, "--out", tmp_path / "sweep")
     counts = [swept.report[name] for name in ("made", "not_made", "not_reached")]
     assert (swept.code, counts) == (1, [1, 0, 1])
@@ -114,7 +116,7 @@ def test_after_ctrl_c_it_is_told_how_to_go_on(jamshape, tmp_path):
     assert code == 130
     assert "Traceback" not in complaint
     sentence = (
-        "jamshape compress: interrupted; the same command with --resume goes on from the last"
+        "jamshape compress: interrupted; the same command with --resume resumes from the last"
     )
     assert complaint.strip().splitlines()[-1].startswith(sentence)
     told = jamshape("info", out)
@@ -160,20 +162,10 @@ def test_another_lammps_is_told(jamshape, tmp_path, monkeypatch):
 
 
 def test_the_lines_of_plugin_load_it_into_lmp(jamshape, tmp_path):
-    if not shutil.which("lmp"):
-        pytest.skip("lmp is not installed")
     said = jamshape("plugin").out.split("before the first pair style:")[1]
     lines = [line.strip() for line in said.splitlines() if line.startswith("    ")]
     box = ["region box block 0 9 0 9 -0.5 0.5", "create_box 1 box"]
-    deck = tmp_path / "own.in"
-    deck.write_text(
-        "\n".join(["dimension 2", lines[0], *box, *lines[1:], "pair_style dimer/harmonic"]) + "\n"
-    )
-    done = subprocess.run(
-        ["lmp", "-in", deck.name, "-log", "none"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    deck = ["dimension 2", lines[0], *box, *lines[1:], "pair_style dimer/harmonic"]
+    (tmp_path / "own.in").write_text("\n".join(deck) + "\n")
+    done = start_lmp(*QUIET, "-in", "own.in", cwd=tmp_path, env=bare_environment())
     assert done.returncode == 0, done.stdout

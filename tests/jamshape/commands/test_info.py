@@ -16,7 +16,7 @@ pytestmark = pytest.mark.lammps
 
 
 def info(jamshape, path, *more):
-    """What is said of a file: the lines by their subjects, and the last one."""
+    """Return the report on a file: the lines by their subjects, and the last one."""
     ended = jamshape("info", path, *more)
     assert not ended.code
     first, *lines, _ = ended.out.splitlines()
@@ -46,7 +46,7 @@ def test_a_packing(jamshape, tiny, name, rate, made):
     assert lines["particles"].startswith("16 spherocylinders in 2D, 8 with alpha 1, 2R = 1; 8 with")
     assert lines["made with"] == made
     assert "format 2" in lines["written by"]
-    assert "go on with" not in lines
+    assert "continue with" not in lines
 
 
 def test_a_tilt_is_told(jamshape, tmp_path):
@@ -91,25 +91,25 @@ def test_a_run(jamshape, tiny, name, kind):
     ("name", "stored", "words"),
     [
         ("run.h5", {"finished": False}, "jamshape compress --resume --out {path}"),
-        ("slow.h5", {"finished": False}, "start the command that began it again"),
+        ("slow.h5", {"finished": False}, "repeat the command that began it"),
         (
             "dynamics.h5.run.h5",
             {"finished": False},
-            "start the command that makes {folder}/dynamics.h5 again",
+            "repeat the command for {folder}/dynamics.h5, which continues",
         ),
         (
             "packing.h5.search.h5",
             {"search_step": 1e-4},
-            "the command that makes {folder}/packing.h5 again",
+            "the command for {folder}/packing.h5, which continues",
         ),
         (
             "packing.h5.path.h5",
             {"loose_phi": 0.5},
-            "the command that makes {folder}/packing.h5 again",
+            "the command for {folder}/packing.h5, which continues",
         ),
     ],
 )
-def test_what_is_not_finished_is_gone_on_with(jamshape, tiny, tmp_path, name, stored, words):
+def test_what_is_not_finished_says_how_to_continue(jamshape, tiny, tmp_path, name, stored, words):
     source, path = tiny[0] / name, tmp_path / name
     if source.exists():
         path.write_bytes(source.read_bytes())
@@ -120,7 +120,7 @@ def test_what_is_not_finished_is_gone_on_with(jamshape, tiny, tmp_path, name, st
     lines, report = info(jamshape, path)
     assert not report["finished"]
     assert words.format(path=path, folder=tmp_path) in report["go_on"]
-    assert lines["go on with"] == report["go_on"]
+    assert lines["continue with"] == report["go_on"]
 
 
 def test_modes(jamshape, tiny):
@@ -163,7 +163,7 @@ def test_dumps_and_restart_files_of_lammps(jamshape, tiny, tmp_path):
     lines, report = info(jamshape, restart)
     assert (report["kind"], report["step"], report["dimension"]) == ("LAMMPS restart file", 7, 2)
     assert report["lammps"][-4:].isdigit()
-    assert f"-var restart {restart}" in lines["go on with"]
+    assert f"-var restart {restart}" in lines["continue with"]
 
 
 def test_what_a_data_file_does_not_say_is_said_by_options(jamshape, tiny, tmp_path, capsys):
@@ -178,7 +178,7 @@ def test_what_a_data_file_does_not_say_is_said_by_options(jamshape, tiny, tmp_pa
         ended = jamshape(command, tmp_path / "bare.data", *said, "--out", tmp_path / out)
         assert (ended.report["shape"], ended.report["dimension"]) == ("dimer", 2)
     refused = jamshape("info", tiny[0] / "packing.h5", *said).code
-    assert "says shape spherocylinder, expected --shape to be the same; leave it out" in refused
+    assert "has shape spherocylinder, expected --shape to be the same; leave it out" in refused
     capsys.readouterr()
 
 
@@ -194,8 +194,8 @@ def test_gsd(jamshape, tiny, tmp_path):
     ("content", "sentence"),
     [
         (b"", "is empty, expected"),
-        (b"notes\n", "is no file that jamshape knows, expected"),
-        (bytes(range(256)), "is no file that jamshape knows, expected"),
+        (b"notes\n", "has no known format, expected"),
+        (bytes(range(256)), "has no known format, expected"),
         (gzip.compress(b"notes"), "is compressed, expected the file itself; unpack it with gunzip"),
     ],
 )

@@ -1,11 +1,11 @@
-"""What takes long is one process, also where mpirun or srun starts several."""
+"""Long calculations refuse to run as several ranks of mpirun or srun."""
 
 import os
 import subprocess
 import sys
 
 import pytest
-from lammps_scenes import ENVIRONMENT, MPIRUN
+from lammps_runs import ENVIRONMENT, MPIRUN
 
 import jamshape as js
 from jamshape.checks import RANKS

@@ -1,4 +1,4 @@
-"""What `jamshape reproduce` refuses before any job; tests/scripts/test_reproduce_with_snakemake.py plans its jobs."""
+"""Refusals of `jamshape reproduce` before any job; tests/scripts/test_reproduce_with_snakemake.py plans its jobs."""
 
 import importlib.util
 import json
@@ -12,7 +12,7 @@ PAPER = "marschall-2018"
 
 @pytest.fixture(autouse=True)
 def _with_snakemake(monkeypatch):
-    """As if it were there: none of these tests starts it."""
+    """Pretend that Snakemake is installed: none of these tests starts it."""
     find = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *more: name == "snakemake" or find(name, *more)
@@ -38,7 +38,7 @@ def test_a_package_without_its_clone_is_told_so(jamshape, monkeypatch, tmp_path)
     monkeypatch.chdir(tmp_path)
     said = jamshape("reproduce", PAPER, "--out", tmp_path / "new").code
     assert "found no analysis/marschall_2018/reproduce.smk in " in said
-    assert said.endswith("start it in the clone")
+    assert said.endswith("run it in the clone")
     workflow = tmp_path / "analysis" / "marschall_2018" / "reproduce.smk"
     workflow.parent.mkdir(parents=True)
     workflow.touch()
@@ -60,8 +60,8 @@ def test_a_folder_of_something_else_is_refused(jamshape, tmp_path):
     (tmp_path / "reproduced.json").write_text(json.dumps({"paper": PAPER, "scale": "small"}))
     said = jamshape("reproduce", PAPER, "--out", tmp_path).code
     assert said == (
-        f"jamshape reproduce: {tmp_path} is of {PAPER} at the scale small, expected {PAPER} at the"
-        " scale demo; choose another folder by --out"
+        f"jamshape reproduce: {tmp_path} holds {PAPER} at the scale small, expected {PAPER} at the"
+        " scale demo; choose another --out"
     )
 
 

@@ -38,7 +38,7 @@ def test_images_that_reach_into_the_box():
 
 
 def test_images_fill_the_rectangle_around_a_tilted_box():
-    """As many as a search over far more images finds, beside a box of which the tilt is long."""
+    """The same number as in a search over far more images, for a box with a large tilt."""
     rng = np.random.default_rng(1)
     for tilt in (2.0, -5.5, 13.0):
         box = Box(BOX.lo, BOX.edges, [tilt])

@@ -1,18 +1,14 @@
 import pytest
 
-from jamshape.drawing.text import (
-    attributes_text,
+from common.text import (
     ensemble_labels,
     ensembles_title,
     range_text,
     samples_text,
-    scientific,
     short,
     system_labels,
-    system_text,
-    systems_text,
-    unit_text,
 )
+from jamshape.drawing.text import attributes_text, scientific, system_text, systems_text, unit_text
 from jamshape.files.sets import System
 from jamshape.measures.runs import Ensemble
 from jamshape.shapes.particles import Kind, Particles

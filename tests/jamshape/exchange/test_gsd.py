@@ -107,7 +107,7 @@ def test_a_type_is_a_species_and_its_shape_has_the_size_of_the_particles(path, n
 
 
 def reach_of(shape, dimension):
-    """How far a body goes from its centre, in the plane or in space."""
+    """Largest distance of a body's surface from its centre, in the plane or in space."""
     match shape["type"]:
         case "Sphere":
             return shape["diameter"] / 2

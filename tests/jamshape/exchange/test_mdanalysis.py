@@ -36,7 +36,7 @@ def run_file(tmp_path, request):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("how", [{}, {"convert_units": False}])
 def test_which_of_our_own_files_it_opens(tmp_path, dimension, how):
-    """As the page on files says: of runs in space, without units."""
+    """Runs in space, without units, as stated on the page on files."""
     frames = run(dimension)
     write_run(tmp_path / "run.h5", frames)
     universe = MDAnalysis.Universe.empty(frames[0].n, trajectory=True)

@@ -53,7 +53,7 @@ def three(vector):
 
 
 def seen_between(packing, point, normal):
-    """What is seen on a line through a contact along its normal, with the plane of contact edge-on."""
+    """Pixels on a line through a contact along its normal, with the plane of contact edge-on."""
     up = three(normal)
     across = np.cross(up, [0.0, 0.0, 1.0]) if packing.dimension == 3 else np.array([0.0, 0.0, -1.0])
     toward = tuple(across / np.linalg.norm(across))
@@ -136,7 +136,7 @@ def test_positions_are_those_that_ovito_has_now():
 
 
 def test_data_of_others_are_refused_in_a_sentence():
-    with pytest.raises(FileFormatError, match="expected what to_ovito made"):
+    with pytest.raises(FileFormatError, match="expected data from to_ovito"):
         from_ovito(DataCollection())
 
 

@@ -393,7 +393,7 @@ def replace(file, name, value):
             r"diameters hold -1\.0, expected positive lengths; write it",
         ),
         ("id", np.ones(6), "id has dtype float64, expected integers"),
-        ("id", np.ones(6, int), "an id is there more than once"),
+        ("id", np.ones(6, int), "an id occurs more than once"),
     ],
 )
 def test_wrong_content(path, name, value, sentence):
@@ -605,5 +605,5 @@ def test_two_copies_of_a_size_that_disagree_are_refused(tmp_path):
     write_packing(tmp_path / "rods.h5", nasty_packing(2))
     with h5py.File(tmp_path / "rods.h5", "a") as file:
         file["particles/all/radius"][2] *= 1.1
-    with pytest.raises(FileFormatError, match="radius is not that of diameters"):
+    with pytest.raises(FileFormatError, match="radius differs from that of diameters"):
         read_packing(tmp_path / "rods.h5")

@@ -1,8 +1,6 @@
-import shutil
-import subprocess
-
 import numpy as np
 import pytest
+from lammps_runs import run_lmp_well
 from nasty import NASTY, assert_identical, nasty_packing, tilted_box
 
 from jamshape.files.h5md import FileFormatError
@@ -87,7 +85,7 @@ def test_a_tilt_is_kept_in_data_files(path, dimension, given):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_tilt_is_kept_in_dumps(path, dimension):
-    """Which tell the cuboid around the box."""
+    """Dumps hold the bounds of the cuboid around the box."""
     packing = nasty_packing(dimension, box=tilted_box(dimension))
     frames = [packing, nasty_packing(dimension)]
     path.write_text("".join(dump_frame(one, [*COLUMNS, "ix", "iy", "iz"]) for one in frames))
@@ -272,7 +270,7 @@ def test_dump_cut_anywhere_gives_the_complete_frames_before(path):
         ("OF ATOMS\n6", "OF ATOMS\n5", "a line reads '6 .*', expected an 'ITEM:' line"),
         ("OF ATOMS\n6", "OF ATOMS\n7", "the file ends within the frame"),
         ("\n1 1 ", "\n1 1 nan ", "row .* has 13 columns, expected 'id type x y z"),
-        ("\n1 1 ", "\n2 1 ", "an id is there more than once"),
+        ("\n1 1 ", "\n2 1 ", "an id occurs more than once"),
     ],
 )
 def test_wrong_dump(path, old, new, sentence):
@@ -336,7 +334,6 @@ def test_read_any_refuses_other_files(path):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("tilted", [False, True])
 def test_lammps_reads_our_data_file_and_we_read_its_files(tmp_path, dimension, tilted):
-    lmp = shutil.which("lmp") or pytest.skip("lmp is not installed")
     rng = np.random.default_rng(3)
     edges = np.full(dimension, 7.1)
     tilt = np.array([3.1, -2.2, 1.3])[: 2 * dimension - 3]
@@ -350,13 +347,13 @@ def test_lammps_reads_our_data_file_and_we_read_its_files(tmp_path, dimension, t
     )
     write_data(tmp_path / "data.in", packing)
     computes = "".join(f"compute {name} all property/atom {name}\n" for name in COLUMNS[5:])
-    (tmp_path / "in.deck").write_text(
+    run_lmp_well(
         f"units lj\ndimension {dimension}\natom_style ellipsoid\nread_data data.in\n{computes}"
         f"dump 1 all custom 1 dump.out id type x y z ix iy iz c_{' c_'.join(COLUMNS[5:])}\n"
         "dump_modify 1 format float %.17g\n"
-        "pair_style zero 1.0\npair_coeff * *\nrun 0\nwrite_data data.out\n"
+        "pair_style zero 1.0\npair_coeff * *\nrun 0\nwrite_data data.out\n",
+        tmp_path,
     )
-    subprocess.run([lmp, "-in", "in.deck", "-log", "none"], cwd=tmp_path, check=True)
     expected = packing.sorted_by_id()
     for name in ("dump.out", "data.out"):
         found = read_any(tmp_path / name, dimension=dimension, shape=RODS)
@@ -376,7 +373,7 @@ ROUNDNESS = ["SuperquadricRoundness.Phi", "SuperquadricRoundness.Theta"]
 
 
 def dump_of_bodies(packing, columns):
-    """As decks of bodies with an exponent write it, with 1/p computed in LAMMPS."""
+    """Dump of a deck of bodies with an exponent, with 1/p computed in LAMMPS."""
     plain = dump_frame(packing)
     given = dict.fromkeys(ROUNDNESS, 1 / packing.exponent)
     given |= dict.fromkeys(("exponent", "v_exponent"), packing.exponent)

@@ -2,11 +2,10 @@
 
 import gzip
 import re
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
+from lammps_runs import run_lmp_well
 
 import jamshape as js
 from jamshape.contacts import find_contacts
@@ -39,7 +38,7 @@ Ellipsoids
 2 5 1 1 1 0 0 0
 """
 ATOMS = "1 1 1 1.0 10.0 10.0 0.0\n2 1 1 1.0 10.5 10.8 0.0"
-NO_SHAPE = "does not say which shape its particles have: they are read as spherocylinders in {}D"
+NO_SHAPE = "does not state the shape of its particles: they are read as spherocylinders in {}D"
 
 
 @pytest.fixture
@@ -120,21 +119,21 @@ def test_the_pair_style_of_a_file_says_shape_law_and_exponents(path):
 REFUSED = {
     "hybrid": (
         [("# ellipsoid", "# hybrid"), (ATOMS, "1 1 10 10 0 1 1.0\n2 1 10.5 10.8 0 1 1.0")],
-        "titled 'Atoms # hybrid', which does not tell its 7 columns",
+        "titled 'Atoms # hybrid', which does not define its 7 columns",
     ),
     "images of a hybrid": (
         [
             ("# ellipsoid", "# hybrid"),
             (ATOMS, "1 1 4 4 0 1 1 0 0 0\n2 1 12 9 0 1 1 0 0 0"),
         ],
-        "titled 'Atoms # hybrid', which does not tell its 10 columns",
+        "titled 'Atoms # hybrid', which does not define its 10 columns",
     ),
     "another one first": (
         [
             ("# ellipsoid", "# hybrid molecular ellipsoid"),
             (ATOMS, "1 1 10.0 10.0 0.0 1 1 1.0\n2 1 10.5 10.8 0.0 2 1 1.0"),
         ],
-        "titled 'Atoms # hybrid molecular ellipsoid', which does not tell its 8 columns",
+        "titled 'Atoms # hybrid molecular ellipsoid', which does not define its 8 columns",
     ),
     "another style": (
         [("# ellipsoid", "# sphere")],
@@ -179,7 +178,7 @@ def test_blocks_of_lammps_from_2026_on_tell_the_exponent(path):
     packing = js.load(path)
     assert (packing.shape_style, packing.dimension) == ("superellipsoid", 2)
     np.testing.assert_array_equal(packing.exponent, 1.5)
-    with pytest.raises(FileFormatError, match="there are exponents, which no dimer has"):
+    with pytest.raises(FileFormatError, match="the file has exponents, which no dimer has"):
         js.load(path, shape="dimer")
 
 
@@ -192,14 +191,14 @@ def test_a_plane_box_of_any_height(path, height):
     if height == (-0.5, 0.5):
         assert js.load(path, shape=RODS).dimension == 2
     else:
-        with pytest.warns(UserWarning, match="does not say its dimension.*: it is read as 2D"):
+        with pytest.warns(UserWarning, match="does not state its dimension.*: it is read as 2D"):
             assert js.load(path, shape=RODS).dimension == 2
     assert js.load(path, shape=RODS, dimension=2).phi == packing.phi
     assert js.load(path, shape=RODS, dimension=3).dimension == 3
 
 
 def test_a_plane_is_one_to_within_rounding(path):
-    """As fix rigid leaves a plane system, and a program that turned particles about z by matrices."""
+    """Planes from fix rigid, and from a program that rotated particles about z by matrices."""
     turned = changed(
         ("1 5 1 1 1 0 0 0", "1 5 1 1 0.8 6e-17 -1e-17 0.6"),
         ("10.0 0.0\n", "10.0 1e-16\n"),
@@ -240,14 +239,14 @@ def test_rods_along_another_axis_are_the_same_rods(path, sizes):
     np.testing.assert_allclose(packing.axes, np.tile([1 / 3, 2 / 3, 2 / 3], (2, 1)), atol=1e-15)
     assert js.load(path, shape=RODS).phi == packing.phi
     assert js.load(path, shape="dimer").shape_style == "dimer"
-    with pytest.warns(UserWarning, match="does not say the exponents"):
+    with pytest.warns(UserWarning, match="does not state the exponents"):
         bodies = js.load(path, shape="superellipsoid")
     assert bodies.phi == pytest.approx(0.00314159, rel=1e-5)
 
 
 def test_six_digits_are_said_to_cost_overlaps(path):
     path.write_text(changed(("10.5 10.8", "10.5123 10.8"), ("20 x", "20.0 x")))
-    with pytest.warns(UserWarning, match="of 6 digits, which are off by up to 5e-05, 5e-05 of the"):
+    with pytest.warns(UserWarning, match="of 6 digits, with errors up to 5e-05, 5e-05 of the"):
         js.load(path, shape=RODS)
 
 
@@ -278,7 +277,6 @@ def test_what_we_write_says_what_it_holds(path, name, dimension):
 
 @pytest.mark.lammps
 def test_lammps_reads_what_we_write_with_its_comments(tmp_path):
-    lmp = shutil.which("lmp") or pytest.skip("lmp is not installed")
     packing = Packing(
         position=[[1, 1, 1], [2.9, 1, 1]],
         orientation=[[1, 0, 0, 0], [0.6, 0, 0, 0.8]],
@@ -290,14 +288,12 @@ def test_lammps_reads_what_we_write_with_its_comments(tmp_path):
         exponent=[2.25, 10 / 3],
     )
     write_data(tmp_path / "ours.data", packing)
-    (tmp_path / "deck").write_text(
+    run_lmp_well(
         "units lj\natom_style ellipsoid\nread_data ours.data\npair_style zero 1.0\npair_coeff * *\n"
-        "run 0\nwrite_data theirs.data nocoeff\n"
+        "run 0\nwrite_data theirs.data nocoeff\n",
+        tmp_path,
     )
-    subprocess.run(
-        [lmp, "-in", "deck", "-log", "none", "-screen", "none"], cwd=tmp_path, check=True
-    )
-    with pytest.warns(UserWarning, match="does not say the exponents"):
+    with pytest.warns(UserWarning, match="does not state the exponents"):
         theirs = read_data(tmp_path / "theirs.data", 3, "superellipsoid")
     np.testing.assert_array_equal(theirs.position, packing.position)
     np.testing.assert_allclose(theirs.orientation, packing.orientation, atol=1e-16)
@@ -306,19 +302,16 @@ def test_lammps_reads_what_we_write_with_its_comments(tmp_path):
 @pytest.mark.lammps
 def test_a_dump_of_fix_rigid_in_the_plane_reads_back(tmp_path):
     """Its quaternions leave the plane by rounding."""
-    lmp = shutil.which("lmp") or pytest.skip("lmp is not installed")
     (tmp_path / "rods.data").write_text(changed(("10.5 10.8", "11.5 10.8")))
-    (tmp_path / "deck").write_text(
+    run_lmp_well(
         "units lj\ndimension 2\natom_style ellipsoid\natom_modify map array\nread_data rods.data\n"
         "set atom 1 quat 0 0 1 35\nset atom 2 quat 0 0 1 80\npair_style zero 1\npair_coeff * *\n"
         "neigh_modify exclude group all all\nfix r all rigid single torque * off off on force * on on off\n"
         "velocity all set 0.3 0.2 0\nvariable f atom 0.05*(y-10)\nfix a all addforce 0.1 v_f 0\n"
         "fix e all enforce2d\ncompute q all property/atom quatw quati quatj quatk shapex shapey shapez\n"
         "dump d all custom 100 rods.dump id type x y z c_q[*]\n"
-        "dump_modify d sort id format float %.17g\nthermo_style custom step pe\ntimestep 0.01\nrun 200\n"
-    )
-    subprocess.run(
-        [lmp, "-in", "deck", "-log", "none", "-screen", "none"], cwd=tmp_path, check=True
+        "dump_modify d sort id format float %.17g\nthermo_style custom step pe\ntimestep 0.01\nrun 200\n",
+        tmp_path,
     )
     names = ["quatw", "quati", "quatj", "quatk", "shapex", "shapey", "shapez"]
     text = (tmp_path / "rods.dump").read_text()

@@ -48,7 +48,7 @@ CPU = Path("/proc/cpuinfo")
     reason="no processor with FMA under glibc",
 )
 def test_a_processor_without_fused_multiply_add_is_another_one():
-    """As glibc sees it."""
+    """The C library selects its code by the processor."""
     found = elsewhere(GLIBC_TUNABLES="glibc.cpu.hwcaps=-FMA,-AVX2")
     ours = dict(
         zip(("machine", "libc", "numpy", "scipy", "lapack"), origin().split("; "), strict=True)

@@ -151,7 +151,7 @@ def test_what_follows_a_byte_that_changed_is_not_believed(byte, tmp_path):
 
 
 class Killed(BaseException):
-    """As if the process had ended here."""
+    """Stands for the end of the process."""
 
 
 CALLS = ("pwrite", "ftruncate", "fsync", "replace", "unlink")
@@ -263,7 +263,7 @@ def test_no_kill_damages_a_run(kills, tmp_path, measured):
 
 
 def test_a_row_costs_little(tmp_path, measured):
-    """Of 25 observables, as a compression writes; opening the file for each took fifteen milliseconds."""
+    """A row of a compression has 25 observables; opening the file for each took fifteen milliseconds."""
     observables = {f"observable_{k}": k / 7 for k in range(25)}
     seconds = []
     with RunWriter.create(tmp_path / "run.h5", frame(0), {}, observables) as writer:
@@ -317,7 +317,7 @@ def test_a_file_that_another_program_writes_gets_a_sentence(whole):
     command = [sys.executable, "-c", script, str(whole)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         process.stdout.readline()
-        with pytest.raises(OSError, match="another program has it open to write, expected to"):
+        with pytest.raises(OSError, match="another program has it open for writing, expected"):
             read_packing(whole)
         process.communicate(b"\n")
     assert require_prefix(whole) == ROWS
@@ -371,7 +371,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", str(folder)], check=True)
 
 
-FULL = r"cannot be written \(No space left on device\), expected a folder with room"
+FULL = r"cannot be written \(No space left on device\), expected a writable folder with room"
 
 
 def test_a_full_disk_leaves_the_run_and_the_packing_as_they_were(small_disk):
@@ -427,7 +427,9 @@ def test_a_file_that_may_not_grow_ends_the_program_with_a_sentence(tmp_path):
 
 def test_a_folder_that_is_not_there_gets_a_sentence(tmp_path):
     path = tmp_path / "none" / "packing.h5"
-    sentence = r"packing\.h5: cannot be written \(No such file or directory\), expected a folder"
+    sentence = (
+        r"packing\.h5: cannot be written \(No such file or directory\), expected a writable folder"
+    )
     for write in (write_packing, RunWriter.create):
         with pytest.raises(OSError, match=sentence):
             write(path, frame(0))

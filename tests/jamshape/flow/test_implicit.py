@@ -106,19 +106,6 @@ def test_huge_steps_land_on_the_quasistatic_minimum(method):
     assert steps[-1].dt > 1e5
 
 
-def test_lone_particles_follow_the_box_exactly():
-    position = np.array([[1.0, 1.0], [5.0, 5.0], [7.5, 2.0]])
-    packing = packing_of(2.0, position, [0.1, 1.0, 2.0])
-    _, flow, steps = ended(packing, Protocol(1e-6, packing.phi * 1.2))
-    scale = flow.state.edges / packing.box.edges
-    assert scale == pytest.approx(np.exp(-flow.strain), rel=1e-15)
-    np.testing.assert_allclose(np.float64(flow.state.position / scale), position, rtol=1e-14)
-    np.testing.assert_array_equal(np.float64(flow.state.orientation[:, 0]), packing.orientation)
-    assert steps[-1].phi == pytest.approx(packing.phi * 1.2, rel=1e-12)
-    assert steps[-1].pressure == 0.0
-    assert flow.evaluations < 20 * len(steps)
-
-
 @pytest.fixture(scope="module")
 def jamming():
     """Twelve rods a little below jamming."""

@@ -42,7 +42,7 @@ def test_the_first_step_has_the_shear_modulus_of_the_hessian(name, measured):
 
 
 def test_small_steps_lose_no_energy():
-    """Where nothing rearranges, the work of the stress is all there: less is left of it as the cube of the step."""
+    """Without rearrangements the work of the stress is stored: the rest falls as the cube of the step."""
     rows = rows_of("discs", strain_step=1e-6, strain_end=1e-5, tolerance=1e-10)
     gained = rows[-1].u - rows[0].u
     work = 0.5 * sum((a.stress + b.stress) * 1e-6 for a, b in pairwise(rows))
@@ -51,7 +51,7 @@ def test_small_steps_lose_no_energy():
 
 
 def test_small_steps_at_constant_pressure_lose_no_energy():
-    """What the pressure gives as the box changes is part of the work."""
+    """The work includes that of the pressure on the box."""
     pressure = rows_of("discs", strain_step=1e-6, strain_end=1e-6)[0].pressure
     rows = rows_of(
         "discs", strain_step=1e-6, strain_end=1e-5, tolerance=1e-10, hold_pressure=pressure
@@ -156,7 +156,7 @@ def test_drops_of_the_stress_are_listed(cut_off):
 
 def test_wrong_numbers_are_refused():
     for numbers, words in (
-        ({"strain_step": 0.2, "strain_end": 0.1}, "expected at most the strain to reach"),
+        ({"strain_step": 0.2, "strain_end": 0.1}, "expected at most the final strain"),
         ({"hold_pressure": -1.0}, "expected a positive number"),
         ({"flow": "none"}, "expected one of simple, pure"),
     ):

@@ -24,9 +24,9 @@ def test_a_run_that_was_cut_off_goes_on_to_the_same_bits(start, tmp_path, monkey
     for step in slow_recording.record(paths[1]):
         if step.step == 7:
             break
-    assert not slow_recording.is_finished(paths[1])
+    assert not read_attributes(paths[1])["finished"]
     assert [s.step for s in slow_recording.record(paths[1])] == list(range(5, len(steps) + 1))
-    assert all(map(slow_recording.is_finished, paths))
+    assert all(read_attributes(path)["finished"] for path in paths)
     whole, cut = map(read_packing, paths)
     np.testing.assert_array_equal(whole.position, cut.position)
     np.testing.assert_array_equal(whole.position_rest, cut.position_rest)

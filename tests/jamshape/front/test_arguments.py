@@ -25,7 +25,7 @@ def scene(n=4):
 
 
 class Nonsense:
-    """What nobody takes."""
+    """A type that no function accepts."""
 
 
 NEEDED = {"particles": RODS, "packing": scene(), "thing": scene(), "path": "x.h5", "file": "x.h5"}
@@ -166,7 +166,7 @@ def test_whole_numbers_of_every_kind_are_taken(kind):
 
 @pytest.mark.lammps
 def test_rates_of_numpy_are_taken():
-    """As of JAX, whose numbers are float32."""
+    """Scalars of JAX are float32, too."""
     how = {"phi": np.float32([0.4, 0.41]), "kappa": np.float32(1e-2)}
     run = js.compress(RODS, **HERE, **how, rows=np.uint8(2), frames=np.int16(2))
     assert run.kappa == float(np.float32(1e-2))
@@ -205,7 +205,7 @@ def test_a_quasistatic_shear_shows_itself(quasistatic):
 
 
 def test_what_is_not_in_a_run_is_named(quasistatic):
-    with pytest.raises(KeyError, match=r"nix is no observable of .*expected one of .*stress"):
+    with pytest.raises(KeyError, match=r"nix is not an observable of .*expected one of .*stress"):
         quasistatic["nix"]
     with pytest.raises(ValueError, match=r"^least is nan, expected a finite number"):
         quasistatic.events(np.nan)

@@ -20,6 +20,7 @@ TOOLS = {
 }
 
 FOLDER = Path(jamshape.__file__).parent
+COMMON = Path(__file__).parents[3] / "analysis" / "common"
 # Which minimum it is depends on every step to it: examples leave out ("...") what is its own.
 LIKE_HERE = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 EXAMPLE = re.compile(r"^ *>>> ", re.MULTILINE)
@@ -27,9 +28,11 @@ EXAMPLE = re.compile(r"^ *>>> ", re.MULTILINE)
 
 def with_examples():
     """All modules that have one."""
-    files = [f for f in sorted(FOLDER.rglob("*.py")) if EXAMPLE.search(f.read_text())]
-    parts = [("jamshape", *f.relative_to(FOLDER).with_suffix("").parts) for f in files]
-    return [".".join(p).removesuffix(".__init__") for p in parts]
+    for folder in (FOLDER, COMMON):
+        for file in sorted(folder.rglob("*.py")):
+            if EXAMPLE.search(file.read_text()):
+                parts = file.relative_to(folder.parent).with_suffix("").parts
+                yield ".".join(parts).removesuffix(".__init__")
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""What `js.modes` says of a packing: translations, bands, moduli."""
+"""Results of `js.modes`: translations, bands, moduli."""
 
 import json
 import math
@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import jamshape as js
+from common.mode_tables import Wanted, pick_modes
 from jamshape.command import plain
 from jamshape.commands.modes import summary_of
 from jamshape.drawing.modes import mode_figure
-from jamshape.vibration.sets import TOLD, Wanted, pick_modes
+from jamshape.vibration.sets import TOLD
 from jamshape.vibration.statistics import density_of_states
 
 
@@ -63,7 +64,7 @@ def test_one_or_two_discs(n):
     assert len(found.vibrational) == density_of_states(found.omega).n_modes.sum() == 2 * n - 2
     bulk = found.moduli.bulk
     assert 0 < bulk.bound < 1e-9 * bulk.relaxed
-    said = "has no modes of vibration, as all its 2 modes are translations"
+    said = "has no vibrational modes: all its 2 modes are translations"
     with pytest.raises(ValueError, match=said if n == 1 else "expected from 1 to 2"):
         js.modes(discs, lowest=2 * n - 1)
 
@@ -73,7 +74,7 @@ def test_far_above_jamming_there_are_no_bands_and_it_says_why(far):
     assert len(far.in_band("translation")) == 2
     assert "(no bands)" in repr(far)
     assert far.table.attributes["why_no_bands"] in repr(far)
-    assert "more than the 46 modes of vibration" in repr(far)
+    assert "constrain all of the 46 vibrational modes" in repr(far)
     found = json.loads(json.dumps(plain(summary_of(far.table)), allow_nan=False))
     assert found == {"low": None, "middle": None, "high": None}
     assert len(pick_modes(far.table, Wanted(per_band={"low": 1, "high": 2}))) == 3

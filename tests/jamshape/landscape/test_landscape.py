@@ -3,10 +3,8 @@ import pytest
 from pressed import PRESSED, pressed_named
 from scenes import make, scaled
 
-from jamshape.contacts import find_contacts, find_rattlers, forces
+from jamshape.contacts import find_contacts, find_rattlers
 from jamshape.landscape import CrossingError, Landscape, State
-
-H = 1e-6  # of central differences: well below the 0.005 that rods of alpha 0.01 are long
 
 
 @pytest.fixture(params=PRESSED)
@@ -20,19 +18,6 @@ def assert_close(found, expected, relative):
     np.testing.assert_allclose(found, expected, rtol=0, atol=relative * scale)
 
 
-def slopes(landscape, state, value):
-    """Central differences of a function of the state by each coordinate, in the last axis."""
-    columns = []
-    for step in H * np.eye(landscape.size):
-        ahead, behind = (value(landscape.displaced(state, s)) for s in (step, -step))
-        columns.append((ahead - behind) / (2 * H))
-    return np.stack(columns, axis=-1)
-
-
-def slope_by_strain(state, value):
-    return (value(state.strained(H)) - value(state.strained(-H))) / (2 * H)
-
-
 def test_discs_have_no_rotation_and_rods_one_or_three():
     sizes = {name: Landscape(pressed_named(name)).size for name in PRESSED}
     rods = (24 * 2, 24 * 3, 24 * 3, 24 * 2 + 12, 16 * 6, 16 * 3 + 8 * 3)
@@ -43,58 +28,6 @@ def test_discs_have_no_rotation_and_rods_one_or_three():
     spread = landscape.components(np.ones(landscape.size))
     np.testing.assert_array_equal(spread[:, 2] == 0, discs)
     np.testing.assert_array_equal(landscape.particle_of_coordinate(), np.nonzero(spread)[0])
-
-
-@pytest.mark.parametrize("sides", [1, 2])
-def test_energy_and_forces_are_those_of_the_contacts(packing, sides):
-    expected = forces(packing, 2.5, sides)
-    found = Landscape(packing, 2.5, sides).evaluate(State.of(packing))
-    network = find_contacts(packing, 2.5, sides)
-    assert found.energy == pytest.approx(expected.energy, rel=1e-12)
-    assert found.n_bonds == len(network.bonds.distance)
-    magnitude = np.linalg.norm(network.bonds.force, axis=1)
-    assert found.bond_force == pytest.approx(magnitude.mean(), rel=1e-12)
-    assert found.strain_gradient == pytest.approx(
-        -packing.dimension * packing.box.volume * expected.pressure, rel=1e-12
-    )
-    A = Landscape(packing).rotation_length
-    turns = A > 0
-    components = Landscape(packing).components(found.gradient)
-    D = packing.dimension
-    assert_close(-components[:, :D], expected.force, 1e-12)
-    if turns.any():
-        torque = expected.torque.reshape(packing.n, -1)[turns]
-        assert_close(-components[turns, D:] * A[turns, None], torque, 1e-11)
-
-
-def test_gradient_is_the_slope_of_the_energy(packing):
-    landscape, state = Landscape(packing, 2.5), State.of(packing)
-    found = landscape.evaluate(state).gradient
-    assert_close(found, slopes(landscape, state, lambda s: landscape.evaluate(s).energy), 1e-7)
-
-
-def test_hessian_is_the_slope_of_the_gradient(packing):
-    landscape, state = Landscape(packing, 2.5), State.of(packing)
-    hessian = landscape.curvature(state).hessian.toarray()
-    expected = slopes(landscape, state, lambda s: landscape.evaluate(s).gradient)
-    if packing.dimension == 3:  # rotations about different axes do not commute
-        expected = (expected + expected.T) / 2
-    assert_close(hessian, expected, 1e-7)
-    assert_close(hessian, hessian.T, 1e-14)
-
-
-def test_derivatives_by_the_strain_are_slopes(packing):
-    landscape, state = Landscape(packing, 2.5), State.of(packing)
-    found, curvature = landscape.evaluate(state), landscape.curvature(state)
-    slope = slope_by_strain(state, lambda s: landscape.evaluate(s).energy)
-    assert found.strain_gradient == pytest.approx(slope, rel=1e-7)
-    coupling = slope_by_strain(state, lambda s: landscape.evaluate(s).gradient)
-    assert_close(curvature.coupling, coupling, 1e-7)
-
-    def per_strain(s):  # each step of the strain is relative to the box that it begins from
-        return landscape.evaluate(s).strain_gradient / float(s.edges[0] / state.edges[0])
-
-    assert curvature.strain_hessian == pytest.approx(slope_by_strain(state, per_strain), rel=1e-7)
 
 
 def test_translations_cost_nothing(packing):
@@ -185,16 +118,6 @@ def test_rests_survive_the_way_through_a_packing(packing):
         assert double.dtype == rest.dtype == np.float64
         assert np.any(rest != 0)
         np.testing.assert_array_equal(double + rest, double)  # the rest is below the last digit
-
-
-def test_extended_and_double_sums_agree(packing):
-    landscape, state = Landscape(packing), State.of(packing)
-    extended, double = (landscape.evaluate(state, extended=on) for on in (True, False))
-    assert double.energy == pytest.approx(extended.energy, rel=1e-13)
-    assert_close(double.gradient, extended.gradient, 1e-12)
-    assert double.n_bonds == extended.n_bonds
-    one, other = (landscape.curvature(state, extended=on) for on in (True, False))
-    assert_close(other.hessian.toarray(), one.hessian.toarray(), 1e-12)
 
 
 @pytest.mark.parametrize("half_length", [0.0, 1.0])

@@ -36,7 +36,7 @@ def right_sides(n, k=2):
 
 
 def remainders(newton, hessian, right, found):
-    """What solutions leave of right-hand sides, over these."""
+    """Residuals of solutions over the right-hand sides."""
     left = right - (hessian @ found.T).T - newton.shift * found
     return np.linalg.norm(left, axis=1) / np.linalg.norm(right, axis=1)
 

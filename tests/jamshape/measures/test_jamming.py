@@ -1,4 +1,4 @@
-"""Where frames of a compression stay jammed when they are minimised."""
+"""Bracket of jamming: frames of a compression that stay jammed when minimised."""
 
 import numpy as np
 import pytest

@@ -21,7 +21,7 @@ def remembering(memory, rng, n=N_SAMPLES):
 
 @pytest.mark.parametrize("memory", [0, 3, 30])
 def test_errors_are_those_of_series_with_this_memory(memory):
-    """Of many series the means scatter by what each of them tells, and one of the exact inefficiency is told."""
+    """The means of many series scatter by their error estimates, and the estimate of an exact inefficiency is right."""
     rng = np.random.default_rng(7)
     found = [block_average(remembering(memory, rng, 4000)) for _ in range(60)]
     scatter = np.std([one.mean for one in found], ddof=1)

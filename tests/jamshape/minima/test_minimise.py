@@ -18,6 +18,8 @@ from jamshape.minima import (
     rounding_floor,
 )
 from jamshape.protocols.random_start import random_packing
+from methods.lammps_cg import lammps_cg
+from methods.lbfgs import lbfgs
 
 
 def shaken(n, alpha, phi, seed=1):
@@ -96,8 +98,8 @@ def test_residual_is_that_of_single_particles(jammed):
     assert found.largest == max(found)
 
 
-@pytest.mark.parametrize("method", ["lbfgs", "paper"])
-def test_lbfgs_and_paper_come_close_to_minima_of_discs(method):
+@pytest.mark.parametrize("method", [lbfgs, "cg_marschall"])
+def test_first_order_methods_come_close_to_minima_of_discs(method):
     for name in ("24 discs", "48 discs"):
         landscape, start = shaken(*JAMMED[name])
         before = landscape.evaluate(start)
@@ -109,7 +111,7 @@ def test_lbfgs_and_paper_come_close_to_minima_of_discs(method):
         assert again.energy == pytest.approx(found.evaluation.energy, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])
+@pytest.mark.parametrize("method", ["newton", "auto", lbfgs, "cg_marschall"])
 def test_no_method_raises_the_energy_of_rods(method):
     for name in ("24 rods of alpha 1", "32 rods of alpha 4"):
         landscape, start = shaken(*JAMMED[name])
@@ -125,7 +127,7 @@ def test_methods_agree_where_they_begin_close_to_a_minimum_of_discs(name):
     # The same basin for all: a step off the minimum that is small against the overlaps.
     step = np.random.default_rng(2).normal(size=landscape.size)
     close = landscape.displaced(expected.state, 1e-3 * step)
-    for method in ("newton", "auto", "lbfgs", "paper"):
+    for method in ("newton", "auto", lbfgs, "cg_marschall"):
         found = minimise(landscape, close, method, Stop(evaluations=5000))
         assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-9), method
         moved = (found.state.position - expected.state.position).astype(float)
@@ -153,7 +155,7 @@ def test_methods_agree_where_they_begin_close_to_a_minimum_of_any_shape(name):
     close = landscape.displaced(expected.state, 1e-3 * landscape.length * step)
     away = landscape.evaluate(close).energy / expected.state.volume
     assert away > 1.001 * expected.energy_density
-    for method in ("newton", "auto", "lbfgs"):
+    for method in ("newton", "auto", lbfgs):
         found = minimise(landscape, close, method, Stop(evaluations=5000))
         assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-9), method
         assert found.residual.largest < 1e-5, method
@@ -166,7 +168,7 @@ def many_in_space():
 
 
 def reach_of(landscape, move):
-    """How much of a move pairs hold for, those of a wide skin of which near ones are chosen."""
+    """Largest move for which pairs stay valid, those of a wide skin from which near ones are chosen."""
     state, step = State.of(landscape.particles), 1e-3 * landscape.length
     pairs, factor = Landscape(landscape.particles).wide_pairs(state), 0.0
     while not pairs.outrun_by(
@@ -182,7 +184,7 @@ OF_ANY_AGE = {name: partial(pressed_named, name) for name in PRESSED} | {"many":
 @pytest.mark.parametrize("method", ["newton", "auto"])
 @pytest.mark.parametrize("name", OF_ANY_AGE)
 def test_a_minimum_is_the_same_to_the_bit_whatever_the_age_of_the_pairs(name, method):
-    """What goes on after a kill finds all pairs anew, at another state than what was not killed."""
+    """A resumed run finds all pairs anew, at another state than an uninterrupted one."""
     packing = OF_ANY_AGE[name]()
     state, rng = State.of(packing), np.random.default_rng(7)
     stop = Stop(tolerance=1e-7, evaluations=150)
@@ -205,7 +207,7 @@ def test_a_minimum_is_the_same_to_the_bit_whatever_the_age_of_the_pairs(name, me
 def test_lammps_agrees_with_newton_and_lowers_the_energy():
     landscape, start = shaken(*JAMMED["24 discs"])
     expected = minimise(landscape, start, "newton")
-    found = minimise(landscape, start, "lammps", Stop(evaluations=5000))
+    found = minimise(landscape, start, lammps_cg, Stop(evaluations=5000))
     assert found.evaluation.energy < landscape.evaluate(start).energy
     assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-9)
     assert found.residual.largest < 1e-5
@@ -214,19 +216,19 @@ def test_lammps_agrees_with_newton_and_lowers_the_energy():
 @pytest.mark.lammps
 @pytest.mark.parametrize("packing_of", [ellipsoids, octahedra_and_boxes, superellipses])
 def test_lammps_minimises_superellipsoids(packing_of):
-    """Of several exponents, which are types in LAMMPS; from a start beside a minimum."""
+    """Particles have several exponents, which are types in LAMMPS; from a start beside a minimum."""
     landscape = Landscape(packing_of())
     start = State.of(landscape.particles)
     expected = minimise(landscape, start, "newton")
     step = np.random.default_rng(2).normal(size=landscape.size)
     close = landscape.displaced(expected.state, 1e-3 * landscape.length * step)
-    found = minimise(landscape, close, "lammps", Stop(evaluations=3000))
+    found = minimise(landscape, close, lammps_cg, Stop(evaluations=3000))
     assert found.evaluation.energy < landscape.evaluate(close).energy
     assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-9)
     assert found.residual.largest < 1e-4
 
 
-@pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])
+@pytest.mark.parametrize("method", ["newton", "auto", lbfgs, "cg_marschall"])
 @pytest.mark.parametrize("alpha", [0, 1])
 def test_packings_below_jamming_are_called_unjammed(method, alpha):
     packing = random_packing(24, 0.5, 2, bidisperse(alpha))
@@ -237,7 +239,7 @@ def test_packings_below_jamming_are_called_unjammed(method, alpha):
     assert found.energy_density <= 1e-20
 
 
-@pytest.mark.parametrize("method", [m for m in METHODS if m != "lammps"])
+@pytest.mark.parametrize("method", [*METHODS, lbfgs])
 def test_without_contacts_nothing_is_done(method):
     packing = random_packing(10, 0.2, 1)
     landscape, start = Landscape(packing), State.of(packing)
@@ -251,19 +253,19 @@ def test_without_contacts_nothing_is_done(method):
 
 def test_unknown_method_is_refused_in_a_sentence():
     packing = random_packing(4, 0.2, 1)
-    sentence = "the method is 'fire', expected one of auto, near, newton, lbfgs, paper, lammps"
+    sentence = "the method is 'fire', expected one of auto, near, newton, cg_marschall"
     with pytest.raises(ValueError, match=f"^{sentence}$"):
         minimise(Landscape(packing), State.of(packing), "fire")
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [*METHODS, lbfgs, lammps_cg])
 def test_crossing_spines_are_refused(method):
     crossing = make([[5, 5], [5.1, 5.1], [9, 9]], [0, np.pi / 2, 0])
     with pytest.raises(CrossingError, match=r"spines of particles [12] and [12] cross"):
         minimise(Landscape(crossing), State.of(crossing), method)
 
 
-@pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])
+@pytest.mark.parametrize("method", ["newton", "auto", lbfgs, "cg_marschall"])
 def test_so_many_evaluations_exhaust_it(method):
     landscape, start = shaken(*JAMMED["48 discs"])
     landscape.evaluate(start)  # those before do not count
@@ -271,11 +273,11 @@ def test_so_many_evaluations_exhaust_it(method):
     found = minimise(landscape, start, method, Stop(evaluations=6))
     assert found.outcome is Outcome.EXHAUSTED
     # A line search is brought to its end.
-    assert 6 <= landscape.evaluations - before < (60 if method == "paper" else 20)
+    assert 6 <= landscape.evaluations - before < (60 if method == "cg_marschall" else 20)
     assert found.residual.largest > 1e-8
 
 
-@pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])
+@pytest.mark.parametrize("method", ["newton", "auto", lbfgs, "cg_marschall"])
 def test_so_much_time_exhausts_it(method):
     landscape, start = shaken(*JAMMED["48 discs"])
     found = minimise(landscape, start, method, Stop(seconds=1e-9))
@@ -283,7 +285,7 @@ def test_so_much_time_exhausts_it(method):
     assert found.history.wall_seconds[-1] < 1
 
 
-@pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])
+@pytest.mark.parametrize("method", ["newton", "auto", lbfgs, "cg_marschall"])
 def test_history_is_complete_and_ascending(jammed, method):
     landscape, start = jammed
     found = minimise(landscape, start, method, Stop(evaluations=300))
@@ -299,7 +301,7 @@ def test_history_is_complete_and_ascending(jammed, method):
     assert history.residual[0] == residual_of(landscape, landscape.evaluate(start)).largest
 
 
-@pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])
+@pytest.mark.parametrize("method", ["newton", "auto", lbfgs, "cg_marschall"])
 def test_history_goes_on_where_it_is_given(method):
     landscape, start = shaken(*JAMMED["24 discs"])
     first = minimise(landscape, start, method, Stop(evaluations=3))
@@ -311,7 +313,7 @@ def test_history_goes_on_where_it_is_given(method):
     assert np.all(np.diff(second.history.wall_seconds) >= 0)
 
 
-@pytest.mark.parametrize("method", ["newton", "auto", "lbfgs", "paper"])
+@pytest.mark.parametrize("method", ["newton", "auto", lbfgs, "cg_marschall"])
 def test_a_repetition_gives_the_same_bits(jammed, method):
     landscape, start = jammed
     one, other = (

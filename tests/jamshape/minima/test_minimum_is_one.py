@@ -40,7 +40,7 @@ def found(name):
 
 
 def as_minimum(landscape, state, outcome=Outcome.CONVERGED):
-    """What would be said of a state that is taken for a minimum."""
+    """Return a state as if it were a minimum."""
     evaluation = landscape.evaluate(state)
     residual = residual_of(landscape, evaluation)
     return Minimum(state, evaluation, outcome, residual, History())

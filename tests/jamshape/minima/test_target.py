@@ -33,7 +33,7 @@ def coordination_of(landscape, minimum):
 
 
 def phi_J_of(landscape, minimum):
-    """Where the tangent of sqrt(u) over phi vanishes."""
+    """Extrapolate the tangent of sqrt(u) over phi to zero."""
     phi = minimum.state.packing(landscape.particles).phi
     u = minimum.energy_density
     pressure = -minimum.evaluation.strain_gradient / (2 * minimum.state.volume)

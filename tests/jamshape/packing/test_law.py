@@ -6,11 +6,11 @@ import pytest
 from scenes import make
 
 import jamshape as js
+from common.spines import with_spines
 from jamshape.contacts import Contacts, find_contacts, forces
 from jamshape.exchange.gsd import read_gsd, write_gsd
 from jamshape.files.h5md import read_packing, write_packing, write_run
 from jamshape.landscape import Landscape, State
-from jamshape.packing.spines import with_spines
 
 LAW = js.Interaction(k_e=2.5, sides=1)
 
@@ -115,6 +115,6 @@ def test_a_run_with_one_bond_side_to_side(tmp_path):
     one, stiff, two = (js.modes(frame.with_(law=law), force=True).eigenvalues[-1] for law in laws)
     assert stiff == pytest.approx(2.5 * one, rel=1e-9)
     assert two != pytest.approx(one, rel=1e-3)
-    with pytest.warns(UserWarning, match="the start has sides=1.* and the run has sides=2: energy"):
+    with pytest.warns(UserWarning, match="the start has sides=1.* and the run sides=2: energy"):
         sheared = js.quasistatic_shear(start=frame, step=1e-3, strain=2e-3, progress=False)
     assert sheared.packing(0).law == js.Interaction(1.0, 2)

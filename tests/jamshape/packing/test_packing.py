@@ -101,7 +101,7 @@ def test_image_defaults_to_zero():
         ({"species": np.ones(5, int)}, r"species has shape \(5,\), expected \(6,\)"),
         ({"image": np.zeros((6, 3), int)}, r"image has shape \(6, 3\), expected \(6, 2\)"),
         ({"id": np.arange(6.0)}, "id has dtype float64, expected integers"),
-        ({"id": np.ones(6, int)}, "an id is there more than once, expected one for each particle"),
+        ({"id": np.ones(6, int)}, "an id occurs more than once, expected one for each particle"),
         ({"id": np.arange(6)}, "id holds 0, expected numbers from 1"),
         ({"species": np.zeros(6, int)}, "species holds 0, expected numbers from 1"),
         ({"orientation": np.full(6, np.inf)}, "orientation holds NaN or infinity, expected finite"),
@@ -118,7 +118,7 @@ def test_packing_refuses(changes, sentence):
 
 
 def test_packing_refuses_quaternions_that_are_not_unit():
-    with pytest.raises(ValueError, match="is off 1 by 1, expected unit quaternions"):
+    with pytest.raises(ValueError, match="differs from 1 by 1, expected unit quaternions"):
         nasty_packing(3, orientation=np.tile([2.0, 0, 0, 0], (6, 1)))
 
 

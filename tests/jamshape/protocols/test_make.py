@@ -47,7 +47,7 @@ def minimum():
 
 
 def compressed(out, packing=None):
-    """What a compression leaves that has reached its end."""
+    """Write the files of a finished compression."""
     writer = RunWriter.create(run_of(out), packing or start(), {"finished": False})
     phi = np.linspace(0.80, 0.88, 60)
     p = 0.3 * np.clip(phi - 0.85, 0, None)
@@ -202,7 +202,7 @@ OTHERS = {
 
 
 def refused(sample, out):
-    """Say why a sample is not made, after a look at the files, which must stay as they are."""
+    """Return why a sample is not made, and check that its files stay as they are."""
     before = {path: path.read_bytes() for path in out.parent.iterdir()}
     with pytest.raises(ValueError) as error:
         next(make(sample, out))
@@ -220,7 +220,7 @@ def test_the_compression_of_another_sample_is_neither_taken_nor_replaced(tmp_pat
     sentence = refused(replace(RECIPE, **OTHERS[words]), out)
     assert "run.h5 holds the compression of a packing with " in sentence
     assert words in sentence
-    assert sentence.endswith("; write to another file, or make it again")
+    assert sentence.endswith("; write to another file, or use again to replace it")
 
 
 def test_the_compression_of_another_mixture_is_refused(tmp_path):

@@ -100,7 +100,7 @@ ADAPTIVE = Quasistatic(step=2e-3, energy=1e-8, coarse=4e-2)
 
 @pytest.fixture(scope="module")
 def adaptive():
-    """Of each minimisation that left the packing unjammed: the step before, its evaluations, the step after."""
+    """List the step before, the evaluations and the step after each minimisation that left the packing unjammed."""
     landscape, compression, protocol = begun(n=24, phi=0.3, protocol=ADAPTIVE)
     rows, loose = [], compression.loose
     step, evaluations, reached = compression.step, landscape.evaluations, []

@@ -140,7 +140,7 @@ def test_recommended_start_works(n, mixture, dimension, monkeypatch):
     monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS", 50_000)
     monkeypatch.setattr("jamshape.protocols.random_start._ATTEMPTS_PER_PARTICLE", 0)
     sentence = (
-        rf"^random insertion of {n} particles stalled at phi = 0\.\d+ of the 0\.95 asked after"
+        rf"^random insertion of {n} particles stalled at phi = 0\.\d+ of the 0\.95 requested after"
         r" \d+ attempts: start at phi <= (0\.\d+) and compress from there$"
     )
     with pytest.raises(InsertionError, match=sentence) as error:
@@ -158,7 +158,7 @@ def test_box_too_short_for_the_longest(alpha, dimension):
     assert random_packing(1, phi, 1, rod, dimension=dimension).n == 1
 
 
-NO_ROD = r"a particle of the mixture is no spherocylinder, expected \(2\(A\+R\), 2R, 2R\)"
+NO_ROD = r"a particle of the mixture is not a spherocylinder, expected \(2\(A\+R\), 2R, 2R\)"
 
 
 @pytest.mark.parametrize(
@@ -239,7 +239,7 @@ def test_driver_writes_what_it_says(tmp_path, name, reader, dimension):
     [
         ("--phi 0.9 --n 20 --out {}/a.data", "stalled at phi"),
         ("--alpha -1 --out {}/a.data", "alpha is -1.0"),
-        ("--out {}/a.txt", "expected a name that ends in .data or .h5"),
+        ("--out {}/a.txt", "expected a suffix .data or .h5"),
         ("--out {}/missing/a.data", "No such file or directory"),
     ],
 )

@@ -1,4 +1,4 @@
-"""The second try: what stalls at first is led on to where forces balance, the same after a kill."""
+"""The second attempt relaxes stalled packings until forces balance, the same after a kill."""
 
 import itertools
 
@@ -68,8 +68,8 @@ def test_after_a_kill_it_ends_in_the_same_packing(cured, tmp_path, monkeypatch):
     file = tmp_path / "packing.h5.strict.h5"
     assert read_attributes(file)["retry_n_steps"] == 1
     told = contents_of(file)
-    assert (told["kind"], told["finished"]) == ("second try of a packing", False)
-    assert told["go_on"].startswith(f"start the command that makes {out} again")
+    assert (told["kind"], told["finished"]) == ("second attempt at a packing", False)
+    assert told["go_on"].startswith(f"repeat the command for {out}, which")
     again = made(out)
     assert [path.name for path in tmp_path.iterdir()] == ["packing.h5"]
     whole, known = cured
@@ -80,12 +80,12 @@ def test_after_a_kill_it_ends_in_the_same_packing(cured, tmp_path, monkeypatch):
 
 
 def test_what_it_does_not_cure_stays_as_it_was_and_is_said(stalled, tmp_path, monkeypatch):
-    """As where its work is used up."""
+    """The same happens when its work is used up."""
     monkeypatch.setattr("jamshape.protocols.retry._EVALUATIONS", 1)
     monkeypatch.setattr("jamshape.protocols.retry._PRICE", 10**6)
     out = tmp_path / "packing.h5"
     with pytest.warns(
-        js.NotReachedWarning, match="ended sliding after a second try, with net forces up to"
+        js.NotReachedWarning, match="ended sliding after a second attempt, with net forces up to"
     ):
         packing = js.make_packing(
             bidisperse(4.0), n=16, seed=SEED, u0=1e-12, file=out, progress=False

@@ -220,5 +220,5 @@ def test_minima_where_nothing_slides_are_strict(particles, n, tmp_path):
 
 
 def test_strict_packing_needs_an_energy():
-    with pytest.raises(ValueError, match="expected one for a strict minimum"):
+    with pytest.raises(ValueError, match="does not work with a strict minimum"):
         recipe_for(bidisperse(4.0), n=32, u0=0.0, strict=True)

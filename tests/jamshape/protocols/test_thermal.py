@@ -9,6 +9,7 @@ from jamshape.minima import Stop, minimise
 from jamshape.packing import Box
 from jamshape.protocols.random_start import random_packing
 from jamshape.protocols.thermal import Thermal, equilibrate, without_overlaps
+from methods.lbfgs import lbfgs
 
 
 def loose(diameters, exponent, phi, dimension=3):
@@ -16,7 +17,7 @@ def loose(diameters, exponent, phi, dimension=3):
     packing = scattered(
         np.asarray(diameters, float), np.asarray(exponent, float), phi, 5, dimension
     )
-    found = minimise(Landscape(packing), State.of(packing), "lbfgs", Stop(lowest=1e-12))
+    found = minimise(Landscape(packing), State.of(packing), lbfgs, Stop(lowest=1e-12))
     return without_overlaps(found.state.packing(packing))
 
 
@@ -132,7 +133,7 @@ def test_rods_move_and_keep_apart(dimension):
 
 def test_opening_the_box_removes_the_last_overlaps():
     packing = scattered(np.tile([1.0, 1.0, 1.5], (30, 1)), np.ones(30), 0.55)
-    found = minimise(Landscape(packing), State.of(packing), "lbfgs", Stop(lowest=1e-10))
+    found = minimise(Landscape(packing), State.of(packing), lbfgs, Stop(lowest=1e-10))
     touching = found.state.packing(packing)
     assert len(find_contacts(touching).pairs) > 0
     opened = without_overlaps(touching)

@@ -145,7 +145,7 @@ def test_a_floppy_mode_that_couples_leaves_no_modulus():
     found = moduli(cut, modes)
     assert np.isnan(found.simple_shear.relaxed)
     assert "to this strain (by " in found.simple_shear.reason
-    assert "so that nothing holds the packing against it" in found.simple_shear.reason
+    assert "so nothing resists it" in found.simple_shear.reason
     assert found.simple_shear.affine == pytest.approx(moduli(matrix, whole).simple_shear.affine)
 
 

@@ -372,7 +372,7 @@ def test_weak_contacts_can_be_left_out():
 
 def test_rattlers_alone_are_refused():
     apart = scaled(pressed_named("rods of alpha 4"), 2.0)
-    with pytest.raises(ValueError, match="all 24 particles are rattlers, so that there is no mode"):
+    with pytest.raises(ValueError, match="all 24 particles are rattlers, so there are no modes"):
         dynamical_matrix(Landscape(apart), State.of(apart))
 
 

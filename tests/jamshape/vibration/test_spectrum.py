@@ -294,7 +294,7 @@ def test_shifted_inverse_keeps_the_prestress():
 
 @pytest.mark.parametrize("k", [0, 1000])
 def test_a_senseless_number_of_modes_is_refused(k):
-    with pytest.raises(ValueError, match=f"{k} modes were asked for, expected from 1 to"):
+    with pytest.raises(ValueError, match=f"{k} modes were requested, expected from 1 to"):
         lowest(matrix_of("discs"), k)
 
 

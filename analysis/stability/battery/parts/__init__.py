@@ -1,1 +1,0 @@
-"""Cases of each part of jamshape, for all shapes of the table."""

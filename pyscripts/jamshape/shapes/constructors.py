@@ -1,0 +1,132 @@
+"""Constructors of particles, made from the parameters of a shape: ``Spherocylinders(alpha=4)``."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from inspect import Signature
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jamshape.arguments import checked
+from jamshape.arrays import real_numbers
+from jamshape.shapes.particles import Kind, Particles
+from jamshape.shapes.shape import Shape
+
+_OF_KINDS = ("size", "share", "spread")
+
+_TEXT = """{about}
+
+Parameters
+----------
+{parameters}
+size_ratio : float, optional
+    Size ratio of big and small particles, mixed 1:1, with the same parameters; {size_ratio:g} by default, 1 for
+    equal particles.
+**kinds : float or (k,) array
+    ``size`` over the unit of length, {unit} (1); ``share``, number fraction of the kind up to normalisation (1);
+    ``spread``, standard deviation of the logarithm of the size (0). These exclude `size_ratio`. Arrays make a
+    mixture of k kinds.
+
+Returns
+-------
+Particles
+
+Raises
+------
+ValueError
+    If a number is out of its range, or arrays differ in length.
+
+Examples
+--------
+>>> import jamshape as js
+>>> js.{name}({example}, size_ratio=1.25)
+{made!r}
+>>> mixture = js.{name}({example}, size=[1, 1.4], share=[3, 1])
+"""
+
+
+def constructor(shape: Shape) -> Callable[..., Particles]:
+    """Make the function whose arguments are the parameters of a shape, each a number or an array.
+
+    Examples
+    --------
+    >>> from jamshape.shapes.table import shape_named
+    >>> constructor(shape_named("dimer"))(alpha=0.5, size_ratio=1)
+    Particles('dimer', alpha=0.5, size_ratio=1)
+    """
+    signature = signature_of(shape)
+
+    def make(*args: ArrayLike, **kwargs: ArrayLike) -> Particles:
+        given = signature.bind(*args, **kwargs)
+        given.apply_defaults()
+        numbers = dict(given.arguments)
+        return _particles(shape, numbers, numbers.pop("size_ratio"), numbers.pop("kinds"))
+
+    make.__signature__ = signature  # type: ignore[attr-defined]
+    make.__name__ = make.__qualname__ = shape.compiled_name
+    make.__module__ = "jamshape.shapes.named"
+    make.__doc__ = _text_of(shape)
+    return checked(make)
+
+
+def signature_of(shape: Shape) -> Signature:
+    """Signature of the constructor of a shape, with types as text."""
+    either = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    arguments = [
+        inspect.Parameter(p.option, either, default=p.default, annotation="ArrayLike")
+        for p in shape.parameters
+    ]
+    ratio = inspect.Parameter("size_ratio", either, default=None, annotation="float | None")
+    kinds = inspect.Parameter("kinds", inspect.Parameter.VAR_KEYWORD, annotation="ArrayLike")
+    return Signature([*arguments, ratio, kinds], return_annotation="Particles")
+
+
+def _text_of(shape: Shape) -> str:
+    parameters = "\n".join(
+        f"{p.option} : float or (k,) array\n    {p.meaning}; {p.default:g} by default."
+        for p in shape.parameters
+    )
+    first = dict(shape.examples[0])
+    return _TEXT.format(
+        about=inspect.getdoc(shape),
+        parameters=parameters,
+        size_ratio=shape.size_ratio,
+        unit=shape.unit,
+        name=shape.compiled_name,
+        example=", ".join(f"{p.option}={first[p.name]:g}" for p in shape.parameters),
+        made=Particles.of(shape, 1.25, **first),
+    )
+
+
+def _particles(
+    shape: Shape,
+    parameters: Mapping[str, ArrayLike],
+    size_ratio: float | None,
+    kinds: Mapping[str, ArrayLike],
+) -> Particles:
+    """Make particles from numbers, or kinds from arrays."""
+    for name in kinds:
+        if name not in _OF_KINDS:
+            expected = ", ".join((*parameters, "size_ratio", *_OF_KINDS))
+            msg = f"{name} is unknown for {shape.name}s, expected {expected}"
+            raise ValueError(msg)
+    values: dict[str, Any] = {k: real_numbers(k, v) for k, v in {**parameters, **kinds}.items()}
+    if not kinds and all(np.ndim(value) == 0 for value in values.values()):
+        return Particles.of(shape, size_ratio, **{k: float(v) for k, v in values.items()})
+    if size_ratio is not None:
+        msg = "size_ratio does not work with kinds, expected the size of each kind in size alone"
+        raise ValueError(msg)
+    try:
+        columns = np.broadcast_arrays(
+            *(np.atleast_1d(v).astype(np.float64) for v in values.values())
+        )
+    except ValueError:
+        lengths = {name: np.size(value) for name, value in values.items()}
+        msg = f"arrays have lengths {lengths}, expected one entry for each kind"
+        raise ValueError(msg) from None
+    rows = [dict(zip(values, row, strict=True)) for row in np.column_stack(columns).tolist()]
+    own = [{name: row.pop(name) for name in kinds} for row in rows]
+    return Particles.mixture(shape, [Kind(row, **k) for row, k in zip(rows, own, strict=True)])

@@ -1,0 +1,41 @@
+"""Write the stubs of what the table of shapes decides, from the table; `./run setup` does so, and a test compares."""
+
+from pathlib import Path
+
+import jamshape
+from jamshape.shapes.constructors import signature_of
+from jamshape.shapes.table import SHAPES
+
+FOLDER = Path(jamshape.__file__).parent
+NAMES, IMPORT = FOLDER / "__init__.pyi", "from .shapes.named import {0} as {0}\n"
+
+HEADER = '''"""Written by tests/house/stubs.py from the table of shapes."""
+
+from numpy.typing import ArrayLike
+
+from jamshape.shapes.particles import Particles
+
+'''
+
+
+def stub(shape):
+    """Declare the function that makes particles of a shape, an argument a line as the formatter leaves it."""
+    signature = signature_of(shape)
+    arguments = "".join(f"    {p},\n" for p in signature.parameters.values())
+    return f"def {shape.compiled_name}(\n{arguments}) -> Particles: ...\n".replace("'", "")
+
+
+def stubs():
+    """Give the text of each stub by its path."""
+    names = sorted(shape.compiled_name for shape in SHAPES.values())
+    lines = NAMES.read_text(encoding="utf-8").splitlines(keepends=True)
+    others = [line for line in lines if not line.startswith("from .shapes.named ")]
+    behind = next(k for k, line in enumerate(others) if line.startswith("from .shapes."))
+    others[behind:behind] = [IMPORT.format(name) for name in names]
+    functions = "".join(map(stub, SHAPES.values()))
+    return {NAMES: "".join(others), FOLDER / "shapes/named.pyi": HEADER + functions}
+
+
+if __name__ == "__main__":
+    for path, text in stubs().items():
+        path.write_text(text, encoding="utf-8")
