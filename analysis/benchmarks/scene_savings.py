@@ -1,4 +1,4 @@
-"""What a scene leaves out, and what that saves: each turned back on, by paired timings.
+"""Savings by skipped work: paired timings with each shortcut disabled.
 
     python analysis/benchmarks/scene_savings.py --out runs/scene_savings
     python analysis/benchmarks/scene_savings.py --quick
