@@ -73,7 +73,7 @@ SCENES = {
 
 
 class Case(NamedTuple):
-    """Something that a scene leaves out, and how it is turned back on."""
+    """Work that a run skips, and the way to disable the shortcut."""
 
     scene: str
     what: str
