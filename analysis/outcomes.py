@@ -1,4 +1,4 @@
-"""Count the packings of rods whose forces balance, with and without the second try, and what it costs.
+"""Count the packings of rods whose forces balance, with and without the second attempt, and its cost.
 
     python analysis/outcomes.py --alpha 2 4 --n 64 --u0 1e-12 --samples 100 --out outcomes/
 

@@ -1,4 +1,4 @@
-"""Write what packings, modes and runs of a reproduced paper are as tables, a line for each of their files.
+"""Write tables of the packings, modes and runs of a reproduced paper, one line per file.
 
     python analysis/sample_tables.py FOLDER --out FOLDER/samples
     python analysis/sample_tables.py FOLDER --known TABLES --out FOLDER/samples

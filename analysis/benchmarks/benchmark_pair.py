@@ -1,4 +1,4 @@
-"""Cost of our pair styles against LAMMPS's own of similar particles, on the same states, in one go.
+"""Cost of jamshape's pair styles and of LAMMPS's own for similar particles, on the same states.
 
     python analysis/benchmarks/benchmark_pair.py --quick
     python analysis/benchmarks/benchmark_pair.py --shape superellipsoid --quick

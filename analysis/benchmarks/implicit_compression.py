@@ -1,4 +1,4 @@
-"""Core seconds of an implicit compression through jamming, from a state that was compressed faster to where it begins.
+"""Core seconds of an implicit compression through jamming, starting from a state that was compressed faster.
 
     python analysis/benchmarks/implicit_compression.py --n 1024 --tolerances 1e-2 1e-3
     python analysis/benchmarks/implicit_compression.py --n 256 --alpha 0.01 --phi-start 0.834 --phi-end 0.85

@@ -144,7 +144,7 @@ def measured(system: System, n: int, work: Path) -> Iterator[Row]:
 def markdown(rows: list[Row]) -> str:
     """Draw a table, a line for each system."""
     parts = list(dict.fromkeys(row.part for row in rows))
-    text = f"| | {' | '.join(f'{part}: s (busy), GB' for part in parts)} |\n{'| --- ' * (1 + len(parts))}|\n"
+    text = f"| | {' | '.join(f'{part}: s (CPU), GB' for part in parts)} |\n{'| --- ' * (1 + len(parts))}|\n"
     for name, n in dict.fromkeys((row.system, row.n) for row in rows):
         cells = [
             f"{row.seconds:.3g} ({row.busy:.3g}), {row.megabytes / 1e3:.2g}"

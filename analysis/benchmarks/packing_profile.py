@@ -1,4 +1,4 @@
-"""Where the core seconds of one packing go: steps below jamming, the first jammed state, the way from there to u0.
+"""Profile of the core seconds of one packing: steps below jamming, the first jammed state, the search for u0.
 
     OPENBLAS_NUM_THREADS=1 python analysis/benchmarks/packing_profile.py --alpha 4 --n 1024
     OPENBLAS_NUM_THREADS=1 python analysis/benchmarks/packing_profile.py --superellipsoid 1 0.6 1 --n 400
@@ -137,7 +137,7 @@ def main(options: Namespace) -> None:
     parts = profile.parts
     parts[REST].seconds = total - sum(part.seconds for part in parts.values())
     counts = "minimisations | evaluations | factorisations | products"
-    print(f"| | {counts} | core s | longest | us an evaluation |")
+    print(f"| | {counts} | core s | longest | us per evaluation |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for name, part in parts.items():
         print("| " + " | ".join([name, *part.told()]) + " |")

@@ -1,4 +1,4 @@
-"""What threads save of one large packing: seconds of an evaluation and of a factorisation by each number of threads.
+"""Speed-up of one large packing by threads: seconds of an evaluation and of a factorisation.
 
     OPENBLAS_NUM_THREADS=1 python analysis/benchmarks/packing_threads.py --n 4096
     OPENBLAS_NUM_THREADS=1 python analysis/benchmarks/packing_threads.py --superellipsoid 1 1 1 --n 2000 --threads 2 4

@@ -1,4 +1,4 @@
-"""What part of a core's arithmetic and of its memory's bandwidth force evaluations reach.
+"""Fraction of a core's peak arithmetic and memory bandwidth that force evaluations reach.
 
     python analysis/benchmarks/peak_fraction.py
     python analysis/benchmarks/peak_fraction.py --shape spherocylinder --phi 0.86 --tiles 8

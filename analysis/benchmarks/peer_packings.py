@@ -1,4 +1,4 @@
-"""Packings of discs and spheres beside those of spheropack and JaxDEM: core seconds, packing fractions and contacts, in turns.
+"""Packings of discs and spheres compared with spheropack and JaxDEM: core seconds, packing fractions and contacts.
 
     python -m venv peers && peers/bin/pip install spheropack git+https://github.com/cdelv/JaxDEM
     python analysis/benchmarks/peer_packings.py --spheropack peers/bin/python --seeds 3 --out runs/peer_packings

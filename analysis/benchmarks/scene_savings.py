@@ -1,4 +1,4 @@
-"""What a scene leaves out, and what that saves: each turned back on, by paired timings.
+"""Savings by skipped work: paired timings with each shortcut disabled.
 
     python analysis/benchmarks/scene_savings.py --out runs/scene_savings
     python analysis/benchmarks/scene_savings.py --quick
@@ -73,7 +73,7 @@ SCENES = {
 
 
 class Case(NamedTuple):
-    """Something that a scene leaves out, and how it is turned back on."""
+    """Work that a run skips, and the way to disable the shortcut."""
 
     scene: str
     what: str
@@ -250,7 +250,7 @@ def second_derivatives(packing: Packing, options: Namespace) -> Row:
 def table(rows: list[Row]) -> str:
     """Write the rows as Markdown."""
     lines = [
-        "| scene | left out | per | turned back on: times as long (quartiles) | forces differ by |",
+        "| particles | skipped | per | without the shortcut: time ratio (quartiles) | forces differ by |",
         "| --- | --- | --- | --- | --- |",
     ]
     for r in rows:

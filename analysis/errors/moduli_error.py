@@ -1,4 +1,4 @@
-"""Elastic moduli of twenty packings and their bounds, beside quasistatic shear and a dense calculation.
+"""Elastic moduli of twenty packings and their bounds, compared with quasistatic shear and a dense calculation.
 
     python analysis/errors/moduli_error.py --out runs/moduli_error
 

@@ -1,4 +1,4 @@
-"""Error and cost of the implicit integrator of slow compressions, beside Heun's method.
+"""Error and cost of the implicit integrator of slow compressions, compared with Heun's method.
 
     python analysis/errors/stiff_error.py --alpha 4 --n 256 --kappas 1e-6 1e-8 1e-10 --out runs/stiff_error
 

@@ -1,4 +1,4 @@
-"""Errors of contacts of superellipsoids whose faces, edges or tips lie on each other, against 33 digits.
+"""Errors of contacts of superellipsoids with touching faces, edges or tips, against a solution in 33 digits.
 
     python analysis/errors/superellipsoid_error.py --n 1000000 --out runs/superellipsoid_error
 

@@ -1,4 +1,4 @@
-"""Draw where on their surface particles touch: Fig. 10 of Marschall & Teitel, PRE 97, 012905.
+"""Draw the distribution of contacts over the surface of particles: Fig. 10 of Marschall & Teitel, PRE 97, 012905.
 
     python analysis/marschall_2018/fig10_contact_angles.py SWEEP [MORE.h5 ...] --out contact_angles.png
 

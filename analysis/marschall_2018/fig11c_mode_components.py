@@ -1,4 +1,4 @@
-"""Draw what kinds of motion modes are: Figs. 11(c), 15(c), 19(c) of Marschall & Teitel, PRE 97, 012905.
+"""Draw the components of modes, sliding and rotation: Figs. 11(c), 15(c), 19(c) of Marschall & Teitel, PRE 97, 012905.
 
     python analysis/marschall_2018/fig11c_mode_components.py MODES [MORE.h5 ...] --alpha 4 --out mode_components.png
 

@@ -1,4 +1,4 @@
-"""Draw what is left of forces and torques: Fig. 21 of Marschall & Teitel, PRE 97, 012905.
+"""Draw residual forces and torques: Fig. 21 of Marschall & Teitel, PRE 97, 012905.
 
     python analysis/marschall_2018/fig21_residuals.py SWEEP [MORE.h5 ...] --out residuals.png
 

@@ -1,4 +1,4 @@
-"""What bonds that only graze do to contact numbers and bands: beside Secs. III C and III D of Marschall & Teitel, PRE 97, 012905.
+"""Effect of grazing bonds on contact numbers and bands: compare Secs. III C and III D of Marschall & Teitel, PRE 97, 012905.
 
     python analysis/marschall_2018/grazing_bonds.py samples/modes.csv
 

@@ -1,4 +1,4 @@
-"""Draw where on their surface sheared particles touch, over the steady state.
+"""Draw the distribution of contacts over the surface of sheared particles, over the steady state.
 
     python analysis/shear/contact_angles.py runs/shear/a4_phi0.90_g1e-5.h5 runs/shear/a0.01_phi0.84_g1e-5.h5
 

@@ -1,4 +1,4 @@
-"""Draw what steady shear does against packing fraction: stress, contacts, order, rotation.
+"""Draw stress, contacts, order and rotation of steady shear against packing fraction.
 
     python analysis/shear/rheology.py runs/shear/*.h5 --out rheology.png
 

@@ -1,4 +1,4 @@
-"""Draw what order does to density and contacts: Figs. 8 a and 11 a of Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019).
+"""Draw density and contacts against order: Figs. 8 a and 11 a of Yuan, VanderWerf, Shattuck & O'Hern, Soft Matter (2019).
 
     python analysis/yuan_2019/fig08_order_density.py SWEEP1 SWEEP2 --out order_density.png
 

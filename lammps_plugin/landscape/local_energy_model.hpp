@@ -649,7 +649,7 @@ template <class Model, int D> class VicinityOf : public LocalEnergyModel {
     }
   }
 
-  /// With blocks of displacements alone if nothing can rotate.
+  /// The block system, with blocks of displacements alone if nothing can rotate.
   std::unique_ptr<BlockSystem> block_system() const
   {
     const BlockPlan plan{coordinates.column, pairs.particles, shapes.size(), BLOCK, fill()};

@@ -123,16 +123,19 @@ class StageSolver {
   /// A stage is given up after this many directions.
   static constexpr int DIRECTIONS = 10;
 
-  /// Smooth stages need no more directions than this; later ones are assumed to meet kinks if the
-  /// force along a step has reversed, to this fraction of its value, and the solution is within
-  /// this many tolerances, or if consecutive steps are antiparallel, with this cosine.
+  /// Directions that suffice for smooth stages; later steps are checked for kinks.
   static constexpr int SMOOTH = 3;
-  static constexpr double OVERSHOT = 0.3, NEAR = 100.0, BACK = 0.95;
+  /// Fraction of the force along a step that has reversed if the step crossed a kink.
+  static constexpr double OVERSHOT = 0.3;
+  /// Tolerances within which such a step is near the solution.
+  static constexpr double NEAR = 100.0;
+  /// Cosine beyond which such a step is antiparallel to the one before.
+  static constexpr double BACK = 0.95;
 
-  /// Factors serve once more if they leave a correction smaller than the previous one by this
-  /// factor. A correction of at most this many tolerances is the last if the next is expected
-  /// within one.
-  static constexpr double SHRUNK = 0.02, NEARLY = 10.0;
+  /// Ratio of successive corrections below which factors serve once more.
+  static constexpr double SHRUNK = 0.02;
+  /// Tolerances within which a correction is the last if the next is expected within one.
+  static constexpr double NEARLY = 10.0;
 
   /// A guess with a force above this multiple of the typical one has passed through a collision.
   static constexpr double COLLISION = 30.0;

@@ -40,7 +40,7 @@ inline Split difference(const Split &i, const Split &j)
   return found;
 }
 
-/// The coordinate with j shifted by `turns` lengths.
+/// The same coordinate with j shifted by `turns` lengths.
 inline Split difference(const Split &apart, const Split &length, double turns)
 {
   const double image = turns * length.value;

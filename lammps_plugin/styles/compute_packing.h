@@ -27,7 +27,7 @@ namespace jamshape {
 ///   14 C_4       cubatic order (Yuan et al. 2019, Eq. 7) of shapes with three axes, in 3D, else 0;
 ///                directions tried are the axes of all particles, or of about 512 of many
 ///   15 n_1       normal stress difference p_xx - p_yy of the pressure tensor, virial / L^d
-///   16 p_xy      sum of r_y f_x over contacts / L^d: what shear of x along y works against, and
+///   16 p_xy      sum of r_y f_x over contacts / L^d: conjugate to shear of x along y, and
 ///                r_x f_y where torques balance. The shear stress of rheology is -p_xy
 ///   17 sigma     deviatoric stress in the plane of x and y, ((n_1 / 2)^2 + p_xy^2)^(1/2)
 ///   18 mu        sigma / p

@@ -188,8 +188,8 @@ def test_time_passes_forwards(dt, integrator, sentence_of):
 
 def test_steps_that_cannot_be_divided(sentence_of):
     assert sentence_of(f"{FIX} integrator rkc2\ntimestep 2000\nrun 1") == (
-        "fix overdamped/affine found timestep 2000, a strain of 2, expected a step from 0 to a strain "
-        "of 1: the integrator divides it."
+        "fix overdamped/affine found timestep 2000, a strain of 2, expected a strain of at most 1 "
+        "per step: the integrator divides the step."
     )
 
 

@@ -1,4 +1,4 @@
-"""What a scene leaves out: the line in the log."""
+"""Log line on skipped work."""
 
 import re
 

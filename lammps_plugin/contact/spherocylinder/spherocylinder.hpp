@@ -81,7 +81,7 @@ template <int D, class S> ContactKind kind_of(const SpinePair<D, S> &p, const Fe
 }
 
 /// Contact of two spherocylinders in 2D or 3D. With overlaps a of the shortest distance of the
-/// spines and b of the far end of what lies opposite of them, E the harmonic law:
+/// spines and b at the far end of their facing portions, E the harmonic law:
 ///     Sides::ONE  V = E(a)                                  (Marschall & Teitel 2018, Eqs. 3, 5,
 ///     22) Sides::TWO  V = (E(a)^(1/w) + E(b)^(1/w))^w, E(a) where b <= 0
 /// w is the `EndExponent`: 1, the paper's two bonds (Fig. 6), for overlaps far below A_min^2 / d of

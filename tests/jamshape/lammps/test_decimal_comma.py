@@ -10,7 +10,7 @@ from math import exp
 
 import pytest
 
-from jamshape.lammps.plugin import errors_path, load_script_path
+from jamshape.lammps.plugin import errors_path, loader_lines
 
 pytestmark = pytest.mark.lammps
 
@@ -40,9 +40,11 @@ print("bits", packing.position.tobytes().hex(), packing.orientation.tobytes().he
 
 START = "from jamshape.lammps.module import start_lammps\nlmp = start_lammps(['-log', 'none', '-nocite'])\n"
 
+VARIABLE, INCLUDE = loader_lines()
 HEAD = f"""dimension 2
 atom_style ellipsoid
-include "{load_script_path()}"
+{VARIABLE}
+{INCLUDE}
 """
 BOX = """region box block 0 20.5 0 20.5 -0.5 0.5
 create_box 1 box
