@@ -98,7 +98,7 @@ class Modes:
 
     @property
     def omega(self) -> FloatArray:
-        """(k,) frequencies sign(lambda) sqrt(|lambda|)."""
+        """(k,) frequencies ``sign(lambda) sqrt(|lambda|)``."""
         return self.table["omega"]
 
     @property
