@@ -232,8 +232,8 @@ OF_BODIES = "pair_coeff of superellipsoid/harmonic found "
            "are not convex."))
           for value in ("0.5", "0.0", "-2", "1e400")),
         *((f"pair_coeff {types} 1.0 1.5",
-           (f"{OF_BODIES}p = 1.5 for types {' and '.join(types.split())}, expected it where both are the "
-           "same: an exponent belongs to a type, give it with 'pair_coeff I I epsilon p'."))
+           (f"{OF_BODIES}p = 1.5 for types {' and '.join(types.split())}, expected p only for "
+           "equal types: an exponent belongs to a type; give it with 'pair_coeff I I epsilon p'."))
           for types in ("1 2", "1 *", "* 2", "1*2 2")),
     ],
 )  # fmt: skip

@@ -29,7 +29,7 @@ class Superellipsoid(Shape):
     name = "superellipsoid"
     parameters = (
         Parameter(
-            "exponent", 1.0, "exponent p above 1/2, 1 for ellipsoids", "p",
+            "exponent", 1.0, "exponent p of the surface (Yuan et al. 2019, Eq. 1)", "p",
             Range(0.55, 10.0, "an exponent"),
         ),
         Parameter("w1", 1.0, "a/b <= 1", "w1", Range(0.1, 1.0, "a/b")),
