@@ -105,7 +105,7 @@ def test_the_flow_relaxes_and_compresses(case, integrator, tmp_path):
     """Without losing contacts; its estimates of rates go through the second derivatives."""
     packing = pressed(case)
     start, before = energy_of(squeezed(case)), energy_of(packing)
-    dt, steps = (0.002, 2000) if integrator == "heun" else (0.5, 8)
+    dt, steps = (0.002, 3000) if integrator == "heun" else (0.75, 8)
     with loaded(packing, tmp_path, **OF_EVERY_SHAPE) as session:
         session.commands(f"{drive(1e-4, dt, f'integrator {integrator}')}\nrun {steps}")
         found, after = state_of(session, packing), session.lmp.get_thermo("pe")
