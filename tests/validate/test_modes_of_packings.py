@@ -27,7 +27,7 @@ SEEDS = (1, 2)
 PAPER = {0.01: (0.262, 0.0), 1.0: (0.0144, 0.0039), 4.0: (0.0641, 0.0638)}
 
 
-@pytest.fixture(options="module")
+@pytest.fixture(scope="module")
 def packings(tmp_path_factory):
     found = {}
     for alpha in PAPER:

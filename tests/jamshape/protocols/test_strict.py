@@ -83,7 +83,7 @@ def test_steps_end_at_walls():
     assert along > 0  # on, away from the middle
 
 
-@pytest.fixture(options="module")
+@pytest.fixture(scope="module")
 def strict(tmp_path_factory):
     out = tmp_path_factory.mktemp("strict") / "packing.h5"
     recipe = recipe_for(bidisperse(4.0), n=32, seed=5, strict=True)
