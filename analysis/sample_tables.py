@@ -33,7 +33,7 @@ from jamshape.vibration.table import read_modes
 SHAPE = ("alpha", "exponent", "w1", "w2", "size_ratio", "n", "seed")
 STYLE = ("shape", "dimension")
 PACKING = (
-    *STYLE, *SHAPE, "asphericity", "beta", "z_iso", "way", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
+    *STYLE, *SHAPE, "asphericity", "beta", "z_iso", "protocol", "phi_thermal", "n_sweeps", "u0", "u", "pressure", "phi", "phi_J", "z", "z_single",
     "n_rattlers", "n_bonds", "S2", "S4", "C4", "residual_force", "residual_torque", "tolerance", "outcome", "retry_of", "wall_seconds",
 )  # fmt: skip
 RUN = (

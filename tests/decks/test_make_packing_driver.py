@@ -90,7 +90,7 @@ def test_the_usual_way_leaves_the_packing_and_nothing_else(tmp_path):
     assert report["reached"] is True
     assert report["u"] == pytest.approx(1e-9, rel=1e-7, abs=0)
     assert stored["protocol"] == "quasistatic"
-    assert not {"kappa", "protocol"} & stored.keys()
+    assert not {"kappa", "way"} & stored.keys()
     for path in (out, tmp_path / "none.h5"):
         refused = run(*USUAL, "--kappa", "1e-5", "--out", path)
         assert refused.returncode == 1

@@ -115,7 +115,7 @@ def check_python(place, words):
     if words[0] == "-m" and words[1] == "venv":
         make_programs(place / words[2] / "bin")
     elif words[0] == "-m":
-        assert words[1] in {"pip", "jamshape"}
+        assert words[1] in {"pip", "jamshape", "pytest"}
         CHECKS.get(words[1], lambda _, rest: check_jamshape(rest))(place, words[2:])
     elif not words[0].startswith("tests/"):  # those set up machines
         check_script(tuple(words))

@@ -233,13 +233,7 @@ def slow_compress(
     for _, rate in protocol.rates:
         require_stated(kappa=rate)
     at = place(file, "slow.h5")
-    if start is None:
-        phi_start = _PHI_SLOW_USUAL[0] if phi_start is None else phi_start
-        require_in("phi_start", phi_start, _PHI_SLOW)
-        require_rising(phi_start, phi_end)
-    asked = Asked(n, None if start is not None else phi_start, seed)
-    of = Start.of(particles, asked, start, usual_phi=_PHI_SLOW_USUAL[0])
-    _require_own(of.known, phi_start)
+    of = _start_of(particles, start, phi=(phi_start, phi_end), n=n, seed=seed)
     if at.path.exists() and not again:
         slow_recording.require_same(at.path, protocol, of.made_from)
     else:
@@ -250,11 +244,28 @@ def slow_compress(
     return RunFile(*at)
 
 
-def _require_own(start: Packing | None, phi: float | None) -> None:
-    """Refuse a packing fraction that differs from that of a start."""
-    if start and phi is not None and not math.isclose(phi, start.phi, rel_tol=_SAME):
-        said = f"{{phi_start}} differs from that of the start, {start.phi:.6g}, expected no value beside a start; leave it out"
-        raise ArgumentError(said, {"phi_start": phi})
+def _start_of(
+    particles: Particles | None,
+    start: Packing | str | Path | None,
+    phi: tuple[float | None, float],
+    **sizes: int | None,
+) -> Start:
+    """Return the start of a slow compression; refuse a packing fraction that differs from that of a given one."""
+    phi_start, phi_end = phi
+    if start is None:
+        phi_start = _PHI_SLOW_USUAL[0] if phi_start is None else phi_start
+        require_in("phi_start", phi_start, _PHI_SLOW)
+        require_rising(phi_start, phi_end)
+        return Start.of(particles, Asked(phi=phi_start, **sizes), None, usual_phi=phi_start)
+    of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=_PHI_SLOW_USUAL[0])
+    if (
+        of.known
+        and phi_start is not None
+        and not math.isclose(phi_start, of.known.phi, rel_tol=_SAME)
+    ):
+        said = f"{{phi_start}} differs from that of the start, {of.known.phi:.6g}, expected no value beside a start; leave it out"
+        raise ArgumentError(said, {"phi_start": phi_start})
+    return of
 
 
 def _require_end_ahead(first: Packing, protocol: Protocol) -> None:

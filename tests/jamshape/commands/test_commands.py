@@ -11,7 +11,7 @@ from lammps_runs import QUIET, bare_environment, start_lmp
 
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.files.lammps_text import read_data
-from jamshape.lammps.plugin import PluginError, built_for, load_script_path, plugin_path
+from jamshape.lammps.plugin import PluginError, built_for, loader_lines, plugin_path
 from jamshape.vibration.table import read_modes
 
 pytestmark = pytest.mark.lammps
@@ -141,7 +141,7 @@ def test_plugin_says_where_it_is_and_how_a_deck_loads_it(jamshape):
     assert f"built for:  LAMMPS {version}" in ended.out
     # The tests run in the LAMMPS that it was built for.
     assert report["module"] == version
-    assert f'\n    include "{load_script_path()}"\n' in ended.out
+    assert "".join(f"    {line}\n" for line in loader_lines()) in ended.out
 
 
 def test_plugin_path_is_the_path_alone(jamshape):

@@ -27,7 +27,7 @@ def info(jamshape, path, *more):
 @pytest.mark.parametrize(
     ("name", "rate", "made"),
     [
-        ("packing.h5", (), "seed 1, u0 1e-06, phi from 0.55"),
+        ("packing.h5", (), "seed 1, u0 1e-06, protocol quasistatic, phi from 0.55"),
         ("dynamics.h5", ("kappa",), "seed 1, kappa 1e-05, u0 1e-06, phi from 0.55"),
     ],
 )
@@ -196,7 +196,10 @@ def test_gsd(jamshape, tiny, tmp_path):
         (b"", "is empty, expected"),
         (b"notes\n", "has no known format, expected"),
         (bytes(range(256)), "has no known format, expected"),
-        (gzip.compress(b"notes", mtime=0), "is compressed, expected the file itself; unpack it with gunzip"),
+        (
+            gzip.compress(b"notes", mtime=0),
+            "is compressed, expected the file itself; unpack it with gunzip",
+        ),
     ],
 )
 def test_what_is_none_of_ours_is_one_sentence(jamshape, tmp_path, content, sentence):

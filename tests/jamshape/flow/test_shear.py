@@ -58,7 +58,7 @@ def test_a_lonely_rod_turns_as_the_closed_form_says(tmp_path):
     root = np.sqrt(1 - c**2)
     period = 2 * np.pi / root
     run = js.shear(rod, n=1, phi=1e-3, gdot=1e-2, strain=4 * period, rows=4000, file=tmp_path / "b.h5",
-                   tolerance=1e-8, progress=False)  # fmt: skip
+                   integration_tolerance=1e-8, progress=False)  # fmt: skip
     found = run.steady(after=0.0)
     assert found["rotation"].value == pytest.approx(root / 2, rel=1e-6)
     # S_2 of one rod is 1 at every moment; that of the mean tensor is the one of the closed form.

@@ -115,4 +115,4 @@ def test_strict_packings_and_searches_as_published_have_none():
     assert recipe().is_searched
     published = recipe_for(bidisperse(4.0), n=16, protocol="marschall-2018", search="bisection")
     assert not published.is_searched
-    assert not recipe_for(bidisperse(4.0), n=16, way="steps").is_searched
+    assert not recipe_for(bidisperse(4.0), n=16, protocol="steps").is_searched
