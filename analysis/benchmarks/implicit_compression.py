@@ -69,7 +69,7 @@ def start_of(options: Namespace) -> Packing:
         n=options.n,
         phi=(phi - 0.05, phi),
         kappa=RATE_BEFORE,
-        tolerance=TOLERANCE_BEFORE,
+        integration_tolerance=TOLERANCE_BEFORE,
         seed=options.seed,
         file=options.out / name,
     )

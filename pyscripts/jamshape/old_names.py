@@ -45,7 +45,7 @@ def accepts_old(**names: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
                     raise ValueError(msg)
                 _warn(f"{old} is called {new} now; the old name goes with the next release")
                 given[new] = given.pop(old)
-            return function(*args, **{k: current(k, v) for k, v in given.items()})  # type: ignore[arg-type]
+            return function(*args, **{k: current(k, v) for k, v in given.items()})
 
         return call
 

@@ -23,7 +23,7 @@ def add_recipe_options(parser: ArgumentParser) -> None:
     group.add_argument(
         "--dimension", type=int, choices=(2, 3), help="2 or 3 (that of the shape's paper)"
     )
-    kinds = {"type": read_protocol, "choices": tuple(PROTOCOLS)}
+    kinds: dict[str, Any] = {"type": read_protocol, "choices": tuple(PROTOCOLS)}
     how = "route to jamming, or as published; 1 and 2 are short for the last two (quasistatic)"
     group.add_argument("--protocol", **kinds, help=how)
     add_old_option(parser, "--way", "--protocol", **kinds)
