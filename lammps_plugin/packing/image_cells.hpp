@@ -43,21 +43,30 @@ template <int D> class ImageCells {
   }
 
   /// Whether `test(label, x - y)` holds for any image y of a point whose sphere meets one of this
-  /// radius about x, of the points added after the first `but`. The cell of x comes first: most
-  /// hits are there.
+  /// radius about x, of the points added after the first `but`: of those in the cell of x, where
+  /// most hits are, and of those in the cells around it.
   template <class Test>
-  bool any_near(const Vec<D> &x, double radius, std::size_t but, const Test &test) const
+  bool any_here(const Vec<D> &x, double radius, std::size_t but, const Test &test) const
+  {
+    return any_of_cell(cell_of(x), Vec<D>{}, {x, radius, but}, test);
+  }
+  template <class Test>
+  bool any_around(const Vec<D> &x, double radius, std::size_t but, const Test &test) const
   {
     const Sphere about{x, radius, but};
-    return any_of_cell(cell_of(x), Vec<D>{}, about, test) ||
-           any_in(0, 0, Vec<D>{}, false, about, test);
+    return any_in(0, 0, Vec<D>{}, false, x, [&](std::size_t cell, const Vec<D> &image) {
+      return any_of_cell(cell, image, about, test);
+    });
   }
 
-  /// Prefetches the memory that `any_near` reads first.
-  void fetch(const Vec<D> &x) const
+  /// Prefetches the memory that `any_here`, and that which `any_around` reads first.
+  void fetch_here(const Vec<D> &x) const { fetch(cell_of(x), sizeof(Part)); }
+  void fetch_around(const Vec<D> &x) const
   {
-    const char *const from = reinterpret_cast<const char *>(&parts[cell_of(x)]);
-    for (std::size_t byte = 0; byte < sizeof(Part); byte += 64) __builtin_prefetch(from + byte);
+    any_in(0, 0, Vec<D>{}, false, x, [&](std::size_t cell, const Vec<D> &) {
+      fetch(cell, 2 * LINE);
+      return false;
+    });
   }
 
   /// Whether `test(shift)` holds for any sum of edges shorter than a length, each pair of opposite
@@ -69,7 +78,7 @@ template <int D> class ImageCells {
 
  private:
   static constexpr std::size_t NONE = static_cast<std::size_t>(-1);
-  static constexpr std::size_t PER_PART = 4;
+  static constexpr std::size_t PER_PART = 4, LINE = 64;  // bytes of a cache line
   struct Point {
     Vec<D> x;
     double radius;
@@ -82,7 +91,7 @@ template <int D> class ImageCells {
   };
   /// Points of a cell, contiguous in memory: fetching them dominates the time in a large box. The
   /// first shares a cache line with the numbers.
-  struct alignas(64) Part {
+  struct alignas(LINE) Part {
     std::size_t n = 0, more = NONE;
     std::array<Point, PER_PART> points;
   };
@@ -105,18 +114,24 @@ template <int D> class ImageCells {
     return cell;
   }
 
-  /// Searches the cells around that of x, but not that one.
-  template <class Test>
-  bool any_in(int k, std::size_t cell, Vec<D> image, bool is_other, const Sphere &about,
-              const Test &test) const
+  void fetch(std::size_t cell, std::size_t size) const
   {
-    if (k == D) return is_other && any_of_cell(cell, image, about, test);
-    const long centre = static_cast<long>(cell_along(k, about.x[k]));
+    const char *const from = reinterpret_cast<const char *>(&parts[cell]);
+    for (std::size_t byte = 0; byte < size; byte += LINE) __builtin_prefetch(from + byte);
+  }
+
+  /// Whether `visit(cell, image)` holds for any of the cells around that of x.
+  template <class Visit>
+  bool any_in(int k, std::size_t cell, Vec<D> image, bool is_other, const Vec<D> &x,
+              const Visit &visit) const
+  {
+    if (k == D) return is_other && visit(cell, image);
+    const long centre = static_cast<long>(cell_along(k, x[k]));
     for (long c = centre - around[k]; c <= centre + around[k]; ++c) {
       const long turns = c >= 0 ? c / count[k] : -((count[k] - 1 - c) / count[k]);
       image[k] = static_cast<double>(turns);
       const auto own = static_cast<std::size_t>(c - turns * count[k]);
-      if (any_in(k + 1, cell * count[k] + own, image, is_other || c != centre, about, test))
+      if (any_in(k + 1, cell * count[k] + own, image, is_other || c != centre, x, visit))
         return true;
     }
     return false;

@@ -7,6 +7,7 @@
 #include "packing/orientation.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
@@ -143,14 +144,26 @@ template <class Model, int D> class RandomInsertion {
       for (int k = 0; k < D; ++k) x[k] = edges[k] * at[D * t + k];
       return x;
     };
-    for (std::size_t t = 0; t < n_trials; ++t) {
-      placed.fetch(trial(std::min(t + AHEAD, n_trials - 1)));
-      const std::size_t rank = t % competing, i = waiting[n_done + rank];
-      if (found[rank]) continue;
-      const Vec<D> x = trial(t);
-      if (meets(i, x, 0)) continue;
-      centre[i] = x;
-      found[rank] = 1;
+    for (std::size_t begin = 0; begin < n_trials; begin += AHEAD) {
+      const std::size_t end = std::min(begin + AHEAD, n_trials);
+      for (std::size_t t = end; t < std::min(end + AHEAD, n_trials); ++t)
+        placed.fetch_here(trial(t));
+      std::array<std::size_t, AHEAD> left;  // those that the cells around must decide
+      std::size_t n_left = 0;
+      for (std::size_t t = begin; t < end; ++t) {
+        const Vec<D> x = trial(t);
+        const std::size_t i = waiting[n_done + t % competing];
+        if (found[t % competing] || placed.any_here(x, radius[i], 0, with(i))) continue;
+        placed.fetch_around(x);
+        left[n_left++] = t;
+      }
+      for (std::size_t k = 0; k < n_left; ++k) {
+        const std::size_t rank = left[k] % competing, i = waiting[n_done + rank];
+        const Vec<D> x = trial(left[k]);
+        if (found[rank] || placed.any_around(x, radius[i], 0, with(i))) continue;
+        centre[i] = x;
+        found[rank] = 1;
+      }
     }
     return keep(found);
   }
@@ -161,7 +174,8 @@ template <class Model, int D> class RandomInsertion {
     const std::size_t first_new = placed.size();
     for (std::size_t rank = 0; rank < found.size(); ++rank) {
       const std::size_t i = waiting[n_done + rank];
-      found[rank] = found[rank] && !meets(i, centre[i], first_new);
+      found[rank] = found[rank] && !placed.any_here(centre[i], radius[i], first_new, with(i)) &&
+                    !placed.any_around(centre[i], radius[i], first_new, with(i));
       if (found[rank]) placed.add(i, centre[i], radius[i]);
     }
     std::size_t to = n_done + found.size();  // the others of the batch move up to the waiting ones
@@ -172,12 +186,10 @@ template <class Model, int D> class RandomInsertion {
     return placed.size() - first_new;
   }
 
-  /// Whether particle i, at x, overlaps any placed particle except the first `but`.
-  bool meets(std::size_t i, const Vec<D> &x, std::size_t but) const
+  /// Test of particle i with others.
+  auto with(std::size_t i) const
   {
-    return placed.any_near(x, radius[i], but, [&](std::size_t j, const Vec<D> &apart) {
-      return overlap(i, j, apart);
-    });
+    return [this, i](std::size_t j, const Vec<D> &apart) { return overlap(i, j, apart); };
   }
 
   bool overlap(std::size_t i, std::size_t j, const Vec<D> &apart) const
