@@ -2,7 +2,7 @@
 
 from math import exp, pi
 
-from feature import CROWD, DISC, Feature
+from feature import CROWD, DISC, LOAD, Feature
 
 FIX = "fix f all overdamped/affine drag 1.0 compress 1e-2"
 FLOW = f"{FIX}\ntimestep 0.1"
@@ -170,7 +170,7 @@ _STATES = (
         for more in ("", " pre no")
     ),
     Feature("`write_restart`, `read_restart remap`: strain",
-            f"{FLOW}\nrun 25\nwrite_restart r.rst\nclear\natom_style ellipsoid\njamshape styles\n"
+            f"{FLOW}\nrun 25\nwrite_restart r.rst\nclear\n{LOAD}\natom_style ellipsoid\n"
             f"read_restart r.rst remap\npair_style spherocylinder/harmonic sides two\n{FIX}\nrun 25",
             "f_f[2]", 0.05),
     Feature("`f_f[5]` before a run", FLOW, "f_f[5] != f_f[5]", 1),

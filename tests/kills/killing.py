@@ -79,7 +79,7 @@ def ended(process, after=_SECONDS):
     """Wait until a process has ended and return its exit code, or kill it after some seconds."""
     process.join(after)
     if process.exitcode is None:
-        os.kill(process.pid, signal.SIGKILL)
+        process.kill()  # also of one that has just ended
         process.join(_SECONDS)
     return process.exitcode
 
