@@ -157,6 +157,7 @@ def reproduce(tmp_path):
     scripts = ("workflow.smk", "agreement.py", "sample_tables.py")
     for name in (*scripts, "yuan_2019/scales.toml", "yuan_2019/paper.csv"):
         (tmp_path / "analysis" / name).write_bytes((ANALYSIS / name).read_bytes())
+    (tmp_path / "analysis" / "common").symlink_to(ANALYSIS / "common")
     runner = (
         "import sys; from jamshape.commands import main, reproduce\n"
         f"reproduce.workflow_of = lambda paper: reproduce.Path({str(folder / 'reproduce.smk')!r})\n"
