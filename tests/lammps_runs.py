@@ -46,6 +46,12 @@ ENVIRONMENT = {
 
 # --- input ---------------------------------------------------------------------------------------
 
+# Columns of compute contact/local: those of every bond, then the lever arm from the particle itag.
+BONDS = [
+    "itag", "jtag", "kind", "bond", "dist", "sumrad", "overlap", "fx", "fy", "fz", "nx", "ny", "nz",
+    "cx", "cy", "cz", "energy", "sidei", "sidej", "stiffness", "rx", "ry", "rz",
+]  # fmt: skip
+
 
 def before_box(dimension, newton="on", extra=""):
     return f"""

@@ -20,6 +20,8 @@ VALUES = {
 }
 """New values by name and old value."""
 
+_SAID = "{} is called {} now; the old name goes with the next release"
+
 
 def accepts_old(**names: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
     """Let a function accept old names of arguments, given as ``old="new"``, and old values of all arguments.
@@ -43,9 +45,11 @@ def accepts_old(**names: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
                 if given.get(new) is not None:
                     msg = f"{old} is an old name of {new}, which is given as well; leave {old} out"
                     raise ValueError(msg)
-                _warn(f"{old} is called {new} now; the old name goes with the next release")
+                _warn(old, new, stacklevel=3)
                 given[new] = given.pop(old)
-            return function(*args, **{k: current(k, v) for k, v in given.items()})
+            for name in VALUES.keys() & given.keys():
+                given[name] = current(name, given[name])
+            return function(*args, **given)
 
         return call
 
@@ -57,7 +61,7 @@ def current(name: str, value: Any) -> Any:
     new = VALUES.get(name, {}).get(value) if isinstance(value, str) else None
     if new is None:
         return value
-    _warn(f"{name} {value!r} is called {new!r} now; the old name goes with the next release")
+    _warn(f"{name} {value!r}", repr(new), stacklevel=4)
     return new
 
 
@@ -95,12 +99,11 @@ def add_old_option(parser: ArgumentParser, old: str, new: str, **keywords: Any) 
 
 class _OldOption(Action):
     def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
-        said = (
-            f"{option_string} is called {self.metavar} now; the old name goes with the next release"
+        print(
+            f"{parser.prog}: warning: {_SAID.format(option_string, self.metavar)}", file=sys.stderr
         )
-        print(f"{parser.prog}: warning: {said}", file=sys.stderr)
         setattr(namespace, self.dest, values)
 
 
-def _warn(said: str) -> None:
-    warnings.warn(said, FutureWarning, stacklevel=4)
+def _warn(old: str, new: str, stacklevel: int) -> None:
+    warnings.warn(_SAID.format(old, new), FutureWarning, stacklevel=stacklevel)

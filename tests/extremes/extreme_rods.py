@@ -59,7 +59,7 @@ def all_sizes(dimension, style=RODS):
     return started(radius, radius, 0.45 if dimension == 2 else 0.2, dimension, style)
 
 
-def stack(angle, dimension, n=6):
+def stack(angle, dimension=2, n=6):
     """Nearly parallel rods side by side, some upside down, with their neighbours' images."""
     rng = np.random.default_rng(2)
     height, gap = 3 * n * 0.97, 0.97

@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 import pytest
+from extreme_rods import longer_than_the_box, stack
 from lammps_runs import SIDES, difference_from_library, fix_vector, library_forces, loaded, state_of
 from lammps_scenes import dense, rods, rods_3d, squeezed
 from mixtures import bidisperse
@@ -17,34 +18,6 @@ pytestmark = pytest.mark.lammps
 
 
 # --- scenes --------------------------------------------------------------------------------------
-
-
-def longer_than_the_box(alpha=100.0, angle=1e-12, n=4):
-    """Rods of length 101 d in a box 60 d wide; each lies on its own image and on its neighbours'."""
-    rng = np.random.default_rng(1)
-    gap, width = 0.95, 60.0
-    tilt = np.arcsin(gap / width)
-    height = 2 * gap * n / np.cos(tilt)
-    position = np.column_stack([rng.uniform(-2, 2, n), height * (np.arange(n) / n - 0.45)])
-    position[:, 1] += np.tan(tilt) * position[:, 0]
-    angles = tilt + angle * rng.uniform(-1, 1, n)
-    return rods(position, angles, alpha / 2, 0.5, [width, height])
-
-
-def stack(angle, dimension=2, n=6):
-    """Nearly parallel rods side by side, with all their neighbours' images."""
-    rng = np.random.default_rng(2)
-    height, gap = 3 * n * 0.97, 0.97
-    y = gap * np.arange(n) - height / 2 + 1.0
-    x = rng.uniform(-1, 1, n)
-    turn = angle * rng.uniform(0.5, 1, n) * (-1) ** np.arange(n)
-    if dimension == 2:
-        head = np.pi * (np.arange(n) % 3 == 0)  # some upside down
-        return rods(np.column_stack([x, y]), turn + head, 2.0, 0.5, [12.0, height])
-    axis = rng.normal(size=(n, 3))
-    q = np.column_stack([np.ones(n), axis * turn[:, None] / 2])
-    position = np.column_stack([x, y, 0.01 * rng.uniform(-1, 1, n)])
-    return rods_3d(position, q, 2.0, 0.5, [12.0, height, 12.0])
 
 
 def unequal(dimension, phi):

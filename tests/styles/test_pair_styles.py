@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from every_shape import MIXTURES, TYPICAL, size_of
 from lammps_runs import (
+    BONDS,
     difference_from,
     dump,
     load_plugin,
@@ -38,31 +39,6 @@ pytestmark = pytest.mark.lammps
 K_E = 1.7
 NAMES = {1: "one", 2: "two"}
 THERMO = ["pe", "press", "pxx", "pyy", "pxy", *(f"c_packing[{k}]" for k in range(1, 23))]
-BONDS = [
-    "itag",
-    "jtag",
-    "kind",
-    "bond",
-    "dist",
-    "sumrad",
-    "overlap",
-    "fx",
-    "fy",
-    "fz",
-    "nx",
-    "ny",
-    "nz",
-    "cx",
-    "cy",
-    "cz",
-    "energy",
-    "sidei",
-    "sidej",
-    "stiffness",
-    "rx",
-    "ry",
-    "rz",
-]
 
 
 class Case(NamedTuple):

@@ -15,8 +15,11 @@ from jamshape.protocols.defaults import PROTOCOLS
 def test_old_names_of_arguments_and_values_warn_and_work(tmp_path):
     rods = js.Spherocylinders(alpha=1)
     file, few = tmp_path / "packing.h5", {"n": 8, "u0": 1e-6, "progress": False}
-    with pytest.warns(FutureWarning, match="^way is called protocol now; the old name goes"):
+    with pytest.warns(
+        FutureWarning, match="^way is called protocol now; the old name goes"
+    ) as said:
         js.make_packing(rods, way="steps", file=file, **few)
+    assert [one.filename for one in said] == [__file__]  # it points at the caller
     assert js.make_packing(rods, protocol="steps", file=file, **few).n == 8
     with (
         pytest.warns(FutureWarning),
