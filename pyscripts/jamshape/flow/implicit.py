@@ -298,19 +298,9 @@ def follow(landscape: Landscape, flow: Flow, how: Course) -> Iterator[Step]:
     Step
         After each accepted step.
     """
-    run = _Run(landscape, flow, how)
+    run = ImplicitFlow(landscape, flow, how)
     while not how.is_over(flow, run.phi):
-        began, evaluations = time.perf_counter(), landscape.evaluations
-        found, error, dt = run.step()
-        flow.wall_seconds += time.perf_counter() - began
-        flow.evaluations += landscape.evaluations - evaluations
-        flow.steps += 1
-        volume = flow.state.volume
-        pressure = -found.strain_gradient / (2 * volume)
-        yield Step(
-            flow.steps, flow.time, flow.strain, run.phi, pressure, found.energy / volume, dt, error,
-            flow.evaluations, flow.factorisations, flow.rejected, flow.explicit, flow.wall_seconds,
-        )  # fmt: skip
+        yield run.advance()
 
 
 class Course(Proto):
@@ -387,8 +377,8 @@ class _Attempt(NamedTuple):
     evaluation: Evaluation
 
 
-class _Run:
-    """A flow on its landscape."""
+class ImplicitFlow:
+    """A flow on its landscape; parameters and errors as `follow`."""
 
     def __init__(self, landscape: Landscape, flow: Flow, protocol: Course) -> None:
         self.landscape, self.flow, self.protocol = landscape, flow, protocol
@@ -408,7 +398,22 @@ class _Run:
     def phi(self) -> float:
         return self.area / self.flow.state.volume
 
-    def step(self) -> tuple[Evaluation, float, float]:
+    def advance(self) -> Step:
+        """Take a step and count it."""
+        flow, landscape = self.flow, self.landscape
+        began, evaluations = time.perf_counter(), landscape.evaluations
+        found, error, dt = self._step()
+        flow.wall_seconds += time.perf_counter() - began
+        flow.evaluations += landscape.evaluations - evaluations
+        flow.steps += 1
+        volume = flow.state.volume
+        pressure = -found.strain_gradient / (2 * volume)
+        return Step(
+            flow.steps, flow.time, flow.strain, self.phi, pressure, found.energy / volume, dt, error,
+            flow.evaluations, flow.factorisations, flow.rejected, flow.explicit, flow.wall_seconds,
+        )  # fmt: skip
+
+    def _step(self) -> tuple[Evaluation, float, float]:
         """Take a step; return the evaluation at its end, its error and size."""
         flow = self.flow
         if flow._is_fresh:
@@ -654,7 +659,7 @@ class _Path:
     Velocities and displacements due to forces refer to the box at their stage; the host transports them to others.
     """
 
-    def __init__(self, run: _Run, times: list[float]) -> None:
+    def __init__(self, run: ImplicitFlow, times: list[float]) -> None:
         self.run, self.times = run, times
         self.velocities: list[FloatArray] = []
         self._turned = run.no_turns

@@ -184,20 +184,25 @@ def shear(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Iterator
         If spines cross in a step, which is then too long.
     """
     while run.steps < how.steps:
-        began, evaluations = time.perf_counter(), landscape.evaluations
-        strain = 0.0 if run.steps < 0 else _strain_of(how, run.steps)
-        state = run.state.deformed(how.gradient(run.state.dimension, strain))
-        # The continuation depends on the state alone, also after reading it from a file.
-        landscape.forget_pairs()
-        found = _minimum(landscape, state.with_least_tilt(), how)
-        run.state = found.state
-        run.steps += 1
-        row = _row(landscape, found, run, how)
-        run.evaluations += landscape.evaluations - evaluations
-        run.wall_seconds += time.perf_counter() - began
-        run.u, run.stress, run.pressure = row.u, row.stress, row.pressure
-        run.volume = found.state.volume
-        yield row._replace(evaluations=run.evaluations, wall_seconds=run.wall_seconds)
+        yield advance(landscape, run, how)
+
+
+def advance(landscape: Landscape, run: Sheared, how: QuasistaticShear) -> Row:
+    """Minimise the start, or shear by one step and minimise; parameters and errors as `shear`."""
+    began, evaluations = time.perf_counter(), landscape.evaluations
+    strain = 0.0 if run.steps < 0 else _strain_of(how, run.steps)
+    state = run.state.deformed(how.gradient(run.state.dimension, strain))
+    # The continuation depends on the state alone, also after reading it from a file.
+    landscape.forget_pairs()
+    found = _minimum(landscape, state.with_least_tilt(), how)
+    run.state = found.state
+    run.steps += 1
+    row = _row(landscape, found, run, how)
+    run.evaluations += landscape.evaluations - evaluations
+    run.wall_seconds += time.perf_counter() - began
+    run.u, run.stress, run.pressure = row.u, row.stress, row.pressure
+    run.volume = found.state.volume
+    return row._replace(evaluations=run.evaluations, wall_seconds=run.wall_seconds)
 
 
 def _strain_of(how: QuasistaticShear, done: int) -> float:

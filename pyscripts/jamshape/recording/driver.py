@@ -1,0 +1,99 @@
+"""What a long calculation offers, so that it can be recorded, stopped, and taken up again.
+
+A driver advances by steps or by bounded pieces of work. At its *marks*, which its settings fix, it drops caches, pair
+lists, extrapolations and the order of atoms, whether or not a checkpoint is written there: what is computed does not
+depend on what is written, and the continuation from a checkpoint is the same to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from numpy.typing import ArrayLike
+
+from jamshape.packing import Packing
+
+Checkpoint = dict[str, Any]
+"""Numbers, texts, bytes, arrays, `State`s and dictionaries of these, by name; None is left out."""
+
+
+class Told(NamedTuple):
+    """Progress of a run."""
+
+    phase: str
+    """Name, such as ``compression``."""
+    text: str
+    """Current state."""
+    part: float | None = None
+    """Completed fraction of the phase, from 0 to 1; None if unknown."""
+    aside: str | None = None
+    """Note to print once."""
+
+
+class Row(NamedTuple):
+    """What one advance of a driver records."""
+
+    told: Told
+    step: int = 0
+    time: float = 0.0
+    observables: Mapping[str, ArrayLike] | None = None
+    """By name; None where there is nothing to record."""
+    wall_seconds: float = 0.0
+    error: float | None = None
+    """Error of the step, for the convergence history; None without one."""
+    has_frame: bool = False
+    """Whether the state is recorded as well."""
+
+
+class Driver(Protocol):
+    """A calculation in progress."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the end is reached."""
+
+    @property
+    def at_mark(self) -> bool:
+        """Whether `checkpoint` may be called now."""
+
+    def first(self) -> Row:
+        """Return what to record of the start, whose state is the first frame."""
+
+    def advance(self) -> Row:
+        """Do one step, or a bounded piece of work."""
+
+    def frame(self) -> Packing:
+        """Return the present state, with its step and time."""
+
+    def checkpoint(self) -> Checkpoint:
+        """Return all that is needed to go on from here."""
+
+    def results(self) -> Mapping[str, Any]:
+        """Return attributes for the file: counts so far, and at the end what was found."""
+
+    def close(self) -> None:
+        """Free what the driver holds outside of Python."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be recorded.
+
+    Parameters
+    ----------
+    what
+        Name in messages, with its article, such as ``a compression``.
+    settings
+        Attributes that identify it: a file with others is refused.
+    begin
+        Makes the driver at its start.
+    restore
+        Makes the driver from the particles of the file, whose first frame they are, and a checkpoint.
+    """
+
+    what: str
+    settings: Mapping[str, Any]
+    begin: Callable[[], Driver]
+    restore: Callable[[Packing, Checkpoint], Driver]

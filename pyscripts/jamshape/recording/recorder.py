@@ -1,0 +1,165 @@
+"""The recorder: writes rows, frames and checkpoints of any driver, and takes up any interrupted run.
+
+While a run goes on, nothing else touches its file. The file is locked before it is read, and replaced as a whole at
+checkpoints, whose distance follows their cost, so that they take less than a fiftieth of the run. A killed run
+computes again what came after its last checkpoint, to the same bits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jamshape.files.disk import remove_leftovers
+from jamshape.files.layout import FileFormatError
+from jamshape.files.lock import Lock
+from jamshape.recording.content import Content
+from jamshape.recording.driver import Driver, Plan, Row
+from jamshape.recording.interrupts import Interrupts
+
+PAUSE = 100.0
+"""Time between two checkpoints, over that of writing one."""
+
+SECONDS = 1.0
+"""Least time between two checkpoints, [seconds]."""
+
+
+class TimeLimitReached(RuntimeError):
+    """A run was put down at a checkpoint, since its time was up; the same call goes on."""
+
+
+class How(NamedTuple):
+    """Arguments of recording that every run has."""
+
+    again: bool = False
+    """Begin anew, whatever the file holds."""
+    seconds: float | None = None
+    """Time after which the run is put down at the next mark, [seconds]."""
+    tell: Callable[[Row], None] = lambda row: None
+    """Receives every row, for the display of progress."""
+
+
+_USUAL = How()
+
+
+def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
+    """Record a run to its end, or go on with it; a finished one is left alone.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    plan : Plan
+    how : How
+
+    Raises
+    ------
+    ValueError
+        If the file holds another run.
+    TimeLimitReached
+        If `how.seconds` are over before the end; the file holds all that is needed to go on.
+    FileFormatError
+        If the file cannot be read as a run.
+    OSError
+        If another process writes the file, or it cannot be written.
+    """
+    with Lock(path):
+        remove_leftovers(path)
+        content = None if how.again or not path.exists() else Content.read(path)
+        if content:
+            require_same(content, plan)
+            if content.attributes["finished"]:
+                return
+        with Interrupts() as interrupts:
+            run = _begun(path, plan) if content is None else _resumed(content, plan)
+            with closing(run.driver):
+                _follow(run, interrupts, how)
+
+
+class _Run(NamedTuple):
+    content: Content
+    driver: Driver
+
+    def write(self) -> float:
+        """Write a checkpoint; return when the next one is due."""
+        began = perf_counter()
+        self.content.write(self.driver.results(), self.driver.checkpoint())
+        now = perf_counter()
+        return now + max(SECONDS, PAUSE * (now - began))
+
+
+def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
+    """Advance to the end, or to the mark at which the run is put down."""
+    content, driver = run
+    began = perf_counter()
+    end = math.inf if how.seconds is None else began + how.seconds
+    due = began + SECONDS
+    while not driver.done:
+        row = driver.advance()
+        content.add(row, driver.frame() if row.has_frame else None)
+        how.tell(row)
+        if driver.done or not driver.at_mark:
+            continue
+        stops = interrupts.noted is not None or perf_counter() >= end
+        if stops or perf_counter() >= due:
+            due = run.write()
+        if interrupts.noted is not None:
+            return  # raised again outside
+        if stops:
+            raise TimeLimitReached(_stopped(row, perf_counter() - began, content.path))
+    content.write(driver.results(), None)
+
+
+def _stopped(row: Row, seconds: float, path: Path) -> str:
+    return (
+        f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command goes on"
+    )
+
+
+def _begun(path: Path, plan: Plan) -> _Run:
+    """Begin a run."""
+    driver = plan.begin()
+    content = Content(path, [driver.frame()], dict(plan.settings))
+    content.add(driver.first(), None)
+    return _Run(content, driver)
+
+
+def _resumed(content: Content, plan: Plan) -> _Run:
+    """Go on from the checkpoint of a file."""
+    checkpoint, content.checkpoint = content.checkpoint, None
+    if checkpoint is None:
+        msg = (
+            f"{content.path} holds {plan.what} that was interrupted in an earlier version of jamshape, expected one with a"
+            " checkpoint; use again to replace it"
+        )
+        raise FileFormatError(msg)
+    return _Run(content, plan.restore(content.frames[0], checkpoint))
+
+
+def require_same(content: Content, plan: Plan) -> None:
+    """Refuse the file of another run.
+
+    Raises
+    ------
+    ValueError
+    """
+    if "finished" not in content.attributes:
+        msg = f"{content.path} does not hold {plan.what}, expected one; write to another file, or use again to replace it"
+        raise ValueError(msg)
+    for name, value in plan.settings.items():
+        if not _is_same(content.attributes.get(name), value):
+            msg = (
+                f"{content.path} holds {plan.what} with {name} = {content.attributes.get(name)}, expected"
+                f" {value}; write to another file, or use again to replace it"
+            )
+            raise ValueError(msg)
+
+
+def _is_same(stored: Any, value: Any) -> bool:
+    return stored is not None and np.array_equal(stored, value)
