@@ -32,7 +32,8 @@ from typing import IO, Any, NamedTuple
 
 from jamshape.command import parser_of, report
 from jamshape.commands.sweep import cores, python_path
-from jamshape.front.progress import Told, follow
+from jamshape.front.progress import follow
+from jamshape.recording.driver import Told
 
 PAPERS = ("marschall-2018", "yuan-2019")
 SCALES = ("demo", "small", "full")

@@ -31,7 +31,8 @@ from typing import IO, Any, NamedTuple
 from jamshape.command import report
 from jamshape.commands import main as command
 from jamshape.commands import pack
-from jamshape.front.progress import Told, follow
+from jamshape.front.progress import follow
+from jamshape.recording.driver import Told
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import DEFAULT, SHAPES, shape_named
 

@@ -263,6 +263,12 @@ def write_metadata(file: h5py.File) -> None:
     creator.attrs["origin"] = np.bytes_(origin())
 
 
+def put(group: h5py.Group, name: str, array: NDArray[Any]) -> h5py.Dataset:
+    """Write an array."""
+    group[name] = array
+    return group[name]
+
+
 def create_file(
     file: h5py.File,
     packing: Packing,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from jamshape.checks import require_one_of, require_positive
 from jamshape.lammps.module import one_at_a_time
 from jamshape.packing import Packing
+from jamshape.recording.driver import Checkpoint
 from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
@@ -141,10 +141,8 @@ class FlowRun(Generic[_Motion]):
     settings
     start
         Initial state; of an earlier run, any of its states.
-    restart
-        Restart file of an earlier run to resume.
-    time
-        Time of that state; step times time step by default.
+    checkpoint
+        Checkpoint of an earlier run to resume.
 
     Raises
     ------
@@ -157,20 +155,20 @@ class FlowRun(Generic[_Motion]):
         session: Session,
         settings: _Motion,
         start: Packing,
-        restart: str | Path | None = None,
-        time: float | None = None,
+        checkpoint: Checkpoint | None = None,
     ) -> None:
         self.session, self.settings = session, settings
         self._began = perf_counter()
         self._time, self._step_of_time, self._evaluations = 0.0, 0, 0.0
-        if restart is None:
+        if checkpoint is None:
             session.load(start)
         else:
-            session.load_restart(restart, start)
+            self._began -= checkpoint["wall_seconds"]
+            self._time, self._step_of_time = checkpoint["time"], checkpoint["step_of_time"]
+            self._evaluations = checkpoint["evaluations"]
+            session.load_restart(checkpoint["restart"], start)
         self._set_up()
         self.last_step = session.step + settings.steps_left(self.measure(), start.dimension)
-        if time is not None:
-            self._time, self._step_of_time = time, session.step
 
     def _set_up(self) -> None:
         s = self.settings
@@ -205,20 +203,24 @@ class FlowRun(Generic[_Motion]):
             f"unfix flow\n{self._fix()}\ntimestep {self.settings.dt!r}\nrun 0 post no"
         )
 
-    def count_from(self, evaluations: float) -> None:
-        """Continue the count of force evaluations from an earlier process."""
-        self._evaluations = evaluations
-
     @property
     def time(self) -> float:
         """Time since the start, valid after changes of the time step."""
         return self._time + (self.session.step - self._step_of_time) * self.settings.dt
 
-    def write_restart(self, path: Path) -> None:
-        """Write a LAMMPS restart file of the present state; errors as in `Session.write_restart`."""
-        self.session.write_restart(path)
-        # It wraps and reorders atoms, which neighbour lists must follow.
+    def renew(self) -> None:
+        """Wrap and sort atoms and build their neighbour lists anew, as after reading a restart file."""
         self.session.commands("run 0 post no")
+
+    def checkpoint(self) -> Checkpoint:
+        """Return all that is needed to go on; `renew` follows, here and where it is resumed."""
+        return {
+            "restart": self.session.restart(),
+            "time": self._time,
+            "step_of_time": self._step_of_time,
+            "evaluations": self.measure()["evaluations"],
+            "wall_seconds": perf_counter() - self._began,
+        }
 
     def samples(self, every: int) -> Iterator[Row]:
         """Run to the end and yield a row at each multiple of `every` steps, and at the end."""

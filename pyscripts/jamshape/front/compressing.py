@@ -14,17 +14,16 @@ from jamshape.checks import (
     require_in,
     require_no_effect,
     require_one_of,
-    require_path,
     require_rising,
     require_stated,
 )
-from jamshape.flow import recording, slow_recording
+from jamshape.flow import implicit_driver, lammps_driver
 from jamshape.flow.compression import Compression
 from jamshape.flow.implicit import Protocol
-from jamshape.flow.recording import Recording
+from jamshape.flow.lammps_driver import Sizes
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import place
-from jamshape.front.recorded import record_flow, resume
+from jamshape.front.recorded import recorded
 from jamshape.front.run import RunFile
 from jamshape.front.starts import Asked, Start
 from jamshape.old_names import accepts_old
@@ -62,6 +61,7 @@ def compress(
     frames: int = 20,
     file: str | Path | None = None,
     again: bool = False,
+    seconds: float | None = None,
     progress: bool = True,
 ) -> RunFile:
     """Compress particles through jamming in LAMMPS, as Marschall & Teitel 2018, Sec. II.
@@ -96,6 +96,8 @@ def compress(
         with other settings refused. Without a file, the run is deleted together with its result.
     again : bool
         Start over, whatever the file holds.
+    seconds : float, optional
+        Time after which the run is put down at its next checkpoint, before a queue ends it; the same call goes on.
     progress : bool
         Whether to show progress on standard error.
 
@@ -109,6 +111,8 @@ def compress(
         If a number is out of its range or has no effect, or the file holds another run.
     PluginError
         If there is no LAMMPS or no plugin for it.
+    TimeLimitReached
+        If `seconds` are over before the end.
 
     Examples
     --------
@@ -135,15 +139,12 @@ def compress(
         require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
     settings.steps(phi[0], dimension)  # refuses what does not end
     at = place(file, "run.h5")
-    require_path(at.path)
     made_from = dict(particles.told) | {"n": n, "seed": seed}
-    to = Recording(at.path, rows, frames, made_from)
-    if again or not at.path.exists():
-        start = random_packing(n, phi[0], seed, particles, dimension)
-        record_flow(lambda session: recording.begin(session, settings, start, to), to, progress)
-    else:
-        recording.require_same(to, settings, dimension)
-        resume(at.path, progress=progress)
+    plan = lammps_driver.plan(
+        lambda: random_packing(n, phi[0], seed, particles, dimension),
+        settings, Sizes(rows, frames), made_from | {"dimension": dimension},
+    )  # fmt: skip
+    recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
     return RunFile(*at)
 
 
@@ -163,6 +164,7 @@ def slow_compress(
     largest_drop: float = math.inf,
     file: str | Path | None = None,
     again: bool = False,
+    seconds: float | None = None,
     progress: bool = True,
 ) -> RunFile:
     """Compress particles in the plane through jamming at any rate, however slow, with implicit time steps.
@@ -191,7 +193,7 @@ def slow_compress(
         Local error of a step over the typical overlap.
     largest_drop : float
         Fraction of the elastic energy that one step may lose, so that plastic events are resolved in time.
-    file, again, progress
+    file, again, seconds, progress
         See `compress`.
 
     Returns
@@ -234,13 +236,14 @@ def slow_compress(
         require_stated(kappa=rate)
     at = place(file, "slow.h5")
     of = _start_of(particles, start, phi=(phi_start, phi_end), n=n, seed=seed)
-    if at.path.exists() and not again:
-        slow_recording.require_same(at.path, protocol, of.made_from)
-    else:
-        first = of.known or compressed_start(of.random(_PHI_RANDOM), of.phi)
-        _require_end_ahead(first, protocol)
-        slow_recording.begin(at.path, first, protocol, of.made_from)
-    resume(at.path, progress=progress)
+
+    def first() -> Packing:
+        packing = of.known or compressed_start(of.random(_PHI_RANDOM), of.phi)
+        _require_end_ahead(packing, protocol)
+        return packing
+
+    plan = implicit_driver.plan(first, protocol, of.made_from)
+    recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
     return RunFile(*at)
 
 

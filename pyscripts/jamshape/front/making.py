@@ -8,7 +8,8 @@ from jamshape.arguments import checked
 from jamshape.checks import require_path, require_stated
 from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.progress import Told, follow, place
+from jamshape.front.progress import follow, place
+from jamshape.recording.driver import Told
 from jamshape.landscape.threads import sharing
 from jamshape.old_names import accepts_old
 from jamshape.protocols.defaults import recipe_for

@@ -10,10 +10,12 @@ import time
 import warnings
 import weakref
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from jamshape.checks import require_one_process
+from jamshape.recording.driver import Told
 
 _Step = TypeVar("_Step")
 
@@ -23,19 +25,6 @@ _BAR_SECONDS = 1.0  # between two updates of a bar
 # Layout of a bar when the remaining time is known, and when it is not.
 _WITH_REST = "{desc}:{percentage:5.1f} %|{bar}| [{elapsed}, remain {remaining}]{postfix}"
 _WITHOUT_REST = "{desc} [{elapsed}]{postfix}"
-
-
-class Told(NamedTuple):
-    """Progress of a run."""
-
-    phase: str
-    """Name, such as ``compression``."""
-    text: str
-    """Current state."""
-    part: float | None = None
-    """Completed fraction of the phase, from 0 to 1; None if unknown."""
-    aside: str | None = None
-    """Note to print once."""
 
 
 def follow(
@@ -56,15 +45,42 @@ def follow(
     begun : float
         Fraction of the first phase that was completed before.
     """
-    line = (_Bar if _is_looked_at() else _Log)(begun) if shown else None
-    try:
+    with display(shown=shown, begun=begun) as tell:
         for step in steps:
-            at = told(step)
-            if line:
-                line.say(at)
+            tell(told(step))
+
+
+@contextmanager
+def display(*, shown: bool = True, begun: float | None = None) -> Iterator[Callable[[Told], None]]:
+    """Yield a function that shows progress, as in `follow`.
+
+    Parameters
+    ----------
+    shown : bool
+        Whether to show anything.
+    begun : float, optional
+        Fraction of the first phase that was completed before; by default that of the first progress shown.
+    """
+    line: _Bar | _Log | None = None
+
+    def tell(at: Told) -> None:
+        nonlocal line, shown
+        if not shown:
+            return
+        try:
+            if line is None:
+                part = at.part if begun is None else begun
+                line = (_Bar if _is_looked_at() else _Log)(part or 0.0)
+            line.say(at)
+        except (OSError, ValueError):  # a standard error that is closed or full ends no run
+            shown, line = False, None
+
+    try:
+        yield tell
     finally:
         if line:
-            line.end()
+            with suppress(OSError, ValueError):
+                line.end()
 
 
 def _is_looked_at() -> bool:

@@ -25,13 +25,15 @@ from jamshape.files.h5md import (
     read_report,
     read_style,
 )
-from jamshape.files.run_writer import RunWriter
+from jamshape.files.lock import Lock
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.progress import Told, follow, place
+from jamshape.front.progress import follow, place
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.steady import SteadyState, steady_state
+from jamshape.recording.content import set_attributes
+from jamshape.recording.driver import Told
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -223,8 +225,8 @@ class RunFile(Recorded):
         follow(frames, told, shown=progress)
         found = Jamming.of(tried)
         if self.about.get("finished"):
-            with suppress(OSError), RunWriter.open(self.file) as file:  # or it may only be read
-                file.set_attributes(found.attributes())
+            with suppress(OSError), Lock(self.file):  # or it may only be read
+                set_attributes(self.file, found.attributes())
             self.__dict__.pop("about", None)
         return found
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
-from typing import NamedTuple
 
 from jamshape.arguments import checked
-from jamshape.checks import require_given, require_no_effect, require_path, require_stated
-from jamshape.flow import quasistatic_recording, recording, slow_recording
+from jamshape.checks import require_given, require_no_effect, require_stated
+from jamshape.flow import implicit_driver, lammps_driver, quasistatic_driver
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.quasistatic import QuasistaticShear
-from jamshape.flow.recording import Recording
+from jamshape.flow.lammps_driver import Sizes
 from jamshape.flow.shear import Shear
 from jamshape.flow.slow_shear import SlowShear
 from jamshape.front.progress import place
-from jamshape.front.recorded import record_flow, resume
+from jamshape.front.recorded import recorded
 from jamshape.front.run import QuasistaticShearFile, ShearFile
 from jamshape.front.starts import Asked, Start
 from jamshape.landscape import Landscape, State
@@ -56,6 +54,7 @@ def shear(
     frames: int | None = None,
     file: str | Path | None = None,
     again: bool = False,
+    seconds: float | None = None,
     progress: bool = True,
 ) -> ShearFile:
     """Shear particles at a constant rate and packing fraction, as in Marschall, Keta, Olsson & Teitel 2019.
@@ -96,10 +95,8 @@ def shear(
         Number of snapshots to keep; 20 by default. Implicit runs keep one of every 100 steps.
     file : path, optional
         H5MD file of the run, as in `compress`.
-    again : bool
-        Start over, whatever the file holds.
-    progress : bool
-        Whether to show progress on standard error.
+    again, seconds, progress
+        See `compress`.
 
     Returns
     -------
@@ -138,8 +135,9 @@ def shear(
         longest = min(SlowShear.largest_strain, strain / rows)
         error = integration_tolerance or _IMPLICIT_ERROR
         slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
-        _shear_slowly(slow, of, at.path, again=again, sides=sides)
-        resume(at.path, progress=progress)
+        _require_plane(of, sides)
+        plan = implicit_driver.plan(lambda: _flowing(of), slow, of.made_from)
+        recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
         return ShearFile(*at)
     settings = Shear(
         gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
@@ -151,8 +149,10 @@ def shear(
         settings = settings.in_steps(rows)
     else:
         require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
-    to = Recording(at.path, rows, _FRAMES if frames is None else frames, of.made_from)
-    _shear_in_lammps(settings, of, to, _How(again, progress))
+    sizes = Sizes(rows, _FRAMES if frames is None else frames)
+    made_from = of.made_from | {"dimension": of.dimension}
+    plan = lammps_driver.plan(lambda: _flowing(of), settings, sizes, made_from)
+    recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
     return ShearFile(*at)
 
 
@@ -173,6 +173,7 @@ def quasistatic_shear(
     frames: int = 20,
     file: str | Path | None = None,
     again: bool = False,
+    seconds: float | None = None,
     progress: bool = True,
 ) -> QuasistaticShearFile:
     """Shear particles in small strain steps, each followed by minimisation (AQS); needs no LAMMPS.
@@ -200,7 +201,7 @@ def quasistatic_shear(
         Initial packing, at its own packing fraction; the last frame of a file.
     frames : int
         Approximate number of snapshots to keep.
-    file, again, progress
+    file, again, seconds, progress
         See `compress`.
 
     Returns
@@ -235,19 +236,9 @@ def quasistatic_shear(
     of = Start.of(particles, asked, start, usual_phi=0.9, phi_name=_PHI_NAME)
     how = QuasistaticShear(step, strain, flow, pressure, tolerance)
     at = place(file, "aqs.h5")
-    require_path(at.path)
-    made_from = of.made_from | {"frames": frames}
-    if again or not at.path.exists():
-        quasistatic_recording.begin(at.path, _still(of), how, made_from)
-    else:
-        quasistatic_recording.require_same(at.path, how, made_from)
-    resume(at.path, progress=progress)
+    plan = quasistatic_driver.plan(lambda: _still(of), how, frames, of.made_from)
+    recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
     return QuasistaticShearFile(*at)
-
-
-class _How(NamedTuple):
-    again: bool
-    progress: bool
 
 
 def _flowing(of: Start) -> Packing:
@@ -274,29 +265,11 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
     return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
 
 
-def _shear_in_lammps(settings: Shear, of: Start, to: Recording, how: _How) -> None:
-    require_path(to.path)
-    if how.again or not to.path.exists():
-        first = _flowing(of)
-        settings.all_steps(first)  # refuses what does not end
-        if said := settings.warning(first):
-            warnings.warn(said, stacklevel=3)
-        record_flow(lambda session: recording.begin(session, settings, first, to), to, how.progress)
-    else:
-        recording.require_same(to, settings, of.dimension)
-        resume(to.path, progress=how.progress)
-
-
-def _shear_slowly(settings: SlowShear, of: Start, path: Path, *, again: bool, sides: int) -> None:
-    """Create the file of a run by implicit steps, or check that it holds this run."""
-    require_path(path)
+def _require_plane(of: Start, sides: int) -> None:
+    """Refuse what implicit steps do not serve."""
     if of.dimension != 2 or sides != 2:
         msg = (
             f"implicit steps were requested in {of.dimension} dimensions with {sides} bonds side to side,"
             " expected 2 and 2; choose another integrator"
         )
         raise ValueError(msg)
-    if path.exists() and not again:
-        slow_recording.require_same(path, settings, of.made_from)
-    else:
-        slow_recording.begin(path, _flowing(of), settings, of.made_from)

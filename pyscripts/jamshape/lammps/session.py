@@ -9,13 +9,12 @@ import subprocess
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jamshape.checks import require_one_process
-from jamshape.files.disk import store
 from jamshape.files.lammps_text import write_data
 from jamshape.lammps.module import lammps_class, one_at_a_time, run_command, start_lammps
 from jamshape.lammps.plugin import PluginError, built_for, plugin_path
@@ -62,6 +61,11 @@ def _as_one_process() -> Iterator[None]:
         yield
     finally:
         os.environ.update(hidden)
+
+
+def _in_memory() -> BinaryIO:
+    """Open a file without a name, for LAMMPS to read or write through its descriptor."""
+    return open(os.memfd_create("restart"), "w+b")  # noqa: PTH123 - a descriptor
 
 
 class Session:
@@ -200,24 +204,21 @@ class Session:
                 self.commands(f"read_data /dev/fd/{file.fileno()}")
         self.commands(_POSES)
 
-    def load_restart(self, path: str | Path, like: Packing | None = None) -> None:
-        """Load a restart file into a fresh instance, with the particles of a packing."""
+    def load_restart(self, restart: bytes, like: Packing | None = None) -> None:
+        """Load the content of a restart file into a fresh instance, with the particles of a packing."""
         self._like = like
-        with Path(path).open("rb") as file:
+        with _in_memory() as file:
+            file.write(restart)
+            file.flush()
             self.commands(f"{_ATOMS}\nread_restart /dev/fd/{file.fileno()}\n{_POSES}")
 
-    def write_restart(self, path: Path) -> None:
-        """Write a restart file of the present state, which takes its place when complete.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written; the message is one sentence.
-        """
-        # In memory first: on a full disk LAMMPS would end this process.
-        with open(os.memfd_create("restart"), "rb") as file:  # noqa: PTH123 - a descriptor
+    def restart(self) -> bytes:
+        """Return the content of a restart file of the present state, which LAMMPS wraps and sorts."""
+        # In memory: on a full disk LAMMPS would end this process.
+        with _in_memory() as file:
             self.commands(f"write_restart /dev/fd/{file.fileno()}")
-            store(path, file.read(), wait=False)
+            file.seek(0)
+            return file.read()
 
     def interact(self, law: Interaction) -> None:
         """Set the pair style of the loaded particles; packings carry this law from then on."""

@@ -82,6 +82,7 @@ class Content:
             n = layout.count(file, "report")
             rows = [layout.require_rows(file, "report", name)[:n].tolist() for name in layout.REPORT]
             found.report = list(zip(*rows, strict=True))
+            found.attributes.setdefault("dimension", frames[0].dimension)  # missing in older files
             if _CHECKPOINT in file:
                 found.checkpoint = read_checkpoint(layout.require_item(file, _CHECKPOINT))
         return found

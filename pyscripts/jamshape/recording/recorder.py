@@ -126,7 +126,7 @@ def _begun(path: Path, plan: Plan) -> _Run:
     """Begin a run."""
     driver = plan.begin()
     content = Content(path, [driver.frame()], dict(plan.settings))
-    content.add(driver.first(), None)
+    content.add(driver.first()._replace(error=None), None)
     return _Run(content, driver)
 
 

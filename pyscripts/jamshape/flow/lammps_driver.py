@@ -1,0 +1,143 @@
+"""Flows in LAMMPS as a driver: compression and shear at a rate, by explicit steps."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from jamshape.flow import motion
+from jamshape.flow.compression import Compression
+from jamshape.flow.motion import FlowRun, Motion
+from jamshape.flow.shear import Shear
+from jamshape.lammps.session import Session
+from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+
+if TYPE_CHECKING:
+    from jamshape.packing import Packing
+
+TIME_PER_MARK = 1000.0
+"""Least time between marks, [time]: many relaxations of a contact, next to which building neighbour lists is cheap."""
+
+
+def plan(
+    start: Callable[[], Packing], settings: Motion, sizes: Sizes, made_from: Mapping[str, Any]
+) -> Plan:
+    """Plan a compression or a shear.
+
+    Parameters
+    ----------
+    start
+        Makes the initial state.
+    settings
+    sizes
+        Numbers of rows and frames.
+    made_from
+        Attributes of the particles and the start.
+    """
+
+    def begin() -> LammpsDriver:
+        first = start()
+        settings.all_steps(first)  # refuses what does not end
+        if isinstance(settings, Shear) and (said := settings.warning(first)):
+            warnings.warn(said, stacklevel=2)
+        return LammpsDriver(first, settings, sizes)
+
+    def restore(first: Packing, checkpoint: Checkpoint) -> LammpsDriver:
+        return LammpsDriver(first, settings, sizes, checkpoint)
+
+    told = dataclasses.asdict(settings) | dict(made_from) | dataclasses.asdict(sizes)
+    return Plan(f"a {settings.name}", told, begin, restore)
+
+
+@dataclasses.dataclass(frozen=True)
+class Sizes:
+    """Numbers of samples of the observables and of snapshots over the whole run."""
+
+    rows: int = 400
+    frames: int = 20
+
+
+class LammpsDriver:
+    """A flow in LAMMPS.
+
+    Parameters
+    ----------
+    first : Packing
+        The initial state.
+    settings : Motion
+    sizes : Sizes
+    checkpoint : Checkpoint, optional
+        From which to go on.
+    """
+
+    def __init__(
+        self, first: Packing, settings: Motion, sizes: Sizes, checkpoint: Checkpoint | None = None
+    ) -> None:
+        every = max(1, settings.all_steps(first) // sizes.rows)
+        self._every, self._per_frame = every, every * max(1, sizes.rows // sizes.frames)
+        self._per_mark = every * max(1, math.ceil(TIME_PER_MARK / (every * settings.dt)))
+        self._first = first
+        self._session = Session()
+        try:
+            self._run = FlowRun(self._session, settings, first, checkpoint)
+        except BaseException:
+            self._session.close()
+            raise
+
+    @property
+    def done(self) -> bool:
+        """Whether the final strain or packing fraction is reached."""
+        return self._session.step >= self._run.last_step
+
+    @property
+    def at_mark(self) -> bool:
+        """Whether `checkpoint` may be called now."""
+        return self._session.step % self._per_mark == 0
+
+    def first(self) -> Row:
+        """Measure the state from which the run begins or goes on."""
+        return self._row(self._run.sample())
+
+    def advance(self) -> Row:
+        """Run to the next row."""
+        run = self._run
+        if self.at_mark:
+            run.renew()
+        run.advance(min(run.last_step, (self._session.step // self._every + 1) * self._every))
+        return self._row(run.sample())
+
+    def _row(self, sample: motion.Row) -> Row:
+        found, settings = sample.observables, self._run.settings
+        text = f"{settings.where(found)}, pressure {found['pressure']:.2e}"
+        told = Told(settings.name, text, settings.part(found, self._first.phi))
+        error = found["local_error" if "local_error" in found else "step_error"]
+        has_frame = self.done or sample.step % self._per_frame == 0
+        return Row(told, sample.step, sample.time, found, sample.wall_seconds, error, has_frame)
+
+    def frame(self) -> Packing:
+        """Return the present state."""
+        return self._run.packing()
+
+    def checkpoint(self) -> Checkpoint:
+        """Return a LAMMPS restart file and what it lacks."""
+        return self._run.checkpoint()
+
+    def results(self) -> dict[str, Any]:
+        """Return the packing fraction of the start, and what LAMMPS left out."""
+        session = self._session
+        found = {"left_out": session.left_out(), "lammps_version": session.version}
+        return {"phi_start": self._first.phi} | found
+
+    def close(self) -> None:
+        """End LAMMPS."""
+        self._session.close()
+
+
+def settings_of(stored: Mapping[str, Any]) -> Motion:
+    """Read the settings of a run from the attributes of its file."""
+    kind = Shear if "gdot" in stored else Compression
+    names = {f.name for f in dataclasses.fields(kind)} & set(stored)
+    return kind(**{name: stored[name] for name in names})
