@@ -97,6 +97,7 @@ class _Run(NamedTuple):
 def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
     """Advance to the end, or to the mark at which the run is put down."""
     content, driver = run
+    how.tell(driver.first())
     began = perf_counter()
     end = math.inf if how.seconds is None else began + how.seconds
     due = began + SECONDS
