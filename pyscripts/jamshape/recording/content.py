@@ -80,7 +80,9 @@ class Content:
                 lists = (series.step.tolist(), series.time.tolist(), list(series.value))
                 found.columns[name] = Column(*lists)
             n = layout.count(file, "report")
-            rows = [layout.require_rows(file, "report", name)[:n].tolist() for name in layout.REPORT]
+            rows = [
+                layout.require_rows(file, "report", name)[:n].tolist() for name in layout.REPORT
+            ]
             found.report = list(zip(*rows, strict=True))
             found.attributes.setdefault("dimension", frames[0].dimension)  # missing in older files
             if _CHECKPOINT in file:

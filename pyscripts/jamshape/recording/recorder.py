@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jamshape.checks import TimeLimitReached
 from jamshape.files.disk import remove_leftovers
 from jamshape.files.layout import FileFormatError
 from jamshape.files.lock import Lock
@@ -28,10 +29,6 @@ PAUSE = 100.0
 
 SECONDS = 1.0
 """Least time between two checkpoints, [seconds]."""
-
-
-class TimeLimitReached(RuntimeError):
-    """A run was put down at a checkpoint, since its time was up; the same call goes on."""
 
 
 class How(NamedTuple):
@@ -118,9 +115,7 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
 
 
 def _stopped(row: Row, seconds: float, path: Path) -> str:
-    return (
-        f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command goes on"
-    )
+    return f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command goes on"
 
 
 def _begun(path: Path, plan: Plan) -> _Run:
