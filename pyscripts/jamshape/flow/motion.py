@@ -160,6 +160,7 @@ class FlowRun(Generic[_Motion]):
         self.session, self.settings = session, settings
         self._began = perf_counter()
         self._time, self._step_of_time, self._evaluations = 0.0, 0, 0.0
+        self._is_new, self._is_written = True, False
         if checkpoint is None:
             session.load(start)
         else:
@@ -209,16 +210,28 @@ class FlowRun(Generic[_Motion]):
         return self._time + (self.session.step - self._step_of_time) * self.settings.dt
 
     def renew(self) -> None:
-        """Wrap and sort atoms and build their neighbour lists anew, as after reading a restart file."""
+        """Wrap and sort atoms and build their neighbour lists anew, as after reading a restart file.
+
+        LAMMPS rounds positions in tilted boxes when it writes one and when it sets up a run. So one is written here
+        unless `checkpoint` has done so, and a state that was just set up is left alone.
+        """
+        if self._is_new:
+            self._is_new = False
+            return
+        if not self._is_written:
+            self.session.restart()
+        self._is_written = False
         self.session.commands("run 0 post no")
 
     def checkpoint(self) -> Checkpoint:
         """Return all that is needed to go on; `renew` follows, here and where it is resumed."""
+        evaluations = self.measure()["evaluations"]  # before LAMMPS writes, which drops contacts
+        self._is_written = True
         return {
             "restart": self.session.restart(),
             "time": self._time,
             "step_of_time": self._step_of_time,
-            "evaluations": self.measure()["evaluations"],
+            "evaluations": evaluations,
             "wall_seconds": perf_counter() - self._began,
         }
 
