@@ -49,8 +49,8 @@ def plan(
         return ImplicitDriver(first, course, Flow(State.of(first)))
 
     def restore(first: Packing, checkpoint: Checkpoint) -> ImplicitDriver:
-        state = checkpoint.pop("state")
-        return ImplicitDriver(first, course, Flow(state, **checkpoint))
+        counts = {name: checkpoint[name] for name in _COUNTS}
+        return ImplicitDriver(first, course, Flow(checkpoint["state"], **counts))
 
     what = "a shear" if isinstance(course, SlowShear) else "a compression"
     return Plan(what, _as_attributes(course) | dict(made_from), begin, restore)

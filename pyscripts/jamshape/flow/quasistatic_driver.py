@@ -36,7 +36,8 @@ def plan(
         return QuasistaticDriver(first, how, frames, Sheared(State.of(first)))
 
     def restore(first: Packing, checkpoint: Checkpoint) -> QuasistaticDriver:
-        return QuasistaticDriver(first, how, frames, Sheared(**checkpoint))
+        counts = {name: checkpoint[name] for name in _COUNTS}
+        return QuasistaticDriver(first, how, frames, Sheared(checkpoint["state"], **counts))
 
     settings = dataclasses.asdict(how) | dict(made_from) | {"frames": frames}
     return Plan("a quasistatic shear", settings, begin, restore)

@@ -66,17 +66,17 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
     OSError
         If another process writes the file, or it cannot be written.
     """
-    with Lock(path):
+    # A noted signal is raised again when the lock is released.
+    with Interrupts() as interrupts, Lock(path):
         remove_leftovers(path)
         content = None if how.again or not path.exists() else Content.read(path)
         if content:
             require_same(content, plan)
             if content.attributes["finished"]:
                 return
-        with Interrupts() as interrupts:
-            run = _begun(path, plan) if content is None else _resumed(content, plan)
-            with closing(run.driver):
-                _follow(run, interrupts, how)
+        run = _begun(path, plan) if content is None else _resumed(content, plan)
+        with closing(run.driver):
+            _follow(run, interrupts, how)
 
 
 class _Run(NamedTuple):
@@ -115,7 +115,7 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
 
 
 def _stopped(row: Row, seconds: float, path: Path) -> str:
-    return f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command goes on"
+    return f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command resumes"
 
 
 def _begun(path: Path, plan: Plan) -> _Run:
@@ -129,13 +129,16 @@ def _begun(path: Path, plan: Plan) -> _Run:
 def _resumed(content: Content, plan: Plan) -> _Run:
     """Go on from the checkpoint of a file."""
     checkpoint, content.checkpoint = content.checkpoint, None
-    if checkpoint is None:
-        msg = (
-            f"{content.path} holds {plan.what} that was interrupted in an earlier version of jamshape, expected one with a"
-            " checkpoint; use again to replace it"
-        )
-        raise FileFormatError(msg)
-    return _Run(content, plan.restore(content.frames[0], checkpoint))
+    try:
+        if checkpoint is not None:
+            return _Run(content, plan.restore(content.frames[0], checkpoint))
+    except (KeyError, TypeError):  # a number is missing, or of another kind
+        pass
+    msg = (
+        f"{content.path} holds {plan.what} that was interrupted in another version of jamshape, expected one with a"
+        " checkpoint of this version; use again to replace it"
+    )
+    raise FileFormatError(msg)
 
 
 def require_same(content: Content, plan: Plan) -> None:
