@@ -99,9 +99,8 @@ class Case:
         """Record, resume or load the run in a file."""
         given = dict(self.settings) | {"progress": False} | more
         if isinstance(self.particles, str):
-            return getattr(js, self.function)(
-                start=write_start(starts, self.particles), file=file, **given
-            )
+            given = {"start": write_start(starts, self.particles)} | given
+            return getattr(js, self.function)(file=file, **given)
         return getattr(js, self.function)(self.particles, file=file, **given)
 
 

@@ -15,7 +15,20 @@ from pathlib import Path
 
 import h5py
 import pytest
-from drivers import CASES, DRIVERS, EVERY, FAR, NONE, SHORT, resume, run_case, started, write_start
+from drivers import (
+    CASES,
+    DRIVERS,
+    EVERY,
+    FAR,
+    NONE,
+    RODS,
+    SHORT,
+    dense,
+    resume,
+    run_case,
+    started,
+    write_start,
+)
 from killing import CALLS, differences, ended, forked, light, said
 
 import jamshape as js
@@ -274,6 +287,14 @@ def test_other_settings_are_refused_by_name(name, whole, starts, tmp_path, patch
             assert "\n" not in str(refused.value)
             assert f" with {key}" in str(refused.value), key
         assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+def test_another_start_is_refused(name, whole, starts):
+    phi = CASES[name].settings.get("phi")
+    more = {"phi": (phi[0] + 0.01, phi[1])} if phi else {"start": dense(RODS, 12, 0.83)}
+    with pytest.raises(ValueError, match=r"holds a .* with (phi_start|start|alpha)=.*, expected"):
+        CASES[name].run(whole(name)[0], starts, **more)
 
 
 @pytest.mark.parametrize("name", DRIVERS)

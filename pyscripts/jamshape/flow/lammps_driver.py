@@ -22,6 +22,9 @@ TIME_PER_MARK = 1000.0
 """Least time between marks, [time]: many relaxations of a contact, next to which building neighbour lists is cheap."""
 
 
+_ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integration_tolerance"}
+
+
 def plan(
     start: Callable[[], Packing], settings: Motion, sizes: Sizes, made_from: Mapping[str, Any]
 ) -> Plan:
@@ -49,7 +52,8 @@ def plan(
         return LammpsDriver(first, settings, sizes, checkpoint)
 
     told = dataclasses.asdict(settings) | dict(made_from) | dataclasses.asdict(sizes)
-    return Plan(f"a {settings.name}", told, begin, restore)
+    told["dt"] = told.pop("dt")  # may follow from the others
+    return Plan(f"a {settings.name}", told, begin, restore, _ARGUMENTS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,10 +130,9 @@ class LammpsDriver:
         return self._run.checkpoint()
 
     def results(self) -> dict[str, Any]:
-        """Return the packing fraction of the start, and what LAMMPS left out."""
+        """Return what LAMMPS left out, and its version."""
         session = self._session
-        found = {"left_out": session.left_out(), "lammps_version": session.version}
-        return {"phi_start": self._first.phi} | found
+        return {"left_out": session.left_out(), "lammps_version": session.version}
 
     def close(self) -> None:
         """End LAMMPS."""

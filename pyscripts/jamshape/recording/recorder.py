@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.checks import TimeLimitReached
+from jamshape.checks import ArgumentError, TimeLimitReached
 from jamshape.files.disk import remove_leftovers
 from jamshape.files.layout import FileFormatError
 from jamshape.files.lock import Lock
@@ -146,18 +146,31 @@ def require_same(content: Content, plan: Plan) -> None:
 
     Raises
     ------
-    ValueError
+    ArgumentError
     """
-    if "finished" not in content.attributes:
-        msg = f"{content.path} does not hold {plan.what}, expected one; write to another file, or use again to replace it"
-        raise ValueError(msg)
+    advice = "choose another {file:name}, or use {again} to replace it"
+    given = {"file": content.path, "again": True}
+    stored, path = content.attributes, str(content.path).replace("{", "{{").replace("}", "}}")
+    if "finished" not in stored:
+        raise ArgumentError(f"{path} does not hold {plan.what}, expected one; {advice}", given)
     for name, value in plan.settings.items():
-        if not _is_same(content.attributes.get(name), value):
-            msg = (
-                f"{content.path} holds {plan.what} with {name} = {content.attributes.get(name)}, expected"
-                f" {value}; write to another file, or use again to replace it"
+        if not _is_same(stored.get(name), value):
+            argument = plan.arguments.get(name, name)
+            said = (
+                f"{path} holds {plan.what} with {{{argument}}}, expected {_Shown(value)}; {advice}"
             )
-            raise ValueError(msg)
+            raise ArgumentError(said, {argument: _Shown(stored.get(name)), **given})
+
+
+class _Shown:
+    """A stored value in a message."""
+
+    def __init__(self, value: Any) -> None:
+        self._value = value
+
+    def __repr__(self) -> str:
+        """Return it on one line."""
+        return " ".join(str(self._value).split())
 
 
 def _is_same(stored: Any, value: Any) -> bool:
