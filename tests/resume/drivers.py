@@ -50,7 +50,9 @@ def dense(particles: js.Particles, n: int, phi: float, dimension: int = 2) -> js
 def tilted() -> js.Packing:
     """Return discs in a box that is about to take other cell vectors."""
     packing = dense(DISCS, 12, 0.86)
-    return State.of(packing).deformed(Host.shearing(0.5, "simple").deformation(1.1)).packing(packing)
+    return (
+        State.of(packing).deformed(Host.shearing(0.5, "simple").deformation(1.1)).packing(packing)
+    )
 
 
 STARTS: Mapping[str, Callable[[], js.Packing]] = {
@@ -114,7 +116,9 @@ def resume(file: Path) -> None:
     js.resume(file, progress=False)
 
 
-def started(name: str, file: Path, starts: Path, patches: Any = (), fuse: int = 0, **more: Any) -> Any:
+def started(
+    name: str, file: Path, starts: Path, patches: Any = (), fuse: int = 0, **more: Any
+) -> Any:
     """Start a case in a process of its own."""
     write_start(starts, CASES[name].particles) if isinstance(CASES[name].particles, str) else None
     log = file.parent / "said.log"

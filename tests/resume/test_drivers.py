@@ -114,7 +114,9 @@ def test_checkpoints_do_not_change_a_run(name, whole):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_run_put_down_at_every_mark_ends_as_if_it_were_not(name, whole, starts, tmp_path, patched):
+def test_a_run_put_down_at_every_mark_ends_as_if_it_were_not(
+    name, whole, starts, tmp_path, patched
+):
     patched(*SHORT, *NONE)
     file, stops = tmp_path / "run.h5", 0
     while not file.exists() or not read_attributes(file)["finished"]:
@@ -193,7 +195,9 @@ def going(name, file, starts, patches, **more):
 
 
 # An interrupt ends Python by a KeyboardInterrupt.
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 1), (signal.SIGTERM, -signal.SIGTERM)])
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 1), (signal.SIGTERM, -signal.SIGTERM)]
+)
 @pytest.mark.parametrize("name", DRIVERS)
 def test_a_signal_ends_a_run_at_its_next_mark(name, number, code, starts, tmp_path):
     file = tmp_path / "run.h5"
@@ -209,7 +213,9 @@ def test_a_signal_ends_a_run_at_its_next_mark(name, number, code, starts, tmp_pa
     assert names(tmp_path) == ALONE
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 1), (signal.SIGTERM, -signal.SIGTERM)])
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 1), (signal.SIGTERM, -signal.SIGTERM)]
+)
 @pytest.mark.parametrize("name", DRIVERS)
 def test_a_second_signal_ends_a_run_at_once(name, number, code, starts, tmp_path):
     """Even if there is no mark for minutes."""
@@ -282,7 +288,9 @@ def test_other_settings_are_refused_by_name(name, whole, starts, tmp_path, patch
     for path in (file, whole(name)[0]):
         before = path.read_bytes()
         for key, value in CASES[name].others.items():
-            with pytest.raises(ValueError, match=r"holds a .*, expected .*; .* use again") as refused:
+            with pytest.raises(
+                ValueError, match=r"holds a .*, expected .*; .* use again"
+            ) as refused:
                 CASES[name].run(path, starts, **{key: value})
             assert "\n" not in str(refused.value)
             assert f" with {key}" in str(refused.value), key
@@ -407,7 +415,9 @@ def test_a_checkpoint_that_cannot_be_used_is_a_sentence(name, damage, starts, tm
         damage(opened)
     before = file.read_bytes()
     for call in (lambda: CASES[name].run(file, starts), lambda: js.resume(file, progress=False)):
-        with pytest.raises(FileFormatError, match=r"another version .*expected .*checkpoint") as refused:
+        with pytest.raises(
+            FileFormatError, match=r"another version .*expected .*checkpoint"
+        ) as refused:
             call()
         assert "\n" not in str(refused.value)
     assert file.read_bytes() == before
@@ -419,7 +429,9 @@ def test_a_checkpoint_that_cannot_be_used_is_a_sentence(name, damage, starts, tm
 
 def jamshape(*words, **how):
     command = [sys.executable, "-m", "jamshape", *map(str, words)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how)
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how
+    )
 
 
 def test_a_command_that_stops_in_time_has_an_exit_code_of_its_own(starts, tmp_path):

@@ -52,6 +52,8 @@ def plan(
         return ImplicitDriver(first, course, Flow(State.of(first)))
 
     def restore(first: Packing, checkpoint: Checkpoint) -> ImplicitDriver:
+        if not checkpoint:
+            return ImplicitDriver(first, course, Flow(State.of(first)))
         counts = {name: checkpoint[name] for name in _COUNTS}
         return ImplicitDriver(first, course, Flow(checkpoint["state"], **counts))
 

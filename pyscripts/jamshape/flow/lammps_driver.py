@@ -49,7 +49,7 @@ def plan(
         return LammpsDriver(first, settings, sizes)
 
     def restore(first: Packing, checkpoint: Checkpoint) -> LammpsDriver:
-        return LammpsDriver(first, settings, sizes, checkpoint)
+        return LammpsDriver(first, settings, sizes, checkpoint or None)
 
     told = dataclasses.asdict(settings) | dict(made_from) | dataclasses.asdict(sizes)
     told["dt"] = told.pop("dt")  # may follow from the others

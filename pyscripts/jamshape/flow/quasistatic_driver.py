@@ -44,6 +44,8 @@ def plan(
         return QuasistaticDriver(first, how, frames, Sheared(State.of(first)))
 
     def restore(first: Packing, checkpoint: Checkpoint) -> QuasistaticDriver:
+        if not checkpoint:
+            return QuasistaticDriver(first, how, frames, Sheared(State.of(first)))
         counts = {name: checkpoint[name] for name in _COUNTS}
         return QuasistaticDriver(first, how, frames, Sheared(checkpoint["state"], **counts))
 

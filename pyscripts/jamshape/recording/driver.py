@@ -90,7 +90,8 @@ class Plan:
     begin
         Makes the driver at its start.
     restore
-        Makes the driver from the particles of the file, whose first frame they are, and a checkpoint.
+        Makes the driver from the particles of the file, whose first frame they are, and a checkpoint, which is empty
+        at the start.
     arguments
         Names of the arguments that settings of other names come from.
     """

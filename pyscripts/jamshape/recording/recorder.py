@@ -119,10 +119,11 @@ def _stopped(row: Row, seconds: float, path: Path) -> str:
 
 
 def _begun(path: Path, plan: Plan) -> _Run:
-    """Begin a run."""
+    """Begin a run; its file keeps the start, and shows at once whether it can be written."""
     driver = plan.begin()
     content = Content(path, [driver.frame()], dict(plan.settings))
     content.add(driver.first()._replace(error=None), None)
+    content.write(driver.results(), {})
     return _Run(content, driver)
 
 

@@ -5,12 +5,11 @@ import pytest
 
 import jamshape as js
 from jamshape.files.h5md import read_attributes
-from jamshape.flow.slow_recording import summary_of
 from jamshape.landscape import Landscape
 from jamshape.measures import jamming
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames, stays_jammed
 from jamshape.measures.onset import OnsetFit
-from jamshape.measures.runs import read_run
+from jamshape.measures.runs import read_run, summary_of
 from jamshape.packing import State
 
 NAN = float("nan")
