@@ -17,6 +17,7 @@ from jamshape.files.h5md import read_packing, write_packing
 from jamshape.files.lammps_text import read_data
 from jamshape.flow.compression import Compression
 from jamshape.flow.implicit import Protocol
+from jamshape.flow.lammps_driver import Sizes
 from jamshape.flow.shear import Shear
 from jamshape.minima.target import Target
 from jamshape.packing import Box
@@ -78,6 +79,7 @@ def cases():
         for name, value in itertools.product(names, (NAN, math.inf, 0, "4; touch X", None, [1])):
             yield f"{kind.__name__} {name}={value}", partial(kind, **{name: value})
     for name, value in (("rows", 0), ("rows", 1.5), ("rows", "4"), ("frames", 0), ("frames", NAN)):
+        yield f"Sizes {name}={value}", partial(Sizes, **{name: value})
         for record in (compress, shear):
             yield f"{record.__name__} {name}={value}", record(**{name: value})
     for integrator in ("euler", "heun\nshell touch X", "rkc2 tolerance 1", "", None, 1):
