@@ -572,6 +572,7 @@ double FixOverdampedAffine::memory_usage() { return flow->memory_usage(); }
 void FixOverdampedAffine::write_restart(FILE *fp)
 {
   const double mean_turn = flow->mean_turn();
+  flow->set_mean_turn(mean_turn);  // rounded as where the file is read
   if (comm->me != 0) return;
   const StepState *const of_steps = integrator->state();
   const Saved saved{SAVED_AS, box->saved_state(), of_steps ? *of_steps : StepState{}, mean_turn,

@@ -24,12 +24,12 @@ NONE = ((f"{RECORDER}.PAUSE", 1e9), (f"{RECORDER}.SECONDS", 1e9))
 """No checkpoint before the end."""
 SHORT = (
     ("jamshape.flow.implicit_driver.STEPS_PER_MARK", 20),
-    ("jamshape.flow.lammps_driver.TIME_PER_MARK", 40.0),
+    ("jamshape.flow.lammps_driver.EVALUATIONS_PER_MARK", 100),
 )
 """Marks close to each other."""
 FAR = (
     ("jamshape.flow.implicit_driver.STEPS_PER_MARK", 10**9),
-    ("jamshape.flow.lammps_driver.TIME_PER_MARK", 1e15),
+    ("jamshape.flow.lammps_driver.EVALUATIONS_PER_MARK", 10**15),
 )
 """No marks before the end, where marks can be placed."""
 

@@ -34,7 +34,6 @@ from killing import CALLS, differences, ended, forked, light, said
 import jamshape as js
 from jamshape.checks import TimeLimitReached
 from jamshape.files.h5md import FileFormatError, read_attributes
-from jamshape.files.lock import lock_of
 from jamshape.recording.content import Content
 
 pytestmark = pytest.mark.lammps
@@ -134,15 +133,25 @@ def test_a_run_put_down_at_every_mark_ends_as_if_it_were_not(
 # --- kills ----------------------------------------------------------------------------------------
 
 
+def wait_for(path):
+    deadline = time.monotonic() + 60
+    while not path.exists() and time.monotonic() < deadline:
+        time.sleep(0.005)
+
+
 def kill_and_compare(name, whole, starts, folder, kills, seed):
     """Kill a run at random moments and in calls that change files, and let it end; return the number of kills."""
     expected, _, seconds, calls = whole(name)
     file, rng, count = folder / "run.h5", random.Random(seed), 0
     for k in range(kills):
-        # Every second one between two calls, and always by the same call.
+        # The first one when its file holds the start alone, then every second one between two calls.
         fuse = rng.randrange(1, calls + 1) if k % 2 else 0
-        process = started(name, file, starts, EVERY, fuse)
-        code = ended(process, 120 if fuse else rng.uniform(0, seconds))
+        process = started(name, file, starts, EVERY if k else NONE, fuse)
+        if k:
+            code = ended(process, 120 if fuse else rng.uniform(0, seconds))
+        else:
+            wait_for(file)
+            code = ended(process, 0)
         if code == 0:
             break
         assert code == -signal.SIGKILL, said(folder)
@@ -184,12 +193,9 @@ def test_hundreds_of_kills(name, whole, starts, tmp_path, measured):
 
 
 def going(name, file, starts, patches, **more):
-    """Start a long run and wait until it has its lock and, with checkpoints, its file."""
+    """Start a long run and wait until it has its file."""
     process = started(name, file, starts, patches, **dict(CASES[name].long) | more)
-    sought = file if EVERY[0] in patches else lock_of(file)
-    deadline = time.monotonic() + 60
-    while not sought.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
+    wait_for(file)
     assert process.exitcode is None, said(file.parent)
     return process
 
@@ -453,9 +459,7 @@ def test_ctrl_c_ends_a_command_at_a_checkpoint(starts, tmp_path):
     start, file = write_start(starts, "dimers"), tmp_path / "run.h5"
     words = ("aqs", "--start", start, "--step", "1e-3", "--strain", 1000, "--out", file)
     process = jamshape(*words)
-    deadline = time.monotonic() + 60
-    while not file.exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
+    wait_for(file)
     process.send_signal(signal.SIGINT)
     _, error = process.communicate()
     assert process.returncode == 130

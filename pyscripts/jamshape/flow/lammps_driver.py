@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from jamshape.checks import require_stated
 from jamshape.flow import motion
 from jamshape.flow.compression import Compression
 from jamshape.flow.motion import FlowRun, Motion
 from jamshape.flow.shear import Shear
 from jamshape.lammps.session import Session
 from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
     from jamshape.packing import Packing
 
-TIME_PER_MARK = 1000.0
-"""Least time between marks, [time]: many relaxations of a contact, next to which building neighbour lists is cheap."""
+EVALUATIONS_PER_MARK = 2000
+"""Least number of evaluations of all forces between marks, next to which building neighbour lists anew is cheap."""
 
 
 _ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integration_tolerance"}
@@ -42,7 +43,8 @@ def plan(
     """
 
     def begin() -> LammpsDriver:
-        first = start()
+        law = Interaction(settings.k_e, settings.sides)
+        first = start().sorted_by_id().with_(law=law, step=0, time=0.0)
         settings.all_steps(first)  # refuses what does not end
         if isinstance(settings, Shear) and (said := settings.warning(first)):
             warnings.warn(said, stacklevel=2)
@@ -63,6 +65,9 @@ class Sizes:
     rows: int = 400
     frames: int = 20
 
+    def __post_init__(self) -> None:
+        require_stated(rows=self.rows, frames=self.frames)  # of files as well
+
 
 class LammpsDriver:
     """A flow in LAMMPS.
@@ -82,8 +87,8 @@ class LammpsDriver:
     ) -> None:
         every = max(1, settings.all_steps(first) // sizes.rows)
         self._every, self._per_frame = every, every * max(1, sizes.rows // sizes.frames)
-        self._per_mark = every * max(1, math.ceil(TIME_PER_MARK / (every * settings.dt)))
-        self._first = first
+        self._first, self.at_mark = first, False
+        self._marked = checkpoint["evaluations"] if checkpoint else 0.0
         self._session = Session()
         try:
             self._run = FlowRun(self._session, settings, first, checkpoint)
@@ -96,11 +101,6 @@ class LammpsDriver:
         """Whether the final strain or packing fraction is reached."""
         return self._session.step >= self._run.last_step
 
-    @property
-    def at_mark(self) -> bool:
-        """Whether `checkpoint` may be called now."""
-        return self._session.step % self._per_mark == 0
-
     def first(self) -> Row:
         """Measure the state from which the run begins or goes on."""
         return self._row(self._run.sample())
@@ -111,7 +111,12 @@ class LammpsDriver:
         if self.at_mark:
             run.renew()
         run.advance(min(run.last_step, (self._session.step // self._every + 1) * self._every))
-        return self._row(run.sample())
+        sample = run.sample()
+        evaluations = sample.observables["evaluations"]
+        self.at_mark = evaluations - self._marked >= EVALUATIONS_PER_MARK
+        if self.at_mark:
+            self._marked = evaluations
+        return self._row(sample)
 
     def _row(self, sample: motion.Row) -> Row:
         found, settings = sample.observables, self._run.settings
@@ -122,8 +127,8 @@ class LammpsDriver:
         return Row(told, sample.step, sample.time, found, sample.wall_seconds, error, has_frame)
 
     def frame(self) -> Packing:
-        """Return the present state."""
-        return self._run.packing()
+        """Return the present state; at the start as it was given to LAMMPS, to begin again with the same bits."""
+        return self._run.packing() if self._session.step else self._first
 
     def checkpoint(self) -> Checkpoint:
         """Return a LAMMPS restart file and what it lacks."""

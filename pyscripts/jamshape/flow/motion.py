@@ -160,7 +160,7 @@ class FlowRun(Generic[_Motion]):
         self.session, self.settings = session, settings
         self._began = perf_counter()
         self._time, self._step_of_time, self._evaluations = 0.0, 0, 0.0
-        self._is_new, self._is_written = True, False
+        self._is_written = False
         if checkpoint is None:
             session.load(start)
         else:
@@ -213,11 +213,8 @@ class FlowRun(Generic[_Motion]):
         """Wrap and sort atoms and build their neighbour lists anew, as after reading a restart file.
 
         LAMMPS rounds positions in tilted boxes when it writes one and when it sets up a run. So one is written here
-        unless `checkpoint` has done so, and a state that was just set up is left alone.
+        unless `checkpoint` has done so.
         """
-        if self._is_new:
-            self._is_new = False
-            return
         if not self._is_written:
             self.session.restart()
         self._is_written = False

@@ -22,7 +22,7 @@ import jamshape as js
 from jamshape.checks import TimeLimitReached
 from jamshape.flow import lammps_driver
 
-lammps_driver.TIME_PER_MARK = 30.0
+lammps_driver.EVALUATIONS_PER_MARK = 20
 rods = js.Spherocylinders(alpha=4)
 try:
     js.compress(rods, n=8, phi=(0.4, 0.45), kappa=1e-3, rows=40, file="run.h5", progress=False, seed=1, seconds=0)

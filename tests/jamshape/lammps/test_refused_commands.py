@@ -101,7 +101,7 @@ def test_a_compression_that_is_refused_leaves_a_whole_file(tmp_path, monkeypatch
     """Its time step is past what the pressure on the way lets it be."""
     monkeypatch.setattr(recorder, "PAUSE", 0.0)
     monkeypatch.setattr(recorder, "SECONDS", 0.0)
-    monkeypatch.setattr(lammps_driver, "TIME_PER_MARK", 5.0)
+    monkeypatch.setattr(lammps_driver, "EVALUATIONS_PER_MARK", 2)
     rods = js.Spherocylinders(alpha=4)
     settings = {"n": 16, "kappa": 1e-2, "phi": (0.4, 1.4), "progress": False}
     with pytest.raises(LammpsError, match=r"found timestep 3 above the stability limit"):
