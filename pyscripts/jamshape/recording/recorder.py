@@ -38,7 +38,7 @@ class How(NamedTuple):
     """Begin anew, whatever the file holds."""
     seconds: float | None = None
     """Time after which the run is put down at the next mark, [seconds]."""
-    tell: Callable[[Row], None] = lambda row: None
+    tell: Callable[[Row], None] = lambda _: None
     """Receives every row, for the display of progress."""
 
 
@@ -153,7 +153,8 @@ def require_same(content: Content, plan: Plan) -> None:
     given = {"file": content.path, "again": True}
     stored, path = content.attributes, str(content.path).replace("{", "{{").replace("}", "}}")
     if "finished" not in stored:
-        raise ArgumentError(f"{path} does not hold {plan.what}, expected one; {advice}", given)
+        said = f"{path} does not hold {plan.what}, expected one; {advice}"
+        raise ArgumentError(said, given)
     for name, value in plan.settings.items():
         if not _is_same(stored.get(name), value):
             argument = plan.arguments.get(name, name)
