@@ -8,12 +8,12 @@ from jamshape.arguments import checked
 from jamshape.checks import require_path, require_stated
 from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.progress import follow, place
-from jamshape.recording.driver import Told
+from jamshape.front.progress import display, place
 from jamshape.landscape.threads import sharing
 from jamshape.old_names import accepts_old
 from jamshape.protocols.defaults import recipe_for
-from jamshape.protocols.make import Progress, is_done, make, require_same, tidy
+from jamshape.protocols.make import is_done, make, require_same
+from jamshape.recording.recorder import How
 from jamshape.shapes.particles import Particles
 
 
@@ -43,6 +43,7 @@ def make_packing(
     threads: int = 1,
     file: str | Path | None = None,
     again: bool = False,
+    seconds: float | None = None,
     progress: bool = True,
 ) -> MeasuredPacking:
     """Make one mechanically stable packing: compress, relax to a target energy, measure.
@@ -104,7 +105,9 @@ def make_packing(
         H5MD file of the packing. A packing of this recipe is loaded from it, an interrupted one resumed from
         files beside it, and one of another recipe refused. Without a file only the result is kept.
     again : bool
-        Start over, whatever the file holds.
+        Start over, whatever the file holds, but for a compression in LAMMPS that serves this packing.
+    seconds : float, optional
+        Time after which the work is put down at its next checkpoint, before a queue ends it; the same call goes on.
     progress : bool
         Whether to show progress on standard error.
 
@@ -145,17 +148,11 @@ def make_packing(
     at = place(file, "packing.h5")
     require_path(at.path)
     if again or not is_done(at.path):
-        steps = make(recipe, at.path, again=again)
-        with sharing(threads):
-            follow(steps, _told, shown=progress)
+        with sharing(threads), display(shown=progress) as tell:
+            make(recipe, at.path, How(again, seconds, lambda row: tell(row.told)))
     else:
         require_same(at.path, recipe)
-        tidy(recipe, at.path)
     packing = MeasuredPacking.read(at.path)
     warn_unless_reached(packing.results)
     # A temporary file is not named in messages.
     return packing if at.folder is None else MeasuredPacking.of(packing, packing.results)
-
-
-def _told(at: Progress) -> Told:
-    return Told(at.phase, f"phi {at.phi:.6f}, {at.text}", at.part)

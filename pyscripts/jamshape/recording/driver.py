@@ -91,9 +91,12 @@ class Plan:
         Makes the driver at its start.
     restore
         Makes the driver from the particles of the file, whose first frame they are, and a checkpoint.
+    finish
+        Writes the results elsewhere at the end, when the file is not needed any more.
     """
 
     what: str
     settings: Mapping[str, Any]
     begin: Callable[[], Driver]
     restore: Callable[[Packing, Checkpoint], Driver]
+    finish: Callable[[Driver], None] | None = None

@@ -85,6 +85,7 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
 class _Run(NamedTuple):
     content: Content
     driver: Driver
+    finish: Callable[[Driver], None] | None
 
     def write(self) -> float:
         """Write a checkpoint; return when the next one is due."""
@@ -96,7 +97,7 @@ class _Run(NamedTuple):
 
 def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
     """Advance to the end, or to the mark at which the run is put down."""
-    content, driver = run
+    content, driver = run.content, run.driver
     how.tell(driver.first())
     began = perf_counter()
     end = math.inf if how.seconds is None else began + how.seconds
@@ -114,7 +115,11 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
             return  # raised again outside
         if stops:
             raise TimeLimitReached(_stopped(row, perf_counter() - began, content.path))
-    content.write(driver.results(), None)
+    if run.finish is None:
+        content.write(driver.results(), None)
+        return
+    run.finish(driver)
+    content.path.unlink(missing_ok=True)
 
 
 def _stopped(row: Row, seconds: float, path: Path) -> str:
@@ -128,7 +133,7 @@ def _begun(path: Path, plan: Plan) -> _Run:
     driver = plan.begin()
     content = Content(path, [driver.frame()], dict(plan.settings))
     content.add(driver.first()._replace(error=None), None)
-    return _Run(content, driver)
+    return _Run(content, driver, plan.finish)
 
 
 def _resumed(content: Content, plan: Plan) -> _Run:
@@ -140,7 +145,7 @@ def _resumed(content: Content, plan: Plan) -> _Run:
             " checkpoint; use again to replace it"
         )
         raise FileFormatError(msg)
-    return _Run(content, plan.restore(content.frames[0], checkpoint))
+    return _Run(content, plan.restore(content.frames[0], checkpoint), plan.finish)
 
 
 def require_same(content: Content, plan: Plan) -> None:
