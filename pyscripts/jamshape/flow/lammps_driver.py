@@ -79,7 +79,7 @@ class LammpsDriver:
         every = max(1, settings.all_steps(first) // sizes.rows)
         self._every, self._per_frame = every, every * max(1, sizes.rows // sizes.frames)
         self._per_mark = every * max(1, math.ceil(TIME_PER_MARK / (every * settings.dt)))
-        self._first = first
+        self._first, self._marked = first, checkpoint
         self._session = Session()
         try:
             self._run = FlowRun(self._session, settings, first, checkpoint)
@@ -105,7 +105,8 @@ class LammpsDriver:
         """Run to the next row."""
         run = self._run
         if self.at_mark:
-            run.renew()
+            self.checkpoint()
+        self._marked = None
         run.advance(min(run.last_step, (self._session.step // self._every + 1) * self._every))
         return self._row(run.sample())
 
@@ -123,7 +124,8 @@ class LammpsDriver:
 
     def checkpoint(self) -> Checkpoint:
         """Return a LAMMPS restart file and what it lacks."""
-        return self._run.checkpoint()
+        self._marked = self._marked or self._run.mark()
+        return self._marked
 
     def results(self) -> dict[str, Any]:
         """Return the packing fraction of the start, and what LAMMPS left out."""

@@ -208,19 +208,22 @@ class FlowRun(Generic[_Motion]):
         """Time since the start, valid after changes of the time step."""
         return self._time + (self.session.step - self._step_of_time) * self.settings.dt
 
-    def renew(self) -> None:
-        """Wrap and sort atoms and build their neighbour lists anew, as after reading a restart file."""
-        self.session.commands("run 0 post no")
+    def mark(self) -> Checkpoint:
+        """Return all that is needed to go on, and go on as after reading it.
 
-    def checkpoint(self) -> Checkpoint:
-        """Return all that is needed to go on; `renew` follows, here and where it is resumed."""
-        return {
+        Writing a restart file wraps and sorts atoms and, in a tilted box, rounds their positions, so it is written
+        at every mark, needed or not.
+        """
+        evaluations = self.measure()["evaluations"]
+        found = {
             "restart": self.session.restart(),
             "time": self._time,
             "step_of_time": self._step_of_time,
-            "evaluations": self.measure()["evaluations"],
+            "evaluations": evaluations,
             "wall_seconds": perf_counter() - self._began,
         }
+        self.session.commands("run 0 post no")
+        return found
 
     def samples(self, every: int) -> Iterator[Row]:
         """Run to the end and yield a row at each multiple of `every` steps, and at the end."""

@@ -135,7 +135,7 @@ class ApproachDriver:
     ) -> None:
         told = checkpoint or {"kappa": settings.kappa_start, "dt": settings.dt, "rows": 0}
         self._first, self._settings, self._rows = first, settings, told["rows"]
-        self._pressure = told.get("pressure", math.inf)
+        self._pressure, self._marked = told.get("pressure", math.inf), checkpoint
         flow = Compression(kappa=told["kappa"], phi_end=_NO_END, dt=told["dt"], sides=2)
         self._session = Session()
         try:
@@ -164,7 +164,8 @@ class ApproachDriver:
         """Run to the next row; raises ApproachError after `MOST_STEPS` time steps."""
         run, settings = self._run, self._settings
         if self.at_mark:
-            run.renew()
+            self.checkpoint()
+        self._marked = None
         if run.settings.kappa < 0:
             # Near jamming the pressure is about 0.3 (phi - phi_J): go a fraction of the way.
             sample = _advance(run, settings, min(settings.strain, _PART * self._pressure))
@@ -204,9 +205,11 @@ class ApproachDriver:
 
     def checkpoint(self) -> Checkpoint:
         """Return the state of LAMMPS, the rate, the time step, and the last pressure."""
-        settings = self._run.settings
-        found = {"kappa": settings.kappa, "dt": settings.dt, "rows": self._rows}
-        return found | {"pressure": self._pressure, "run": self._run.checkpoint()}
+        if self._marked is None:
+            settings = self._run.settings
+            found = {"kappa": settings.kappa, "dt": settings.dt, "rows": self._rows}
+            self._marked = found | {"pressure": self._pressure, "run": self._run.mark()}
+        return self._marked
 
     def results(self) -> dict[str, Any]:
         """Return the version of LAMMPS."""
