@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jamshape.flow.recording import Recording
 
 import jamshape as js
 from jamshape.checks import RANGES, require_stated
@@ -18,7 +19,6 @@ from jamshape.files.h5md import read_packing, write_packing
 from jamshape.files.lammps_text import read_data
 from jamshape.flow.compression import Compression
 from jamshape.flow.implicit import Protocol
-from jamshape.flow.recording import Recording
 from jamshape.flow.shear import Shear
 from jamshape.minima.target import Target
 from jamshape.packing import Box

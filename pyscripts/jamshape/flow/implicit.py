@@ -396,6 +396,7 @@ class ImplicitFlow:
 
     @property
     def phi(self) -> float:
+        """Packing fraction."""
         return self.area / self.flow.state.volume
 
     def advance(self) -> Step:

@@ -98,7 +98,9 @@ class ImplicitDriver:
         observables |= self._course.measured(self._run.landscape, self._flow)
         told = self._told(step.phi, _where(step))
         has_frame = self.at_mark or self.done
-        return Row(told, step.step, step.time, observables, step.wall_seconds, step.error, has_frame)
+        return Row(
+            told, step.step, step.time, observables, step.wall_seconds, step.error, has_frame
+        )
 
     def frame(self) -> Packing:
         """Return the present state."""

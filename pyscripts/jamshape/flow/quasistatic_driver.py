@@ -86,9 +86,7 @@ class QuasistaticDriver:
         """Return the present state; its time is the strain."""
         run = self._run
         strain = min(self._how.strain_end, max(0, run.steps) * self._how.strain_step)
-        return dataclasses.replace(
-            run.state.packing(self._first), step=run.steps + 1, time=strain
-        )
+        return dataclasses.replace(run.state.packing(self._first), step=run.steps + 1, time=strain)
 
     def checkpoint(self) -> Checkpoint:
         """Return the state and all counts."""

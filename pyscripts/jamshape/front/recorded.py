@@ -19,9 +19,7 @@ from jamshape.recording.driver import Plan
 from jamshape.recording.recorder import How, record
 
 
-def recorded(
-    path: Path, plan: Plan, *, again: bool, seconds: float | None, progress: bool
-) -> None:
+def recorded(path: Path, plan: Plan, *, again: bool, seconds: float | None, progress: bool) -> None:
     """Record a run, or go on with it, showing progress; errors as `record`, and warnings as `resume`."""
     require_path(path)
     with display(shown=progress) as tell:
@@ -30,9 +28,7 @@ def recorded(
 
 
 @checked
-def resume(
-    file: str | Path, *, seconds: float | None = None, progress: bool = True
-) -> Recorded:
+def resume(file: str | Path, *, seconds: float | None = None, progress: bool = True) -> Recorded:
     """Resume an interrupted run with its settings; load a finished one.
 
     Parameters

@@ -8,8 +8,8 @@ from jamshape.arguments import checked
 from jamshape.checks import require_given, require_no_effect, require_stated
 from jamshape.flow import implicit_driver, lammps_driver, quasistatic_driver
 from jamshape.flow.implicit import METHODS
-from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.flow.lammps_driver import Sizes
+from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.flow.shear import Shear
 from jamshape.flow.slow_shear import SlowShear
 from jamshape.front.progress import place

@@ -10,6 +10,7 @@ from jamshape.landscape import Evaluation
 from jamshape.minima.descent import History, Minimum, Outcome, Residual
 from jamshape.minima.target import Leading, Search
 
+
 def told_minimum(minimum: Minimum | None) -> dict[str, Any] | None:
     """Return a minimum without its history; None for None."""
     if minimum is None:
@@ -45,6 +46,8 @@ def search_of(told: Mapping[str, Any], history: History) -> Search:
     """Return a search with its history."""
     found = dict(told) | {"minimum": minimum_of(told.get("minimum"), history), "history": history}
     if leading := told.get("leading"):
-        minima = {name: minimum_of(leading.get(name), history) for name in ("start", "jammed", "best")}
+        minima = {
+            name: minimum_of(leading.get(name), history) for name in ("start", "jammed", "best")
+        }
         found["leading"] = Leading(**leading | minima)
     return Search(**found)

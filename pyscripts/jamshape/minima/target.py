@@ -472,9 +472,7 @@ def bisection(
         yield search
 
 
-def bisect(
-    landscape: Landscape, search: Search, target: Target, shortest: float = 1e-16
-) -> None:
+def bisect(landscape: Landscape, search: Search, target: Target, shortest: float = 1e-16) -> None:
     """Advance a search by one minimisation; parameters and errors as `bisection`."""
     stop = Stop(tolerance=target.tolerance)
     found = minimise(landscape, search.state, target.method, stop, search.history)

@@ -103,9 +103,7 @@ def compressed_start(start: Packing, phi: float) -> Packing:
         return run.packing()
 
 
-def plan(
-    start: Callable[[], Packing], settings: Approach, made_from: Mapping[str, Any]
-) -> Plan:
+def plan(start: Callable[[], Packing], settings: Approach, made_from: Mapping[str, Any]) -> Plan:
     """Plan an approach to jamming, and the return to a vanishing pressure."""
 
     def begin() -> ApproachDriver:
@@ -134,14 +132,13 @@ class ApproachDriver:
         self, first: Packing, settings: Approach, checkpoint: Checkpoint | None = None
     ) -> None:
         told = checkpoint or {"kappa": settings.kappa_start, "dt": settings.dt, "rows": 0}
-        self._first, self._settings, self._rows = first, settings, told["rows"]
+        self._settings, self._rows = settings, told["rows"]
+        self._pressure: float
         self._pressure, self._marked = told.get("pressure", math.inf), checkpoint
         flow = Compression(kappa=told["kappa"], phi_end=_NO_END, dt=told["dt"], sides=2)
         self._session = Session()
         try:
-            self._run = CompressionRun(
-                self._session, flow, first, checkpoint and checkpoint["run"]
-            )
+            self._run = CompressionRun(self._session, flow, first, checkpoint and checkpoint["run"])
         except BaseException:
             self._session.close()
             raise
@@ -149,7 +146,7 @@ class ApproachDriver:
     @property
     def done(self) -> bool:
         """Whether the pressure has vanished again."""
-        return self._run.settings.kappa < 0 and self._pressure <= self._settings.p_open
+        return self._run.settings.kappa < 0.0 and self._pressure <= self._settings.p_open
 
     @property
     def at_mark(self) -> bool:
@@ -212,8 +209,8 @@ class ApproachDriver:
         return self._marked
 
     def results(self) -> dict[str, Any]:
-        """Return the version of LAMMPS."""
-        return {"lammps_version": self._session.version}
+        """Return the rate and the version of LAMMPS."""
+        return {"rate": self._run.settings.kappa, "lammps_version": self._session.version}
 
     def close(self) -> None:
         """End LAMMPS."""

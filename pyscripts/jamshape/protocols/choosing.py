@@ -41,7 +41,8 @@ class Choosing:
     def __init__(self, making: Making, checkpoint: Checkpoint | None, file: Path) -> None:
         self._making, self._file = making, file
         at = checkpoint or {"first": -1, "last": count_frames(file), "minimised_u": 0.0}
-        self._first, self._last, self._u = at["first"], at["last"], at["minimised_u"]
+        self._first, self._last = int(at["first"]), int(at["last"])
+        self._u = float(at["minimised_u"])
 
     @property
     def done(self) -> bool:

@@ -9,14 +9,14 @@ file until the packing is finished, ``OUT.making.h5``, from which an interrupted
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jamshape.files.h5md import count_frames, read_attributes, read_observables, require_attributes
+from jamshape.files.h5md import read_attributes, read_observables, require_attributes
+from jamshape.files.lock import Lock
 from jamshape.flow import lammps_driver
 from jamshape.flow.compression import Compression
 from jamshape.flow.lammps_driver import Sizes
@@ -43,6 +43,7 @@ from jamshape.protocols.stages import (
     Making,
     Retrying,
     Searching,
+    Stage,
     Strengthening,
     Sweeping,
 )
@@ -61,6 +62,7 @@ __all__ = [
     "require_same",
     "run_file",
     "summary_of",
+    "tidy",
 ]
 
 # Rows and frames of marschall-2018; frames are about 2e-3 of phi apart at jamming.
@@ -115,6 +117,14 @@ def _making_file(out: Path) -> Path:
     return out.with_name(out.name + ".making.h5")
 
 
+def tidy(out: Path) -> None:
+    """Remove what a kill after the last write has left beside a finished packing."""
+    left = _making_file(out)
+    if left.exists():
+        with Lock(left):
+            left.unlink(missing_ok=True)
+
+
 def run_file(recipe: Recipe, out: Path) -> Path | None:
     """Name the file of the compression in LAMMPS, if the recipe has one."""
     if isinstance(recipe.way, Steps):
@@ -129,9 +139,10 @@ def compress(recipe: Recipe, out: Path, how: How) -> None:
     if path is None or (isinstance(recipe.way, Compressed) and recipe.way.source):
         return
     plan = _compression(recipe)
-    if path.exists():
-        recipe.require_particles(path) if not how.again else None
     try:
+        if path.exists():
+            require_attributes(path, plan.settings, plan.what)
+            recipe.require_particles(path)
         record(path, plan, how._replace(again=False))
     except ValueError:
         if not how.again:
@@ -188,7 +199,8 @@ class Pipeline:
             making.state, making.attributes = told["state"], told.get("attributes", {})
             history = History.of(told["history"]) if "history" in told else History()
             making.minimum = minimum_of(told.get("minimum"), history)
-        self._k, self._stage = told["stage"], None
+        self._k = told["stage"]
+        self._stage: Stage | None = None
         self._begin_stage(told.get("inner"))
 
     def _stages(self) -> list[Begin]:
@@ -204,7 +216,7 @@ class Pipeline:
             found.append(partial(Choosing, file=self._source))
         return found + [Searching] * bool(recipe.target) + [self._last] * bool(recipe.target)
 
-    def _last(self, making: Making, checkpoint: Checkpoint | None) -> Any:
+    def _last(self, making: Making, checkpoint: Checkpoint | None) -> Stage | None:
         """Begin a strict search or a second attempt, where there is to be one."""
         if self._recipe.strict:
             return Strengthening(making, checkpoint)
@@ -215,11 +227,12 @@ class Pipeline:
     def _begin_stage(self, checkpoint: Checkpoint | None = None) -> None:
         """Begin the present stage, or the next one that there is to be; at the end there is none."""
         stages = self._stages()
-        self._stage = None
-        while self._k < len(stages) and self._stage is None:
+        while self._k < len(stages):
             self._stage = stages[self._k](self._making, checkpoint)
-            if self._stage is None:
-                self._k += 1
+            if self._stage is not None:
+                return
+            self._k += 1
+        self._stage = None
 
     @property
     def done(self) -> bool:
@@ -264,8 +277,8 @@ class Pipeline:
         return found
 
     def results(self) -> dict[str, Any]:
-        """Nothing is in a file before the end."""
-        return {}
+        """Name the present stage."""
+        return {"stage": type(self._stage).__name__.lower()}
 
     def close(self) -> None:
         """Nothing is held outside of Python."""
@@ -291,7 +304,9 @@ def _last_row(run: Path) -> dict[str, float]:
     """Return the end of a compression."""
     rows = read_observables(run)
     names = ("phi", "u", "pressure", "evaluations")
-    return {f"compression_{name}": float(rows[name][-1]) for name in names if len(rows.get(name, ()))}
+    return {
+        f"compression_{name}": float(rows[name][-1]) for name in names if len(rows.get(name, ()))
+    }
 
 
 def onsets_of(run: Path) -> dict[str, float]:

@@ -13,7 +13,14 @@ from typing import Any, Protocol
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Minimum
 from jamshape.minima.checkpoints import minimum_of, search_of, told_minimum, told_search
-from jamshape.minima.target import Search, Target, TargetError, bisect, extrapolate, require_reachable
+from jamshape.minima.target import (
+    Search,
+    Target,
+    TargetError,
+    bisect,
+    extrapolate,
+    require_reachable,
+)
 from jamshape.packing import State
 from jamshape.protocols import quasistatic, retry, strict, thermal
 from jamshape.protocols.quasistatic import QuasistaticRun
@@ -84,8 +91,8 @@ class Stage(Protocol):
         """Hand the results on."""
 
 
-Begin = Callable[[Making, Checkpoint | None], Stage]
-"""Makes a stage at its beginning, or from a checkpoint."""
+Begin = Callable[[Making, Checkpoint | None], Stage | None]
+"""Makes a stage at its beginning, or from a checkpoint; None if it is not needed."""
 
 
 class Compressing:
@@ -264,7 +271,10 @@ class Strengthening:
     def checkpoint(self) -> Checkpoint:
         """Return the search; its proof is made anew."""
         search = self._search
-        minimum = {"minimum": told_minimum(search.minimum), "history": search.minimum.history.told()}
+        minimum = {
+            "minimum": told_minimum(search.minimum),
+            "history": search.minimum.history.told(),
+        }
         return vars(search) | minimum | {"proof": None}
 
     def end(self) -> None:

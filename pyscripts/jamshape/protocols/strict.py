@@ -93,7 +93,9 @@ class StrictSearch:
     def __str__(self) -> str:
         left = "" if self.proof is None else f", {self.proof.n_negative} negative eigenvalues of 0"
         if self.proof is not None and self.proof.n_kinked:
-            left += f", {self.proof.n_kinked} more at kinks, to both sides of which the energy rises"
+            left += (
+                f", {self.proof.n_kinked} more at kinks, to both sides of which the energy rises"
+            )
         return (
             f"step {self.n_steps} of at most {self.most_steps}, {self.n_free} motions slide, {self.n_met} of"
             f" them up to new contacts, longest step {self.farthest.max():.1e}{left}"

@@ -80,7 +80,9 @@ class Content:
                 lists = (series.step.tolist(), series.time.tolist(), list(series.value))
                 found.columns[name] = Column(*lists)
             n = layout.count(file, "report")
-            rows = [layout.require_rows(file, "report", name)[:n].tolist() for name in layout.REPORT]
+            rows = [
+                layout.require_rows(file, "report", name)[:n].tolist() for name in layout.REPORT
+            ]
             found.report = list(zip(*rows, strict=True))
             found.attributes.setdefault("dimension", frames[0].dimension)  # missing in older files
             if _CHECKPOINT in file:
@@ -106,7 +108,7 @@ class Content:
 
     def write(self, attributes: Mapping[str, Any], checkpoint: Checkpoint | None) -> None:
         """Replace the file by the present content, with results so far; errors as `write_packing`."""
-        self.attributes |= attributes | {"finished": checkpoint is None}
+        self.attributes |= dict(attributes) | {"finished": checkpoint is None}
         first, *others = self.frames
         with layout.written(self.path) as file:
             layout.create_file(file, first, self.attributes, {})

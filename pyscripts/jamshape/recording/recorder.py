@@ -41,8 +41,8 @@ class How(NamedTuple):
     """Begin anew, whatever the file holds."""
     seconds: float | None = None
     """Time after which the run is put down at the next mark, [seconds]."""
-    tell: Callable[[Row], None] = lambda row: None
-    """Receives every row, for the display of progress."""
+    tell: Callable[[Row], None] = lambda _: None
+    """Receives every row, once it is safe where a checkpoint was due."""
 
 
 _USUAL = How()
@@ -98,19 +98,21 @@ class _Run(NamedTuple):
 def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
     """Advance to the end, or to the mark at which the run is put down."""
     content, driver = run.content, run.driver
-    how.tell(driver.first())
+    if (first := driver.first()).told.part is not None:
+        how.tell(first)
     began = perf_counter()
     end = math.inf if how.seconds is None else began + how.seconds
     due = began + SECONDS
     while not driver.done:
         row = driver.advance()
         content.add(row, driver.frame() if row.has_frame else None)
-        how.tell(row)
-        if driver.done or not driver.at_mark:
-            continue
         stops = interrupts.noted is not None or perf_counter() >= end
-        if stops or perf_counter() >= due:
+        is_mark = driver.at_mark and not driver.done
+        if is_mark and (stops or perf_counter() >= due):
             due = run.write()
+        how.tell(row)
+        if not is_mark:
+            continue
         if interrupts.noted is not None:
             return  # raised again outside
         if stops:
@@ -123,9 +125,7 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
 
 
 def _stopped(row: Row, seconds: float, path: Path) -> str:
-    return (
-        f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command goes on"
-    )
+    return f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command goes on"
 
 
 def _begun(path: Path, plan: Plan) -> _Run:

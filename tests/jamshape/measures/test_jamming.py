@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from jamshape.flow.slow_recording import summary_of
 
 import jamshape as js
 from jamshape.files.h5md import read_attributes
-from jamshape.flow.slow_recording import summary_of
 from jamshape.landscape import Landscape
 from jamshape.measures import jamming
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames, stays_jammed
