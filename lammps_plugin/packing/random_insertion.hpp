@@ -192,7 +192,8 @@ template <class Model, int D> class RandomInsertion {
     return [this, i](std::size_t j, const Vec<D> &apart) { return overlap(i, j, apart); };
   }
 
-  bool overlap(std::size_t i, std::size_t j, const Vec<D> &apart) const
+  /// Not inlined into each of the loops that call it.
+  [[gnu::noinline]] bool overlap(std::size_t i, std::size_t j, const Vec<D> &apart) const
   {
     Body first = bodies[i], second = bodies[j];
     first.centre = apart;
