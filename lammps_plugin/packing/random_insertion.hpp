@@ -191,7 +191,8 @@ template <class Model, int D> class RandomInsertion {
     return [this, i](const Body &other, const Vec<D> &apart) { return overlap(i, other, apart); };
   }
 
-  bool overlap(std::size_t i, const Body &other, const Vec<D> &apart) const
+  /// Not inlined into each of the loops that call it.
+  [[gnu::noinline]] bool overlap(std::size_t i, const Body &other, const Vec<D> &apart) const
   {
     Body first = bodies[i], second = other;
     first.centre = apart;
