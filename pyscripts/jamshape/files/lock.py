@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
-from jamshape.files.disk import PathLike, real, refusals
+from jamshape.files.disk import PathLike, real, refusals, require_replaceable
 
 # Of file systems without locks.
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
@@ -38,7 +38,8 @@ class Lock:
     Raises
     ------
     OSError
-        If another process holds it, or the folder is missing or not writable; the message is one sentence.
+        If another process holds it, the folder is missing or not writable, or the file cannot be replaced
+        (`require_replaceable`); the message is one sentence.
 
     Warns
     -----
@@ -47,7 +48,9 @@ class Lock:
     """
 
     def __init__(self, path: PathLike) -> None:
-        self._path, self._file = lock_of(path), -1
+        self._path = lock_of(path)
+        self._file = -1
+        require_replaceable(path)
         with refusals(path, self._path):
             self._file = _locked(self._path, path)
         _held.add(self)
