@@ -14,8 +14,8 @@ from typing import Self
 
 from jamshape.files.disk import PathLike, real, refusals, require_replaceable
 
-# Of file systems without locks.
-_NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
+NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
+"""Errors of file systems without locks."""
 
 _FLAGS = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
@@ -129,7 +129,7 @@ def _flocked(file: int, path: PathLike) -> bool:
         )
         raise OSError(msg) from error
     except OSError as error:
-        if error.errno not in _NO_LOCKS:
+        if error.errno not in NO_LOCKS:
             raise
         msg = (
             f"{path}: its file system has no locks, expected one where several processes could write a file;"
