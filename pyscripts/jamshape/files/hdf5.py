@@ -212,47 +212,52 @@ def readable(path: PathLike) -> Iterator[None]:
         raise FileFormatError(msg) from error
 
 
-def has_item(file: h5py.File, name: str) -> bool:
-    """Whether a file has a group or dataset, or a link in its place, which is not followed."""
+def has_item(parent: h5py.Group, name: str) -> bool:
+    """Whether a file or group has a group or dataset, or a link in its place, which is not followed."""
     try:
-        return _link_in(file, name) is not None
+        return _link_in(parent, name) is not None
     except KeyError:
         return False
 
 
-def require_item(file: h5py.File, name: str) -> Any:
-    """Return a group or dataset of the file itself, or refuse the file."""
+def require_item(parent: h5py.Group, name: str) -> Any:
+    """Return a group or dataset that is in the file itself, or refuse the file."""
     try:
-        link = _link_in(file, name)
+        link = _link_in(parent, name)
     except KeyError as error:
-        msg = f"{file.filename}: has no /{name}, expected an H5MD file written by jamshape"
+        msg = f"{parent.file.filename}: has no /{name}, expected an H5MD file written by jamshape"
         raise FileFormatError(msg) from error
     if link:
-        msg = f"{file.filename}: /{link} is a link to elsewhere, expected the data themselves; copy them"
+        msg = f"{parent.file.filename}: /{link} is a link to elsewhere, expected the data themselves; copy them"
         raise FileFormatError(msg)
-    return file[name]
+    return parent[name]
 
 
-def _link_in(file: h5py.File, name: str) -> str:
+def _link_in(parent: h5py.Group, name: str) -> str:
     """Return the first prefix of a path that is a soft or external link, "" without; KeyError if an item is missing."""
     parts = name.split("/")
     for k in range(1, len(parts) + 1):
         part = "/".join(parts[:k])
-        if not file.id.links.exists(part.encode()):
+        if not parent.id.links.exists(part.encode()):
             raise KeyError(part)
-        if file.id.links.get_info(part.encode()).type != hdf5().h5l.TYPE_HARD:
+        if parent.id.links.get_info(part.encode()).type != hdf5().h5l.TYPE_HARD:
             return part
     return ""
 
 
 def require_dataset(
-    file: h5py.File, name: str, n: int | None = None, *, kinds: str = "biuf", sparse: bool = False
+    parent: h5py.Group,
+    name: str,
+    n: int | None = None,
+    *,
+    kinds: str = "biuf",
+    sparse: bool = False,
 ) -> Any:
     """Return a dataset that can be read within bounds, or refuse the file.
 
     Parameters
     ----------
-    file : h5py.File
+    parent : h5py.File or h5py.Group
     name : str
     n : int, optional
         Number of rows that will be read; all by default.
@@ -261,15 +266,15 @@ def require_dataset(
     sparse : bool
         Whether chunks may be missing, which then read as 0; its shape should be checked otherwise.
     """
-    dataset = require_item(file, name)
+    dataset = require_item(parent, name)
     if not hasattr(dataset, "shape"):
-        msg = f"{file.filename}: /{name} is a group, expected a dataset"
+        msg = f"{parent.file.filename}: /{name} is a group, expected a dataset"
         raise FileFormatError(msg)
     shape: tuple[int, ...] = dataset.shape
     if n is not None and shape:
         shape = (min(n, shape[0]), *shape[1:])
-    if problem := _problem(file, dataset, shape, sparse) or _problem_of_type(dataset, kinds):
-        msg = f"{file.filename}: /{name} {problem}; write it again"
+    if problem := _problem(dataset, shape, sparse) or _problem_of_type(dataset, kinds):
+        msg = f"{parent.file.filename}: /{name} {problem}; write it again"
         raise FileFormatError(msg)
     return dataset
 
@@ -279,7 +284,7 @@ def _problem_of_type(dataset: h5py.Dataset, kinds: str) -> str:
     return "" if kind in kinds else f"has dtype {dataset.dtype}, expected numbers"
 
 
-def _problem(file: h5py.File, dataset: h5py.Dataset, shape: tuple[int, ...], sparse: bool) -> str:
+def _problem(dataset: h5py.Dataset, shape: tuple[int, ...], sparse: bool) -> str:
     """Describe why rows of a dataset should not be read; "" if they may be."""
     made = dataset.id.get_create_plist()
     if made.get_layout() == hdf5().h5d.VIRTUAL or made.get_external_count():
@@ -292,7 +297,7 @@ def _problem(file: h5py.File, dataset: h5py.Dataset, shape: tuple[int, ...], spa
     needed = n_chunks * math.prod(chunks) * dataset.dtype.itemsize
     stored = dataset.id.get_storage_size()
     most = stored * (_LARGEST_RATIO if _GZIP in filters else 1)
-    if stored > file.id.get_filesize() or (needed > most and not sparse):
+    if stored > dataset.file.id.get_filesize() or (needed > most and not sparse):
         return f"claims {needed} bytes and stores {stored}, expected all of them"
     return ""
 
@@ -302,12 +307,12 @@ def attribute(item: Any, name: str, otherwise: Any = None) -> Any:
     return _plain(item, name) if name in item.attrs else otherwise
 
 
-def attributes(file: h5py.File, name: str) -> dict[str, Any]:
+def attributes(parent: h5py.Group, name: str) -> dict[str, Any]:
     """Read the attributes of a group, those that are datasets as well."""
-    group = require_item(file, name)
+    group = require_item(parent, name)
     found = attributes_of(group)
     for key in group:
-        array = require_dataset(file, f"{name}/{key}", kinds="biufS")[()]
+        array = require_dataset(group, key, kinds="biufS")[()]
         is_text = array.dtype.kind == "S"
         found[key] = _text(array.tobytes()) if is_text else array
     return found
@@ -330,7 +335,11 @@ def _plain(item: Any, name: str) -> Any:
             f"{file.filename}: the attribute {name} is larger than the file, expected a part of it"
         )
         raise FileFormatError(msg)
-    value = item.attrs[name]
+    return plain(item.attrs[name])
+
+
+def plain(value: Any) -> Any:
+    """Convert NumPy scalars to Python, and bytes to str."""
     if isinstance(value, bytes):
         return _text(value)
     return value.item() if isinstance(value, np.generic) else value

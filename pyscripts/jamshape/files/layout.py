@@ -23,6 +23,7 @@ from jamshape.files.hdf5 import (
     check_attributes,
     has_item,
     open_file,
+    plain,
     put,
     readable,
     reading,
@@ -43,9 +44,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FileFormatError",
+    "attribute",
+    "attributes",
     "check_attributes",
+    "plain",
+    "put",
     "readable",
     "reading",
+    "require_item",
     "set_attributes",
     "written",
 ]
@@ -141,8 +147,11 @@ def count(file: h5py.File, element: str) -> int:
     return shape[0]
 
 
-def require_rows(file: h5py.File, element: str, name: str, n: int, *, sparse: bool = False) -> Any:
-    """Look up a dataset with a row for each of the n steps of its element."""
+def require_rows(
+    file: h5py.File, element: str, name: str, n: int | None = None, *, sparse: bool = False
+) -> Any:
+    """Look up a dataset with a row for each of the n steps of its element, counted by default."""
+    n = count(file, element) if n is None else n
     kinds = "iu" if name == "step" else "biuf"
     dataset = require_dataset(file, f"{element}/{name}", n, kinds=kinds, sparse=sparse)
     if dataset.shape[:1] < (n,):
@@ -372,9 +381,10 @@ def _require_one_size(file: h5py.File, packing: Packing) -> None:
 
 def _read_law(file: h5py.File) -> Interaction:
     """Read the law of the particles; files of 0.1.0 store it only among the attributes of runs."""
-    known = attributes(file, "parameters") if has_item(file, "parameters") else {}
-    group = require_item(file, "particles/all")
-    known |= {name: attribute(group, name) for name in Interaction._fields if name in group.attrs}
+    known: dict[str, Any] = {}
+    for place in filter(lambda name: has_item(file, name), ("parameters", "particles/all")):
+        group = require_item(file, place)
+        known |= {k: attribute(group, k) for k in Interaction._fields if k in group.attrs}
     try:
         return Interaction.told(known)
     except (TypeError, ValueError) as error:
