@@ -139,7 +139,7 @@ def check_attributes(attributes: Mapping[str, Any]) -> None:
             raise ValueError(msg)
 
 
-def set_attributes(group: h5py.Group, attributes: Mapping[str, Any]) -> None:
+def set_attributes(group: h5py.Group | h5py.Dataset, attributes: Mapping[str, Any]) -> None:
     """Set attributes, replacing those of the same name; long ones are datasets of the group.
 
     Raises
@@ -149,7 +149,7 @@ def set_attributes(group: h5py.Group, attributes: Mapping[str, Any]) -> None:
     """
     check_attributes(attributes)
     for name, value in attributes.items():
-        if name in group:
+        if hasattr(group, "keys") and name in group:
             del group[name]
         text = value.encode(errors="surrogateescape") if isinstance(value, str) else None
         size = np.asarray(value).nbytes if text is None else len(text)

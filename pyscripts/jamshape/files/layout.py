@@ -47,6 +47,7 @@ __all__ = [
     "attribute",
     "attributes",
     "check_attributes",
+    "has_item",
     "plain",
     "put",
     "readable",
