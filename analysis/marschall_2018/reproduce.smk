@@ -80,7 +80,7 @@ for n in AT["order_n"]:
             add(
                 "order",
                 name,
-                f"jamshape compress --resume --no-minimising --alpha 4 --size-ratio {ratio} --n {n} --seed {seed}"
+                f"jamshape compress --no-minimising --alpha 4 --size-ratio {ratio} --n {n} --seed {seed}"
                 f" --kappa {AT['order_kappa']} --phi-start 0.2 --phi-end 0.9 --out runs/{name}.h5",
             )
 

@@ -13,6 +13,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+TIME_IS_UP = 75
+"""Exit code of commands that stopped before their end (EX_TEMPFAIL)."""
+
 
 class Range(NamedTuple):
     """Allowed values of a setting."""
@@ -84,6 +87,13 @@ class ArgumentError(Sentence, ValueError):
     phi=0.7 has no effect with start='run.h5'
     >>> print(error.with_options)
     --phi 0.7 has no effect with --start run.h5
+    """
+
+
+class TimeLimitReached(RuntimeError):
+    """A run was stopped at a checkpoint because its time was up; the same call resumes it.
+
+    A command that raises it exits with code `TIME_IS_UP`.
     """
 
 
@@ -184,6 +194,7 @@ RANGES = {
     "spread": Range(0.0, 1.0, "a spread"),
     "samples": Range(1, _COUNT, "samples", whole=True),
     "pairs": Range(1, 10**9, "pairs", whole=True),
+    "seconds": Range(0.0, 1e9, "a time"),
     "threads": Range(1, 1024, "threads", whole=True),
     "dpi": Range(1, 4000, "dots", whole=True),
     "follow": Range(0, _COUNT, "modes", whole=True),

@@ -24,7 +24,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from jamshape.checks import NotReachedWarning, Sentence, require_options
+from jamshape.checks import (
+    TIME_IS_UP,
+    NotReachedWarning,
+    Sentence,
+    TimeLimitReached,
+    require_options,
+)
 
 # Exceptions for wrong input, missing files and failed searches, each with one sentence.
 PROBLEMS = (OSError, ValueError, RuntimeError)
@@ -114,7 +120,7 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
     """Turn expected errors of the body into one sentence after the program's name, and exit; likewise warnings.
 
     The exit code is 1 after one of `PROBLEMS`, a missing module, or a result that did not reach its goal
-    (`checks.NotReachedWarning`), and 130 after Ctrl-C.
+    (`checks.NotReachedWarning`), 75 if the time was up before the end, and 130 after Ctrl-C.
 
     Parameters
     ----------
@@ -144,6 +150,9 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
         if short and not end.code:
             sys.exit(1)
         raise
+    except TimeLimitReached as stop:
+        print(f"{name}: {stop}", file=sys.stderr)
+        sys.exit(TIME_IS_UP)
     except PROBLEMS as error:
         sys.exit(f"{name}: {_typed(error)}")
     except ImportError as error:

@@ -97,6 +97,31 @@ def add_old_option(parser: ArgumentParser, old: str, new: str, **keywords: Any) 
     )
 
 
+def add_old_flag(parser: ArgumentParser, old: str, instead: str) -> None:
+    """Let a command accept an option without a value that is no longer needed, which its help does not show.
+
+    Parameters
+    ----------
+    parser
+    old : str
+        Such as ``--resume``.
+    instead : str
+        What holds without it, for the warning.
+    """
+    parser.add_argument(
+        old, action=_OldFlag, nargs=0, default=False, help=SUPPRESS, metavar=instead
+    )
+
+
+class _OldFlag(Action):
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
+        print(
+            f"{parser.prog}: warning: {self.metavar} without {option_string}, which goes with the next release",
+            file=sys.stderr,
+        )
+        setattr(namespace, self.dest, True)
+
+
 class _OldOption(Action):
     def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
         print(

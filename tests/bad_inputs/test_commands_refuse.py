@@ -19,6 +19,7 @@ NO_NUMBERS = ("-1", "nan", "1e300", "x")
 NO_COUNTS = ("-1", "0", "1.5", "99999999999")
 
 COMPRESS = "compress --n 8 --kappa 1e-2 --phi-start 0.3 --phi-end 0.32 --out new.h5"
+RUN = "compress --alpha 1 --n 8 --kappa 1e-2 --dt 0.1 --phi-start 0.3 --phi-end 0.32 --rows 4 --frames 2 --out run.h5"
 PACK = "pack --n 8 --out new.h5"
 DYNAMICS = "pack --protocol dynamics --n 8 --out new.h5"
 STEPS = "pack --protocol steps --n 8 --out new.h5"
@@ -75,16 +76,18 @@ CASES = [
     (f"{COMPRESS} --phi-start 0.9 --phi-end 1", "stalled at phi"),
     (f"{COMPRESS} --dt 1e-6 --kappa 1e-14", "more than 1e.12 steps"),
     (f"{COMPRESS} --kapa 1", "unrecognized arguments"),
-    (f"{COMPRESS} --again --resume", "not allowed with"),
     ("compress --n 8", "required: --out"),
     (f"{COMPRESS} --integrator rkc2 --dt 0.1", "--dt 0.1 has no effect with --integrator rkc2"),
     (f"{COMPRESS} --dt 0.1 --integration-tolerance 1e-4", "--integration-tolerance 0.0001 has no effect with --integrator heun"),
-    ("compress --resume --out typo.h5", "--out typo.h5 does not exist, expected the file of a run; leave --resume out"),
-    *((f"compress --resume {option} --out run.h5", f"{option} differs from that of the run in --out run.h5, {own}, expected the same")
-      for option, own in (("--kappa 1e-05", "0.01"), ("--n 9", "8"), ("--phi-end 0.9", "0.32"), ("--dimension 3", "2"),
-                          ("--alpha 4.0", "1.0"), ("--rows 5", "4"))),
-    *((f"compress --n 8 --out {name}", "exists, expected another --out")
-      for name in ("start.h5", "run.h5", "text.h5", "start.data", "'a folder'")),
+    *each(COMPRESS, ["--seconds"], NO_NUMBERS),
+    ("compress --resume --out typo.h5", "typo.h5"),
+    *((f"{RUN} {option} {other}", f"run.h5 holds a compression with {option} {own}, expected {other}; choose another --out, or use --again")
+      for option, own, other in (("--kappa", "0.01", "1e-05"), ("--n", "8", "9"), ("--phi-end", "0.32", "0.9"),
+                                 ("--phi-start", "0.3", "0.31"), ("--dimension", "2", "3"), ("--alpha", "1.0", "4.0"),
+                                 ("--rows", "4", "5"), ("--dt", "0.1", "0.05"))),
+    *((f"compress --n 8 --out {name}", words) for name, words in (
+        ("start.h5", "does not hold a compression, expected one; choose another --out, or use --again"),
+        ("text.h5", "text.h5: is not an HDF5 file"), ("start.data", "start.data"), ("'a folder'", "a folder"))),
     ("compress --n 8 --out 'a\nb.h5'", "control character"),
     ("compress --n 8 --out text.h5/new.h5", "text.h5"),
     *((f"compress --resume --out {name}", words) for name, words in (

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +18,7 @@ from jamshape.files.h5md import read_packing, write_packing
 from jamshape.files.lammps_text import read_data
 from jamshape.flow.compression import Compression
 from jamshape.flow.implicit import Protocol
+from jamshape.flow.lammps_driver import Sizes
 from jamshape.flow.shear import Shear
 from jamshape.minima.target import Target
 from jamshape.packing import Box
@@ -80,7 +80,9 @@ def cases():
         for name, value in itertools.product(names, (NAN, math.inf, 0, "4; touch X", None, [1])):
             yield f"{kind.__name__} {name}={value}", partial(kind, **{name: value})
     for name, value in (("rows", 0), ("rows", 1.5), ("rows", "4"), ("frames", 0), ("frames", NAN)):
-        yield f"Recording {name}={value}", partial(Recording, Path("a"), **{name: value})
+        yield f"Sizes {name}={value}", partial(Sizes, **{name: value})
+        for record in (compress, shear):
+            yield f"{record.__name__} {name}={value}", record(**{name: value})
     for integrator in ("euler", "heun\nshell touch X", "rkc2 tolerance 1", "", None, 1):
         yield f"integrator {integrator!r}", partial(Compression, integrator=integrator)
         yield f"compress integrator {integrator!r}", compress(integrator=integrator or "none")

@@ -1,23 +1,17 @@
 import json
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
-from jamshape.files.restarts import RestartFiles
 
 pytestmark = pytest.mark.lammps
 
 DRIVER = Path(__file__).parents[2] / "pyscripts" / "compress.py"
 SMALL = ("--n", "48", "--kappa", "3e-4", "--dt", "0.1", "--phi-end", "0.86", "--rows", "60")
-
-# Last estimated since the process began: not properties of the state.
-OF_THE_PROCESS = {"lambda_max", "dt_max", "step_error"}
 
 
 def command(out, *options, settings=SMALL):
@@ -66,58 +60,25 @@ def test_integrators_that_choose_their_steps_take_rows_as_steps(tmp_path):
     assert (observables["substep_shortest"] > 0).sum() >= 60
     assert observables["forced"][-1] == 0
     assert observables["evaluations"][-1] < 2 * read_attributes(out)["dt"] * 60 / 0.05
-    again = run(out, *options, "--resume", **chosen)
+    again = run(out, *options, **chosen)
     assert again.returncode == 0
 
 
-@pytest.mark.parametrize("broken", [False, True])
-def test_a_killed_run_goes_on_as_if_nothing_had_happened(broken, whole, tmp_path):
-    out = tmp_path / "killed.h5"
-    with subprocess.Popen(
-        command(out), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
-    ) as going:
-        deadline = time.monotonic() + 60
-        while not Path(f"{out}.restart.b").exists() and time.monotonic() < deadline:
-            time.sleep(0.005)
-        going.send_signal(signal.SIGKILL)
-    assert not read_attributes(out)["finished"]
-    if broken:  # the newest restart file, as if it had been killed while it was written
-        newest = RestartFiles(Path(f"{out}.restart")).newest()
-        newest.write_bytes(newest.read_bytes()[:-5])
-    resumed = run(out, "--resume")
-    assert resumed.returncode == 0, resumed.stderr
-    for name, values in read_observables(whole[0]).items():
-        if name in OF_THE_PROCESS:
-            continue
-        np.testing.assert_allclose(read_observables(out)[name], values, rtol=1e-9, atol=1e-10)
-    one, other = read_packing(whole[0]), read_packing(out)
-    np.testing.assert_allclose(other.position, one.position, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(other.orientation, one.orientation, rtol=0, atol=1e-10)
-    assert [path.name for path in tmp_path.iterdir()] == ["killed.h5"]
-
-
-def test_a_run_without_restart_files_begins_anew(whole, tmp_path):
-    out = tmp_path / "killed.h5"
-    with subprocess.Popen(
-        command(out), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
-    ) as going:
-        deadline = time.monotonic() + 60
-        while not out.exists() and time.monotonic() < deadline:
-            time.sleep(0.005)
-        going.send_signal(signal.SIGKILL)
-    RestartFiles(Path(f"{out}.restart")).forget()
-    # Another order of atoms, another path, on which a frame may stay undecided; that is said, and no failure here.
-    resumed = run(out, "--resume")
-    assert resumed.returncode == 0 or "are ignored" in resumed.stderr
-    expected = read_observables(whole[0])["phi"]
-    np.testing.assert_allclose(read_observables(out)["phi"], expected, rtol=1e-12)
+def test_resume_is_accepted_for_one_release(whole):
+    """With the settings, or with none, which takes those of the file."""
+    out, report = whole
+    for settings in (SMALL, ()):
+        again = run(out, "--resume", settings=settings)
+        assert json.loads(again.stdout.splitlines()[-1]) == report
+        assert again.stderr.startswith(
+            "compress.py: warning: the same command resumes without --resume, which goes with the next release\n"
+        )
 
 
 def test_a_finished_run_is_left_alone(whole):
     out, report = whole
     before = out.read_bytes()
-    Path(f"{out}.restart.a").touch()  # as killed before it could remove them
-    again = run(out, "--resume")
+    again = run(out)
     assert again.returncode == 0
     assert json.loads(again.stdout.splitlines()[-1]) == report
     assert out.read_bytes() == before

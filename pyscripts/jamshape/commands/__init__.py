@@ -75,7 +75,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         called = f"{_NAME} {first}"
         _run(first, given[1:], _Called(called, called))
     if first in {"-h", "--help", "--version"}:
-        print(_version() if first == "--version" else _help())
+        with sentences(_NAME):
+            print(_version() if first == "--version" else _help())
         sys.exit(0)
     print(f"{_NAME}: {_unknown(first)}" if first else _help(), file=sys.stderr)
     sys.exit(_WRONG_USE)

@@ -7,7 +7,8 @@ Starts from the last frame of a packing or run file (--start), or compresses a r
 final stress, the modulus of the first step, averages over the steady state, and the stress drops, each with the
 strain and the stress before it, and the dissipated energy over the volume. not_at_rest counts rows in which forces do
 not balance to --tolerance; the exit code is 0 only if there are none. Needs no LAMMPS. The same command resumes an
-interrupted run, and leaves a finished one alone.
+interrupted run and leaves a finished one alone; it refuses a file with other settings, unless --again replaces it.
+With --seconds it stops in time, before a queue ends it: the exit code is then 75.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ from typing import Any
 
 from jamshape.checks import RANGES, require_in
 from jamshape.command import add_numbers, parser_of, report, typed
+from jamshape.commands.recording import add_recording_options
 from jamshape.flow.shear import FLOWS
 from jamshape.front.run import QuasistaticShearFile
 from jamshape.front.shearing import quasistatic_shear
 from jamshape.shapes.command_line import add_particle_options, particles_beside
 
-GO_ON = "the same command resumes from the last frame"
+GO_ON = "the same command resumes from the last checkpoint"
 
 
 def options_of() -> ArgumentParser:
@@ -46,8 +48,7 @@ def options_of() -> ArgumentParser:
     least = "omit drops below this fraction of the largest stress (%(default)s)"
     parser.add_argument("--least-drop", type=float, default=1e-2, help=least)
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
-    parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
-    parser.add_argument("--again", action="store_true", help="start over if --out exists")
+    add_recording_options(parser)
     return parser
 
 
@@ -59,7 +60,7 @@ def main(options: Namespace) -> None:
         RANGES["share"]._replace(meaning="a fraction", also=(0.0,)),
     )
     names = ("n", "dimension", "phi", "step", "strain", "flow", "pressure", "tolerance", "seed",
-             "start", "frames", "again")  # fmt: skip
+             "start", "frames", "again", "seconds")  # fmt: skip
     given = typed(options, *names)
     run = quasistatic_shear(particles_beside(options), **given, file=options.out)
     at_end = ("strain", "phi", "stress", "pressure", "sigma", "mu", "z")

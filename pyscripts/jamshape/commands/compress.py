@@ -4,28 +4,25 @@
 
 At the end frames are minimised, since p(phi) of a flow rises, too: its onset phi_J(kappa) is that of jamming only
 if states there stay jammed without driving; --no-minimising skips this. A sentence reports the result, and the last
-line of standard output is one JSON object. With --resume an interrupted run continues from its last restart
-file, with its own settings, and a finished one is left alone; other settings are refused. An existing file is
-replaced only with --again.
+line of standard output is one JSON object. The same command resumes an interrupted run and leaves a finished one
+alone; it refuses a file with other settings, unless --again replaces it. With --seconds it stops in time, before a
+queue ends it: the exit code is then 75.
 """
 
 from __future__ import annotations
 
-import math
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
-from jamshape.checks import ArgumentError, require_free
 from jamshape.command import add_numbers, parser_of, report, typed
 from jamshape.commands.onset import add_onset_options, tell_onset
-from jamshape.files.h5md import read_attributes, read_style
-from jamshape.flow.recording import summary_of
+from jamshape.commands.recording import add_recording_options
 from jamshape.front.compressing import PHI, compress
 from jamshape.front.recorded import resume
-from jamshape.old_names import add_old_option
+from jamshape.measures.runs import summary_of
+from jamshape.old_names import add_old_flag, add_old_option
 from jamshape.shapes.command_line import add_particle_options, are_particles_given, particles_of
 
-GO_ON = "the same command with --resume resumes from the last restart file"
+GO_ON = "the same command resumes from the last checkpoint"
 
 _SETTINGS = (
     "n",
@@ -39,8 +36,6 @@ _SETTINGS = (
     "rows",
     "frames",
 )
-
-_SAME = 1e-6  # relative rounding of the packing fraction of a start
 
 
 def options_of() -> ArgumentParser:
@@ -69,49 +64,19 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--integrator", help=f"heun, heun/adaptive or rkc2 ({usual})")
     parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
     add_onset_options(parser)
-    parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
-    begin = parser.add_mutually_exclusive_group()
-    begin.add_argument("--resume", action="store_true", help="continue an interrupted run")
-    begin.add_argument("--again", action="store_true", help="start over if --out exists")
+    add_recording_options(parser)
+    add_old_flag(parser, "--resume", "the same command resumes")
     return parser
 
 
 def main(options: Namespace) -> None:
-    """Compress, or resume, and report."""
-    if options.resume:
-        _require_same(options)
-        resume(options.out)
+    """Begin or resume, and report; a finished run is left alone."""
+    given, phi = typed(options, *_SETTINGS), typed(options, "phi_start", "phi_end")
+    if options.resume and not (given or phi or are_particles_given(options)):
+        resume(options.out, seconds=options.seconds)
     else:
-        require_free(options.out, again=options.again, go_on="--resume to continue it, ")
-        usual = {"phi_start": PHI[0], "phi_end": PHI[1]} | typed(options, "phi_start", "phi_end")
-        phi = (usual["phi_start"], usual["phi_end"])
-        given = typed(options, *_SETTINGS)
-        compress(particles_of(options), phi=phi, **given, file=options.out, again=options.again)
+        usual = {"phi_start": PHI[0], "phi_end": PHI[1]} | phi
+        how = {"file": options.out, "again": options.again, "seconds": options.seconds}
+        compress(particles_of(options), phi=tuple(usual.values()), **given, **how)
     tell_onset(options)
     report(summary_of(options.out))
-
-
-def _require_same(options: Namespace) -> None:
-    """Refuse to resume a missing run, or with other settings.
-
-    Raises
-    ------
-    ArgumentError
-    """
-    if not options.out.exists():
-        said = "{file} does not exist, expected the file of a run; leave {resume} out to begin one"
-        raise ArgumentError(said, {"file": options.out, "resume": True})
-    stored = read_attributes(options.out)
-    asked = typed(options, *_SETTINGS, "phi_start", "phi_end")
-    if are_particles_given(options):
-        asked |= particles_of(options).told
-    for name, value in asked.items():
-        own = (
-            read_style(options.out)[1]
-            if name == "dimension"
-            else stored.get(name.removeprefix("integration_"), value)
-        )
-        same = math.isclose(own, value, rel_tol=_SAME) if isinstance(value, float) else own == value
-        if not same:
-            said = f"{{{name}}} differs from that of the run in {{file}}, {own}, expected the same; leave it out"
-            raise ArgumentError(said, {name: value, "file": options.out})

@@ -57,7 +57,7 @@ _STORED = (
     _Stored("compression for a packing", "of_packing", _OTHER_COMMAND),
     _Stored("quasistatic shear", "shear_steps", _SAME_COMMAND),
     _Stored("shear", "gdot", _SAME_COMMAND),
-    _Stored("run", "finished", "jamshape compress --resume --out {path}"),
+    _Stored("run", "finished", _SAME_COMMAND),
     _Stored("packing", "", ""),
 )
 

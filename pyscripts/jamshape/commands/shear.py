@@ -5,8 +5,9 @@
 Starts from a random packing compressed fast to --phi, or from the last frame of a run or packing file
 (--start). The last line of standard output is one JSON object with averages over the steady state, each with its
 error and its correlation strain (memory); they exclude the start-up, which the file
-includes. --after sets the strain at which averaging begins. The same command resumes an interrupted run, and reports
-a finished one.
+includes. --after sets the strain at which averaging begins. The same command resumes an interrupted run and reports
+a finished one; it refuses a file with other settings, unless --again replaces it. With --seconds it stops in time,
+before a queue ends it: the exit code is then 75.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from jamshape.checks import RANGES, require_in
 from jamshape.command import add_numbers, parser_of, report, typed
+from jamshape.commands.recording import add_recording_options
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.motion import INTEGRATORS
 from jamshape.flow.shear import FLOWS
@@ -24,7 +26,7 @@ from jamshape.measures.shears import shear_report
 from jamshape.old_names import add_old_option
 from jamshape.shapes.command_line import add_particle_options, particles_beside
 
-GO_ON = "the same command resumes from the last restart file"
+GO_ON = "the same command resumes from the last checkpoint"
 
 
 def options_of() -> ArgumentParser:
@@ -53,8 +55,7 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--dt", type=float, help="time step of heun (0.05)")
     parser.add_argument("--after", type=float, help="strain at which averaging begins (automatic)")
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
-    parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
-    parser.add_argument("--again", action="store_true", help="start over if --out exists")
+    add_recording_options(parser)
     return parser
 
 
@@ -63,7 +64,7 @@ def main(options: Namespace) -> None:
     if options.after is not None:
         require_in("--after", options.after, RANGES["strain"]._replace(also=(0.0,)))
     names = ("n", "dimension", "phi", "gdot", "strain", "flow", "seed", "start", "sides",
-             "integrator", "dt", "integration_tolerance", "rows", "frames", "again")  # fmt: skip
+             "integrator", "dt", "integration_tolerance", "rows", "frames", "again", "seconds")  # fmt: skip
     given = typed(options, *names)
     shear(particles_beside(options), **given, file=options.out)
     report(shear_report(options.out, options.after))

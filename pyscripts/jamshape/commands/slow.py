@@ -4,8 +4,10 @@
 
 Starts from the last frame of a run or packing file (--start), or compresses a random packing fast in
 LAMMPS first. At the end frames are minimised, since p(phi) of a flow rises, too: its onset phi_J(kappa) is that of
-jamming only if states there stay jammed without driving; --no-minimising skips this. The same command resumes
-an interrupted run, and leaves a finished one alone. The last line of standard output is one JSON object.
+jamming only if states there stay jammed without driving; --no-minimising skips this. The same command resumes an
+interrupted run and leaves a finished one alone; it refuses a file with other settings, unless --again replaces it.
+With --seconds it stops in time, before a queue ends it: the exit code is then 75. The last line of standard output is
+one JSON object.
 """
 
 from __future__ import annotations
@@ -18,13 +20,14 @@ from typing import Any
 from jamshape.checks import RANGES, ArgumentError, require_in, require_no_effect, require_with
 from jamshape.command import add_numbers, parser_of, report, typed
 from jamshape.commands.onset import add_onset_options, tell_onset
+from jamshape.commands.recording import add_recording_options
 from jamshape.flow.implicit import METHODS
-from jamshape.flow.slow_recording import summary_of
 from jamshape.front.compressing import slow_compress
+from jamshape.measures.runs import summary_of
 from jamshape.old_names import add_old_option
 from jamshape.shapes.command_line import add_particle_options, particles_beside
 
-GO_ON = "the same command resumes from the last frame"
+GO_ON = "the same command resumes from the last checkpoint"
 
 
 _PHI_END, _KAPPA, _KAPPA_BEFORE = 0.9, 1e-8, 1e-6  # defaults
@@ -59,7 +62,7 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--method", choices=METHODS, default="tr-bdf2")
     add_onset_options(parser)
     parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
-    parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
+    add_recording_options(parser)
     return parser
 
 
@@ -82,7 +85,8 @@ def _rates(options: Namespace) -> dict[str, Any]:
 def main(options: Namespace) -> None:
     """Begin or resume; a finished run is left alone."""
     require_no_effect("start", options.start, phi_start=options.phi_start)
-    names = ("n", "p_end", "seed", "start", "method", "integration_tolerance", "largest_drop")
+    names = ("n", "p_end", "seed", "start", "method", "integration_tolerance", "largest_drop",
+             "again", "seconds")  # fmt: skip
     given = typed(options, *names) | _rates(options)
     phi_end = _PHI_END if options.phi_end is None else options.phi_end
     phi = (options.phi_start, phi_end)

@@ -38,6 +38,9 @@ _COUNTS = ("dt", "time", "strain", "turned", "steps", "rejected", "explicit", "e
 _COST = ("steps", "rejected", "explicit", "evaluations", "factorisations", "wall_seconds")
 
 
+_ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integration_tolerance"}
+
+
 def plan(
     start: Callable[[], Packing], course: Protocol | SlowShear, made_from: Mapping[str, Any]
 ) -> Plan:
@@ -49,11 +52,17 @@ def plan(
         return ImplicitDriver(first, course, Flow(State.of(first)))
 
     def restore(first: Packing, checkpoint: Checkpoint) -> ImplicitDriver:
-        state = checkpoint.pop("state")
-        return ImplicitDriver(first, course, Flow(state, **checkpoint))
+        if not checkpoint:
+            return ImplicitDriver(first, course, Flow(State.of(first)))
+        counts = {name: checkpoint[name] for name in _COUNTS}
+        return ImplicitDriver(first, course, Flow(checkpoint["state"], **counts))
 
-    what = "a shear" if isinstance(course, SlowShear) else "a compression"
-    return Plan(what, _as_attributes(course) | dict(made_from), begin, restore)
+    is_shear = isinstance(course, SlowShear)
+    what = "a shear" if is_shear else "a compression"
+    arguments = _ARGUMENTS | ({"method": "integrator"} if is_shear else {})
+    told = _as_attributes(course) | dict(made_from)
+    told["largest_strain"] = told.pop("largest_strain")  # may follow from the others
+    return Plan(what, told, begin, restore, arguments)
 
 
 class ImplicitDriver:
@@ -113,8 +122,8 @@ class ImplicitDriver:
         return {"state": self._flow.state} | {name: getattr(self._flow, name) for name in _COUNTS}
 
     def results(self) -> dict[str, Any]:
-        """Return the law, the packing fraction of the start, and the cost so far."""
-        found = self._first.law._asdict() | {"phi_start": self._first.phi}
+        """Return the law, and the cost so far."""
+        found = self._first.law._asdict()
         return found | {f"flow_{name}": getattr(self._flow, name) for name in _COST}
 
     def close(self) -> None:

@@ -22,6 +22,9 @@ TIME_PER_MARK = 1000.0
 """Least time between marks, [time]: many relaxations of a contact, next to which building neighbour lists is cheap."""
 
 
+_ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integration_tolerance"}
+
+
 def plan(
     start: Callable[[], Packing], settings: Motion, sizes: Sizes, made_from: Mapping[str, Any]
 ) -> Plan:
@@ -46,10 +49,11 @@ def plan(
         return LammpsDriver(first, settings, sizes)
 
     def restore(first: Packing, checkpoint: Checkpoint) -> LammpsDriver:
-        return LammpsDriver(first, settings, sizes, checkpoint)
+        return LammpsDriver(first, settings, sizes, checkpoint or None)
 
     told = dataclasses.asdict(settings) | dict(made_from) | dataclasses.asdict(sizes)
-    return Plan(f"a {settings.name}", told, begin, restore)
+    told["dt"] = told.pop("dt")  # may follow from the others
+    return Plan(f"a {settings.name}", told, begin, restore, _ARGUMENTS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,10 +132,9 @@ class LammpsDriver:
         return self._marked
 
     def results(self) -> dict[str, Any]:
-        """Return the packing fraction of the start, and what LAMMPS left out."""
+        """Return what LAMMPS left out, and its version."""
         session = self._session
-        found = {"left_out": session.left_out(), "lammps_version": session.version}
-        return {"phi_start": self._first.phi} | found
+        return {"left_out": session.left_out(), "lammps_version": session.version}
 
     def close(self) -> None:
         """End LAMMPS."""

@@ -23,6 +23,14 @@ _ROW = tuple(
 _COUNTS = ("steps", "u", "stress", "pressure", "volume", "evaluations", "wall_seconds")
 
 
+_ARGUMENTS = {
+    "strain_step": "step",
+    "strain_end": "strain",
+    "phi_sheared": "phi",
+    "hold_pressure": "pressure",
+}
+
+
 def plan(
     start: Callable[[], Packing], how: QuasistaticShear, frames: int, made_from: Mapping[str, Any]
 ) -> Plan:
@@ -36,10 +44,13 @@ def plan(
         return QuasistaticDriver(first, how, frames, Sheared(State.of(first)))
 
     def restore(first: Packing, checkpoint: Checkpoint) -> QuasistaticDriver:
-        return QuasistaticDriver(first, how, frames, Sheared(**checkpoint))
+        if not checkpoint:
+            return QuasistaticDriver(first, how, frames, Sheared(State.of(first)))
+        counts = {name: checkpoint[name] for name in _COUNTS}
+        return QuasistaticDriver(first, how, frames, Sheared(checkpoint["state"], **counts))
 
     settings = dataclasses.asdict(how) | dict(made_from) | {"frames": frames}
-    return Plan("a quasistatic shear", settings, begin, restore)
+    return Plan("a quasistatic shear", settings, begin, restore, _ARGUMENTS)
 
 
 class QuasistaticDriver:
@@ -93,8 +104,8 @@ class QuasistaticDriver:
         return {"state": self._run.state} | {name: getattr(self._run, name) for name in _COUNTS}
 
     def results(self) -> dict[str, Any]:
-        """Return the law, the packing fraction of the start, and counts so far."""
-        found = self._first.law._asdict() | {"phi_start": self._first.phi}
+        """Return the law, and counts so far."""
+        found = self._first.law._asdict()
         return found | {f"shear_{name}": getattr(self._run, name) for name in _COUNTS}
 
     def close(self) -> None:

@@ -65,7 +65,7 @@ def display(*, shown: bool = True, begun: float | None = None) -> Iterator[Calla
 
     def tell(at: Told) -> None:
         nonlocal line, shown
-        if not shown:
+        if not shown or sys.stderr is None:
             return
         try:
             if line is None:

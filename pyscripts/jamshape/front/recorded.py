@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.arguments import checked
-from jamshape.checks import require_path
+from jamshape.checks import require_given, require_path
 from jamshape.files.h5md import FileFormatError, read_attributes
 from jamshape.flow import implicit_driver, lammps_driver, quasistatic_driver
 from jamshape.flow.quasistatic import QuasistaticShear
@@ -22,6 +22,7 @@ from jamshape.recording.recorder import How, record
 def recorded(path: Path, plan: Plan, *, again: bool, seconds: float | None, progress: bool) -> None:
     """Record a run, or go on with it, showing progress; errors as `record`, and warnings as `resume`."""
     require_path(path)
+    require_given(seconds=seconds)
     with display(shown=progress) as tell:
         record(path, plan, How(again, seconds, lambda row: tell(row.told)))
     run_file(path).warn_unless_reached()

@@ -136,7 +136,7 @@ def shear(
         error = integration_tolerance or _IMPLICIT_ERROR
         slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
         _require_plane(of, sides)
-        plan = implicit_driver.plan(lambda: _flowing(of), slow, of.made_from)
+        plan = implicit_driver.plan(lambda: _flowing(of), slow, of.made_from | {"rows": rows})
         recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
         return ShearFile(*at)
     settings = Shear(

@@ -45,7 +45,7 @@ def told_of(start: MeasuredPacking) -> dict[str, Any]:
     found = {name: results[name] for name in names if name in results}
     # As UTF-8, whatever the locale: names may hold bytes that it cannot decode.
     name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else ""
-    return found | {"n": start.n, "start": name}
+    return found | {"n": start.n, "start": name, "phi_start": start.phi}
 
 
 class Asked(NamedTuple):
@@ -67,7 +67,7 @@ class Start(NamedTuple):
     seed: int
     dimension: int
     phi_name: str
-    """Name of `phi` in files; empty if `phi` is not stored."""
+    """Name of `phi` in files."""
 
     @classmethod
     def of(
@@ -78,7 +78,7 @@ class Start(NamedTuple):
         *,
         usual_phi: float,
         sides: int = 2,
-        phi_name: str = "",
+        phi_name: str = "phi_start",
     ) -> Start:
         """Take a start, which excludes other arguments, or particles with defaults."""
         require_no_effect("start", start, particles=particles, **asked._asdict())
@@ -105,8 +105,8 @@ class Start(NamedTuple):
         if self.known:
             return told_of(self.known)
         assert self.particles
-        phi = {self.phi_name: self.phi} if self.phi_name else {}
-        return dict(self.particles.told) | {"n": self.n} | phi | {"seed": self.seed}
+        own = {"n": self.n, self.phi_name: self.phi, "seed": self.seed}
+        return dict(self.particles.told) | own
 
     def random(self, phi: float | None = None) -> Packing:
         """Make the random start at a packing fraction; by default the one asked for, or the densest possible."""

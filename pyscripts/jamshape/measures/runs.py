@@ -14,6 +14,10 @@ from jamshape.files.h5md import read_attributes, read_observables
 from jamshape.measures.jamming import Jamming
 from jamshape.measures.onset import OnsetFit, fit_onset
 
+# Observables whose last values a summary has; slow runs have no contact numbers and order.
+_LAST = ("phi", "pressure", "u", "z", "S_2", "S_4")
+_COST = "flow_"  # of attributes that count the cost of implicit steps
+
 
 class Ensemble(NamedTuple):
     """Common settings of compressions that differ only in their seed."""
@@ -99,6 +103,19 @@ def read_run(path: Path) -> Run:
         return run._replace(fit=fit_onset(phi, pressure))
     except ValueError as error:  # it ends below jamming, or rearranges too soon
         return run._replace(problem=f"{path}: {error}")
+
+
+def summary_of(path: Path) -> dict[str, Any]:
+    """Summarise a compression: its end, its cost, phi_J(kappa), and where frames stay jammed; errors as above."""
+    observables, stored = read_observables(path), read_attributes(path)
+    last = {name: float(observables[name][-1]) for name in _LAST if name in observables}
+    cost = {
+        name.removeprefix(_COST): float(value)
+        for name, value in stored.items()
+        if name.startswith(_COST)
+    }
+    noted = {name: stored[name] for name in ("left_out",) if name in stored}
+    return {"out": str(path), **last, **cost, **noted} | onset_report(path)
 
 
 def onset_report(path: Path) -> dict[str, Any]:

@@ -14,20 +14,30 @@ from jamshape.recording.driver import Checkpoint
 if TYPE_CHECKING:
     import h5py
 
+FORMAT = "format"
+"""Attribute of a checkpoint: the version of what drivers store."""
+
+_VERSION = 1  # raised with every change of what a driver stores
+
 _KIND = "_kind"  # attribute of what is not a plain array or dictionary
 _BYTES, _STATE, _LONG = "bytes", "state", "long"
 
 
 def write_checkpoint(group: h5py.Group, checkpoint: Mapping[str, Any]) -> None:
     """Write a checkpoint into an empty group."""
+    _write(group, checkpoint)
+    group.attrs[FORMAT] = _VERSION
+
+
+def _write(group: h5py.Group, checkpoint: Mapping[str, Any]) -> None:
     for name, value in checkpoint.items():
         if value is None:
             continue
         if isinstance(value, Mapping):
-            write_checkpoint(group.create_group(name), value)
+            _write(group.create_group(name), value)
         elif isinstance(value, State):
             parts = dict(zip(("position", "orientation", "cell"), value.split, strict=True))
-            write_checkpoint(group.create_group(name), parts)
+            _write(group.create_group(name), parts)
             group[name].attrs[_KIND] = _STATE
         elif isinstance(value, bytes):
             layout.put(group, name, np.frombuffer(value, np.uint8)).attrs[_KIND] = _BYTES
@@ -47,9 +57,10 @@ def _write_array(group: h5py.Group, name: str, value: Any) -> None:
     layout.put(group, name, both).attrs[_KIND] = _LONG
 
 
-def read_checkpoint(group: h5py.Group) -> Checkpoint:
-    """Read a checkpoint."""
-    return dict(_items(group))
+def read_checkpoint(group: h5py.Group) -> Checkpoint | None:
+    """Read a checkpoint; return None for one of another version."""
+    found = dict(_items(group))
+    return found if found.pop(FORMAT, None) == _VERSION else None
 
 
 def _items(group: h5py.Group) -> Iterator[tuple[str, Any]]:
@@ -65,5 +76,5 @@ def _items(group: h5py.Group) -> Iterator[tuple[str, Any]]:
                 array = np.longdouble(array[0]) + array[1]
             yield name, array.tobytes() if kind == _BYTES else array
         else:
-            found = read_checkpoint(item)
+            found = dict(_items(item))
             yield name, State.joined(**found) if kind == _STATE else found

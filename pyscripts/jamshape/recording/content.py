@@ -67,6 +67,10 @@ class Content:
     report: list[tuple[int, float, float]] = field(default_factory=list)
     checkpoint: Checkpoint | None = None
 
+    def __post_init__(self) -> None:
+        """Add the dimension, which older files lack."""
+        self.attributes.setdefault("dimension", self.frames[0].dimension)
+
     @classmethod
     def read(cls, path: Path) -> Content:
         """Read a file; errors as `jamshape.files.h5md.read_packing`."""
@@ -84,7 +88,6 @@ class Content:
                 layout.require_rows(file, "report", name)[:n].tolist() for name in layout.REPORT
             ]
             found.report = list(zip(*rows, strict=True))
-            found.attributes.setdefault("dimension", frames[0].dimension)  # missing in older files
             if _CHECKPOINT in file:
                 found.checkpoint = read_checkpoint(layout.require_item(file, _CHECKPOINT))
         return found

@@ -8,7 +8,7 @@ depend on what is written, and the continuation from a checkpoint is the same to
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from numpy.typing import ArrayLike
@@ -86,11 +86,14 @@ class Plan:
     what
         Name in messages, with its article, such as ``a compression``.
     settings
-        Attributes that identify it: a file with others is refused.
+        Attributes that identify it: a file with others is refused. Those that follow from others are the last.
     begin
         Makes the driver at its start.
     restore
-        Makes the driver from the particles of the file, whose first frame they are, and a checkpoint.
+        Makes the driver from the particles of the file, whose first frame they are, and a checkpoint, which is empty
+        at the start.
+    arguments
+        Names of the arguments that settings of other names come from.
     finish
         Writes the results elsewhere at the end, when the file is not needed any more.
     """
@@ -99,4 +102,5 @@ class Plan:
     settings: Mapping[str, Any]
     begin: Callable[[], Driver]
     restore: Callable[[Packing, Checkpoint], Driver]
+    arguments: Mapping[str, str] = field(default_factory=dict)
     finish: Callable[[Driver], None] | None = None

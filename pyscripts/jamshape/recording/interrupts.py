@@ -43,7 +43,8 @@ class Interrupts:
             signal.raise_signal(number)
             return
         self.noted = number
-        with suppress(OSError, ValueError):  # standard error may be closed
+        # Standard error may be closed, or just be written to.
+        with suppress(OSError, ValueError, RuntimeError):
             print("\nstopping at the next checkpoint; once more ends at once", file=sys.stderr)
 
     def _restore(self) -> None:

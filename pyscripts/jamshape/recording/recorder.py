@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jamshape.checks import ArgumentError, TimeLimitReached
 from jamshape.files.disk import remove_leftovers
 from jamshape.files.layout import FileFormatError
 from jamshape.files.lock import Lock
@@ -28,10 +29,6 @@ PAUSE = 100.0
 
 SECONDS = 1.0
 """Least time between two checkpoints, [seconds]."""
-
-
-class TimeLimitReached(RuntimeError):
-    """A run was put down at a checkpoint, since its time was up; the same call goes on."""
 
 
 class How(NamedTuple):
@@ -69,17 +66,17 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
     OSError
         If another process writes the file, or it cannot be written.
     """
-    with Lock(path):
+    # A noted signal is raised again when the lock is released.
+    with Interrupts() as interrupts, Lock(path):
         remove_leftovers(path)
         content = None if how.again or not path.exists() else Content.read(path)
         if content:
             require_same(content, plan)
             if content.attributes["finished"]:
                 return
-        with Interrupts() as interrupts:
-            run = _begun(path, plan) if content is None else _resumed(content, plan)
-            with closing(run.driver):
-                _follow(run, interrupts, how)
+        run = _begun(path, plan) if content is None else _resumed(content, plan)
+        with closing(run.driver):
+            _follow(run, interrupts, how)
 
 
 class _Run(NamedTuple):
@@ -125,27 +122,33 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
 
 
 def _stopped(row: Row, seconds: float, path: Path) -> str:
-    return f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command goes on"
+    return f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command resumes"
 
 
 def _begun(path: Path, plan: Plan) -> _Run:
-    """Begin a run."""
+    """Begin a run; its file keeps the start, and shows at once whether it can be written."""
     driver = plan.begin()
     content = Content(path, [driver.frame()], dict(plan.settings))
     content.add(driver.first()._replace(error=None), None)
+    if plan.finish is None:
+        content.write(driver.results(), {})
     return _Run(content, driver, plan.finish)
 
 
 def _resumed(content: Content, plan: Plan) -> _Run:
     """Go on from the checkpoint of a file."""
     checkpoint, content.checkpoint = content.checkpoint, None
-    if checkpoint is None:
-        msg = (
-            f"{content.path} holds {plan.what} that was interrupted in an earlier version of jamshape, expected one with a"
-            " checkpoint; use again to replace it"
-        )
-        raise FileFormatError(msg)
-    return _Run(content, plan.restore(content.frames[0], checkpoint), plan.finish)
+    try:
+        if checkpoint is not None:
+            driver = plan.restore(content.frames[0], checkpoint)
+            return _Run(content, driver, plan.finish)
+    except (KeyError, TypeError):  # a number is missing, or of another kind
+        pass
+    msg = (
+        f"{content.path} holds {plan.what} that was interrupted in another version of jamshape, expected one with a"
+        " checkpoint of this version; use again to replace it"
+    )
+    raise FileFormatError(msg)
 
 
 def require_same(content: Content, plan: Plan) -> None:
@@ -153,18 +156,31 @@ def require_same(content: Content, plan: Plan) -> None:
 
     Raises
     ------
-    ValueError
+    ArgumentError
     """
-    if "finished" not in content.attributes:
-        msg = f"{content.path} does not hold {plan.what}, expected one; write to another file, or use again to replace it"
-        raise ValueError(msg)
+    advice = "choose another {file:name}, or use {again} to replace it"
+    given = {"file": content.path, "again": True}
+    stored, path = content.attributes, str(content.path).replace("{", "{{").replace("}", "}}")
+    if "finished" not in stored:
+        raise ArgumentError(f"{path} does not hold {plan.what}, expected one; {advice}", given)
     for name, value in plan.settings.items():
-        if not _is_same(content.attributes.get(name), value):
-            msg = (
-                f"{content.path} holds {plan.what} with {name} = {content.attributes.get(name)}, expected"
-                f" {value}; write to another file, or use again to replace it"
+        if not _is_same(stored.get(name), value):
+            argument = plan.arguments.get(name, name)
+            said = (
+                f"{path} holds {plan.what} with {{{argument}}}, expected {_Shown(value)}; {advice}"
             )
-            raise ValueError(msg)
+            raise ArgumentError(said, {argument: _Shown(stored.get(name)), **given})
+
+
+class _Shown:
+    """A stored value in a message."""
+
+    def __init__(self, value: Any) -> None:
+        self._value = value
+
+    def __repr__(self) -> str:
+        """Return it on one line."""
+        return " ".join(str(self._value).split())
 
 
 def _is_same(stored: Any, value: Any) -> bool:

@@ -90,7 +90,7 @@ def test_a_run(jamshape, tiny, name, kind):
 @pytest.mark.parametrize(
     ("name", "stored", "words"),
     [
-        ("run.h5", {"finished": False}, "jamshape compress --resume --out {path}"),
+        ("run.h5", {"finished": False}, "repeat the command that began it"),
         ("slow.h5", {"finished": False}, "repeat the command that began it"),
         (
             "dynamics.h5.run.h5",

@@ -1,4 +1,4 @@
-"""Quasistatic shear: moduli, energies, what is held, and files that go on."""
+"""Quasistatic shear: moduli, energies, what is held, and files."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -8,8 +8,6 @@ import pytest
 from small_packings import jammed
 
 import jamshape as js
-from jamshape.files.h5md import count_frames, read_observables, read_packing
-from jamshape.flow import quasistatic_recording
 from jamshape.flow.quasistatic import QuasistaticShear, Sheared, shear
 from jamshape.landscape import Landscape, State
 from jamshape.protocols.quasistatic import compressed_to
@@ -116,39 +114,23 @@ def test_spheroids_in_space_shear(measured):
 
 
 @pytest.fixture
-def cut_off(tmp_path, monkeypatch):
-    """The same run twice: to the end, and cut off after 17 steps."""
-    monkeypatch.setattr(quasistatic_recording, "MOST_STEPS_PER_FRAME", 5)
+def run(tmp_path):
     landscape, found = jammed("discs", U0)
-    how = QuasistaticShear(2e-3, 0.06)
-    paths = [tmp_path / name for name in ("whole.h5", "cut.h5")]
-    for path in paths:
-        quasistatic_recording.begin(path, found.state.packing(landscape.particles), how, {"n": 16})
-    list(quasistatic_recording.record(paths[0]))
-    steps = quasistatic_recording.record(paths[1])
-    for _ in range(17):
-        next(steps)
-    steps.close()
-    return paths
+    start = found.state.packing(landscape.particles)
+    file = tmp_path / "run.h5"
+    return js.quasistatic_shear(
+        start=start, step=2e-3, strain=0.06, frames=6, file=file, progress=False
+    )
 
 
-def test_a_run_that_was_cut_off_goes_on_as_if_nothing_had_happened(cut_off):
-    assert not js.load(cut_off[1]).about["finished"]
-    js.resume(cut_off[1], progress=False)
-    whole, cut = map(read_observables, cut_off)
-    assert len(whole["strain"]) == 31
-    for name, values in whole.items():
-        np.testing.assert_array_equal(cut[name], values, err_msg=name)
-    assert count_frames(cut_off[0]) == count_frames(cut_off[1])
-    last = [State.of(read_packing(path)) for path in cut_off]
-    np.testing.assert_array_equal(last[0].position, last[1].position)
-    np.testing.assert_array_equal(last[0].cell, last[1].cell)
+def test_a_file_has_a_row_for_each_step_and_frames_between(run):
+    assert len(run.strain) == 31
+    times = [0, 0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06]  # the start, and its minimum
+    assert [frame.time for frame in run] == pytest.approx(times)
 
 
-def test_drops_of_the_stress_are_listed(cut_off):
-    run = js.load(cut_off[0])
-    stress = run.stress
-    fallen = -np.minimum(np.diff(stress), 0).sum()
+def test_drops_of_the_stress_are_listed(run):
+    fallen = -np.minimum(np.diff(run.stress), 0).sum()
     events = run.events(least=0.0)
     assert sum(event.drop for event in events) == pytest.approx(fallen, rel=1e-12)
     assert len(run.events(least=0.5)) < len(events)

@@ -19,19 +19,16 @@ COMMA = 'import locale\nlocale.setlocale(locale.LC_NUMERIC, "de_DE")\n'
 # A run is cut off in its middle and resumed.
 RUNS = """
 import jamshape as js
-from jamshape.flow import recording
+from jamshape.checks import TimeLimitReached
+from jamshape.flow import lammps_driver
 
-write = recording._write_row
-def write_half(writer, row):
-    write(writer, row)
-    if row.step > 60:
-        raise InterruptedError
-recording._write_row = write_half
+lammps_driver.TIME_PER_MARK = 30.0
 rods = js.Spherocylinders(alpha=4)
 try:
-    js.compress(rods, n=8, phi=(0.4, 0.45), kappa=1e-3, rows=40, file="run.h5", progress=False, seed=1)
-except InterruptedError:
-    recording._write_row = write
+    js.compress(rods, n=8, phi=(0.4, 0.45), kappa=1e-3, rows=40, file="run.h5", progress=False, seed=1, seconds=0)
+    raise AssertionError
+except TimeLimitReached:
+    pass
 run = js.resume("run.h5", progress=False)
 packing = run.packing(-1)
 print("phi", run.phi[-1])

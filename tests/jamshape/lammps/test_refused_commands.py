@@ -11,9 +11,11 @@ import pytest
 import jamshape as js
 from jamshape.files.h5md import read_attributes, read_observables, read_packing
 from jamshape.files.lammps_text import read_dump
+from jamshape.flow import lammps_driver
 from jamshape.lammps.module import LammpsError
 from jamshape.lammps.session import Session
 from jamshape.protocols.random_start import random_packing
+from jamshape.recording import recorder
 from jamshape.shapes.shape import Interaction
 
 pytestmark = pytest.mark.lammps
@@ -35,7 +37,7 @@ def begin(session):
 
 
 def run_with_files(session, folder):
-    """Leave a dump with three frames and a restart file; positions at the end."""
+    """Leave a dump with three frames; return the content of a restart file, and positions at the end."""
     columns = "id type x y z ix iy iz c_quatw c_quati c_quatj c_quatk c_shapex c_shapey c_shapez"
     of_each = (word.removeprefix("c_") for word in columns.split() if word.startswith("c_"))
     session.commands("\n".join(f"compute {word} all property/atom {word}" for word in of_each))
@@ -44,8 +46,7 @@ def run_with_files(session, folder):
         "dump_modify all format float %.17g"
     )
     session.commands(f"run {STEPS}")
-    session.write_restart(folder / "a.restart")
-    return session.packing().position
+    return session.restart(), session.packing().position
 
 
 @pytest.mark.parametrize(
@@ -66,7 +67,7 @@ def test_what_lammps_refuses_raises_and_all_else_is_whole(command, sentence, tmp
     with Session() as other, Session() as session:
         begin(other)
         begin(session)
-        expected = run_with_files(session, tmp_path)
+        restart, expected = run_with_files(session, tmp_path)
         with pytest.raises(LammpsError) as refused:
             session.commands(command)
         assert str(refused.value).startswith(sentence)
@@ -80,14 +81,14 @@ def test_what_lammps_refuses_raises_and_all_else_is_whole(command, sentence, tmp
         other.commands(f"run {STEPS}")
         np.testing.assert_array_equal(other.packing().position, expected)
     with Session() as fresh:
-        fresh.load_restart(tmp_path / "a.restart", start())
+        fresh.load_restart(restart, start())
         np.testing.assert_array_equal(fresh.packing().position, expected)
 
 
 def test_an_instance_goes_on_after_a_refusal(tmp_path):
     with Session() as session:
         begin(session)
-        before = run_with_files(session, tmp_path)
+        _, before = run_with_files(session, tmp_path)
         with pytest.raises(LammpsError, match=r"^Unknown command: joke$"):
             session.commands("joke")
         np.testing.assert_array_equal(session.packing().position, before)
@@ -96,8 +97,11 @@ def test_an_instance_goes_on_after_a_refusal(tmp_path):
     assert read_dump(tmp_path / "a.dump", shape="spherocylinder")[-1].step == 2 * STEPS
 
 
-def test_a_compression_that_is_refused_leaves_a_whole_file(tmp_path):
+def test_a_compression_that_is_refused_leaves_a_whole_file(tmp_path, monkeypatch):
     """Its time step is past what the pressure on the way lets it be."""
+    monkeypatch.setattr(recorder, "PAUSE", 0.0)
+    monkeypatch.setattr(recorder, "SECONDS", 0.0)
+    monkeypatch.setattr(lammps_driver, "TIME_PER_MARK", 5.0)
     rods = js.Spherocylinders(alpha=4)
     settings = {"n": 16, "kappa": 1e-2, "phi": (0.4, 1.4), "progress": False}
     with pytest.raises(LammpsError, match=r"found timestep 3 above the stability limit"):

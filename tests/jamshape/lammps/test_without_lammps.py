@@ -89,6 +89,6 @@ def test_the_command_plugin_says_what_to_install(tmp_path):
         assert report_of(done)["agrees"] is False
 
 
-@pytest.mark.parametrize("module", ["jamshape.commands.compress", "jamshape.flow.recording"])
+@pytest.mark.parametrize("module", ["jamshape.commands.compress", "jamshape.flow.lammps_driver"])
 def test_all_can_be_imported(module):
     importlib.import_module(module)

@@ -10,7 +10,7 @@ from jamshape.landscape import Landscape
 from jamshape.measures import jamming
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames, stays_jammed
 from jamshape.measures.onset import OnsetFit
-from jamshape.measures.runs import read_run
+from jamshape.measures.runs import read_run, summary_of
 from jamshape.packing import State
 
 NAN = float("nan")

@@ -1,7 +1,7 @@
 """Runs that are killed at moments that nobody chose, and what is left of them.
 
-Commands run in processes forked from one that has imported everything, so that hundreds of kills take minutes and
-nearly all of them fall into the work itself.
+Commands and drivers run in processes forked from one that has imported everything, so that hundreds of kills take
+minutes and nearly all of them fall into the work itself.
 """
 
 from __future__ import annotations
@@ -45,26 +45,35 @@ _COMMANDS = (
     "initial",
 )
 _PRELOADED = [
+    "jamshape",
     *(f"jamshape.commands.{name}" for name in _COMMANDS),
     "matplotlib.figure",
     "matplotlib.backends.backend_agg",
 ]
 
 
-def forked(words, log, patches=()):
-    """Run the command jamshape in a process of its own, with other values of some constants."""
+def forked(target, args, log, patches=(), fuse=0):
+    """Call a function in a process of its own, with other values of some constants.
+
+    Parameters
+    ----------
+    target, args
+        Function of a module, and its arguments.
+    log
+        File that receives what it says.
+    patches
+        Names of constants with other values.
+    fuse
+        Number of the call that changes files at which the process is killed; 0 for none.
+    """
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOADED)
-    process = context.Process(
-        target=_command, args=([str(word) for word in words], str(log), patches)
-    )
+    process = context.Process(target=_called, args=(target, args, str(log), tuple(patches), fuse))
     process.start()
     return process
 
 
-def _command(words, log, patches):
-    from jamshape.commands import main  # noqa: PLC0415 - in the process that is to be killed
-
+def _called(target, args, log, patches, fuse):
     file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
     os.dup2(file, 1)
     os.dup2(file, 2)
@@ -72,7 +81,38 @@ def _command(words, log, patches):
     for name, value in patches:
         module, constant = name.rsplit(".", 1)
         setattr(importlib.import_module(module), constant, value)
-    main(words)
+    if fuse:
+        light(fuse, lambda: os.kill(os.getpid(), signal.SIGKILL))
+    target(*args)
+
+
+def command(words):
+    """Run the command jamshape."""
+    from jamshape.commands import main  # noqa: PLC0415 - in the process that is to be killed
+
+    main([str(word) for word in words])
+
+
+CALLS = ("open", "fsync", "replace", "rename", "link", "unlink")
+"""Calls of the system between which files change."""
+
+
+def light(at, end=None):
+    """Count calls that change files, and call `end` before one of them; return the list whose length is the count."""
+    calls = []
+
+    def around(name, call):
+        def counted(*args, **options):
+            calls.append(name)
+            if len(calls) == at:
+                end()
+            return call(*args, **options)
+
+        return counted
+
+    for name in CALLS:
+        setattr(os, name, around(name, getattr(os, name)))
+    return calls
 
 
 def ended(process, after=_SECONDS):
@@ -88,7 +128,7 @@ def uninterrupted(case, folder):
     """Run a case to its end; return how long that took."""
     prepare(case, folder)
     ended(
-        forked(["--version"], folder / "said.log")
+        forked(command, (["--version"],), folder / "said.log")
     )  # the process to fork from imports all that there is
     began = time.monotonic()
     code = ended(case.start(folder))
@@ -181,12 +221,12 @@ def said(folder):
     return (folder / "said.log").read_text()[-2000:]
 
 
-def contents(path):
-    """All numbers of an HDF5 file by name, but for those of clocks."""
+def contents(path, without=()):
+    """All numbers of an HDF5 file by name, but for those of clocks and of some groups."""
     found = {}
 
     def take(name, part):
-        if name.split("/")[-1] in CLOCKS or name.startswith(OF_THE_PROCESS):
+        if name.split("/")[-1] in CLOCKS or name.startswith(without):
             return
         for key, value in part.attrs.items():
             if key not in CLOCKS:
@@ -199,14 +239,14 @@ def contents(path):
     return found
 
 
-def differences(one, other):
-    """Names of what differs by a bit between two files."""
+def differences(one, other, without=OF_THE_PROCESS):
+    """Names of what differs by a bit, or by its type, between two files."""
     if one.suffix not in {".h5", ".h5md"}:
         return [] if one.read_bytes() == other.read_bytes() else [one.name]
-    a, b = contents(one), contents(other)
+    a, b = contents(one, without), contents(other, without)
     return sorted(a.keys() ^ b.keys()) + [k for k in a.keys() & b.keys() if not _same(a[k], b[k])]
 
 
 def _same(a, b):
-    numbers = all(np.asarray(x).dtype.kind == "f" for x in (a, b))
-    return np.array_equal(a, b, equal_nan=numbers)
+    a, b = np.asarray(a), np.asarray(b)
+    return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")

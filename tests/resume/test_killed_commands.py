@@ -1,4 +1,7 @@
-"""Every command that writes, killed at random moments: what they leave and where they get to."""
+"""Commands that are no single run, killed at random moments: what they leave and where they get to.
+
+Drivers of runs are killed in `test_drivers.py`.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from killing import GIVEN, differences, forked, killed, require_whole, uninterrupted
+from killing import (
+    GIVEN,
+    command,
+    differences,
+    forked,
+    killed,
+    require_whole,
+    uninterrupted,
+)
 from lattices import discs
 from scenes import pressed
 from superellipsoid_packings import pressed_superellipsoids
@@ -71,8 +82,6 @@ class Case:
     words: tuple
     results: tuple[str, ...]
     """Files that are as if nothing had happened; the first is where to write, or else the folder of all."""
-    resume: tuple = ()
-    """Beside the words, where there is something to go on from."""
     patches: tuple = ()
     """Constants that are other than usual."""
     given: Given = field(default_factory=dict)
@@ -87,19 +96,13 @@ class Case:
 
     def start(self, folder):
         out = folder / (self.results[0] if len(self.results) == 1 or self.beside else "")
-        resume = self.resume if out.is_file() else ()
         read = [folder / GIVEN / name for name in self.given]
         beside = [word if word.startswith("-") else folder / word for word in self.beside]
-        words = [*self.words, *read, *beside, *resume, "--out", out]
-        return forked(words, folder / "said.log", self.patches)
+        words = [*self.words, *read, *beside, "--out", out]
+        return forked(command, (words,), folder / "said.log", self.patches)
 
 
 CASES = {
-    "compress": Case(
-        ("compress", *RODS, "--kappa", 2e-4, "--phi-start", 0.5, "--phi-end", 0.86),
-        ("run.h5",),
-        ("--resume",),
-    ),
     "pack": Case(
         ("pack", *PACK),
         ("packing.h5",),
@@ -114,19 +117,6 @@ CASES = {
     "pack as published": Case(
         ("pack", *PUBLISHED, "--kappa", 1e-4, "--search", "bisection"),
         ("packing.h5",),
-    ),
-    "slow": Case(
-        ("slow", *RODS, "--kappa", 1e-6, "--phi-start", 0.78, "--phi-end", 0.86),
-        ("slow.h5",),
-        patches=(("jamshape.flow.slow_recording.STEPS_PER_FRAME", 20),),
-    ),
-    "shear": Case(
-        ("shear", *RODS, "--phi", 0.7, "--gdot", 1e-3, "--strain", 0.5, "--rows", 100),
-        ("shear.h5",),
-    ),
-    "aqs": Case(
-        ("aqs", *RODS, "--phi", 0.9, "--step", 1e-3, "--strain", 0.1),
-        ("aqs.h5",),
     ),
     "sweep": Case(
         ("sweep", "--alpha", 0, 1, *DYNAMICS[2:], "--samples", 1, "--jobs", 2),
@@ -182,8 +172,8 @@ def test_a_run_that_is_killed_ends_as_if_nothing_had_happened(whole, tmp_path, n
     measured(kills=kill_and_compare(whole, tmp_path, name, kills=2, seed=1))
 
 
-# 300 in all.
-KILLS = dict.fromkeys(CASES, 18) | {"sweep": 12}
+# With those of drivers, 300 in all.
+KILLS = dict.fromkeys(CASES, 9) | {"sweep": 12}
 
 
 @pytest.mark.validate
