@@ -32,6 +32,7 @@ from jamshape.measures.averages import Mean
 from jamshape.minima.target import TargetError
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import make
+from jamshape.recording.recorder import How
 from jamshape.shapes.particles import Particles
 from jamshape.vibration.sliding import Sliding
 
@@ -67,8 +68,7 @@ def sample(alpha: float, seed: int, options: Namespace, sort: str) -> Sample:
         )
         began, failure = time.process_time(), ""
         try:
-            for _ in make(recipe, out, again=True, retry=SORTS[sort]):
-                pass
+            make(recipe, out, How(again=True), retry=SORTS[sort])
         except TargetError as error:
             failure = str(error)
         seconds = time.process_time() - began

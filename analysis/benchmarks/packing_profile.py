@@ -157,8 +157,7 @@ def packing_of(particles: Particles, options: Namespace) -> dict[str, Any]:
     """Make the packing, in a folder for the time being, and tell what it is."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "packing.h5"
-        for _ in make(recipe_for(particles, n=options.n, seed=options.seed), out):
-            pass
+        make(recipe_for(particles, n=options.n, seed=options.seed), out)
         stored = read_attributes(out)
     return {name: stored[name] for name in ("outcome", "residual", "phi_J", "z") if name in stored}
 

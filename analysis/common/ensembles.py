@@ -21,7 +21,7 @@ from jamshape.files.vocabulary import renamed
 from jamshape.shapes.table import DEFAULT
 
 # Suffixes of other files that may lie beside a packing.
-OTHERS = (".run.h5", ".search.h5", ".path.h5", ".strict.h5", ".modes.h5")
+OTHERS = (".run.h5", ".making.h5", ".modes.h5")
 
 TABLE = ".csv"  # suffix of a table of packings
 _STYLE = ("shape", "dimension")  # its columns that are not attributes

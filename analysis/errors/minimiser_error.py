@@ -40,6 +40,7 @@ from jamshape.minima.target import Search, Target, TargetError, bisection, extra
 from jamshape.packing import Packing, State
 from jamshape.protocols.defaults import recipe_for
 from jamshape.protocols.make import Recipe, is_done, make
+from jamshape.recording.recorder import How
 from jamshape.shapes.particles import Kind, Particles
 from jamshape.shapes.table import DEFAULT
 
@@ -106,9 +107,8 @@ def state_of(name: str, options: Namespace) -> Packing:
     if name != "mixture" and 0 < float(name) < NEARLY_ROUND:
         return from_discs(state_of("0", options), float(name), path)
     if not is_done(path):
-        steps = make(recipe_of(name, options), path)
-        for _ in tqdm(steps, desc=f"state {name}", unit="row", mininterval=5):
-            pass
+        with tqdm(desc=f"state {name}", unit="row", mininterval=5) as bar:
+            make(recipe_of(name, options), path, How(tell=lambda _: bar.update()))
     return read_packing(path)
 
 

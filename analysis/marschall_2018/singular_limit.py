@@ -35,6 +35,7 @@ from jamshape.measures.packing_summary import write_minimum
 from jamshape.minima.target import Target, TargetError, find
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.make import Dynamics, Recipe, is_done, make, require_same
+from jamshape.recording.recorder import How
 from jamshape.shapes.particles import Particles
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -96,8 +97,8 @@ def make_discs(options: Namespace) -> list[Path]:
         if is_done(path):
             require_same(path, recipe)
             continue
-        for _ in tqdm(make(recipe, path), desc=path.stem, unit="row", mininterval=1):
-            pass
+        with tqdm(desc=path.stem, unit="row", mininterval=1) as bar:
+            make(recipe, path, How(tell=lambda _, bar=bar: bar.update()))
     return paths
 
 

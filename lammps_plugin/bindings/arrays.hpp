@@ -28,10 +28,11 @@ using Array2 = nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 template <typename T>
 using Array3 = nb::ndarray<const T, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
-/// A NumPy array under construction: filled with zeros, handed over to Python once.
+/// A NumPy array under construction: filled with zeros, handed over to Python once. Files make many
+/// of them: what is done once for each array is not inlined.
 template <typename T> class NewArray {
  public:
-  explicit NewArray(std::initializer_list<std::size_t> shape) :
+  [[gnu::noinline]] explicit NewArray(std::initializer_list<std::size_t> shape) :
       shape(shape), values(new T[size()]{})
   {
   }
@@ -39,7 +40,7 @@ template <typename T> class NewArray {
   T *row(std::size_t n) { return values.get() + n * product(shape.begin() + 1); }
   T &operator[](std::size_t n) { return values[n]; }
 
-  nb::object release()
+  [[gnu::noinline]] nb::object release()
   {
     T *data = values.release();
     nb::capsule owner(data, [](void *p) noexcept { delete[] static_cast<T *>(p); });

@@ -28,7 +28,7 @@ struct PairArrays {
   const Array2<std::int64_t> &pairs;  // (M, 2)
   const Array2<std::int64_t> &shift;  // (M, D)
 
-  void check(std::size_t N, std::size_t D) const
+  [[gnu::noinline]] void check(std::size_t N, std::size_t D) const
   {
     require(position.shape(0) == 2 && position.shape(1) == N && position.shape(2) == D,
             "position does not have the shape (2, N, D).");

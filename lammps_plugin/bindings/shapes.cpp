@@ -130,7 +130,8 @@ Contact<D, double, BONDS> in_doubles(const Contact<D, long double, BONDS> &conta
 }
 
 template <class Model, int D, class S>
-nb::dict contacts_in(const ShapeOf<Model> &of, const PairArrays &arrays, bool with_errors)
+[[gnu::noinline]] nb::dict contacts_in(const ShapeOf<Model> &of, const PairArrays &arrays,
+                                       bool with_errors)
 {
   const PosedPairs<Model, D, S> pairs = of.template posed<D, S>(arrays);
   std::vector<std::size_t> at;

@@ -38,7 +38,7 @@ template <class Model, int D> class RandomInsertion {
   RandomInsertion(const std::vector<Shape> &longest_first, const Vec<D> &box_edges) :
       shapes(longest_first), edges(box_edges), n(shapes.size()),
       reach(2.0 * Model::template outer_radius<D>(shapes.front())), placed(edges, reach, n),
-      centre(n), orientation(PER_ORIENTATION * n), waiting(n)
+      orientation(PER_ORIENTATION * n), waiting(n)
   {
     for (const Shape &shape : shapes) {
       bodies.push_back(Model::template body<D>(shape));
@@ -76,7 +76,7 @@ template <class Model, int D> class RandomInsertion {
   {
     return {waiting.begin() + n_done, waiting.end()};
   }
-  const Vec<D> &position(std::size_t i) const { return centre[i]; }
+  const Vec<D> &position(std::size_t i) const { return bodies[i].centre; }
   const double *orientation_of(std::size_t i) const { return &orientation[PER_ORIENTATION * i]; }
 
  private:
@@ -97,11 +97,10 @@ template <class Model, int D> class RandomInsertion {
   Vec<D> edges;
   std::size_t n, attempts = 0, n_done = 0;
   double reach;
-  ImageCells<D> placed;
-  std::vector<Vec<D>> centre;
+  ImageCells<D, Body> placed;
   std::vector<double> orientation;
   std::vector<std::size_t> waiting;  // from n_done on, ascending
-  std::vector<Body> bodies;          // rotated; their centres are set when they are compared
+  std::vector<Body> bodies;          // at their orientations; centres of those placed
   std::vector<double> radius;
 
   /// Draws orientations of these particles that avoid their own images; false if there are none.
@@ -129,7 +128,7 @@ template <class Model, int D> class RandomInsertion {
   bool meets_own_images(std::size_t i) const
   {
     return placed.any_shift(2.0 * radius[i],
-                            [&](const Vec<D> &apart) { return overlap(i, i, apart); });
+                            [&](const Vec<D> &apart) { return overlap(i, bodies[i], apart); });
   }
 
   /// Tries random places for the first of the waiting particles, each as often as `n_trials` in all
@@ -161,7 +160,7 @@ template <class Model, int D> class RandomInsertion {
         const std::size_t rank = left[k] % competing, i = waiting[n_done + rank];
         const Vec<D> x = trial(left[k]);
         if (found[rank] || placed.any_around(x, radius[i], 0, with(i))) continue;
-        centre[i] = x;
+        bodies[i].centre = x;
         found[rank] = 1;
       }
     }
@@ -174,9 +173,9 @@ template <class Model, int D> class RandomInsertion {
     const std::size_t first_new = placed.size();
     for (std::size_t rank = 0; rank < found.size(); ++rank) {
       const std::size_t i = waiting[n_done + rank];
-      found[rank] = found[rank] && !placed.any_here(centre[i], radius[i], first_new, with(i)) &&
-                    !placed.any_around(centre[i], radius[i], first_new, with(i));
-      if (found[rank]) placed.add(i, centre[i], radius[i]);
+      found[rank] = found[rank] && !placed.any_here(position(i), radius[i], first_new, with(i)) &&
+                    !placed.any_around(position(i), radius[i], first_new, with(i));
+      if (found[rank]) placed.add(bodies[i], radius[i]);
     }
     std::size_t to = n_done + found.size();  // the others of the batch move up to the waiting ones
     for (std::size_t rank = found.size(); rank-- > 0;) {
@@ -189,12 +188,13 @@ template <class Model, int D> class RandomInsertion {
   /// Test of particle i with others.
   auto with(std::size_t i) const
   {
-    return [this, i](std::size_t j, const Vec<D> &apart) { return overlap(i, j, apart); };
+    return [this, i](const Body &other, const Vec<D> &apart) { return overlap(i, other, apart); };
   }
 
-  bool overlap(std::size_t i, std::size_t j, const Vec<D> &apart) const
+  /// Not inlined into each of the loops that call it.
+  [[gnu::noinline]] bool overlap(std::size_t i, const Body &other, const Vec<D> &apart) const
   {
-    Body first = bodies[i], second = bodies[j];
+    Body first = bodies[i], second = other;
     first.centre = apart;
     second.centre = Vec<D>{};
     return are_overlapping(first, second);

@@ -332,7 +332,7 @@ def require_one_of(name: str, value: Any, table: Iterable[Any]) -> None:
 
 
 def require_path(path: Path) -> None:
-    r"""Refuse a path with control characters.
+    r"""Refuse the path of a file to write with control characters, or a name too long for files beside it.
 
     Examples
     --------
@@ -347,6 +347,27 @@ def require_path(path: Path) -> None:
             " choose another name"
         )
         raise ValueError(msg)
+    name = os.path.basename(os.path.realpath(path))  # noqa: PTH119 - of a link's target
+    size, most = len(os.fsencode(name)), _longest_name(path) - _AFFIXES
+    if size > most:
+        msg = (
+            f"the name of {said(str(path))} has {size} bytes, expected at most {most}, since files beside it have"
+            " longer names; choose a shorter one"
+        )
+        raise ValueError(msg)
+
+
+_AFFIXES = (
+    48  # bytes that names of temporary files, locks and intermediate results add to that of a file
+)
+
+
+def _longest_name(path: Path) -> int:
+    """Return the most bytes of a name in the folder of a path."""
+    try:
+        return os.pathconf(path.absolute().parent, "PC_NAME_MAX")
+    except OSError:  # a missing folder, which the writer reports
+        return 255
 
 
 def require_other_file(out: Path, inputs: Sequence[Path]) -> None:

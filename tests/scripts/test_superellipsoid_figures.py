@@ -66,8 +66,7 @@ def made(path, shape=(1.0, 1.0, 1.0), thermal=None, seed=1):
         way=Steps(Quasistatic(step=0.01), thermal),
         target=Target(1e-12),
     )
-    for _ in make(recipe, path):
-        pass
+    make(recipe, path)
     return path
 
 

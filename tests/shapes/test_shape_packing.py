@@ -17,6 +17,8 @@ from every_shape import (
     particles_of,
     taken,
 )
+from making import made as made_of
+from making import stage_of, stages_of, write_every_mark, write_rows
 
 from common.energy_along import AlongModes
 from common.ladder import climb
@@ -28,13 +30,12 @@ from jamshape.files.h5md import (
     read_report,
     write_packing,
 )
-from jamshape.files.run_writer import RunWriter
 from jamshape.landscape import Landscape
 from jamshape.measures.packing_summary import measure
 from jamshape.minima import METHODS, Outcome, Stop, minimise
 from jamshape.minima.target import Target, find
 from jamshape.packing import State
-from jamshape.protocols import by_dynamics, by_steps
+from jamshape.protocols import approach
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.make import Dynamics, Recipe, Steps, Thermalisation, is_done, make
 from jamshape.protocols.quasistatic import Quasistatic
@@ -77,7 +78,7 @@ def made(folder):
     @cache
     def of(case: Case) -> Path:
         out = folder / f"{case}.h5"
-        stages = [at.stage for at in make(recipe_of(case), out)]
+        stages = stages_of(recipe_of(case), out)
         assert {"compression", "search"} <= set(stages)
         return out
 
@@ -137,14 +138,14 @@ def by_dynamics_of(case):
 @pytest.mark.lammps
 @PLANE
 def test_dynamics_lead_to_the_energy_also_when_cut_off(case, tmp_path, monkeypatch, measured):
-    monkeypatch.setattr(by_dynamics, "_ROWS_PER_RESTART", 10)
+    write_every_mark(monkeypatch)
+    monkeypatch.setattr(approach, "ROWS_PER_MARK", 10)
     whole, cut, recipe = tmp_path / "whole.h5", tmp_path / "cut.h5", by_dynamics_of(case)
-    assert {at.stage for at in make(recipe, whole)} == {"compression", "search"}
+    assert set(stages_of(recipe, whole)) == {"compression", "search"}
     stored, _ = assert_at_the_energy(whole)
     measured(phi=stored["phi"], z=stored["z"])
-    assert set(cut_off(recipe, cut, 37)) == {"compression"}
-    for _ in make(recipe, cut):
-        pass
+    assert set(stages_of(recipe, cut, 37)) == {"compression"}
+    make(recipe, cut)
     assert_same_packing(cut, whole)
 
 
@@ -152,7 +153,7 @@ def test_dynamics_lead_to_the_energy_also_when_cut_off(case, tmp_path, monkeypat
 def test_hard_particles_on_the_way(case, tmp_path):
     way = Steps(QUASISTATIC, Thermalisation(0.2, 20))
     recipe = recipe_of(case, n=16, phi_start=0.12, way=way)
-    stages = {at.stage for at in make(recipe, tmp_path / "a.h5")}
+    stages = set(stages_of(recipe, tmp_path / "a.h5"))
     assert {"compression", "Monte Carlo", "search"} == stages
     stored, _ = assert_at_the_energy(tmp_path / "a.h5")
     assert 0.05 < stored["acceptance"] <= 1
@@ -161,8 +162,7 @@ def test_hard_particles_on_the_way(case, tmp_path):
 @TYPICAL_ONES
 def test_packings_without_a_target_are_the_first_that_are_jammed(case, tmp_path):
     recipe = recipe_of(case, target=None)
-    for _ in make(recipe, tmp_path / "a.h5"):
-        pass
+    make(recipe, tmp_path / "a.h5")
     stored = read_attributes(tmp_path / "a.h5")
     assert 1e-6 < stored["energy_per_particle"] <= 2e-6
     assert stored["residual"] <= 1e-3
@@ -176,22 +176,13 @@ def assert_same_packing(one, other):
     assert {name: mine[name] for name in names} == {name: theirs[name] for name in names}
 
 
-def cut_off(recipe, out, after):
-    """Begin, and stop after so many steps."""
-    going = make(recipe, out)
-    stages = [next(going).stage for _ in range(after)]
-    going.close()
-    assert not is_done(out)
-    return stages
-
-
 @TYPICAL_ONES
 def test_what_was_cut_off_goes_on_to_the_same_bits(case, made, tmp_path, monkeypatch):
-    monkeypatch.setattr(by_steps, "_STORE_SECONDS", 0.0)
+    write_every_mark(monkeypatch)
     out, recipe = tmp_path / "a.h5", recipe_of(case)
-    assert set(cut_off(recipe, out, 5)) == {"compression"}
-    assert {path.name for path in tmp_path.iterdir()} == {"a.h5.path.h5"}
-    stages = [at.stage for at in make(recipe, out)]
+    assert set(stages_of(recipe, out, 5)) == {"compression"}
+    assert {path.name for path in tmp_path.iterdir()} == {"a.h5.making.h5"}
+    stages = stages_of(recipe, out)
     assert len(stages) > 5
     assert_same_packing(out, made(case))
     assert {path.name for path in tmp_path.iterdir()} == {"a.h5"}
@@ -199,43 +190,42 @@ def test_what_was_cut_off_goes_on_to_the_same_bits(case, made, tmp_path, monkeyp
 
 def compressed(recipe, out, packing):
     """What a compression by dynamics leaves, ended at some packing."""
-    writer = RunWriter.create(out.with_name(out.name + ".run.h5"), packing, {})
     phi = np.linspace(0.9, 1.0, 20) * packing.phi
     rows = {"phi": phi, "pressure": 0.0 * phi, "kappa": np.ones(20)}
-    writer.append_series(np.arange(20), np.arange(20.0), rows)
-    writer.set_attributes(recipe.attributes() | {"finished": True})
-    writer.close()
+    write_rows(out.with_name(out.name + ".run.h5"), packing, recipe.attributes(), rows)
 
 
 @TYPICAL_ONES
-def test_a_search_from_below_jamming_goes_on_to_the_same_bits(case, made, tmp_path):
+def test_a_search_from_below_jamming_goes_on_to_the_same_bits(case, made, tmp_path, monkeypatch):
+    write_every_mark(monkeypatch)
     packing = read_packing(made(case))
     loose = in_doubles(State.of(packing).strained(2e-3).packing(packing))
     recipe = recipe_of(case, way=Dynamics(FAST))
     whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
     for out in (whole, cut):
         compressed(recipe, out, loose)
-    stages = [at.stage for at in make(recipe, whole)]
+    stages = stages_of(recipe, whole)
     assert set(stages) == {"search"}
     assert len(stages) > 3
     assert_at_the_energy(whole)
-    cut_off(recipe, cut, 2)
-    assert (tmp_path / "cut.h5.search.h5").exists()
-    assert len(list(make(recipe, cut))) == len(stages) - 2
+    stages_of(recipe, cut, 2)
+    assert (tmp_path / "cut.h5.making.h5").exists()
+    assert len(stages_of(recipe, cut)) == len(stages) - 2
     assert_same_packing(cut, whole)
-    assert not (tmp_path / "cut.h5.search.h5").exists()
+    assert not (tmp_path / "cut.h5.making.h5").exists()
 
 
 @TYPICAL_ONES
 def test_files_of_other_recipes_are_refused(case, tmp_path, monkeypatch):
-    monkeypatch.setattr(by_steps, "_STORE_SECONDS", 0.0)
+    write_every_mark(monkeypatch)
     recipe = recipe_of(case)
-    cut_off(recipe, tmp_path / "a.h5", 2)
+    stages_of(recipe, tmp_path / "a.h5", 2)
     other = replace(recipe, seed=3)
     assert not np.array_equal(other.start().position, recipe.start().position)
     with pytest.raises(ValueError, match="seed = 1, expected 3"):
-        next(make(other, tmp_path / "a.h5"))
-    assert next(make(other, tmp_path / "a.h5", again=True)).stage == "compression"
+        make(other, tmp_path / "a.h5")
+    [told] = made_of(other, tmp_path / "a.h5", 1, again=True)
+    assert stage_of(told) == "compression"
 
 
 # --- files ---------------------------------------------------------------------------------------

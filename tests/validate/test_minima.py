@@ -31,8 +31,7 @@ def found(request, tmp_path_factory):
     alpha, seed = request.param
     out = tmp_path_factory.mktemp("packing") / "packing.h5"
     recipe = Recipe(bidisperse(alpha), seed=seed, way=Dynamics(Approach(kappa=4e-6)))
-    for _ in make(recipe, out):
-        pass
+    make(recipe, out)
     packing = read_packing(out)
     landscape, state = Landscape(packing), State.of(packing)
     evaluation, outcome = landscape.evaluate(state), Outcome(read_attributes(out)["outcome"])

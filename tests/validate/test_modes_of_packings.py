@@ -35,8 +35,7 @@ def packings(tmp_path_factory):
             out = tmp_path_factory.mktemp("packings") / f"alpha{alpha}_seed{seed}.h5"
             way = Dynamics(Approach(kappa=2e-6))
             sample = Recipe(bidisperse(alpha), seed=seed, way=way)
-            for _ in make(sample, out):
-                pass
+            make(sample, out)
             found[alpha, seed] = read_packing(out)
     return found
 
@@ -114,8 +113,7 @@ def test_modes_of_extremes(alpha, u0, tmp_path):
     phi = 0.4 if alpha < 10 else 0.15
     sample = Recipe(bidisperse(alpha), n=32, phi_start=phi)
     sample = replace(sample, way=Dynamics(Approach(kappa=1e-5)), target=Target(u0=u0))
-    for _ in make(sample, tmp_path / "packing.h5"):
-        pass
+    make(sample, tmp_path / "packing.h5")
     matrix, found = analysed(read_packing(tmp_path / "packing.h5"))
     counts = count(matrix, found)
     further = sum(r.n_states for r in redundancies(matrix))

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "contact/along_x.hpp"
+#include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
 #include "contact/math/vec.hpp"
@@ -183,5 +184,7 @@ template <int D> bool are_overlapping(const DimerBody<D> &i, const DimerBody<D> 
 {
   return DimerModel::closer_than<D>(0.0, i, j);
 }
+
+JAMSHAPE_CONTACTS(extern, DimerModel)
 
 }  // namespace jamshape

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "contact/along_x.hpp"
+#include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
 #include "contact/instruction_set.hpp"
@@ -454,5 +455,7 @@ bool are_overlapping(const SpherocylinderBody<D> &i, const SpherocylinderBody<D>
 {
   return SpherocylinderModel::closer_than<D>(0.0, i, j);
 }
+
+JAMSHAPE_CONTACTS(extern, SpherocylinderModel)
 
 }  // namespace jamshape

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "contact/compiled_once.hpp"
 #include "contact/contact.hpp"
 #include "contact/harmonic.hpp"
 #include "contact/instruction_set.hpp"
@@ -352,5 +353,27 @@ bool are_overlapping(const SuperellipsoidBody<D> &i, const SuperellipsoidBody<D>
   const TangencyWish<D, Long> wish{plain<Long>(i.centre) - plain<Long>(j.centre), false, nullptr};
   return tangency_of(plain<Long>(i), plain<Long>(j), wish).at.scale < 1;
 }
+
+/// Searches behind contacts and for overlaps, compiled like JAMSHAPE_CONTACTS.
+#define JAMSHAPE_SEARCHES(KEYWORD, D)                                                              \
+  KEYWORD template Contact<D, double, 1> contact_of(const SuperellipsoidBody<D> &,                 \
+                                                    const SuperellipsoidBody<D> &,                 \
+                                                    const SuperellipsoidLaw &, Vec<D> &);          \
+  KEYWORD template Contact<D, Dual<PAIR_VARIABLES<D>>, 1> contact_of(                              \
+      const SuperellipsoidBody<D, Dual<PAIR_VARIABLES<D>>> &,                                      \
+      const SuperellipsoidBody<D, Dual<PAIR_VARIABLES<D>>> &, const SuperellipsoidLaw &,           \
+      Vec<D> &);                                                                                   \
+  KEYWORD template FoundTangency<D, double> tangency_of(const SuperellipsoidBody<D> &,             \
+                                                        const SuperellipsoidBody<D> &,             \
+                                                        const TangencyWish<D, double> &);          \
+  KEYWORD template FoundTangency<D, long double> tangency_of(                                      \
+      const SuperellipsoidBody<D, long double> &, const SuperellipsoidBody<D, long double> &,      \
+      const TangencyWish<D, long double> &);                                                       \
+  KEYWORD template bool are_overlapping(const SuperellipsoidBody<D> &,                             \
+                                        const SuperellipsoidBody<D> &);
+
+JAMSHAPE_CONTACTS(extern, SuperellipsoidModel)
+JAMSHAPE_SEARCHES(extern, 2)
+JAMSHAPE_SEARCHES(extern, 3)
 
 }  // namespace jamshape

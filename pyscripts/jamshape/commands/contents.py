@@ -51,12 +51,9 @@ _OTHER_COMMAND = "repeat the command for {result}, which continues from this fil
 
 # The first match counts.
 _STORED = (
-    _Stored("search for an energy", "search_step", _OTHER_COMMAND),
-    _Stored("search for a strict minimum", "strict_search", _OTHER_COMMAND),
-    _Stored("second attempt at a packing", "retry_budget", _OTHER_COMMAND),
-    _Stored("quasistatic compression for a packing", "loose_phi", _OTHER_COMMAND),
+    _Stored("packing in the making", "stage", _OTHER_COMMAND),
     _Stored("slow run", "flow_steps", _SAME_COMMAND),
-    _Stored("compression for a packing", "restart_step", _OTHER_COMMAND),
+    _Stored("compression for a packing", "rate", _OTHER_COMMAND),
     _Stored("compression for a packing", "of_packing", _OTHER_COMMAND),
     _Stored("quasistatic shear", "shear_steps", _SAME_COMMAND),
     _Stored("shear", "gdot", _SAME_COMMAND),
@@ -65,7 +62,7 @@ _STORED = (
 )
 
 # Suffixes of files beside an unfinished packing.
-_ENDS = (".search.h5", ".path.h5", ".run.h5", ".strict.h5")
+_ENDS = (".making.h5", ".run.h5")
 
 
 def contents_of(path: Path, wanted: Wanted = NOTHING) -> dict[str, Any]:

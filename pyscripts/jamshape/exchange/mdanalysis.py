@@ -146,6 +146,7 @@ def _write(file: h5py.File, source: Source) -> Packing:
     elements["orientation"] = orientation
     group["box"].attrs["dimension"] = 3
     group["box"].attrs["boundary"] = np.array([b"periodic"] * 3)
+    # MDAnalysis reads no strings of fixed length, though those of variable length have no checksum.
     clock["time"].attrs["unit"] = "ps"
     for name in _ELEMENTS:
         elements[name]["value"].attrs["unit"] = "Angstrom"

@@ -1,14 +1,19 @@
 """Atomic replacement of files: the previous content stays until the new one is safe on the disk.
 
-A file is written under a temporary name in the same folder, ``.NAME.HOST.PID.tmp``, and takes its place by a
-rename. A killed process leaves its temporary file behind; the next writer of the same file
-removes it.
+A file is written under a temporary name in the same folder, ``.NAME.HOST.PID.RANDOM.tmp``, and takes its place by a
+rename, with the mode and the owner of the file that it replaces. HOST is a digest of the machine's name. The temporary
+file is new, so that nobody can place a link at its name. A killed process leaves its temporary file behind; the next
+writer of the same file removes it.
 """
 
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
+import re
+import secrets
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,46 +23,122 @@ PathLike = str | os.PathLike[str]
 # Reasons of a disk or a folder to refuse writing.
 _REFUSALS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO}
 
-_END = ".tmp"
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
 # Suffixes of formats other than HDF5.
 _OTHERS = {".data", ".gsd", ".dump", ".png", ".pdf", ".csv", ".json", ".txt"}
 
 
 @contextmanager
-def replacing(path: PathLike) -> Iterator[Path]:
+def replacing(path: PathLike, *, wait: bool = True) -> Iterator[Path]:
     """Yield a temporary path in the folder of `path`, which takes its place if the body succeeds.
 
     If the body raises, the temporary file is removed and `path` is unchanged. If `path`
-    is a link, its target is replaced.
+    is a link, its target is replaced, with its mode and owner.
+
+    Parameters
+    ----------
+    path : path-like
+    wait : bool
+        Whether to sync the file and its folder to disk. Short-lived files need not wait for the disk, and
+        survive kills just as well.
 
     Raises
     ------
     OSError
-        If the disk is full, or the folder is missing or not writable; the message is one sentence.
+        If the disk is full, the folder is missing or not writable, or `path` is write-protected or not a file;
+        the message is one sentence.
     """
-    place = real(path)
+    before, place = require_replaceable(path), real(path)
     remove_leftovers(place)
-    temporary = place.with_name(f"{_prefix(place)}{os.getpid()}{_END}")
+    name = f"{_prefix(place)}{os.getpid()}.{secrets.token_hex(4)}.tmp"
+    temporary = place.with_name(name)
     with refusals(path, temporary):
         try:
+            os.close(os.open(temporary, _NEW, 0o600 if before else 0o666))
+            _settle(path, temporary, before, wait=False)
             yield temporary
+            _settle(path, temporary, before, wait=wait)
             temporary.replace(place)
         finally:
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
+        if wait:
+            _sync_folder(place.parent)
 
 
 def store(path: PathLike, data: bytes | memoryview, *, wait: bool = True) -> None:
-    """Write a whole file, synced to disk before it takes its place; errors as `replacing`.
-
-    Short-lived files need not wait for the disk, and survive kills just as well.
-    """
-    with replacing(path) as temporary, temporary.open("wb") as file:
+    """Write a whole file; parameters and errors as `replacing`."""
+    with replacing(path, wait=wait) as temporary, temporary.open("wb") as file:
         file.write(data)
-        file.flush()
+
+
+def require_replaceable(path: PathLike) -> os.stat_result | None:
+    """Refuse a path that `replacing` cannot replace, before a long calculation begins.
+
+    Returns
+    -------
+    os.stat_result or None
+        Status of the file; None if there is none.
+
+    Raises
+    ------
+    OSError
+        If it is not a file, or write-protected, also for root.
+    """
+    place = real(path)
+    try:
+        found = place.lstat()
+    except OSError:  # missing, or in a folder that the writer reports
+        return None
+    if not stat.S_ISREG(found.st_mode):
+        msg = f"{path}: is not a file, expected the name of a file to write; choose another name"
+        raise OSError(msg)
+    may_write = os.access(place, os.W_OK) or os.statvfs(place).f_flag & os.ST_RDONLY
+    if not found.st_mode & 0o222 or not may_write:
+        msg = (
+            f"{path}: is write-protected, expected a file that may be replaced;"
+            " change its permissions, or write to another file"
+        )
+        raise OSError(msg)
+    return found
+
+
+def _settle(path: PathLike, temporary: Path, before: os.stat_result | None, *, wait: bool) -> None:
+    """Give a file the mode and the owner of the one that it replaces, and sync it to disk."""
+    file = os.open(temporary, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        if before:
+            _keep_owner(path, file, before)
         if wait:
-            os.fsync(file.fileno())
+            os.fsync(file)
+    finally:
+        os.close(file)
+
+
+def _keep_owner(path: PathLike, file: int, before: os.stat_result) -> None:
+    now, mode = os.fstat(file), stat.S_IMODE(before.st_mode)
+    if (now.st_uid, now.st_gid) != (before.st_uid, before.st_gid):
+        try:
+            os.fchown(file, before.st_uid, before.st_gid)
+        except PermissionError as error:
+            msg = (
+                f"{path}: belongs to another user or group, expected a file of this user, since replacing it would"
+                " change its owner; write to another file"
+            )
+            raise OSError(msg) from error
+    if stat.S_IMODE(now.st_mode) != mode:
+        os.fchmod(file, mode)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Sync the names in a folder to disk, where the file system can."""
+    with suppress(OSError):
+        file = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            os.fsync(file)
+        finally:
+            os.close(file)
 
 
 @contextmanager
@@ -112,17 +193,18 @@ def real(path: PathLike) -> Path:
 
 
 def _prefix(place: Path) -> str:
-    return f".{place.name}.{os.uname().nodename}."
+    host = hashlib.blake2b(os.uname().nodename.encode(), digest_size=4).hexdigest()
+    return f".{place.name}.{host}."
 
 
 def remove_leftovers(path: PathLike) -> None:
     """Remove temporary files for `path` left by dead processes of this machine."""
     place = real(path)
-    prefix = _prefix(place)
+    form = re.compile(rf"{re.escape(_prefix(place))}(\d+)\.[0-9a-f]{{8}}\.tmp")
     with suppress(OSError):  # missing folders, which the writer reports
         for name in (path.name for path in place.parent.iterdir()):
-            pid = name.removeprefix(prefix).removesuffix(_END)
-            if name == f"{prefix}{pid}{_END}" and pid.isdecimal() and not _is_alive(int(pid)):
+            found = form.fullmatch(name)
+            if found and not _is_alive(int(found[1])):
                 (place.parent / name).unlink(missing_ok=True)
 
 

@@ -46,11 +46,15 @@ class Form(NamedTuple):
         return Form(self.rests or other.rests, self.tilted or other.tilted)
 
 
+class MissingFrameError(ValueError):
+    """A file has fewer frames than were asked for."""
+
+
 def row_of(frame: int, n_frames: int, path: PathLike) -> int:
-    """Count a frame from 0, a negative one from the end; ValueError if there is none."""
+    """Count a frame from 0, a negative one from the end; MissingFrameError if there is none."""
     if not -n_frames <= frame < n_frames:
         msg = f"{path}: has {n_frames} frames, expected frame {frame} to be one of them"
-        raise ValueError(msg)
+        raise MissingFrameError(msg)
     return frame % n_frames
 
 

@@ -21,8 +21,11 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
         exponent        (N,), for shapes that have one (not in H5MD)
         half_length, radius (N,), A and R of the others, as used for contacts (not in H5MD)
     /observables/NAME   {step, time, value (T', ...)}, each sampled at its own steps
-    /parameters         +every attribute given by the caller, including results
+    /parameters         +every attribute given by the caller, including results; texts and arrays above 1 kB
+                        are datasets, texts as characters
     /report             step, wall_seconds, error (T'',): the convergence history
+
+Files are of HDF5's format of version 1.10, with checksums everywhere (`jamshape.files.hdf5`).
 
 `step` and `time` of all elements under /particles/all are hard links to those of `position`, as
 H5MD requires. `step` is written last and counts the rows: rows beyond it, from an interrupted append,
@@ -51,8 +54,9 @@ from jamshape.checks import require_other_file
 from jamshape.files import layout
 from jamshape.files.disk import PathLike, replacing
 from jamshape.files.frames import Form, row_of
+from jamshape.files.hdf5 import FileFormatError, attribute, attributes, require_item
 from jamshape.files.journal import read_journal
-from jamshape.files.layout import FileFormatError, Report, Series
+from jamshape.files.layout import Report, Series
 from jamshape.files.rows import check_after, check_same_particles
 from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, renamed
 from jamshape.packing import Packing
@@ -216,8 +220,7 @@ def count_frames(path: PathLike) -> int:
 def read_attributes(path: PathLike) -> dict[str, Any]:
     """Read the attributes, as bool, int, float, str or array; errors as `read_packing`."""
     with layout.opened(path) as file:
-        attributes = layout.require_item(file, "parameters").attrs
-        found = renamed({name: layout.plain(value) for name, value in attributes.items()})
+        found = renamed(attributes(file, "parameters"))
     return found | {k: protocol_named(v) for k, v in found.items() if k == "protocol"}
 
 
@@ -244,14 +247,21 @@ def require_attributes(out: Path, expected: Mapping[str, Any], what: str = "a pa
 def read_style(path: PathLike) -> tuple[str, int]:
     """Read the name of the shape and the dimension, without the arrays; errors as `read_packing`."""
     with layout.opened(path) as file:
-        style = layout.require_item(file, "particles/all").attrs.get("shape_style", DEFAULT)
-        return str(style), int(layout.require_item(file, "particles/all/box").attrs["dimension"])
+        style = attribute(require_item(file, "particles/all"), "shape_style", DEFAULT)
+        dimension = attribute(require_item(file, "particles/all/box"), "dimension")
+        if not isinstance(style, str) or dimension not in {2, 3}:
+            msg = (
+                f"{path}: has the shape {style!r} in {dimension!r} dimensions, expected a name and 2 or 3;"
+                " write it again"
+            )
+            raise FileFormatError(msg)
+    return style, int(dimension)
 
 
 def read_format_version(path: PathLike) -> int:
     """Read the version of the names in a file; errors as `read_packing`."""
     with layout.opened(path) as file:
-        return int(layout.require_item(file, "h5md/creator").attrs.get("format_version", 1))
+        return layout.version_of(file)
 
 
 def read_creator(path: PathLike) -> str:
@@ -266,16 +276,14 @@ def read_origin(path: PathLike) -> str:
 
 def _of_creator(path: PathLike, name: str, otherwise: str) -> str:
     with layout.opened(path) as file:
-        text = layout.require_item(file, "h5md/creator").attrs.get(name, otherwise)
-        return text.decode() if isinstance(text, bytes) else str(text)
+        return str(attribute(require_item(file, "h5md/creator"), name, otherwise))
 
 
 def read_observables(path: PathLike) -> dict[str, NDArray[Any]]:
     """Read all observables as arrays (T, ...), T = 1 in a packing; errors as `read_packing`."""
     with layout.opened(path) as file:
         found = {
-            name: layout.read_rows(file, name).value
-            for name in layout.require_item(file, "observables")
+            name: layout.read_rows(file, name).value for name in require_item(file, "observables")
         }
         return renamed(found)
 
@@ -290,4 +298,5 @@ def read_report(path: PathLike) -> Report:
     """Read the convergence history; errors as `read_packing`."""
     with layout.opened(path) as file:
         n = layout.count(file, "report")
-        return Report(*(layout.require_rows(file, "report", name)[:n] for name in layout.REPORT))
+        rows = (layout.require_rows(file, "report", name, n) for name in layout.REPORT)
+        return Report(*(column[:n] for column in rows))

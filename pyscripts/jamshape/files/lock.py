@@ -12,10 +12,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
-from jamshape.files.disk import PathLike, real, refusals
+from jamshape.files.disk import PathLike, real, refusals, require_replaceable
 
-# Of file systems without locks.
-_NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
+NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
+"""Errors of file systems without locks."""
 
 _FLAGS = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 
@@ -38,7 +38,8 @@ class Lock:
     Raises
     ------
     OSError
-        If another process holds it, or the folder is missing or not writable; the message is one sentence.
+        If another process holds it, the folder is missing or not writable, or the file cannot be replaced
+        (`require_replaceable`); the message is one sentence.
 
     Warns
     -----
@@ -47,7 +48,9 @@ class Lock:
     """
 
     def __init__(self, path: PathLike) -> None:
-        self._path, self._file = lock_of(path), -1
+        self._path = lock_of(path)
+        self._file = -1
+        require_replaceable(path)
         with refusals(path, self._path):
             self._file = _locked(self._path, path)
         _held.add(self)
@@ -126,7 +129,7 @@ def _flocked(file: int, path: PathLike) -> bool:
         )
         raise OSError(msg) from error
     except OSError as error:
-        if error.errno not in _NO_LOCKS:
+        if error.errno not in NO_LOCKS:
             raise
         msg = (
             f"{path}: its file system has no locks, expected one where several processes could write a file;"

@@ -89,6 +89,7 @@ class LammpsDriver:
         self._every, self._per_frame = every, every * max(1, sizes.rows // sizes.frames)
         self._first, self.at_mark = first, False
         self._marked = checkpoint["evaluations"] if checkpoint else 0.0
+        self._kept: Checkpoint | None = None  # of the present mark
         self._session = Session()
         try:
             self._run = FlowRun(self._session, settings, first, checkpoint)
@@ -109,7 +110,8 @@ class LammpsDriver:
         """Run to the next row."""
         run = self._run
         if self.at_mark:
-            run.renew()
+            self.checkpoint()
+        self._kept = None
         run.advance(min(run.last_step, (self._session.step // self._every + 1) * self._every))
         sample = run.sample()
         evaluations = sample.observables["evaluations"]
@@ -132,7 +134,8 @@ class LammpsDriver:
 
     def checkpoint(self) -> Checkpoint:
         """Return a LAMMPS restart file and what it lacks."""
-        return self._run.checkpoint()
+        self._kept = self._kept or self._run.mark()
+        return self._kept
 
     def results(self) -> dict[str, Any]:
         """Return what LAMMPS left out, and its version."""

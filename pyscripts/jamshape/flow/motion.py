@@ -160,7 +160,6 @@ class FlowRun(Generic[_Motion]):
         self.session, self.settings = session, settings
         self._began = perf_counter()
         self._time, self._step_of_time, self._evaluations = 0.0, 0, 0.0
-        self._is_written = False
         if checkpoint is None:
             session.load(start)
         else:
@@ -209,28 +208,22 @@ class FlowRun(Generic[_Motion]):
         """Time since the start, valid after changes of the time step."""
         return self._time + (self.session.step - self._step_of_time) * self.settings.dt
 
-    def renew(self) -> None:
-        """Wrap and sort atoms and build their neighbour lists anew, as after reading a restart file.
+    def mark(self) -> Checkpoint:
+        """Return all that is needed to go on, and go on as after reading it.
 
-        LAMMPS rounds positions in tilted boxes when it writes one and when it sets up a run. So one is written here
-        unless `checkpoint` has done so.
+        Writing a restart file wraps and sorts atoms and, in a tilted box, rounds their positions, so it is written
+        at every mark, needed or not.
         """
-        if not self._is_written:
-            self.session.restart()
-        self._is_written = False
-        self.session.commands("run 0 post no")
-
-    def checkpoint(self) -> Checkpoint:
-        """Return all that is needed to go on; `renew` follows, here and where it is resumed."""
-        evaluations = self.measure()["evaluations"]  # before LAMMPS writes, which drops contacts
-        self._is_written = True
-        return {
+        evaluations = self.measure()["evaluations"]
+        found = {
             "restart": self.session.restart(),
             "time": self._time,
             "step_of_time": self._step_of_time,
             "evaluations": evaluations,
             "wall_seconds": perf_counter() - self._began,
         }
+        self.session.commands("run 0 post no")
+        return found
 
     def samples(self, every: int) -> Iterator[Row]:
         """Run to the end and yield a row at each multiple of `every` steps, and at the end."""

@@ -12,7 +12,7 @@ from jamshape.front.progress import display, place
 from jamshape.landscape.threads import sharing
 from jamshape.old_names import accepts_old
 from jamshape.protocols.defaults import recipe_for
-from jamshape.protocols.make import is_done, make, require_same
+from jamshape.protocols.make import is_done, make, require_same, tidy
 from jamshape.recording.recorder import How
 from jamshape.shapes.particles import Particles
 
@@ -152,6 +152,7 @@ def make_packing(
             make(recipe, at.path, How(again, seconds, lambda row: tell(row.told)))
     else:
         require_same(at.path, recipe)
+        tidy(at.path)
     packing = MeasuredPacking.read(at.path)
     warn_unless_reached(packing.results)
     # A temporary file is not named in messages.

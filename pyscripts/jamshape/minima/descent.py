@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jamshape.landscape import Evaluation, Landscape
 from jamshape.landscape.local_energy_model import DescentEnd
@@ -18,6 +20,8 @@ _GAIN = 0.7
 
 # In units of k_e and `Landscape.length`.
 _LOWEST = 1e-24
+
+_ROWS = ("wall_seconds", "evaluations", "residual", "energy_density")
 
 
 class Outcome(Enum):
@@ -84,6 +88,17 @@ class History:
     evaluations: list[int] = field(default_factory=list)
     residual: list[float] = field(default_factory=list)
     energy_density: list[float] = field(default_factory=list)
+
+    def told(self) -> dict[str, NDArray[Any]]:
+        """Return its rows as arrays, for a checkpoint."""
+        return {name: np.array(getattr(self, name)) for name in _ROWS}
+
+    @classmethod
+    def of(cls, told: Mapping[str, NDArray[Any]]) -> History:
+        """Go on from rows of `told`; time goes on, too."""
+        rows = {name: told[name].tolist() for name in _ROWS}
+        passed = rows["wall_seconds"][-1] if rows["wall_seconds"] else 0.0
+        return cls(time.perf_counter() - passed, **rows)
 
     def add(self, evaluations: int, residual: float, energy_density: float) -> None:
         """Append a row with the present time."""

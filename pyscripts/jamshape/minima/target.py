@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import math
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from jamshape.checks import require_positive
@@ -122,6 +122,8 @@ class Search:
         Densest state known to be unjammed, if any; number of unjammed states in a row.
     opening
         Whether the last step opened the box.
+    leading
+        Way from a jammed state to u0, while the search is on it.
     minimum
         Result, once it is found.
     """
@@ -131,6 +133,7 @@ class Search:
     loose: State | None = None
     loose_in_a_row: int = 0
     opening: bool | None = None
+    leading: Leading | None = None
     minimum: Minimum | None = None
     history: History = field(default_factory=History)
 
@@ -193,34 +196,49 @@ def extrapolation(landscape: Landscape, search: Search, target: Target) -> Itera
     ValueError
         If u0 is out of reach: overlaps below the rounding of coordinates, or no longer small.
     """
-    fine = target.strain_above_jamming(landscape)
     require_reachable(landscape, target)
     while search.minimum is None:
+        extrapolate(landscape, search, target)
+        yield search
+
+
+def extrapolate(landscape: Landscape, search: Search, target: Target) -> None:
+    """Advance a search by one minimisation; parameters and errors as `extrapolation`."""
+    if search.leading is None:
         stop = Stop(tolerance=_GOOD, lowest=search.lowest(landscape, target))
         found = minimise(landscape, search.state, "auto", stop, search.history)
         if found.is_at_rest:
-            jammed = found
-            found = yield from _lead_to(landscape, search, jammed, target)
-            if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):
-                search.minimum, search.state = found, found.state
-                yield search
-                return
-            lost = found.outcome is not Outcome.UNJAMMED or found.state.volume > jammed.state.volume
-            if lost and search.loose is not None:
-                search.step, search.loose_in_a_row = search.step / 4, 0
-        if found.outcome is Outcome.UNJAMMED:
-            search.close_further(found.state, fine, target)
-        else:
-            search.leave(found.state)
-        if search.step < _SMALLEST_STEP * fine:
-            u = found.energy_density
-            msg = (
-                f"the search ended between an unjammed state and one with u = {u:.3g} and a"
-                f" residual of {found.residual.largest:.2g}, expected a minimum with u = {target.u0:.3g};"
-                " take another u0 or another start"
-            )
-            raise TargetError(msg)
-        yield search
+            search.leading = Leading(found, found)
+            return
+    else:
+        led = search.leading.advance(landscape, target)
+        if led is None:
+            return
+        found, jammed, search.leading = led, search.leading.start, None
+        if found.outcome is not Outcome.UNJAMMED and target.is_met(found.energy_density):
+            search.minimum, search.state = found, found.state
+            return
+        lost = found.outcome is not Outcome.UNJAMMED or found.state.volume > jammed.state.volume
+        if lost and search.loose is not None:
+            search.step, search.loose_in_a_row = search.step / 4, 0
+    _go_on(landscape, search, target, found)
+
+
+def _go_on(landscape: Landscape, search: Search, target: Target, found: Minimum) -> None:
+    """Close or open the box for the next minimisation."""
+    fine = target.strain_above_jamming(landscape)
+    if found.outcome is Outcome.UNJAMMED:
+        search.close_further(found.state, fine, target)
+    else:
+        search.leave(found.state)
+    if search.step < _SMALLEST_STEP * fine:
+        u = found.energy_density
+        msg = (
+            f"the search ended between an unjammed state and one with u = {u:.3g} and a"
+            f" residual of {found.residual.largest:.2g}, expected a minimum with u = {target.u0:.3g};"
+            " take another u0 or another start"
+        )
+        raise TargetError(msg)
 
 
 def require_reachable(landscape: Landscape, target: Target) -> None:
@@ -239,76 +257,100 @@ def require_reachable(landscape: Landscape, target: Target) -> None:
         raise ValueError(msg)
 
 
-def _lead_to(
-    landscape: Landscape, search: Search, start: Minimum, target: Target
-) -> Generator[Search, None, Minimum]:
-    """Relax a minimum at u0, minimum by minimum; unjammed if the energy vanishes.
-
-    A minimum that stalls at u0, where a contact is about to open or close, is approached again from a higher energy.
-    Yields the search before each minimisation, where a killed run resumes.
-    """
-    best = None
-    jammed = start
-    for _ in range(_CYCLES):
-        yield search
-        led = _Led(landscape, target, _relaxed(landscape, jammed, target, jammed.energy_density))
-        for _ in led.minima():
-            yield search
-        if led.lost is not None:
-            return best or led.lost
-        found = _judged(landscape, led.jammed, target)
-        if best is None or found.residual.largest < best.residual.largest:
-            best = found
-        if found.outcome is not Outcome.STALLED:
-            return found
-        higher = found.state.strained(_strain_to(found, _towards(found, _HIGHER * target.u0)))
-        jammed = replace(found, state=higher)
-    assert best is not None
-    return best
-
-
 @dataclass(eq=False)
-class _Led:
-    """A minimum on its way to u0.
+class Leading:
+    """A minimum on its way to u0, between two minimisations, with all that is needed to resume it.
 
     The box is strained to where sqrt(u), which is linear in the strain, reaches that of u0. Where that opens the
-    packing, fractions of the strain are tried.
+    packing, fractions of the strain are tried. A minimum that stalls at u0, where a contact is about to open or close,
+    is approached again from a higher energy.
+
+    Parameters
+    ----------
+    start
+        Jammed state from which the way begins.
+    jammed
+        Present state: to be relaxed at first, and then a minimum.
+    best
+        Minimum with the smallest residual of earlier approaches.
+    cycle
+        Number of the approach.
+    is_new
+        Whether the present state is still to be relaxed.
+    part, tries
+        Fraction of the strain to u0 to take, and how many fractions were tried.
+    tolerance, aim
+        Residual and energy density to reach.
+    n_minima
+        Minimisations of this approach.
     """
 
-    landscape: Landscape
-    target: Target
+    start: Minimum
     jammed: Minimum
-    lost: Minimum | None = None
-    """Last state, if it unjams on the way."""
+    best: Minimum | None = None
+    cycle: int = 0
+    is_new: bool = True
+    part: float = 1.0
+    tries: int = 1
+    tolerance: float = 0.0
+    aim: float = 0.0
+    n_minima: int = 0
 
-    def minima(self) -> Iterator[None]:
-        """Yield before each minimisation on the way."""
-        if self.jammed.outcome is Outcome.UNJAMMED:
-            self.lost = self.jammed
-            return
-        target, part, tries = self.target, 1.0, 1
-        tolerance, aim = target.tolerance, target.u0
-        for _ in range(_MOST_MINIMA):
-            left, u = self.jammed.residual.largest, self.jammed.energy_density
-            if self.jammed.outcome is Outcome.STALLED and left < _SLIDING:
-                tolerance = max(tolerance, _GAIN * left)  # the next ones need not be better
-            if left <= tolerance and target.is_met(u):
-                return
-            if abs(u / target.u0 - 1) < _CLOSE:
-                aim *= target.u0 / u  # compensates what minimisation removes, as rods slide
-            root = _towards(self.jammed, aim, part)
-            strain = _strain_to(self.jammed, root)
-            wanted = replace(target, tolerance=tolerance)
-            yield
-            strained = replace(self.jammed, state=followed(self.landscape, self.jammed, strain))
-            found = _relaxed(self.landscape, strained, wanted, root**2)
-            if found.outcome is not Outcome.UNJAMMED:
-                self.jammed, part = found, min(2 * part, 1.0)
-            elif tries == _TRIES:
-                self.lost = found
-                return
-            else:
-                tries, part = tries + 1, part / 4
+    def advance(self, landscape: Landscape, target: Target) -> Minimum | None:
+        """Minimise once; return the minimum at u0, or an unjammed one if the energy vanishes on the way."""
+        if self.is_new:
+            self.jammed = _relaxed(landscape, self.jammed, target, self.jammed.energy_density)
+            self.is_new, self.part, self.tries, self.n_minima = False, 1.0, 1, 0
+            self.tolerance, self.aim = target.tolerance, target.u0
+            lost = self.jammed if self.jammed.outcome is Outcome.UNJAMMED else None
+        else:
+            lost = self._step(landscape, target)
+        if lost is not None:
+            return self.best or lost
+        return self._end(landscape, target) if self._is_there(target) else None
+
+    def _step(self, landscape: Landscape, target: Target) -> Minimum | None:
+        """Strain the box towards u0 and minimise; return the state if the packing is lost."""
+        root = _towards(self.jammed, self.aim, self.part)
+        strain = _strain_to(self.jammed, root)
+        wanted = replace(target, tolerance=self.tolerance)
+        strained = replace(self.jammed, state=followed(landscape, self.jammed, strain))
+        found = _relaxed(landscape, strained, wanted, root**2)
+        self.n_minima += 1
+        if found.outcome is not Outcome.UNJAMMED:
+            self.jammed, self.part = found, min(2 * self.part, 1.0)
+        elif self.tries == _TRIES:
+            return found
+        else:
+            self.tries, self.part = self.tries + 1, self.part / 4
+        return None
+
+    def _is_there(self, target: Target) -> bool:
+        """Whether the approach has ended; if not, adapt the next step."""
+        if self.n_minima == _MOST_MINIMA:
+            return True
+        left, u = self.jammed.residual.largest, self.jammed.energy_density
+        if self.jammed.outcome is Outcome.STALLED and left < _SLIDING:
+            self.tolerance = max(self.tolerance, _GAIN * left)  # the next ones need not be better
+        if left <= self.tolerance and target.is_met(u):
+            return True
+        if abs(u / target.u0 - 1) < _CLOSE:
+            self.aim *= target.u0 / u  # compensates what minimisation removes, as rods slide
+        return False
+
+    def _end(self, landscape: Landscape, target: Target) -> Minimum | None:
+        """Judge the end of an approach, and begin the next one if it stalled."""
+        found = _judged(landscape, self.jammed, target)
+        if self.best is None or found.residual.largest < self.best.residual.largest:
+            self.best = found
+        if found.outcome is not Outcome.STALLED:
+            return found
+        self.cycle += 1
+        if self.cycle == _CYCLES:
+            return self.best
+        higher = found.state.strained(_strain_to(found, _towards(found, _HIGHER * target.u0)))
+        self.jammed, self.is_new = replace(found, state=higher), True
+        return None
 
 
 def _relaxed(landscape: Landscape, at: Minimum, target: Target, u: float) -> Minimum:
@@ -426,25 +468,29 @@ def bisection(
         If lambda falls below `shortest` before u reaches u0.
     """
     while search.minimum is None:
-        stop = Stop(tolerance=target.tolerance)
-        found = minimise(landscape, search.state, target.method, stop, search.history)
-        u = found.energy_density
-        if target.is_met(u):
-            search.minimum, search.state = found, found.state
-            yield search
-            return
-        opens = u > target.u0
-        if search.opening is not None and search.opening != opens:
-            search.step /= 2
-        if search.step < shortest:
-            msg = (
-                f"lambda fell below {shortest:g} at u = {u:.9g}, expected u = {target.u0:.9g};"
-                " use extrapolation"
-            )
-            raise TargetError(msg)
-        search.opening = opens
-        search.state = found.state.strained(search.step if opens else -search.step)
+        bisect(landscape, search, target, shortest)
         yield search
+
+
+def bisect(landscape: Landscape, search: Search, target: Target, shortest: float = 1e-16) -> None:
+    """Advance a search by one minimisation; parameters and errors as `bisection`."""
+    stop = Stop(tolerance=target.tolerance)
+    found = minimise(landscape, search.state, target.method, stop, search.history)
+    u = found.energy_density
+    if target.is_met(u):
+        search.minimum, search.state = found, found.state
+        return
+    opens = u > target.u0
+    if search.opening is not None and search.opening != opens:
+        search.step /= 2
+    if search.step < shortest:
+        msg = (
+            f"lambda fell below {shortest:g} at u = {u:.9g}, expected u = {target.u0:.9g};"
+            " use extrapolation"
+        )
+        raise TargetError(msg)
+    search.opening = opens
+    search.state = found.state.strained(search.step if opens else -search.step)
 
 
 def find(landscape: Landscape, start: State, target: Target) -> Minimum:

@@ -8,16 +8,19 @@ the slowest rate, and the run ends when even that rate no longer keeps the press
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from jamshape.checks import require_positive
+from jamshape.flow import motion
 from jamshape.flow.compression import Compression, CompressionRun
-from jamshape.flow.motion import Row
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
+from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+
+ROWS_PER_MARK = 50
+"""Rows between two marks."""
 
 # Rate and time step of `compressed_start`.
 _KAPPA_FAST, _DT_FAST = 1e-4, 0.2
@@ -100,74 +103,121 @@ def compressed_start(start: Packing, phi: float) -> Packing:
         return run.packing()
 
 
-def begin_approach(session: Session, start: Packing, settings: Approach) -> CompressionRun:
-    """Prepare a run in a fresh session."""
-    flow = Compression(kappa=settings.kappa_start, phi_end=_NO_END, dt=settings.dt, sides=2)
-    return CompressionRun(session, flow, start)
+def plan(start: Callable[[], Packing], settings: Approach, made_from: Mapping[str, Any]) -> Plan:
+    """Plan an approach to jamming, and the return to a vanishing pressure."""
+
+    def begin() -> ApproachDriver:
+        return ApproachDriver(start(), settings)
+
+    def restore(first: Packing, checkpoint: Checkpoint) -> ApproachDriver:
+        return ApproachDriver(first, settings, checkpoint)
+
+    return Plan("the compression of a packing", made_from, begin, restore)
 
 
-def resume_approach(
-    session: Session, restart: Path, like: Packing, stored: Mapping[str, Any]
-) -> CompressionRun:
-    """Resume from a LAMMPS restart file of particles, with the stored `rate`, `dt` and `restart_time`."""
-    flow = Compression(kappa=stored["rate"], phi_end=_NO_END, dt=stored["dt"], sides=2)
-    return CompressionRun(session, flow, like, restart, time=stored["restart_time"])
+class ApproachDriver:
+    """Compression until the state is jammed, and then opening of the box until the pressure nearly vanishes.
 
-
-def approach(run: CompressionRun, settings: Approach) -> Iterator[Row]:
-    """Compress until the state is jammed, then open the box until the pressure nearly vanishes.
-
-    Raises if the total number of time steps exceeds `MOST_STEPS`.
+    Rows come after every `Approach.strain`, or less; they include ``kappa``, negative while the box is opened.
 
     Parameters
     ----------
-    run : CompressionRun
-        From `begin_approach`.
+    first : Packing
     settings : Approach
-
-    Yields
-    ------
-    Row
-        Observables after every `settings.strain`, or less; they include `kappa`, negative while
-        the box is opened.
-
-    Raises
-    ------
-    ApproachError
-        After `MOST_STEPS` time steps.
+    checkpoint : Checkpoint, optional
+        From which to go on.
     """
-    if run.settings.kappa > 0:
-        yield from _compress(run, settings)
-    yield from _open(run, settings)
 
+    def __init__(
+        self, first: Packing, settings: Approach, checkpoint: Checkpoint | None = None
+    ) -> None:
+        told = checkpoint or {"kappa": settings.kappa_start, "dt": settings.dt, "rows": 0}
+        self._settings, self._rows = settings, told["rows"]
+        self._pressure: float
+        self._pressure, self._marked = told.get("pressure", math.inf), checkpoint
+        flow = Compression(kappa=told["kappa"], phi_end=_NO_END, dt=told["dt"], sides=2)
+        self._session = Session()
+        try:
+            self._run = CompressionRun(self._session, flow, first, checkpoint and checkpoint["run"])
+        except BaseException:
+            self._session.close()
+            raise
 
-def _compress(run: CompressionRun, settings: Approach) -> Iterator[Row]:
-    while True:
+    @property
+    def done(self) -> bool:
+        """Whether the pressure has vanished again."""
+        return self._run.settings.kappa < 0.0 and self._pressure <= self._settings.p_open
+
+    @property
+    def at_mark(self) -> bool:
+        """Whether `checkpoint` may be called now."""
+        return self._rows % ROWS_PER_MARK == 0
+
+    def first(self) -> Row:
+        """Return the progress at the start."""
+        return Row(self._told(self._run.measure()))
+
+    def advance(self) -> Row:
+        """Run to the next row; raises ApproachError after `MOST_STEPS` time steps."""
+        run, settings = self._run, self._settings
+        if self.at_mark:
+            self.checkpoint()
+        self._marked = None
+        if run.settings.kappa < 0:
+            # Near jamming the pressure is about 0.3 (phi - phi_J): go a fraction of the way.
+            sample = _advance(run, settings, min(settings.strain, _PART * self._pressure))
+            self._pressure = sample.observables["pressure"]
+        else:
+            sample = self._compressed()
+        self._rows += 1
+        found = sample.observables
+        return Row(self._told(found), sample.step, sample.time, found, has_frame=self.done)
+
+    def _compressed(self) -> motion.Row:
+        run, settings = self._run, self._settings
         # At fast rates no rows are recorded in between.
         finer = math.sqrt(settings.kappa / run.settings.kappa)
         sample = _advance(run, settings, min(settings.strain / finer, _LARGEST_STRAIN))
         kappa, pressure = run.settings.kappa, sample.observables["pressure"]
-        is_jammed = kappa == settings.kappa and pressure >= settings.p_end
-        # Before the row is yielded: a restart file written at the row resumes with the next step.
-        if is_jammed:
+        if kappa == settings.kappa and pressure >= settings.p_end:
             run.change(kappa=-settings.kappa)
+            self._pressure = run.measure()["pressure"]
         elif kappa > settings.kappa and pressure >= settings.p_flow:
             run.change(kappa=max(kappa / 2, settings.kappa))
-        yield sample
-        if is_jammed:
-            return
+        return sample
+
+    def _told(self, found: Mapping[str, float]) -> Told:
+        pressure, rate, aim = found["pressure"], self._run.settings.kappa, self._settings
+        where = f"phi {found['phi']:.6f}, pressure {pressure:.2e}"
+        if rate < 0:
+            return Told("opening of the box", f"{where} down to {aim.p_open:.0e}")
+        return Told(
+            "compression",
+            f"{where} up to {aim.p_end:.0e} at rate {rate:.1e} down to {aim.kappa:.0e}",
+        )
+
+    def frame(self) -> Packing:
+        """Return the present state."""
+        return self._run.packing()
+
+    def checkpoint(self) -> Checkpoint:
+        """Return the state of LAMMPS, the rate, the time step, and the last pressure."""
+        if self._marked is None:
+            settings = self._run.settings
+            found = {"kappa": settings.kappa, "dt": settings.dt, "rows": self._rows}
+            self._marked = found | {"pressure": self._pressure, "run": self._run.mark()}
+        return self._marked
+
+    def results(self) -> dict[str, Any]:
+        """Return the rate and the version of LAMMPS."""
+        return {"rate": self._run.settings.kappa, "lammps_version": self._session.version}
+
+    def close(self) -> None:
+        """End LAMMPS."""
+        self._session.close()
 
 
-def _open(run: CompressionRun, settings: Approach) -> Iterator[Row]:
-    pressure = run.measure()["pressure"]
-    while pressure > settings.p_open:
-        # Near jamming the pressure is about 0.3 (phi - phi_J): go a fraction of the way.
-        sample = _advance(run, settings, min(settings.strain, _PART * pressure))
-        yield sample
-        pressure = sample.observables["pressure"]
-
-
-def _advance(run: CompressionRun, settings: Approach, strain: float) -> Row:
+def _advance(run: CompressionRun, settings: Approach, strain: float) -> motion.Row:
     step = abs(run.settings.kappa) * run.settings.dt
     run.advance(min(run.session.step + max(1, round(strain / step)), MOST_STEPS + 1))
     sample = run.sample()

@@ -1,24 +1,34 @@
-"""The pipeline of a packing, of any shape and dimension.
+"""The pipeline of a packing, of any shape and dimension, as a driver of stages.
 
 A random start; compression to jamming, by dynamics, by quasistatic steps or at a fixed rate; the search for the
-target energy, if any; all measurements; and the file. Between its steps everything is in files
-beside the result, so that an interrupted pipeline resumes where it was.
+target energy, if any; a strict minimum or a second attempt; all measurements; and the file. Compressions in LAMMPS
+are runs with a file of their own, ``OUT.run.h5``, which serves searches for other energies; all other stages share one
+file until the packing is finished, ``OUT.making.h5``, from which an interrupted call goes on.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from jamshape.files.h5md import read_attributes, require_attributes
-from jamshape.files.journal import remove_run
+import numpy as np
+
+from jamshape.files.h5md import read_attributes, read_observables, require_attributes
+from jamshape.files.lock import Lock
+from jamshape.flow import lammps_driver
+from jamshape.flow.compression import Compression
+from jamshape.flow.lammps_driver import Sizes
+from jamshape.landscape import Landscape
+from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.packing_summary import summary_of, write_minimum
-from jamshape.protocols.by_compression import ByCompression
-from jamshape.protocols.by_dynamics import ByDynamics
-from jamshape.protocols.by_steps import BySteps
-from jamshape.protocols.making import Making, Progress, SearchFile, lead
+from jamshape.minima import History
+from jamshape.minima.checkpoints import minimum_of, told_minimum
+from jamshape.minima.target import require_reachable
+from jamshape.packing import Packing, State
+from jamshape.protocols import approach
+from jamshape.protocols.choosing import Choosing, frame_of
 from jamshape.protocols.recipe import (
     Adaptive,
     Compressed,
@@ -26,39 +36,44 @@ from jamshape.protocols.recipe import (
     Recipe,
     Steps,
     Thermalisation,
-    Way,
 )
-from jamshape.protocols.retry_file import RetryFile, try_again
-from jamshape.protocols.strict_file import StrictFile, lead_strictly
-
-_MAKING: dict[type[Way], Callable[[Recipe, Path], Making]] = {
-    Dynamics: ByDynamics,
-    Adaptive: BySteps,
-    Steps: BySteps,
-    Compressed: ByCompression,
-}
-"""Implementation of each way."""
+from jamshape.protocols.stages import (
+    Begin,
+    Compressing,
+    Making,
+    Retrying,
+    Searching,
+    Stage,
+    Strengthening,
+    Sweeping,
+)
+from jamshape.recording.driver import Checkpoint, Driver, Plan, Row
+from jamshape.recording.recorder import How, record
 
 __all__ = [
     "Adaptive",
     "Compressed",
     "Dynamics",
-    "Progress",
     "Recipe",
     "Steps",
     "Thermalisation",
     "is_done",
     "make",
     "require_same",
+    "run_file",
     "summary_of",
     "tidy",
 ]
 
+# Rows and frames of marschall-2018; frames are about 2e-3 of phi apart at jamming.
+_SIZES = Sizes(600, 300)
 
-def make(
-    recipe: Recipe, out: Path, *, again: bool = False, retry: bool = True
-) -> Iterator[Progress]:
-    """Make a packing and write it to `out`, resuming an earlier call.
+# Settings of the search alone; a compression, whose file holds its final packing fraction, serves any search.
+_OF_SEARCH = ("phi_start", "search", "start", "protocol")
+
+
+def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> None:  # noqa: B008
+    """Make a packing and write it to `out`, or go on with an interrupted call.
 
     Where forces do not balance at the energy, there is a second attempt (`protocols.retry`).
 
@@ -67,15 +82,10 @@ def make(
     recipe : Recipe
     out : Path
         Replaced when the packing is found.
-    again : bool
-        Start over if files are damaged or belong to another recipe.
+    how : How
+        With `again`, all stages begin anew, but for a compression in LAMMPS that serves this recipe.
     retry : bool
         Whether to make a second attempt.
-
-    Yields
-    ------
-    Progress
-        After every row of a compression, every minimisation and every block of sweeps.
 
     Raises
     ------
@@ -83,55 +93,236 @@ def make(
         See `target.extrapolation`.
     ValueError
         As `Recipe.start` and `target.extrapolation`, or if another packing was being made there.
+    TimeLimitReached, OSError
+        As `jamshape.recording.recorder.record`.
     """
-    began = time.perf_counter()
-    way = _way(recipe, out)
+    compress(recipe, out, how)
+    source = run_file(recipe, out)
+
+    def begin() -> Pipeline:
+        return Pipeline(recipe, source, None, retry=retry)
+
+    def restore(first: Packing, checkpoint: Checkpoint) -> Pipeline:
+        del first
+        return Pipeline(recipe, source, checkpoint, retry=retry)
+
+    def finish(driver: Driver) -> None:
+        assert isinstance(driver, Pipeline)
+        driver.write(out)
+
+    record(_making_file(out), Plan("a packing", recipe.attributes(), begin, restore, finish), how)
+
+
+def _making_file(out: Path) -> Path:
+    return out.with_name(out.name + ".making.h5")
+
+
+def tidy(out: Path) -> None:
+    """Remove what a kill after the last write has left beside a finished packing."""
+    left = _making_file(out)
+    if left.exists():
+        with Lock(left):
+            left.unlink(missing_ok=True)
+
+
+def run_file(recipe: Recipe, out: Path) -> Path | None:
+    """Name the file of the compression in LAMMPS, if the recipe has one."""
+    if isinstance(recipe.way, Steps):
+        return None
+    given = recipe.way.source if isinstance(recipe.way, Compressed) else None
+    return given or out.with_name(out.name + ".run.h5")
+
+
+def compress(recipe: Recipe, out: Path, how: How) -> None:
+    """Record the compression in LAMMPS, if the recipe has one that is not given."""
+    path = run_file(recipe, out)
+    if path is None or (isinstance(recipe.way, Compressed) and recipe.way.source):
+        return
+    plan = _compression(recipe)
     try:
-        way.require_own()
+        if path.exists():
+            require_attributes(path, plan.settings, plan.what)
+            recipe.require_particles(path)
+        record(path, plan, how._replace(again=False))
     except ValueError:
-        if not again:
+        if not how.again:
             raise
-        way.forget()
-    yield from way.steps()
-    landscape, minimum = way.landscape(), way.minimum
-    before, search = landscape.evaluations, _search(recipe, out)
-    if recipe.target:
-        minimum = yield from lead(landscape, way.state(), recipe.target, search)
-    assert minimum is not None
-    searched = landscape.evaluations
-    strict, second = StrictFile(_strict_file(out), recipe), RetryFile(_strict_file(out), recipe)
-    if recipe.strict:
-        minimum = yield from lead_strictly(landscape, minimum, strict)
-    elif retry and recipe.is_searched and not minimum.is_at_rest:
-        minimum = yield from try_again(landscape, minimum, second)
-    attributes: dict[str, Any] = recipe.attributes() | way.measured()
-    if recipe.target:
-        attributes |= {"search": recipe.way.search, "search_minimisations": search.minimisations}
-        attributes |= {"search_evaluations": searched - before}
-    attributes |= strict.attributes | second.attributes
-    seconds = attributes.pop("seconds_before", 0.0) + time.perf_counter() - began
-    attributes |= {"wall_seconds": seconds, "evaluations": landscape.evaluations}
-    write_minimum(out, landscape, minimum, attributes)
-    tidy(recipe, out)
+        record(path, plan, how)
 
 
-def tidy(recipe: Recipe, out: Path) -> None:
-    """Remove files for resuming that a kill left beside a finished packing."""
-    _search(recipe, out).forget()
-    remove_run(_strict_file(out))
-    _way(recipe, out).done()
+def _compression(recipe: Recipe) -> Plan:
+    """Plan the compression in LAMMPS."""
+
+    def start() -> Packing:
+        packing = recipe.start()
+        if recipe.target:
+            require_reachable(Landscape(packing), recipe.target)
+        return packing
+
+    told, way = recipe.before_target(), recipe.way
+    if isinstance(way, Dynamics):
+        return approach.plan(start, way.approach, told)
+    assert isinstance(way, Compressed)
+    flow = Compression(kappa=way.kappa, phi_end=way.phi_end, sides=2, integrator="rkc2")
+    flow = flow.in_steps(recipe.phi_start, _SIZES.rows, recipe.dimension)
+    of_run = {name: value for name, value in told.items() if name not in _OF_SEARCH}
+    return lammps_driver.plan(start, flow, _SIZES, of_run | {"of_packing": True})
 
 
-def _way(recipe: Recipe, out: Path) -> Making:
-    return _MAKING[type(recipe.way)](recipe, out)
+class Pipeline:
+    """A packing in the making.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    source : path or None
+        File of the compression in LAMMPS.
+    checkpoint : Checkpoint, optional
+        From which to go on.
+    retry : bool
+        Whether to make a second attempt where forces do not balance.
+    """
+
+    at_mark = True
+
+    def __init__(
+        self, recipe: Recipe, source: Path | None, checkpoint: Checkpoint | None, *, retry: bool
+    ) -> None:
+        self._recipe, self._source, self._retry = recipe, source, retry
+        told = checkpoint or {"stage": 0, "frame": -1, "wall_seconds": 0.0, "evaluations": 0}
+        self._began = time.perf_counter() - told["wall_seconds"]
+        start = recipe.start() if source is None else frame_of(source, told["frame"])
+        self._making = Making(recipe, Landscape(start), State.of(start))
+        self._making.landscape.evaluations = told["evaluations"]
+        if checkpoint:
+            making = self._making
+            making.state, making.attributes = told["state"], told.get("attributes", {})
+            history = History.of(told["history"]) if "history" in told else History()
+            making.minimum = minimum_of(told.get("minimum"), history)
+        self._k = told["stage"]
+        self._stage: Stage | None = None
+        self._begin_stage(told.get("inner"))
+
+    def _stages(self) -> list[Begin]:
+        """List the stages; the last one follows from the minimum."""
+        recipe, way = self._recipe, self._recipe.way
+        found: list[Begin] = []
+        if isinstance(way, Steps) and way.thermal:
+            found += [partial(Compressing, phi=way.thermal.phi), Sweeping]
+        if isinstance(way, Steps):
+            found.append(Compressing)
+        if isinstance(way, Compressed):
+            assert self._source
+            found.append(partial(Choosing, file=self._source))
+        return found + [Searching] * bool(recipe.target) + [self._last] * bool(recipe.target)
+
+    def _last(self, making: Making, checkpoint: Checkpoint | None) -> Stage | None:
+        """Begin a strict search or a second attempt, where there is to be one."""
+        if self._recipe.strict:
+            return Strengthening(making, checkpoint)
+        assert making.minimum
+        needs = self._retry and self._recipe.is_searched and not making.minimum.is_at_rest
+        return Retrying(making, checkpoint) if needs else None
+
+    def _begin_stage(self, checkpoint: Checkpoint | None = None) -> None:
+        """Begin the present stage, or the next one that there is to be; at the end there is none."""
+        stages = self._stages()
+        while self._k < len(stages):
+            self._stage = stages[self._k](self._making, checkpoint)
+            if self._stage is not None:
+                return
+            self._k += 1
+        self._stage = None
+
+    @property
+    def done(self) -> bool:
+        """Whether all stages have ended."""
+        return self._stage is None
+
+    def first(self) -> Row:
+        """Return the progress at the start."""
+        return Row(self._making.told("start", "", self._making.state))
+
+    def advance(self) -> Row:
+        """Let the present stage do a piece of work."""
+        assert self._stage is not None
+        self._making.landscape.forget_pairs()
+        told = self._stage.advance()
+        if self._stage.done:
+            self._stage.end()
+            self._k += 1
+            self._begin_stage()
+        return Row(told)
+
+    def frame(self) -> Packing:
+        """Return the particles."""
+        return self._making.landscape.particles.with_(step=0, time=0.0)
+
+    def checkpoint(self) -> Checkpoint:
+        """Return the number of the stage, its own checkpoint, and what stages before have handed on."""
+        assert self._stage is not None
+        making = self._making
+        found = {
+            "stage": self._k,
+            "inner": self._stage.checkpoint(),
+            "frame": making.frame,
+            "wall_seconds": time.perf_counter() - self._began,
+            "evaluations": making.landscape.evaluations,
+            "state": making.state,
+            "attributes": making.attributes,
+            "minimum": told_minimum(making.minimum),
+        }
+        if making.minimum:
+            found["history"] = making.minimum.history.told()
+        return found
+
+    def results(self) -> dict[str, Any]:
+        """Name the present stage."""
+        return {"stage": type(self._stage).__name__.lower()}
+
+    def close(self) -> None:
+        """Nothing is held outside of Python."""
+
+    def write(self, out: Path) -> None:
+        """Measure the packing and write its file."""
+        making, recipe = self._making, self._recipe
+        assert making.minimum is not None
+        told = recipe.attributes() | self._of_compression() | making.attributes
+        told |= {"wall_seconds": time.perf_counter() - self._began}
+        told |= {"evaluations": making.landscape.evaluations}
+        write_minimum(out, making.landscape, making.minimum, told)
+
+    def _of_compression(self) -> dict[str, Any]:
+        way = self._recipe.way
+        if isinstance(way, Steps):
+            return {"acceptance": np.nan}  # replaced after Monte Carlo
+        assert self._source
+        return onsets_of(self._source) if isinstance(way, Dynamics) else _last_row(self._source)
 
 
-def _search(recipe: Recipe, out: Path) -> SearchFile:
-    return SearchFile(out.with_name(out.name + ".search.h5"), recipe)
+def _last_row(run: Path) -> dict[str, float]:
+    """Return the end of a compression."""
+    rows = read_observables(run)
+    names = ("phi", "u", "pressure", "evaluations")
+    return {
+        f"compression_{name}": float(rows[name][-1]) for name in names if len(rows.get(name, ()))
+    }
 
 
-def _strict_file(out: Path) -> Path:
-    return out.with_name(out.name + ".strict.h5")
+def onsets_of(run: Path) -> dict[str, float]:
+    """phi_J from p(phi) (Marschall & Teitel 2018, Fig. 4), closing and opening the box; NaN if none."""
+    observables = read_observables(run)
+    rising = observables["kappa"] > 0
+    found: dict[str, float] = {}
+    for name, rows in (("compression", rising), ("opening", ~rising)):
+        order = np.argsort(observables["phi"][rows])
+        phi, p = (observables[key][rows][order] for key in ("phi", "pressure"))
+        try:
+            fit = fit_onset(phi, p)
+        except ValueError:
+            fit = OnsetFit(np.nan, np.nan, np.nan, 0, 0)
+        found |= {f"phi_J_{name}": fit.phi_J, f"phi_J_{name}_error": fit.phi_J_error}
+    return found
 
 
 def is_done(out: Path) -> bool:

@@ -159,42 +159,45 @@ def compress(
         If the start is jammed.
     """
     while compression.minimum is None:
-        before = landscape.evaluations
-        try:
-            found = _minimised(landscape, compression, protocol)
-        except CrossingError:
-            if compression.loose is None:
-                raise
-            if compression.openings == 0:  # the step was too long
-                compression.jammed_phi = compression.phi
-            compression.halves = True
-            compression.halve()
-            yield compression
-            continue
-        compression.parts += 1
-        if found.outcome is Outcome.EXHAUSTED and compression.parts < _MOST_PARTS:
-            compression.state = found.state
-            yield compression
-            continue
-        evaluations = landscape.evaluations - before + (compression.parts - 1) * _PART
-        compression.parts = 0
-        per_particle = found.evaluation.energy / landscape.particles.n
-        if per_particle <= protocol.energy:
-            _go_on_from_unjammed(compression, found, evaluations, protocol)
-        elif compression.loose is None:
-            msg = (
-                f"the start at phi = {compression.phi:.4g} is jammed with U/N = {per_particle:.3g},"
-                f" expected at most {protocol.energy:g}; start at a smaller phi"
-            )
-            raise ValueError(msg)
-        elif compression.openings > 0 and not found.is_at_rest:
-            compression.jammed_phi, compression.halves = compression.phi, True
-            compression.halve()
-        elif per_particle <= protocol.closeness * protocol.energy or _is_narrow(compression):
-            compression.minimum, compression.state = found, found.state
-        else:
-            _go_on_from_jammed(landscape, compression, found, protocol)
+        advance(landscape, compression, protocol)
         yield compression
+
+
+def advance(landscape: Landscape, compression: QuasistaticRun, protocol: Quasistatic) -> None:
+    """Minimise once, or for one part of a long minimisation; parameters and errors as `compress`."""
+    before = landscape.evaluations
+    try:
+        found = _minimised(landscape, compression, protocol)
+    except CrossingError:
+        if compression.loose is None:
+            raise
+        if compression.openings == 0:  # the step was too long
+            compression.jammed_phi = compression.phi
+        compression.halves = True
+        compression.halve()
+        return
+    compression.parts += 1
+    if found.outcome is Outcome.EXHAUSTED and compression.parts < _MOST_PARTS:
+        compression.state = found.state
+        return
+    evaluations = landscape.evaluations - before + (compression.parts - 1) * _PART
+    compression.parts = 0
+    per_particle = found.evaluation.energy / landscape.particles.n
+    if per_particle <= protocol.energy:
+        _go_on_from_unjammed(compression, found, evaluations, protocol)
+    elif compression.loose is None:
+        msg = (
+            f"the start at phi = {compression.phi:.4g} is jammed with U/N = {per_particle:.3g},"
+            f" expected at most {protocol.energy:g}; start at a smaller phi"
+        )
+        raise ValueError(msg)
+    elif compression.openings > 0 and not found.is_at_rest:
+        compression.jammed_phi, compression.halves = compression.phi, True
+        compression.halve()
+    elif per_particle <= protocol.closeness * protocol.energy or _is_narrow(compression):
+        compression.minimum, compression.state = found, found.state
+    else:
+        _go_on_from_jammed(landscape, compression, found, protocol)
 
 
 def _is_narrow(compression: QuasistaticRun) -> bool:

@@ -103,15 +103,20 @@ def go_on(landscape: Landscape, retry: Retry, target: Target) -> Iterator[Retry]
         The same object after each step. The continuation depends on its numbers alone, to the last bit.
     """
     while not retry.is_over:
-        before = landscape.evaluations
-        landscape.forget_pairs()  # as after reading from a file
-        if retry.n_steps < 0:
-            _balance(landscape, retry, target)
-        else:
-            _slide(landscape, retry, target)
-        retry.n_steps += 1
-        retry.evaluations += landscape.evaluations - before
+        advance(landscape, retry, target)
         yield retry
+
+
+def advance(landscape: Landscape, retry: Retry, target: Target) -> None:
+    """Take a step; parameters as `go_on`."""
+    before = landscape.evaluations
+    landscape.forget_pairs()  # as after reading from a file
+    if retry.n_steps < 0:
+        _balance(landscape, retry, target)
+    else:
+        _slide(landscape, retry, target)
+    retry.n_steps += 1
+    retry.evaluations += landscape.evaluations - before
 
 
 def _slide(landscape: Landscape, retry: Retry, target: Target) -> None:

@@ -90,6 +90,17 @@ class StrictSearch:
     n_free: int = 0
     n_met: int = 0
 
+    def __str__(self) -> str:
+        left = "" if self.proof is None else f", {self.proof.n_negative} negative eigenvalues of 0"
+        if self.proof is not None and self.proof.n_kinked:
+            left += (
+                f", {self.proof.n_kinked} more at kinks, to both sides of which the energy rises"
+            )
+        return (
+            f"step {self.n_steps} of at most {self.most_steps}, {self.n_free} motions slide, {self.n_met} of"
+            f" them up to new contacts, longest step {self.farthest.max():.1e}{left}"
+        )
+
     def counts(self) -> dict[str, int]:
         """Return its counts as attributes."""
         return {"strict_steps": self.n_steps, "strict_fallen": self.n_fallen}
@@ -126,30 +137,34 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
     TargetError
         As `target.extrapolation`, if the packing unjams on the way and is relaxed again.
     """
-    radius = 0.5 * landscape.length
     while not search.done:
-        search.proof = None
-        ends = search.n_steps >= search.most_steps or search.n_closed >= _MOST_CLOSED
-        if ends or search.farthest.max() < _STILL * radius:
-            _close(landscape, search, target)
-            search.done |= ends
-            yield search
-            continue
-        reach = float(search.farthest.max())
-        sliding = Sliding.at(landscape, search.minimum.state, reach, keeping=search.keeping)
-        step = sliding.step(search.farthest, landscape.turning_radius)
-        search.n_steps += 1
-        search.n_free, search.n_met = sliding.n_free, step.n_met
-        size = float(np.abs(step.moved).max(initial=0.0))
-        if size > _STILL * radius:
-            _take(landscape, search, target, (sliding, step))
-        elif reach > 2 * _CAREFUL * radius:
-            search.farthest, search.last = _everywhere(landscape, _CAREFUL), None
-        elif search.keeping:
-            search.keeping = False
-        else:
-            _close(landscape, search, target)
+        advance(landscape, search, target)
         yield search
+
+
+def advance(landscape: Landscape, search: StrictSearch, target: Target) -> None:
+    """Take a step, or check a candidate; parameters and errors as `descend`."""
+    radius = 0.5 * landscape.length
+    search.proof = None
+    ends = search.n_steps >= search.most_steps or search.n_closed >= _MOST_CLOSED
+    if ends or search.farthest.max() < _STILL * radius:
+        _close(landscape, search, target)
+        search.done |= ends
+        return
+    reach = float(search.farthest.max())
+    sliding = Sliding.at(landscape, search.minimum.state, reach, keeping=search.keeping)
+    step = sliding.step(search.farthest, landscape.turning_radius)
+    search.n_steps += 1
+    search.n_free, search.n_met = sliding.n_free, step.n_met
+    size = float(np.abs(step.moved).max(initial=0.0))
+    if size > _STILL * radius:
+        _take(landscape, search, target, (sliding, step))
+    elif reach > 2 * _CAREFUL * radius:
+        search.farthest, search.last = _everywhere(landscape, _CAREFUL), None
+    elif search.keeping:
+        search.keeping = False
+    else:
+        _close(landscape, search, target)
 
 
 def _take(

@@ -69,35 +69,41 @@ def equilibrate(thermal: Thermal, n_sweeps: int, seed: int) -> Iterator[Thermal]
         If particles overlap at the start, the box is tilted or shorter than two of them, or moves do not have a
         positive size.
     """
-    _check(thermal)
+    require(thermal)
     while thermal.n_done < n_sweeps:
-        packing, n = thermal.packing, min(_SWEEPS, n_sweeps - thermal.n_done)
-        block = np.random.SeedSequence([seed, thermal.n_done]).generate_state(1, np.uint64)[0]
-        bodies = packing.compiled()
-        # Moves longer than the box are redundant.
-        longest = float(packing.box.edges.min())
-        found = bodies.sweeps(
-            packing.position - packing.box.lo,
-            packing.orientation.reshape(packing.n, -1),
-            packing.box.edges,
-            min(thermal.size * float(bodies.inner_radius.min()), longest),
-            min(thermal.size, 1.0),
-            n,
-            int(block),
-        )
-        orientation = found["orientation"]
-        thermal.packing = packing.with_(
-            position=found["position"] + packing.box.lo,
-            orientation=orientation[:, 0] if packing.dimension == 2 else orientation,
-        )
-        thermal.n_done += n
-        thermal.acceptance = found["accepted"] / found["tried"]
-        change = np.clip(thermal.acceptance / _ACCEPTANCE, 1 / _CHANGE, _CHANGE)
-        thermal.size = float(min(thermal.size * change, 2.0))
+        sweep(thermal, n_sweeps, seed)
         yield thermal
 
 
-def _check(thermal: Thermal) -> None:
+def sweep(thermal: Thermal, n_sweeps: int, seed: int) -> None:
+    """Run a block of sweeps; parameters as `equilibrate`."""
+    packing, n = thermal.packing, min(_SWEEPS, n_sweeps - thermal.n_done)
+    block = np.random.SeedSequence([seed, thermal.n_done]).generate_state(1, np.uint64)[0]
+    bodies = packing.compiled()
+    # Moves longer than the box are redundant.
+    longest = float(packing.box.edges.min())
+    found = bodies.sweeps(
+        packing.position - packing.box.lo,
+        packing.orientation.reshape(packing.n, -1),
+        packing.box.edges,
+        min(thermal.size * float(bodies.inner_radius.min()), longest),
+        min(thermal.size, 1.0),
+        n,
+        int(block),
+    )
+    orientation = found["orientation"]
+    thermal.packing = packing.with_(
+        position=found["position"] + packing.box.lo,
+        orientation=orientation[:, 0] if packing.dimension == 2 else orientation,
+    )
+    thermal.n_done += n
+    thermal.acceptance = found["accepted"] / found["tried"]
+    change = np.clip(thermal.acceptance / _ACCEPTANCE, 1 / _CHANGE, _CHANGE)
+    thermal.size = float(min(thermal.size * change, 2.0))
+
+
+def require(thermal: Thermal) -> None:
+    """Refuse a tilted box and moves without a size; raises ValueError."""
     if thermal.packing.box.is_tilted:
         msg = (
             f"the box has the tilt {thermal.packing.box.tilt.tolist()}, expected none for Monte Carlo;"

@@ -111,7 +111,7 @@ class Content:
 
     def write(self, attributes: Mapping[str, Any], checkpoint: Checkpoint | None) -> None:
         """Replace the file by the present content, with results so far; errors as `write_packing`."""
-        self.attributes |= attributes | {"finished": checkpoint is None}
+        self.attributes |= dict(attributes) | {"finished": checkpoint is None}
         first, *others = self.frames
         with layout.written(self.path) as file:
             layout.create_file(file, first, self.attributes, {})

@@ -94,6 +94,8 @@ class Plan:
         at the start.
     arguments
         Names of the arguments that settings of other names come from.
+    finish
+        Writes the results elsewhere at the end, when the file is not needed any more.
     """
 
     what: str
@@ -101,3 +103,4 @@ class Plan:
     begin: Callable[[], Driver]
     restore: Callable[[Packing, Checkpoint], Driver]
     arguments: Mapping[str, str] = field(default_factory=dict)
+    finish: Callable[[Driver], None] | None = None

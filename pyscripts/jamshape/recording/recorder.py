@@ -39,7 +39,7 @@ class How(NamedTuple):
     seconds: float | None = None
     """Time after which the run is put down at the next mark, [seconds]."""
     tell: Callable[[Row], None] = lambda _: None
-    """Receives every row, for the display of progress."""
+    """Receives every row, once it is safe where a checkpoint was due."""
 
 
 _USUAL = How()
@@ -82,6 +82,7 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
 class _Run(NamedTuple):
     content: Content
     driver: Driver
+    finish: Callable[[Driver], None] | None
 
     def write(self) -> float:
         """Write a checkpoint; return when the next one is due."""
@@ -93,25 +94,30 @@ class _Run(NamedTuple):
 
 def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
     """Advance to the end, or to the mark at which the run is put down."""
-    content, driver = run
-    how.tell(driver.first())
+    content, driver = run.content, run.driver
+    if (first := driver.first()).told.part is not None:
+        how.tell(first)
     began = perf_counter()
     end = math.inf if how.seconds is None else began + how.seconds
     due = began + SECONDS
     while not driver.done:
         row = driver.advance()
         content.add(row, driver.frame() if row.has_frame else None)
-        how.tell(row)
-        if driver.done or not driver.at_mark:
-            continue
         stops = interrupts.noted is not None or perf_counter() >= end
-        if stops or perf_counter() >= due:
+        is_mark = driver.at_mark and not driver.done
+        if is_mark and (stops or perf_counter() >= due):
             due = run.write()
+        how.tell(row)
+        if not (is_mark and stops):
+            continue
         if interrupts.noted is not None:
             return  # raised again outside
-        if stops:
-            raise TimeLimitReached(_stopped(row, perf_counter() - began, content.path))
-    content.write(driver.results(), None)
+        raise TimeLimitReached(_stopped(row, perf_counter() - began, content.path))
+    if run.finish is None:
+        content.write(driver.results(), None)
+        return
+    run.finish(driver)
+    content.path.unlink(missing_ok=True)
 
 
 def _stopped(row: Row, seconds: float, path: Path) -> str:
@@ -123,8 +129,9 @@ def _begun(path: Path, plan: Plan) -> _Run:
     driver = plan.begin()
     content = Content(path, [driver.frame()], dict(plan.settings))
     content.add(driver.first()._replace(error=None), None)
-    content.write(driver.results(), {})
-    return _Run(content, driver)
+    if plan.finish is None:
+        content.write(driver.results(), {})
+    return _Run(content, driver, plan.finish)
 
 
 def _resumed(content: Content, plan: Plan) -> _Run:
@@ -132,7 +139,8 @@ def _resumed(content: Content, plan: Plan) -> _Run:
     checkpoint, content.checkpoint = content.checkpoint, None
     try:
         if checkpoint is not None:
-            return _Run(content, plan.restore(content.frames[0], checkpoint))
+            driver = plan.restore(content.frames[0], checkpoint)
+            return _Run(content, driver, plan.finish)
     except (KeyError, TypeError):  # a number is missing, or of another kind
         pass
     msg = (

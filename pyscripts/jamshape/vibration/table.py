@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jamshape.arrays import FloatArray, IntArray
-from jamshape.files import layout
+from jamshape.files import hdf5
 from jamshape.files.disk import PathLike
-from jamshape.files.h5md import FileFormatError
+from jamshape.files.hdf5 import FileFormatError
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.elasticity import Moduli, Modulus, moduli
 from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
@@ -46,6 +46,12 @@ _ERRORS = ("solver_error", "entry_error", "overlap_error")
 _COLUMNS = (
     *("eigenvalues", "omega", "sign", *_ERRORS, "state_error", "is_translation"),
     *("participation", "parallel", "perpendicular", "rotation", "of_round", "band"),
+)
+
+_REQUIRED = (
+    *(f"modes/{name}" for name in _COLUMNS if name != "overlap_error"),
+    *(f"coordinates/{name}" for name in ("particle", "kind", "direction")),
+    *("singular_values", "parameters"),
 )
 
 
@@ -219,16 +225,17 @@ def write_modes(
         If the file cannot be written.
     """
     c = table.coordinates
-    with layout.written(path) as file:
+    with hdf5.written(path) as file:
         for name in _COLUMNS:
-            file[f"modes/{name}"] = table[name]
+            hdf5.put(file, f"modes/{name}", table[name])
         if vectors:
-            file["modes/vectors"] = table.vectors
+            hdf5.put(file, "modes/vectors", table.vectors)
         for name in ("particle", "kind", "direction"):
-            file[f"coordinates/{name}"] = getattr(c, name)
-        file["coordinates"].attrs.update({"n_all": c.n_all, "dimension": c.dimension})
-        file["singular_values"] = table.singular_values
-        file.create_group("parameters").attrs.update({**attributes, **table.attributes})
+            hdf5.put(file, f"coordinates/{name}", getattr(c, name))
+        size = {"n_all": c.n_all, "dimension": c.dimension}
+        hdf5.set_attributes(file["coordinates"], size)
+        hdf5.put(file, "singular_values", table.singular_values)
+        hdf5.set_attributes(file.create_group("parameters"), {**attributes, **table.attributes})
 
 
 def read_modes(path: PathLike) -> ModeTable:
@@ -241,34 +248,58 @@ def read_modes(path: PathLike) -> ModeTable:
     OSError
         If it cannot be opened.
     """
-    try:
-        with layout.hdf5().File(path, "r") as file:
-            return _read(file)
-    except (KeyError, RuntimeError) as error:
-        msg = f"{path}: is not a complete file of modes, expected one written by analysis/modes.py"
-        raise FileFormatError(msg) from error
+    with hdf5.reading(path) as file:
+        if not all(hdf5.has_item(file, name) for name in _REQUIRED):
+            msg = f"{path}: is not a complete file of modes, expected one written by analysis/modes.py"
+            raise FileFormatError(msg)
+        return _read(file)
 
 
 def holds_modes(path: PathLike) -> bool:
     """Whether an HDF5 file was written by `write_modes`, complete or not; errors as `read_modes`."""
-    with layout.readable(path), layout.hdf5().File(path, "r") as file:
-        return "modes" in file
+    with hdf5.reading(path) as file:
+        return hdf5.has_item(file, "modes")
 
 
 def _read(file: h5py.File) -> ModeTable:
-    group, of = file["modes"], file["coordinates"]
-    stored_of = {name: group[name][()] for name in _COLUMNS if name in group}
+    def read(name: str, *shape: int) -> NDArray[Any]:
+        """Read a dataset of this shape, -1 for any extent."""
+        dataset = hdf5.require_dataset(file, name)
+        found = dataset.shape
+        fits = len(found) == len(shape) and all(
+            m in {n, -1} for n, m in zip(found, shape, strict=True)
+        )
+        if not fits:
+            msg = f"{file.filename}: /{name} has shape {found}, expected {shape}; write it again"
+            raise FileFormatError(msg)
+        return np.asarray(dataset[()])
+
+    size = hdf5.attributes_of(hdf5.require_item(file, "coordinates"))
+    n_all, dimension = int(size["n_all"]), int(size["dimension"])
+    particle = read("coordinates/particle", -1)
+    n, k = len(particle), len(read("modes/eigenvalues", -1))
+    kind, direction = (
+        read("coordinates/kind", n),
+        read("coordinates/direction", n, 3 * dimension - 3),
+    )
+    coordinates = Coordinates(particle, kind, direction, n_all, dimension)
     # Files of earlier versions do not state the effect of rounding of overlaps.
-    columns = {"overlap_error": np.zeros(len(stored_of["eigenvalues"]))} | stored_of
-    if missing := set(_COLUMNS) - columns.keys():
-        raise KeyError(*missing)
+    known = [name for name in _COLUMNS if name != "overlap_error" or _has_column(file, name)]
+    columns = {"overlap_error": np.zeros(k)} | {name: read(f"modes/{name}", k) for name in known}
     for name in ("eigenvalues", "omega", *_ERRORS):  # earlier versions stored rounding errors here
         columns[name] = np.where(columns["is_translation"], 0.0, columns[name])
-    particle, kind, direction = (of[name][()] for name in ("particle", "kind", "direction"))
-    n_all, dimension = int(of.attrs["n_all"]), int(of.attrs["dimension"])
-    coordinates = Coordinates(particle, kind, direction, n_all, dimension)
-    stored = group["vectors"][()] if "vectors" in group else np.empty((coordinates.size, 0))
-    attributes = {
-        k: v.item() if hasattr(v, "item") else v for k, v in file["parameters"].attrs.items()
-    }
-    return ModeTable(columns, stored, coordinates, file["singular_values"][()], attributes)
+    stored = read("modes/vectors", n, k) if _has_column(file, "vectors") else np.empty((n, 0))
+    is_impossible = dimension not in {2, 3} or (
+        n and not 0 <= particle.min() <= particle.max() < n_all
+    )
+    if is_impossible:
+        msg = f"{file.filename}: has coordinates of other particles, expected those of {n_all}; write it again"
+        raise FileFormatError(msg)
+    singular_values = read("singular_values", -1)
+    return ModeTable(
+        columns, stored, coordinates, singular_values, hdf5.attributes(file, "parameters")
+    )
+
+
+def _has_column(file: h5py.File, name: str) -> bool:
+    return hdf5.has_item(file, f"modes/{name}")

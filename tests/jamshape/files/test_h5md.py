@@ -328,12 +328,11 @@ def test_truncated_file(path, part):
         read_packing(path)
 
 
-@pytest.mark.parametrize("signature", [b"SNOD", b"TREE", b"HEAP"])
-def test_damaged_inside(path, signature):
+def test_damaged_inside(path):
     run_of_three(path)
-    path.write_bytes(path.read_bytes().replace(signature, b"\0\0\0\0"))
+    path.write_bytes(path.read_bytes().replace(b"OHDR", b"\0\0\0\0"))
     for read in (read_packing, read_attributes, read_observables, read_report, RunWriter.open):
-        with pytest.raises(FileFormatError, match=r"packing\.h5: (is truncated|has no /h5md)"):
+        with pytest.raises(FileFormatError, match=r"packing\.h5: is truncated or damaged"):
             read(path)
 
 

@@ -4,21 +4,28 @@ from functools import cache
 import h5py
 import numpy as np
 import pytest
+from making import made, stage_of, write_every_mark, write_rows
 from mixtures import bidisperse, monodisperse
 from squeezed import squeezed
 
 import jamshape as js
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
-from jamshape.files.h5md import read_attributes, read_observables, read_packing, read_report
-from jamshape.files.run_writer import RunWriter
+from jamshape.files.h5md import (
+    read_attributes,
+    read_observables,
+    read_packing,
+    read_report,
+    write_packing,
+)
 from jamshape.landscape import Landscape, State
 from jamshape.measures.packing_summary import measure, summary_of, write_minimum
 from jamshape.minima import residual_of
 from jamshape.minima.target import Target, find
+from jamshape.protocols import approach
 from jamshape.protocols.approach import Approach
-from jamshape.protocols.by_dynamics import is_compressed
 from jamshape.protocols.make import Dynamics, Recipe, is_done, make, require_same
 from jamshape.protocols.random_start import InsertionError
+from jamshape.recording.content import set_attributes
 
 U0 = 1e-12
 RECIPE = Recipe(bidisperse(1.0), n=16, phi_start=0.5, target=Target(U0))
@@ -29,8 +36,8 @@ def run_of(out):
     return out.with_name(out.name + ".run.h5")
 
 
-def search_of(out):
-    return out.with_name(out.name + ".search.h5")
+def making_of(out):
+    return out.with_name(out.name + ".making.h5")
 
 
 @cache
@@ -48,15 +55,11 @@ def minimum():
 
 def compressed(out, packing=None):
     """Write the files of a finished compression."""
-    writer = RunWriter.create(run_of(out), packing or start(), {"finished": False})
     phi = np.linspace(0.80, 0.88, 60)
     p = 0.3 * np.clip(phi - 0.85, 0, None)
     kappa = np.where(np.arange(60) < 50, 1e-6, -1e-6)
-    writer.append_series(
-        np.arange(60), np.arange(60.0), {"phi": phi, "pressure": p, "kappa": kappa}
-    )
-    writer.set_attributes(RECIPE.attributes() | {"finished": True})
-    writer.close()
+    rows = {"phi": phi, "pressure": p, "kappa": kappa}
+    write_rows(run_of(out), packing or start(), RECIPE.attributes(), rows)
 
 
 def assert_same_result(out, expected):
@@ -123,20 +126,20 @@ def test_jamming_density_is_where_the_energy_vanishes():
 def whole(tmp_path_factory):
     out = tmp_path_factory.mktemp("whole") / "packing.h5"
     compressed(out)
-    return out, list(make(RECIPE, out))
+    return out, made(RECIPE, out)
 
 
 def test_a_compression_that_is_there_is_taken_and_searched_from(whole):
     out, progress = whole
-    assert {at.stage for at in progress} == {"search"}
+    assert {stage_of(at) for at in progress} == {"search"}
     assert is_done(out)
-    assert is_compressed(run_of(out))
-    assert not search_of(out).exists()
-    assert progress[-1].energy_density == pytest.approx(U0, rel=1e-7, abs=0)
+    assert read_attributes(run_of(out))["finished"]
+    assert not making_of(out).exists()
+    assert f"u {U0:.2e}, u/u0 1, " in progress[-1].text
     found, stored = summary_of(out), read_attributes(out)
     assert found["reached"] is True
     assert found["u"] == stored["u"] == pytest.approx(U0, rel=1e-7, abs=0)
-    assert found["phi"] == pytest.approx(progress[-1].phi, rel=1e-12)
+    assert f"phi {found['phi']:.6f}, " in progress[-1].text
     identity = {"n": 16, "alpha": 1.0, "seed": 1, "phi_start": 0.5, "u0": U0, "size_ratio": 1.4}
     assert {name: stored[name] for name in identity} == identity
     assert stored["phi_J_compression"] == pytest.approx(0.85, abs=1e-3)
@@ -145,25 +148,23 @@ def test_a_compression_that_is_there_is_taken_and_searched_from(whole):
 
 
 @pytest.mark.parametrize("after", [1, 4])
-def test_a_search_that_was_killed_goes_on_to_the_same_bits(whole, tmp_path, after):
+def test_a_search_that_was_killed_goes_on_to_the_same_bits(whole, tmp_path, monkeypatch, after):
+    write_every_mark(monkeypatch)
     out = tmp_path / "packing.h5"
     compressed(out)
     assert len(whole[1]) > after + 1
     for _ in range(2):  # twice, further on the second time
-        going = make(RECIPE, out)
-        for _ in range(after):
-            last = next(going)
-        going.close()
-        assert not is_done(out)
-        assert search_of(out).exists()
-    rest = list(make(RECIPE, out))
+        last = made(RECIPE, out, after)[-1]
+        assert making_of(out).exists()
+    rest = made(RECIPE, out)
     assert last == whole[1][2 * after - 1]
     assert len(rest) == len(whole[1]) - 2 * after
     assert_same_result(out, whole[0])
-    assert not search_of(out).exists()
+    assert not making_of(out).exists()
 
 
-def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_path):
+def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_path, monkeypatch):
+    write_every_mark(monkeypatch)
     # Its first state is all doubles, those after it are not.
     packing, state = squeezed(16, 1, 0.86)
     apart = state.strained(0.006).packing(packing)
@@ -172,23 +173,21 @@ def test_a_search_from_a_start_without_contacts_goes_on_to_the_same_bits(tmp_pat
     unbroken, out = tmp_path / "unbroken.h5", tmp_path / "packing.h5"
     for path in (unbroken, out):
         compressed(path, apart)
-    list(make(RECIPE, unbroken))
-    going = make(RECIPE, out)
-    next(going)
-    going.close()
-    list(make(RECIPE, out))
+    make(RECIPE, unbroken)
+    made(RECIPE, out, 1)
+    make(RECIPE, out)
     assert_same_result(out, unbroken)
 
 
-def test_the_search_of_another_target_is_not_gone_on_with(tmp_path):
+def test_the_search_of_another_target_is_not_gone_on_with(tmp_path, monkeypatch):
+    write_every_mark(monkeypatch)
     out = tmp_path / "packing.h5"
     compressed(out)
-    going = make(RECIPE, out)
-    for _ in range(3):
-        next(going)
-    going.close()
+    made(RECIPE, out, 3)
     other = replace(RECIPE, target=Target(1e-8))
-    list(make(other, out))
+    with pytest.raises(ValueError, match=r"holds a packing with u0 = 1e-12, expected 1e-08; write"):
+        make(other, out)
+    made(other, out, again=True)
     assert read_attributes(out)["u"] == pytest.approx(1e-8, rel=1e-7, abs=0)
 
 
@@ -205,7 +204,7 @@ def refused(sample, out):
     """Return why a sample is not made, and check that its files stay as they are."""
     before = {path: path.read_bytes() for path in out.parent.iterdir()}
     with pytest.raises(ValueError) as error:
-        next(make(sample, out))
+        make(sample, out)
     assert {path: path.read_bytes() for path in out.parent.iterdir()} == before
     sentence = str(error.value)
     assert "\n" not in sentence
@@ -227,21 +226,23 @@ def test_the_compression_of_another_mixture_is_refused(tmp_path):
     sample = replace(RECIPE, particles=monodisperse(1.0))
     out = tmp_path / "packing.h5"
     compressed(out)
-    with RunWriter.open(run_of(out)) as writer:
-        writer.set_attributes(sample.attributes())
+    set_attributes(run_of(out), sample.attributes())
     assert "expected those of another mixture" in refused(sample, out)
 
 
 @pytest.mark.lammps
-def test_the_compression_of_another_sample_is_replaced_where_that_is_asked_for(tmp_path):
+def test_the_compression_of_another_sample_is_replaced_where_that_is_asked_for(
+    tmp_path, monkeypatch
+):
+    write_every_mark(monkeypatch)
     out = tmp_path / "packing.h5"
     for damaged in (False, True):
         compressed(out)
         if damaged:
             cut(run_of(out))
-        going = make(replace(RECIPE, particles=bidisperse(0.0), way=FAST), out, again=True)
-        assert next(going).stage == "compression"
-        going.close()
+        monkeypatch.setattr(approach, "ROWS_PER_MARK", 1)
+        other = replace(RECIPE, particles=bidisperse(0.0), way=FAST)
+        assert stage_of(made(other, out, 1, again=True)[0]) == "compression"
         assert read_attributes(run_of(out))["alpha"] == 0
 
 
@@ -281,14 +282,13 @@ DAMAGE = {
 
 @pytest.mark.parametrize("words", DAMAGE)
 @pytest.mark.parametrize("stage", ["run", "search"])
-def test_damaged_files_are_refused_and_kept(tmp_path, words, stage):
+def test_damaged_files_are_refused_and_kept(tmp_path, monkeypatch, words, stage):
     out = tmp_path / "packing.h5"
     compressed(out)
     if stage == "search":
-        going = make(RECIPE, out)
-        next(going)
-        going.close()
-    path = {"run": run_of, "search": search_of}[stage](out)
+        write_every_mark(monkeypatch)
+        made(RECIPE, out, 1)
+    path = {"run": run_of, "search": making_of}[stage](out)
     DAMAGE[words](path)
     sentence = refused(RECIPE, out)
     assert sentence.startswith(f"{path}: ")
@@ -320,7 +320,7 @@ def test_a_finished_packing_of_another_sample_or_shape_is_refused(tmp_path):
 
 def test_a_file_that_is_no_finished_packing_is_neither_done_nor_replaced(tmp_path):
     out = tmp_path / "run.h5"
-    RunWriter.create(out, start(), {"kappa": 1e-6})
+    write_packing(out, start(), {"kappa": 1e-6})
     sentence = (
         r"run\.h5 holds no finished packing, expected one of make_packing\.py; write to anoth"
     )
@@ -328,45 +328,27 @@ def test_a_file_that_is_no_finished_packing_is_neither_done_nor_replaced(tmp_pat
         is_done(out)
 
 
-def test_a_run_without_its_end_is_not_compressed(tmp_path):
-    run = tmp_path / "run.h5"
-    assert not is_compressed(run)
-    writer = RunWriter.create(run, start(), {"finished": False})
-    assert not is_compressed(run)
-    writer.set_attributes({"finished": True})
-    assert is_compressed(run)
-    assert not is_done(tmp_path / "none.h5")
-
-
 @pytest.mark.lammps
-def test_a_compression_that_was_killed_goes_on_to_a_result(tmp_path):
+def test_a_compression_that_was_killed_goes_on_to_a_result(tmp_path, monkeypatch):
+    write_every_mark(monkeypatch)
     sample = Recipe(bidisperse(0.0), n=16, phi_start=0.5, target=Target(1e-6), way=FAST)
-    unbroken, out = make(sample, tmp_path / "unbroken.h5"), tmp_path / "packing.h5"
-    rows = [next(unbroken) for _ in range(150)]
-    unbroken.close()
-    going = make(sample, out)
-    for _ in range(60):  # past the first restart file, which is written after 50 rows
-        next(going)
-    going.close()
-    assert list(tmp_path.glob("packing*restart*"))
-    assert not is_compressed(run_of(out))
-    progress = list(make(sample, out))
-    assert {at.stage for at in progress} == {"compression", "search"}
-    for found, expected in zip(progress[:100], rows[50:], strict=True):
-        assert found.phi == pytest.approx(expected.phi, rel=1e-12)
-        assert found.energy_density == pytest.approx(expected.energy_density, rel=1e-6, abs=1e-20)
-    phi = read_observables(run_of(out))["phi"]
-    np.testing.assert_allclose(phi[:150], [at.phi for at in rows], rtol=1e-12)
-    assert is_compressed(run_of(out))
+    rows = made(sample, tmp_path / "unbroken.h5", 150)
+    out = tmp_path / "packing.h5"
+    made(sample, out, approach.ROWS_PER_MARK + 10)
+    assert not read_attributes(run_of(out))["finished"]
+    progress = made(sample, out)
+    assert {stage_of(at) for at in progress} == {"compression", "search"}
+    rest = rows[approach.ROWS_PER_MARK :]
+    assert [at.text for at in progress[: len(rest)]] == [at.text for at in rest]
+    assert read_attributes(run_of(out))["finished"]
     assert summary_of(out)["reached"]
-    assert not list(tmp_path.glob("packing*restart*"))
 
 
 @pytest.mark.lammps
 def test_a_start_that_cannot_be_placed_leaves_no_file(tmp_path):
     sample = Recipe(bidisperse(4.0), n=16, phi_start=0.95)
     with pytest.raises((ValueError, InsertionError)):
-        next(make(sample, tmp_path / "packing.h5"))
+        make(sample, tmp_path / "packing.h5")
     assert not list(tmp_path.iterdir())
 
 
@@ -377,7 +359,7 @@ def test_what_a_kill_after_the_last_write_leaves_goes_with_the_next_call(tmp_pat
         {"n": 12, "u0": 1e-6, "protocol": "steps", "file": out},
     )
     made = js.make_packing(rods, **tiny, phi_start=0.5, delta_phi=0.02, progress=False)
-    search_of(out).touch()
+    making_of(out).touch()
     again = js.make_packing(rods, **tiny, phi_start=0.5, delta_phi=0.02, progress=False)
     assert [path.name for path in tmp_path.iterdir()] == [out.name]
     np.testing.assert_array_equal(made.position, again.position)
@@ -387,21 +369,16 @@ def test_what_a_kill_after_the_last_write_leaves_goes_with_the_next_call(tmp_pat
 def test_a_kill_where_the_rate_changes_is_gone_on_from_to_the_bit(tmp_path, monkeypatch, which):
     sample = Recipe(bidisperse(0.0), n=16, phi_start=0.6, target=Target(1e-6), way=FAST)
     usual, whole, cut = (tmp_path / f"{name}.h5" for name in ("usual", "whole", "cut"))
-    for _ in make(sample, usual):
-        pass
+    make(sample, usual)
     kappa = read_observables(run_of(usual))["kappa"]
     changes = np.flatnonzero(np.diff(kappa))
     row = changes[0] if which.startswith("first") else np.flatnonzero(kappa > 0)[-1]
     # A restart file at this very row, which orders particles anew.
-    monkeypatch.setattr("jamshape.protocols.by_dynamics._ROWS_PER_RESTART", int(row) + 1)
-    for _ in make(sample, whole):
-        pass
-    going = make(sample, cut)
-    for _ in range(row + 1):
-        next(going)
-    going.close()
-    for _ in make(sample, cut):
-        pass
+    write_every_mark(monkeypatch)
+    monkeypatch.setattr(approach, "ROWS_PER_MARK", int(row) + 1)
+    make(sample, whole)
+    made(sample, cut, row + 1)
+    make(sample, cut)
     one, other = (read_observables(run_of(path)) for path in (whole, cut))
     for name in ("kappa", "phi", "pressure"):
         np.testing.assert_array_equal(other[name], one[name])

@@ -1,9 +1,8 @@
 """The second attempt relaxes stalled packings until forces balance, the same after a kill."""
 
-import itertools
-
 import numpy as np
 import pytest
+from making import stages_of, write_every_mark
 from mixtures import bidisperse
 
 import jamshape as js
@@ -24,8 +23,7 @@ def recipe(**more):
 
 
 def made(out, **how):
-    for _ in make(recipe(), out, **how):
-        pass
+    make(recipe(), out, **how)
     return read_attributes(out)
 
 
@@ -59,16 +57,15 @@ def test_a_second_try_balances_what_slides(cured, stalled):
 
 
 def test_after_a_kill_it_ends_in_the_same_packing(cured, tmp_path, monkeypatch):
-    monkeypatch.setattr("jamshape.protocols.retry_file._STORE_SECONDS", 0.0)
+    write_every_mark(monkeypatch)
     out = tmp_path / "packing.h5"
-    steps = make(recipe(), out)
-    for _ in itertools.islice((at for at in steps if at.stage == "retry"), 2):
-        pass
-    steps.close()
-    file = tmp_path / "packing.h5.strict.h5"
-    assert read_attributes(file)["retry_n_steps"] == 1
+    first = stages_of(recipe(), tmp_path / "whole.h5").index("retry")
+    (tmp_path / "whole.h5").unlink()
+    assert stages_of(recipe(), out, first + 2)[first:] == ["retry"] * 2
+    file = tmp_path / "packing.h5.making.h5"
+    assert read_attributes(file)["stage"] == "retrying"
     told = contents_of(file)
-    assert (told["kind"], told["finished"]) == ("second attempt at a packing", False)
+    assert (told["kind"], told["finished"]) == ("packing in the making", False)
     assert told["go_on"].startswith(f"repeat the command for {out}, which")
     again = made(out)
     assert [path.name for path in tmp_path.iterdir()] == ["packing.h5"]

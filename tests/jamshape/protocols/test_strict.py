@@ -1,11 +1,10 @@
 """Strict minima: what slides is followed to where it stops, and no negative eigenvalue is left."""
 
-import itertools
-
 import mpmath
 import numpy as np
 import pytest
 from chosen_seeds import chosen_by_seed
+from making import stages_of, write_every_mark
 from mixtures import bidisperse
 
 from jamshape.files.h5md import read_attributes, read_packing
@@ -87,8 +86,7 @@ def test_steps_end_at_walls():
 def strict(tmp_path_factory):
     out = tmp_path_factory.mktemp("strict") / "packing.h5"
     recipe = recipe_for(bidisperse(4.0), n=32, seed=5, strict=True)
-    for _ in make(recipe, out):
-        pass
+    make(recipe, out)
     return out, recipe
 
 
@@ -122,8 +120,7 @@ def test_strict_packing_has_no_negative_eigenvalue(strict):
 def test_what_is_pushed_by_next_to_nothing_meets_its_wall(n, seed, tmp_path):
     """A rod in a channel is pushed by 1e-9 of the mean force, of N = 128 by less than digits tell."""
     out = tmp_path / "packing.h5"
-    for _ in make(recipe_for(bidisperse(4.0), n=n, seed=seed, strict=True), out):
-        pass
+    make(recipe_for(bidisperse(4.0), n=n, seed=seed, strict=True), out)
     stored = read_attributes(out)
     assert (stored["outcome"], stored["n_negative"]) == ("converged", 0)
     assert max(stored["residual_force"], stored["residual_torque"]) <= stored["tolerance"]
@@ -150,8 +147,7 @@ def energies_beside(landscape, minimum, size):
 def test_minimum_on_a_kink_is_proven_by_its_two_sides(n, seed, tmp_path):
     """The tips of two rods are level: a bond passes from one to the other. In the second, others meet walls below the digits."""
     out = tmp_path / "packing.h5"
-    for _ in make(recipe_for(bidisperse(4.0), n=n, seed=seed, strict=True), out):
-        pass
+    make(recipe_for(bidisperse(4.0), n=n, seed=seed, strict=True), out)
     stored, packing = read_attributes(out), read_packing(out)
     assert (stored["outcome"], stored["n_negative"], stored["n_kinked"]) == ("converged", 0, 1)
     assert max(stored["residual_force"], stored["residual_torque"]) <= stored["tolerance"]
@@ -181,23 +177,18 @@ def test_a_kink_takes_the_eigenvalue_of_what_crosses_it_and_no_other():
 
 def test_strict_search_goes_on_from_its_file(strict, tmp_path, monkeypatch):
     out, recipe = strict
-    monkeypatch.setattr("jamshape.protocols.strict_file._STORE_SECONDS", 0.0)
-    again = tmp_path / "packing.h5"
-    steps = make(recipe, again)
-    during = (at for at in steps if at.stage == "strict")
-    for _ in itertools.islice(during, 4):
-        pass
-    steps.close()
-    file = tmp_path / "packing.h5.strict.h5"
-    before = read_attributes(file)["strict_steps"]
-    assert before > 0
-    for _ in make(recipe, again):
-        pass
-    stored = read_attributes(again)
-    assert stored["strict_steps"] > before
-    assert stored["n_negative"] == 0
-    assert stored["outcome"] == "converged"
-    assert stored["phi_J"] == pytest.approx(read_attributes(out)["phi_J"], abs=1e-7)
+    write_every_mark(monkeypatch)
+    again, whole = tmp_path / "packing.h5", tmp_path / "whole.h5"
+    first = stages_of(recipe, whole).index("strict")
+    assert set(stages_of(recipe, again, first + 4)[first:]) == {"strict"}
+    file = tmp_path / "packing.h5.making.h5"
+    assert read_attributes(file)["stage"] == "strengthening"
+    make(recipe, again)
+    stored, expected = read_attributes(again), read_attributes(out)
+    for name in ("strict_steps", "n_negative", "outcome", "phi_J", "u", "evaluations"):
+        assert stored[name] == expected[name], name
+    for one, other in zip(read_packing(again).poses(), read_packing(out).poses(), strict=True):
+        np.testing.assert_array_equal(one, other)
     assert not file.exists()
 
 
@@ -211,8 +202,7 @@ def test_strict_search_goes_on_from_its_file(strict, tmp_path, monkeypatch):
 )
 def test_minima_where_nothing_slides_are_strict(particles, n, tmp_path):
     out = tmp_path / "packing.h5"
-    for _ in make(recipe_for(particles, n=n, strict=True), out):
-        pass
+    make(recipe_for(particles, n=n, strict=True), out)
     stored = read_attributes(out)
     assert stored["outcome"] == "converged"
     assert stored["n_negative"] == 0

@@ -1,0 +1,320 @@
+"""Stages of making a packing: each advances by a bounded piece of work, at whose end it can be put down.
+
+The continuation of a stage depends on the numbers of its checkpoint alone, to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from jamshape.landscape import Landscape
+from jamshape.minima import History, Minimum
+from jamshape.minima.checkpoints import minimum_of, search_of, told_minimum, told_search
+from jamshape.minima.target import (
+    Search,
+    Target,
+    TargetError,
+    bisect,
+    extrapolate,
+    require_reachable,
+)
+from jamshape.packing import State
+from jamshape.protocols import quasistatic, retry, strict, thermal
+from jamshape.protocols.quasistatic import QuasistaticRun
+from jamshape.protocols.recipe import Recipe, Steps
+from jamshape.protocols.retry import Retry
+from jamshape.protocols.strict import StrictSearch
+from jamshape.protocols.thermal import Thermal, without_overlaps
+from jamshape.recording.driver import Checkpoint, Told
+
+MOST_MINIMISATIONS = 20_000
+"""Limit of a search: with the steps of 1e-6 of bisection they change phi by 0.04."""
+
+_ADVANCES = {"extrapolation": extrapolate, "bisection": bisect}
+
+
+@dataclass(eq=False)
+class Making:
+    """A packing in the making: what one stage hands to the next.
+
+    Parameters
+    ----------
+    recipe
+    landscape
+        Landscape of the particles; it counts evaluations.
+    state
+        State to go on from.
+    minimum
+        The packing so far, once there is one.
+    attributes
+        Results for the file of the packing.
+    frame
+        Frame of the compression in LAMMPS, if any, whose particles these are.
+    """
+
+    recipe: Recipe
+    landscape: Landscape
+    state: State
+    minimum: Minimum | None = None
+    frame: int = -1
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def target(self) -> Target:
+        """Target energy."""
+        assert self.recipe.target is not None
+        return self.recipe.target
+
+    def told(self, phase: str, text: str, state: State, part: float | None = None) -> Told:
+        """Return progress at a state."""
+        phi = float(self.landscape.particles.measures.sum()) / state.volume
+        return Told(phase, f"phi {phi:.6f}, {text}", part)
+
+
+class Stage(Protocol):
+    """A part of making a packing."""
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended."""
+
+    def advance(self) -> Told:
+        """Do a bounded piece of work."""
+
+    def checkpoint(self) -> Checkpoint:
+        """Return all that is needed to go on."""
+
+    def end(self) -> None:
+        """Hand the results on."""
+
+
+Begin = Callable[[Making, Checkpoint | None], Stage | None]
+"""Makes a stage at its beginning, or from a checkpoint; None if it is not needed."""
+
+
+class Compressing:
+    """Quasistatic compression to jamming, or to a packing fraction where Monte Carlo begins."""
+
+    def __init__(
+        self, making: Making, checkpoint: Checkpoint | None, phi: float = math.inf
+    ) -> None:
+        way = making.recipe.way
+        assert isinstance(way, Steps)
+        self._making, self._phi = making, phi
+        self._protocol = way.compression(making.recipe.target)
+        if checkpoint is None:
+            if making.recipe.target:
+                require_reachable(making.landscape, making.target)
+            self._run = QuasistaticRun.of(making.landscape, making.state, self._protocol)
+        else:
+            history = History.of(checkpoint.pop("history"))
+            self._run = QuasistaticRun(**checkpoint, history=history)
+
+    @property
+    def done(self) -> bool:
+        """Whether the packing is jammed, or as dense as asked for."""
+        return self._run.minimum is not None or self._run.phi >= self._phi
+
+    def advance(self) -> Told:
+        """Minimise once, or for a part of a long minimisation."""
+        run, making = self._run, self._making
+        quasistatic.advance(making.landscape, run, self._protocol)
+        energy = run.history.energy_density[-1] * run.state.volume / making.recipe.n
+        text = f"U/N {energy:.1e} of {self._protocol.energy:.0e}, next step {run.step:.1e}"
+        aim = f"to phi = {self._phi:g}" if math.isfinite(self._phi) else "to jamming"
+        return making.told(f"compression {aim}", text, run.state)
+
+    def checkpoint(self) -> Checkpoint:
+        """Return the run; before its end it has no minimum."""
+        return vars(self._run) | {"minimum": None, "history": self._run.history.told()}
+
+    def end(self) -> None:
+        """Hand on the jammed packing, or one without overlaps."""
+        run, making = self._run, self._making
+        making.minimum = run.minimum
+        if run.minimum is not None:
+            making.state = run.minimum.state
+            return
+        assert run.loose is not None
+        making.state = State.of(without_overlaps(run.loose.packing(making.landscape.particles)))
+
+
+class Sweeping:
+    """Monte Carlo of hard particles."""
+
+    def __init__(self, making: Making, checkpoint: Checkpoint | None) -> None:
+        way = making.recipe.way
+        assert isinstance(way, Steps)
+        assert way.thermal
+        self._making, self._n_sweeps = making, way.thermal.n_sweeps
+        told = dict(checkpoint or {"state": making.state})
+        packing = told.pop("state").packing(making.landscape.particles)
+        self._thermal = Thermal(packing, **told)
+        thermal.require(self._thermal)
+
+    @property
+    def done(self) -> bool:
+        """Whether all sweeps are done."""
+        return self._thermal.n_done >= self._n_sweeps
+
+    def advance(self) -> Told:
+        """Run a block of sweeps."""
+        at, making = self._thermal, self._making
+        thermal.sweep(at, self._n_sweeps, making.recipe.seed)
+        text = f"sweep {at.n_done} of {self._n_sweeps}, acceptance {at.acceptance:.2f}"
+        part = at.n_done / self._n_sweeps
+        return making.told("Monte Carlo", text, State.of(at.packing), part)
+
+    def checkpoint(self) -> Checkpoint:
+        """Return the state, the sweeps done, and the size of moves."""
+        at = self._thermal
+        numbers = {"n_done": at.n_done, "size": at.size, "acceptance": at.acceptance}
+        return {"state": State.of(at.packing)} | numbers
+
+    def end(self) -> None:
+        """Hand on the state."""
+        self._making.state = State.of(self._thermal.packing)
+        self._making.attributes["acceptance"] = self._thermal.acceptance
+
+
+class Searching:
+    """Search for the target energy."""
+
+    def __init__(self, making: Making, checkpoint: Checkpoint | None) -> None:
+        self._making, self._n = making, 0
+        self._before, self._u = making.landscape.evaluations, math.nan
+        self._advance = _ADVANCES[making.recipe.way.search]
+        if checkpoint is None:
+            require_reachable(making.landscape, making.target)
+            self._search = Search(making.state, making.target.step)
+        else:
+            self._n, self._before = checkpoint["n"], checkpoint["before"]
+            self._search = search_of(checkpoint["search"], History.of(checkpoint["history"]))
+
+    @property
+    def done(self) -> bool:
+        """Whether the packing is found."""
+        return self._search.minimum is not None
+
+    def advance(self) -> Told:
+        """Minimise once."""
+        search, making = self._search, self._making
+        self._advance(making.landscape, search, making.target)
+        self._n += 1
+        u, last = search.history.energy_density[-1], self._u
+        self._u = u
+        if not self.done and self._n >= MOST_MINIMISATIONS:
+            msg = (
+                f"after {self._n} minimisations the search is at u = {u:.3g}, expected u ="
+                f" {making.target.u0:.3g}; use a start nearer to jamming, or extrapolation"
+            )
+            raise TargetError(msg)
+        text = f"{_where(search, making.target, last)}, minimisation {self._n}"
+        return making.told(f"search for u0 = {making.target.u0:g}", text, search.state)
+
+    def checkpoint(self) -> Checkpoint:
+        """Return the search."""
+        search = {"search": told_search(self._search), "history": self._search.history.told()}
+        return search | {"n": self._n, "before": self._before}
+
+    def end(self) -> None:
+        """Hand on the packing."""
+        making = self._making
+        making.minimum = self._search.minimum
+        making.attributes |= {
+            "search": making.recipe.way.search,
+            "search_minimisations": self._n,
+            "search_evaluations": making.landscape.evaluations - self._before,
+        }
+
+
+def _where(search: Search, target: Target, last: float) -> str:
+    """Describe where a search is; `last` is u before its last step."""
+    u, residual = search.history.energy_density[-1], search.history.residual[-1]
+    ratio = f"u/u0 {u / target.u0:.3g}" if u > 0 else "unjammed"
+    text = f"u {u:.2e}, {ratio}, residual {residual:.1e} of {target.tolerance:.0e}, step {search.step:.1e}"
+    if not target.u0 < u < last:
+        return text
+    # Equal steps down to u0, estimated from sqrt(u), which is linear in the strain.
+    now, before, aim = map(math.sqrt, (u, last, target.u0))
+    return f"{text}, about {math.ceil((now - aim) / (before - now))} more of it"
+
+
+class Strengthening:
+    """Search for a strict minimum."""
+
+    def __init__(self, making: Making, checkpoint: Checkpoint | None) -> None:
+        self._making = making
+        if checkpoint is None:
+            assert making.minimum is not None
+            self._search = strict.start(making.landscape, making.minimum.state)
+        else:
+            history = History.of(checkpoint.pop("history"))
+            minimum = minimum_of(checkpoint.pop("minimum"), history)
+            assert minimum is not None
+            self._search = StrictSearch(minimum, **checkpoint)
+
+    @property
+    def done(self) -> bool:
+        """Whether the search has ended."""
+        return self._search.done
+
+    def advance(self) -> Told:
+        """Take a step, or check a candidate."""
+        search, making = self._search, self._making
+        strict.advance(making.landscape, search, making.target)
+        return making.told("search for a strict minimum", str(search), search.minimum.state)
+
+    def checkpoint(self) -> Checkpoint:
+        """Return the search; its proof is made anew."""
+        search = self._search
+        minimum = {
+            "minimum": told_minimum(search.minimum),
+            "history": search.minimum.history.told(),
+        }
+        return vars(search) | minimum | {"proof": None}
+
+    def end(self) -> None:
+        """Hand on the minimum and its proof."""
+        search, making = self._search, self._making
+        assert search.proof is not None
+        making.minimum = search.minimum
+        making.attributes |= search.counts() | search.proof.attributes()
+
+
+class Retrying:
+    """Second attempt at a packing whose forces do not balance, for as much work as it has taken so far."""
+
+    def __init__(self, making: Making, checkpoint: Checkpoint | None) -> None:
+        assert making.minimum is not None
+        self._making, self._first = making, making.minimum
+        told = checkpoint or {"state": making.minimum.state, "budget": making.landscape.evaluations}
+        self._retry = Retry(**told)
+
+    @property
+    def done(self) -> bool:
+        """Whether the packing is found, or the work used up."""
+        return self._retry.is_over
+
+    def advance(self) -> Told:
+        """Take a step."""
+        at, making = self._retry, self._making
+        retry.advance(making.landscape, at, making.target)
+        text = (
+            f"step {max(at.n_steps, 0)}, {at.work} of the work of {at.budget} evaluations, after a minimum that"
+            f" ended {self._first.outcome.value} with a residual of {self._first.residual.largest:.1e}"
+        )
+        return making.told("second attempt", text, at.state, min(1.0, at.work / at.budget))
+
+    def checkpoint(self) -> Checkpoint:
+        """Return the attempt; before its end it has no minimum."""
+        return vars(self._retry) | {"minimum": None}
+
+    def end(self) -> None:
+        """Hand on the better packing, if it was found."""
+        making = self._making
+        making.minimum = self._retry.minimum or self._first
+        making.attributes |= {"retry_of": self._first.outcome.value} | self._retry.counts()

@@ -1,0 +1,58 @@
+"""Making packings to the end, or up to some piece of work, with what was told on the way."""
+
+from jamshape.protocols.make import is_done, make
+from jamshape.recording.content import Content
+from jamshape.recording.driver import Row, Told
+from jamshape.recording.recorder import How
+
+STAGES = {
+    "opening of the box": "compression",
+    "search for a strict minimum": "strict",
+    "second attempt": "retry",
+    "Monte Carlo": "Monte Carlo",
+}
+
+
+class Stopped(Exception):
+    """Raised where a process would be killed."""
+
+
+def made(recipe, out, after=None, *, again=False, retry=True):
+    """Make a packing, and return the progress that it told, up to a number of rows."""
+    told = []
+
+    def tell(row):
+        told.append(row.told)
+        if len(told) == after:
+            raise Stopped
+
+    try:
+        make(recipe, out, How(again, tell=tell), retry=retry)
+    except Stopped:
+        assert again or not is_done(out)
+    return told
+
+
+def stage_of(told):
+    """Name the stage that a row of progress belongs to."""
+    return STAGES.get(told.phase, told.phase.split()[0])
+
+
+def stages_of(recipe, out, after=None):
+    """Make a packing, and return the stages of its progress."""
+    return [stage_of(told) for told in made(recipe, out, after)]
+
+
+def write_every_mark(monkeypatch):
+    """Write a checkpoint at every mark."""
+    for name in ("PAUSE", "SECONDS"):
+        monkeypatch.setattr(f"jamshape.recording.recorder.{name}", 0.0)
+
+
+def write_rows(path, packing, attributes, columns):
+    """Write the file of a finished run with one frame, and rows at the steps 0, 1, 2, ..."""
+    content = Content(path, [packing], dict(attributes))
+    for step, values in enumerate(zip(*columns.values(), strict=True)):
+        row = dict(zip(columns, map(float, values), strict=True))
+        content.add(Row(Told("", ""), step, float(step), row), None)
+    content.write({}, None)
