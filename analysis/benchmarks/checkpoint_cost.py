@@ -56,13 +56,18 @@ def measured(case: Callable[[Path], None], folder: Path) -> dict[str, Any]:
         write(*args)
         spans.append((began, time.perf_counter()))
 
-    Content.write = timed  # type: ignore[method-assign]
+    Content.write = timed  # type: ignore[method-assign, assignment]
     try:
         case(folder / "run.h5")
     finally:
         Content.write = write  # type: ignore[method-assign]
     total, writing = spans[-1][1] - spans[0][0], sum(end - began for began, end in spans)
-    found = {"seconds": total, "writes": len(spans), "writing": writing, "fraction": writing / total}
+    found = {
+        "seconds": total,
+        "writes": len(spans),
+        "writing": writing,
+        "fraction": writing / total,
+    }
     return found | {"bytes": (folder / "run.h5").stat().st_size}
 
 

@@ -115,6 +115,7 @@ def add_old_flag(parser: ArgumentParser, old: str, instead: str) -> None:
 
 class _OldFlag(Action):
     def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
+        del values
         print(
             f"{parser.prog}: warning: {self.metavar} without {option_string}, which goes with the next release",
             file=sys.stderr,

@@ -370,7 +370,7 @@ def with_progress(name, file, starts, target):
         os.dup2(os.open(target, os.O_WRONLY), 2)
     try:
         run_case(name, file, starts, {"progress": True})
-    except BaseException as error:
+    except BaseException as error:  # noqa: BLE001 - that of any kind
         file.with_name("said.log").write_text(repr(error))
         os._exit(1)
     os._exit(0)  # multiprocessing would fail to flush it

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drivers import EVERY
 from killing import (
     GIVEN,
     command,
@@ -106,17 +107,18 @@ CASES = {
     "pack": Case(
         ("pack", *PACK),
         ("packing.h5",),
-        patches=(("jamshape.protocols.by_steps._STORE_SECONDS", 0.0),),
+        patches=EVERY,
     ),
-    "pack by dynamics": Case(("pack", *DYNAMICS), ("packing.h5",)),
+    "pack by dynamics": Case(("pack", *DYNAMICS), ("packing.h5",), patches=EVERY),
     "pack by steps": Case(
         ("pack", *STEPS),
         ("packing.h5",),
-        patches=(("jamshape.protocols.by_steps._STORE_SECONDS", 0.0),),
+        patches=EVERY,
     ),
     "pack as published": Case(
         ("pack", *PUBLISHED, "--kappa", 1e-4, "--search", "bisection"),
         ("packing.h5",),
+        patches=EVERY,
     ),
     "sweep": Case(
         ("sweep", "--alpha", 0, 1, *DYNAMICS[2:], "--samples", 1, "--jobs", 2),
