@@ -13,7 +13,8 @@ from jamshape.flow.implicit import Flow, ImplicitFlow, Protocol, Step
 from jamshape.flow.slow_shear import SlowShear
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
-from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+from jamshape.files.checkpoint import Checkpoint
+from jamshape.recording.driver import Plan, Row, Told
 
 STEPS_PER_MARK = 100
 """Steps between two marks, where caches and factors are dropped, and a frame is recorded."""

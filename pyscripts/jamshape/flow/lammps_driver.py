@@ -13,7 +13,8 @@ from jamshape.flow.compression import Compression
 from jamshape.flow.motion import FlowRun, Motion
 from jamshape.flow.shear import Shear
 from jamshape.lammps.session import Session
-from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+from jamshape.files.checkpoint import Checkpoint
+from jamshape.recording.driver import Plan, Row, Told
 
 if TYPE_CHECKING:
     from jamshape.packing import Packing

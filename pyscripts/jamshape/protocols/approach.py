@@ -17,7 +17,8 @@ from jamshape.flow import motion
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
-from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+from jamshape.files.checkpoint import Checkpoint
+from jamshape.recording.driver import Plan, Row, Told
 
 ROWS_PER_MARK = 50
 """Rows between two marks."""

@@ -15,7 +15,8 @@ from jamshape.landscape import Landscape
 from jamshape.minima import Stop, minimise
 from jamshape.packing import Packing, State
 from jamshape.protocols.stages import Making
-from jamshape.recording.driver import Checkpoint, Told
+from jamshape.files.checkpoint import Checkpoint
+from jamshape.recording.driver import Told
 from jamshape.shapes.shape import Interaction
 
 # Residual to which a frame is minimised to decide whether it is jammed.

@@ -28,7 +28,8 @@ from jamshape.protocols.recipe import Recipe, Steps
 from jamshape.protocols.retry import Retry
 from jamshape.protocols.strict import StrictSearch
 from jamshape.protocols.thermal import Thermal, without_overlaps
-from jamshape.recording.driver import Checkpoint, Told
+from jamshape.files.checkpoint import Checkpoint
+from jamshape.recording.driver import Told
 
 MOST_MINIMISATIONS = 20_000
 """Limit of a search: with the steps of 1e-6 of bisection they change phi by 0.04."""

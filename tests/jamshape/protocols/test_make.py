@@ -25,7 +25,7 @@ from jamshape.protocols import approach
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.make import Dynamics, Recipe, is_done, make, require_same
 from jamshape.protocols.random_start import InsertionError
-from jamshape.recording.content import set_attributes
+from jamshape.files.content import add_attributes as set_attributes
 
 U0 = 1e-12
 RECIPE = Recipe(bidisperse(1.0), n=16, phi_start=0.5, target=Target(U0))
