@@ -17,11 +17,11 @@ import warnings
 
 import h5py
 import numpy as np
+from jamshape.files.restarts import is_whole
 from matplotlib.image import imread
 
 from jamshape.exchange.gsd import read_gsd
 from jamshape.files.lammps_text import read_data
-from jamshape.files.restarts import is_whole
 
 # The folder, in that of a run, of what the run reads.
 GIVEN = "given"

@@ -29,13 +29,13 @@ from drivers import (
     started,
     write_start,
 )
+from jamshape.recording.content import Content
 from killing import CALLS, differences, ended, forked, light, said
 
 import jamshape as js
 from jamshape.checks import TimeLimitError
 from jamshape.files.h5md import FileFormatError, read_attributes
 from jamshape.files.lock import lock_of
-from jamshape.recording.content import Content
 
 pytestmark = pytest.mark.lammps
 

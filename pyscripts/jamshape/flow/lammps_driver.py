@@ -8,12 +8,12 @@ import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.flow import motion
 from jamshape.flow.compression import Compression
 from jamshape.flow.motion import FlowRun, Motion
 from jamshape.flow.shear import Shear
 from jamshape.lammps.session import Session
-from jamshape.files.checkpoint import Checkpoint
 from jamshape.recording.driver import Plan, Row, Told
 
 if TYPE_CHECKING:

@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jamshape.checks import ArgumentError, TimeLimitError
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.files.content import Content
 from jamshape.files.disk import remove_leftovers
 from jamshape.files.hdf5 import FileFormatError
 from jamshape.files.lock import Lock
-from jamshape.files.checkpoint import Checkpoint
 from jamshape.recording.driver import Driver, Plan, Row
 from jamshape.recording.interrupts import Interrupts
 

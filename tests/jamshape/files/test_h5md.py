@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from jamshape.files.run_writer import RunWriter
 from nasty import assert_identical, nasty_packing, tilted_box, with_rests
 
 from jamshape.files.h5md import (
@@ -17,7 +18,6 @@ from jamshape.files.h5md import (
     write_packing,
     write_run,
 )
-from jamshape.files.run_writer import RunWriter
 
 h5py = pytest.importorskip("h5py")
 

@@ -12,6 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jamshape.files.journal import journal_of, parse, remove_run
+from jamshape.files.restarts import RestartFiles, is_whole
+from jamshape.files.run_writer import RunWriter
 from nasty import assert_identical, nasty_packing
 
 from jamshape.files import disk, run_writer
@@ -25,9 +28,6 @@ from jamshape.files.h5md import (
     read_series,
     write_packing,
 )
-from jamshape.files.journal import journal_of, parse, remove_run
-from jamshape.files.restarts import RestartFiles, is_whole
-from jamshape.files.run_writer import RunWriter
 
 h5py = pytest.importorskip("h5py")
 

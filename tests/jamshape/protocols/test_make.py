@@ -10,6 +10,7 @@ from squeezed import squeezed
 
 import jamshape as js
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
+from jamshape.files.content import add_attributes as set_attributes
 from jamshape.files.h5md import (
     read_attributes,
     read_observables,
@@ -25,7 +26,6 @@ from jamshape.protocols import approach
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.make import Dynamics, Recipe, is_done, make, require_same
 from jamshape.protocols.random_start import InsertionError
-from jamshape.files.content import add_attributes as set_attributes
 
 U0 = 1e-12
 RECIPE = Recipe(bidisperse(1.0), n=16, phi_start=0.5, target=Target(U0))
