@@ -216,10 +216,10 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
     n_frames = count(file, "particles/all/position")
     n = math.prod(require_dataset(file, "particles/all/species").shape[:1])
 
-    def row(name: str, like: NDArray[Any] | None = None) -> Any:
+    def row(name: str, *, sparse: bool = False) -> Any:
         element, dataset = f"particles/all/{name}".rsplit("/", 1)
-        rows = require_rows(file, element, dataset, n_frames, sparse=like is not None)
-        _require_most(rows, rows.shape[1:], n if like is None else like)
+        rows = require_rows(file, element, dataset, n_frames, sparse=sparse)
+        _require_most(rows, rows.shape[1:], n)
         return rows[frame]
 
     def fixed(name: str) -> Any:
@@ -234,14 +234,14 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
     for name, element in RESTS.items():
         if has_item(file, f"particles/all/{element}"):
             whole = fields[name.removesuffix("_rest")]
-            fields[name] = as_rest(row(f"{element}/value", whole), whole)
+            fields[name] = as_rest(row(f"{element}/value", sparse=True), whole)
     fields["shape_style"] = attribute(require_item(file, "particles/all"), "shape_style")
     fields["law"] = _read_law(file)
     fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
     lo, edges = row("box/lo/value"), row(f"{EDGES}/value")
     try:
         if has_item(file, f"particles/all/{EDGES_REST}"):
-            rest = lengths_of(as_rest(row(f"{EDGES_REST}/value", edges), edges))
+            rest = lengths_of(as_rest(row(f"{EDGES_REST}/value", sparse=True), edges))
             fields |= {"edges_rest": rest.edges, "tilt_rest": rest.tilt}
         packing = Packing(box=Box(lo, *lengths_of(edges)), **fields)
     except ValueError as error:
@@ -254,13 +254,11 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
 _MOST_COLUMNS = 4  # numbers of a particle in one array, or of a row of a box
 
 
-def _require_most(dataset: Any, shape: tuple[int, ...], most: int | NDArray[Any]) -> None:
-    """Refuse an array larger than its particles need, or of another shape than its low parts, before it is read."""
-    if isinstance(most, np.ndarray):
-        is_fine, expected = shape == most.shape, f"{most.shape}"
-    else:
-        allowed = max(most, _MOST_COLUMNS) * _MOST_COLUMNS
-        is_fine, expected = math.prod(shape) <= allowed, f"numbers of {most} particles"
-    if not is_fine:
-        msg = f"{dataset.file.filename}: {dataset.name} has shape {shape}, expected {expected}; write it again"
+def _require_most(dataset: Any, shape: tuple[int, ...], n: int) -> None:
+    """Refuse an array larger than n particles need, before it is read."""
+    if math.prod(shape) > max(n, _MOST_COLUMNS) * _MOST_COLUMNS:
+        msg = (
+            f"{dataset.file.filename}: {dataset.name} has shape {shape}, expected numbers of {n} particles;"
+            " write it again"
+        )
         raise FileFormatError(msg)
