@@ -1,6 +1,5 @@
 """Making packings to the end, or up to some piece of work, with what was told on the way."""
 
-from jamshape.files.content import Content
 from jamshape.protocols.make import is_done, make
 from jamshape.recording.recorder import How
 
@@ -46,12 +45,3 @@ def write_every_mark(monkeypatch):
     """Write a checkpoint at every mark."""
     for name in ("PAUSE", "SECONDS"):
         monkeypatch.setattr(f"jamshape.recording.recorder.{name}", 0.0)
-
-
-def write_rows(path, packing, attributes, columns):
-    """Write the file of a finished run with one frame, and rows at the steps 0, 1, 2, ..."""
-    content = Content(path, [packing], dict(attributes))
-    for step, values in enumerate(zip(*columns.values(), strict=True)):
-        content.add_row(step, float(step), dict(zip(columns, map(float, values), strict=True)))
-    content.attributes["finished"] = True
-    content.write()

@@ -30,22 +30,20 @@ class Column:
     times: list[float] = field(default_factory=list)
     values: list[NDArray[Any]] = field(default_factory=list)
 
-    def add(self, name: str, step: int, time: float, value: ArrayLike) -> None:
-        """Add a row; raises ValueError unless its step is after the last one and its type and shape as before."""
+    def checked(self, name: str, step: int, value: ArrayLike) -> NDArray[Any]:
+        """Return a row as it is stored; raises ValueError unless it can follow the rows before."""
         # Numbers are doubles: a first one that happens to be an integer must not make an integer series.
         row = np.asarray(value)
         row = row.astype(np.float64) if row.ndim == 0 and row.dtype.kind in "biuf" else row
         if not self.steps:
             _require_storable(name, row)
-        else:
-            _require_after(name, self.steps[-1], step)
-            last = self.values[-1]
-            if (row.dtype, row.shape) != (last.dtype, last.shape):
-                msg = f"observable {name!r} is {row.dtype} {row.shape}, expected {last.dtype} {last.shape} as before"
-                raise ValueError(msg)
-        self.steps.append(step)
-        self.times.append(time)
-        self.values.append(row)
+            return row
+        last = self.values[-1]
+        if (row.dtype, row.shape) != (last.dtype, last.shape):
+            msg = f"observable {name!r} is {row.dtype} {row.shape}, expected {last.dtype} {last.shape} as before"
+            raise ValueError(msg)
+        _require_after(name, self.steps[-1], step)
+        return row
 
 
 @dataclass
@@ -103,9 +101,14 @@ class Content:
         self.frames.append(frame)
 
     def add_row(self, step: int, time: float, observables: Mapping[str, ArrayLike]) -> None:
-        """Add a row of some observables; raises ValueError as `Column.add`."""
-        for name, value in observables.items():
-            self.columns.setdefault(name, Column()).add(name, step, time, value)
+        """Add a row of some observables, or none of it; raises ValueError as `Column.checked`."""
+        columns = {name: self.columns.get(name) or Column() for name in observables}
+        rows = {name: columns[name].checked(name, step, observables[name]) for name in observables}
+        self.columns |= columns
+        for name, column in columns.items():
+            column.steps.append(step)
+            column.times.append(time)
+            column.values.append(rows[name])
 
     def write(self) -> None:
         """Replace the file; errors as `jamshape.files.h5md.write_packing`."""
@@ -117,8 +120,9 @@ class Content:
                 values = np.stack(column.values)
                 series = Series(np.array(column.steps), np.array(column.times), values)
                 layout.write_rows(group.create_group(name), series)
-            columns = zip(*self.report, strict=True) if self.report else ((), (), ())
-            layout.write_rows(file.create_group("report"), Report(*map(np.array, columns)))
+            steps, seconds, errors = zip(*self.report, strict=True) if self.report else ((), (), ())
+            report = Report(np.array(steps, np.int64), np.array(seconds, float), np.array(errors, float))
+            layout.write_rows(file.create_group("report"), report)
             set_attributes(file.create_group("parameters"), self.attributes)
             if self.checkpoint is not None:
                 write_checkpoint(file.create_group(_CHECKPOINT), self.checkpoint)

@@ -148,7 +148,7 @@ class ApproachDriver:
     def done(self) -> bool:
         """Whether the pressure has vanished again."""
         opens = self._run.settings.kappa < 0
-        return opens and self._pressure <= self._settings.p_open
+        return bool(opens and self._pressure <= self._settings.p_open)
 
     @property
     def at_mark(self) -> bool:
