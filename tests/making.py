@@ -1,8 +1,6 @@
 """Making packings to the end, or up to some piece of work, with what was told on the way."""
 
 from jamshape.protocols.make import is_done, make
-from jamshape.recording.content import Content
-from jamshape.recording.driver import Row, Told
 from jamshape.recording.recorder import How
 
 STAGES = {
@@ -13,7 +11,7 @@ STAGES = {
 }
 
 
-class Stopped(Exception):
+class StoppedError(Exception):
     """Raised where a process would be killed."""
 
 
@@ -24,11 +22,11 @@ def made(recipe, out, after=None, *, again=False, retry=True):
     def tell(row):
         told.append(row.told)
         if len(told) == after:
-            raise Stopped
+            raise StoppedError
 
     try:
         make(recipe, out, How(again, tell=tell), retry=retry)
-    except Stopped:
+    except StoppedError:
         assert again or not is_done(out)
     return told
 
@@ -47,12 +45,3 @@ def write_every_mark(monkeypatch):
     """Write a checkpoint at every mark."""
     for name in ("PAUSE", "SECONDS"):
         monkeypatch.setattr(f"jamshape.recording.recorder.{name}", 0.0)
-
-
-def write_rows(path, packing, attributes, columns):
-    """Write the file of a finished run with one frame, and rows at the steps 0, 1, 2, ..."""
-    content = Content(path, [packing], dict(attributes))
-    for step, values in enumerate(zip(*columns.values(), strict=True)):
-        row = dict(zip(columns, map(float, values), strict=True))
-        content.add(Row(Told("", ""), step, float(step), row), None)
-    content.write({}, None)

@@ -22,7 +22,7 @@ from typing import Any
 
 import jamshape as js
 from jamshape.command import parser_of, report, run
-from jamshape.recording.content import Content
+from jamshape.files.content import Content
 
 
 def rows(file: Path) -> None:

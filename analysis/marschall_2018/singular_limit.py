@@ -86,6 +86,11 @@ def check(options: Namespace) -> None:
         raise ValueError(msg)
 
 
+def _make(recipe: Recipe, path: Path) -> None:
+    with tqdm(desc=path.stem, unit="row", mininterval=1) as bar:
+        make(recipe, path, How(tell=lambda _: bar.update()))
+
+
 def make_discs(options: Namespace) -> list[Path]:
     """Make jammed discs, unless they are there; return their files."""
     folder = options.out / "discs"
@@ -97,8 +102,7 @@ def make_discs(options: Namespace) -> list[Path]:
         if is_done(path):
             require_same(path, recipe)
             continue
-        with tqdm(desc=path.stem, unit="row", mininterval=1) as bar:
-            make(recipe, path, How(tell=lambda _, bar=bar: bar.update()))
+        _make(recipe, path)
     return paths
 
 

@@ -90,7 +90,7 @@ class ArgumentError(Sentence, ValueError):
     """
 
 
-class TimeLimitReached(RuntimeError):  # noqa: N818 - nothing is wrong
+class TimeLimitError(RuntimeError):
     """A run was stopped at a checkpoint because its time was up; the same call resumes it.
 
     A command that raises it exits with code `TIME_IS_UP`.

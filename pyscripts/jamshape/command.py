@@ -28,7 +28,7 @@ from jamshape.checks import (
     TIME_IS_UP,
     NotReachedWarning,
     Sentence,
-    TimeLimitReached,
+    TimeLimitError,
     require_options,
 )
 
@@ -150,7 +150,7 @@ def sentences(name: str, go_on: str = "it may be started again") -> Iterator[Non
         if short and not end.code:
             sys.exit(1)
         raise
-    except TimeLimitReached as stop:
+    except TimeLimitError as stop:
         print(f"{name}: {stop}", file=sys.stderr)
         sys.exit(TIME_IS_UP)
     except PROBLEMS as error:

@@ -114,8 +114,9 @@ def add_old_flag(parser: ArgumentParser, old: str, instead: str) -> None:
 
 
 class _OldFlag(Action):
-    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
-        del values
+    def __call__(
+        self, parser: Any, namespace: Any, _values: Any, option_string: Any = None
+    ) -> None:
         print(
             f"{parser.prog}: warning: {self.metavar} without {option_string}, which goes with the next release",
             file=sys.stderr,
@@ -124,11 +125,13 @@ class _OldFlag(Action):
 
 
 class _OldOption(Action):
-    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
+    def __call__(
+        self, parser: Any, namespace: Any, _values: Any, option_string: Any = None
+    ) -> None:
         print(
             f"{parser.prog}: warning: {_SAID.format(option_string, self.metavar)}", file=sys.stderr
         )
-        setattr(namespace, self.dest, values)
+        setattr(namespace, self.dest, _values)
 
 
 def _warn(old: str, new: str, stacklevel: int) -> None:

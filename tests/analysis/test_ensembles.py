@@ -19,7 +19,6 @@ from common.text import conditions_text, system_labels
 from jamshape.command import plain
 from jamshape.files.ensembles import PackingFile, System
 from jamshape.files.h5md import write_packing
-from jamshape.files.run_writer import RunWriter
 from jamshape.protocols.random_start import random_packing
 
 ROD, OTHER = "spherocylinder", "superellipsoid"
@@ -42,8 +41,8 @@ def folder(tmp_path):
     write(tmp_path, "d", bidisperse(4), dimension=3, u0=1e-15)
     write(tmp_path, "stalled", bidisperse(1), outcome="stalled", u0=1e-15)
     write_packing(tmp_path / "start.h5", random_packing(8, 0.1, 1, bidisperse(1)))
-    RunWriter.create(tmp_path / "a.h5.run.h5", random_packing(8, 0.1, 1, bidisperse(1)))
-    (tmp_path / "b.search.h5").write_text("still written")
+    write_packing(tmp_path / "a.h5.run.h5", random_packing(8, 0.1, 1, bidisperse(1)))
+    (tmp_path / "b.making.h5").write_text("still written")
     (tmp_path / "modes.h5").write_bytes(b"\x89HDF\r\n\x1a\n of another kind")
     return tmp_path
 

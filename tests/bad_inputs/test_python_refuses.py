@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from jamshape.flow.recording import Recording
 
 import jamshape as js
 from jamshape.checks import RANGES, require_stated

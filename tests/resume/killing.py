@@ -21,7 +21,6 @@ from matplotlib.image import imread
 
 from jamshape.exchange.gsd import read_gsd
 from jamshape.files.lammps_text import read_data
-from jamshape.files.restarts import is_whole
 
 # The folder, in that of a run, of what the run reads.
 GIVEN = "given"
@@ -184,10 +183,6 @@ def _read_hdf5(path):
         file.visititems(lambda _, part: part[()] if isinstance(part, h5py.Dataset) else None)
 
 
-def _read_restart(path):
-    assert is_whole(path), f"{path} has no end"
-
-
 def _read_data(path):
     with warnings.catch_warnings(action="ignore"):  # of what LAMMPS does not write
         read_data(path)
@@ -199,7 +194,6 @@ READERS = {
     "*.png": imread,
     "*.data": _read_data,
     "*.gsd": read_gsd,
-    "final.restart": _read_restart,
 }
 
 

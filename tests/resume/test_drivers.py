@@ -32,9 +32,9 @@ from drivers import (
 from killing import CALLS, differences, ended, forked, light, said
 
 import jamshape as js
-from jamshape.checks import TimeLimitReached
+from jamshape.checks import TimeLimitError
+from jamshape.files.content import Content
 from jamshape.files.h5md import FileFormatError, read_attributes
-from jamshape.recording.content import Content
 
 pytestmark = pytest.mark.lammps
 
@@ -96,7 +96,7 @@ def names(folder):
 
 def unfinished(name, file, starts):
     """Put a run down at its first mark."""
-    with pytest.raises(TimeLimitReached, match=r"stopped after .* the same command resumes"):
+    with pytest.raises(TimeLimitError, match=r"stopped after .* the same command resumes"):
         CASES[name].run(file, starts, seconds=0.0)
     assert not Content.read(file).attributes["finished"]
 
@@ -119,7 +119,7 @@ def test_a_run_put_down_at_every_mark_ends_as_if_it_were_not(
     patched(*SHORT, *NONE)
     file, stops = tmp_path / "run.h5", 0
     while not file.exists() or not read_attributes(file)["finished"]:
-        with suppress(TimeLimitReached):
+        with suppress(TimeLimitError):
             if stops % 2 and file.exists():
                 js.resume(file, seconds=0.0, progress=False)
             else:
@@ -315,11 +315,11 @@ def test_another_start_is_refused(name, whole, starts):
 def test_again_begins_anew(name, whole, starts, tmp_path, patched):
     patched(*SHORT)
     file, (key, value) = tmp_path / "run.h5", next(iter(CASES[name].others.items()))
-    with pytest.raises(TimeLimitReached):
+    with pytest.raises(TimeLimitError):
         CASES[name].run(file, starts, seconds=0.0, **{key: value})
     CASES[name].run(file, starts, again=True)
     require_same(whole(name)[0], file)
-    with pytest.raises(TimeLimitReached):
+    with pytest.raises(TimeLimitError):
         CASES[name].run(file, starts, again=True, seconds=0.0)
     assert not read_attributes(file)["finished"]
 

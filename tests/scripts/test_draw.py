@@ -5,9 +5,8 @@ import pytest
 from pictures import image, is_color
 
 from jamshape.drawing.styles import CONTACT, KINDS, RATTLER
-from jamshape.files.h5md import write_packing
+from jamshape.files.h5md import write_packing, write_run
 from jamshape.files.lammps_text import write_data
-from jamshape.files.run_writer import RunWriter
 from jamshape.packing import Box, Packing
 from jamshape.shapes.table import SHAPES
 
@@ -131,9 +130,8 @@ def test_discs_and_particles_longer_than_the_box(report, tmp_path, A):
 
 
 def test_a_frame_of_a_run(report, problem, tmp_path):
-    writer = RunWriter.create(tmp_path / "run.h5", packing())
     apart = np.array([[3.0, 7.8], [3.0, 1.5], [2.0, 4.0]])
-    writer.append(packing(step=10, position=apart))
+    write_run(tmp_path / "run.h5", [packing(), packing(step=10, position=apart)])
     asked = ("--out", tmp_path / "p.png")
     counts = [
         report(SCRIPT, tmp_path / "run.h5", "--frame", k, *asked)["contacts"] for k in (0, -1)

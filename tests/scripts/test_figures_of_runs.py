@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pictures import image
+from written import write_content
 
 from jamshape.files.h5md import write_packing
-from jamshape.files.run_writer import RunWriter
 from jamshape.measures.order import orientational_order
 from jamshape.packing import Box, Packing
 
@@ -39,14 +39,15 @@ def compression(path, seed=1, shift=0.0, ends=(0.8, 0.9), slope=0.2, **attribute
     first = packing(rng.uniform(0, 7, 3))
     known = {"alpha": 4.0, "n": 1024, "kappa": 1e-6, "size_ratio": 1.4, "k_e": 1.0, "sides": 2}
     known |= {"seed": seed, "finished": True} | attributes
-    writer = RunWriter.create(path, first, known)
     n = known["n"]
     S = {f"S_{k}": orientational_order(rng.uniform(0, 7, n), k).S_n for k in (2, 4)}
     phi, steps = np.linspace(*ends, 81), np.arange(81)
     rows = {"phi": phi, "pressure": slope * np.maximum(phi - PHI_J - shift, 0)}
     rows |= {name: np.full(81, value) for name, value in S.items()}
-    writer.append_series(steps, steps / 3, rows)
-    writer.close()
+    values = [{name: column[k] for name, column in rows.items()} for k in steps]
+    write_content(
+        path, [first], known, zip(steps.tolist(), (steps / 3).tolist(), values, strict=True)
+    )
     return path
 
 

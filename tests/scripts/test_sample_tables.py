@@ -6,8 +6,7 @@ import pytest
 
 import jamshape as js
 from common.ensembles import read_groups
-from jamshape.files.h5md import read_attributes
-from jamshape.files.run_writer import RunWriter
+from jamshape.files.h5md import read_attributes, write_packing
 
 SCRIPT = "sample_tables.py"
 
@@ -34,7 +33,7 @@ def folder(tmp_path_factory):
     for name, finished in (("slow1", True), ("slow2", False)):
         rates = [[0.8, 1e-6], [0.85, 1e-8]]  # from these packing fractions on
         known = {"alpha": 4.0, "kappa": rates, "phi_jams": 0.86, "finished": finished}
-        RunWriter.create(root / "runs" / f"{name}.h5", js.load(packing), known).close()
+        write_packing(root / "runs" / f"{name}.h5", js.load(packing), known)
     return root
 
 

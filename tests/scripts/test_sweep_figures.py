@@ -12,7 +12,6 @@ from common.contact_angles import contact_angles
 from common.contact_classes import class_fractions, flat_fraction
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import read_packing, write_packing
-from jamshape.files.run_writer import RunWriter
 from jamshape.measures.averages import Mean
 from jamshape.packing import Box
 from jamshape.protocols.random_start import random_packing
@@ -73,7 +72,7 @@ def sweep(tmp_path_factory):
         write(folder, alpha)
     write(folder, 1.0, 2, phi_J_compression=0.885, outcome="sliding")
     write(folder, 0.1, 2, outcome="stalled")
-    RunWriter.create(folder / "still.run.h5", squeezed(1.0, 1), {"outcome": "none yet"})
+    write_packing(folder / "still.run.h5", squeezed(1.0, 1), {"outcome": "none yet"})
     write_packing(folder / "start.h5", squeezed(1.0, 1))
     (folder / "notes.txt").write_text("left out\n")
     return folder

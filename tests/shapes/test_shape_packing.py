@@ -18,7 +18,8 @@ from every_shape import (
     taken,
 )
 from making import made as made_of
-from making import stage_of, stages_of, write_every_mark, write_rows
+from making import stage_of, stages_of, write_every_mark
+from written import write_columns
 
 from common.energy_along import AlongModes
 from common.ladder import climb
@@ -192,7 +193,9 @@ def compressed(recipe, out, packing):
     """What a compression by dynamics leaves, ended at some packing."""
     phi = np.linspace(0.9, 1.0, 20) * packing.phi
     rows = {"phi": phi, "pressure": 0.0 * phi, "kappa": np.ones(20)}
-    write_rows(out.with_name(out.name + ".run.h5"), packing, recipe.attributes(), rows)
+    write_columns(
+        out.with_name(out.name + ".run.h5"), packing, recipe.attributes() | {"finished": True}, rows
+    )
 
 
 @TYPICAL_ONES

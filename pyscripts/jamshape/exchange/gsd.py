@@ -23,7 +23,7 @@ from jamshape.exchange.fields import alike, box_fields, centered, packing_of, pa
 from jamshape.exchange.tools import tool
 from jamshape.files.disk import PathLike, replacing
 from jamshape.files.frames import Form, row_of
-from jamshape.files.layout import FileFormatError
+from jamshape.files.hdf5 import FileFormatError
 from jamshape.packing import Packing
 from jamshape.shapes.mesh import SurfaceMesh
 from jamshape.shapes.shape import Interaction

@@ -24,6 +24,7 @@ from jamshape.exchange.tools import tool
 from jamshape.files import layout
 from jamshape.files.disk import PathLike
 from jamshape.files.h5md import count_frames, read_packing
+from jamshape.files.hdf5 import put, written
 from jamshape.packing import Packing
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def write_mdanalysis(path: PathLike, source: Source) -> Packing:
     FileFormatError, OSError, ValueError
         As in `to_mdanalysis`.
     """
-    with layout.written(path) as file:
+    with written(path) as file:
         return _write(file, source)
 
 
@@ -133,28 +134,27 @@ def _write(file: h5py.File, source: Source) -> Packing:
     if first is None:
         msg = "there is no packing, expected at least one"
         raise ValueError(msg)
+    rows, clocks = [], []
+    for k, packing in enumerate(itertools.chain([first], frames)):
+        _require_same(first, packing, k)
+        rows.append(_values(packing))
+        clocks.append((packing.step, packing.time))
     layout.write_metadata(file)
     group = file.create_group(_GROUP)
     clock = group.create_group("position")
-    layout.create_clock(clock)
-    orientation = file.create_group("observables/orientation")
-    elements = {"position": clock, "box/edges": group.create_group("box/edges")}
-    for name, element in (*elements.items(), ("orientation", orientation)):
-        layout.create_rows(element, "value", _values(first)[name])
-        if element is not clock:
-            element["step"], element["time"] = clock["step"], clock["time"]
-    elements["orientation"] = orientation
-    group["box"].attrs["dimension"] = 3
-    group["box"].attrs["boundary"] = np.array([b"periodic"] * 3)
+    for name, column in zip(("step", "time"), zip(*clocks, strict=True), strict=True):
+        put(clock, name, np.array(column))
     # MDAnalysis reads no strings of fixed length, though those of variable length have no checksum.
     clock["time"].attrs["unit"] = "ps"
-    for name in _ELEMENTS:
-        elements[name]["value"].attrs["unit"] = "Angstrom"
-    for k, packing in enumerate(itertools.chain([first], frames)):
-        _require_same(first, packing, k)
-        for name, value in _values(packing).items():
-            layout.extend_dataset(elements[name]["value"], k, value[None])
-        layout.extend(clock, {"time": np.array([packing.time]), "step": np.array([packing.step])})
+    for name in rows[0]:
+        element = (file if name == "observables/orientation" else group).require_group(name)
+        put(element, "value", np.stack([row[name] for row in rows]))
+        if element != clock:
+            element["step"], element["time"] = clock["step"], clock["time"]
+        if name in _ELEMENTS:
+            element["value"].attrs["unit"] = "Angstrom"
+    group["box"].attrs["dimension"] = 3
+    group["box"].attrs["boundary"] = np.array([b"periodic"] * 3)
     return first
 
 
@@ -166,7 +166,7 @@ def _values(packing: Packing) -> dict[str, Any]:
     return {
         "position": in_space(packing.position - packing.box.lo),
         "box/edges": edges,
-        "orientation": packing.quaternions,
+        "observables/orientation": packing.quaternions,
     }
 
 

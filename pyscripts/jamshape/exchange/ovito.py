@@ -20,7 +20,7 @@ from jamshape.drawing.kinds import kinds_of
 from jamshape.exchange.fields import PARTICLE_RESTS, alike, in_space, packing_of, particle_fields
 from jamshape.exchange.tools import tool
 from jamshape.files.frames import as_rest
-from jamshape.files.layout import FileFormatError
+from jamshape.files.hdf5 import FileFormatError
 from jamshape.packing import Lengths, Packing, angle_from_quaternion
 from jamshape.packing.rotation import product
 from jamshape.shapes.shape import Interaction

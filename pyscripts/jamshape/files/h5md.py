@@ -52,12 +52,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from jamshape.checks import require_other_file
 from jamshape.files import layout
-from jamshape.files.disk import PathLike, replacing
-from jamshape.files.frames import Form, row_of
+from jamshape.files.content import Content
+from jamshape.files.disk import PathLike, replacing, store
+from jamshape.files.frames import row_of
 from jamshape.files.hdf5 import FileFormatError, attribute, attributes, require_item
-from jamshape.files.journal import read_journal
 from jamshape.files.layout import Report, Series
-from jamshape.files.rows import check_after, check_same_particles
 from jamshape.files.vocabulary import FORMAT_VERSION, protocol_named, renamed
 from jamshape.packing import Packing
 from jamshape.shapes.table import DEFAULT
@@ -113,11 +112,11 @@ def write_packing(
     OSError
         If the file cannot be written.
     """
-    with layout.written(path) as file:
-        layout.create_file(file, packing, attributes or {}, observables or {})
-        if report is not None:
-            steps, seconds, errors = map(np.asarray, report)
-            layout.extend(file["report"], {"wall_seconds": seconds, "error": errors, "step": steps})
+    content = Content(Path(path), [packing], dict(attributes or {}))
+    content.add_row(packing.step, packing.time, observables or {})
+    if report is not None:
+        content.report = list(zip(*(np.asarray(column).tolist() for column in report), strict=True))
+    content.write()
 
 
 def write_frames(
@@ -158,19 +157,14 @@ def write_run(
     >>> count_frames("two.h5")
     2
     """
-    first, last = frames[0], frames[0].step
-    with layout.written(path) as file:
-        layout.create_file(file, first, attributes or {}, {})
-        for frame in frames[1:]:
-            check_same_particles(path, first, frame)
-            check_after("position", last, frame.step)
-            form = Form.found(file).joined(Form.of(frame))
-            layout.append_table(file, layout.FRAMES, layout.frames_table(frame, form))
-            last = frame.step
+    content = Content(Path(path), [frames[0]], dict(attributes or {}))
+    for frame in frames[1:]:
+        content.add_frame(frame)
+    content.write()
 
 
 def copy_run(path: PathLike, out: PathLike) -> None:
-    """Copy a run to another file, including rows that are still in its journal.
+    """Copy a packing or a run to another file.
 
     Raises
     ------
@@ -182,10 +176,8 @@ def copy_run(path: PathLike, out: PathLike) -> None:
         If one cannot be read or the other written.
     """
     require_other_file(Path(out), [Path(path)])
-    pending = read_journal(path)
-    with layout.changed(path, out) as file:
-        layout.fold(file, pending)
-        layout.set_token(file, None)
+    with layout.opened(path):  # refuses other files
+        store(out, Path(path).read_bytes())
 
 
 def read_packing(path: PathLike, frame: int = -1) -> Packing:
@@ -297,6 +289,4 @@ def read_series(path: PathLike, name: str) -> Series:
 def read_report(path: PathLike) -> Report:
     """Read the convergence history; errors as `read_packing`."""
     with layout.opened(path) as file:
-        n = layout.count(file, "report")
-        rows = (layout.require_rows(file, "report", name, n) for name in layout.REPORT)
-        return Report(*(column[:n] for column in rows))
+        return layout.read_report(file)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import importlib.metadata
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.files.disk import PathLike
@@ -19,49 +19,24 @@ from jamshape.files.hdf5 import (
     FileFormatError,
     Image,
     attribute,
-    attributes,
-    check_attributes,
     has_item,
-    open_file,
-    plain,
     put,
     readable,
     reading,
     require_dataset,
     require_item,
     set_attributes,
-    written,
 )
-from jamshape.files.journal import Pending, Table, read_journal
 from jamshape.files.origin import origin
-from jamshape.files.rows import Columns, Stored, as_column, gathered, table
-from jamshape.files.vocabulary import FORMAT_VERSION, RENAMED, former
+from jamshape.files.vocabulary import FORMAT_VERSION, former
 from jamshape.packing import Box, Packing
 from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
     import h5py
 
-__all__ = [
-    "FileFormatError",
-    "attribute",
-    "attributes",
-    "check_attributes",
-    "has_item",
-    "plain",
-    "put",
-    "readable",
-    "reading",
-    "require_item",
-    "set_attributes",
-    "written",
-]
 
-REPORT = {"step": np.int64, "wall_seconds": np.float64, "error": np.float64}
 _SAME_SIZE = 1e-12  # relative rounding difference between two copies of a size
-# Tables of a journal.
-FRAMES, OBSERVABLES, REPORT_TABLE = "frames", "observables", "report"
-_TOKEN = "journal"  # attribute of a file with a journal
 
 
 class Series(NamedTuple):
@@ -87,13 +62,6 @@ class Report(NamedTuple):
 
 
 @contextmanager
-def rewritten(path: PathLike) -> Iterator[h5py.File]:
-    """Yield a copy of an HDF5 file to change, which replaces it if the body succeeds; errors as `opened`."""
-    with changed(path, path) as file:
-        yield file
-
-
-@contextmanager
 def changed(path: PathLike, out: PathLike) -> Iterator[h5py.File]:
     """Yield a copy of an HDF5 file to change, which is written to `out` if the body succeeds; errors as `opened`."""
     with readable(path):
@@ -107,28 +75,10 @@ def changed(path: PathLike, out: PathLike) -> Iterator[h5py.File]:
 
 @contextmanager
 def opened(path: PathLike) -> Iterator[h5py.File]:
-    """Open for reading, including rows that are still in the journal.
-
-    Errors as `reading`.
-    """
-    with readable(path), _with_journal(path) as file:
+    """Open for reading; errors as `reading`."""
+    with reading(path) as file:
         check_h5md(file)
         yield file
-
-
-def _with_journal(path: PathLike) -> h5py.File:
-    """Open a file, in memory if there are rows to add."""
-    pending = read_journal(path)
-    while pending:
-        file = Image(path, Path(path).read_bytes()).open("r+")
-        if fold(file, pending):
-            return file
-        file.close()
-        # Its rows have been folded already, unless a writer has begun another journal meanwhile.
-        before, pending = pending.token, read_journal(path)
-        if pending and pending.token == before:
-            break
-    return open_file(path)
 
 
 def check_h5md(file: h5py.File) -> None:
@@ -166,22 +116,9 @@ def stored_name(file: h5py.File, name: str) -> str:
     return former(name, require_item(file, "observables"))
 
 
-def rename_observables(file: h5py.File) -> None:
-    """Give the observables of an older file their current names."""
-    for new, old in ((new, stored_name(file, new)) for new in RENAMED):
-        if old != new and old in require_item(file, "observables"):
-            file.move(f"observables/{old}", f"observables/{new}")
-    require_item(file, "h5md/creator").attrs["format_version"] = FORMAT_VERSION
-
-
 def version_of(file: h5py.File) -> int:
     """Read the version of the names in a file."""
     return int(attribute(require_item(file, "h5md/creator"), "format_version", 1))
-
-
-def has_todays_names(file: h5py.File) -> bool:
-    """Whether a file uses the current names."""
-    return version_of(file) >= FORMAT_VERSION
 
 
 def read_rows(file: h5py.File, name: str) -> Series:
@@ -189,6 +126,12 @@ def read_rows(file: h5py.File, name: str) -> Series:
     element = f"observables/{name}"
     n = count(file, element)
     return Series(*(require_rows(file, element, field, n)[:n] for field in Series._fields))
+
+
+def read_report(file: h5py.File) -> Report:
+    """Read the convergence history."""
+    n = count(file, "report")
+    return Report(*(require_rows(file, "report", name, n)[:n] for name in Report._fields))
 
 
 def write_metadata(file: h5py.File) -> None:
@@ -207,158 +150,33 @@ def write_metadata(file: h5py.File) -> None:
     creator.attrs["origin"] = np.bytes_(origin())
 
 
-def create_file(
-    file: h5py.File,
-    packing: Packing,
-    parameters: Mapping[str, Any],
-    observables: Mapping[str, ArrayLike],
-) -> None:
-    """Write a packing, or the first frame of a run, into an empty file."""
-    write_metadata(file)
-    create_particles(file.create_group("particles/all"), packing)
-    file.create_group("observables")
-    for name, dtype in REPORT.items():
-        create_rows(file.require_group("report"), name, np.zeros((), dtype))
-    append_table(file, FRAMES, frames_table(packing, Form.of(packing)))
-    columns = {name: as_column(value) for name, value in observables.items()}
-    Stored().check_observables(packing.step, columns)
-    append_table(file, OBSERVABLES, table([packing.step], [packing.time], columns))
-    set_attributes(file.create_group("parameters"), parameters)
-
-
-def create_particles(group: h5py.Group, packing: Packing) -> None:
-    """Create the elements of particles, without frames."""
-    set_attributes(group, {"shape_style": packing.shape_style, **packing.law._asdict()})
+def write_particles(group: h5py.Group, frames: Sequence[Packing]) -> None:
+    """Write frames of the same particles into an empty group."""
+    first = frames[0]
+    set_attributes(group, {"shape_style": first.shape_style, **first.law._asdict()})
     # Half lengths and radii reproduce overlaps without the rounding of 2(A + R).
-    more = ("exponent",) if packing.shape.has_exponent else ("half_length", "radius")
+    more = ("exponent",) if first.shape.has_exponent else ("half_length", "radius")
     for name in ("species", "id", "diameters", *more):
-        put(group, name, getattr(packing, name))
-    for name, value in frame_values(packing, Form.of(packing)).items():
-        element = group.create_group(name)
-        create_rows(element, "value", value)
-        if name == "position":
-            create_clock(element)
-        else:
-            element["step"], element["time"] = group["position/step"], group["position/time"]
-    group["box"].attrs["dimension"] = packing.dimension
-    group["box"].attrs["boundary"] = np.array([b"periodic"] * packing.dimension)
+        put(group, name, getattr(first, name))
+    forms = [Form.of(frame) for frame in frames]
+    form = Form(*(any(parts) for parts in zip(*forms, strict=True)))
+    rows = [frame_values(frame, form) for frame in frames]
+    clock = group.create_group("position")
+    put(clock, "step", np.array([frame.step for frame in frames]))
+    put(clock, "time", np.array([frame.time for frame in frames]))
+    for name in rows[0]:
+        element = group.require_group(name)
+        put(element, "value", np.stack([row[name] for row in rows]))
+        if name != "position":
+            element["step"], element["time"] = clock["step"], clock["time"]
+    group["box"].attrs["dimension"] = first.dimension
+    group["box"].attrs["boundary"] = np.array([b"periodic"] * first.dimension)
 
 
-def create_rest(group: h5py.Group, path: str, row: NDArray[Any], n: int) -> None:
-    """Create an element of low parts, zero in the n existing frames."""
-    element = group.create_group(path)
-    put(element, "value", np.zeros((n, *row.shape)), grows=True)
-    element["step"], element["time"] = group["position/step"], group["position/time"]
-
-
-def create_clock(group: h5py.Group) -> None:
-    """Create steps and times, without rows."""
-    create_rows(group, "step", np.zeros((), np.int64))
-    create_rows(group, "time", np.zeros((), np.float64))
-
-
-def create_rows(group: h5py.Group, name: str, row: NDArray[Any]) -> None:
-    """Create an extensible dataset for rows like `row`, without rows."""
-    put(group, name, np.empty((0, *row.shape), row.dtype), grows=True)
-
-
-def fold(file: h5py.File, pending: Pending | None) -> bool:
-    """Append the rows of a journal, if it continues this file."""
-    if not pending or token_of(file) != pending.token:
-        return False
-    tables, changed_attributes = gathered(pending.records)
-    for name, rows in tables:
-        append_table(file, name, rows)
-    set_attributes(file["parameters"], changed_attributes)
-    return True
-
-
-def token_of(file: h5py.File) -> str | None:
-    """Return the token of a file's state, or None."""
-    token: str | None = attribute(file, _TOKEN)
-    return token
-
-
-def set_token(file: h5py.File, token: str | None) -> None:
-    """Set the token of the file's state that a journal continues; None without a journal."""
-    if token:
-        set_attributes(file, {_TOKEN: token})
-    elif _TOKEN in file.attrs:
-        del file.attrs[_TOKEN]
-
-
-def append_table(file: h5py.File, name: str, rows: Table) -> None:
-    """Append rows to the frames, the observables or the report."""
-    columns = {key: rows[key] for key in rows.dtype.names or ()}
-    if name == REPORT_TABLE:
-        extend(file["report"], columns)
-        return
-    clock = {key: columns.pop(key) for key in ("time", "step")}
-    if name == FRAMES:
-        _append_frames(file["particles/all"], clock, columns)
-        return
-    for key, column in columns.items():
-        group = file["observables"]
-        if key not in group:
-            create_rows(group.create_group(key), "value", column[0])
-            create_clock(group[key])
-        extend(group[key], {"value": column, **clock})
-
-
-def _append_frames(group: h5py.Group, clock: Columns, columns: Columns) -> None:
-    n = len(group["position/step"])
-    for key, column in columns.items():
-        if key not in group:
-            create_rest(group, key, column[0], n)
-        if column.ndim > group[key]["value"].ndim:
-            _make_matrices(group[key])
-        extend_dataset(group[key]["value"], n, column)
-    extend(group["position"], clock)
-
-
-def _make_matrices(element: h5py.Group) -> None:
-    """Convert edges (T, D) of boxes without tilt to matrices (T, D, D)."""
-    edges = element["value"][()]
-    matrices = edges[:, :, None] * np.eye(edges.shape[1])
-    del element["value"]
-    create_rows(element, "value", np.eye(edges.shape[1]))
-    extend_dataset(element["value"], 0, matrices)
-
-
-def frames_table(packing: Packing, form: Form) -> Table:
-    """Convert a frame to a table of one row."""
-    columns = {name: value[None] for name, value in frame_values(packing, form).items()}
-    return table([packing.step], [packing.time], columns)
-
-
-def extend(group: h5py.Group, columns: Columns) -> None:
-    """Append rows, overwriting remains of an interrupted writer of earlier versions."""
-    n = len(group["step"])
-    for name, column in columns.items():
-        extend_dataset(group[name], n, column)
-
-
-def extend_dataset(dataset: h5py.Dataset, n: int, rows: NDArray[Any]) -> None:
-    """Write rows after the first n."""
-    dataset.resize(n + len(rows), axis=0)
-    dataset[n:] = rows
-
-
-def truncate_all(file: h5py.File, step: int) -> None:
-    """Drop all frames, observables and rows of the report after a step."""
-    frames = file["particles/all"]
-    names = ("position", "orientation", "image", EDGES, "box/lo", *RESTS.values(), EDGES_REST)
-    values = [frames[name]["value"] for name in names if name in frames]
-    truncate(step, frames["position"], values)
-    for element in (*file["observables"].values(), file["report"]):
-        truncate(step, element)
-
-
-def truncate(step: int, clock: h5py.Group, others: Iterable[h5py.Dataset] = ()) -> None:
-    """Drop the rows after a step."""
-    n = int(np.searchsorted(clock["step"][:], step, side="right"))
-    for dataset in (*clock.values(), *others):
-        dataset.resize(n, axis=0)
+def write_rows(group: h5py.Group, columns: Series | Report) -> None:
+    """Write the rows of an observable or the report into an empty group."""
+    for name, column in columns._asdict().items():
+        put(group, name, column)
 
 
 def _require_one_size(file: h5py.File, packing: Packing) -> None:
@@ -398,10 +216,10 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
     n_frames = count(file, "particles/all/position")
     n = math.prod(require_dataset(file, "particles/all/species").shape[:1])
 
-    def row(name: str, like: NDArray[Any] | None = None) -> Any:
+    def row(name: str, *, sparse: bool = False) -> Any:
         element, dataset = f"particles/all/{name}".rsplit("/", 1)
-        rows = require_rows(file, element, dataset, n_frames, sparse=like is not None)
-        _require_most(rows, rows.shape[1:], n if like is None else like)
+        rows = require_rows(file, element, dataset, n_frames, sparse=sparse)
+        _require_most(rows, rows.shape[1:], n)
         return rows[frame]
 
     def fixed(name: str) -> Any:
@@ -416,14 +234,14 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
     for name, element in RESTS.items():
         if has_item(file, f"particles/all/{element}"):
             whole = fields[name.removesuffix("_rest")]
-            fields[name] = as_rest(row(f"{element}/value", whole), whole)
+            fields[name] = as_rest(row(f"{element}/value", sparse=True), whole)
     fields["shape_style"] = attribute(require_item(file, "particles/all"), "shape_style")
     fields["law"] = _read_law(file)
     fields["step"], fields["time"] = int(row("position/step")), float(row("position/time"))
     lo, edges = row("box/lo/value"), row(f"{EDGES}/value")
     try:
         if has_item(file, f"particles/all/{EDGES_REST}"):
-            rest = lengths_of(as_rest(row(f"{EDGES_REST}/value", edges), edges))
+            rest = lengths_of(as_rest(row(f"{EDGES_REST}/value", sparse=True), edges))
             fields |= {"edges_rest": rest.edges, "tilt_rest": rest.tilt}
         packing = Packing(box=Box(lo, *lengths_of(edges)), **fields)
     except ValueError as error:
@@ -436,13 +254,11 @@ def read_frame(file: h5py.File, frame: int) -> Packing:
 _MOST_COLUMNS = 4  # numbers of a particle in one array, or of a row of a box
 
 
-def _require_most(dataset: Any, shape: tuple[int, ...], most: int | NDArray[Any]) -> None:
-    """Refuse an array larger than its particles need, or of another shape than its low parts, before it is read."""
-    if isinstance(most, np.ndarray):
-        is_fine, expected = shape == most.shape, f"{most.shape}"
-    else:
-        allowed = max(most, _MOST_COLUMNS) * _MOST_COLUMNS
-        is_fine, expected = math.prod(shape) <= allowed, f"numbers of {most} particles"
-    if not is_fine:
-        msg = f"{dataset.file.filename}: {dataset.name} has shape {shape}, expected {expected}; write it again"
+def _require_most(dataset: Any, shape: tuple[int, ...], n: int) -> None:
+    """Refuse an array larger than n particles need, before it is read."""
+    if math.prod(shape) > max(n, _MOST_COLUMNS) * _MOST_COLUMNS:
+        msg = (
+            f"{dataset.file.filename}: {dataset.name} has shape {shape}, expected numbers of {n} particles;"
+            " write it again"
+        )
         raise FileFormatError(msg)

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.flow.implicit import Flow, ImplicitFlow, Protocol, Step
 from jamshape.flow.slow_shear import SlowShear
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
-from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+from jamshape.recording.driver import Plan, Row, Told
 
 STEPS_PER_MARK = 100
 """Steps between two marks, where caches and factors are dropped, and a frame is recorded."""

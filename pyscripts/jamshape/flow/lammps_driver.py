@@ -8,12 +8,13 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from jamshape.checks import require_stated
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.flow import motion
 from jamshape.flow.compression import Compression
 from jamshape.flow.motion import FlowRun, Motion
 from jamshape.flow.shear import Shear
 from jamshape.lammps.session import Session
-from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+from jamshape.recording.driver import Plan, Row, Told
 from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from jamshape.checks import require_one_of, require_positive
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.lammps.module import one_at_a_time
 from jamshape.packing import Packing
-from jamshape.recording.driver import Checkpoint
 from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:

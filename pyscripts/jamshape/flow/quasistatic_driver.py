@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.flow import quasistatic
 from jamshape.flow.quasistatic import QuasistaticShear, Sheared
 from jamshape.landscape import Landscape, State
 from jamshape.packing import Packing
-from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+from jamshape.recording.driver import Plan, Row, Told
 
 MOST_STEPS_PER_FRAME = 50
 """Largest number of steps between frames."""

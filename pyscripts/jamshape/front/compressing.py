@@ -111,7 +111,7 @@ def compress(
         If a number is out of its range or has no effect, or the file holds another run.
     PluginError
         If there is no LAMMPS or no plugin for it.
-    TimeLimitReached
+    TimeLimitError
         If `seconds` are over before the end.
 
     Examples

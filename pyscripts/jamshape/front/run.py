@@ -16,6 +16,7 @@ import numpy as np
 from jamshape.arguments import checked
 from jamshape.arrays import BoolArray, FloatArray
 from jamshape.checks import RANGES, NotReachedWarning, require_number
+from jamshape.files.content import add_attributes
 from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
     count_frames,
@@ -32,7 +33,6 @@ from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.steady import SteadyState, steady_state
-from jamshape.recording.content import set_attributes
 from jamshape.recording.driver import Told
 
 if TYPE_CHECKING:
@@ -226,7 +226,7 @@ class RunFile(Recorded):
         found = Jamming.of(tried)
         if self.about.get("finished"):
             with suppress(OSError), Lock(self.file):  # or it may only be read
-                set_attributes(self.file, found.attributes())
+                add_attributes(self.file, found.attributes())
             self.__dict__.pop("about", None)
         return found
 

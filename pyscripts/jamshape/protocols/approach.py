@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from jamshape.checks import require_positive
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.flow import motion
 from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
-from jamshape.recording.driver import Checkpoint, Plan, Row, Told
+from jamshape.recording.driver import Plan, Row, Told
 
 ROWS_PER_MARK = 50
 """Rows between two marks."""
@@ -146,7 +147,8 @@ class ApproachDriver:
     @property
     def done(self) -> bool:
         """Whether the pressure has vanished again."""
-        return self._run.settings.kappa < 0.0 and self._pressure <= self._settings.p_open
+        opens = self._run.settings.kappa < 0
+        return bool(opens and self._pressure <= self._settings.p_open)
 
     @property
     def at_mark(self) -> bool:

@@ -10,12 +10,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.files.h5md import count_frames, read_packing
 from jamshape.landscape import Landscape
 from jamshape.minima import Stop, minimise
 from jamshape.packing import Packing, State
 from jamshape.protocols.stages import Making
-from jamshape.recording.driver import Checkpoint, Told
+from jamshape.recording.driver import Told
 from jamshape.shapes.shape import Interaction
 
 # Residual to which a frame is minimised to decide whether it is jammed.

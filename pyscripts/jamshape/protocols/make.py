@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.files.h5md import read_attributes, read_observables, require_attributes
 from jamshape.files.lock import Lock
 from jamshape.flow import lammps_driver
@@ -47,7 +48,7 @@ from jamshape.protocols.stages import (
     Strengthening,
     Sweeping,
 )
-from jamshape.recording.driver import Checkpoint, Driver, Plan, Row
+from jamshape.recording.driver import Driver, Plan, Row
 from jamshape.recording.recorder import How, record
 
 __all__ = [
@@ -93,7 +94,7 @@ def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> 
         See `target.extrapolation`.
     ValueError
         As `Recipe.start` and `target.extrapolation`, or if another packing was being made there.
-    TimeLimitReached, OSError
+    TimeLimitError, OSError
         As `jamshape.recording.recorder.record`.
     """
     compress(recipe, out, how)
@@ -110,7 +111,11 @@ def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> 
         assert isinstance(driver, Pipeline)
         driver.write(out)
 
-    record(_making_file(out), Plan("a packing", recipe.attributes(), begin, restore, finish), how)
+    record(
+        _making_file(out),
+        Plan("a packing", recipe.attributes(), begin, restore, finish=finish),
+        how,
+    )
 
 
 def _making_file(out: Path) -> Path:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Minimum
 from jamshape.minima.checkpoints import minimum_of, search_of, told_minimum, told_search
@@ -28,7 +29,7 @@ from jamshape.protocols.recipe import Recipe, Steps
 from jamshape.protocols.retry import Retry
 from jamshape.protocols.strict import StrictSearch
 from jamshape.protocols.thermal import Thermal, without_overlaps
-from jamshape.recording.driver import Checkpoint, Told
+from jamshape.recording.driver import Told
 
 MOST_MINIMISATIONS = 20_000
 """Limit of a search: with the steps of 1e-6 of bisection they change phi by 0.04."""

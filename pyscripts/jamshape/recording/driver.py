@@ -13,10 +13,8 @@ from typing import Any, NamedTuple, Protocol
 
 from numpy.typing import ArrayLike
 
+from jamshape.files.checkpoint import Checkpoint
 from jamshape.packing import Packing
-
-Checkpoint = dict[str, Any]
-"""Numbers, texts, bytes, arrays, `State`s and dictionaries of these, by name; None is left out."""
 
 
 class Told(NamedTuple):

@@ -16,11 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jamshape.checks import ArgumentError, TimeLimitReached
+from jamshape.checks import ArgumentError, TimeLimitError
+from jamshape.files.checkpoint import Checkpoint
+from jamshape.files.content import Content
 from jamshape.files.disk import remove_leftovers
-from jamshape.files.layout import FileFormatError
+from jamshape.files.hdf5 import FileFormatError
 from jamshape.files.lock import Lock
-from jamshape.recording.content import Content
 from jamshape.recording.driver import Driver, Plan, Row
 from jamshape.recording.interrupts import Interrupts
 
@@ -59,7 +60,7 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
     ------
     ValueError
         If the file holds another run.
-    TimeLimitReached
+    TimeLimitError
         If `how.seconds` are over before the end; the file holds all that is needed to go on.
     FileFormatError
         If the file cannot be read as a run.
@@ -84,10 +85,25 @@ class _Run(NamedTuple):
     driver: Driver
     finish: Callable[[Driver], None] | None
 
+    def add(self, row: Row) -> None:
+        """Keep a row, and the frame that belongs to it."""
+        content = self.content
+        content.add_row(row.step, row.time, row.observables or {})
+        if row.error is not None:
+            content.report.append((row.step, row.wall_seconds, row.error))
+        if row.has_frame:
+            content.add_frame(self.driver.frame())
+
+    def store(self, checkpoint: Checkpoint | None) -> None:
+        """Write the file, which is finished without a checkpoint."""
+        self.content.attributes |= dict(self.driver.results()) | {"finished": checkpoint is None}
+        self.content.checkpoint = checkpoint
+        self.content.write()
+
     def write(self) -> float:
         """Write a checkpoint; return when the next one is due."""
         began = perf_counter()
-        self.content.write(self.driver.results(), self.driver.checkpoint())
+        self.store(self.driver.checkpoint())
         now = perf_counter()
         return now + max(SECONDS, PAUSE * (now - began))
 
@@ -102,7 +118,7 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
     due = began + SECONDS
     while not driver.done:
         row = driver.advance()
-        content.add(row, driver.frame() if row.has_frame else None)
+        run.add(row)
         stops = interrupts.noted is not None or perf_counter() >= end
         is_mark = driver.at_mark and not driver.done
         if is_mark and (stops or perf_counter() >= due):
@@ -112,9 +128,9 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
             continue
         if interrupts.noted is not None:
             return  # raised again outside
-        raise TimeLimitReached(_stopped(row, perf_counter() - began, content.path))
+        raise TimeLimitError(_stopped(row, perf_counter() - began, content.path))
     if run.finish is None:
-        content.write(driver.results(), None)
+        run.store(None)
         return
     run.finish(driver)
     content.path.unlink(missing_ok=True)
@@ -128,10 +144,11 @@ def _begun(path: Path, plan: Plan) -> _Run:
     """Begin a run; its file keeps the start, and shows at once whether it can be written."""
     driver = plan.begin()
     content = Content(path, [driver.frame()], dict(plan.settings))
-    content.add(driver.first()._replace(error=None), None)
+    run = _Run(content, driver, plan.finish)
+    run.add(driver.first()._replace(error=None, has_frame=False))
     if plan.finish is None:
-        content.write(driver.results(), {})
-    return _Run(content, driver, plan.finish)
+        run.store({})
+    return run
 
 
 def _resumed(content: Content, plan: Plan) -> _Run:

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from exchanged import PLACES, mixed, tilted
 from scenes import pressed, scaled
+from written import write_content
 
 from jamshape.contacts import find_contacts
 from jamshape.exchange.mdanalysis import to_mdanalysis, write_mdanalysis
 from jamshape.files.h5md import write_run
-from jamshape.files.run_writer import RunWriter
 
 MDAnalysis = pytest.importorskip("MDAnalysis")
 
@@ -26,10 +26,7 @@ def run(dimension):
 @pytest.fixture
 def run_file(tmp_path, request):
     frames = run(request.param)
-    writer = RunWriter.create(tmp_path / "run.h5", frames[0], observables={"phi": frames[0].phi})
-    for packing in frames[1:]:
-        writer.append(packing)
-    writer.close()
+    write_content(tmp_path / "run.h5", frames, rows=[(0, 0.0, {"phi": frames[0].phi})])
     return tmp_path / "run.h5", frames
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 from scenes import pressed, scaled
+from written import write_content
 
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import write_packing
-from jamshape.files.run_writer import RunWriter
 
 PAGE = Path(__file__).parents[3] / "docs/how-to/other-tools.md"
 TEXT = PAGE.read_text(encoding="utf-8")
@@ -31,10 +31,9 @@ def folder(request, tmp_path, monkeypatch):
     assert len(find_contacts(first).pairs)
     write_packing(tmp_path / "packing.h5", first)
     told = {"finished": True, "kappa": 1e-6}
-    writer = RunWriter.create(tmp_path / "run.h5", first, told, {"phi": first.phi, "pressure": 0.1})
-    for k in (1, 2):
-        writer.append(scaled(first, 1 - 0.01 * k).with_(step=k, time=float(k)))
-    writer.close()
+    later = [scaled(first, 1 - 0.01 * k).with_(step=k, time=float(k)) for k in (1, 2)]
+    row = (first.step, first.time, {"phi": first.phi, "pressure": 0.1})
+    write_content(tmp_path / "run.h5", [first, *later], told, [row])
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from nasty import assert_identical, nasty_packing, tilted_box, with_rests
+from written import write_content
 
 from jamshape.files.h5md import (
     FileFormatError,
@@ -17,7 +18,6 @@ from jamshape.files.h5md import (
     write_packing,
     write_run,
 )
-from jamshape.files.run_writer import RunWriter
 
 h5py = pytest.importorskip("h5py")
 
@@ -36,12 +36,12 @@ def frame(step, dimension=2):
 
 
 def run_of_three(path):
-    writer = RunWriter.create(path, frame(0), observables={"pressure": 0.0})
+    rows = [(0, 0.0, {"pressure": 0.0})]
     for step in (10, 20):
-        writer.append_observables(step - 5, (step - 5) / 3, {"pressure": step / 7 - 1})
-        writer.append(frame(step), {"pressure": step / 7})
-        writer.append_report(step, step / 11, 1 / step)
-    return writer
+        rows.append((step - 5, (step - 5) / 3, {"pressure": step / 7 - 1}))
+        rows.append((step, step / 3, {"pressure": step / 7}))
+    report = [(step, step / 11, 1 / step) for step in (10, 20)]
+    return write_content(path, [frame(step) for step in (0, 10, 20)], rows=rows, report=report)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -102,9 +102,8 @@ def test_mdanalysis_opens_three_dimensional_runs(path):
         warnings.simplefilter("ignore")  # its imports warn of their own dependencies
         h5md = pytest.importorskip("MDAnalysis.coordinates.H5MD")
     frames = [frame(step, 3).with_(position=np.full((6, 3), step / 4)) for step in (0, 10)]
-    writer = RunWriter.create(path, frames[0], {"kappa": 1e-6}, {"pressure": 0.5})
-    writer.append(frames[1], {"pressure": 0.75})
-    writer.close()
+    rows = [(0, 0.0, {"pressure": 0.5}), (10, 10 / 3, {"pressure": 0.75})]
+    write_content(path, frames, {"kappa": 1e-6}, rows)
     with h5md.H5MDReader(str(path), convert_units=False) as reader:
         assert (reader.n_frames, reader.n_atoms) == (2, 6)
         for packing, ts in zip(frames, reader, strict=True):
@@ -171,72 +170,8 @@ def test_observables_are_sampled_between_frames(path):
 
 
 def test_first_value_that_is_an_integer_makes_no_integer_series(path):
-    writer = RunWriter.create(path, frame(0), observables={"pressure": 0})
-    writer.append_observables(1, 1, {"pressure": 0.5})
+    write_content(path, [frame(0)], rows=[(0, 0.0, {"pressure": 0}), (1, 1.0, {"pressure": 0.5})])
     np.testing.assert_array_equal(read_observables(path)["pressure"], [0, 0.5])
-
-
-def test_report_takes_one_row_or_many(path):
-    writer = RunWriter.create(path, frame(0))
-    assert len(read_report(path).step) == 0
-    writer.append_report(0, 0.5, 1 / 3)
-    writer.append_report([0, 7], [1.5, 2.5], [0.1, 0.01])
-    report = read_report(path)
-    np.testing.assert_array_equal(report.step, [0, 0, 7])
-    np.testing.assert_array_equal(report.wall_seconds, [0.5, 1.5, 2.5])
-    np.testing.assert_array_equal(report.error, [1 / 3, 0.1, 0.01])
-    with pytest.raises(ValueError, match="steps decrease, expected ascending steps"):
-        writer.append_report(6, 3, 0.001)
-    with pytest.raises(ValueError, match="steps decrease, expected ascending steps"):
-        writer.append_report([8, 7], [3, 4], [0.1, 0.1])
-
-
-def test_resumed_run_equals_an_unbroken_one(path, tmp_path):
-    run_of_three(path)
-    writer = RunWriter.open(path)
-    writer.truncate(12)
-    assert count_frames(path) == 2
-    np.testing.assert_array_equal(read_series(path, "pressure").step, [0, 5, 10])
-    np.testing.assert_array_equal(read_report(path).step, [10])
-    writer.append_observables(15, 5, {"pressure": 20 / 7 - 1})
-    writer.append(frame(20), {"pressure": 20 / 7})
-    writer.append_report(20, 20 / 11, 1 / 20)
-
-    unbroken = tmp_path / "unbroken.h5"
-    run_of_three(unbroken)
-    for index in range(3):
-        assert_identical(read_packing(path, index), read_packing(unbroken, index))
-    for resumed, expected in (
-        (read_series(path, "pressure"), read_series(unbroken, "pressure")),
-        (read_report(path), read_report(unbroken)),
-    ):
-        for a, b in zip(resumed, expected, strict=True):
-            np.testing.assert_array_equal(a, b)
-
-
-def test_truncate_keeps_the_step_itself_and_the_first_frame(path):
-    writer = run_of_three(path)
-    writer.truncate(20)
-    assert count_frames(path) == 3
-    writer.truncate(0)
-    assert count_frames(path) == 1
-    with pytest.raises(ValueError, match="starts at step 0, expected to keep step -1"):
-        writer.truncate(-1)
-
-
-def test_set_attributes_replaces(path):
-    writer = RunWriter.create(path, frame(0), {"finished": False, "kappa": 1e-6})
-    writer.set_attributes({"finished": True, "phi_J": 0.84})
-    assert read_attributes(path) == {"finished": True, "kappa": 1e-6, "phi_J": 0.84}
-
-
-def test_file_is_closed_between_appends(path):
-    writer = run_of_three(path)
-    with h5py.File(path, "r+"):  # HDF5's lock would refuse this if the writer held the file
-        pass
-    assert_identical(read_packing(path), frame(20))
-    writer.append(frame(30))
-    assert count_frames(path) == 4
 
 
 def test_run_survives_the_sudden_end_of_its_process(path):
@@ -248,20 +183,7 @@ def test_run_survives_the_sudden_end_of_its_process(path):
     command = [sys.executable, "-c", script, str(path), *sys.path]
     assert subprocess.run(command, check=False).returncode == 3
     assert_identical(read_packing(path), frame(20))
-    RunWriter.open(path).append(frame(30))
-    assert count_frames(path) == 4
-
-
-def test_rows_of_an_interrupted_append_are_overwritten(path):
-    writer = run_of_three(path)
-    with h5py.File(path, "r+") as file:
-        for name in ("particles/all/position/value", "observables/pressure/value"):
-            file[name].resize(len(file[name]) + 1, axis=0)
     assert count_frames(path) == 3
-    assert len(read_observables(path)["pressure"]) == 5
-    writer.append(frame(30), {"pressure": 1.0})
-    assert_identical(read_packing(path), frame(30))
-    assert read_observables(path)["pressure"][-1] == 1
 
 
 @pytest.mark.parametrize(
@@ -275,30 +197,27 @@ def test_rows_of_an_interrupted_append_are_overwritten(path):
     ],
 )
 def test_append_refuses_and_changes_nothing(path, changes, sentence):
-    writer = run_of_three(path)
-    before = path.read_bytes()
+    content = run_of_three(path)
     with pytest.raises(ValueError, match=sentence):
-        writer.append(frame(30).with_(**changes), {"pressure": 1.0})
-    assert path.read_bytes() == before
+        content.add_frame(frame(30).with_(**changes))
+    assert len(content.frames) == 3
 
 
 def test_append_refuses_another_dimension(path):
     with pytest.raises(ValueError, match="dimension differs from the first frame"):
-        run_of_three(path).append(nasty_packing(3))
+        run_of_three(path).add_frame(nasty_packing(3))
 
 
 def test_append_refuses_observables_and_changes_nothing(path):
-    writer = run_of_three(path)
-    before = read_series(path, "pressure").step
+    content = run_of_three(path)
     with pytest.raises(
         ValueError, match="pressure is stored up to step 20, expected a step after it"
     ):
-        writer.append_observables(20, 1, {"q": 1.0, "pressure": 1.0})
+        content.add_row(20, 1.0, {"q": 1.0, "pressure": 1.0})
     with pytest.raises(ValueError, match=r"'pressure' is float64 \(2,\), expected float64 \(\) as"):
-        writer.append(frame(30), {"pressure": np.zeros(2)})
-    assert read_observables(path).keys() == {"pressure"}
-    np.testing.assert_array_equal(read_series(path, "pressure").step, before)
-    assert count_frames(path) == 3
+        content.add_row(30, 10.0, {"pressure": np.zeros(2)})
+    assert content.columns.keys() == {"pressure"}
+    assert content.columns["pressure"].steps == [0, 5, 10, 15, 20]
 
 
 def test_missing_file_is_an_oserror_that_names_it(path):
@@ -331,7 +250,7 @@ def test_truncated_file(path, part):
 def test_damaged_inside(path):
     run_of_three(path)
     path.write_bytes(path.read_bytes().replace(b"OHDR", b"\0\0\0\0"))
-    for read in (read_packing, read_attributes, read_observables, read_report, RunWriter.open):
+    for read in (read_packing, read_attributes, read_observables, read_report):
         with pytest.raises(FileFormatError, match=r"packing\.h5: is truncated or damaged"):
             read(path)
 
@@ -460,32 +379,20 @@ def test_a_tilt_comes_back_to_the_last_bit(path, dimension, make):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_frames_with_and_without_a_tilt_are_in_one_file(path, dimension, tmp_path):
+def test_frames_with_and_without_a_tilt_are_in_one_file(path, dimension):
     plain, tilted = frame(0, dimension), frame(0, dimension).with_(box=tilted_box(dimension))
     fine = with_rests(dimension, box=tilted_box(dimension))
     frames = [
         one.with_(step=10 * k, time=k / 3)
         for k, one in enumerate([plain, plain, tilted, plain, fine, plain])
     ]
-    writer = RunWriter.create(path, frames[0])
-    for packing in frames[1:]:
-        writer.append(packing)  # of the journal too, before they are folded
-        assert_same_poses(read_packing(path), packing)
-    writer.close()
-    write_run(tmp_path / "other.h5", frames)
-    for file in (path, tmp_path / "other.h5"):
+    write_run(path, frames)
+    for file in [path]:
         for k, packing in enumerate(frames):
             assert_identical(read_packing(file, k), packing)
             assert_same_poses(read_packing(file, k), packing)
         with h5py.File(file) as found:
             assert found["particles/all/box/edges/value"].shape == (6, dimension, dimension)
-    writer = RunWriter.open(path)
-    writer.truncate(10)
-    writer.append(frames[2])
-    writer.append(frames[3])
-    writer.close()
-    for k, packing in enumerate(frames[:4]):
-        assert_same_poses(read_packing(path, k), packing)
 
 
 def test_boxes_without_a_tilt_are_stored_by_their_edges(path):
@@ -512,68 +419,12 @@ def test_packings_of_doubles_have_no_rests_in_their_files(path):
         assert all(name in file["particles/all"] for name in REST_ELEMENTS)
 
 
-def test_frames_with_rests_are_appended_and_truncated(path):
-    frames = [with_rests(2).with_(step=step) for step in (0, 10, 20)]
-    frames[1] = frames[1].with_(position=frames[1].position)  # without one of them
-    writer = RunWriter.create(path, frames[0])
-    for packing in frames[1:]:
-        writer.append(packing)
-    for index, packing in enumerate(frames):
-        assert_same_poses(read_packing(path, index), packing)
-    writer.truncate(10)
-    assert count_frames(path) == 2
-    assert_same_poses(read_packing(path), frames[1])
-    writer.append(frames[2])
-    assert_same_poses(read_packing(path), frames[2])
-
-
 def test_rests_that_come_with_a_later_frame_are_not_lost(path):
     first = with_rests(2)
-    writer = RunWriter.create(
-        path,
-        first.with_(step=0, position=first.position, orientation=first.orientation, box=first.box),
-    )
+    plain = {"position": first.position, "orientation": first.orientation, "box": first.box}
     later = first.with_(step=10)
-    writer.append(later)
+    write_run(path, [first.with_(step=0, **plain), later])
     assert_same_poses(read_packing(path), later)
-
-
-def test_a_series_is_as_many_rows_one_by_one(path, tmp_path):
-    steps, times = np.array([5, 7, 20]), np.array([5, 7, 20]) / 3
-    columns = {"pressure": np.array([1 / 3, np.nan, -0.0]), "u": np.array([1e-300, 2, 3])}
-    together, single = (RunWriter.create(p, frame(0)) for p in (path, tmp_path / "single.h5"))
-    together.append_series(steps[:2], times[:2], {k: v[:2] for k, v in columns.items()})
-    together.append_series(steps[2:], times[2:], {k: v[2:] for k, v in columns.items()})
-    together.append_series([], [], {"pressure": []})
-    for row, (step, time) in enumerate(zip(steps, times, strict=True)):
-        single.append_observables(step, time, {k: v[row] for k, v in columns.items()})
-    for name in columns:
-        one, other = read_series(together.path, name), read_series(single.path, name)
-        for x, y in zip(one, other, strict=True):
-            assert (x.dtype, x.tobytes()) == (y.dtype, y.tobytes())
-
-
-@pytest.mark.parametrize(
-    ("steps", "times", "p", "sentence"),
-    [
-        ([21, 22], [1, 2], [1], r"rows of a series differ in length, expected \(2,\)"),
-        ([21, 22], [1], [1, 2], r"rows of a series differ in length, expected \(2,\)"),
-        ([22, 21], [1, 2], [1, 2], "the steps of a series do not ascend"),
-        ([21, 21], [1, 2], [1, 2], "the steps of a series do not ascend"),
-        (
-            [20, 21],
-            [1, 2],
-            [1, 2],
-            "pressure is stored up to step 20, expected a step after it, found 20",
-        ),
-    ],
-)
-def test_series_is_refused_and_changes_nothing(path, steps, times, p, sentence):
-    writer = run_of_three(path)
-    before = path.read_bytes()
-    with pytest.raises(ValueError, match=sentence):
-        writer.append_series(steps, times, {"pressure": p})
-    assert path.read_bytes() == before
 
 
 def test_a_reader_finds_the_half_lengths_and_radii_that_contacts_are_computed_with(path):

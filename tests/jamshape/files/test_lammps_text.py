@@ -3,9 +3,8 @@ import pytest
 from lammps_runs import run_lmp_well
 from nasty import NASTY, assert_identical, nasty_packing, tilted_box
 
-from jamshape.files.h5md import FileFormatError
+from jamshape.files.h5md import FileFormatError, write_run
 from jamshape.files.lammps_text import iter_dump, read_any, read_data, read_dump, write_data
-from jamshape.files.run_writer import RunWriter
 from jamshape.packing import Box
 
 RODS = "spherocylinder"
@@ -293,7 +292,7 @@ def test_read_any_tells_the_format_by_content(path):
     path.write_text(dump_frame(packing))
     assert read_any(path, shape=RODS).step == packing.step
     path.unlink()
-    RunWriter.create(path, packing).append(packing.with_(step=packing.step + 1))
+    write_run(path, [packing, packing.with_(step=packing.step + 1)])
     assert_identical(read_any(path, 0), packing)
     assert read_any(path).step == packing.step + 1
 

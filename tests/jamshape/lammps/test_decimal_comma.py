@@ -19,7 +19,7 @@ COMMA = 'import locale\nlocale.setlocale(locale.LC_NUMERIC, "de_DE")\n'
 # A run is cut off in its middle and resumed.
 RUNS = """
 import jamshape as js
-from jamshape.checks import TimeLimitReached
+from jamshape.checks import TimeLimitError
 from jamshape.flow import lammps_driver
 
 lammps_driver.EVALUATIONS_PER_MARK = 20
@@ -27,7 +27,7 @@ rods = js.Spherocylinders(alpha=4)
 try:
     js.compress(rods, n=8, phi=(0.4, 0.45), kappa=1e-3, rows=40, file="run.h5", progress=False, seed=1, seconds=0)
     raise AssertionError
-except TimeLimitReached:
+except TimeLimitError:
     pass
 run = js.resume("run.h5", progress=False)
 packing = run.packing(-1)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from jamshape.flow.slow_recording import summary_of
 
 import jamshape as js
 from jamshape.files.h5md import read_attributes

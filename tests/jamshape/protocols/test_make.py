@@ -4,12 +4,14 @@ from functools import cache
 import h5py
 import numpy as np
 import pytest
-from making import made, stage_of, write_every_mark, write_rows
+from making import made, stage_of, write_every_mark
 from mixtures import bidisperse, monodisperse
 from squeezed import squeezed
+from written import write_columns
 
 import jamshape as js
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
+from jamshape.files.content import add_attributes as set_attributes
 from jamshape.files.h5md import (
     read_attributes,
     read_observables,
@@ -25,7 +27,6 @@ from jamshape.protocols import approach
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.make import Dynamics, Recipe, is_done, make, require_same
 from jamshape.protocols.random_start import InsertionError
-from jamshape.recording.content import set_attributes
 
 U0 = 1e-12
 RECIPE = Recipe(bidisperse(1.0), n=16, phi_start=0.5, target=Target(U0))
@@ -59,7 +60,7 @@ def compressed(out, packing=None):
     p = 0.3 * np.clip(phi - 0.85, 0, None)
     kappa = np.where(np.arange(60) < 50, 1e-6, -1e-6)
     rows = {"phi": phi, "pressure": p, "kappa": kappa}
-    write_rows(run_of(out), packing or start(), RECIPE.attributes(), rows)
+    write_columns(run_of(out), packing or start(), RECIPE.attributes() | {"finished": True}, rows)
 
 
 def assert_same_result(out, expected):

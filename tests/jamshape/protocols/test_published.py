@@ -9,8 +9,13 @@ from making import made, stage_of, write_every_mark
 from squeezed import squeezed
 
 import jamshape as js
-from jamshape.files.h5md import read_attributes, read_observables, read_packing, write_packing
-from jamshape.files.run_writer import RunWriter
+from jamshape.files.h5md import (
+    read_attributes,
+    read_observables,
+    read_packing,
+    write_packing,
+    write_run,
+)
 from jamshape.landscape import Landscape, State
 from jamshape.minima import Stop, minimise
 from jamshape.minima.target import TargetError
@@ -50,9 +55,7 @@ def run(tmp_path):
 
 def written(path, states):
     told = dict(RODS.told) | {"n": 16, "seed": 3, "kappa": 1e-5, "finished": True}
-    with RunWriter.create(path, states[0], told) as writer:
-        for state in states[1:]:
-            writer.append(state)
+    write_run(path, states, told)
     return path
 
 

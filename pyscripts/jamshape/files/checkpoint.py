@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jamshape.files import layout
+from jamshape.files.hdf5 import attributes_of, put, require_dataset, require_item, set_attributes
 from jamshape.packing import State
-from jamshape.recording.driver import Checkpoint
 
 if TYPE_CHECKING:
     import h5py
+
+Checkpoint = dict[str, Any]
+"""Numbers, texts, bytes, arrays, `State`s and dictionaries of these, by name; None is left out."""
 
 FORMAT = "format"
 """Attribute of a checkpoint: the version of what drivers store."""
@@ -38,23 +40,27 @@ def _write(group: h5py.Group, checkpoint: Mapping[str, Any]) -> None:
         elif isinstance(value, State):
             parts = dict(zip(("position", "orientation", "cell"), value.split, strict=True))
             _write(group.create_group(name), parts)
-            group[name].attrs[_KIND] = _STATE
+            _mark(group[name], _STATE)
         elif isinstance(value, bytes):
-            layout.put(group, name, np.frombuffer(value, np.uint8)).attrs[_KIND] = _BYTES
+            _mark(put(group, name, np.frombuffer(value, np.uint8)), _BYTES)
         elif isinstance(value, np.ndarray) and value.ndim:
             _write_array(group, name, value)
         else:
-            group.attrs[name] = value
+            set_attributes(group, {name: value})
 
 
 def _write_array(group: h5py.Group, name: str, value: Any) -> None:
     """Write an array; extended precision as doubles and their low parts."""
     if value.dtype != np.longdouble or value.dtype == np.float64:
-        layout.put(group, name, value)
+        put(group, name, value)
         return
     double = value.astype(np.float64)
     both = np.stack([double, (value - double).astype(np.float64)])
-    layout.put(group, name, both).attrs[_KIND] = _LONG
+    _mark(put(group, name, both), _LONG)
+
+
+def _mark(item: Any, kind: str) -> None:
+    set_attributes(item, {_KIND: kind})
 
 
 def read_checkpoint(group: h5py.Group) -> Checkpoint | None:
@@ -64,14 +70,14 @@ def read_checkpoint(group: h5py.Group) -> Checkpoint | None:
 
 
 def _items(group: h5py.Group) -> Iterator[tuple[str, Any]]:
-    for name, value in group.attrs.items():
+    for name, value in attributes_of(group).items():
         if name != _KIND:
-            yield name, layout.plain(value)
+            yield name, value
     for name in group:
-        item = layout.require_item(group, name)
-        kind = item.attrs.get(_KIND)
+        item = require_item(group, name)
+        kind = attributes_of(item).get(_KIND)
         if hasattr(item, "shape"):
-            array = item[()]
+            array = require_dataset(group, name)[()]
             if kind == _LONG:
                 array = np.longdouble(array[0]) + array[1]
             yield name, array.tobytes() if kind == _BYTES else array
