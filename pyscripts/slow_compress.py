@@ -5,15 +5,7 @@
 The same as ``jamshape slow``; --help lists the options.
 """
 
-import sys
-
-try:
-    from jamshape.commands import start
-except ImportError as error:
-    sys.exit(
-        f"slow_compress.py: {error} in {sys.executable}, expected a Python with jamshape;"
-        " run ./run setup in the repository, then use .venv/bin/python"
-    )
+from jamshape.commands import start
 
 if __name__ == "__main__":
     start("slow")

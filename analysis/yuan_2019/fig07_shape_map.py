@@ -21,7 +21,7 @@ from jamshape.command import parser_of, report, run
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.styles import BLACK
 from jamshape.files.ensembles import System
-from jamshape.files.vocabulary import NUMBERED, read_protocol
+from jamshape.files.vocabulary import NUMBERED, protocol_named
 from jamshape.measures.averages import Mean
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -125,7 +125,7 @@ def main(options: Namespace) -> None:
 if __name__ == "__main__":
     parser = parser_of(__doc__, "shape_map.png", "SWEEP")
     parser.add_argument(
-        "--protocol", type=read_protocol, choices=tuple(NUMBERED.values()),
+        "--protocol", type=protocol_named, choices=tuple(NUMBERED.values()),
         help="or its number (all without Monte Carlo)",
     )  # fmt: skip
     run(parser, main)

@@ -10,9 +10,15 @@ Names are loaded on first use, so that the import is quick and needs neither LAM
 matplotlib; ``__init__.pyi`` lists them.
 """
 
-import lazy_loader as _lazy
+try:
+    import lazy_loader as _lazy
+except ImportError as _error:  # scripts report it in a sentence
+    _missing = _error
 
-_load, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
+    def _load(_name):  # type: ignore[no-untyped-def]
+        raise _missing
+else:
+    _load, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
 
 
 def __getattr__(name):  # type: ignore[no-untyped-def]

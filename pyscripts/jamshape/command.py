@@ -62,16 +62,6 @@ def parser_of(doc: str | None, out: str = "", files: str = "") -> ArgumentParser
     return parser
 
 
-def add_numbers(parser: ArgumentParser, *rows: tuple[str, int | float, str]) -> None:
-    """Add numeric options, each with its name, default and meaning.
-
-    Options that were not typed are None: the called function knows the defaults, and absent options cannot contradict
-    anything.
-    """
-    for name, default, meaning in rows:
-        parser.add_argument(name, type=type(default), help=f"{meaning} ({default})")
-
-
 def typed(options: Namespace, *names: str) -> dict[str, Any]:
     """Return the options of these names that were typed."""
     found = {name: getattr(options, name) for name in names}

@@ -26,6 +26,8 @@ _SAID = "{} is called {} now; the old name goes with the next release"
 def accepts_old(**names: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
     """Let a function accept old names of arguments, given as ``old="new"``, and old values of all arguments.
 
+    Its attribute `old_names` holds the names.
+
     Examples
     --------
     >>> @accepts_old(way="protocol")
@@ -51,6 +53,7 @@ def accepts_old(**names: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
                 given[name] = current(name, given[name])
             return function(*args, **given)
 
+        call.old_names = names  # type: ignore[attr-defined]
         return call
 
     return decorated

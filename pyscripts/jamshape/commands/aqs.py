@@ -14,61 +14,35 @@ With --seconds it stops in time, before a queue ends it: the exit code is then 7
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 from typing import Any
 
 from jamshape.checks import RANGES, require_in
-from jamshape.command import add_numbers, parser_of, report, typed
-from jamshape.commands.recording import add_recording_options
-from jamshape.flow.shear import FLOWS
+from jamshape.command import report
+from jamshape.commands.signatures import called, parser_for
 from jamshape.front.run import QuasistaticShearFile
 from jamshape.front.shearing import quasistatic_shear
-from jamshape.shapes.command_line import add_particle_options, particles_beside
 
 GO_ON = "the same command resumes from the last checkpoint"
+
+_DROPS = RANGES["share"]._replace(meaning="a fraction", also=(0.0,))
 
 
 def options_of() -> ArgumentParser:
     """Make the parser."""
-    parser = parser_of(__doc__)
-    add_particle_options(parser)
-    add_numbers(
-        parser,
-        ("--n", 256, "particles"),
-        ("--dimension", 2, "2 or 3"),
-        ("--phi", 0.9, "packing fraction"),
-        ("--step", 1e-3, "strain of each step"),
-        ("--strain", 0.5, "final strain"),
-        ("--pressure", 0.0, "pressure to hold; 0 holds the volume"),
-        ("--tolerance", 1e-8, "largest net force over the mean bond force"),
-        ("--seed", 1, "random seed of the start"),
-        ("--frames", 20, "snapshots"),
-    )
-    parser.add_argument("--flow", choices=FLOWS, default=FLOWS[0], help="(%(default)s)")
+    parser = parser_for(quasistatic_shear, __doc__)
     least = "omit drops below this fraction of the largest stress (%(default)s)"
     parser.add_argument("--least-drop", type=float, default=1e-2, help=least)
-    parser.add_argument("--start", type=Path, help="H5MD file whose last frame to start from")
-    add_recording_options(parser)
     return parser
 
 
 def main(options: Namespace) -> None:
     """Begin or resume; a finished run is left alone."""
-    require_in(
-        "--least-drop",
-        options.least_drop,
-        RANGES["share"]._replace(meaning="a fraction", also=(0.0,)),
-    )
-    names = ("n", "dimension", "phi", "step", "strain", "flow", "pressure", "tolerance", "seed",
-             "start", "frames", "again", "seconds")  # fmt: skip
-    given = typed(options, *names)
-    run = quasistatic_shear(particles_beside(options), **given, file=options.out)
+    require_in("--least-drop", options.least_drop, _DROPS)
+    run = called(quasistatic_shear, options)
     at_end = ("strain", "phi", "stress", "pressure", "sigma", "mu", "z")
     found = {name: float(run[name][-1]) for name in at_end}
-    events = run.events(options.least_drop)
-    found |= {"not_at_rest": int((~run.at_rest).sum())}
-    found = {"out": options.out, **found, "modulus": run.modulus(), **_steady(run)}
-    report(found | {"events": events})
+    found |= {"not_at_rest": int((~run.at_rest).sum()), "modulus": run.modulus(), **_steady(run)}
+    report({"out": options.out, **found, "events": run.events(options.least_drop)})
 
 
 def _steady(run: QuasistaticShearFile) -> dict[str, Any]:

@@ -19,39 +19,23 @@ which the same command resumes.
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
-from jamshape.command import parser_of, report
+from jamshape.command import report
+from jamshape.commands.signatures import called, parser_for
 from jamshape.front.making import make_packing
-from jamshape.protocols.command_line import add_recipe_options, settings_of
 from jamshape.protocols.make import summary_of
-from jamshape.shapes.command_line import particles_beside
 
 GO_ON = "the same command resumes from the files beside the result"
 
 
 def options_of() -> ArgumentParser:
     """Make the parser."""
-    parser = parser_of(__doc__)
-    add_recipe_options(parser)
-    parser.add_argument("--out", type=Path, required=True, help="H5MD file to write")
-    parser.add_argument(
-        "--threads",
-        type=int,
-        default=1,
-        help="number of threads; worth it from thousands of particles on (1)",
-    )
-    parser.add_argument("--again", action="store_true", help="start over if --out exists")
-    return parser
+    return parser_for(make_packing, __doc__)
 
 
 def main(options: Namespace) -> int:
     """Make the packing unless it exists; return the exit code."""
-    settings = settings_of(options)
-    make_packing(
-        particles_beside(options), **settings, threads=options.threads, file=options.out,
-        again=options.again,
-    )  # fmt: skip
+    called(make_packing, options)
     found = summary_of(options.out)
     report(found)
     return 0 if found["reached"] else 1  # a warning was issued

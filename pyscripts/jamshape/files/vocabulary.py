@@ -54,22 +54,10 @@ def protocol_named(value: Any) -> Any:
 
     Examples
     --------
-    >>> protocol_named(2), protocol_named("yuan-2019-1")
-    ('yuan-2019-2', 'yuan-2019-1')
+    >>> protocol_named(2), protocol_named("2"), protocol_named("yuan-2019-1")
+    ('yuan-2019-2', 'yuan-2019-2', 'yuan-2019-1')
     """
-    is_number = isinstance(value, int) and not isinstance(value, bool)
-    return NUMBERED.get(value, value) if is_number else value
-
-
-def read_protocol(text: str) -> str:
-    """Parse a protocol from the command line: its name, or its number.
-
-    Examples
-    --------
-    >>> read_protocol("2"), read_protocol("marschall-2018")
-    ('yuan-2019-2', 'marschall-2018')
-    """
-    return str(protocol_named(int(text))) if text.isdecimal() else text
+    return {str(number): name for number, name in NUMBERED.items()}.get(str(value), value)
 
 
 def former(name: str, stored: Container[str]) -> str:

@@ -35,12 +35,18 @@ from jamshape.shapes.particles import Particles
 PHI = (0.4, 0.9)
 """Default packing fractions of the random start and of the end of a compression."""
 
-_PHI_SLOW_USUAL = (0.8, 0.9)
+PHI_SLOW = (None, 0.9)
+"""Default packing fractions of the start and of the end of a slow compression; None for 0.8 or those of a start."""
+
+KAPPA_SLOW = 1e-8
+"""Default rate of a slow compression."""
+
+_PHI_HANDED_OVER = 0.8
 _SAME = 1e-9  # of packing fractions, up to rounding
 _DT, _ERROR = 0.05, 1e-4
 
 _PHI_RANDOM = 0.4  # of the random start of a slow compression
-_PHI_SLOW = Range(0.41, 2.0, "a packing fraction above that of the random start, which is 0.4,")
+_HANDED_OVER = Range(0.41, 2.0, "a packing fraction above that of the random start, which is 0.4,")
 
 
 @accepts_old(tolerance="integration_tolerance")
@@ -73,10 +79,11 @@ def compress(
     n : int
         Number of particles.
     dimension : {2, 3}
+        Number of dimensions.
     phi : (float, float)
-        Packing fractions of the random start and of the end.
+        Packing fraction of the random start, and final packing fraction.
     kappa : float, [1/time]
-        Rate: the box shrinks with dL/dt = -kappa L.
+        Compression rate: the box shrinks with dL/dt = -kappa L.
     seed : int
         Random seed of the start.
     sides : {1, 2}
@@ -89,8 +96,10 @@ def compress(
         Time step of ``heun``; 0.05 by default.
     integration_tolerance : float, optional
         Local error of a step over the typical overlap, for the other integrators; 1e-4 by default.
-    rows, frames : int
-        Numbers of samples of p(phi) and of snapshots to keep.
+    rows : int
+        Number of samples of p(phi) to keep.
+    frames : int
+        Number of snapshots to keep.
     file : path, optional
         H5MD file of the run. A finished run with the same settings is loaded, an interrupted one resumed, and one
         with other settings refused. Without a file, the run is deleted together with its result.
@@ -154,8 +163,8 @@ def slow_compress(
     particles: Particles | None = None,
     *,
     n: int | None = None,
-    phi: tuple[float | None, float] | None = None,
-    kappa: float | Sequence[tuple[float, float]] = 1e-8,
+    phi: tuple[float | None, float] | None = PHI_SLOW,
+    kappa: float | Sequence[tuple[float, float]] = KAPPA_SLOW,
     p_end: float = math.inf,
     seed: int | None = None,
     start: Packing | str | Path | None = None,
@@ -176,19 +185,19 @@ def slow_compress(
     n : int, optional
         Number of particles; 256 by default, or those of the start.
     phi : (float, float), optional
-        Packing fraction at which a fast compression in LAMMPS hands over, and the final one; (0.8, 0.9) by default.
-        With a start, the first must be that of the start, or None.
+        Packing fraction at the end of a fast compression in LAMMPS, by default 0.8 or that of the start, and final
+        packing fraction.
     kappa : float, [1/time], or sequence of (float, float)
-        Rate: the box shrinks with dL/dt = -kappa L. Or pairs of a packing fraction and the rate used from
-        there on, ascending.
+        Compression rate: the box shrinks with dL/dt = -kappa L. In Python also pairs of a packing fraction and the
+        rate used from there on, ascending.
     p_end : float, [energy / length^2]
-        Stop also when this pressure is reached.
+        Final pressure: stop also when it is reached.
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
-        Initial packing; the last frame of a file.
-    method : {"tr-bdf2", "sdirk2", ...}
-        A name of `jamshape.flow.implicit.METHODS`.
+        Initial packing, or H5MD file whose last frame to start from.
+    method : {"tr-bdf2", "sdirk2"}
+        Method of the implicit steps.
     integration_tolerance : float
         Local error of a step over the typical overlap.
     largest_drop : float
@@ -222,7 +231,7 @@ def slow_compress(
     0.72
     """
     require_no_effect("start", start, particles=particles, n=n, seed=seed)
-    phi_start, phi_end = phi or (None, _PHI_SLOW_USUAL[1])
+    phi_start, phi_end = phi or PHI_SLOW
     require_stated(
         phi_end=phi_end, integration_tolerance=integration_tolerance, largest_drop=largest_drop
     )
@@ -256,11 +265,11 @@ def _start_of(
     """Return the start of a slow compression; refuse a packing fraction that differs from that of a given one."""
     phi_start, phi_end = phi
     if start is None:
-        phi_start = _PHI_SLOW_USUAL[0] if phi_start is None else phi_start
-        require_in("phi_start", phi_start, _PHI_SLOW)
+        phi_start = _PHI_HANDED_OVER if phi_start is None else phi_start
+        require_in("phi_start", phi_start, _HANDED_OVER)
         require_rising(phi_start, phi_end)
         return Start.of(particles, Asked(phi=phi_start, **sizes), None, usual_phi=phi_start)
-    of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=_PHI_SLOW_USUAL[0])
+    of = Start.of(particles, Asked(phi=None, **sizes), start, usual_phi=_PHI_HANDED_OVER)
     if (
         of.known
         and phi_start is not None

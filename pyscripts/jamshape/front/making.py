@@ -53,7 +53,7 @@ def make_packing(
     particles : Particles, optional
         Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
-        Number of particles; 256 in 2D, 400 in 3D by default, or that of the protocol's paper.
+        Number of particles; by default 256 in 2D, 400 in 3D, and 1024 for marschall-2018.
     dimension : {2, 3}, optional
         By default that of the shape's paper.
     seed : int, optional
@@ -76,19 +76,21 @@ def make_packing(
         Pressure at which compression at that rate ends, for ``dynamics``; 1e-3 by default.
     phi_end : float, optional
         Final packing fraction of marschall-2018, beyond jamming; 0.95 in 2D, 0.8 in 3D by default.
-    protocol : {"quasistatic", "dynamics", "steps", "marschall-2018", "yuan-2019-1", "yuan-2019-2"}, optional
+    protocol : {"quasistatic", "dynamics", "steps", "marschall-2018", "yuan-2019-1", "yuan-2019-2", 1, 2}, optional
         Route to jamming: quasistatic steps that are large far from jamming (default, fastest), slow compression in
         LAMMPS (Marschall & Teitel 2018, Sec. III B), equal quasistatic steps (Yuan et al. 2019, Sec. 2.2), or a
         published protocol, with the paper's values as defaults (Marschall & Teitel 2018, Sec. II and III B-C; Yuan et
         al. 2019, Sec. 2.2, where 2 adds Monte Carlo of hard particles, which orders them). 1 and 2 are short for the
         last two.
-    phi_thermal, n_sweeps : float, int, optional
-        Packing fraction and sweeps of the Monte Carlo of yuan-2019-2; 0.55 and 100000 by default.
+    phi_thermal : float, optional
+        Packing fraction of the Monte Carlo of yuan-2019-2; 0.55 by default.
+    n_sweeps : int, optional
+        Sweeps of the Monte Carlo of yuan-2019-2; 100000 by default.
     delta_phi : float, optional
         Step of the packing fraction near jamming, 2e-3 by default, or of equal steps, 1e-3.
     start : path, optional
-        File of `compress` or `slow_compress` that replaces the compression of marschall-2018. The search begins at
-        its first frame that stays jammed when minimised; particles, n and seed are those of the file.
+        H5MD file of a compression through jamming that replaces the one of marschall-2018. The search begins at
+        its first frame that stays jammed when minimised; particles, `n` and `seed` are those of the file.
     search : {"extrapolation", "bisection"}, optional
         Search for u0 in marschall-2018: extrapolation of box and particles together (default), or the paper's
         steps of the box, 1e-6 at first and halved where u crosses u0 (Sec. III C, Eq. 20).
@@ -96,7 +98,7 @@ def make_packing(
         Minimiser of bisection: "cg_marschall" is the conjugate gradients of its App. A; "auto" by default.
     strict : bool
         Continue at fixed u, along floppy modes, until no mode has an eigenvalue below minus its error bound;
-        ``results["n_negative"]`` counts those that do. Rods of alpha = 4 end at saddles otherwise.
+        ``n_negative`` of the results counts those that do. Rods of alpha = 4 end at saddles otherwise.
     threads : int
         Number of threads; worth it from thousands of particles on. The last bits depend on it, and with them
         which of many minima is found; an interrupted packing resumes with any number. Many packings take less

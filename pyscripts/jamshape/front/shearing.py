@@ -70,14 +70,15 @@ def shear(
     phi : float, optional
         Packing fraction, reached by fast compression of a random packing; 0.8 by default, or that of the start.
     gdot : float, [1/time]
-        Rate: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
+        Shear rate: dv_x/dy of simple shear, dv_x/dx = -dv_y/dy of pure shear.
     strain : float
         Final strain, the rate times the time.
     flow : {"simple", "pure"}
+        Simple or pure shear.
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
-        Initial packing, at its own packing fraction; the last frame of a file.
+        Initial packing, or H5MD file whose last frame to start from, at its own packing fraction.
     sides : {1, 2}
         Bonds of a side-to-side contact of rods.
     integrator : {"rkc2", "heun/adaptive", "heun", "tr-bdf2", "sdirk2"}, optional
@@ -188,17 +189,20 @@ def quasistatic_shear(
         2 by default, or that of the start.
     phi : float, optional
         Packing fraction, reached by quasistatic compression of a random packing; 0.9 by default, or that of the start.
-    step, strain : float
-        Strain of each step, and final strain.
+    step : float
+        Strain of each step.
+    strain : float
+        Final strain.
     flow : {"simple", "pure"}
+        Simple or pure shear.
     pressure : float, [energy / length^D]
-        Pressure to hold, in place of the volume.
+        Pressure to hold; 0 holds the volume.
     tolerance : float
         Largest net force and torque of a particle over the mean bond force.
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
-        Initial packing, at its own packing fraction; the last frame of a file.
+        Initial packing, or H5MD file whose last frame to start from, at its own packing fraction.
     frames : int
         Approximate number of snapshots to keep.
     file, again, seconds, progress

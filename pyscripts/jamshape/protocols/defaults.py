@@ -32,33 +32,6 @@ _TIGHT = 1e-8
 Values = Mapping[str, Any]
 """Settings of a recipe by name."""
 
-
-class Setting(NamedTuple):
-    """A setting of a recipe; it belongs to the protocols with a default for it."""
-
-    name: str
-    kind: Callable[[str], Any]
-    """Parses it from the command line."""
-    meaning: str
-
-
-SETTINGS = (
-    Setting("n", int, "particles"),
-    Setting("phi_start", float, "packing fraction of the random start"),
-    Setting("tolerance", float, "largest net force and torque over the mean bond force"),
-    Setting("u0", float, "energy density U/L^D; 0: the first jammed packing as it is"),
-    Setting("accuracy", float, "relative error |u - u0|/u0"),
-    Setting("kappa", float, "slowest compression rate"),
-    Setting("p_end", float, "final pressure at that rate"),
-    Setting("phi_end", float, "final packing fraction, beyond jamming"),
-    Setting("phi_thermal", float, "packing fraction of the Monte Carlo"),
-    Setting("n_sweeps", int, "Monte Carlo sweeps"),
-    Setting("delta_phi", float, "step of the packing fraction"),
-    Setting("start", Path, "file of compress or slow, through jamming, instead of a compression"),
-    Setting("search", str, "search for u0; bisection is the paper's"),
-    Setting("minimiser", str, "minimiser of bisection; auto by default"),
-)
-
 _COARSE = 1e-2  # largest step of the packing fraction, far below jamming
 _ROUGH = 1e-2  # residual that suffices before the search for an energy
 
@@ -188,7 +161,7 @@ def recipe_for(
     protocol : str or int, optional
         One of `PROTOCOLS`, "quasistatic" by default; 1 and 2 are those of Yuan et al. 2019.
     **given
-        `SETTINGS` by name, None for defaults; and `strict`, whether to continue to a minimum
+        Settings of `PROTOCOLS` by name, None for defaults; and `strict`, whether to continue to a minimum
         without negative eigenvalues.
 
     Returns
@@ -239,7 +212,7 @@ def _placed(particles: Particles | None, dimension: int | None) -> tuple[Particl
 
 def _allowed(given: dict[str, Any], usual: UsualProtocol, protocol: str) -> dict[str, Any]:
     """Drop settings that are None, and refuse invalid ones."""
-    known = [setting.name for setting in SETTINGS]
+    known = dict.fromkeys(name for protocol in PROTOCOLS.values() for name in protocol.usual)
     for name, value in given.items():
         if name not in known:
             msg = f"{name} is not a setting of a recipe, expected one of {', '.join(known)}"

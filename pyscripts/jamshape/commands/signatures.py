@@ -1,0 +1,138 @@
+"""Options of a command, from the signature and the docstring of a public function.
+
+An argument becomes the option of its name, with the type of its annotation, the default of the signature, and the
+choices and the text of the docstring. A pair such as ``phi`` becomes ``--phi-start`` and ``--phi-end``, with the parts
+of its text before and after ", and "; ``particles`` becomes the options of particles, and ``file`` becomes ``--out``.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import types
+import typing
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from jamshape.checks import TIME_IS_UP
+from jamshape.command import parser_of
+from jamshape.old_names import VALUES, add_old_option, current
+from jamshape.shapes.command_line import add_particle_options, particles_beside, particles_of
+
+_STOP = f"stop at the first checkpoint after this time [s], with exit code {TIME_IS_UP}; the same command resumes"
+
+# Arguments that are alike for every command; progress is always shown.
+_ALIKE: dict[str, Any] = {
+    "file": {"type": Path, "required": True, "help": "H5MD file to write"},
+    "again": {"action": "store_true", "help": "start over if --out exists"},
+    "seconds": {"type": float, "help": _STOP},
+}
+_DESTS = {"file": "out"}
+_LEFT_OUT = {"particles", "progress"}
+
+
+class _Option(NamedTuple):
+    dest: str
+    usual: Any
+    keywords: dict[str, Any]
+
+
+def parser_for(function: Callable[..., Any], doc: str | None) -> ArgumentParser:
+    """Make the parser of a command that calls a function, with a docstring as its help.
+
+    Options that were not typed are None: the function knows the defaults, and absent options cannot contradict
+    anything. Old names of arguments become old options.
+    """
+    parser = parser_of(doc)
+    add_particle_options(parser)
+    old = {new: name for name, new in getattr(function, "old_names", {}).items()}
+    for name, options in _options(function).items():
+        for one in options:
+            parser.add_argument(_typed(one.dest), **one.keywords, default=None)
+        if name in old:
+            keywords = {key: options[0].keywords[key] for key in ("type", "choices")}
+            add_old_option(parser, _typed(old[name]), _typed(name), **keywords)
+    return parser
+
+
+def given(function: Callable[..., Any], options: Namespace) -> dict[str, Any]:
+    """Return the arguments that were typed, without particles; half of a pair is completed by its default."""
+    found = {}
+    for name, parts in _options(function).items():
+        values = [getattr(options, one.dest) for one in parts]
+        if any(value is not None for value in values):
+            pairs = zip(values, parts, strict=True)
+            whole = tuple(one.usual if value is None else value for value, one in pairs)
+            found[name] = whole if len(whole) > 1 else whole[0]
+    return found
+
+
+def called(function: Callable[..., Any], options: Namespace, **more: Any) -> Any:
+    """Call a function with the particles and arguments that were typed, and more."""
+    needs = inspect.signature(function).parameters["particles"].default is inspect.Parameter.empty
+    particles = particles_of(options) if needs else particles_beside(options)
+    return function(particles, **given(function, options) | more)
+
+
+def _options(function: Callable[..., Any]) -> dict[str, list[_Option]]:
+    """List the options of each argument of a function: one, or two of a pair."""
+    told, found = _told(function), {}
+    for name, parameter in inspect.signature(function, eval_str=True).parameters.items():
+        if name in _ALIKE:
+            found[name] = [_Option(_DESTS.get(name, name), None, _ALIKE[name])]
+        elif name not in _LEFT_OUT:
+            kind, is_pair = _kind(parameter.annotation)
+            dests = [f"{name}_start", f"{name}_end"] if is_pair else [name]
+            usual = parameter.default if is_pair else [parameter.default]
+            texts = told[name][1].split(", and ") if is_pair else [told[name][1]]
+            keywords = _keywords(name, kind, told[name][0])
+            found[name] = [
+                _Option(dest, value, keywords | {"help": _help(text, value, told)})
+                for dest, value, text in zip(dests, usual, texts, strict=True)
+            ]
+    return found
+
+
+def _kind(annotation: Any) -> tuple[type, bool]:
+    """Return the type of an option, and whether there are two."""
+    kinds = typing.get_args(annotation) if isinstance(annotation, types.UnionType) else [annotation]
+    for kind in kinds:
+        if typing.get_origin(kind) is tuple:
+            return _kind(typing.get_args(kind)[-1])[0], True
+    return next(kind for kind in (Path, str, float, int, bool) if kind in kinds), False
+
+
+def _keywords(name: str, kind: type, known: str) -> dict[str, Any]:
+    """Return keywords of `add_argument`; braces in the type of a docstring list choices."""
+    if kind is bool:
+        return {"action": "store_true"}
+    listed = re.search(r"\{(.*)\}", known)
+    choices = [kind(one) for one in ast.literal_eval(f"[{listed[1]}]")] if listed else None
+    return {"type": partial(current, name) if name in VALUES else kind, "choices": choices}
+
+
+def _told(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
+    """Read the type and the text of each argument from the docstring."""
+    section = (inspect.getdoc(function) or "").split("Parameters\n----------\n")[1].split("\n\n")[0]
+    entries = re.findall(r"^(\w+) : (.*)((?:\n    .*)*)", section, re.MULTILINE)
+    return {name: (known, " ".join(text.split())) for name, known, text in entries}
+
+
+def _help(text: str, default: Any, told: dict[str, Any]) -> str:
+    """Format a text of a docstring as help: options for arguments, no markup, no capital, and the default."""
+    text = re.sub(r"`(\w+)`", lambda one: _typed(one[1]) if one[1] in told else one[1], text)
+    text = text.replace("`", "").removesuffix(".").replace("%", "%%")
+    if text[1:2].islower():
+        text = text[0].lower() + text[1:]
+    if default is None or default is False:
+        return text
+    first, dot, rest = text.partition(". ")
+    return f"{first} ({default}){dot}{rest}"
+
+
+def _typed(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
