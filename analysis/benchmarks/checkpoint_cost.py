@@ -34,7 +34,7 @@ def rows(file: Path) -> None:
 def frames(file: Path) -> None:
     """Compress 100000 discs."""
     discs = js.Spherocylinders(alpha=0)
-    js.compress(discs, n=100_000, phi=(0.4, 0.5), kappa=1e-4, rows=200, frames=20, file=file)
+    js.compress(discs, n=100_000, phi=(0.4, 0.41), kappa=1e-4, rows=200, frames=20, file=file)
 
 
 def short(file: Path) -> None:
