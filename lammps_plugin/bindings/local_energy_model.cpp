@@ -193,6 +193,27 @@ template <class Model, int D>
   return std::make_unique<VicinityOf<Model, D>>(of.shapes(), std::move(names), of.law());
 }
 
+/// Gives each shape's class a method that makes the energy of its particles.
+void export_constructors()
+{
+  using namespace nb::literals;
+  Shapes::each([](auto model) {
+    using Model = decltype(model);
+    class_of<Model>().def(
+        "local_energy_model",
+        [](const ShapeOf<Model> &of, const Array2<std::int64_t> &column,
+           const Array1<double> &rotation_length, const Array1<double> &turning_radius) {
+          const CoordinateArrays names{column, rotation_length, turning_radius};
+          return of.in_space(
+              [&](auto D) { return local_model_of<Model, D>(of, names.read(of.n(), D)); });
+        },
+        "column"_a, "rotation_length"_a, "turning_radius"_a,
+        "The energy about a base; column (N, 3), in space (N, 6), numbers of the coordinates\n"
+        "displacement, rotation, or -1. First of all, move_to a base; evaluate returns None if it\n"
+        "needs pairs.");
+  });
+}
+
 }  // namespace
 
 void export_local_energy_model(nb::module_ &m)
@@ -243,21 +264,7 @@ void export_local_energy_model(nb::module_ &m)
           "Take all pairs of surfaces closer than a wide skin at these poses, and of centres\n"
           "closer than reach; those within skin are chosen among them as particles move.");
 
-  Shapes::each([](auto model) {
-    using Model = decltype(model);
-    class_of<Model>().def(
-        "local_energy_model",
-        [](const ShapeOf<Model> &of, const Array2<std::int64_t> &column,
-           const Array1<double> &rotation_length, const Array1<double> &turning_radius) {
-          const CoordinateArrays names{column, rotation_length, turning_radius};
-          return of.in_space(
-              [&](auto D) { return local_model_of<Model, D>(of, names.read(of.n(), D)); });
-        },
-        "column"_a, "rotation_length"_a, "turning_radius"_a,
-        "The energy about a base; column (N, 3), in space (N, 6), numbers of the coordinates\n"
-        "displacement, rotation, or -1. First of all, move_to a base; evaluate returns None if it\n"
-        "needs pairs.");
-  });
+  export_constructors();
 }
 
 }  // namespace jamshape

@@ -136,6 +136,43 @@ def test_functions_have_few_parameters():
     assert {name: p for name, p in door.items() if len(p) > 3} == {}
 
 
+# The head of a function in C++ as clang-format leaves it, up to the brace that opens its body.
+CPP_HEAD = re.compile(
+    r"^(?P<margin> *)(?!else|if|for|while|switch|catch|do|struct|class|namespace|enum|union|return)"
+    r"[\w:~&*<>,\[\] ]*?(?P<name>[\w:~]+)\((?P<inside>[^;{}]*)\)[^;{}()]*(?::[^;]*?)?\{",
+    re.MULTILINE,
+)
+
+
+def closed(text, at):
+    """Find the end of the body that was opened before a place."""
+    depth = 1
+    for brace in re.compile("[{}]").finditer(text, at):
+        depth += 1 if brace[0] == "{" else -1
+        if not depth:
+            return brace.end()
+    return at
+
+
+def cpp_functions():
+    """Yield the place of each function in C++, its lines and its parameters."""
+    for path in sorted((ROOT / "lammps_plugin").rglob("*.[ch]*")):
+        text = path.read_text(encoding="utf-8")
+        for head in CPP_HEAD.finditer(text) if path.suffix in {".cpp", ".hpp", ".h"} else ():
+            body = text[head.start() : closed(text, head.end())]
+            inside = re.sub(r"<[^<>]*>|\([^()]*\)", "", head["inside"]).partition(")")[0]
+            place = f"{path.relative_to(ROOT)}:{text.count(chr(10), 0, head.start()) + 1}"
+            yield place, body.count("\n") + 1, inside.count(",") + bool(inside.strip())
+
+
+def test_functions_in_cpp_are_short_and_have_few_parameters(measured):
+    every = list(cpp_functions())
+    measured(functions=len(every), longest=max(lines for _, lines, _ in every))
+    assert len(every) > 800
+    assert [place for place, lines, _ in every if lines > LONGEST] == []
+    assert [place for place, _, count in every if count > MOST_PARAMETERS + 1] == []
+
+
 def imported(path):
     for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):

@@ -16,7 +16,8 @@ import numpy as np
 
 import jamshape as js
 from jamshape.files import h5md
-from jamshape.packing import Packing
+from jamshape.files.content import Content
+from jamshape.packing import Packing, State
 from jamshape.vibration.table import ModeTable, read_modes
 
 FIELDS = (
@@ -35,6 +36,8 @@ def flat(thing):
         return (thing.dtype.str, thing.shape, thing.tobytes())
     if isinstance(thing, dict):
         return sorted((name, flat(value)) for name, value in thing.items())
+    if isinstance(thing, State):
+        return flat(list(thing.split))
     if isinstance(thing, Packing):
         fields = [flat(getattr(thing, name)) for name in FIELDS]
         box = [flat(x) for x in (thing.box.lo, thing.box.edges, thing.box.tilt)]
@@ -64,6 +67,13 @@ def loaded(path):
     return [flat(found.about), flat(found.observables), [flat(packing) for packing in found]]
 
 
+def content(path):
+    """Read what a run goes on from."""
+    found = Content.read(path)
+    columns = {name: vars(column) for name, column in found.columns.items()}
+    return [flat(found.checkpoint), flat(columns), flat(found.report), flat(found.frames)]
+
+
 def every_series(path):
     return [flat(h5md.read_series(path, name)) for name in h5md.read_observables(path)]
 
@@ -84,7 +94,9 @@ def by_h5py(path):
 
 def readers_of(kind):
     ours = {"load": loaded}
-    if kind in {"packing", "run"}:
+    if kind == "unfinished":
+        ours["content"] = content
+    if kind in {"packing", "run", "unfinished"}:
         ours |= {name: getattr(h5md, name) for name in READERS} | {"series": every_series}
     if kind == "run":
         ours["first"] = partial(h5md.read_packing, frame=0)

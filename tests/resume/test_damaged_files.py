@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 import jamshape as js
+from jamshape.checks import TimeLimitError
 from jamshape.exchange.mdanalysis import write_mdanalysis
 
 h5py = pytest.importorskip("h5py")
 pytestmark = pytest.mark.lammps
 
-KINDS = ("packing", "run", "modes", "mdanalysis")
+KINDS = ("packing", "run", "unfinished", "modes", "mdanalysis")
 FLIPS = [pytest.param(25, id="few"), pytest.param(200, id="many", marks=pytest.mark.validate)]
 CUTS = 40
 
@@ -33,6 +34,8 @@ def files(tmp_path_factory):
     packing = js.make_packing(rods, u0=1e-8, file=found["packing"], **how)
     run = {"phi": (0.4, 0.9), "kappa": 1e-2, "rows": 60, "frames": 3, "file": found["run"]}
     js.compress(rods, **how, **run)
+    with pytest.raises(TimeLimitError):
+        js.compress(rods, **how, **run | {"file": found["unfinished"], "kappa": 1e-3}, seconds=0.0)
     js.save(found["modes"], js.modes(packing))
     write_mdanalysis(found["mdanalysis"], found["run"])
     return found

@@ -311,6 +311,18 @@ def test_another_start_is_refused(name, whole, starts):
         CASES[name].run(whole(name)[0], starts, **more)
 
 
+def test_another_packing_of_the_same_density_is_refused(tmp_path):
+    packing, file = dense(RODS, 12, 0.82), tmp_path / "run.h5"
+    how = {"step": 0.05, "strain": 0.1, "file": file, "progress": False}
+    js.quasistatic_shear(start=packing, **how)
+    js.quasistatic_shear(start=packing, **how)
+    turned = packing.with_(orientation=packing.orientation + 0.1)
+    with pytest.raises(
+        ValueError, match=r"holds a quasistatic shear with start=packing \w+, expected"
+    ):
+        js.quasistatic_shear(start=turned, **how)
+
+
 @pytest.mark.parametrize("name", DRIVERS)
 def test_again_begins_anew(name, whole, starts, tmp_path, patched):
     patched(*SHORT)

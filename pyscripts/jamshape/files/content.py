@@ -13,7 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from jamshape.files import layout
 from jamshape.files.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from jamshape.files.disk import PathLike
-from jamshape.files.hdf5 import attributes, has_item, require_item, set_attributes, written
+from jamshape.files.hdf5 import (
+    attributes,
+    has_item,
+    put,
+    require_item,
+    set_attributes,
+    written,
+)
 from jamshape.files.layout import Report, Series
 from jamshape.packing import Packing
 
@@ -44,6 +51,10 @@ class Column:
             raise ValueError(msg)
         _require_after(name, self.steps[-1], step)
         return row
+
+    def has_clock_of(self, other: Column) -> bool:
+        """Whether another observable has rows at the same steps and times."""
+        return self.steps == other.steps and self.times == other.times
 
 
 @dataclass
@@ -116,10 +127,17 @@ class Content:
             layout.write_metadata(file)
             layout.write_particles(file.create_group("particles/all"), self.frames)
             group = file.create_group("observables")
+            written_clocks: list[tuple[Column, Any]] = []
             for name, column in self.columns.items():
-                values = np.array(column.values)
+                values, element = np.array(column.values), group.create_group(name)
+                known = (of for other, of in written_clocks if other.has_clock_of(column))
+                if clock := next(known, None):  # most observables are in every row
+                    element["step"], element["time"] = clock["step"], clock["time"]
+                    put(element, "value", values)
+                    continue
                 series = Series(np.array(column.steps), np.array(column.times), values)
-                layout.write_rows(group.create_group(name), series)
+                layout.write_rows(element, series)
+                written_clocks.append((column, element))
             steps, seconds, errors = zip(*self.report, strict=True) if self.report else ((), (), ())
             report = Report(
                 np.array(steps, np.int64), np.array(seconds, float), np.array(errors, float)

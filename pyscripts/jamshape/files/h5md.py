@@ -20,7 +20,8 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
         diameters       (N, 3), the shape columns of LAMMPS (not in H5MD)
         exponent        (N,), for shapes that have one (not in H5MD)
         half_length, radius (N,), A and R of the others, as used for contacts (not in H5MD)
-    /observables/NAME   {step, time, value (T', ...)}, each sampled at its own steps
+    /observables/NAME   {step, time, value (T', ...)}, each sampled at its own steps; those with the same steps
+                        and times share them by hard links
     /parameters         +every attribute given by the caller, including results; texts and arrays above 1 kB
                         are datasets, texts as characters
     /report             step, wall_seconds, error (T'',): the convergence history

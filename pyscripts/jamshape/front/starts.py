@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from jamshape.checks import require_no_effect, require_one_of, require_stated
 from jamshape.files.disk import named
@@ -44,8 +47,14 @@ def told_of(start: MeasuredPacking) -> dict[str, Any]:
     names, results = (*own, "size_ratio", "kinds", "seed"), start.results
     found = {name: results[name] for name in names if name in results}
     # As UTF-8, whatever the locale: names may hold bytes that it cannot decode.
-    name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else ""
+    name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else _digest(start)
     return found | {"n": start.n, "start": name, "phi_start": start.phi}
+
+
+def _digest(start: Packing) -> str:
+    """Name a packing without a file by its poses, so that another one is told apart."""
+    poses = b"".join(np.ascontiguousarray(x, np.float64).tobytes() for x in start.poses())
+    return f"packing {hashlib.blake2b(poses, digest_size=8).hexdigest()}"
 
 
 class Asked(NamedTuple):

@@ -153,7 +153,7 @@ class ApproachDriver:
     @property
     def at_mark(self) -> bool:
         """Whether `checkpoint` may be called now."""
-        return self._rows % ROWS_PER_MARK == 0
+        return bool(self._rows % ROWS_PER_MARK == 0)
 
     def first(self) -> Row:
         """Return the progress at the start."""

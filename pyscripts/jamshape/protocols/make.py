@@ -197,7 +197,7 @@ class Pipeline:
         told = checkpoint or {"stage": 0, "frame": -1, "wall_seconds": 0.0, "evaluations": 0}
         self._began = time.perf_counter() - told["wall_seconds"]
         start = recipe.start() if source is None else frame_of(source, told["frame"])
-        self._making = Making(recipe, Landscape(start), State.of(start))
+        self._making = Making(recipe, Landscape(start), State.of(start), frame=told["frame"])
         self._making.landscape.evaluations = told["evaluations"]
         if checkpoint:
             making = self._making

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -80,10 +81,15 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
             _follow(run, interrupts, how)
 
 
-class _Run(NamedTuple):
+@dataclass
+class _Run:
+    """A run in progress."""
+
     content: Content
     driver: Driver
     finish: Callable[[Driver], None] | None
+    due: float = field(default_factory=lambda: perf_counter() + SECONDS)
+    """Time at which a checkpoint is due."""
 
     def add(self, row: Row) -> None:
         """Keep a row, and the frame that belongs to it."""
@@ -96,16 +102,12 @@ class _Run(NamedTuple):
 
     def store(self, checkpoint: Checkpoint | None) -> None:
         """Write the file, which is finished without a checkpoint."""
+        began = perf_counter()
         self.content.attributes |= dict(self.driver.results()) | {"finished": checkpoint is None}
         self.content.checkpoint = checkpoint
         self.content.write()
-
-    def write(self) -> float:
-        """Write a checkpoint; return when the next one is due."""
-        began = perf_counter()
-        self.store(self.driver.checkpoint())
         now = perf_counter()
-        return now + max(SECONDS, PAUSE * (now - began))
+        self.due = now + max(SECONDS, PAUSE * (now - began))
 
 
 def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
@@ -115,14 +117,13 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
         how.tell(first)
     began = perf_counter()
     end = math.inf if how.seconds is None else began + how.seconds
-    due = began + SECONDS
     while not driver.done:
         row = driver.advance()
         run.add(row)
         stops = interrupts.noted is not None or perf_counter() >= end
         is_mark = driver.at_mark and not driver.done
-        if is_mark and (stops or perf_counter() >= due):
-            due = run.write()
+        if is_mark and (stops or perf_counter() >= run.due):
+            run.store(driver.checkpoint())
         how.tell(row)
         if not (is_mark and stops):
             continue

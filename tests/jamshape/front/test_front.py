@@ -125,14 +125,14 @@ def test_a_finished_run_is_loaded_and_not_made_again(run, file):
 )
 @pytest.mark.usefixtures("run")
 def test_a_run_of_other_settings_is_refused(file, other):
-    with pytest.raises(ValueError, match="write to another file, or use again to replace it"):
+    with pytest.raises(ValueError, match="choose another file, or use again=True to replace it"):
         js.compress(RODS, **(SMALL | other), file=file, progress=False)
 
 
 @pytest.mark.lammps
 @pytest.mark.usefixtures("run")
 def test_other_particles_are_refused(file):
-    with pytest.raises(ValueError, match="write to another file, or use again to replace it"):
+    with pytest.raises(ValueError, match="choose another file, or use again=True to replace it"):
         js.compress(js.Spherocylinders(alpha=3), **SMALL, file=file, progress=False)
 
 
@@ -165,7 +165,7 @@ def test_what_is_loaded_is_what_the_file_holds(run, file, tmp_path):
         copy = js.load(tmp_path / name)
         assert isinstance(copy, js.MeasuredPacking)
         assert (copy.position == packing.position).all()
-    with pytest.raises(ValueError, match="write to another file, or use again to replace it"):
+    with pytest.raises(ValueError, match="choose another file, or use again=True to replace it"):
         js.compress(RODS, **SMALL, file=tmp_path / "copy.h5", progress=False)
 
 
@@ -221,7 +221,7 @@ def test_a_slow_run_begins_with_any_packing_and_goes_on_by_its_file(run, tmp_pat
     written = (tmp_path / "slow.h5").stat().st_mtime_ns
     assert (js.resume(tmp_path / "slow.h5").phi == first.phi).all()
     assert (tmp_path / "slow.h5").stat().st_mtime_ns == written
-    with pytest.raises(ValueError, match="write to another file, or use again to replace it"):
+    with pytest.raises(ValueError, match="choose another file, or use again=True to replace it"):
         js.slow_compress(start=start, **(slow | {"kappa": 1e-5}))
 
 

@@ -23,7 +23,7 @@ def test_a_pressure_that_is_not_reached_is_said(start, tmp_path):
         js.slow_compress(start=start, p_end=0.5, **how)
     with pytest.warns(js.NotReachedWarning, match=r"at the end, phi = 0.52, expected p_end=0.5"):
         js.resume(tmp_path / "slow.h5", progress=False)
-    with pytest.raises(ValueError, match=r"a compression with p_end = 0\.5, expected inf"):
+    with pytest.raises(ValueError, match=r"a compression with p_end=0\.5, expected inf"):
         js.slow_compress(start=start, **how)
 
 
