@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 
 from jamshape.checks import require_other_file
-from jamshape.command import parser_of, report
+from jamshape.command import report
+from jamshape.commands.signatures import called, parser_for
 from jamshape.drawing.modes import mode_figure
 from jamshape.drawing.saving import save_figure
 from jamshape.drawing.text import packing_text
 from jamshape.files.ensembles import PackingFile
-from jamshape.front.modes import modes, require_modes_file
+from jamshape.front.modes import Modes, modes, require_modes_file
 from jamshape.vibration.ensembles import TOLD
-from jamshape.vibration.spectrum import METHODS
 from jamshape.vibration.statistics import Redundancy, redundancies
 from jamshape.vibration.table import BANDS, MODULI, ModeTable
 
@@ -34,24 +34,11 @@ KINDS = ("rotation", "parallel", "perpendicular")
 
 def options_of() -> ArgumentParser:
     """Make the parser."""
-    parser = parser_of(__doc__, "modes.h5")
-    parser.add_argument("packing", type=Path, metavar="PACKING.h5")
+    parser = parser_for(modes, __doc__)
+    out = Path("modes.h5")
+    parser.add_argument("--out", type=Path, default=out, help="HDF5 file to write (%(default)s)")
     parser.add_argument("--plot", type=Path, help="D(omega), participation and kinds of motion")
-    usual = "(projected; sparse with --lowest and --near)"
-    parser.add_argument("--method", choices=[*METHODS, "sparse"], help=usual)
-    parser.add_argument("--lowest", type=int, metavar="K", help="only the K softest, sparse")
-    parser.add_argument(
-        "--near", type=float, metavar="OMEGA", help="the K modes nearest to this frequency"
-    )
-    counts = "length that scales radians (%(default)s)"
-    scales = ("half_length", "radius")
-    parser.add_argument("--rotation", choices=scales, default=scales[0], help=counts)
-    weak = "omit contacts weaker than X mean bond forces; 1e-4 omits grazing ones"
-    parser.add_argument("--least-force", type=float, default=0.0, metavar="X", help=weak)
     parser.add_argument("--vectors", action="store_true", help="store eigenvectors")
-    parser.add_argument(
-        "--force", action="store_true", help="compute even if the state is not a minimum"
-    )
     return parser
 
 
@@ -150,8 +137,7 @@ def main(options: Namespace) -> None:
     require_modes_file(options.out, [options.packing])
     if options.plot:
         require_other_file(options.plot, [options.packing, options.out])
-    names = ("lowest", "near", "method", "rotation", "least_force", "force")
-    found = modes(options.packing, **{name: getattr(options, name) for name in names})
+    found: Modes = called(modes, options)
     table, packing, matrix = found.table, found.packing, found.matrix
     assert packing is not None
     assert matrix is not None

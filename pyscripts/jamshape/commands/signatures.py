@@ -1,7 +1,7 @@
 """Options of a command, from the signature and the docstring of a public function.
 
-An argument becomes the option of its name, with the type of its annotation, the default of the signature, and the
-choices and the text of the docstring. A pair such as ``phi`` becomes ``--phi-start`` and ``--phi-end``, with the parts
+An argument becomes the option of its name, or a position if it has no default, with the type of its annotation, the
+default of the signature, and the choices and the text of the docstring. A pair such as ``phi`` becomes ``--phi-start`` and ``--phi-end``, with the parts
 of its text before and after ", and "; ``particles`` becomes the options of particles, and ``file`` becomes ``--out``.
 """
 
@@ -32,13 +32,20 @@ _ALIKE: dict[str, Any] = {
     "seconds": {"type": float, "help": _STOP},
 }
 _DESTS = {"file": "out"}
-_LEFT_OUT = {"particles", "progress"}
+_PARTICLES = "particles"
+_LEFT_OUT = {_PARTICLES, "progress"}
 
 
 class _Option(NamedTuple):
     dest: str
     usual: Any
+    """Default, or `inspect.Parameter.empty`."""
     keywords: dict[str, Any]
+
+    @property
+    def flag(self) -> str:
+        """Its name on the command line: that of a position if there is no default."""
+        return self.dest if self.usual is inspect.Parameter.empty else _typed(self.dest)
 
 
 def parser_for(function: Callable[..., Any], doc: str | None) -> ArgumentParser:
@@ -48,11 +55,12 @@ def parser_for(function: Callable[..., Any], doc: str | None) -> ArgumentParser:
     anything. Old names of arguments become old options.
     """
     parser = parser_of(doc)
-    add_particle_options(parser)
+    if _PARTICLES in inspect.signature(function).parameters:
+        add_particle_options(parser)
     old = {new: name for name, new in getattr(function, "old_names", {}).items()}
     for name, options in _options(function).items():
         for one in options:
-            parser.add_argument(_typed(one.dest), **one.keywords, default=None)
+            parser.add_argument(one.flag, **one.keywords, default=None)
         if name in old:
             keywords = {key: options[0].keywords[key] for key in ("type", "choices")}
             add_old_option(parser, _typed(old[name]), _typed(name), **keywords)
@@ -73,9 +81,12 @@ def given(function: Callable[..., Any], options: Namespace) -> dict[str, Any]:
 
 def called(function: Callable[..., Any], options: Namespace, **more: Any) -> Any:
     """Call a function with the particles and arguments that were typed, and more."""
-    needs = inspect.signature(function).parameters["particles"].default is inspect.Parameter.empty
-    particles = particles_of(options) if needs else particles_beside(options)
-    return function(particles, **given(function, options) | more)
+    arguments = given(function, options) | more
+    known = inspect.signature(function).parameters.get(_PARTICLES)
+    if known is not None:
+        read = particles_of if known.default is known.empty else particles_beside
+        arguments[_PARTICLES] = read(options)
+    return function(**arguments)
 
 
 def _options(function: Callable[..., Any]) -> dict[str, list[_Option]]:
@@ -90,6 +101,8 @@ def _options(function: Callable[..., Any]) -> dict[str, list[_Option]]:
             usual = parameter.default if is_pair else [parameter.default]
             texts = told[name][1].split(", and ") if is_pair else [told[name][1]]
             keywords = _keywords(name, kind, told[name][0])
+            if parameter.default is parameter.empty:
+                keywords["metavar"] = name.upper()
             found[name] = [
                 _Option(dest, value, keywords | {"help": _help(text, value, told)})
                 for dest, value, text in zip(dests, usual, texts, strict=True)
@@ -128,7 +141,7 @@ def _help(text: str, default: Any, told: dict[str, Any]) -> str:
     text = text.replace("`", "").removesuffix(".").replace("%", "%%")
     if text[1:2].islower():
         text = text[0].lower() + text[1:]
-    if default is None or default is False:
+    if any(default is one for one in (None, False, inspect.Parameter.empty)):
         return text
     first, dot, rest = text.partition(". ")
     return f"{first} ({default}){dot}{rest}"

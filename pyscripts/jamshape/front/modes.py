@@ -217,15 +217,15 @@ def modes(
     Parameters
     ----------
     packing : Packing or path
-        At a minimum of its energy, as from `make_packing`, under its law, ``packing.law``.
+        Packing or H5MD file, at a minimum of its energy, as from `make_packing`; its law stays.
     lowest : int, optional
         Number of softest modes to find, by a sparse method; all by default. Translations are
         added, flagged, as in the whole spectrum.
     near : float, [sqrt(energy) / length], optional
         Frequency around which to find `lowest` (or 20) modes.
     method : {"projected", "refined", "plain", "first_order", "sparse"}, optional
-        Method for the whole spectrum; see `jamshape.vibration.spectrum.spectrum`. ``sparse`` finds 20 modes
-        by default. The default is ``sparse`` where only some modes are requested, and else ``projected``.
+        Method for the whole spectrum, by default ``projected``; or ``sparse``, the default where only some modes are
+        requested, which finds 20 unless `lowest` is given. See `jamshape.vibration.spectrum.spectrum`.
     rotation : {"half_length", "radius"}
         Length by which rotations in radians are scaled.
     least_force : float
