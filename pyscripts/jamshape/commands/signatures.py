@@ -45,7 +45,7 @@ class _Option(NamedTuple):
     @property
     def flag(self) -> str:
         """Its name on the command line: that of a position if there is no default."""
-        return self.dest if self.usual is inspect.Parameter.empty else _typed(self.dest)
+        return self.dest if self.usual is inspect.Parameter.empty else _flag(self.dest)
 
 
 def parser_for(function: Callable[..., Any], doc: str | None) -> ArgumentParser:
@@ -63,7 +63,7 @@ def parser_for(function: Callable[..., Any], doc: str | None) -> ArgumentParser:
             parser.add_argument(one.flag, **one.keywords, default=None)
         if name in old:
             keywords = {key: options[0].keywords[key] for key in ("type", "choices")}
-            add_old_option(parser, _typed(old[name]), _typed(name), **keywords)
+            add_old_option(parser, _flag(old[name]), _flag(name), **keywords)
     return parser
 
 
@@ -137,7 +137,7 @@ def _told(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
 
 def _help(text: str, default: Any, told: dict[str, Any]) -> str:
     """Format a text of a docstring as help: options for arguments, no markup, no capital, and the default."""
-    text = re.sub(r"`(\w+)`", lambda one: _typed(one[1]) if one[1] in told else one[1], text)
+    text = re.sub(r"`(\w+)`", lambda one: _flag(one[1]) if one[1] in told else one[1], text)
     text = text.replace("`", "").removesuffix(".").replace("%", "%%")
     if text[1:2].islower():
         text = text[0].lower() + text[1:]
@@ -147,5 +147,5 @@ def _help(text: str, default: Any, told: dict[str, Any]) -> str:
     return f"{first} ({default}){dot}{rest}"
 
 
-def _typed(name: str) -> str:
+def _flag(name: str) -> str:
     return f"--{name.replace('_', '-')}"

@@ -80,6 +80,11 @@ class _Parser(ArgumentParser):
             self.error(
                 f"--start is {given.start}, which has no effect on a sweep: its samples differ in their seed"
             )
+        if given.seconds is not None:
+            self.error(
+                f"--seconds is {given.seconds}, which stops one packing and no sweep; leave it out, a sweep that was"
+                " ended resumes by the same command"
+            )
         for particle in particles(options):
             parser.parse_args(arguments_of(particle, 1, options))
 

@@ -198,7 +198,7 @@ def readable(path: PathLike) -> Iterator[None]:
         raise FileFormatError(msg)
     try:
         yield
-    except (FileFormatError, MissingFrameError):
+    except (FileFormatError, MissingFrameError, ImportError):
         raise
     except BlockingIOError as error:
         msg = (

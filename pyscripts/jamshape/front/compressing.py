@@ -78,20 +78,20 @@ def compress(
         Such as ``Spherocylinders(alpha=4)``.
     n : int
         Number of particles.
-    dimension : {2, 3}
-        Number of dimensions.
+    dimension : int
+        2 or 3.
     phi : (float, float)
         Packing fraction of the random start, and final packing fraction.
     kappa : float, [1/time]
         Compression rate: the box shrinks with dL/dt = -kappa L.
     seed : int
         Random seed of the start.
-    sides : {1, 2}
-        Bonds of a side-to-side contact of rods. The paper's dynamics has one, on which parallel rods
+    sides : int
+        Bonds of a side-to-side contact of rods, 1 or 2. The paper's dynamics has one, on which parallel rods
         chatter, which needs small steps; with two they come to rest, as in minima and modes.
-    integrator : {"rkc2", "heun/adaptive", "heun"}, optional
-        The paper's is ``heun``, with equal time steps; the others choose their own. ``rkc2``, the
-        fastest, by default, and ``heun`` where there is one bond or `dt` is given.
+    integrator : str, optional
+        ``rkc2``, ``heun/adaptive``, or ``heun``, the paper's, with equal time steps; the others choose their own.
+        ``rkc2``, the fastest, by default, and ``heun`` where there is one bond or `dt` is given.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 by default.
     integration_tolerance : float, optional

@@ -65,8 +65,8 @@ def shear(
         Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
         Number of particles; 256 by default, or those of the start.
-    dimension : {2, 3}, optional
-        2 by default, or that of the start.
+    dimension : int, optional
+        2 or 3; 2 by default, or that of the start.
     phi : float, optional
         Packing fraction, reached by fast compression of a random packing; 0.8 by default, or that of the start.
     gdot : float, [1/time]
@@ -79,11 +79,11 @@ def shear(
         Random seed of the start; 1 by default.
     start : Packing or path, optional
         Initial packing, or H5MD file whose last frame to start from, at its own packing fraction.
-    sides : {1, 2}
-        Bonds of a side-to-side contact of rods.
-    integrator : {"rkc2", "heun/adaptive", "heun", "tr-bdf2", "sdirk2"}, optional
-        The first three are LAMMPS's, as in `compress`; the last two take implicit steps in the plane, without LAMMPS,
-        at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
+    sides : int
+        Bonds of a side-to-side contact of rods, 1 or 2.
+    integrator : str, optional
+        ``rkc2``, ``heun/adaptive`` or ``heun`` in LAMMPS, as in `compress`; or ``tr-bdf2`` or ``sdirk2``, which take
+        implicit steps in the plane, without LAMMPS, at a cost that hardly grows as the rate falls. By default ``heun`` with one bond or with `dt`, else ``tr-bdf2``
         in the plane at rates of 3e-7 and below, and else ``rkc2``.
     dt : float, [time], optional
         Time step of ``heun``; 0.05 by default.
@@ -185,8 +185,8 @@ def quasistatic_shear(
         Such as ``Spherocylinders(alpha=4)``; omit with a start.
     n : int, optional
         Number of particles; 256 by default, or those of the start.
-    dimension : {2, 3}, optional
-        2 by default, or that of the start.
+    dimension : int, optional
+        2 or 3; 2 by default, or that of the start.
     phi : float, optional
         Packing fraction, reached by quasistatic compression of a random packing; 0.9 by default, or that of the start.
     step : float

@@ -24,13 +24,10 @@ FUNCTIONS = {
     "pack": js.make_packing,
 }
 CHOICES = [
-    ("compress", "integrator", INTEGRATORS),
-    ("compress", "dimension", [2, 3]),
-    ("compress", "sides", [1, 2]),
     ("slow", "method", implicit.METHODS),
-    ("shear", "integrator", [*INTEGRATORS, *implicit.METHODS]),
     ("shear", "flow", FLOWS),
     ("aqs", "flow", FLOWS),
+    ("pack", "dimension", [2, 3]),
     ("pack", "protocol", [*PROTOCOLS, "1", "2"]),
     ("pack", "search", SEARCHES),
     ("pack", "minimiser", METHODS),
@@ -54,6 +51,13 @@ def test_every_argument_but_progress_has_an_option_with_a_help(command):
 @pytest.mark.parametrize(("command", "name", "table"), CHOICES)
 def test_choices_are_those_that_the_function_knows(command, name, table):
     assert set(actions(command)[name].choices) == set(table)
+
+
+@pytest.mark.parametrize("command", ["compress", "shear"])
+def test_help_of_an_integrator_tells_all(command):
+    others = implicit.METHODS if command == "shear" else ()
+    told = re.findall(r"[\w/-]+", actions(command)["integrator"].help)
+    assert {*INTEGRATORS, *others} <= set(told)
 
 
 def numbers(text):
