@@ -97,15 +97,16 @@ def _options(function: Callable[..., Any]) -> dict[str, list[_Option]]:
             found[name] = [_Option(_DESTS.get(name, name), None, _ALIKE[name])]
         elif name not in _LEFT_OUT:
             kind, is_pair = _kind(parameter.annotation)
+            known, text = told.get(name, ("", ""))  # nothing is known under python -OO
             dests = [f"{name}_start", f"{name}_end"] if is_pair else [name]
             usual = parameter.default if is_pair else [parameter.default]
-            texts = told[name][1].split(", and ") if is_pair else [told[name][1]]
-            keywords = _keywords(name, kind, told[name][0])
+            texts = text.partition(", and ")[::2] if is_pair else [text]
+            keywords = _keywords(name, kind, known)
             if parameter.default is parameter.empty:
                 keywords["metavar"] = name.upper()
             found[name] = [
-                _Option(dest, value, keywords | {"help": _help(text, value, told)})
-                for dest, value, text in zip(dests, usual, texts, strict=True)
+                _Option(dest, value, keywords | {"help": _help(part, value, told)})
+                for dest, value, part in zip(dests, usual, texts, strict=True)
             ]
     return found
 
@@ -130,7 +131,8 @@ def _keywords(name: str, kind: type, known: str) -> dict[str, Any]:
 
 def _told(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
     """Read the type and the text of each argument from the docstring."""
-    section = (inspect.getdoc(function) or "").split("Parameters\n----------\n")[1].split("\n\n")[0]
+    doc = inspect.getdoc(function) or ""
+    section = doc.partition("Parameters\n----------\n")[2].partition("\n\n")[0]
     entries = re.findall(r"^(\w+) : (.*)((?:\n    .*)*)", section, re.MULTILINE)
     return {name: (known, " ".join(text.split())) for name, known, text in entries}
 

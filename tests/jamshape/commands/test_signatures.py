@@ -2,6 +2,8 @@
 
 import inspect
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -71,6 +73,14 @@ def test_help_of_a_packing_tells_the_defaults_of_all_protocols(name):
         values = {table[name] for table in (protocol.usual, protocol.in_plane) if name in table}
         assert {v for v in values if isinstance(v, int | float)} <= numbers(told), told
         assert all(v in told for v in values if isinstance(v, str)), told
+
+
+def test_commands_work_without_docstrings(tmp_path):
+    out = tmp_path / "new.h5"
+    words = ["pack", "--alpha", "1", "--n", "16", "--u0", "1e-6", "--protocol", "1", "--phi-start", "0.55"]  # fmt: skip
+    command = [sys.executable, "-OO", "-m", "jamshape", *words, "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, out.exists()) == (0, True), done.stderr
 
 
 def stirred(
