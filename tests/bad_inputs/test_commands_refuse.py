@@ -80,6 +80,7 @@ CASES = [
     (f"{COMPRESS} --integrator rkc2 --dt 0.1", "--dt 0.1 has no effect with --integrator rkc2"),
     (f"{COMPRESS} --dt 0.1 --integration-tolerance 1e-4", "--integration-tolerance 0.0001 has no effect with --integrator heun"),
     *each(COMPRESS, ["--seconds"], NO_NUMBERS),
+    *each(PACK, ["--seconds"], NO_NUMBERS),
     ("compress --resume --out typo.h5", "typo.h5"),
     *((f"{RUN} {option} {other}", f"run.h5 holds a compression with {option} {own}, expected {other}; choose another --out, or use --again")
       for option, own, other in (("--kappa", "0.01", "1e-05"), ("--n", "8", "9"), ("--phi-end", "0.32", "0.9"),

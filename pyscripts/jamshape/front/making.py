@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from jamshape.arguments import checked
-from jamshape.checks import require_path, require_stated
+from jamshape.checks import require_given, require_path, require_stated
 from jamshape.files.outcomes import warn_unless_reached
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import display, place
@@ -147,6 +147,7 @@ def make_packing(
         search=search, minimiser=minimiser, strict=strict,
     )  # fmt: skip
     require_stated(threads=threads)
+    require_given(seconds=seconds)
     at = place(file, "packing.h5")
     require_path(at.path)
     if again or not is_done(at.path):

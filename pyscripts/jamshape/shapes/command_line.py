@@ -13,11 +13,9 @@ def add_particle_options(parser: ArgumentParser) -> None:
     """Add --shape, the parameters of all shapes, --size-ratio and --kind."""
     group = parser.add_argument_group("particles")
     group.add_argument("--shape", choices=SHAPES, help=f"({DEFAULT})")
-    for parameter, shapes in _parameters().items():
-        usual = ", ".join(f"{shape.name} {_default(shape, parameter):g}" for shape in shapes)
-        group.add_argument(
-            f"--{parameter.option}", type=float, help=f"{parameter.meaning} ({usual})"
-        )
+    for option, known in _parameters().items():
+        usual = ", ".join(f"{shape.name} {parameter.default:g}" for shape, parameter in known)
+        group.add_argument(f"--{option}", type=float, help=f"{known[0][1].meaning} ({usual})")
     usual = ", ".join(f"{shape.name} {shape.size_ratio:g}" for shape in SHAPES.values())
     group.add_argument("--size-ratio", type=float, help=f"big over small, mixed 1:1 ({usual})")
     group.add_argument(
@@ -74,30 +72,25 @@ def _given(options: Namespace) -> dict[str, float]:
     """Collect the given parameters; raise unless all belong to the shape."""
     shape, found = _shape(options), {}
     own = {parameter.option: parameter.name for parameter in shape.parameters}
-    for parameter in _parameters():
-        value = getattr(options, parameter.option)
+    for option in _parameters():
+        value = getattr(options, option)
         if value is None:
             continue
-        if parameter.option not in own:
+        if option not in own:
             options_of_it = ", ".join(f"--{name}" for name in own)
-            msg = f"--{parameter.option} does not apply to {shape.name}s, expected {options_of_it}"
+            msg = f"--{option} does not apply to {shape.name}s, expected {options_of_it}"
             raise ValueError(msg)
-        found[own[parameter.option]] = value
+        found[own[option]] = value
     return found
 
 
-def _parameters() -> dict[Parameter, list[Shape]]:
-    """List all parameters with the shapes that have them; once per option."""
-    found: dict[Parameter, list[Shape]] = {}
+def _parameters() -> dict[str, list[tuple[Shape, Parameter]]]:
+    """List the parameters of all shapes by their options, with the shapes that have them."""
+    found: dict[str, list[tuple[Shape, Parameter]]] = {}
     for shape in SHAPES.values():
         for parameter in shape.parameters:
-            known = next((p for p in found if p.option == parameter.option), parameter)
-            found.setdefault(known, []).append(shape)
+            found.setdefault(parameter.option, []).append((shape, parameter))
     return found
-
-
-def _default(shape: Shape, parameter: Parameter) -> float:
-    return next(p.default for p in shape.parameters if p.option == parameter.option)
 
 
 def _kind(text: str) -> Kind:

@@ -45,6 +45,19 @@ def test_a_finished_packing_is_not_made_again(tiny, jamshape):
     assert (folder / "packing.h5").stat().st_mtime_ns == before
 
 
+def test_a_packing_that_stops_in_time_is_resumed_by_the_same_command(
+    tiny, jamshape, tmp_path, capfd
+):
+    _, said = tiny
+    out = tmp_path / "packing.h5"
+    command = (*said["packing.h5"].arguments, "--out", out)
+    stopped = jamshape(*command, "--seconds", 0)
+    assert (stopped.code, stopped.out, out.exists()) == (75, "", False)
+    assert "the same command resumes" in capfd.readouterr().err.strip().splitlines()[-1]
+    whole, resumed = said["packing.h5"].report, jamshape(*command).report
+    assert resumed == whole | {"out": str(out), "wall_seconds": resumed["wall_seconds"]}
+
+
 def test_what_does_not_reach_its_goal_ends_with_the_exit_code_1(jamshape, tmp_path, capfd):
     """Forces cannot balance better than rounding lets them."""
     short = ("--n", 8, "--phi-start", 0.5, "--u0", 1e-16, "--tolerance", 1e-14)
