@@ -138,6 +138,16 @@ def test_a_sweep_that_is_killed_alone_leaves_no_process_and_goes_on(tmp_path, en
     assert not list(tmp_path.glob("*.search.h5"))
 
 
+def test_a_sweep_stops_in_time_and_goes_on(tmp_path):
+    asked = ("--alpha", "1", "--samples", "3")
+    done, report = run(tmp_path, *asked, "--seconds", "0")
+    assert done.returncode == 75
+    assert report["made"] == 0
+    assert report["failed"] == [f"alpha1_seed{seed}.h5: not begun in time" for seed in (1, 2, 3)]
+    done, report = run(tmp_path, *asked, "--seconds", "300")
+    assert (done.returncode, report["made"], report["failed"]) == (0, 3, [])
+
+
 def test_names_of_files_keep_all_digits_and_options_given_twice_add_up(tmp_path):
     done, report = run(
         tmp_path, *("--alpha", "1", "1.0000001", "1e0", "--alpha", "1e6", "--samples", "1")

@@ -9,8 +9,8 @@ Each sample is one run of `jamshape pack` in its own process, one a core, which 
 however that ends. The same command resumes after a kill: finished packings are kept, unfinished ones continue from
 their files, and those of other parameters are refused. A sample that fails, or whose forces do not balance, is listed
 as failed, and the others continue. The last line of standard output is one JSON object: made and not_made count
-packings, not_reached those whose forces do not balance. The exit code is 0 only if nothing failed. For clusters see
-docs/how-to/cluster.md.
+packings, not_reached those whose forces do not balance. The exit code is 0 only if nothing failed, and 75 if
+--seconds stopped packings before their ends. For clusters see docs/how-to/cluster.md.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+from jamshape.checks import TIME_IS_UP, require_stated
 from jamshape.command import report
 from jamshape.commands import main as command
 from jamshape.commands import pack
@@ -80,11 +81,6 @@ class _Parser(ArgumentParser):
             self.error(
                 f"--start is {given.start}, which has no effect on a sweep: its samples differ in their seed"
             )
-        if given.seconds is not None:
-            self.error(
-                f"--seconds is {given.seconds}, which stops one packing and no sweep; leave it out, a sweep that was"
-                " ended resumes by the same command"
-            )
         for particle in particles(options):
             parser.parse_args(arguments_of(particle, 1, options))
 
@@ -122,6 +118,9 @@ def options_of() -> ArgumentParser:
     )
     parser.add_argument("--jobs", type=int, default=cores(), help="processes (all cores)")
     parser.add_argument("--out", type=Path, required=True, help="folder")
+    parser.add_argument(
+        "--seconds", type=float, help="time after which packings stop at their next checkpoints"
+    )
     return parser
 
 
@@ -214,18 +213,25 @@ class Complaint(NamedTuple):
     said: str
     is_made: bool = False
     """Whether its packing exists, but did not reach its goal."""
+    is_late: bool = False
+    """Whether its time was up."""
 
 
 def make(particle: Particle, seed: int, options: Namespace, leash: Leash) -> Complaint | None:
     """Make one sample; return its complaint if it fails or does not reach its goal."""
-    out = file_of(particle, seed, options)
+    out, left = file_of(particle, seed, options), []
+    if options.seconds is not None:
+        seconds = options.until - time.monotonic()
+        if seconds <= 0 and not out.exists():
+            return Complaint(f"{out.name}: not begun in time", is_late=True)
+        left = ["--seconds", f"{max(0.0, seconds):.3f}"]
     log = out.with_suffix(".log")
     with log.open("a") as errors:
         if not _is_ours(errors):
             said = f"{out.name}: another process is making it, expected none; wait until it ends"
             return Complaint(said)
         done = subprocess.run(
-            [*_PACK, *arguments_of(particle, seed, options)],
+            [*_PACK, *arguments_of(particle, seed, options), *left],
             check=False,
             stdin=leash.read,
             stdout=subprocess.PIPE,
@@ -236,7 +242,8 @@ def make(particle: Particle, seed: int, options: Namespace, leash: Leash) -> Com
         return None
     last = log.read_text().strip().replace("\r", "\n").splitlines()
     said = f"{out.name}: {last[-1] if last else f'exit code {done.returncode}'}"
-    return Complaint(said, is_made=bool(done.stdout.strip()))
+    is_late = done.returncode == TIME_IS_UP
+    return Complaint(said, is_made=bool(done.stdout.strip()), is_late=is_late)
 
 
 def _is_ours(log: IO[str]) -> bool:
@@ -279,6 +286,9 @@ def made(options: Namespace) -> Iterator[Complaint | None]:
 def main(options: Namespace) -> int:
     """Run all samples; return the exit code."""
     options.out.mkdir(parents=True, exist_ok=True)
+    if options.seconds is not None:
+        require_stated(seconds=options.seconds)
+    options.until = time.monotonic() + (options.seconds or 0.0)
     total, done = options.samples * len(particles(options)), 0
     failures: list[Complaint] = []
 
@@ -296,4 +306,6 @@ def main(options: Namespace) -> int:
     found = {"out": options.out, "made": total - missing, "not_made": missing}
     found |= {"not_reached": len(failures) - missing}
     report(found | {"failed": [complaint.said for complaint in failures]})
+    if any(complaint.is_late for complaint in failures):
+        return TIME_IS_UP
     return 1 if failures else 0
