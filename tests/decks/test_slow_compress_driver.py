@@ -68,7 +68,7 @@ def test_a_finished_run_is_left_alone(made):
     ("options", "sentence"),
     [
         (("--kappa", "1e-7"), "kappa"),
-        (("--integration-tolerance", "1e-2"), "tolerance = 0.001, expected 0.01"),
+        (("--integration-tolerance", "1e-2"), "--integration-tolerance 0.001, expected 0.01"),
     ],
 )
 def test_a_file_with_another_protocol_is_refused(made, options, sentence, run_here):

@@ -135,7 +135,7 @@ def test_a_sweep_that_is_killed_alone_leaves_no_process_and_goes_on(tmp_path, en
     assert (done.returncode, report["made"], report["failed"]) == (0, 4, []), done.stderr
     after = times(tmp_path)
     assert {name: after[name] for name in finished} == finished
-    assert not list(tmp_path.glob("*.search.h5"))
+    assert not list(tmp_path.glob("*.making.h5"))
 
 
 def test_a_sweep_stops_in_time_and_goes_on(tmp_path):

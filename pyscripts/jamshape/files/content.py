@@ -1,4 +1,4 @@
-"""What the file of a packing or a run holds, in memory: frames, observables, attributes, and a checkpoint."""
+"""Content of the file of a packing or a run, in memory: frames, observables, attributes, and a checkpoint."""
 
 from __future__ import annotations
 

@@ -138,21 +138,15 @@ def shear(
         slow = SlowShear(gdot, strain, flow, error, largest_strain=longest, method=integrator)
         _require_plane(of, sides)
         plan = implicit_driver.plan(lambda: _flowing(of), slow, of.made_from | {"rows": rows})
-        recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
-        return ShearFile(*at)
-    settings = Shear(
-        gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
-        sides=sides, k_e=of.k_e, integrator=integrator,
-        tolerance=integration_tolerance or _ERROR,
-    )  # fmt: skip
-    if settings.chooses_steps:
-        require_no_effect("integrator", integrator, dt=dt)
-        settings = settings.in_steps(rows)
     else:
-        require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
-    sizes = Sizes(rows, _FRAMES if frames is None else frames)
-    made_from = of.made_from | {"dimension": of.dimension}
-    plan = lammps_driver.plan(lambda: _flowing(of), settings, sizes, made_from)
+        settings = Shear(
+            gdot=gdot, strain_end=strain, flow=flow, dt=min(0.05, 0.01 / gdot) if dt is None else dt,
+            sides=sides, k_e=of.k_e, integrator=integrator, tolerance=integration_tolerance or _ERROR,
+        )  # fmt: skip
+        settings = _in_rows(settings, rows, dt=dt, integration_tolerance=integration_tolerance)
+        sizes = Sizes(rows, _FRAMES if frames is None else frames)
+        made_from = of.made_from | {"dimension": of.dimension}
+        plan = lammps_driver.plan(lambda: _flowing(of), settings, sizes, made_from)
     recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
     return ShearFile(*at)
 
@@ -260,6 +254,13 @@ def _still(of: Start) -> Packing:
         return of.known
     random = of.random()
     return compressed_to(Landscape(random), State.of(random), of.phi).packing(random)
+
+
+def _in_rows(settings: Shear, rows: int, **given: float | None) -> Shear:
+    """Refuse options without an effect, and return settings whose steps end at rows, if the integrator is adaptive."""
+    without = "dt" if settings.chooses_steps else "integration_tolerance"
+    require_no_effect("integrator", settings.integrator, **{without: given[without]})
+    return settings.in_steps(rows) if settings.chooses_steps else settings
 
 
 def _usual(gdot: float, dimension: int, *, whole: bool) -> str:

@@ -52,7 +52,7 @@ def told_of(start: MeasuredPacking) -> dict[str, Any]:
 
 
 def _digest(start: Packing) -> str:
-    """Name a packing without a file by its poses, so that another one is told apart."""
+    """Name a packing without a file by its poses, to distinguish it from another one."""
     poses = b"".join(np.ascontiguousarray(x, np.float64).tobytes() for x in start.poses())
     return f"packing {hashlib.blake2b(poses, digest_size=8).hexdigest()}"
 

@@ -135,11 +135,11 @@ class ApproachDriver:
         told = checkpoint or {"kappa": settings.kappa_start, "dt": settings.dt, "rows": 0}
         self._settings, self._rows = settings, told["rows"]
         self._pressure: float
-        self._pressure, self._marked = told.get("pressure", math.inf), checkpoint
+        self._pressure, self._marked = told.get("pressure", math.inf), checkpoint or None
         flow = Compression(kappa=told["kappa"], phi_end=_NO_END, dt=told["dt"], sides=2)
         self._session = Session()
         try:
-            self._run = CompressionRun(self._session, flow, first, checkpoint and checkpoint["run"])
+            self._run = CompressionRun(self._session, flow, first, checkpoint["run"] if checkpoint else None)
         except BaseException:
             self._session.close()
             raise

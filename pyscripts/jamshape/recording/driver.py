@@ -1,4 +1,4 @@
-"""What a long calculation offers, so that it can be recorded, stopped, and taken up again.
+"""Interface of long calculations: what they offer to be recorded, stopped and resumed.
 
 A driver advances by steps or by bounded pieces of work. At its *marks*, which its settings fix, it drops caches, pair
 lists, extrapolations and the order of atoms, whether or not a checkpoint is written there: what is computed does not
@@ -31,13 +31,13 @@ class Told(NamedTuple):
 
 
 class Row(NamedTuple):
-    """What one advance of a driver records."""
+    """Record of one advance of a driver."""
 
     told: Told
     step: int = 0
     time: float = 0.0
     observables: Mapping[str, ArrayLike] | None = None
-    """By name; None where there is nothing to record."""
+    """Numbers or arrays by name; None where there is nothing to record."""
     wall_seconds: float = 0.0
     error: float | None = None
     """Error of the step, for the convergence history; None without one."""
@@ -77,7 +77,7 @@ class Driver(Protocol):
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be recorded.
+    """Settings of a run, and how to begin and to resume it.
 
     Parameters
     ----------

@@ -98,13 +98,8 @@ def test_a_run(jamshape, tiny, name, kind):
             "repeat the command for {folder}/dynamics.h5, which continues",
         ),
         (
-            "packing.h5.search.h5",
-            {"search_step": 1e-4},
-            "the command for {folder}/packing.h5, which continues",
-        ),
-        (
-            "packing.h5.path.h5",
-            {"loose_phi": 0.5},
+            "packing.h5.making.h5",
+            {"stage": "searching"},
             "the command for {folder}/packing.h5, which continues",
         ),
     ],

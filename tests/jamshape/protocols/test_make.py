@@ -186,7 +186,7 @@ def test_the_search_of_another_target_is_not_gone_on_with(tmp_path, monkeypatch)
     compressed(out)
     made(RECIPE, out, 3)
     other = replace(RECIPE, target=Target(1e-8))
-    with pytest.raises(ValueError, match=r"holds a packing with u0 = 1e-12, expected 1e-08; write"):
+    with pytest.raises(ValueError, match=r"holds a packing with u0=1e-12, expected 1e-08; choose"):
         make(other, out)
     made(other, out, again=True)
     assert read_attributes(out)["u"] == pytest.approx(1e-8, rel=1e-7, abs=0)
