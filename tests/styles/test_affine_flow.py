@@ -433,8 +433,9 @@ def test_a_modified_flow_goes_on_from_the_strain(
     assert vector[1] == vector[16] == vector[17] == 0.0
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_modified_flow_goes_on_after_flips(dimension, packings, tmp_path):
+def test_a_modified_flow_goes_on_after_flips(dimension, ranks, packings, tmp_path):
     """At a strain of 0.8, whose cell has other vectors, by `fix_modify` and after `read_restart` alike."""
     flow, restart, back = "shear 1e-2", tmp_path / "turned.restart", "shear -1e-2"
     with loaded(packings[dimension], tmp_path, extra="box tilt large") as session:
@@ -445,16 +446,18 @@ def test_a_modified_flow_goes_on_after_flips(dimension, packings, tmp_path):
         strain, end = fix_vector(session, "drive", 17), session.lmp.extract_box()
     assert strain == pytest.approx(0, abs=1e-15)
     np.testing.assert_allclose(np.hstack(end[:5]), np.hstack(start[:5]), rtol=0, atol=1e-13)
-    said = run_lmp_well(
-        f"""{load_plugin()}
-        read_restart {restart}
-        {after_restart()}
-        {drive(back, 0.05)}
-        run 1600
-        print "strain $(f_drive[17])" """,
-        tmp_path,
-    )
-    assert float(said.split("\nstrain ")[-1].split()[0]) == pytest.approx(0, abs=1e-15)
+    for change in (drive(back, 0.05), f"{drive(flow, 0.05)}\nfix_modify drive {back}"):
+        said = run_lmp_well(
+            f"""{load_plugin()}
+            read_restart {restart}
+            {after_restart()}
+            {change}
+            run 1600
+            print "strain $(f_drive[17])" """,
+            tmp_path,
+            ranks,
+        )
+        assert float(said.split("\nstrain ")[-1].split()[0]) == pytest.approx(0, abs=1e-15)
 
 
 def test_a_modified_flow_is_checked_as_a_new_one(packings, tmp_path):
