@@ -24,8 +24,8 @@ Vec<3> vec3(const double *from) { return {{from[0], from[1], from[2]}}; }
 }  // namespace
 
 AffineBox::AffineBox(LAMMPS_NS::LAMMPS *lmp, const Upper &gradient, Reference fixed_point) :
-    Pointers(lmp), fixed(fixed_point), dimension(domain->dimension), now{}, time_base(0.0),
-    reached_step(update->ntimestep), started(false), left{}
+    Pointers(lmp), fixed(fixed_point), dimension(domain->dimension), now{}, next_rate(gradient),
+    time_base(0.0), reached_step(update->ntimestep), started(false), left{}
 {
   now.rate = gradient;
 }
@@ -39,13 +39,10 @@ AffineBox::State AffineBox::saved_state() const
 
 void AffineBox::restore(const State &from, double time_until_base)
 {
-  const Upper gradient = now.rate;
   now = from;
   time_base = time_until_base;
   reached_step = update->ntimestep;
   started = from.dt != 0.0;  // the fix had run
-  if (!(gradient == from.rate)) go_on_from(update->ntimestep);
-  now.rate = gradient;
 }
 
 bool AffineBox::begin_run(bigint step)
@@ -55,6 +52,7 @@ bool AffineBox::begin_run(bigint step)
   const bool was_started = started, continues = started && is_in_box(bounds(deformation(step)));
   if (continues) {
     follow_timestep();
+    if (!(now.rate == next_rate)) follow_gradient(step);
   } else {
     start_here(step);
   }
@@ -62,6 +60,13 @@ bool AffineBox::begin_run(bigint step)
   started = true;
   left = present_bounds();
   return continues || !was_started;
+}
+
+void AffineBox::follow_gradient(bigint step)
+{
+  go_on_from(step);
+  now.rate = next_rate;
+  set_box(deformation(step));  // without the rounding errors of flips
 }
 
 bool AffineBox::follow_timestep()
@@ -89,7 +94,6 @@ bool AffineBox::is_in_box(const Bounds &at) const
 
 void AffineBox::start_here(bigint step)
 {
-  const Upper gradient = now.rate;
   now = State{};
   time_base = 0.0;
   for (int k = 0; k < 3; ++k) {
@@ -101,7 +105,7 @@ void AffineBox::start_here(bigint step)
     now.xz = domain->xz;
     now.yz = domain->yz;
   }
-  now.rate = gradient;
+  now.rate = next_rate;
   now.step_base = step;
 }
 

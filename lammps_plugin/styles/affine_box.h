@@ -48,6 +48,8 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   bool begin_run(LAMMPS_NS::bigint step);
   /// Continues from the present strain if `timestep` has changed; true where it has.
   bool follow_timestep();
+  /// Continues from the strain at the start of the next run with another velocity gradient.
+  void change_gradient(const Upper &gradient) { next_rate = gradient; }
   /// Last step made by the flow; LAMMPS also counts the steps of minimisers, during which the flow
   /// pauses.
   LAMMPS_NS::bigint reached() const { return reached_step; }
@@ -116,6 +118,7 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   };
 
   State now;
+  Upper next_rate;   // G from the start of the next run
   double time_base;  // since strain 0, at step_base
   LAMMPS_NS::bigint reached_step;
   bool started;
@@ -139,6 +142,7 @@ class AffineBox : protected LAMMPS_NS::Pointers {
   Upper unflipped(double passed) const;
   Upper flips_in_reference(const Flip &by) const;
   void go_on_from(LAMMPS_NS::bigint step);
+  void follow_gradient(LAMMPS_NS::bigint step);
   void start_here(LAMMPS_NS::bigint step);
 };
 

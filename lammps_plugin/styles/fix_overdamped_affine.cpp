@@ -79,8 +79,8 @@ struct FixOverdampedAffine::Command {
 
 FixOverdampedAffine::FixOverdampedAffine(LAMMPS_NS::LAMMPS *lmp, int narg, char **arg) :
     Fix(lmp, narg, arg), check_every(1000), next_check(0), largest_rate(0.0), largest_tilt(0.5),
-    warned(false), was_told(false), running(false), inside_step(false), has_begun(false),
-    next_look(0)
+    holds_volume(false), warned(false), was_told(false), running(false), inside_step(false),
+    has_begun(false), next_look(0)
 {
   make_parts(read(narg, arg));
   tell_what_this_is();
@@ -212,6 +212,7 @@ void FixOverdampedAffine::read_option(const std::string &keyword, const char *te
 void FixOverdampedAffine::make_parts(const Command &of)
 {
   require_cell(of.gradient);
+  holds_volume = of.holds_volume;
   box = std::make_unique<AffineBox>(lmp, of.gradient, of.reference);
   try {
     integrator = make_integrator(of.method, *box, of.of_method);
@@ -293,6 +294,19 @@ void FixOverdampedAffine::require_alone() const
            cure);
     }
   }
+}
+
+/// Replaces the velocity gradient by the sum of those specified.
+int FixOverdampedAffine::modify_param(int narg, char **arg)
+{
+  Command command{};
+  int k = 0;
+  for (int taken = 1; taken > 0 && k < narg; k += taken) taken = read_flow(k, narg, arg, command);
+  if (k == 0) return 0;  // LAMMPS rejects the keyword
+  require_cell(command.gradient);
+  if (holds_volume) require_no_trace(command.gradient);
+  box->change_gradient(command.gradient);
+  return k;
 }
 
 void FixOverdampedAffine::init()

@@ -13,6 +13,7 @@ namespace jamshape {
 /// fix ID all overdamped/affine drag k_d [compress kappa] [shear gdot] [pure edot]
 ///     [gradient xx xy yx yy | xx xy xz yx yy yz zx zy zz] [flip F]
 ///     [integrator NAME] [tolerance T] [stages MAX] [reference center|corner] [check N]
+/// fix_modify ID [compress kappa] [shear gdot] [pure edot] [gradient ...], from the next run on
 ///
 /// Overdamped motion on a substrate that moves affinely with the box, with the sum of the specified
 /// velocity gradients: -kappa 1 (Marschall & Teitel 2018, Eqs. 6-14), G_xy = gdot (Marschall, Keta,
@@ -40,6 +41,7 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   void post_run() override;
   void initial_integrate(int vflag) override;
   double compute_vector(int n) override;
+  int modify_param(int narg, char **arg) override;
   double memory_usage() override;
 
   void write_restart(FILE *fp) override;
@@ -63,6 +65,7 @@ class FixOverdampedAffine : public LAMMPS_NS::Fix {
   std::unique_ptr<Integrator> integrator;
   LAMMPS_NS::bigint check_every, next_check;
   double largest_rate, largest_tilt;
+  bool holds_volume;
   bool warned, was_told, running, inside_step;
   bool has_begun;               // in the present run
   LAMMPS_NS::bigint next_look;  // for changes by other fixes

@@ -11,9 +11,11 @@ from .front.modes import modes as modes
 from .front.packing import MeasuredPacking as MeasuredPacking
 from .front.pictures import plot as plot
 from .front.recorded import resume as resume
+from .front.run import CyclicShearFile as CyclicShearFile
 from .front.run import QuasistaticShearFile as QuasistaticShearFile
 from .front.run import RunFile as RunFile
 from .front.run import ShearFile as ShearFile
+from .front.shearing import cyclic_shear as cyclic_shear
 from .front.shearing import quasistatic_shear as quasistatic_shear
 from .front.shearing import shear as shear
 from .packing import Box as Box

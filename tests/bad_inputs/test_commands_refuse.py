@@ -156,8 +156,12 @@ CASES = [
     (f"{SLOW} --kappa-before 1e-6", "--kappa-before 1e-06 has no effect without --phi-slow, expected both or neither"),
     (f"{SLOW} --phi-slow 0.9", "--phi-slow 0.9 is not below --phi-end, .* expected a smaller one"),
     *((f"{command} --start start.h5 {option} --out new.h5", f"{option} has no effect with --start start.h5")
-      for command in ("shear", "aqs") for option in ("--phi 0.7", "--n 8", "--seed 1", "--dimension 2")),
+      for command in ("shear", "cycle", "aqs") for option in ("--phi 0.7", "--n 8", "--seed 1", "--dimension 2")),
     ("shear --start start.h5 --alpha 4 --out new.h5", "has no effect with --start start.h5"),
+    *each("cycle --n 8 --out new.h5", ["--amplitude", "--period", "--dt", "--integration-tolerance"], NO_NUMBERS),
+    *each("cycle --n 8 --out new.h5", ["--cycles", "--rows", "--frames"], NO_COUNTS),
+    ("cycle --n 8 --rows 10 --out new.h5", "--rows 10 samples in a cycle miss the largest strain, expected a multiple of 4"),
+    ("cycle --n 8 --amplitude 1 --period 1 --out new.h5", "--amplitude 1.0 and --period 1.0 make a rate of 4, expected a rate"),
     ("shear --n 8 --integrator rkc2 --dt 0.1 --out new.h5", "--dt 0.1 has no effect with --integrator rkc2"),
     ("shear --n 8 --dt 0.1 --integration-tolerance 1e-4 --out new.h5", "--integration-tolerance 0.0001 has no effect with --integrator heun"),
     ("shear --n 8 --gdot 1e-8 --frames 3 --out new.h5", "--frames 3 has no effect with --integrator tr-bdf2"),

@@ -36,6 +36,12 @@ def shear(**options):
     return lambda: js.shear(RODS, **({"n": 8, "file": "new.h5", "progress": False} | options))
 
 
+def cyclic(**options):
+    return lambda: js.cyclic_shear(
+        RODS, **({"n": 8, "file": "new.h5", "progress": False} | options)
+    )
+
+
 def aqs(**options):
     return lambda: js.quasistatic_shear(
         RODS, **({"n": 8, "file": "new.h5", "progress": False} | options)
@@ -114,6 +120,22 @@ def cases():
         "shear run": shear(file="run.h5"),
         "shear start": shear(start="none.h5"),
         "shear no particles": lambda: js.shear(file="new.h5", progress=False),
+        "cyclic amplitude": cyclic(amplitude=0.0),
+        "cyclic period": cyclic(period=-1.0),
+        "cyclic rate": cyclic(amplitude=1.0, period=1.0),
+        "cyclic slow": cyclic(amplitude=1e-6, period=1e18),
+        "cyclic cycles": cyclic(cycles=2.5),
+        "cyclic rows": cyclic(rows=10),
+        "cyclic frames": cyclic(frames=0),
+        "cyclic flow": cyclic(flow="complex"),
+        "cyclic too far": cyclic(flow="pure", amplitude=5.0, period=1e6),
+        "cyclic integrator": cyclic(integrator="tr-bdf2"),
+        "cyclic dt": cyclic(integrator="rkc2", dt=0.1),
+        "cyclic tolerance": cyclic(dt=0.1, integration_tolerance=1e-3),
+        "cyclic steps": cyclic(period=1e12, amplitude=1.0, dt=1e-6),
+        "cyclic file": cyclic(file="run.h5"),
+        "cyclic no particles": lambda: js.cyclic_shear(file="new.h5", progress=False),
+        "cyclic start and phi": lambda: js.cyclic_shear(start="start.h5", phi=0.7, file="new.h5"),
         "aqs step": aqs(step=0.0),
         "aqs long step": aqs(step=0.1, strain=0.05),
         "aqs flow": aqs(flow="complex"),

@@ -117,7 +117,7 @@ _FIXES = (
             refused="fix overdamped/affine found atom 3 without a shape, expected an ellipsoid: .*"),
     Feature("a group other than all", f"group one id 1\n{FIX.replace('all', 'one')}",
             refused="fix overdamped/affine found a group other than all, .*"),
-    Feature("`fix_modify`", f"{FLOW}\nfix_modify f energy yes", refused="Illegal fix_modify command"),
+    Feature("`fix_modify` of another option", f"{FLOW}\nfix_modify f energy yes", refused="Illegal fix_modify command"),
     Feature("`fix addforce`", f"{REST} \nfix g all addforce 0.01 0 0\nrun 50", "x[1]",
             5 + 0.01 * 5 / AREA, scene=DISC),
     Feature("`fix addforce`, substeps",

@@ -80,6 +80,7 @@ QUICK = [
     Told("*", "jamshape compress", "--alpha 1 --n 16 --kappa 1e-3 --rows 20 --frames 4"),
     Told("*", "jamshape slow", "--alpha 1 --n 16 --phi-start 0.7 --phi-end 0.72 --kappa 1e-6"),
     Told("*", "jamshape shear", "--alpha 1 --n 16 --gdot 1e-2 --strain 0.5 --rows 20 --frames 4"),
+    Told("*", "jamshape cycle", "--alpha 1 --n 16 --period 20 --cycles 2 --rows 8"),
     Told("*", "jamshape aqs", "--step 1e-2 --strain 0.1"),
     Told("*", "jamshape draw", "--dpi 50"),
     Told("*", "jamshape reproduce", "--dry-run"),

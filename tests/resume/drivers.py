@@ -141,6 +141,13 @@ DRIVERS = {
          "integration_tolerance": 1e-3, "sides": 1},
         {"strain": 4000.0, "rows": 100_000},
     ),
+    "cyclic shear in LAMMPS": Case(
+        "cyclic_shear", "rods",  # its box takes other cell vectors, to and fro
+        {"amplitude": 0.6, "period": 240.0, "cycles": 2, "rows": 20},
+        {"amplitude": 0.5, "period": 250.0, "cycles": 3, "flow": "pure", "rows": 16, "frames": 1,
+         "integrator": "heun/adaptive", "integration_tolerance": 1e-3, "sides": 1},
+        {"period": 4e7, "rows": 1_000_000},
+    ),
     "implicit compression": Case(
         "slow_compress", DIMERS,
         {"n": 8, "phi": (0.7, 0.82), "kappa": 1e-3},
@@ -178,6 +185,10 @@ CASES = DRIVERS | {
     "shear in space": Case("shear", "bodies", {"gdot": 1e-2, "strain": 0.9, **_ROWS}),
     "pure shear in LAMMPS": Case(
         "shear", "dimers", {"gdot": 1e-2, "strain": 0.5, "flow": "pure", "dt": 0.1, **_ROWS}
+    ),
+    "cyclic pure shear in space": Case(
+        "cyclic_shear", "bodies",
+        {"amplitude": 0.1, "period": 40.0, "cycles": 2, "flow": "pure", "dt": 0.1, "rows": 8},
     ),
     "implicit compression at two rates": Case(
         "slow_compress", "dimers",

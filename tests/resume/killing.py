@@ -36,6 +36,7 @@ _COMMANDS = (
     "pack",
     "slow",
     "shear",
+    "cycle",
     "aqs",
     "sweep",
     "modes",

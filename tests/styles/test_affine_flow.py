@@ -398,6 +398,83 @@ def test_rates_may_change_between_runs(packings, tmp_path):
 # --- pressure tensor and work --------------------------------------------------------------------
 
 
+def to_and_fro(packing, folder, first, then, *, steps=400, integrator="rkc2"):
+    """Run, change the gradient by `fix_modify`, run as long; end with the box and the elements of the fix."""
+    with loaded(packing, folder, sides="two", extra="box tilt large") as session:
+        session.commands(f"{TILT}\n{drive(first, 0.05, f'integrator {integrator}')}\nrun 0")
+        start = session.lmp.extract_box()
+        session.commands(f"run {steps}\nfix_modify drive {then}\nrun {steps}")
+        return (
+            start,
+            session.lmp.extract_box(),
+            [fix_vector(session, "drive", k) for k in range(1, 21)],
+        )
+
+
+@pytest.mark.parametrize("integrator", ["heun", "rkc2"])
+@pytest.mark.parametrize(
+    ("dimension", "flow", "back"),
+    [
+        (2, "shear 1e-3", "shear -1e-3"),
+        (3, "shear 1e-3", "shear -1e-3"),
+        (2, "pure 1e-3", "pure -1e-3"),
+        (3, "compress -1e-4", "compress 1e-4"),
+        (3, "gradient 1e-4 0 1e-3 0 0 0 0 0 0", "gradient -1e-4 0 -1e-3 0 0 0 0 0 0"),
+    ],
+)
+def test_a_modified_flow_goes_on_from_the_strain(
+    dimension, flow, back, integrator, packings, tmp_path
+):
+    start, end, vector = to_and_fro(
+        packings[dimension], tmp_path, flow, back, integrator=integrator
+    )
+    np.testing.assert_allclose(np.hstack(end[:5]), np.hstack(start[:5]), rtol=0, atol=1e-15)
+    assert vector[0] == pytest.approx(40.0, rel=1e-14)
+    assert vector[1] == vector[16] == vector[17] == 0.0
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_modified_flow_goes_on_after_flips(dimension, ranks, packings, tmp_path):
+    """At a strain of 0.8, whose cell has other vectors, by `fix_modify` and after `read_restart` alike."""
+    flow, restart, back = "shear 1e-2", tmp_path / "turned.restart", "shear -1e-2"
+    with loaded(packings[dimension], tmp_path, extra="box tilt large") as session:
+        session.commands(f"{TILT}\n{drive(flow, 0.05)}\nrun 0")
+        start = session.lmp.extract_box()
+        session.commands(f"run 1600\nwrite_restart {restart}\nfix_modify drive {back}")
+        session.commands("run 0\nrun 0\nrun 1600")  # a run of no steps leaves the box as it is
+        strain, end = fix_vector(session, "drive", 17), session.lmp.extract_box()
+    assert strain == pytest.approx(0, abs=1e-15)
+    np.testing.assert_allclose(np.hstack(end[:5]), np.hstack(start[:5]), rtol=0, atol=1e-13)
+    for change in (drive(back, 0.05), f"{drive(flow, 0.05)}\nfix_modify drive {back}"):
+        said = run_lmp_well(
+            f"""{load_plugin()}
+            read_restart {restart}
+            {after_restart()}
+            {change}
+            run 1600
+            print "strain $(f_drive[17])" """,
+            tmp_path,
+            ranks,
+        )
+        assert float(said.split("\nstrain ")[-1].split()[0]) == pytest.approx(0, abs=1e-15)
+
+
+def test_a_modified_flow_is_checked_as_a_new_one(packings, tmp_path):
+    for flow, then, sentence in (
+        ("shear 1e-3 volume constant", "compress 1e-3", "trace is -0.002, expected a trace of 0"),
+        ("shear 1e-3", "shear x", "x"),
+        ("shear 1e-3", "gradient 1e-3 0 0", "gradient with 3 numbers, expected 4"),
+        ("shear 1e-3", "drag 2", "fix_modify"),
+    ):
+        start = scene(packings[2], tmp_path / "start.data")
+        text = f"{load_plugin()}\n{start}\n{TILT}\n{drive(flow, 0.01)}\nfix_modify drive {then}"
+        assert sentence in error_of(run_lmp(text, tmp_path)), then
+    text = f"{load_plugin()}\n{scene(packings[2], tmp_path / 'start.data')}\n{drive('pure 1e-3', 0.01)}"
+    said = error_of(run_lmp(f"{text}\nfix_modify drive shear 1e-3", tmp_path))
+    assert "a box without tilt, expected one that shear can tilt" in said
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_stress_is_how_the_energy_changes_with_each_strain(dimension, packings, tmp_path, measured):
     """-V P_kj = dU / d(strain), particles moved with the box at fixed orientations."""

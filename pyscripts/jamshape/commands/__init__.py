@@ -25,6 +25,7 @@ COMMANDS = {
     "pack": "make one mechanically stable packing at a chosen energy",
     "slow": "compress at any rate, however slow, in the plane; record p(phi)",
     "shear": "shear at a constant rate; record stress, order and snapshots",
+    "cycle": "shear to and fro; record stress, and displacements from cycle to cycle",
     "aqs": "shear by small steps with a minimisation after each; record stress and its drops",
     "sweep": "make many packings on all cores",
     "reproduce": "make all data and figures of a paper, with its numbers beside ours",

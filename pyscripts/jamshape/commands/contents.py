@@ -33,7 +33,7 @@ from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
 _STATE = ("phi", "pressure", "u", "z", "rattlers")
 _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",
-         "flow", "strain_step", "strain_end", "hold_pressure", "outcome")  # fmt: skip
+         "amplitude", "period", "cycles", "flow", "strain_step", "strain_end", "hold_pressure", "outcome")  # fmt: skip
 
 
 class _Stored(NamedTuple):
@@ -56,6 +56,7 @@ _STORED = (
     _Stored("compression for a packing", "rate", _OTHER_COMMAND),
     _Stored("compression for a packing", "of_packing", _OTHER_COMMAND),
     _Stored("quasistatic shear", "shear_steps", _SAME_COMMAND),
+    _Stored("cyclic shear", "amplitude", _SAME_COMMAND),
     _Stored("shear", "gdot", _SAME_COMMAND),
     _Stored("run", "finished", _SAME_COMMAND),
     _Stored("packing", "", ""),

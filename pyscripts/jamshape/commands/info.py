@@ -37,6 +37,8 @@ _LINES = {
         "phi from {phi_start:g}",
         "to {phi_end:g}",
         "{flow} shear at gdot {gdot:g}",
+        "{flow} shear to strains of +-{amplitude:g}",
+        "{cycles} cycles of the period {period:g}",
         "steps of {strain_step:g}",
         "to strain {strain_end:g}",
         "at pressure {hold_pressure:g}",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from jamshape.drawing.text import ensemble_text, pressure_unit, systems_text
 from jamshape.measures.events import stress_drops
@@ -36,6 +36,27 @@ def draw_stress(axes: Axes, run: ShearOf) -> None:
     unit = pressure_unit([run.ensemble.system])
     axes.set(xlabel=r"strain $\gamma$", ylabel=rf"stress  ${unit}$", xlim=(0, strain[-1]))
     axes.set_title(title_of(run), size=9)
+    axes.legend(fontsize=8)
+
+
+class Cycles(NamedTuple):
+    """A cyclic shear."""
+
+    strain: FloatArray
+    stress: FloatArray
+    rows: int
+    """Number of rows of a cycle."""
+
+
+def draw_cycles(axes: Axes, run: Cycles, system: System) -> None:
+    """Draw the stress against the strain, with the first and the last whole cycle in color."""
+    axes.plot(run.strain, run.stress, color="0.7", lw=0.5)
+    last = max(1, (len(run.strain) - 1) // run.rows)
+    for cycle, color in {1: "C0", last: "C1"}.items():
+        part = slice((cycle - 1) * run.rows, cycle * run.rows + 1)
+        axes.plot(run.strain[part], run.stress[part], color=color, lw=1, label=f"cycle {cycle}")
+    axes.set(xlabel=r"strain $\gamma$", ylabel=rf"shear stress  ${pressure_unit([system])}$")
+    axes.set_title(f"{systems_text([system])}, cyclic shear", size=9)
     axes.legend(fontsize=8)
 
 

@@ -11,8 +11,9 @@ from jamshape.checks import require_stated
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.flow import motion
 from jamshape.flow.compression import Compression
+from jamshape.flow.cyclic_shear import CyclicShear
 from jamshape.flow.motion import FlowRun, Motion
-from jamshape.flow.shear import Shear
+from jamshape.flow.shear import Shear, Shearing
 from jamshape.lammps.session import Session
 from jamshape.recording.driver import Plan, Row, Told
 from jamshape.shapes.shape import Interaction
@@ -28,7 +29,11 @@ _ARGUMENTS = {"strain_end": "strain", "phi_sheared": "phi", "tolerance": "integr
 
 
 def plan(
-    start: Callable[[], Packing], settings: Motion, sizes: Sizes, made_from: Mapping[str, Any]
+    start: Callable[[], Packing],
+    settings: Motion,
+    sizes: Sizes,
+    made_from: Mapping[str, Any],
+    kind: type[LammpsDriver] | None = None,
 ) -> Plan:
     """Plan a compression or a shear.
 
@@ -41,18 +46,21 @@ def plan(
         Numbers of rows and frames.
     made_from
         Attributes of the particles and the start.
+    kind
+        Class of the driver; by default `LammpsDriver`.
     """
+    driver = kind or LammpsDriver
 
     def begin() -> LammpsDriver:
         law = Interaction(settings.k_e, settings.sides)
         first = start().sorted_by_id().with_(law=law, step=0, time=0.0)
         settings.all_steps(first)  # refuses what does not end
-        if isinstance(settings, Shear) and (said := settings.warning(first)):
+        if isinstance(settings, Shearing) and (said := settings.warning(first)):
             warnings.warn(said, stacklevel=2)
-        return LammpsDriver(first, settings, sizes)
+        return driver(first, settings, sizes)
 
     def restore(first: Packing, checkpoint: Checkpoint) -> LammpsDriver:
-        return LammpsDriver(first, settings, sizes, checkpoint or None)
+        return driver(first, settings, sizes, checkpoint or None)
 
     told = dataclasses.asdict(settings) | dict(made_from) | dataclasses.asdict(sizes)
     told["dt"] = told.pop("dt")  # may follow from the others
@@ -61,7 +69,7 @@ def plan(
 
 @dataclasses.dataclass(frozen=True)
 class Sizes:
-    """Numbers of samples of the observables and of snapshots over the whole run."""
+    """Numbers of samples of the observables and of snapshots, over the whole run or as the driver says."""
 
     rows: int = 400
     frames: int = 20
@@ -86,8 +94,7 @@ class LammpsDriver:
     def __init__(
         self, first: Packing, settings: Motion, sizes: Sizes, checkpoint: Checkpoint | None = None
     ) -> None:
-        every = max(1, settings.all_steps(first) // sizes.rows)
-        self._every, self._per_frame = every, every * max(1, sizes.rows // sizes.frames)
+        self._every, self._per_frame = self._spacing(settings, sizes, first)
         self._first, self.at_mark = first, False
         self._marked = checkpoint["evaluations"] if checkpoint else 0.0
         self._kept: Checkpoint | None = None  # of the present mark
@@ -97,6 +104,12 @@ class LammpsDriver:
         except BaseException:
             self._session.close()
             raise
+
+    @staticmethod
+    def _spacing(settings: Any, sizes: Sizes, first: Packing) -> tuple[int, int]:
+        """Return the numbers of steps between rows and between frames."""
+        every = max(1, settings.all_steps(first) // sizes.rows)
+        return every, every * max(1, sizes.rows // sizes.frames)
 
     @property
     def done(self) -> bool:
@@ -150,6 +163,7 @@ class LammpsDriver:
 
 def settings_of(stored: Mapping[str, Any]) -> Motion:
     """Read the settings of a run from the attributes of its file."""
-    kind = Shear if "gdot" in stored else Compression
+    kinds: dict[str, type[Motion]] = {"gdot": Shear, "amplitude": CyclicShear}
+    kind = next((kinds[name] for name in kinds if name in stored), Compression)
     names = {f.name for f in dataclasses.fields(kind)} & set(stored)
     return kind(**{name: stored[name] for name in names})

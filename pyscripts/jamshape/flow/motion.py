@@ -95,13 +95,18 @@ class Motion(ABC):
     def gradient(self) -> str:
         """Velocity gradient in the syntax of `fix overdamped/affine`."""
 
+    def gradient_at(self, step: int) -> str:
+        """Velocity gradient of the steps that follow one."""
+        del step
+        return self.gradient
+
     @abstractmethod
     def all_steps(self, start: Packing) -> int:
         """Count the time steps from a packing to the end."""
 
     @abstractmethod
     def steps_left(self, found: Mapping[str, float], dimension: int) -> int:
-        """Count the time steps from observed values to the end.
+        """Count the time steps from observed values, and the ``step``, to the end.
 
         Raises
         ------
@@ -168,7 +173,8 @@ class FlowRun(Generic[_Motion]):
             self._evaluations = checkpoint["evaluations"]
             session.load_restart(checkpoint["restart"], start)
         self._set_up()
-        self.last_step = session.step + settings.steps_left(self.measure(), start.dimension)
+        found = self.measure() | {"step": session.step}
+        self.last_step = session.step + settings.steps_left(found, start.dimension)
 
     def _set_up(self) -> None:
         s = self.settings
@@ -189,7 +195,7 @@ class FlowRun(Generic[_Motion]):
     def _fix(self) -> str:
         s = self.settings
         return (
-            f"fix flow all overdamped/affine drag {s.k_d!r} {s.gradient}"
+            f"fix flow all overdamped/affine drag {s.k_d!r} {s.gradient_at(self.session.step)}"
             f" integrator {s.integrator}"
             f"{f' tolerance {s.tolerance!r}' if s.chooses_steps else ''}"
         )
@@ -202,6 +208,11 @@ class FlowRun(Generic[_Motion]):
         self.session.commands(
             f"unfix flow\n{self._fix()}\ntimestep {self.settings.dt!r}\nrun 0 post no"
         )
+
+    def steer(self) -> None:
+        """Continue with the velocity gradient of the present step; strain and integrator go on."""
+        gradient = self.settings.gradient_at(self.session.step)
+        self.session.commands(f"fix_modify flow {gradient}\nrun 0 post no")
 
     @property
     def time(self) -> float:

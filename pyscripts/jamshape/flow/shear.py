@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -20,8 +21,8 @@ _WORDS = {"simple": "shear", "pure": "pure"}
 FLOWS = tuple(_WORDS)
 """Simple shear, u_x = gdot y, and pure shear, which stretches x and shrinks y."""
 
-# Largest shear of the box in a time step: neighbours pass each other in discrete steps.
-_LARGEST_STRAIN = 0.01
+LARGEST_STRAIN = 0.01
+"""Largest shear of the box in a time step: neighbours pass each other in discrete steps."""
 
 # Drag on a particle held by others, over the strength of a contact, above which rods may begin to cross.
 _BEARABLE = 0.5
@@ -29,8 +30,65 @@ _BEARABLE = 0.5
 _STRAINS = {"simple": "shear_strain", "pure": "pure_strain"}
 
 
+class Shearing(Motion):
+    """Settings of any shear in LAMMPS, as a base class."""
+
+    flow: str
+
+    of_packing: ClassVar[Mapping[str, int]] = dict(Motion.of_packing) | {
+        "normal_difference": 14, "p_xy": 15, "sigma": 16, "mu": 17, "director": 21,
+    }  # fmt: skip
+    of_fix: ClassVar[Mapping[str, int]] = dict(Motion.of_fix) | {
+        "shear_strain": 16, "pure_strain": 17, "turned": 18,
+    }  # fmt: skip
+    tilts: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        require_one_of("flow", self.flow, FLOWS)
+        super().__post_init__()
+        if self.gdot * self.dt > LARGEST_STRAIN * (1 + 1e-9):
+            msg = (
+                f"gdot = {self.gdot:g} and dt = {self.dt:g} shear by {self.gdot * self.dt:g} in a step,"
+                f" expected at most {LARGEST_STRAIN:g}; use a smaller time step"
+            )
+            raise ValueError(msg)
+
+    @property
+    @abstractmethod
+    def gdot(self) -> float:
+        """Magnitude of the rate, [1/time]."""
+
+    @property
+    def gradient(self) -> str:
+        """Velocity gradient in the syntax of `fix overdamped/affine`."""
+        return f"{_WORDS[self.flow]} {self.gdot!r}"
+
+    def strained(self, found: Mapping[str, float]) -> float:
+        """Return the strain among observables."""
+        return found[_STRAINS[self.flow]]
+
+    def drag_over_force(self, packing: Packing) -> float:
+        """Estimate the drag on a particle held by others, over the strength of one contact.
+
+        The drag is that at the host's velocity at its outer radius; a harmonic contact bears its
+        stiffness over the distance of first touch.
+        """
+        pull = self.k_d * packing.measures * self.gdot * packing.outer_radius
+        return float((2 * pull * packing.inner_radius).max() / self.k_e)
+
+    def warning(self, packing: Packing) -> str:
+        """Return a warning if the rate may drive particles through each other, else an empty text."""
+        ratio = self.drag_over_force(packing)
+        if ratio < _BEARABLE:
+            return ""
+        return (
+            f"gdot = {self.gdot:g} drags particles with up to {ratio:.2g} times the force that a contact bears, so that long"
+            f" ones may cross, which ends the run; contacts bear rates below {self.gdot * _BEARABLE / ratio:.2g}"
+        )
+
+
 @dataclass(frozen=True)
-class Shear(Motion):
+class Shear(Shearing):
     """Settings of a shear.
 
     Parameters
@@ -55,56 +113,18 @@ class Shear(Motion):
     strain_end: float = 5.0
     flow: str = "simple"
 
-    of_packing: ClassVar[Mapping[str, int]] = dict(Motion.of_packing) | {
-        "normal_difference": 14, "p_xy": 15, "sigma": 16, "mu": 17, "director": 21,
-    }  # fmt: skip
-    of_fix: ClassVar[Mapping[str, int]] = dict(Motion.of_fix) | {
-        "shear_strain": 16, "pure_strain": 17, "turned": 18,
-    }  # fmt: skip
-    tilts: ClassVar[bool] = True
     name: ClassVar[str] = "shear"
 
     def __post_init__(self) -> None:
         require_positive(gdot=self.gdot, strain_end=self.strain_end)
-        require_one_of("flow", self.flow, FLOWS)
         if self.flow == "pure":
             require_in("strain", self.strain_end, RANGES["pure_strain"])
         super().__post_init__()
-        if self.gdot * self.dt > _LARGEST_STRAIN * (1 + 1e-9):
-            msg = (
-                f"gdot = {self.gdot:g} and dt = {self.dt:g} shear by {self.gdot * self.dt:g} in a step,"
-                f" expected at most {_LARGEST_STRAIN:g}; use a smaller time step"
-            )
-            raise ValueError(msg)
-
-    @property
-    def gradient(self) -> str:
-        """Velocity gradient in the syntax of `fix overdamped/affine`."""
-        return f"{_WORDS[self.flow]} {self.gdot!r}"
 
     def in_steps(self, rows: int) -> Shear:
         """Return the same with a time step equal to the interval of rows, or a divisor of it."""
-        steps = rows * math.ceil(self.strain_end / (rows * _LARGEST_STRAIN))
+        steps = rows * math.ceil(self.strain_end / (rows * LARGEST_STRAIN))
         return dataclasses.replace(self, dt=self.strain_end / (self.gdot * steps))
-
-    def drag_over_force(self, packing: Packing) -> float:
-        """Estimate the drag on a particle held by others, over the strength of one contact.
-
-        The drag is that at the host's velocity at its outer radius; a harmonic contact bears its
-        stiffness over the distance of first touch.
-        """
-        pull = self.k_d * packing.measures * self.gdot * packing.outer_radius
-        return float((2 * pull * packing.inner_radius).max() / self.k_e)
-
-    def warning(self, packing: Packing) -> str:
-        """Return a warning if the rate may drive particles through each other, else an empty text."""
-        ratio = self.drag_over_force(packing)
-        if ratio < _BEARABLE:
-            return ""
-        return (
-            f"gdot = {self.gdot:g} drags particles with up to {ratio:.2g} times the force that a contact bears, so that long"
-            f" ones may cross, which ends the run; contacts bear rates below {self.gdot * _BEARABLE / ratio:.2g}"
-        )
 
     def all_steps(self, start: Packing) -> int:
         """Count the time steps from a packing to the end."""
@@ -115,10 +135,6 @@ class Shear(Motion):
         """Count the time steps from observed values to the end."""
         del dimension
         return self._steps(self.strain_end - self.strained(found))
-
-    def strained(self, found: Mapping[str, float]) -> float:
-        """Return the strain among observables."""
-        return found[_STRAINS[self.flow]]
 
     def where(self, found: Mapping[str, float]) -> str:
         """Describe the position and the end."""

@@ -13,11 +13,11 @@ from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
 from jamshape.drawing.pressure import draw_pressure
-from jamshape.drawing.shear import draw_steps, draw_stress
+from jamshape.drawing.shear import Cycles, draw_cycles, draw_steps, draw_stress
 from jamshape.files.ensembles import PackingFile
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.run import QuasistaticShearFile, Recorded, RunFile, ShearFile
+from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, Recorded, RunFile, ShearFile
 from jamshape.measures.runs import read_run
 from jamshape.measures.shears import read_shear
 from jamshape.packing import Packing
@@ -39,7 +39,7 @@ def plot(
 
     Parameters
     ----------
-    thing : Packing, RunFile, ShearFile, QuasistaticShearFile or Modes
+    thing : Packing, RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile or Modes
     axes : matplotlib Axes, optional
         Axes without a projection, for packings in space too; by default a new figure of
         `matplotlib.pyplot`.
@@ -140,6 +140,12 @@ def _shear(run: ShearFile, axes: Axes, color: str) -> None:
     draw_stress(axes, read_shear(run.file))
 
 
+def _cyclic(run: CyclicShearFile, axes: Axes, color: str) -> None:
+    del color
+    cycles = Cycles(run.strain, run.stress, int(run.about["rows"]))
+    draw_cycles(axes, cycles, PackingFile.read(run.file).system())
+
+
 def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
     del color
     draw_steps(axes, run.observables, PackingFile.read(run.file).system())
@@ -156,6 +162,7 @@ _DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {
     Packing: _packing,
     RunFile: _run,
     ShearFile: _shear,
+    CyclicShearFile: _cyclic,
     QuasistaticShearFile: _quasistatic,
     Modes: _modes,
 }

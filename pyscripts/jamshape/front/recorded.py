@@ -10,7 +10,8 @@ from typing import Any
 from jamshape.arguments import checked
 from jamshape.checks import require_given, require_path
 from jamshape.files.h5md import FileFormatError, read_attributes
-from jamshape.flow import implicit_driver, lammps_driver, quasistatic_driver
+from jamshape.flow import cyclic_driver, implicit_driver, lammps_driver, quasistatic_driver
+from jamshape.flow.cyclic_shear import CyclicShear
 from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.front.progress import display
 from jamshape.front.run import Recorded, run_file
@@ -35,13 +36,13 @@ def resume(file: str | Path, *, seconds: float | None = None, progress: bool = T
     Parameters
     ----------
     file : path
-        File of `compress`, `slow_compress`, `shear` or `quasistatic_shear`.
+        File of `compress`, `slow_compress`, `shear`, `cyclic_shear` or `quasistatic_shear`.
     seconds, progress
         See `compress`.
 
     Returns
     -------
-    RunFile, ShearFile or QuasistaticShearFile
+    RunFile, ShearFile, CyclicShearFile or QuasistaticShearFile
 
     Raises
     ------
@@ -78,9 +79,14 @@ def _plan_of(path: Path, stored: Mapping[str, Any]) -> Plan:
         plan = quasistatic_driver.plan(_no_start, how, int(stored["frames"]), {})
     elif {"finished", "rows", "frames"} <= stored.keys():
         sizes = lammps_driver.Sizes(int(stored["rows"]), int(stored["frames"]))
-        plan = lammps_driver.plan(_no_start, lammps_driver.settings_of(stored), sizes, {})
+        settings = lammps_driver.settings_of(stored)
+        of = cyclic_driver if isinstance(settings, CyclicShear) else lammps_driver
+        plan = of.plan(_no_start, settings, sizes, {})
     else:
-        msg = f"{path} holds no run, expected a file of compress, slow_compress, shear or quasistatic_shear"
+        msg = (
+            f"{path} holds no run, expected a file of compress, slow_compress, shear, cyclic_shear or"
+            " quasistatic_shear"
+        )
         raise FileFormatError(msg)
     return dataclasses.replace(plan, settings={})
 

@@ -27,6 +27,7 @@ from jamshape.files.h5md import (
     read_style,
 )
 from jamshape.files.lock import Lock
+from jamshape.flow.cyclic_shear import QUARTERS
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import follow, place
 from jamshape.measures.events import Event, stress_drops
@@ -288,6 +289,61 @@ class ShearFile(Recorded):
         return f"<Shear of {self._who()} at {start}: {len(self)} frames to {end}{self._where()}>"
 
 
+class CyclicShearFile(Recorded):
+    """A cyclic shear in its H5MD file; parameters as in `Recorded`.
+
+    Frames are of ends of cycles, at strain 0.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> rods = js.Spherocylinders(alpha=1)
+    >>> run = js.cyclic_shear(rods, n=24, phi=0.8, amplitude=0.02, period=100, cycles=4, file="cycles.h5", progress=False)
+    >>> run
+    <Cyclic shear of 24 spherocylinders in 2D at phi = 0.8: 4 cycles to strains of +-0.02, displacement = ..., in cycles.h5>
+    >>> run.displacement.shape, run.dissipated.shape, len(run)
+    ((4,), (4,), 5)
+    """
+
+    @property
+    def strain(self) -> FloatArray:
+        """(T,) strains of the box."""
+        return self["pure_strain" if self.about["flow"] == "pure" else "shear_strain"]
+
+    @property
+    def stress(self) -> FloatArray:
+        """(T,) stress that does work on the strain, [energy / length^D]: -p_xy, or p_yy - p_xx of pure shear."""
+        return -self["normal_difference" if self.about["flow"] == "pure" else "p_xy"]
+
+    @property
+    def gdot(self) -> float:
+        """Magnitude of the rate, 4 amplitude / period, [1/time]."""
+        return QUARTERS * float(self.about["amplitude"]) / float(self.about["period"])
+
+    @property
+    def displacement(self) -> FloatArray:
+        """(C,) mean squared displacement in each cycle, between its ends, [length^2]; 0 where particles return."""
+        rows = int(self.about["rows"])
+        return self["displacement"][rows::rows]
+
+    @property
+    def dissipated(self) -> FloatArray:
+        """(C,) energy that the drag dissipates in each cycle over the volume, by the trapezoidal rule, [energy / length^D]."""
+        rows, period = int(self.about["rows"]), float(self.about["period"])
+        power = self["dissipation"]
+        means = (power[1:] + power[:-1]) / 2
+        whole = means[: len(means) // rows * rows].reshape(-1, rows)
+        return np.asarray(whole.mean(axis=1) * period)
+
+    def __repr__(self) -> str:
+        cycles = len(self.displacement)
+        start = (
+            f"phi = {self.phi[0]:.5g}: {cycles} cycles to strains of +-{self.about['amplitude']:g}"
+        )
+        end = f", displacement = {self.displacement[-1]:.3g}" if cycles else ""
+        return f"<Cyclic shear of {self._who()} at {start}{end}{self._where()}>"
+
+
 class QuasistaticShearFile(Recorded):
     """A quasistatic shear in its H5MD file; parameters as in `Recorded`.
 
@@ -374,5 +430,9 @@ def run_file(path: Path, folder: Any = None) -> Recorded:
     return kind(path, folder)
 
 
-_KINDS: dict[str, type[Recorded]] = {"gdot": ShearFile, "shear_steps": QuasistaticShearFile}
+_KINDS: dict[str, type[Recorded]] = {
+    "gdot": ShearFile,
+    "amplitude": CyclicShearFile,
+    "shear_steps": QuasistaticShearFile,
+}
 """Classes by an attribute that only their files have."""

@@ -5,8 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from jamshape.arguments import checked
-from jamshape.checks import require_given, require_no_effect, require_stated
-from jamshape.flow import implicit_driver, lammps_driver, quasistatic_driver
+from jamshape.checks import (
+    RANGES,
+    ArgumentError,
+    described,
+    require_given,
+    require_no_effect,
+    require_stated,
+)
+from jamshape.flow import cyclic_driver, implicit_driver, lammps_driver, quasistatic_driver
+from jamshape.flow.cyclic_shear import QUARTERS, CyclicShear, dividing, longest_step
 from jamshape.flow.implicit import METHODS
 from jamshape.flow.lammps_driver import Sizes
 from jamshape.flow.quasistatic import QuasistaticShear
@@ -14,7 +22,7 @@ from jamshape.flow.shear import Shear
 from jamshape.flow.slow_shear import SlowShear
 from jamshape.front.progress import place
 from jamshape.front.recorded import recorded
-from jamshape.front.run import QuasistaticShearFile, ShearFile
+from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, ShearFile
 from jamshape.front.starts import Asked, Start
 from jamshape.landscape import Landscape, State
 from jamshape.old_names import accepts_old
@@ -152,6 +160,122 @@ def shear(
 
 
 @checked
+def cyclic_shear(
+    particles: Particles | None = None,
+    *,
+    n: int | None = None,
+    dimension: int | None = None,
+    phi: float | None = None,
+    amplitude: float = 0.05,
+    period: float = 2000.0,
+    cycles: int = 20,
+    flow: str = "simple",
+    seed: int | None = None,
+    start: Packing | str | Path | None = None,
+    sides: int = 2,
+    integrator: str | None = None,
+    dt: float | None = None,
+    integration_tolerance: float | None = None,
+    rows: int = 100,
+    frames: int | None = None,
+    file: str | Path | None = None,
+    again: bool = False,
+    seconds: float | None = None,
+    progress: bool = True,
+) -> CyclicShearFile:
+    """Shear particles to and fro between two strains, at a constant packing fraction, in LAMMPS.
+
+    The strain is a triangle wave: from 0 to the amplitude, to minus the amplitude, and back to 0, at the constant rate 4
+    amplitude / period.
+
+    Parameters
+    ----------
+    particles : Particles
+        Such as ``Spherocylinders(alpha=4)``; omit with a start.
+    n : int, optional
+        Number of particles; 256 by default, or those of the start.
+    dimension : int, optional
+        2 or 3; 2 by default, or that of the start.
+    phi : float, optional
+        Packing fraction, reached by fast compression of a random packing; 0.8 by default, or that of the start.
+    amplitude : float
+        Largest strain.
+    period : float, [time]
+        Time of a cycle.
+    cycles : int
+        Number of cycles.
+    flow : {"simple", "pure"}
+    seed : int, optional
+        Random seed of the start; 1 by default.
+    start : Packing or path, optional
+        Initial packing, at its own packing fraction; the last frame of a file.
+    sides : int
+        Bonds of a side-to-side contact of rods, 1 or 2.
+    integrator : str, optional
+        ``rkc2``, ``heun/adaptive`` or ``heun``, as in `compress`; by default ``heun`` with one bond or with `dt`, else ``rkc2``.
+    dt : float, [time], optional
+        Largest time step of ``heun``, 0.05 by default; the next smaller one that divides the interval of rows is used.
+    integration_tolerance : float, optional
+        Local error of a step over the typical overlap, for the other integrators; 1e-4 by default.
+    rows : int
+        Number of samples in a cycle, a multiple of 4.
+    frames : int, optional
+        Least number of snapshots to keep, at ends of cycles; by default one for each cycle.
+    file : path, optional
+        H5MD file of the run, as in `compress`.
+    again, seconds, progress
+        See `compress`.
+
+    Returns
+    -------
+    CyclicShearFile
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range or has no effect, the file holds another run, or neither particles nor a start
+        is given.
+    PluginError
+        If there is no LAMMPS or no plugin for it.
+
+    Warns
+    -----
+    UserWarning
+        If the rate is so large that long particles may pass through each other, which ends the run.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> discs = js.Spherocylinders(alpha=0)
+    >>> run = js.cyclic_shear(discs, n=24, phi=0.7, amplitude=0.02, period=100, cycles=4, rows=20, progress=False)
+    >>> bool(run.displacement[-1] < run.displacement[0])
+    True
+    """
+    require_stated(amplitude=amplitude, period=period, cycles=cycles, rows=rows)
+    require_given(dt=dt, integration_tolerance=integration_tolerance, frames=frames)
+    _require_cycle(amplitude, period, rows)
+    of = Start.of(particles, Asked(n, phi, seed, dimension), start, usual_phi=0.8, sides=sides, phi_name=_PHI_NAME)  # fmt: skip
+    at = place(file, "cycles.h5")
+    integrator = integrator or ("heun" if dt is not None or sides == 1 else "rkc2")
+    longest = longest_step(amplitude, period)
+    if integrator == "heun":
+        require_no_effect("integrator", integrator, integration_tolerance=integration_tolerance)
+        longest = min(longest, 0.05 if dt is None else dt)
+    else:
+        require_no_effect("integrator", integrator, dt=dt)
+    settings = CyclicShear(
+        amplitude=amplitude, period=period, cycles=cycles, flow=flow,
+        dt=dividing(period, rows, longest), sides=sides, k_e=of.k_e, integrator=integrator,
+        tolerance=integration_tolerance or _ERROR,
+    )  # fmt: skip
+    sizes = Sizes(rows, cycles if frames is None else frames)
+    made_from = of.made_from | {"dimension": of.dimension}
+    plan = cyclic_driver.plan(lambda: _flowing(of), settings, sizes, made_from)
+    recorded(at.path, plan, again=again, seconds=seconds, progress=progress)
+    return CyclicShearFile(*at)
+
+
+@checked
 def quasistatic_shear(
     particles: Particles | None = None,
     *,
@@ -268,6 +392,18 @@ def _usual(gdot: float, dimension: int, *, whole: bool) -> str:
     if not whole:
         return "heun"
     return "tr-bdf2" if dimension == 2 and gdot <= _SLOW else "rkc2"
+
+
+def _require_cycle(amplitude: float, period: float, rows: int) -> None:
+    """Refuse a rate out of range, and rows that miss the ends of the strain."""
+    rate, allowed = QUARTERS * amplitude / period, RANGES["gdot"]
+    if not allowed.low <= rate <= allowed.high:
+        expected = described(allowed)
+        said = f"{{amplitude}} and {{period}} make a rate of {rate:g}, expected {expected}"
+        raise ArgumentError(said, {"amplitude": amplitude, "period": period})
+    if rows % QUARTERS:
+        said = "{rows} samples in a cycle miss the largest strain, expected a multiple of 4"
+        raise ArgumentError(said, {"rows": rows})
 
 
 def _require_plane(of: Start, sides: int) -> None:

@@ -11,7 +11,7 @@ import pytest
 import jamshape as js
 from jamshape.arguments import ArgumentTypeError, checked
 from jamshape.front.pictures import _DRAWN
-from jamshape.front.run import QuasistaticShearFile, RunFile, ShearFile
+from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, RunFile, ShearFile
 
 RODS = js.Spherocylinders(alpha=1)
 HERE = {"n": 8, "progress": False}
@@ -214,7 +214,7 @@ def test_what_is_not_in_a_run_is_named(quasistatic):
 
 
 def test_every_run_is_drawn():
-    assert {RunFile, ShearFile, QuasistaticShearFile} <= set(_DRAWN)
+    assert {RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile} <= set(_DRAWN)
 
 
 @pytest.mark.parametrize("projection", ["3d", "polar"])

@@ -49,6 +49,13 @@ def sheared(**how):
     return js.shear(discs, phi=0.8, gdot=2e-2, strain=0.2, rows=5, frames=2, **QUICK, **how)
 
 
+def cyclic(**how):
+    discs = js.Spherocylinders(alpha=0)
+    return js.cyclic_shear(
+        discs, phi=0.8, amplitude=0.02, period=20, cycles=2, rows=8, **QUICK, **how
+    )
+
+
 def quasistatic(**how):
     return js.quasistatic_shear(start=packed(**how), step=2e-3, strain=4e-3, progress=False)
 
@@ -84,6 +91,7 @@ def made(folder):
         "OnsetFit": run.onset(),
         "Jamming": run.jamming(progress=False),
         "ShearFile": sheared(),
+        "CyclicShearFile": cyclic(),
         "QuasistaticShearFile": quasistatic(),
         "Event": quasistatic().events(),
         "Interaction": js.Interaction(2.0, 1),
@@ -98,7 +106,7 @@ def objects(tmp_path_factory):
 
 NAMES = """Box|Packing|MeasuredPacking|its copy|Kind|Particles|Particles mixed|Particles given|Modes|Modes of a file
 ModeTable|DynamicalMatrix|Moduli|Contacts|ContactNetwork|State|Landscape|Recipe|RunFile|RunFile of a file|OnsetFit
-Jamming|ShearFile|QuasistaticShearFile|Event|Interaction|NotReachedWarning""".replace(
+Jamming|ShearFile|CyclicShearFile|QuasistaticShearFile|Event|Interaction|NotReachedWarning""".replace(
     "\n", "|"
 ).split("|")
 NAMES += [f"shape {name}" for name in SHAPES]
