@@ -209,7 +209,7 @@ CASES = [
     ("sweep --out new --alpha x", "invalid float"),
     ("sweep --out new --shape dimer --spherocylinder 1", "--shape dimer has no effect without --alpha or --kind"),
     ("sweep --out new --alpha 1 --kapa 1", "unrecognized arguments"),
-    ("sweep --out new --alpha 1 --seconds 5", "--seconds is 5.0, which stops one packing and no sweep"),
+    ("sweep --out new --alpha 1 --seconds -1", "--seconds is -1.0, expected a time from 0 to 1e+09"),
     ("sweep --out new --superellipsoid 1", "expected 3"),
     ("sing", "there is no command"),
     ("", "usage"),

@@ -28,7 +28,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from jamshape.checks import TIME_IS_UP, require_stated
+from jamshape.checks import RANGES, TIME_IS_UP, require_in
 from jamshape.command import report
 from jamshape.commands import main as command
 from jamshape.commands import pack
@@ -285,9 +285,9 @@ def made(options: Namespace) -> Iterator[Complaint | None]:
 
 def main(options: Namespace) -> int:
     """Run all samples; return the exit code."""
-    options.out.mkdir(parents=True, exist_ok=True)
     if options.seconds is not None:
-        require_stated(seconds=options.seconds)
+        require_in("--seconds", options.seconds, RANGES["seconds"])
+    options.out.mkdir(parents=True, exist_ok=True)
     options.until = time.monotonic() + (options.seconds or 0.0)
     total, done = options.samples * len(particles(options)), 0
     failures: list[Complaint] = []

@@ -1,5 +1,5 @@
 import math
-from dataclasses import replace
+from copy import deepcopy
 from functools import cache
 
 import numpy as np
@@ -9,6 +9,7 @@ from squeezed import squeezed
 from jamshape.contacts import coordination, find_contacts
 from jamshape.landscape import Landscape
 from jamshape.minima import History, Outcome, minimise, residual_of
+from jamshape.minima.checkpoints import search_of, told_search
 from jamshape.minima.target import Search, Target, TargetError, bisection, extrapolation, find
 
 # n, alpha, and the packing fraction just below jamming where the search begins
@@ -149,7 +150,11 @@ def test_halving_ends_with_a_sentence_where_lambda_is_too_short():
 
 
 def copied(search):
-    return replace(search, history=History())
+    """As from a checkpoint."""
+    told = deepcopy(
+        {name: value for name, value in told_search(search).items() if value is not None}
+    )
+    return search_of(told, History())
 
 
 @pytest.mark.parametrize("name", ["16 discs", "16 rods"])
