@@ -139,7 +139,9 @@ class ApproachDriver:
         flow = Compression(kappa=told["kappa"], phi_end=_NO_END, dt=told["dt"], sides=2)
         self._session = Session()
         try:
-            self._run = CompressionRun(self._session, flow, first, checkpoint["run"] if checkpoint else None)
+            self._run = CompressionRun(
+                self._session, flow, first, checkpoint["run"] if checkpoint else None
+            )
         except BaseException:
             self._session.close()
             raise
