@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import pytest
 from killing import forked
 
 import jamshape as js
@@ -36,6 +38,25 @@ RODS = js.Spherocylinders(alpha=1)
 DISCS = js.Spherocylinders(alpha=0.01)
 DIMERS = js.Dimers(alpha=1)
 BODIES = js.Superellipsoids(w1=0.6)
+
+
+def in_turn(*columns: Any) -> list[Any]:
+    """Return all combinations of parameters; in the default suite only those that take turns: each value occurs."""
+    every = []
+    for numbers in itertools.product(*(range(len(column)) for column in columns)):
+        values = [column[k] for column, k in zip(columns, numbers, strict=True)]
+        first, *others = numbers
+        is_quick = all(
+            k == first % len(column) for k, column in zip(others, columns[1:], strict=True)
+        )
+        every.append(pytest.param(*values, marks=() if is_quick else pytest.mark.validate))
+    return every
+
+
+def quick(names: Iterable[str], kept: Container[str]) -> list[Any]:
+    """Return parameters, of which the default suite takes those that are kept."""
+    return [n if n in kept else pytest.param(n, marks=pytest.mark.validate) for n in names]
+
 
 # --- starts ---------------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ h5py = pytest.importorskip("h5py")
 pytestmark = pytest.mark.lammps
 
 KINDS = ("packing", "run", "unfinished", "modes", "mdanalysis")
-FLIPS = [pytest.param(25, id="few"), pytest.param(200, id="many", marks=pytest.mark.validate)]
+FLIPS = [pytest.param(10, id="few"), pytest.param(200, id="many", marks=pytest.mark.validate)]
 CUTS = 40
 
 

@@ -24,6 +24,8 @@ from drivers import (
     RODS,
     SHORT,
     dense,
+    in_turn,
+    quick,
     resume,
     run_case,
     started,
@@ -104,7 +106,7 @@ def unfinished(name, file, starts):
 # --- the same bits --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, {*DRIVERS, "shear in space"}))
 def test_checkpoints_do_not_change_a_run(name, whole):
     """In a process of its own without any, and here with one at every mark."""
     without, every, *_ = whole(name)
@@ -112,7 +114,7 @@ def test_checkpoints_do_not_change_a_run(name, whole):
     assert read_attributes(without)["finished"]
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, {*DRIVERS, "shear in space"}))
 def test_a_run_put_down_at_every_mark_ends_as_if_it_were_not(
     name, whole, starts, tmp_path, patched
 ):
@@ -167,11 +169,11 @@ def kill_and_compare(name, whole, starts, folder, kills, seed):
     return count
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", quick(CASES, DRIVERS))
 def test_a_run_that_is_killed_ends_as_if_nothing_had_happened(
     name, whole, starts, tmp_path, measured
 ):
-    kills = 5 if name in DRIVERS else 2
+    kills = 3 if name in DRIVERS else 2
     measured(kills=kill_and_compare(name, whole, starts, tmp_path, kills, seed=len(name)))
 
 
@@ -201,11 +203,12 @@ def going(name, file, starts, patches, **more):
 
 
 # An interrupt ends Python by a KeyboardInterrupt.
-@pytest.mark.parametrize(
-    ("number", "code"), [(signal.SIGINT, 1), (signal.SIGTERM, -signal.SIGTERM)]
-)
-@pytest.mark.parametrize("name", DRIVERS)
-def test_a_signal_ends_a_run_at_its_next_mark(name, number, code, starts, tmp_path):
+SIGNALS = [(signal.SIGINT, 1), (signal.SIGTERM, -signal.SIGTERM)]
+
+
+@pytest.mark.parametrize(("name", "signal_and_code"), in_turn([*DRIVERS], SIGNALS))
+def test_a_signal_ends_a_run_at_its_next_mark(name, signal_and_code, starts, tmp_path):
+    number, code = signal_and_code
     file = tmp_path / "run.h5"
     process = going(name, file, starts, EVERY)
     os.kill(process.pid, number)
@@ -219,12 +222,10 @@ def test_a_signal_ends_a_run_at_its_next_mark(name, number, code, starts, tmp_pa
     assert names(tmp_path) == ALONE
 
 
-@pytest.mark.parametrize(
-    ("number", "code"), [(signal.SIGINT, 1), (signal.SIGTERM, -signal.SIGTERM)]
-)
-@pytest.mark.parametrize("name", DRIVERS)
-def test_a_second_signal_ends_a_run_at_once(name, number, code, starts, tmp_path):
+@pytest.mark.parametrize(("name", "signal_and_code"), in_turn([*DRIVERS], SIGNALS[::-1]))
+def test_a_second_signal_ends_a_run_at_once(name, signal_and_code, starts, tmp_path):
     """Even if there is no mark for minutes."""
+    number, code = signal_and_code
     file = tmp_path / "run.h5"
     process = going(name, file, starts, (*FAR, *NONE))
     time.sleep(0.5)
@@ -388,8 +389,7 @@ def with_progress(name, file, starts, target):
     os._exit(0)  # multiprocessing would fail to flush it
 
 
-@pytest.mark.parametrize("target", ["/dev/full", "closed", "none"])
-@pytest.mark.parametrize("name", DRIVERS)
+@pytest.mark.parametrize(("name", "target"), in_turn([*DRIVERS], ["/dev/full", "closed", "none"]))
 def test_no_run_ends_for_its_standard_error(name, target, whole, starts, tmp_path):
     file = tmp_path / "run.h5"
     args = (name, file, starts, target)
@@ -423,8 +423,9 @@ def without_a_part(file):
     del group.attrs[next(name for name in group.attrs if name != "format")]
 
 
-@pytest.mark.parametrize("damage", [forgotten, of_another_version, without_a_part])
-@pytest.mark.parametrize("name", DRIVERS)
+@pytest.mark.parametrize(
+    ("name", "damage"), in_turn([*DRIVERS], [forgotten, of_another_version, without_a_part])
+)
 def test_a_checkpoint_that_cannot_be_used_is_a_sentence(name, damage, starts, tmp_path, patched):
     patched(*SHORT, *NONE)
     file = tmp_path / "run.h5"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drivers import EVERY
+from drivers import EVERY, quick
 from killing import (
     GIVEN,
     command,
@@ -169,7 +169,10 @@ def kill_and_compare(whole, tmp_path, name, kills, seed):
     return count
 
 
-@pytest.mark.parametrize("name", CASES)
+QUICK = {"pack by dynamics", "sweep", "initial, H5MD", "modes", "draw", "export"}
+
+
+@pytest.mark.parametrize("name", quick(CASES, QUICK))
 def test_a_run_that_is_killed_ends_as_if_nothing_had_happened(whole, tmp_path, name, measured):
     measured(kills=kill_and_compare(whole, tmp_path, name, kills=2, seed=1))
 

@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from drivers import EVERY, NONE, SHORT
+from drivers import EVERY, NONE, SHORT, quick
 from killing import differences, ended, forked, said
 
 import jamshape as js
@@ -63,7 +63,7 @@ def whole(tmp_path_factory):
     return of
 
 
-@pytest.mark.parametrize("name", PACKINGS)
+@pytest.mark.parametrize("name", quick(PACKINGS, {"strict", "Monte Carlo", "dynamics"}))
 def test_checkpoints_do_not_change_a_packing(name, whole, tmp_path):
     file = tmp_path / "packing.h5"
     code = ended(forked(pack, (name, file), tmp_path / "said.log", (*MARKS, *EVERY)))
@@ -82,7 +82,7 @@ def put_down(name, file):
     assert stops > 2
 
 
-@pytest.mark.parametrize("name", PACKINGS)
+@pytest.mark.parametrize("name", quick(PACKINGS, {"second attempt", "equal steps", "dynamics"}))
 def test_a_packing_put_down_again_and_again_ends_as_if_it_were_not(name, whole, tmp_path):
     file = tmp_path / "packing.h5"
     code = ended(forked(put_down, (name, file), tmp_path / "said.log", (*MARKS, *NONE)), 240)
