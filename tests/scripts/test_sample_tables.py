@@ -27,7 +27,7 @@ def folder(tmp_path_factory):
         js.Spherocylinders(alpha=4), n=16, seed=1, u0=1e-12, file=packing, progress=False
     )
     js.modes(packing).save(root / "modes" / "modes" / "alpha4_seed1.modes.h5")
-    for others in ("search", "path", "run"):
+    for others in ("making", "run"):
         (packing.parent / f"alpha4_seed2.h5.{others}.h5").write_bytes(b"half of a packing")
     (root / "runs").mkdir()
     for name, finished in (("slow1", True), ("slow2", False)):

@@ -19,6 +19,7 @@ from jamshape.flow.compression import Compression, CompressionRun
 from jamshape.lammps.session import Session
 from jamshape.packing import Packing
 from jamshape.recording.driver import Plan, Row, Told
+from jamshape.shapes.shape import Interaction
 
 ROWS_PER_MARK = 50
 """Rows between two marks."""
@@ -108,7 +109,9 @@ def plan(start: Callable[[], Packing], settings: Approach, made_from: Mapping[st
     """Plan an approach to jamming, and the return to a vanishing pressure."""
 
     def begin() -> ApproachDriver:
-        return ApproachDriver(start(), settings)
+        # As the file has it: LAMMPS's own copy has other bits.
+        law = Interaction(sides=2)
+        return ApproachDriver(start().sorted_by_id().with_(law=law, step=0, time=0.0), settings)
 
     def restore(first: Packing, checkpoint: Checkpoint) -> ApproachDriver:
         return ApproachDriver(first, settings, checkpoint)
@@ -133,7 +136,7 @@ class ApproachDriver:
         self, first: Packing, settings: Approach, checkpoint: Checkpoint | None = None
     ) -> None:
         told = checkpoint or {"kappa": settings.kappa_start, "dt": settings.dt, "rows": 0}
-        self._settings, self._rows = settings, told["rows"]
+        self._first, self._settings, self._rows = first, settings, told["rows"]
         self._pressure: float
         self._pressure, self._marked = told.get("pressure", math.inf), checkpoint or None
         flow = Compression(kappa=told["kappa"], phi_end=_NO_END, dt=told["dt"], sides=2)
@@ -202,7 +205,7 @@ class ApproachDriver:
 
     def frame(self) -> Packing:
         """Return the present state."""
-        return self._run.packing()
+        return self._run.packing() if self._session.step else self._first
 
     def checkpoint(self) -> Checkpoint:
         """Return the state of LAMMPS, the rate, the time step, and the last pressure."""
