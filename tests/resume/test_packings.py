@@ -1,5 +1,6 @@
 """What the recorder promises of packings in the making, whose stages share one file beside the result."""
 
+import time
 from contextlib import suppress
 
 import numpy as np
@@ -11,6 +12,9 @@ import jamshape as js
 from jamshape.checks import TimeLimitError
 from jamshape.files.content import Content
 from jamshape.files.h5md import read_attributes
+from jamshape.protocols import make
+from jamshape.protocols.recipe import Recipe
+from jamshape.recording.recorder import How
 
 pytestmark = pytest.mark.lammps
 
@@ -105,6 +109,18 @@ def test_other_settings_are_refused_and_again_begins_anew(tmp_path):
     packing = pack("quasistatic", file, u0=1e-7, again=True)
     assert packing.u == pytest.approx(1e-7, rel=1e-6)
     assert names(tmp_path) == {"packing.h5"}
+
+
+def test_the_time_of_a_compression_counts(tmp_path, monkeypatch):
+    """Both files share the time that was given."""
+    found = []
+    monkeypatch.setattr(make, "compress", lambda *_: time.sleep(0.2))
+    monkeypatch.setattr(make, "record", lambda _path, _plan, how: found.append(how.seconds))
+    for seconds in (0.1, 1.0, None):
+        make.make(Recipe(n=16), tmp_path / "packing.h5", How(seconds=seconds))
+    assert found[0] == 0.0
+    assert 0.5 < found[1] <= 0.8
+    assert found[2] is None
 
 
 def test_a_compression_serves_packings_at_other_energies(whole, tmp_path):

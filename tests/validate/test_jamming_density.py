@@ -24,7 +24,10 @@ def compress(alpha, kappa, seed):
     settings = Compression(kappa=kappa, phi_end=0.92, dt=0.3)
     with Session() as session:
         run = CompressionRun(session, settings, start)
-        rows = [sample.observables for sample in run.samples(max(1, run.last_step // 600))]
+        rows, every = [], max(1, run.last_step // 600)
+        while session.step < run.last_step:
+            run.advance(min(run.last_step, session.step + every))
+            rows.append(run.measure())
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 

@@ -22,7 +22,7 @@ FORMAT = "format"
 _VERSION = 1  # raised with every change of what a driver stores
 
 _KIND = "_kind"  # attribute of what is not a plain array or dictionary
-_BYTES, _STATE, _LONG = "bytes", "state", "long"
+_BYTES, _STATE = "bytes", "state"
 
 
 def write_checkpoint(group: h5py.Group, checkpoint: Mapping[str, Any]) -> None:
@@ -44,19 +44,9 @@ def _write(group: h5py.Group, checkpoint: Mapping[str, Any]) -> None:
         elif isinstance(value, bytes):
             _mark(put(group, name, np.frombuffer(value, np.uint8)), _BYTES)
         elif isinstance(value, np.ndarray) and value.ndim:
-            _write_array(group, name, value)
+            put(group, name, value)
         else:
             set_attributes(group, {name: value})
-
-
-def _write_array(group: h5py.Group, name: str, value: Any) -> None:
-    """Write an array; extended precision as doubles and their low parts."""
-    if value.dtype != np.longdouble or value.dtype == np.float64:
-        put(group, name, value)
-        return
-    double = value.astype(np.float64)
-    both = np.stack([double, (value - double).astype(np.float64)])
-    _mark(put(group, name, both), _LONG)
 
 
 def _mark(item: Any, kind: str) -> None:
@@ -78,8 +68,6 @@ def _items(group: h5py.Group) -> Iterator[tuple[str, Any]]:
         kind = attributes_of(item).get(_KIND)
         if hasattr(item, "shape"):
             array = require_dataset(group, name)[()]
-            if kind == _LONG:
-                array = np.longdouble(array[0]) + array[1]
             yield name, array.tobytes() if kind == _BYTES else array
         else:
             found = dict(_items(item))

@@ -11,8 +11,6 @@ from jamshape.arrays import FloatArray
 from jamshape.packing import Lengths, Packing
 
 if TYPE_CHECKING:
-    import h5py
-
     from jamshape.files.disk import PathLike
 
 # Elements under /particles/all, some by the fields of a packing.
@@ -34,12 +32,6 @@ class Form(NamedTuple):
     def of(cls, packing: Packing) -> Form:
         """Return the form of a file with this frame alone."""
         return cls(packing.has_rests, packing.box.is_tilted or bool(packing.tilt_rest.any()))
-
-    @classmethod
-    def found(cls, file: h5py.File) -> Form:
-        """Detect the form of a file."""
-        frames = file["particles/all"]
-        return cls("position_rest" in frames, frames[EDGES]["value"].ndim == _MATRICES)
 
     def joined(self, other: Form) -> Form:
         """Return the form of a file with frames of both."""

@@ -29,10 +29,7 @@ if TYPE_CHECKING:
     import h5py
 
 _FORMAT = ("v110", "v110")  # has checksums of metadata; Debian 12 opens nothing newer
-_ROWS_BYTES = (
-    1024  # of a chunk: a long series has few chunks, yet the file of a packing stays small
-)
-_WHOLE_BYTES = 2**20  # of a chunk of an array that does not grow
+_CHUNK_BYTES = 2**20
 _SMALL_BYTES = 1024  # HDF5 stores attributes above 4 kB without checksums
 _ATTRIBUTE_BYTES = 60_000  # HDF5 refused attributes of 64 kB and more in files of 0.1.0
 _GZIP, _SHUFFLE, _FLETCHER = 1, 2, 3  # numbers of HDF5's filters
@@ -96,7 +93,7 @@ def written(path: PathLike) -> Iterator[h5py.File]:
     image.store()
 
 
-def put(group: h5py.Group, name: str, array: ArrayLike, *, grows: bool = False) -> h5py.Dataset:
+def put(group: h5py.Group, name: str, array: ArrayLike) -> h5py.Dataset:
     """Create a dataset with checksums.
 
     Parameters
@@ -106,18 +103,15 @@ def put(group: h5py.Group, name: str, array: ArrayLike, *, grows: bool = False) 
     array : array_like
         Numbers, or characters of dtype S1; a scalar becomes an array of length 1, since HDF5 has checksums for
         chunks only.
-    grows : bool
-        Whether rows will be appended.
     """
     rows = np.atleast_1d(np.asarray(array))
     row_bytes = rows.dtype.itemsize * math.prod(rows.shape[1:])
-    n = (_ROWS_BYTES if grows else _WHOLE_BYTES) // max(1, row_bytes)
-    n = max(1, n if grows else min(n, len(rows)))
+    n = max(1, min(_CHUNK_BYTES // max(1, row_bytes), len(rows)))
     return group.create_dataset(
         name,
         data=rows,
         # HDF5 requires chunks of at least 1 within the maximum: an empty extent gets no maximum.
-        maxshape=(None if grows else len(rows) or None, *(m or None for m in rows.shape[1:])),
+        maxshape=tuple(extent or None for extent in rows.shape),
         chunks=(n, *(extent or 1 for extent in rows.shape[1:])),
         fletcher32=True,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.metadata
 import math
 from collections.abc import Iterator, Sequence
@@ -158,8 +159,7 @@ def write_particles(group: h5py.Group, frames: Sequence[Packing]) -> None:
     more = ("exponent",) if first.shape.has_exponent else ("half_length", "radius")
     for name in ("species", "id", "diameters", *more):
         put(group, name, getattr(first, name))
-    forms = [Form.of(frame) for frame in frames]
-    form = Form(*(any(parts) for parts in zip(*forms, strict=True)))
+    form = functools.reduce(Form.joined, map(Form.of, frames))
     rows = [frame_values(frame, form) for frame in frames]
     clock = group.create_group("position")
     put(clock, "step", np.array([frame.step for frame in frames]))

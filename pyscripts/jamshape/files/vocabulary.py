@@ -18,9 +18,6 @@ FORMAT_VERSION = 2
 
 _OLD, _PRESSURE = "p", "pressure"
 
-RENAMED = (_PRESSURE,)
-"""Observables with former names."""
-
 COMPRESSED, ATHERMAL, THERMAL = "marschall-2018", "yuan-2019-1", "yuan-2019-2"
 """Published protocols, by name."""
 

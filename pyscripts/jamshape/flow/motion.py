@@ -15,7 +15,7 @@ from jamshape.packing import Packing
 from jamshape.shapes.shape import Interaction
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
     from jamshape.lammps.session import Session
 
@@ -235,12 +235,6 @@ class FlowRun(Generic[_Motion]):
         }
         self.session.commands("run 0 post no")
         return found
-
-    def samples(self, every: int) -> Iterator[Row]:
-        """Run to the end and yield a row at each multiple of `every` steps, and at the end."""
-        while self.session.step < self.last_step:
-            self.advance(min(self.last_step, (self.session.step // every + 1) * every))
-            yield self.sample()
 
     def advance(self, step: int) -> None:
         """Run to `step`."""

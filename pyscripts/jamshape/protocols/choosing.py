@@ -54,12 +54,13 @@ class Choosing:
         """Minimise a frame: the last one at first, then that between the two."""
         n, target = count_frames(self._file), self._making.target
         middle = n - 1 if self._last == n else (self._first + self._last) // 2
-        found = self._minimised_u(middle)
+        packing = frame_of(self._file, middle)
+        found = self._minimised_u(packing)
         if found > target.u0:
             self._last, self._u = middle, found
         elif middle == n - 1:
             msg = (
-                f"{self._file}: its last frame, at phi = {frame_of(self._file, middle).phi:.6g}, has u = {found:.2g}"
+                f"{self._file}: its last frame, at phi = {packing.phi:.6g}, has u = {found:.2g}"
                 f" after minimisation, expected more than u0 = {target.u0:g};"
                 " compress further, beyond jamming (phi_end)"
             )
@@ -67,12 +68,10 @@ class Choosing:
         else:
             self._first = middle
         text = f"frame {self._last} is jammed, frame {self._first} is not, u {found:.1e}"
-        state = State.of(frame_of(self._file, middle))
-        return self._making.told("choice of a jammed frame", text, state)
+        return self._making.told("choice of a jammed frame", text, State.of(packing))
 
-    def _minimised_u(self, frame: int) -> float:
+    def _minimised_u(self, packing: Packing) -> float:
         """Minimise until forces balance, or until the frame is unjammed; return u."""
-        packing = frame_of(self._file, frame)
         landscape = Landscape(packing)
         stop = Stop(_GOOD, lowest=self._making.target.u0)
         u = minimise(landscape, State.of(packing), "auto", stop).energy_density

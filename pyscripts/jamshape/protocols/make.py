@@ -97,7 +97,10 @@ def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> 
     TimeLimitError, OSError
         As `jamshape.recording.recorder.record`.
     """
+    began = time.perf_counter()
     compress(recipe, out, how)
+    if how.seconds is not None:
+        how = how._replace(seconds=max(0.0, how.seconds - (time.perf_counter() - began)))
     source = run_file(recipe, out)
 
     def begin() -> Pipeline:

@@ -68,6 +68,7 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
     OSError
         If another process writes the file, or it cannot be written.
     """
+    end = math.inf if how.seconds is None else perf_counter() + how.seconds
     # A noted signal is raised again when the lock is released.
     with Interrupts() as interrupts, Lock(path):
         remove_leftovers(path)
@@ -78,7 +79,7 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
                 return
         run = _begun(path, plan) if content is None else _resumed(content, plan)
         with closing(run.driver):
-            _follow(run, interrupts, how)
+            _follow(run, interrupts, how, end)
 
 
 @dataclass
@@ -110,13 +111,11 @@ class _Run:
         self.due = now + max(SECONDS, PAUSE * (now - began))
 
 
-def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
-    """Advance to the end, or to the mark at which the run is put down."""
+def _follow(run: _Run, interrupts: Interrupts, how: How, end: float) -> None:
+    """Advance to the end, or to the mark at which the run is put down, after a time."""
     content, driver = run.content, run.driver
     if (first := driver.first()).told.part is not None:
         how.tell(first)
-    began = perf_counter()
-    end = math.inf if how.seconds is None else began + how.seconds
     while not driver.done:
         row = driver.advance()
         run.add(row)
@@ -129,7 +128,7 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
             continue
         if interrupts.noted is not None:
             return  # raised again outside
-        raise TimeLimitError(_stopped(row, perf_counter() - began, content.path))
+        raise TimeLimitError(_stopped(row, how, content.path))
     if run.finish is None:
         run.store(None)
         return
@@ -137,8 +136,8 @@ def _follow(run: _Run, interrupts: Interrupts, how: How) -> None:
     content.path.unlink(missing_ok=True)
 
 
-def _stopped(row: Row, seconds: float, path: Path) -> str:
-    return f"{path}: stopped after {seconds:.0f} s at {row.told.text}, expected the end; the same command resumes"
+def _stopped(row: Row, how: How, path: Path) -> str:
+    return f"{path}: stopped after {how.seconds:.3g} s at {row.told.text}, expected the end; the same command resumes"
 
 
 def _begun(path: Path, plan: Plan) -> _Run:
@@ -159,13 +158,14 @@ def _resumed(content: Content, plan: Plan) -> _Run:
         if checkpoint is not None:
             driver = plan.restore(content.frames[0], checkpoint)
             return _Run(content, driver, plan.finish)
-    except (KeyError, TypeError):  # a number is missing, or of another kind
-        pass
+        cause = None
+    except (KeyError, TypeError) as error:  # a number is missing, or of another kind
+        cause = error
     msg = (
         f"{content.path} holds {plan.what} that was interrupted in another version of jamshape, expected one with a"
         " checkpoint of this version; use again to replace it"
     )
-    raise FileFormatError(msg)
+    raise FileFormatError(msg) from cause
 
 
 def require_same(content: Content, plan: Plan) -> None:

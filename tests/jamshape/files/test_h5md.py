@@ -387,12 +387,11 @@ def test_frames_with_and_without_a_tilt_are_in_one_file(path, dimension):
         for k, one in enumerate([plain, plain, tilted, plain, fine, plain])
     ]
     write_run(path, frames)
-    for file in [path]:
-        for k, packing in enumerate(frames):
-            assert_identical(read_packing(file, k), packing)
-            assert_same_poses(read_packing(file, k), packing)
-        with h5py.File(file) as found:
-            assert found["particles/all/box/edges/value"].shape == (6, dimension, dimension)
+    for k, packing in enumerate(frames):
+        assert_identical(read_packing(path, k), packing)
+        assert_same_poses(read_packing(path, k), packing)
+    with h5py.File(path) as found:
+        assert found["particles/all/box/edges/value"].shape == (6, dimension, dimension)
 
 
 def test_boxes_without_a_tilt_are_stored_by_their_edges(path):

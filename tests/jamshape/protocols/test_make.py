@@ -11,7 +11,7 @@ from written import write_columns
 
 import jamshape as js
 from jamshape.contacts import coordination, find_contacts, find_rattlers, sum_forces
-from jamshape.files.content import add_attributes as set_attributes
+from jamshape.files.content import add_attributes
 from jamshape.files.h5md import (
     read_attributes,
     read_observables,
@@ -227,7 +227,7 @@ def test_the_compression_of_another_mixture_is_refused(tmp_path):
     sample = replace(RECIPE, particles=monodisperse(1.0))
     out = tmp_path / "packing.h5"
     compressed(out)
-    set_attributes(run_of(out), sample.attributes())
+    add_attributes(run_of(out), sample.attributes())
     assert "expected those of another mixture" in refused(sample, out)
 
 
