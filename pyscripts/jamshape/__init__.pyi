@@ -3,6 +3,7 @@
 from .checks import NotReachedWarning as NotReachedWarning
 from .front.compressing import compress as compress
 from .front.compressing import slow_compress as slow_compress
+from .front.ensembles import ensemble as ensemble
 from .front.files import load as load
 from .front.files import save as save
 from .front.making import make_packing as make_packing
@@ -12,6 +13,7 @@ from .front.packing import MeasuredPacking as MeasuredPacking
 from .front.pictures import plot as plot
 from .front.recorded import resume as resume
 from .front.run import CyclicShearFile as CyclicShearFile
+from .front.run import EnsembleFile as EnsembleFile
 from .front.run import QuasistaticShearFile as QuasistaticShearFile
 from .front.run import RunFile as RunFile
 from .front.run import ShearFile as ShearFile

@@ -90,6 +90,8 @@ def _kinds_of(annotation: Any, names: dict[str, Any]) -> tuple[Any, ...]:
 
 def _is_known(kind: Any) -> bool:
     """Return whether a type can be checked."""
+    if kind is Any:
+        return False
     return kind is None or isinstance(kind, type) or typing.get_origin(kind) in _SEVERAL
 
 

@@ -31,9 +31,9 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from jamshape.command import parser_of, report
-from jamshape.commands.sweep import cores, python_path
 from jamshape.front.progress import follow
 from jamshape.recording.driver import Told
+from jamshape.recording.workers import cores, python_path
 
 PAPERS = ("marschall-2018", "yuan-2019")
 SCALES = ("demo", "small", "full")

@@ -5,7 +5,7 @@
     jamshape sweep --kind alpha=0 --kind alpha=4,size=1.4 --samples 5 --n 256 --out mixtures/
     jamshape sweep --alpha 4 --first-seed 101 --samples 20 --n 256 --out sweep/
 
-Each sample is one run of `jamshape pack` in its own process, one a core, which ends with the sweep,
+Each sample is one run of `jamshape pack` in one of a few processes, one a core, which end with the sweep,
 however that ends. The same command resumes after a kill: finished packings are kept, unfinished ones continue from
 their files, and those of other parameters are refused. A sample that fails, or whose forces do not balance, is listed
 as failed, and the others continue. The last line of standard output is one JSON object: made and not_made count
@@ -15,16 +15,14 @@ packings, not_reached those whose forces do not balance. The exit code is 0 only
 
 from __future__ import annotations
 
-import concurrent.futures
 import fcntl
 import os
-import signal
-import subprocess
 import sys
-import threading
 import time
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -34,14 +32,11 @@ from jamshape.commands import main as command
 from jamshape.commands import pack
 from jamshape.front.progress import follow
 from jamshape.recording.driver import Told
+from jamshape.recording.workers import Workers, cores
 from jamshape.shapes.shape import Shape
 from jamshape.shapes.table import DEFAULT, SHAPES, shape_named
 
-# -P: files in the working directory are not modules of ours.
-_PACK = (sys.executable, "-P", "-c", "from jamshape.commands.sweep import sample; sample()")
-
-# One core a process: BLAS threads would only compete.
-_ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+_SAMPLE = f"{__name__}:sample"
 
 # How long a sample waits for another process that makes it, such as one of a killed sweep.
 _PATIENCE = 5.0
@@ -124,11 +119,6 @@ def options_of() -> ArgumentParser:
     return parser
 
 
-def cores() -> int:
-    """Count the cores available to this process, in a cluster job possibly fewer than those of the machine."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 class Particle(NamedTuple):
     """Particles of packings: name of their files, and options that specify them."""
 
@@ -180,33 +170,6 @@ def arguments_of(particle: Particle, seed: int, options: Namespace) -> list[str]
     return [*particle.arguments, "--seed", str(seed), "--out", str(out), *options.extra]
 
 
-class Leash(NamedTuple):
-    """A pipe without writer: when the sweep ends, the samples, which read it, see its end."""
-
-    read: int
-    write: int
-
-    @classmethod
-    def new(cls) -> Leash:
-        """Create the pipe."""
-        return cls(*os.pipe())
-
-    def let_go(self) -> None:
-        """End all samples."""
-        os.close(self.write)
-
-
-def sample() -> None:
-    """Make one sample in a process of its own, which ends with the sweep that holds its standard input."""
-
-    def end_with_the_sweep() -> None:
-        os.read(0, 1)
-        os.kill(os.getpid(), signal.SIGKILL)
-
-    threading.Thread(target=end_with_the_sweep, daemon=True).start()
-    command(["pack", *sys.argv[1:]])
-
-
 class Complaint(NamedTuple):
     """Fault of a sample."""
 
@@ -217,37 +180,63 @@ class Complaint(NamedTuple):
     """Whether its time was up."""
 
 
-def make(particle: Particle, seed: int, options: Namespace, leash: Leash) -> Complaint | None:
-    """Make one sample; return its complaint if it fails or does not reach its goal."""
-    out, left = file_of(particle, seed, options), []
-    if options.seconds is not None:
-        seconds = options.until - time.monotonic()
-        if seconds <= 0 and not out.exists():
-            return Complaint(f"{out.name}: not begun in time", is_late=True)
-        left = ["--seconds", f"{max(0.0, seconds):.3f}"]
-    log = out.with_suffix(".log")
-    with log.open("a") as errors:
-        if not _is_ours(errors):
+def sample(arguments: list[str], out: Path, until: float | None) -> Complaint | None:
+    """Make one sample in this process; return its complaint if it fails or does not reach its goal.
+
+    Parameters
+    ----------
+    arguments : list of str
+        Options of `jamshape pack`.
+    out : Path
+        File of the sample; messages go to its log, which is locked meanwhile.
+    until : float, optional
+        Time of `time.monotonic` at which to stop.
+    """
+    seconds = None if until is None else until - time.monotonic()
+    if seconds is not None and seconds <= 0 and not out.exists():
+        return Complaint(f"{out.name}: not begun in time", is_late=True)
+    left = [] if seconds is None else ["--seconds", f"{max(0.0, seconds):.3f}"]
+    path = out.with_suffix(".log")
+    with path.open("a") as log:
+        if not _is_ours(log):
             said = f"{out.name}: another process is making it, expected none; wait until it ends"
             return Complaint(said)
-        done = subprocess.run(
-            [*_PACK, *arguments_of(particle, seed, options), *left],
-            check=False,
-            stdin=leash.read,
-            stdout=subprocess.PIPE,
-            stderr=errors,
-            env=os.environ | _ONE_THREAD | {"PYTHONPATH": python_path()},
-        )
-    if not done.returncode:
+        with _standard_error_to(log), redirect_stdout(StringIO()) as told:
+            code = _exit_code(["pack", *arguments, *left])
+    if not code:
         return None
-    last = log.read_text().strip().replace("\r", "\n").splitlines()
-    said = f"{out.name}: {last[-1] if last else f'exit code {done.returncode}'}"
-    is_late = done.returncode == TIME_IS_UP
-    return Complaint(said, is_made=bool(done.stdout.strip()), is_late=is_late)
+    last = path.read_text().strip().replace("\r", "\n").splitlines()
+    said = f"{out.name}: {last[-1] if last else f'exit code {code}'}"
+    return Complaint(said, is_made=bool(told.getvalue().strip()), is_late=code == TIME_IS_UP)
+
+
+def _exit_code(arguments: list[str]) -> int:
+    """Run a command in this process."""
+    try:
+        command(arguments)
+    except SystemExit as end:
+        if isinstance(end.code, str):
+            print(end.code, file=sys.stderr)
+            return 1
+        return end.code or 0
+
+
+@contextmanager
+def _standard_error_to(log: IO[str]) -> Iterator[None]:
+    """Send what Python and libraries print to a log."""
+    sys.stderr.flush()
+    before = os.dup(2)
+    os.dup2(log.fileno(), 2)
+    try:
+        yield
+    finally:
+        sys.stderr.flush()
+        os.dup2(before, 2)
+        os.close(before)
 
 
 def _is_ours(log: IO[str]) -> bool:
-    """Lock the log of a sample, for as long as it is open here or in the process that makes the sample."""
+    """Lock the log of a sample, for as long as it is open."""
     until = time.monotonic() + _PATIENCE
     while True:
         try:
@@ -262,25 +251,17 @@ def _is_ours(log: IO[str]) -> bool:
             return True
 
 
-def python_path() -> str:
-    """Return the search path on which a process finds this jamshape first."""
-    before = os.environ.get("PYTHONPATH")
-    return os.pathsep.join([str(Path(__file__).parents[2]), *([before] if before else [])])
-
-
 def made(options: Namespace) -> Iterator[Complaint | None]:
     """Make all samples, and yield the complaint of each, or None, when it ends."""
-    samples = [(p, s) for s in seeds(options) for p in particles(options)]
-    leash = Leash.new()
-    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        runs = [pool.submit(make, particle, seed, options, leash) for particle, seed in samples]
-        try:
-            for run in concurrent.futures.as_completed(runs):
-                yield run.result()
-        except BaseException:
-            leash.let_go()
-            pool.shutdown(cancel_futures=True)
-            raise
+    tasks = [
+        (arguments_of(particle, seed, options), file_of(particle, seed, options), options.until)
+        for seed in seeds(options)
+        for particle in particles(options)
+    ]
+    with Workers(_SAMPLE, tasks, options.jobs, label=f"samples of {options.out}") as workers:
+        for done in workers:
+            name = tasks[done.number][1].name
+            yield Complaint(f"{name}: {done.failure}") if done.failure else done.result
 
 
 def main(options: Namespace) -> int:
@@ -288,7 +269,7 @@ def main(options: Namespace) -> int:
     if options.seconds is not None:
         require_in("--seconds", options.seconds, RANGES["seconds"])
     options.out.mkdir(parents=True, exist_ok=True)
-    options.until = time.monotonic() + (options.seconds or 0.0)
+    options.until = None if options.seconds is None else time.monotonic() + options.seconds
     total, done = options.samples * len(particles(options)), 0
     failures: list[Complaint] = []
 
