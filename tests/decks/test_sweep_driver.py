@@ -9,7 +9,10 @@ import time
 from pathlib import Path
 
 import pytest
+from matplotlib.image import imread
 
+from jamshape.drawing.sweep import sweep_figure
+from jamshape.files.ensembles import PackingFile
 from jamshape.files.h5md import read_attributes, read_packing
 
 pytestmark = pytest.mark.lammps
@@ -148,6 +151,24 @@ def test_a_sweep_stops_in_time_and_goes_on(tmp_path):
     ]
     done, report = run(tmp_path, *asked, "--seconds", "300")
     assert (done.returncode, report["made"], report["failed"]) == (0, 3, [])
+
+
+def test_phi_j_and_z_are_drawn_against_what_is_swept(tmp_path):
+    picture = tmp_path / "sweep.png"
+    done, report = run(tmp_path, "--alpha", "0", "1", "--samples", "2", "--plot", str(picture))
+    assert (done.returncode, report["made"]) == (0, 4), done.stderr
+    files = [PackingFile.read(path) for path in sorted(tmp_path.glob("alpha*_seed?.h5"))]
+    above, below = sweep_figure(files).axes
+    assert below.get_xlabel() == r"$\alpha$"
+    for axes, name in ((above, "phi_J"), (below, "z")):
+        drawn = sorted(
+            tuple(point)
+            for line in axes.lines
+            for point in line.get_xydata()
+            if line.get_marker() == "."
+        )
+        assert drawn == sorted((f.number("alpha"), f.number(name)) for f in files)
+    assert imread(picture).std() > 0
 
 
 def test_names_of_files_keep_all_digits_and_options_given_twice_add_up(tmp_path):

@@ -1,6 +1,6 @@
 """Make many packings on all cores, several samples for each choice of particles.
 
-    jamshape sweep --alpha 0 0.01 1 4 --samples 6 --n 256 --out sweep/
+    jamshape sweep --alpha 0 0.01 1 4 --samples 6 --n 256 --out sweep/ --plot sweep.png
     jamshape sweep --superellipsoid 1 0.6 1 --superellipsoid 1.5 1 1 --samples 5 --n 400 --out sweep3d/
     jamshape sweep --kind alpha=0 --kind alpha=4,size=1.4 --samples 5 --n 256 --out mixtures/
     jamshape sweep --alpha 4 --first-seed 101 --samples 20 --n 256 --out sweep/
@@ -30,6 +30,9 @@ from jamshape.checks import RANGES, TIME_IS_UP, require_in
 from jamshape.command import report
 from jamshape.commands import main as command
 from jamshape.commands import pack
+from jamshape.drawing.saving import save_figure
+from jamshape.drawing.sweep import sweep_figure
+from jamshape.files.ensembles import PackingFile
 from jamshape.front.progress import follow
 from jamshape.recording.driver import Told
 from jamshape.recording.workers import Workers, cores
@@ -115,6 +118,9 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--out", type=Path, required=True, help="folder")
     parser.add_argument(
         "--seconds", type=float, help="time after which packings stop at their next checkpoints"
+    )
+    parser.add_argument(
+        "--plot", type=Path, help="picture of phi_J and z against the swept parameter"
     )
     return parser
 
@@ -264,6 +270,13 @@ def made(options: Namespace) -> Iterator[Complaint | None]:
             yield Complaint(f"{name}: {done.failure}") if done.failure else done.result
 
 
+def _plot(options: Namespace) -> None:
+    """Draw the packings that were made."""
+    files = [file_of(p, s, options) for p in particles(options) for s in seeds(options)]
+    if made := [PackingFile.read(file) for file in files if file.exists()]:
+        save_figure(sweep_figure(made), options.plot)
+
+
 def main(options: Namespace) -> int:
     """Run all samples; return the exit code."""
     if options.seconds is not None:
@@ -283,6 +296,8 @@ def main(options: Namespace) -> int:
         return Told("packings", f"{done} of {total}{failed}", done / total, aside)
 
     follow(made(options), told)
+    if options.plot:
+        _plot(options)
     missing = sum(not complaint.is_made for complaint in failures)
     found = {"out": options.out, "made": total - missing, "not_made": missing}
     found |= {"not_reached": len(failures) - missing}

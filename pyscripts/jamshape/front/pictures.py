@@ -14,10 +14,18 @@ from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
 from jamshape.drawing.pressure import draw_pressure
 from jamshape.drawing.shear import Cycles, draw_cycles, draw_steps, draw_stress
+from jamshape.drawing.text import attribute_text, systems_text
 from jamshape.files.ensembles import PackingFile
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, Recorded, RunFile, ShearFile
+from jamshape.front.run import (
+    CyclicShearFile,
+    EnsembleFile,
+    QuasistaticShearFile,
+    Recorded,
+    RunFile,
+    ShearFile,
+)
 from jamshape.measures.runs import read_run
 from jamshape.measures.shears import read_shear
 from jamshape.packing import Packing
@@ -35,11 +43,11 @@ _DPI = 100
 def plot(
     thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str | None = None
 ) -> Axes:
-    """Draw a packing, the pressure of a compression, the stress of a shear, or the density of modes.
+    """Draw a packing, the pressure of a compression, the stress of a shear, phi_J of an ensemble, or the density of modes.
 
     Parameters
     ----------
-    thing : Packing, RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile or Modes
+    thing : Packing, RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile, EnsembleFile or Modes
     axes : matplotlib Axes, optional
         Axes without a projection, for packings in space too; by default a new figure of
         `matplotlib.pyplot`.
@@ -151,6 +159,18 @@ def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
     draw_steps(axes, run.observables, PackingFile.read(run.file).system())
 
 
+def _ensemble(table: EnsembleFile, axes: Axes, color: str) -> None:
+    del color
+    phi = table["phi_J"][table.reached]
+    axes.hist(phi, bins=max(10, int(len(phi) ** 0.5)))
+    axes.set(xlabel=r"$\phi_J$", ylabel="samples")
+    told = ", ".join(attribute_text(name, table.about) for name in ("n", "u0"))
+    axes.set_title(
+        f"{systems_text([PackingFile.read(table.file).system()])}\n{told}, {len(phi)} of {len(table)} samples",
+        fontsize=9,
+    )
+
+
 def _modes(modes: Modes, axes: Axes, color: str) -> None:
     del color
     draw_density(axes, modes.told)
@@ -160,6 +180,7 @@ def _modes(modes: Modes, axes: Axes, color: str) -> None:
 
 _DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {
     Packing: _packing,
+    EnsembleFile: _ensemble,
     RunFile: _run,
     ShearFile: _shear,
     CyclicShearFile: _cyclic,
