@@ -32,7 +32,7 @@ from jamshape.contacts import (
 )
 from jamshape.lammps.session import Session
 from jamshape.measures.order import planar_order
-from jamshape.measures.packing_summary import order
+from jamshape.measures.order import order
 
 pytestmark = pytest.mark.lammps
 

@@ -16,11 +16,10 @@ from jamshape.drawing.pressure import draw_pressure
 from jamshape.drawing.shear import Cycles, draw_cycles, draw_steps, draw_stress
 from jamshape.files.ensembles import PackingFile
 from jamshape.front.modes import Modes
-from jamshape.front.packing import MeasuredPacking
+from jamshape.front.packing import PackingLike, public
 from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, Recorded, RunFile, ShearFile
 from jamshape.measures.runs import read_run
 from jamshape.measures.shears import read_shear
-from jamshape.packing import Packing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,7 +32,7 @@ _DPI = 100
 
 @checked
 def plot(
-    thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str | None = None
+    thing: PackingLike | Recorded | Modes, axes: Axes | None = None, *, color: str | None = None
 ) -> Axes:
     """Draw a packing, the pressure of a compression, the stress of a shear, or the density of modes.
 
@@ -68,7 +67,7 @@ def plot(
     >>> "N=16" in axes.get_title()
     True
     """
-    if color is not None and not isinstance(thing, Packing):
+    if color is not None and not isinstance(thing, PackingLike):
         msg = (
             f"{{color}} has no effect on a {type(thing).__name__}, expected a packing; leave it out"
         )
@@ -82,7 +81,7 @@ def plot(
     return axes
 
 
-def html(thing: MeasuredPacking | Recorded | Modes) -> str:
+def html(thing: PackingLike | Recorded | Modes) -> str:
     """Return HTML for notebooks: the repr and a picture."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - only notebooks ask
 
@@ -106,7 +105,7 @@ def _require_plane(axes: Any) -> None:
 
 
 def _size(thing: Any) -> tuple[float, float]:
-    return _INCHES["packing" if isinstance(thing, Packing) else "curve"]
+    return _INCHES["packing" if isinstance(thing, PackingLike) else "curve"]
 
 
 def _draw(thing: Any, axes: Axes, color: str) -> None:
@@ -118,9 +117,8 @@ def _draw(thing: Any, axes: Axes, color: str) -> None:
     raise TypeError(msg)
 
 
-def _packing(packing: Packing, axes: Axes, color: str) -> None:
-    measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
-    found = measured.contacts()
+def _packing(packing: PackingLike, axes: Axes, color: str) -> None:
+    found = public(packing).contacts()
     colored, scale = colorings([found], color)
     draw_packing(axes, found, colored[0], Look(color))
     axes.set_title(title_of(found, narrow=True), fontsize=9, linespacing=1.4)
@@ -159,7 +157,7 @@ def _modes(modes: Modes, axes: Axes, color: str) -> None:
 
 
 _DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {
-    Packing: _packing,
+    PackingLike: _packing,
     RunFile: _run,
     ShearFile: _shear,
     CyclicShearFile: _cyclic,
