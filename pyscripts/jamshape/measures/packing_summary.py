@@ -12,11 +12,13 @@ import numpy as np
 from jamshape.arrays import BoolArray, FloatArray
 from jamshape.contacts import Contacts
 from jamshape.files.h5md import read_attributes, write_packing
+from jamshape.files.hdf5 import as_read
 from jamshape.files.outcomes import is_reached
 from jamshape.landscape import Landscape
 from jamshape.measures.contact_statistics import contact_scale, residuals
 from jamshape.measures.order import order
 from jamshape.minima import History, Minimum, residual_of, rounding_floor
+from jamshape.packing import Packing
 
 # Rows of the convergence history stored in a packing's file.
 _REPORT_ROWS = 2000
@@ -42,6 +44,14 @@ class Measured(NamedTuple):
 
     attributes: dict[str, float | str]
     observables: dict[str, FloatArray]
+
+
+def with_results(
+    landscape: Landscape, minimum: Minimum, attributes: Mapping[str, Any]
+) -> Packing:
+    """Return a packing with the results that a file of `write_minimum` has."""
+    told = as_read(dict(attributes) | measure(landscape, minimum).attributes)
+    return minimum.state.packing(landscape.particles).with_(results=told)
 
 
 def write_minimum(
