@@ -27,7 +27,8 @@ from jamshape.files.lammps_text import iter_dump, read_data
 from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
-from jamshape.front.packing import Packing, PackingLike, public, results_of
+from jamshape.front.packing import Packing, public, results_of
+from jamshape.packing import Packing as PackingLike
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 

@@ -12,8 +12,9 @@ from jamshape.files.lammps_text import read_any, write_data
 from jamshape.files.meaning import Wanted, require_told
 from jamshape.files.signature import GSD, HDF5, format_of
 from jamshape.front.modes import Modes
-from jamshape.front.packing import Packing, PackingLike, public
+from jamshape.front.packing import Packing, public
 from jamshape.front.run import Recorded, run_file
+from jamshape.packing import Packing as PackingLike
 from jamshape.vibration.table import holds_modes
 
 

@@ -12,8 +12,9 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.checks import Range, require_in, require_no_effect, require_one_of, require_other_file
 from jamshape.files.disk import require_hdf5_name, settled
 from jamshape.files.outcomes import warn_unless_reached
-from jamshape.front.packing import Packing, PackingLike, public
+from jamshape.front.packing import Packing, public
 from jamshape.landscape import Landscape, State
+from jamshape.packing import Packing as PackingLike
 from jamshape.vibration.elasticity import Moduli
 from jamshape.vibration.ensembles import TOLD, to_store
 from jamshape.vibration.hessian import DynamicalMatrix, DynamicalMatrixOptions, dynamical_matrix

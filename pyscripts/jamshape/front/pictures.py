@@ -14,12 +14,14 @@ from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
 from jamshape.drawing.pressure import draw_pressure
 from jamshape.drawing.shear import Cycles, draw_cycles, draw_steps, draw_stress
-from jamshape.files.ensembles import PackingFile
+from jamshape.files.ensembles import system_of
+from jamshape.files.h5md import read_style
 from jamshape.front.modes import Modes
-from jamshape.front.packing import PackingLike, public
+from jamshape.front.packing import public
 from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, Recorded, RunFile, ShearFile
 from jamshape.measures.runs import read_run
 from jamshape.measures.shears import read_shear
+from jamshape.packing import Packing as PackingLike
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -141,12 +143,12 @@ def _shear(run: ShearFile, axes: Axes, color: str) -> None:
 def _cyclic(run: CyclicShearFile, axes: Axes, color: str) -> None:
     del color
     cycles = Cycles(run.strain, run.stress, int(run.about["rows"]))
-    draw_cycles(axes, cycles, PackingFile.read(run.file).system())
+    draw_cycles(axes, cycles, system_of(run.about, *read_style(run.file)))
 
 
 def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
     del color
-    draw_steps(axes, run.observables, PackingFile.read(run.file).system())
+    draw_steps(axes, run.observables, system_of(run.about, *read_style(run.file)))
 
 
 def _modes(modes: Modes, axes: Axes, color: str) -> None:

@@ -12,7 +12,8 @@ import numpy as np
 
 from jamshape.checks import require_no_effect, require_one_of, require_stated
 from jamshape.files.disk import named
-from jamshape.front.packing import Packing, PackingLike, public
+from jamshape.front.packing import Packing, public
+from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.random_start import random_packing, start_below
 from jamshape.shapes.particles import Particles
 from jamshape.shapes.shape import Interaction

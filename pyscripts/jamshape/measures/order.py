@@ -97,7 +97,9 @@ def tetratic(packing: Packing) -> float:
 def cubatic(packing: Packing) -> float:
     """C_4 of all particles (Yuan et al. 2019, Eq. 7); NaN if none has a direction, and in the plane."""
     is_defined = packing.dimension == 3 and len(_directors(packing))
-    return float(cubatic_order(body_axes(packing.quaternions)).magnitude) if is_defined else math.nan
+    return (
+        float(cubatic_order(body_axes(packing.quaternions)).magnitude) if is_defined else math.nan
+    )
 
 
 def _directors(packing: Packing) -> FloatArray:

@@ -46,9 +46,7 @@ class Measured(NamedTuple):
     observables: dict[str, FloatArray]
 
 
-def with_results(
-    landscape: Landscape, minimum: Minimum, attributes: Mapping[str, Any]
-) -> Packing:
+def with_results(landscape: Landscape, minimum: Minimum, attributes: Mapping[str, Any]) -> Packing:
     """Return a packing with the results that a file of `write_minimum` has."""
     told = as_read(dict(attributes) | measure(landscape, minimum).attributes)
     return minimum.state.packing(landscape.particles).with_(results=told)

@@ -46,7 +46,10 @@ class Bodies(NamedTuple):
                 expected = ", ".join(p.option for p in shape.parameters)
                 msg = f"{name} is not a parameter of {shape.name}s, expected {expected}"
                 raise ValueError(msg)
-        given = {known[name].name: _parameter(known[name], value, n) for name, value in parameters.items()}
+        given = {
+            known[name].name: _parameter(known[name], value, n)
+            for name, value in parameters.items()
+        }
         if diameters is not None:
             surplus = ["size"] * (size is not None) + [name for name in given if name != _EXPONENT]
             if surplus:

@@ -101,7 +101,7 @@ def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> 
     TimeLimitError, OSError
         As `jamshape.recording.recorder.record`.
     """
-    how = compress(recipe, out, how)
+    how = _after_compression(recipe, out, how)
     plan = _plan(recipe, run_file(recipe, out), partial(Pipeline.write, out=out), retry=retry)
     record(_making_file(out), plan, how)
 
@@ -120,7 +120,7 @@ def made(recipe: Recipe, how: How = How()) -> Packing:  # noqa: B008
     place = TemporaryDirectory(prefix="jamshape-") if compresses(recipe) else nullcontext("")
     with place as folder:
         out = Path(folder, "packing.h5")
-        how = compress(recipe, out, how)
+        how = _after_compression(recipe, out, how)
         plan = _plan(recipe, run_file(recipe, out), lambda driver: found.append(driver.packing()))
         record(None, plan, how)
     if not found:  # the caller's handler of a signal has let us go on
@@ -167,12 +167,21 @@ def compresses(recipe: Recipe) -> bool:
     return not isinstance(recipe.way, Steps) and not is_given
 
 
-def compress(recipe: Recipe, out: Path, how: How) -> How:
-    """Record the compression in LAMMPS, if the recipe has one that is not given; return what time is left."""
+def _after_compression(recipe: Recipe, out: Path, how: How) -> How:
+    """Compress, and return what time is left."""
+    began = time.perf_counter()
+    compress(recipe, out, how)
+    if how.seconds is None:
+        return how
+    return how._replace(seconds=max(0.0, how.seconds - (time.perf_counter() - began)))
+
+
+def compress(recipe: Recipe, out: Path, how: How) -> None:
+    """Record the compression in LAMMPS, if the recipe has one that is not given."""
     path = run_file(recipe, out)
     if path is None or not compresses(recipe):
-        return how
-    began, plan = time.perf_counter(), _compression(recipe)
+        return
+    plan = _compression(recipe)
     try:
         if path.exists():
             require_attributes(path, plan.settings, plan.what)
@@ -182,9 +191,6 @@ def compress(recipe: Recipe, out: Path, how: How) -> How:
         if not how.again:
             raise
         record(path, plan, how)
-    if how.seconds is None:
-        return how
-    return how._replace(seconds=max(0.0, how.seconds - (time.perf_counter() - began)))
 
 
 def _compression(recipe: Recipe) -> Plan:
