@@ -31,57 +31,17 @@ _REST_OF = {
 @checked_fields
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Packing(Record):
-    """Particles in a periodic box: the record of which `jamshape.Packing` is the public class.
-
-    Arrays are copied and made read-only; use `with_` to change one.
-
-    Parameters
-    ----------
-    position : (N, D) array of float64, [length]
-    orientation : (N,) or (N, 4) array of float64
-        Angle of the body's x axis in radians in 2D, unit quaternion w i j k in 3D.
-    diameters : (N, 3) array of float64, [length]
-        Shape columns of LAMMPS: (2(A+R), 2R, 2R) for elongated particles, three equal ones for discs,
-        (2a, 2b, 2c) for bodies with semi-axes a, b, c.
-    species : (N,) array of int64
-        LAMMPS types, from 1.
-    id : (N,) array of int64
-        LAMMPS IDs, from 1, each once.
-    box : Box
-    image : (N, D) array of int64, optional
-        Periodic image counts; zeros by default.
-    shape_style : str
-        A name of `jamshape.shapes.table.SHAPES`.
-    exponent : (N,) array of float64, optional
-        p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones by default.
-    law : Interaction
-        Constants of the contacts, on which energy and forces depend; by default k_e = 1 and two bonds side to
-        side.
-    step : int
-    time : float, [time]
-    position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional
-        Low-order parts of position, orientation, edges and tilt in double-double precision; zeros by default.
-        See `poses`.
-    results : mapping of str to Any, optional
-        Attributes of its file: how it was made and what was measured.
-    file : Path, optional
-        File it was read from.
-
-    Raises
-    ------
-    ValueError
-        If array shapes disagree, a number is not finite, a diameter is not positive, an exponent is not
-        above 1/2, an ID occurs twice, the diameters do not fit the shape style, or the law is invalid.
+    """Particles in a periodic box: the record behind `jamshape.Packing`, whose docstring has the fields and errors.
 
     Examples
     --------
     >>> from jamshape.packing import Box, Packing
-    >>> rod_and_disc = Packing(
-    ...     position=[[2, 5], [8, 5]], orientation=[0, 0], diameters=[[5, 1, 1], [1, 1, 1]],
-    ...     species=[1, 2], id=[1, 2], box=Box(lo=[0, 0], edges=[10, 10]),
+    >>> rod = Packing(
+    ...     position=[[2, 5]], orientation=[0], diameters=[[5, 1, 1]], species=[1], id=[1],
+    ...     box=Box(lo=[0, 0], edges=[10, 10]),
     ... )
-    >>> round(rod_and_disc.phi, 4)
-    0.0557
+    >>> rod.n, rod.dimension
+    (1, 2)
     """
 
     position: FloatArray

@@ -25,7 +25,10 @@ IN_LAMMPS = {
     "dynamics": {"protocol": "dynamics", "kappa": 1e-4},
     "marschall-2018": {"protocol": "marschall-2018", "kappa": 1e-4},
 }
-RUNS = {"wall_seconds", "start_file"}  # the second names the compression in LAMMPS, beside the packing
+RUNS = {
+    "wall_seconds",
+    "start_file",
+}  # the second names the compression in LAMMPS, beside the packing
 
 
 @pytest.fixture

@@ -117,7 +117,9 @@ def test_what_is_refused(changes, sentence):
 def test_what_is_missing_is_named():
     with pytest.raises(ValueError, match="^alpha of spherocylinders is missing, expected aspect"):
         js.Packing.of("spherocylinder", **RODS)
-    with pytest.raises(ValueError, match="^w1 of superellipsoids is missing, expected a/b <= 1, or"):
+    with pytest.raises(
+        ValueError, match="^w1 of superellipsoids is missing, expected a/b <= 1, or"
+    ):
         js.Packing.of("superellipsoid", **RODS, p=1)
     with pytest.raises(ValueError, match=r"orientation is missing, expected \(1, 4\) quaternions"):
         js.Packing.of("dimer", [[1, 2, 3]], box=[9, 9, 9], alpha=1)
@@ -128,8 +130,8 @@ def test_a_state_that_is_no_minimum_has_its_numbers():
     packing = of(position=[[2, 5], [2, 5.9], [7, 5]], orientation=[0, 0, np.pi / 2])
     assert packing.n_rattlers == packing.rattlers.sum() == 3
     assert (packing.z, packing.z_single, packing.z_iso) == (0, 0, 6)
-    assert packing.S_2 == pytest.approx(1 / 3)
-    assert packing.S_4 == pytest.approx(1)
+    assert pytest.approx(1 / 3) == packing.S_2
+    assert pytest.approx(1) == packing.S_4
     assert np.isnan(packing.C_4)
     assert packing.u > 0
     solid = js.Packing.of(
