@@ -29,4 +29,8 @@ def __getattr__(name):  # type: ignore[no-untyped-def]
             return version(__name__)
         except PackageNotFoundError:
             return "0+not.installed"
+    if name == "MeasuredPacking":
+        from jamshape.old_names import renamed_class  # noqa: PLC0415 - only where it is asked for
+
+        return renamed_class(name, _load("Packing"))
     return _load(name)

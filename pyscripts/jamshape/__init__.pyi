@@ -9,7 +9,7 @@ from .front.files import save as save
 from .front.making import make_packing as make_packing
 from .front.modes import Modes as Modes
 from .front.modes import modes as modes
-from .front.packing import MeasuredPacking as MeasuredPacking
+from .front.packing import Packing as Packing
 from .front.pictures import plot as plot
 from .front.recorded import resume as resume
 from .front.run import CyclicShearFile as CyclicShearFile
@@ -21,7 +21,6 @@ from .front.shearing import cyclic_shear as cyclic_shear
 from .front.shearing import quasistatic_shear as quasistatic_shear
 from .front.shearing import shear as shear
 from .packing import Box as Box
-from .packing import Packing as Packing
 from .shapes.named import Dimers as Dimers
 from .shapes.named import Spherocylinders as Spherocylinders
 from .shapes.named import Superellipsoids as Superellipsoids

@@ -68,6 +68,12 @@ def current(name: str, value: Any) -> Any:
     return new
 
 
+def renamed_class(old: str, new: type) -> type:
+    """Return a class for its old name, with a warning."""
+    _warn(old, new.__name__, stacklevel=4)
+    return new
+
+
 def stored(name: str, value: Any) -> Any:
     """Return today's value for an old one in a file, without a warning; others as they are.
 

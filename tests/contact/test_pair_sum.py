@@ -13,7 +13,7 @@ from spherocylinder_pairs import EPS, concatenated, disc_to_disc, tip_to_side, t
 
 from jamshape.contacts import find_contacts, forces
 from jamshape.contacts.near import near_particles
-from jamshape.packing import Box
+from jamshape.packing import Box, State
 from jamshape.protocols.random_start import random_packing
 
 K_E = 1.7
@@ -54,7 +54,7 @@ def compressed(mixture, dimension):
 
 
 def arguments(packing):
-    near = near_particles(packing, packing.compiled())
+    near = near_particles(State.of(packing), packing.compiled())
     position, orientation, cell = packing.poses()
     poses = (split(x) for x in (position, orientation.reshape(packing.n, -1), cell))
     return [*poses, np.column_stack([near.first, near.second]), near.shift]

@@ -87,13 +87,13 @@ def test_every_contact_is_near(packing):
     bodies = packing.compiled()
     expected = rows_of(contacts_among(packing, every_pair(packing)))
     for margin in (0.0, 0.3 * bodies.inner_radius.min()):
-        assert expected <= rows_of(near_particles(packing, bodies, margin))
+        assert expected <= rows_of(near_particles(State.of(packing), bodies, margin))
 
 
 def test_pairs_that_are_not_near_do_not_touch_when_moved_by_the_margin(packing):
     bodies, rng = packing.compiled(Interaction(1.0, SIDES)), np.random.default_rng(7)
     margin = 0.3 * float(bodies.inner_radius.min())
-    near = rows_of(near_particles(packing, bodies, margin))
+    near = rows_of(near_particles(State.of(packing), bodies, margin))
     every = every_pair(packing, margin)
     rows = np.column_stack([every.first, every.second, every.shift]).tolist()
     far = every.take(np.array([tuple(row) not in near for row in rows], bool))

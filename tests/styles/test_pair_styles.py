@@ -31,8 +31,7 @@ from jamshape.contacts import (
     sum_forces,
 )
 from jamshape.lammps.session import Session
-from jamshape.measures.order import planar_order
-from jamshape.measures.packing_summary import order
+from jamshape.measures.order import order, planar_order
 
 pytestmark = pytest.mark.lammps
 

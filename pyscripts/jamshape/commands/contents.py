@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -26,12 +27,14 @@ from jamshape.files.lammps_text import iter_dump, read_data
 from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
-from jamshape.front.packing import MeasuredPacking, results_of
-from jamshape.packing import Packing
+from jamshape.front.packing import Packing, public, results_of
+from jamshape.packing import Packing as PackingLike
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
 from jamshape.vibration.table import ModeTable, holds_modes, read_modes
 
-_STATE = ("phi", "pressure", "u", "z", "rattlers")
+_OF_CONTACTS = ("pressure", "u", "z", "z_single")
+_STATE = ("phi", *_OF_CONTACTS, "rattlers")
+_MOST_CUBATIC = 2000  # particles whose cubatic order takes less than a second
 _MADE = ("seed", "kappa", "u0", "protocol", "phi_start", "phi_end", "gdot",
          "amplitude", "period", "cycles", "flow", "strain_step", "strain_end", "hold_pressure", "outcome")  # fmt: skip
 
@@ -131,7 +134,7 @@ def _particles(path: Path) -> dict[str, Any]:
     return found
 
 
-def _of_packing(packing: Packing) -> dict[str, Any]:
+def _of_packing(packing: PackingLike) -> dict[str, Any]:
     """Describe the particles and the box."""
     kinds = kinds_of(packing)
     numbers = range(kinds.of.max() + 1) if len(kinds.parameters) else ()
@@ -160,13 +163,21 @@ def _rattlers(found: Mapping[str, Any], known: Mapping[str, Any]) -> int | None:
     return None if number is None else int(number)
 
 
-def _state(packing: Packing, measured: Mapping[str, Any]) -> dict[str, Any]:
+def _state(packing: PackingLike, measured: Mapping[str, Any]) -> dict[str, Any]:
     """Return the numbers of a state, computing missing ones from its contacts."""
+    of, known = public(packing), dict(measured)
+    known |= {"z_iso": of.z_iso} | _order(of)
     if all(name in measured for name in _STATE):
-        return dict(measured)
-    of = MeasuredPacking.of(packing)
-    found = {"phi": of.phi, "pressure": of.pressure, "u": of.u, "z": of.z}
-    return found | {"rattlers": int(of.rattlers.sum())} | dict(measured)
+        return known
+    found = {name: getattr(of, name) for name in _OF_CONTACTS}
+    return found | {"phi": of.phi, "rattlers": of.n_rattlers} | known
+
+
+def _order(packing: Packing) -> dict[str, float]:
+    """Return the orders of a packing that are defined, unless they take long."""
+    names = ["S_2", "S_4"] + ["C_4"] * (packing.n <= _MOST_CUBATIC)
+    found = {name: getattr(packing, name) for name in names}
+    return {name: value for name, value in found.items() if not math.isnan(value)}
 
 
 def _cost(path: Path, known: Mapping[str, Any]) -> dict[str, Any]:
@@ -222,7 +233,7 @@ def _gsd(path: Path) -> dict[str, Any]:
     return _text("GSD file", read_gsd(path))
 
 
-def _text(kind: str, packing: Packing) -> dict[str, Any]:
+def _text(kind: str, packing: PackingLike) -> dict[str, Any]:
     return {"kind": kind, **_of_packing(packing), **_state(packing, {}), "finished": True}
 
 

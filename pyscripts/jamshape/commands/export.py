@@ -29,7 +29,6 @@ from jamshape.files.lammps_text import read_dump, write_data
 from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.files.signature import DUMP, format_of
 from jamshape.front.files import load
-from jamshape.front.packing import MeasuredPacking
 from jamshape.front.run import Recorded
 from jamshape.packing import Packing
 from jamshape.shapes.command_line import add_meaning_options
@@ -59,11 +58,10 @@ def _write_session(path: Path, packings: Sequence[Packing]) -> None:
 
 def _write_h5(path: Path, packings: Sequence[Packing]) -> None:
     first, *others = packings
-    measured = MeasuredPacking.of(first, getattr(first, "results", {}))
     if others:
-        write_run(path, packings, measured.to_store)
+        write_run(path, packings, first.to_store)
     else:
-        write_packing(path, first, measured.to_store)
+        write_packing(path, first, first.to_store)
 
 
 def _write_data(path: Path, packings: Sequence[Packing]) -> None:

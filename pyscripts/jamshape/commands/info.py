@@ -27,8 +27,11 @@ _LINES = {
         "pressure {pressure:.4g}",
         "u {u:.4g}",
         "z {z:.5g}",
+        "z_single {z_single:.5g}",
+        "z_iso {z_iso:.5g}",
         "{rattlers} rattlers",
     ),
+    "order": ("S_2 {S_2:.4g}", "S_4 {S_4:.4g}", "C_4 {C_4:.4g}"),
     "made with": (
         "seed {seed}",
         "kappa {kappa:g}",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
-from jamshape.packing import Box, Packing, State
+from jamshape.packing import Box, State
 
 # Bounding spheres are larger by this fraction, so that rounding never loses a contact.
 _BOUNDING_MARGIN = 1e-9
@@ -100,12 +100,12 @@ def each_once(near: NearPairs) -> NearPairs:
     return near.take(np.lexsort((*near.shift.T[::-1], near.second, near.first)))
 
 
-def near_particles(packing: Packing, bodies: Any, margin: float = 0.0) -> NearPairs:
+def near_particles(state: State, bodies: Any, margin: float = 0.0) -> NearPairs:
     """Find all pairs whose surfaces are closer than a margin, once each, in ascending order.
 
     Parameters
     ----------
-    packing : Packing
+    state : State
     bodies : object of `Packing.compiled`
     margin : float, [length]
 
@@ -114,10 +114,11 @@ def near_particles(packing: Packing, bodies: Any, margin: float = 0.0) -> NearPa
     NearPairs
         May include pairs somewhat farther apart.
     """
-    around = Spheres(packing.position, bodies.outer_radius + 0.5 * margin)
-    near = each_once(near_pairs(around, around, packing.box))
+    position, _, cell = (both[0] for both in state.split)
+    around = Spheres(position, bodies.outer_radius + 0.5 * margin)
+    near = each_once(near_pairs(around, around, Box.of(np.zeros(state.dimension), cell)))
     rounding = _BOUNDING_MARGIN * float(bodies.inner_radius.min())
-    return nearer(State.of(packing), bodies, near, margin + rounding)
+    return nearer(state, bodies, near, margin + rounding)
 
 
 def nearer(state: State, bodies: Any, near: NearPairs, margin: float) -> NearPairs:

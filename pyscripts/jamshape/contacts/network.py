@@ -185,7 +185,7 @@ def find_contacts(
     0
     """
     bodies, state = packing.compiled(packing.law.but(k_e, sides)), State.of(packing)
-    near = near_particles(packing, bodies)
+    near = near_particles(state, bodies)
     found = bodies.contacts(*PairArrays.of(state, near), packing.has_rests, errors)
     near = near.take(found["pair"])
     refuse_crossing(packing, bodies.core, near.take(found["status"] == _CROSSING))

@@ -19,7 +19,7 @@ from jamshape.drawing.text import attributes_text, scientific
 from jamshape.files.h5md import FileFormatError, PathLike, read_attributes
 from jamshape.files.lammps_text import read_any
 from jamshape.files.meaning import NOTHING, Wanted
-from jamshape.measures.packing_summary import order
+from jamshape.measures.order import order
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

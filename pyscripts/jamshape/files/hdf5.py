@@ -339,5 +339,19 @@ def plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
+def as_read(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes as a file gives them back.
+
+    Examples
+    --------
+    >>> as_read({"n": np.int64(16), "kappa": [1, 2]})
+    {'n': 16, 'kappa': array([1, 2])}
+    """
+    return {
+        name: value if isinstance(value, str) else plain(np.asarray(value)[()])
+        for name, value in attributes.items()
+    }
+
+
 def _text(data: bytes) -> str:
     return data.decode(errors="surrogateescape")

@@ -21,7 +21,7 @@ from jamshape.flow import implicit_driver, lammps_driver
 from jamshape.flow.compression import Compression
 from jamshape.flow.implicit import Protocol
 from jamshape.flow.lammps_driver import Sizes
-from jamshape.front.packing import MeasuredPacking
+from jamshape.front.packing import public
 from jamshape.front.progress import place
 from jamshape.front.recorded import recorded
 from jamshape.front.run import RunFile
@@ -285,7 +285,7 @@ def _require_end_ahead(first: Packing, protocol: Protocol) -> None:
     if not first.phi < protocol.phi_end:
         msg = f"the start has phi = {first.phi:.6g}, expected less than phi_end = {protocol.phi_end:g}"
         raise ValueError(msg)
-    pressure = MeasuredPacking.of(first).pressure
+    pressure = public(first).pressure
     if pressure >= protocol.p_end:
         said = f"{{p_end}} is not above the pressure of the start, {pressure:.4g}, expected a larger one"
         raise ArgumentError(said, {"p_end": protocol.p_end})

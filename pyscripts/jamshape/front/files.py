@@ -12,9 +12,9 @@ from jamshape.files.lammps_text import read_any, write_data
 from jamshape.files.meaning import Wanted, require_told
 from jamshape.files.signature import GSD, HDF5, format_of
 from jamshape.front.modes import Modes
-from jamshape.front.packing import MeasuredPacking
+from jamshape.front.packing import Packing, public
 from jamshape.front.run import Recorded, run_file
-from jamshape.packing import Packing
+from jamshape.packing import Packing as PackingLike
 from jamshape.vibration.table import holds_modes
 
 
@@ -25,7 +25,7 @@ def load(
     *,
     dimension: int | None = None,
     shape: str | None = None,
-) -> MeasuredPacking | Recorded | Modes:
+) -> Packing | Recorded | Modes:
     """Load a packing, a run or modes from a file.
 
     Parameters
@@ -43,7 +43,7 @@ def load(
 
     Returns
     -------
-    MeasuredPacking, RunFile, ShearFile or Modes
+    Packing, RunFile, ShearFile or Modes
 
     Raises
     ------
@@ -70,22 +70,22 @@ def load(
 
         packing = read_gsd(path, last)
         require_told(path, packing, wanted)
-        return MeasuredPacking.of(packing, file=path)
+        return public(packing, file=path)
     if found != HDF5:
-        return MeasuredPacking.of(read_any(path, last, *wanted), file=path)
+        return public(read_any(path, last, *wanted), file=path)
     if holds_modes(path):
         return Modes.read(path)
     if frame is None and "finished" in read_attributes(path):
         run = run_file(path)
         require_told(path, run.packing(0), wanted)
         return run
-    measured = MeasuredPacking.read(path, last)
-    require_told(path, measured, wanted)
-    return measured
+    packing = Packing.read(path, last)
+    require_told(path, packing, wanted)
+    return packing
 
 
 @checked
-def save(path: str | Path, thing: Packing | Recorded | Modes) -> None:
+def save(path: str | Path, thing: PackingLike | Recorded | Modes) -> None:
     """Write a packing, a run or modes; an existing file is replaced only when writing is complete.
 
     Parameters
@@ -123,9 +123,8 @@ def save(path: str | Path, thing: Packing | Recorded | Modes) -> None:
     raise ValueError(msg)
 
 
-def _save_h5(path: Path, packing: Packing) -> None:
-    measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
-    write_packing(path, measured, measured.to_store)
+def _save_h5(path: Path, packing: PackingLike) -> None:
+    write_packing(path, packing, packing.to_store)
 
 
 def _save_run(path: Path, run: Recorded) -> None:
@@ -136,16 +135,16 @@ def _save_modes(path: Path, modes: Modes) -> None:
     modes.save(path)
 
 
-def _save_gsd(path: Path, packings: Packing | Recorded) -> None:
+def _save_gsd(path: Path, packings: PackingLike | Recorded) -> None:
     from jamshape.exchange.gsd import write_gsd  # noqa: PLC0415 - gsd may be missing
 
     write_gsd(path, packings)
 
 
-_NAMES = {Packing: "a packing", Recorded: "a run", Modes: "modes"}
+_NAMES = {PackingLike: "a packing", Recorded: "a run", Modes: "modes"}
 _WRITERS: dict[str, dict[type, Callable[[Path, Any], None]]] = {
-    ".h5": {Packing: _save_h5, Recorded: _save_run, Modes: _save_modes},
-    ".data": {Packing: write_data},
-    ".gsd": {Packing: _save_gsd, Recorded: _save_gsd},
+    ".h5": {PackingLike: _save_h5, Recorded: _save_run, Modes: _save_modes},
+    ".data": {PackingLike: write_data},
+    ".gsd": {PackingLike: _save_gsd, Recorded: _save_gsd},
 }
 """Content and writer, by suffix."""

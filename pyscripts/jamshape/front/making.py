@@ -7,12 +7,13 @@ from pathlib import Path
 from jamshape.arguments import checked
 from jamshape.checks import require_given, require_path, require_stated
 from jamshape.files.outcomes import warn_unless_reached
-from jamshape.front.packing import MeasuredPacking
+from jamshape.front.packing import Packing, public
 from jamshape.front.progress import display, place
 from jamshape.landscape.threads import sharing
 from jamshape.old_names import accepts_old
 from jamshape.protocols.defaults import recipe_for
-from jamshape.protocols.make import is_done, make, require_same, tidy
+from jamshape.protocols.make import is_done, made, make, require_same, tidy
+from jamshape.protocols.recipe import Recipe
 from jamshape.recording.recorder import How
 from jamshape.shapes.particles import Particles
 
@@ -45,7 +46,7 @@ def make_packing(
     again: bool = False,
     seconds: float | None = None,
     progress: bool = True,
-) -> MeasuredPacking:
+) -> Packing:
     """Make one mechanically stable packing: compress, relax to a target energy, measure.
 
     Parameters
@@ -115,7 +116,7 @@ def make_packing(
 
     Returns
     -------
-    MeasuredPacking
+    Packing
         ``reached`` is true if forces balance to the tolerance; ``results["outcome"]`` says how it ended.
 
     Raises
@@ -148,15 +149,20 @@ def make_packing(
     )  # fmt: skip
     require_stated(threads=threads)
     require_given(seconds=seconds)
-    at = place(file, "packing.h5")
-    require_path(at.path)
-    if again or not is_done(at.path):
-        with sharing(threads), display(shown=progress) as tell:
-            make(recipe, at.path, How(again, seconds, lambda row: tell(row.told)))
-    else:
-        require_same(at.path, recipe)
-        tidy(at.path)
-    packing = MeasuredPacking.read(at.path)
+    with sharing(threads), display(shown=progress) as tell:
+        how = How(again, seconds, lambda row: tell(row.told))
+        packing = public(made(recipe, how)) if file is None else _kept(file, recipe, how)
     warn_unless_reached(packing.results)
-    # A temporary file is not named in messages.
-    return packing if at.folder is None else MeasuredPacking.of(packing, packing.results)
+    return packing
+
+
+def _kept(file: str | Path, recipe: Recipe, how: How) -> Packing:
+    """Make a packing in a file, unless it is there, and read it."""
+    path = place(file, "packing.h5").path
+    require_path(path)
+    if how.again or not is_done(path):
+        make(recipe, path, how)
+    else:
+        require_same(path, recipe)
+        tidy(path)
+    return Packing.read(path)

@@ -12,9 +12,9 @@ from jamshape.arrays import FloatArray, IntArray
 from jamshape.checks import Range, require_in, require_no_effect, require_one_of, require_other_file
 from jamshape.files.disk import require_hdf5_name, settled
 from jamshape.files.outcomes import warn_unless_reached
-from jamshape.front.packing import MeasuredPacking
+from jamshape.front.packing import Packing, public
 from jamshape.landscape import Landscape, State
-from jamshape.packing import Packing
+from jamshape.packing import Packing as PackingLike
 from jamshape.vibration.elasticity import Moduli
 from jamshape.vibration.ensembles import TOLD, to_store
 from jamshape.vibration.hessian import DynamicalMatrix, DynamicalMatrixOptions, dynamical_matrix
@@ -52,7 +52,7 @@ class Modes:
         All columns; ``modes["participation"]`` looks one up.
     about : mapping of str to number or str
         Properties of the packing.
-    packing : MeasuredPacking, optional
+    packing : Packing, optional
         None for modes that were read from a file.
     file : Path, optional
         File they were read from.
@@ -73,7 +73,7 @@ class Modes:
 
     table: ModeTable
     about: dict[str, Any]
-    packing: MeasuredPacking | None = None
+    packing: Packing | None = None
     file: Path | None = None
     matrix: DynamicalMatrix | None = None
 
@@ -203,7 +203,7 @@ def require_modes_file(out: Path, read: Sequence[Path] = ()) -> None:
 
 @checked
 def modes(
-    packing: Packing | str | Path,
+    packing: PackingLike | str | Path,
     *,
     lowest: int | None = None,
     near: float | None = None,
@@ -272,9 +272,9 @@ def modes(
     if method != _SPARSE:
         require_no_effect("lowest", lowest, method=method)
         require_no_effect("near", near, method=method)
-    if not isinstance(packing, Packing):
-        packing = MeasuredPacking.read(Path(packing))
-    measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
+    if not isinstance(packing, PackingLike):
+        packing = Packing.read(Path(packing))
+    measured = public(packing)
     if not force and not measured.reached:
         warn_unless_reached(measured.results)
     landscape, state = Landscape(measured), State.of(measured)

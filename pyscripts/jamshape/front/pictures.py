@@ -15,9 +15,10 @@ from jamshape.drawing.pictures import title_of
 from jamshape.drawing.pressure import draw_pressure
 from jamshape.drawing.shear import Cycles, draw_cycles, draw_steps, draw_stress
 from jamshape.drawing.text import attribute_text, systems_text
-from jamshape.files.ensembles import PackingFile
+from jamshape.files.ensembles import system_of
+from jamshape.files.h5md import read_style
 from jamshape.front.modes import Modes
-from jamshape.front.packing import MeasuredPacking
+from jamshape.front.packing import public
 from jamshape.front.run import (
     CyclicShearFile,
     EnsembleFile,
@@ -28,7 +29,7 @@ from jamshape.front.run import (
 )
 from jamshape.measures.runs import read_run
 from jamshape.measures.shears import read_shear
-from jamshape.packing import Packing
+from jamshape.packing import Packing as PackingLike
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,7 +42,7 @@ _DPI = 100
 
 @checked
 def plot(
-    thing: Packing | Recorded | Modes, axes: Axes | None = None, *, color: str | None = None
+    thing: PackingLike | Recorded | Modes, axes: Axes | None = None, *, color: str | None = None
 ) -> Axes:
     """Draw a packing, the pressure of a compression, the stress of a shear, phi_J of an ensemble, or the density of modes.
 
@@ -76,7 +77,7 @@ def plot(
     >>> "N=16" in axes.get_title()
     True
     """
-    if color is not None and not isinstance(thing, Packing):
+    if color is not None and not isinstance(thing, PackingLike):
         msg = (
             f"{{color}} has no effect on a {type(thing).__name__}, expected a packing; leave it out"
         )
@@ -90,7 +91,7 @@ def plot(
     return axes
 
 
-def html(thing: MeasuredPacking | Recorded | Modes) -> str:
+def html(thing: PackingLike | Recorded | Modes) -> str:
     """Return HTML for notebooks: the repr and a picture."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - only notebooks ask
 
@@ -114,7 +115,7 @@ def _require_plane(axes: Any) -> None:
 
 
 def _size(thing: Any) -> tuple[float, float]:
-    return _INCHES["packing" if isinstance(thing, Packing) else "curve"]
+    return _INCHES["packing" if isinstance(thing, PackingLike) else "curve"]
 
 
 def _draw(thing: Any, axes: Axes, color: str) -> None:
@@ -126,9 +127,8 @@ def _draw(thing: Any, axes: Axes, color: str) -> None:
     raise TypeError(msg)
 
 
-def _packing(packing: Packing, axes: Axes, color: str) -> None:
-    measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
-    found = measured.contacts()
+def _packing(packing: PackingLike, axes: Axes, color: str) -> None:
+    found = public(packing).contacts()
     colored, scale = colorings([found], color)
     draw_packing(axes, found, colored[0], Look(color))
     axes.set_title(title_of(found, narrow=True), fontsize=9, linespacing=1.4)
@@ -151,12 +151,12 @@ def _shear(run: ShearFile, axes: Axes, color: str) -> None:
 def _cyclic(run: CyclicShearFile, axes: Axes, color: str) -> None:
     del color
     cycles = Cycles(run.strain, run.stress, int(run.about["rows"]))
-    draw_cycles(axes, cycles, PackingFile.read(run.file).system())
+    draw_cycles(axes, cycles, system_of(run.about, *read_style(run.file)))
 
 
 def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
     del color
-    draw_steps(axes, run.observables, PackingFile.read(run.file).system())
+    draw_steps(axes, run.observables, system_of(run.about, *read_style(run.file)))
 
 
 def _ensemble(table: EnsembleFile, axes: Axes, color: str) -> None:
@@ -165,10 +165,8 @@ def _ensemble(table: EnsembleFile, axes: Axes, color: str) -> None:
     axes.hist(phi, bins=max(10, int(len(phi) ** 0.5)))
     axes.set(xlabel=r"$\phi_J$", ylabel="samples")
     told = ", ".join(attribute_text(name, table.about) for name in ("n", "u0"))
-    axes.set_title(
-        f"{systems_text([PackingFile.read(table.file).system()])}\n{told}, {len(phi)} of {len(table)} samples",
-        fontsize=9,
-    )
+    who = systems_text([system_of(table.about, *read_style(table.file))])
+    axes.set_title(f"{who}\n{told}, {len(phi)} of {len(table)} samples", fontsize=9)
 
 
 def _modes(modes: Modes, axes: Axes, color: str) -> None:
@@ -179,7 +177,7 @@ def _modes(modes: Modes, axes: Axes, color: str) -> None:
 
 
 _DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {
-    Packing: _packing,
+    PackingLike: _packing,
     EnsembleFile: _ensemble,
     RunFile: _run,
     ShearFile: _shear,

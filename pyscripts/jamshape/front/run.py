@@ -31,7 +31,7 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.lock import Lock
 from jamshape.flow.cyclic_shear import QUARTERS
-from jamshape.front.packing import MeasuredPacking
+from jamshape.front.packing import Packing
 from jamshape.front.progress import follow, place
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
@@ -110,11 +110,11 @@ class Recorded:
         return count_frames(self.file)
 
     @checked
-    def packing(self, frame: int = -1) -> MeasuredPacking:
+    def packing(self, frame: int = -1) -> Packing:
         """Read a frame, counted from 0 or, if negative, from the end."""
-        return MeasuredPacking.read(self.file, frame)
+        return Packing.read(self.file, frame)
 
-    def __iter__(self) -> Iterator[MeasuredPacking]:
+    def __iter__(self) -> Iterator[Packing]:
         return map(self.packing, range(len(self)))
 
     def plot(self, axes: Axes | None = None) -> Axes:

@@ -12,21 +12,21 @@ import numpy as np
 
 from jamshape.checks import require_no_effect, require_one_of, require_stated
 from jamshape.files.disk import named
-from jamshape.front.packing import MeasuredPacking
-from jamshape.packing import Packing
+from jamshape.front.packing import Packing, public
+from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.random_start import random_packing, start_below
 from jamshape.shapes.particles import Particles
 from jamshape.shapes.shape import Interaction
 
 
-def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
+def start_of(start: PackingLike | str | Path, sides: int = 2) -> Packing:
     """Return the initial packing, or the last frame of a file, under the law of the run.
 
     Warns if the default number of side-to-side bonds differs from that of the start.
     """
     if isinstance(start, str | Path):
-        start = MeasuredPacking.read(Path(start))
-    known = start if isinstance(start, MeasuredPacking) else MeasuredPacking.of(start)
+        start = Packing.read(Path(start))
+    known = public(start)
     if known.law.sides == sides:
         return known
     # `sides` was given explicitly.
@@ -41,7 +41,7 @@ def start_of(start: Packing | str | Path, sides: int = 2) -> MeasuredPacking:
     return known.with_(law=law, results=known.results, file=known.file)
 
 
-def told_of(start: MeasuredPacking) -> dict[str, Any]:
+def told_of(start: Packing) -> dict[str, Any]:
     """Return metadata on the particles of a start and on its source."""
     own = [parameter.name for parameter in start.shape.parameters]
     names, results = (*own, "size_ratio", "kinds", "seed"), start.results
@@ -51,7 +51,7 @@ def told_of(start: MeasuredPacking) -> dict[str, Any]:
     return found | {"n": start.n, "start": name, "phi_start": start.phi}
 
 
-def _digest(start: Packing) -> str:
+def _digest(start: PackingLike) -> str:
     """Name a packing without a file by its poses, to distinguish it from another one."""
     poses = b"".join(np.ascontiguousarray(x, np.float64).tobytes() for x in start.poses())
     return f"packing {hashlib.blake2b(poses, digest_size=8).hexdigest()}"
@@ -69,7 +69,7 @@ class Asked(NamedTuple):
 class Start(NamedTuple):
     """Initial state of a run: a packing, or particles with the settings of a random start."""
 
-    known: MeasuredPacking | None
+    known: Packing | None
     particles: Particles | None
     n: int
     phi: float
@@ -83,7 +83,7 @@ class Start(NamedTuple):
         cls,
         particles: Particles | None,
         asked: Asked,
-        start: Packing | str | Path | None,
+        start: PackingLike | str | Path | None,
         *,
         usual_phi: float,
         sides: int = 2,
@@ -117,7 +117,7 @@ class Start(NamedTuple):
         own = {"n": self.n, self.phi_name: self.phi, "seed": self.seed}
         return dict(self.particles.told) | own
 
-    def random(self, phi: float | None = None) -> Packing:
+    def random(self, phi: float | None = None) -> PackingLike:
         """Make the random start at a packing fraction; by default the one asked for, or the densest possible."""
         assert self.particles
         if phi is not None:

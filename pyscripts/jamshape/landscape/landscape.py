@@ -275,7 +275,7 @@ class Landscape:
         wide = self._wide
         if wide is None or wide.outrun_by(state, self.turning_radius, self.skin):
             skin = _WIDE * self.skin
-            near = near_particles(state.packing(self.particles), self.bodies, skin)
+            near = near_particles(state, self.bodies, skin)
             wide = self._wide = Pairs.of(near, state, skin, self._reach)
         return wide
 

@@ -1,13 +1,16 @@
-"""Orientational order in two dimensions."""
+"""Orientational order: in two dimensions, and all that files have of it."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jamshape.packing import Packing
+from jamshape.arrays import FloatArray
+from jamshape.measures.order3d import cubatic_order, nematic_order
+from jamshape.packing import Packing, body_axes
 
 
 class OrientationalOrder(NamedTuple):
@@ -59,7 +62,47 @@ def planar_order(packing: Packing, n: int = 2) -> OrientationalOrder:
 
     The same as in LAMMPS's `compute packing`.
     """
-    directors = packing.directors[~np.isnan(packing.directors[:, 0])]
+    directors = _directors(packing)
     if not len(directors):
         return OrientationalOrder(0.0, 0.0)
     return orientational_order(np.arctan2(directors[:, 1], directors[:, 0]), n)
+
+
+def order(packing: Packing) -> dict[str, float]:
+    """Orientational order as files have it: S2 and S4 in two dimensions, S2 and C4 in three."""
+    if packing.dimension == 2:
+        return {"S2": nematic(packing), "S4": tetratic(packing)}
+    return {"S2": nematic(packing), "C4": cubatic(packing)}
+
+
+def nematic(packing: Packing) -> float:
+    """S_2 of the particles with a direction; NaN without any.
+
+    Marschall & Teitel 2018, Eq. 16, in the plane; Yuan et al. 2019, Eq. 6, in space.
+    """
+    directors = _directors(packing)
+    if not len(directors):
+        return math.nan
+    if packing.dimension == 2:
+        return planar_order(packing, 2).S_n
+    return float(nematic_order(directors).magnitude)
+
+
+def tetratic(packing: Packing) -> float:
+    """S_4 of the particles with a direction (Marschall & Teitel 2018, Eq. 16); NaN without any, and in space."""
+    is_defined = packing.dimension == 2 and len(_directors(packing))
+    return planar_order(packing, 4).S_n if is_defined else math.nan
+
+
+def cubatic(packing: Packing) -> float:
+    """C_4 of all particles (Yuan et al. 2019, Eq. 7); NaN if none has a direction, and in the plane."""
+    is_defined = packing.dimension == 3 and len(_directors(packing))
+    return (
+        float(cubatic_order(body_axes(packing.quaternions)).magnitude) if is_defined else math.nan
+    )
+
+
+def _directors(packing: Packing) -> FloatArray:
+    """(M, D) directions of the particles that have one."""
+    directors = packing.directors
+    return directors[~np.isnan(directors[:, 0])]

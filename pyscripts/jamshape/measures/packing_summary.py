@@ -12,13 +12,13 @@ import numpy as np
 from jamshape.arrays import BoolArray, FloatArray
 from jamshape.contacts import Contacts
 from jamshape.files.h5md import read_attributes, write_packing
+from jamshape.files.hdf5 import as_read
 from jamshape.files.outcomes import is_reached
 from jamshape.landscape import Landscape
 from jamshape.measures.contact_statistics import contact_scale, residuals
-from jamshape.measures.order import planar_order
-from jamshape.measures.order3d import cubatic_order, nematic_order
+from jamshape.measures.order import order
 from jamshape.minima import History, Minimum, residual_of, rounding_floor
-from jamshape.packing import Packing, body_axes
+from jamshape.packing import Packing
 
 # Rows of the convergence history stored in a packing's file.
 _REPORT_ROWS = 2000
@@ -44,6 +44,12 @@ class Measured(NamedTuple):
 
     attributes: dict[str, float | str]
     observables: dict[str, FloatArray]
+
+
+def with_results(landscape: Landscape, minimum: Minimum, attributes: Mapping[str, Any]) -> Packing:
+    """Return a packing with the results that a file of `write_minimum` has."""
+    told = as_read(dict(attributes) | measure(landscape, minimum).attributes)
+    return minimum.state.packing(landscape.particles).with_(results=told)
 
 
 def write_minimum(
@@ -84,7 +90,7 @@ def measure(landscape: Landscape, minimum: Minimum) -> Measured:
         "pressure": pressure,
         **_residuals(landscape, minimum, found.rattlers),
         **found.counts._asdict(),
-        "z_iso": 2 * float(packing.freedoms.mean()),
+        "z_iso": packing.z_iso,
         **order(packing),
     }
     if D == 3:
@@ -120,24 +126,6 @@ def _net(landscape: Landscape, minimum: Minimum, found: Contacts) -> dict[str, F
     scale = contact_scale(at, found.network, found.rattlers)
     net = residuals(gradient[:, :D], torque, scale, found.rattlers)
     return {"net_force": net.force, "net_torque": net.torque}
-
-
-def order(packing: Packing) -> dict[str, float]:
-    """Orientational order of the particles with a direction; NaN without any.
-
-    S2 and S4 in two dimensions (Marschall & Teitel 2018, Eq. 16), S2 and C4 in three (Yuan et al. 2019,
-    Eqs. 6 and 7).
-    """
-    directors = packing.directors
-    directors = directors[~np.isnan(directors[:, 0])]
-    if not len(directors):
-        return {"S2": math.nan, ("S4" if packing.dimension == 2 else "C4"): math.nan}
-    if packing.dimension == 2:
-        return {f"S{n}": planar_order(packing, n).S_n for n in (2, 4)}
-    return {
-        "S2": float(nematic_order(directors).magnitude),
-        "C4": float(cubatic_order(body_axes(packing.quaternions)).magnitude),
-    }
 
 
 def energy_onset(phi: float, u: float, pressure: float) -> float:

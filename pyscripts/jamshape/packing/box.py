@@ -21,6 +21,8 @@ from jamshape.records import Record
 # Relative size of entries that rounding leaves when a program rotates a box forth and back.
 _ROUNDING = 1e-13
 
+_ABOVE = {D: np.triu_indices(D, 1) for D in (2, 3)}  # places of the tilts in a matrix
+
 
 @dataclass(frozen=True, eq=False)
 class Box(Record):
@@ -192,13 +194,13 @@ class Lengths(NamedTuple):
                 " and the second one in the x-y plane; rotate box and particles"
             )
             raise ValueError(msg)
-        return cls(np.diagonal(matrix).copy(), matrix[np.triu_indices(len(matrix), 1)])
+        return cls(np.diagonal(matrix).copy(), matrix[_ABOVE[len(matrix)]])
 
     @property
     def matrix(self) -> NDArray[Any]:
         """(D, D), zero below the diagonal."""
         matrix = np.diag(self.edges)
-        matrix[np.triu_indices(len(matrix), 1)] = self.tilt
+        matrix[_ABOVE[len(matrix)]] = self.tilt
         return matrix
 
 

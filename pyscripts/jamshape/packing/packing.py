@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
@@ -29,53 +31,17 @@ _REST_OF = {
 @checked_fields
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Packing(Record):
-    """Particles in a periodic box.
-
-    Arrays are copied and made read-only; use `with_` to change one.
-
-    Parameters
-    ----------
-    position : (N, D) array of float64, [length]
-    orientation : (N,) or (N, 4) array of float64
-        Angle of the body's x axis in radians in 2D, unit quaternion w i j k in 3D.
-    diameters : (N, 3) array of float64, [length]
-        Shape columns of LAMMPS: (2(A+R), 2R, 2R) for elongated particles, three equal ones for discs,
-        (2a, 2b, 2c) for bodies with semi-axes a, b, c.
-    species : (N,) array of int64
-        LAMMPS types, from 1.
-    id : (N,) array of int64
-        LAMMPS IDs, from 1, each once.
-    box : Box
-    image : (N, D) array of int64, optional
-        Periodic image counts; zeros by default.
-    shape_style : str
-        A name of `jamshape.shapes.table.SHAPES`.
-    exponent : (N,) array of float64, optional
-        p of ``|x/a|^2p + |y/b|^2p + |z/c|^2p = 1``, of shapes that have one; ones by default.
-    law : Interaction
-        Constants of the contacts, on which energy and forces depend; by default k_e = 1 and two bonds side to
-        side.
-    step : int
-    time : float, [time]
-    position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional
-        Low-order parts of position, orientation, edges and tilt in double-double precision; zeros by default.
-        See `poses`.
-
-    Raises
-    ------
-    ValueError
-        If array shapes disagree, a number is not finite, a diameter is not positive, an exponent is not
-        above 1/2, an ID occurs twice, the diameters do not fit the shape style, or the law is invalid.
+    """Particles in a periodic box: the record behind `jamshape.Packing`, whose docstring has the fields and errors.
 
     Examples
     --------
-    >>> from jamshape import Box, Packing
-    >>> rod_and_disc = Packing(
-    ...     position=[[2, 5], [8, 5]], orientation=[0, 0], diameters=[[5, 1, 1], [1, 1, 1]],
-    ...     species=[1, 2], id=[1, 2], box=Box(lo=[0, 0], edges=[10, 10]),
+    >>> from jamshape.packing import Box, Packing
+    >>> rod = Packing(
+    ...     position=[[2, 5]], orientation=[0], diameters=[[5, 1, 1]], species=[1], id=[1],
+    ...     box=Box(lo=[0, 0], edges=[10, 10]),
     ... )
-    >>> round(rod_and_disc.phi, 4)
-    0.0557
+    >>> rod.n, rod.dimension
+    (1, 2)
     """
 
     position: FloatArray
@@ -94,6 +60,8 @@ class Packing(Record):
     orientation_rest: FloatArray = field(default_factory=lambda: np.empty(0))
     edges_rest: FloatArray = field(default_factory=lambda: np.empty(0))
     tilt_rest: FloatArray = field(default_factory=lambda: np.empty(0))
+    results: Mapping[str, Any] = field(default_factory=dict)
+    file: Path | None = None
 
     def __post_init__(self) -> None:
         n = len(np.atleast_1d(real_numbers("position", self.position)))
@@ -121,6 +89,8 @@ class Packing(Record):
         _check_labels(self)
         _check_shapes(self)
         object.__setattr__(self, "law", _checked_law(self.law))
+        if self.file is not None:  # so that it stays valid when the working folder changes
+            object.__setattr__(self, "file", self.file.absolute())
 
     @property
     def n(self) -> int:
@@ -217,6 +187,11 @@ class Packing(Record):
         return np.where(self.is_round, 3, np.where(self.symmetry_axis >= 0, 5, 6))
 
     @property
+    def z_iso(self) -> float:
+        """Isostatic contact number: twice the mean number of `freedoms`."""
+        return 2 * float(self.freedoms.mean())
+
+    @property
     def turning_axes(self) -> FloatArray:
         """(N, T, T) orthogonal unit vectors about which contacts can rotate particles, else zeros.
 
@@ -263,7 +238,7 @@ class Packing(Record):
         position, orientation, cell = (np.longdouble(x) + rest for x, rest in pairs)
         return position, orientation, cell
 
-    def with_poses(self, position: LongArray, orientation: LongArray, cell: LongArray) -> Packing:
+    def with_poses(self, position: LongArray, orientation: LongArray, cell: LongArray) -> Self:
         """Return the packing with new `poses`, each number stored as a double and its low part."""
         doubles = [np.asarray(x, np.float64) for x in (position, orientation, cell)]
         rests = [
@@ -281,19 +256,24 @@ class Packing(Record):
             tilt_rest=tilt_rest,
         )
 
-    def sorted_by_id(self) -> Packing:
+    def sorted_by_id(self) -> Self:
         """Return the same packing with its particles in the order of their IDs."""
         order = np.argsort(self.id)
         names = ["position", "orientation", "diameters", "exponent", "species", "id", "image"]
         names += ["position_rest", "orientation_rest"]
         return self.with_(**{name: getattr(self, name)[order] for name in names})
 
-    def with_(self, **changes: Any) -> Packing:
-        """Return a new packing with the named fields replaced; new poses are exact doubles."""
+    def with_(self, **changes: Any) -> Self:
+        """Return a packing with the named fields replaced, and without results and file; new poses are exact doubles."""
         for name, rests in _REST_OF.items():
             for rest in rests if name in changes else ():
                 changes.setdefault(rest, np.empty(0))
-        return dataclasses.replace(self, **changes)
+        return dataclasses.replace(self, **({"results": {}, "file": None} | changes))
+
+    @property
+    def to_store(self) -> dict[str, Any]:
+        """Return the results without attributes of a run: a single frame cannot be continued as a run."""
+        return {k: v for k, v in self.results.items() if k != "finished"}
 
 
 def _check_labels(packing: Packing) -> None:

@@ -9,8 +9,11 @@ file until the packing is finished, ``OUT.making.h5``, from which an interrupted
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -23,8 +26,8 @@ from jamshape.flow.compression import Compression
 from jamshape.flow.lammps_driver import Sizes
 from jamshape.landscape import Landscape
 from jamshape.measures.onset import OnsetFit, fit_onset
-from jamshape.measures.packing_summary import summary_of, write_minimum
-from jamshape.minima import History
+from jamshape.measures.packing_summary import summary_of, with_results, write_minimum
+from jamshape.minima import History, Minimum
 from jamshape.minima.checkpoints import minimum_of, told_minimum
 from jamshape.minima.target import require_reachable
 from jamshape.packing import Packing, State
@@ -48,7 +51,7 @@ from jamshape.protocols.stages import (
     Strengthening,
     Sweeping,
 )
-from jamshape.recording.driver import Driver, Plan, Row
+from jamshape.recording.driver import Plan, Row
 from jamshape.recording.recorder import How, record
 
 __all__ = [
@@ -59,6 +62,7 @@ __all__ = [
     "Steps",
     "Thermalisation",
     "is_done",
+    "made",
     "make",
     "require_same",
     "run_file",
@@ -97,12 +101,36 @@ def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> 
     TimeLimitError, OSError
         As `jamshape.recording.recorder.record`.
     """
-    began = time.perf_counter()
-    compress(recipe, out, how)
-    if how.seconds is not None:
-        how = how._replace(seconds=max(0.0, how.seconds - (time.perf_counter() - began)))
-    source = run_file(recipe, out)
+    how = _after_compression(recipe, out, how)
+    plan = _plan(recipe, run_file(recipe, out), partial(Pipeline.write, out=out), retry=retry)
+    record(_making_file(out), plan, how)
 
+
+def made(recipe: Recipe, how: How = How()) -> Packing:  # noqa: B008
+    """Make a packing and write nothing, but for a compression in LAMMPS, whose file goes with a temporary folder.
+
+    Arguments and errors as in `make`.
+
+    Returns
+    -------
+    Packing
+        With the results that its file would have.
+    """
+    found: list[Packing] = []
+    place = TemporaryDirectory(prefix="jamshape-") if compresses(recipe) else nullcontext("")
+    with place as folder:
+        out = Path(folder, "packing.h5")
+        how = _after_compression(recipe, out, how)
+        plan = _plan(recipe, run_file(recipe, out), lambda driver: found.append(driver.packing()))
+        record(None, plan, how)
+    if not found:  # the caller's handler of a signal has let us go on
+        raise KeyboardInterrupt
+    return found[0]
+
+
+def _plan(
+    recipe: Recipe, source: Path | None, finish: Callable[[Any], None], *, retry: bool = True
+) -> Plan:
     def begin() -> Pipeline:
         return Pipeline(recipe, source, None, retry=retry)
 
@@ -110,15 +138,7 @@ def make(recipe: Recipe, out: Path, how: How = How(), *, retry: bool = True) -> 
         del first
         return Pipeline(recipe, source, checkpoint, retry=retry)
 
-    def finish(driver: Driver) -> None:
-        assert isinstance(driver, Pipeline)
-        driver.write(out)
-
-    record(
-        _making_file(out),
-        Plan("a packing", recipe.attributes(), begin, restore, finish=finish),
-        how,
-    )
+    return Plan("a packing", recipe.attributes(), begin, restore, finish=finish)
 
 
 def _making_file(out: Path) -> Path:
@@ -141,10 +161,25 @@ def run_file(recipe: Recipe, out: Path) -> Path | None:
     return given or out.with_name(out.name + ".run.h5")
 
 
+def compresses(recipe: Recipe) -> bool:
+    """Whether the recipe has a compression in LAMMPS that is not given."""
+    is_given = isinstance(recipe.way, Compressed) and recipe.way.source is not None
+    return not isinstance(recipe.way, Steps) and not is_given
+
+
+def _after_compression(recipe: Recipe, out: Path, how: How) -> How:
+    """Compress, and return what time is left."""
+    began = time.perf_counter()
+    compress(recipe, out, how)
+    if how.seconds is None:
+        return how
+    return how._replace(seconds=max(0.0, how.seconds - (time.perf_counter() - began)))
+
+
 def compress(recipe: Recipe, out: Path, how: How) -> None:
     """Record the compression in LAMMPS, if the recipe has one that is not given."""
     path = run_file(recipe, out)
-    if path is None or (isinstance(recipe.way, Compressed) and recipe.way.source):
+    if path is None or not compresses(recipe):
         return
     plan = _compression(recipe)
     try:
@@ -293,12 +328,22 @@ class Pipeline:
 
     def write(self, out: Path) -> None:
         """Measure the packing and write its file."""
-        making, recipe = self._making, self._recipe
-        assert making.minimum is not None
-        told = recipe.attributes() | self._of_compression() | making.attributes
+        write_minimum(out, self._making.landscape, self._minimum, self._told())
+
+    def packing(self) -> Packing:
+        """Measure the packing and return it with its results."""
+        return with_results(self._making.landscape, self._minimum, self._told())
+
+    @property
+    def _minimum(self) -> Minimum:
+        assert self._making.minimum is not None
+        return self._making.minimum
+
+    def _told(self) -> dict[str, Any]:
+        """Return all but measurements."""
+        told = self._recipe.attributes() | self._of_compression() | self._making.attributes
         told |= {"wall_seconds": time.perf_counter() - self._began}
-        told |= {"evaluations": making.landscape.evaluations}
-        write_minimum(out, making.landscape, making.minimum, told)
+        return told | {"evaluations": self._making.landscape.evaluations}
 
     def _of_compression(self) -> dict[str, Any]:
         way = self._recipe.way

@@ -12,6 +12,7 @@ import numpy as np
 from jamshape.arrays import FloatArray
 from jamshape.checks import RANGES, require_in, require_one_of, require_stated
 from jamshape.packing import Box, Packing
+from jamshape.packing.plain import unturned
 from jamshape.shapes.particles import Particles
 
 # Trial placements: a few seconds for 1000 particles.
@@ -67,22 +68,26 @@ def random_packing(
     0.3
     """
     unplaced, rng = _unplaced(n, phi, seed, (particles or Particles.of(), dimension))
-    ordered = _longest_first(unplaced)
-    boxed = _boxed(ordered, ordered.phi, phi)
-    found = boxed.compiled().insert(
-        boxed.box.edges,
+    # Long particles are placed first, while there is room; short ones fit into gaps.
+    first = np.argsort(-unplaced.outer_radius, kind="stable")
+    sizes = unplaced.diameters[first], unplaced.exponent[first]
+    bodies = unplaced.shape.compiled(sizes, dimension, unplaced.law)
+    box = _box(float(np.sum(bodies.measure)), phi, dimension)
+    found = bodies.insert(
+        box.edges,
         lambda m: rng.random((m, dimension)),
         lambda m: _random_orientations(m, dimension, rng).reshape(m, -1),
         _ATTEMPTS + _ATTEMPTS_PER_PARTICLE * n,
     )
     if found["outcome"] != "all":
-        raise _refusal(boxed, found)
+        raise _refusal(bodies, box, found)
     order = rng.permutation(n)  # independent of the order of insertion
     names = ("diameters", "exponent", "species")
-    return boxed.with_(
+    return unplaced.with_(
+        box=box,
         position=found["position"][order],
-        orientation=found["orientation"][order].reshape(boxed.orientation.shape),
-        **{name: getattr(boxed, name)[order] for name in names},
+        orientation=found["orientation"][order].reshape(unplaced.orientation.shape),
+        **{name: getattr(unplaced, name)[first[order]] for name in names},
     )
 
 
@@ -108,10 +113,10 @@ def dilute_packing(
     are few and small, and the first minimisation undoes them.
     """
     unplaced, rng = _unplaced(n, phi, seed, (particles or Particles.of(), dimension))
-    boxed = _boxed(unplaced, math.fsum(unplaced.measures), phi)
+    box = _box(math.fsum(unplaced.measures), phi, dimension)
     orientation = _random_orientations(n, dimension, rng)
-    position = rng.uniform(0, boxed.box.edges[0], (n, dimension))
-    return boxed.with_(position=position, orientation=orientation)
+    position = rng.uniform(0, box.edges[0], (n, dimension))
+    return unplaced.with_(box=box, position=position, orientation=orientation)
 
 
 def _unplaced(
@@ -124,10 +129,9 @@ def _unplaced(
     require_stated(n=n, seed=seed)
     rng = np.random.default_rng(seed)
     sizes = particles.sample(n, rng)
-    no_turn = np.eye(1, 4)[0]
     unplaced = Packing(
         position=np.zeros((n, dimension)),
-        orientation=np.zeros(n) if dimension == 2 else np.tile(no_turn, (n, 1)),
+        orientation=unturned(n, dimension),
         diameters=sizes.diameters,
         exponent=sizes.exponent,
         species=sizes.species,
@@ -138,35 +142,29 @@ def _unplaced(
     return unplaced, rng
 
 
-def _boxed(packing: Packing, area: float, phi: float) -> Packing:
+def _box(area: float, phi: float, dimension: int) -> Box:
     """Return the box in which particles of that area (volume) have the packing fraction phi."""
-    edge = (area / phi) ** (1 / packing.dimension)
-    return packing.with_(box=Box(np.zeros(packing.dimension), np.full(packing.dimension, edge)))
+    edge = (area / phi) ** (1 / dimension)
+    return Box(np.zeros(dimension), np.full(dimension, edge))
 
 
-def _longest_first(packing: Packing) -> Packing:
-    """Order for insertion: long particles first, while there is room; short ones fit into gaps."""
-    order = np.argsort(-packing.outer_radius, kind="stable")
-    names = ("diameters", "exponent", "species")
-    return packing.with_(**{k: getattr(packing, k)[order] for k in names})
-
-
-def _refusal(particles: Packing, found: Mapping[str, Any]) -> InsertionError:
-    """Explain why particles, the longest first, found no room, and suggest another start."""
+def _refusal(bodies: Any, box: Box, found: Mapping[str, Any]) -> InsertionError:
+    """Explain why bodies, the longest first, found no room, and suggest another start."""
+    measure = np.array(bodies.measure)
+    phi = float(np.sum(measure)) / box.volume
     if found["outcome"] == "too short":
-        length, edge = 2 * particles.outer_radius[0], particles.box.edges[0]
-        fits = particles.phi * (edge / length) ** particles.dimension
+        length, edge = 2 * bodies.outer_radius[0], box.edges[0]
+        fits = phi * (edge / length) ** box.dimension
         return InsertionError(
             f"no direction keeps the longest particle, of length {length:.3g}, off its"
             f" own periodic images in a box of edge {edge:.3g}: start at phi <= {_SAFE * fits:.2g}"
             " and compress from there, or take more particles"
         )
-    measure = np.array(particles.measures)
     measure[found["waiting"]] = 0
-    reached = measure.sum() / particles.box.volume
+    reached = measure.sum() / box.volume
     return InsertionError(
-        f"random insertion of {particles.n} particles stalled at phi = {reached:.3g} of the"
-        f" {particles.phi:.3g} requested after {found['attempts']} attempts: start at"
+        f"random insertion of {len(measure)} particles stalled at phi = {reached:.3g} of the"
+        f" {phi:.3g} requested after {found['attempts']} attempts: start at"
         f" phi <= {_SAFE * reached:.2g} and compress from there"
     )
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -47,13 +47,13 @@ class How(NamedTuple):
 _USUAL = How()
 
 
-def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
+def record(path: Path | None, plan: Plan, how: How = _USUAL) -> None:
     """Record a run to its end, or go on with it; a finished one is left alone.
 
     Parameters
     ----------
-    path : path
-        The file.
+    path : path or None
+        The file; with None nothing is written, and only the `finish` of the plan learns the results.
     plan : Plan
     how : How
 
@@ -70,14 +70,10 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
     """
     end = math.inf if how.seconds is None else perf_counter() + how.seconds
     # A noted signal is raised again when the lock is released.
-    with Interrupts() as interrupts, Lock(path):
-        remove_leftovers(path)
-        content = None if how.again or not path.exists() else Content.read(path)
-        if content:
-            require_same(content, plan)
-            if content.attributes["finished"]:
-                return
-        run = _begun(path, plan) if content is None else _resumed(content, plan)
+    with Interrupts() as interrupts, nullcontext() if path is None else Lock(path):
+        run = _Run(None, plan.begin(), plan.finish) if path is None else _opened(path, plan, how)
+        if run is None:
+            return
         with closing(run.driver):
             _follow(run, interrupts, how, end)
 
@@ -86,7 +82,8 @@ def record(path: Path, plan: Plan, how: How = _USUAL) -> None:
 class _Run:
     """A run in progress."""
 
-    content: Content
+    content: Content | None
+    """None if nothing is to be written."""
     driver: Driver
     finish: Callable[[Driver], None] | None
     due: float = field(default_factory=lambda: perf_counter() + SECONDS)
@@ -95,6 +92,8 @@ class _Run:
     def add(self, row: Row) -> None:
         """Keep a row, and the frame that belongs to it."""
         content = self.content
+        if content is None:
+            return
         content.add_row(row.step, row.time, row.observables or {})
         if row.error is not None:
             content.report.append((row.step, row.wall_seconds, row.error))
@@ -103,6 +102,8 @@ class _Run:
 
     def store(self, checkpoint: Checkpoint | None) -> None:
         """Write the file, which is finished without a checkpoint."""
+        if self.content is None:
+            return
         began = perf_counter()
         self.content.attributes |= dict(self.driver.results()) | {"finished": checkpoint is None}
         self.content.checkpoint = checkpoint
@@ -121,23 +122,37 @@ def _follow(run: _Run, interrupts: Interrupts, how: How, end: float) -> None:
         run.add(row)
         stops = interrupts.noted is not None or perf_counter() >= end
         is_mark = driver.at_mark and not driver.done
-        if is_mark and (stops or perf_counter() >= run.due):
+        if content and is_mark and (stops or perf_counter() >= run.due):
             run.store(driver.checkpoint())
         how.tell(row)
         if not (is_mark and stops):
             continue
         if interrupts.noted is not None:
             return  # raised again outside
-        raise TimeLimitError(_stopped(row, how, content.path))
+        raise TimeLimitError(_stopped(row, how, content.path if content else None))
     if run.finish is None:
         run.store(None)
         return
     run.finish(driver)
-    content.path.unlink(missing_ok=True)
+    if content:
+        content.path.unlink(missing_ok=True)
 
 
-def _stopped(row: Row, how: How, path: Path) -> str:
-    return f"{path}: stopped after {how.seconds:.3g} s at {row.told.text}, expected the end; the same command resumes"
+def _stopped(row: Row, how: How, path: Path | None) -> str:
+    said = f"stopped after {how.seconds:.3g} s at {row.told.text}, expected the end"
+    if path is None:
+        return f"{said}; with a file the same call would go on from here"
+    return f"{path}: {said}; the same command resumes"
+
+
+def _opened(path: Path, plan: Plan, how: How) -> _Run | None:
+    """Begin a run, or go on with that of a file; None if that is finished."""
+    remove_leftovers(path)
+    content = None if how.again or not path.exists() else Content.read(path)
+    if content is None:
+        return _begun(path, plan)
+    require_same(content, plan)
+    return None if content.attributes["finished"] else _resumed(content, plan)
 
 
 def _begun(path: Path, plan: Plan) -> _Run:

@@ -78,7 +78,7 @@ class Interaction(NamedTuple):
     ...     species=[1, 1], id=[1, 2], box=js.Box(lo=[0, 0], edges=[10, 10]),
     ... )
     >>> stiff = discs.with_(law=js.Interaction(k_e=2.0))
-    >>> round(float(js.MeasuredPacking.of(stiff).u / js.MeasuredPacking.of(discs).u), 12)
+    >>> round(float(stiff.u / discs.u), 12)
     2.0
     """
 
@@ -175,9 +175,9 @@ class Shape(ABC):
 
     @abstractmethod
     def sizes(
-        self, parameters: Mapping[str, float], size: FloatArray
+        self, parameters: Mapping[str, float | FloatArray], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Convert parameters and (n,) sizes to (n, 3) diameters and (n,) exponents.
+        """Convert parameters, numbers or (n,), and (n,) sizes to (n, 3) diameters and (n,) exponents.
 
         Raises
         ------
@@ -270,7 +270,7 @@ class ElongatedShape(Shape):
         return "(2(A+R), 2R, 2R) with A >= 0"
 
     def sizes(
-        self, parameters: Mapping[str, float], size: FloatArray
+        self, parameters: Mapping[str, float | FloatArray], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """See `Shape.sizes`."""
         radius = 0.5 * size

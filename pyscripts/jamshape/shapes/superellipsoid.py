@@ -54,7 +54,7 @@ class Superellipsoid(Shape):
         return "(2a, 2b, 2c), all positive"
 
     def sizes(
-        self, parameters: Mapping[str, float], size: FloatArray
+        self, parameters: Mapping[str, float | FloatArray], size: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """See `Shape.sizes`."""
         axes = axes_from(parameters["w1"], parameters["w2"])

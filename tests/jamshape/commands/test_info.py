@@ -37,8 +37,12 @@ def test_a_packing(jamshape, tiny, name, rate, made):
     stored = read_attributes(path)
     assert (report["kind"], report["finished"], report["reached"]) == ("packing", True, True)
     assert set(rate) == {"kappa"} & report.keys()
-    for told in ("phi", "pressure", "u", "z", "seed", *rate, "u0", "wall_seconds"):
+    known = ("phi", "pressure", "u", "z", "z_single", "z_iso", "seed", *rate, "u0", "wall_seconds")
+    for told in known:
         assert report[told] == stored[told]
+    assert (report["S_2"], report["S_4"]) == (stored["S2"], stored["S4"])
+    assert lines["order"] == f"S_2 {stored['S2']:.4g}, S_4 {stored['S4']:.4g}"
+    assert "C_4" not in report
     assert report["rattlers"] == stored["n_rattlers"]
     assert report["error"] == stored["residual"]
     kind = {"alpha": pytest.approx(1.0), "count": 8}
@@ -73,6 +77,8 @@ def test_a_packing_of_which_nothing_is_known_is_measured(jamshape, tiny, tmp_pat
         assert report["u"] == pytest.approx(1e-6, rel=1e-6)
         assert report["pressure"] == pytest.approx(stored["pressure"], rel=1e-6)
         assert (report["z"], report["rattlers"]) == (stored["z"], stored["n_rattlers"])
+        assert report["z_single"] == stored["z_single"]
+        assert report["S_2"] == pytest.approx(stored["S2"], rel=1e-12)
 
 
 @pytest.mark.parametrize(("name", "kind"), [("run.h5", "run"), ("slow.h5", "slow run")])

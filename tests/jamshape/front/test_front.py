@@ -163,7 +163,7 @@ def test_what_is_loaded_is_what_the_file_holds(run, file, tmp_path):
     for name in ("copy.h5", "copy.data"):
         js.save(tmp_path / name, packing)
         copy = js.load(tmp_path / name)
-        assert isinstance(copy, js.MeasuredPacking)
+        assert isinstance(copy, js.Packing)
         assert (copy.position == packing.position).all()
     with pytest.raises(ValueError, match="choose another file, or use again=True to replace it"):
         js.compress(RODS, **SMALL, file=tmp_path / "copy.h5", progress=False)
@@ -186,7 +186,7 @@ def test_results_are_those_of_the_file_until_something_is_changed(run):
     packing = run.packing()
     assert packing.results["n"] == 16
     moved = packing.with_(step=3)
-    assert isinstance(moved, js.MeasuredPacking)
+    assert isinstance(moved, js.Packing)
     assert moved.results == {}
     assert moved.file is None
 
@@ -234,13 +234,13 @@ def test_a_slow_run_of_nothing_is_refused(tmp_path):
 @pytest.mark.lammps
 def test_a_packing_whose_forces_do_not_balance_says_so(run):
     packing = run.packing()
-    stalled = js.MeasuredPacking.of(packing, {"outcome": "stalled"})
+    stalled = packing.with_(results={"outcome": "stalled"})
     assert "stalled: forces do not balance" in repr(stalled)
     assert not stalled.reached
-    assert "balance" not in repr(js.MeasuredPacking.of(packing, {"outcome": "kink"}))
+    assert "balance" not in repr(packing.with_(results={"outcome": "kink"}))
     saddle = {"outcome": "converged", "strict": True, "n_negative": 2}
     said = "2 of its modes have a negative eigenvalue, expected none"
-    assert said in repr(js.MeasuredPacking.of(packing, saddle))
+    assert said in repr(packing.with_(results=saddle))
 
 
 @pytest.mark.lammps

@@ -69,8 +69,8 @@ def made(folder):
     plain = js.load(folder / "packing.h5")
     return {
         "Box": js.Box(lo=[0, 0], edges=[10, 12], tilt=[3]),
-        "Packing": js.Packing(**{f: getattr(packing, f) for f in js.Packing.__dataclass_fields__}),
-        "MeasuredPacking": packing,
+        "Packing": packing,
+        "Packing of arrays": js.Packing.of("spherocylinder", [[1, 2]], [0], box=[9, 9], alpha=4),
         "its copy": plain.with_(step=3),
         "Kind": js.Kind({"alpha": 1}, size=1.2),
         "Particles": js.Spherocylinders(alpha=4),
@@ -104,7 +104,7 @@ def objects(tmp_path_factory):
     return made(tmp_path_factory.mktemp("objects"))
 
 
-NAMES = """Box|Packing|MeasuredPacking|its copy|Kind|Particles|Particles mixed|Particles given|Modes|Modes of a file
+NAMES = """Box|Packing|Packing of arrays|its copy|Kind|Particles|Particles mixed|Particles given|Modes|Modes of a file
 ModeTable|DynamicalMatrix|Moduli|Contacts|ContactNetwork|State|Landscape|Recipe|RunFile|RunFile of a file|OnsetFit
 Jamming|ShearFile|CyclicShearFile|QuasistaticShearFile|Event|Interaction|NotReachedWarning""".replace(
     "\n", "|"

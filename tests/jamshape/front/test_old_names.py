@@ -30,6 +30,13 @@ def test_old_names_of_arguments_and_values_warn_and_work(tmp_path):
         js.slow_compress(rods, n=8, phi=(0.6, 0.61), kappa=1e-3, tolerance=1e-2, progress=False)
 
 
+def test_the_old_name_of_the_class_warns_and_is_the_new_one():
+    said = "^MeasuredPacking is called Packing now; the old name goes"
+    with pytest.warns(FutureWarning, match=said) as warned:
+        assert js.MeasuredPacking is js.Packing
+    assert warned[0].filename == __file__
+
+
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [

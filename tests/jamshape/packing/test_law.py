@@ -10,6 +10,7 @@ from common.spines import with_spines
 from jamshape.contacts import Contacts, find_contacts, forces
 from jamshape.exchange.gsd import read_gsd, write_gsd
 from jamshape.files.h5md import read_packing, write_packing, write_run
+from jamshape.front.packing import public
 from jamshape.landscape import Landscape, State
 
 LAW = js.Interaction(k_e=2.5, sides=1)
@@ -33,7 +34,7 @@ def test_energy_and_forces_are_those_of_the_law(rods):
     landscape = Landscape(rods)
     assert (landscape.k_e, landscape.sides) == LAW
     assert landscape.evaluate(State.of(rods)).energy == pytest.approx(expected.energy, rel=1e-12)
-    measured = js.MeasuredPacking.of(rods)
+    measured = public(rods)
     assert measured.pressure == expected.pressure
     assert measured.u * rods.box.volume == pytest.approx(expected.energy, rel=1e-14)
     assert Landscape(rods, sides=2).evaluate(State.of(rods)).energy == pytest.approx(
@@ -48,7 +49,7 @@ def test_copies_carry_it(rods):
         rods.with_(position=rods.position + 0.5),
         State.of(rods).strained(1e-3).packing(rods),
         rods.with_poses(*rods.poses()),
-        js.MeasuredPacking.of(rods).with_(step=3),
+        public(rods).with_(step=3),
     ]
     assert {copy.law for copy in copies} == {LAW}
     discs = js.Packing(
