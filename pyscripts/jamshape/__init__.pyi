@@ -7,6 +7,7 @@ from .front.ensembles import ensemble as ensemble
 from .front.files import load as load
 from .front.files import save as save
 from .front.making import make_packing as make_packing
+from .front.minimising import minimise as minimise
 from .front.modes import Modes as Modes
 from .front.modes import modes as modes
 from .front.packing import Packing as Packing

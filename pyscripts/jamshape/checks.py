@@ -198,6 +198,7 @@ RANGES = {
     "samples": Range(1, _COUNT, "samples", whole=True),
     "pairs": Range(1, 10**9, "pairs", whole=True),
     "seconds": Range(0.0, 1e9, "a time"),
+    "evaluations": Range(1, _COUNT, "evaluations", whole=True),
     "jobs": Range(1, 1024, "processes", whole=True),
     "threads": Range(1, 1024, "threads", whole=True),
     "dpi": Range(1, 4000, "dots", whole=True),

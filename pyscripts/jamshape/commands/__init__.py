@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 COMMANDS = {
     "compress": "compress particles through jamming; record p(phi) and snapshots",
     "pack": "make one mechanically stable packing at a chosen energy",
+    "minimise": "minimise the energy of a state of your own",
     "slow": "compress at any rate, however slow, in the plane; record p(phi)",
     "shear": "shear at a constant rate; record stress, order and snapshots",
     "cycle": "shear to and fro; record stress, and displacements from cycle to cycle",

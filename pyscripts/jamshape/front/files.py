@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.arguments import checked
-from jamshape.files.h5md import copy_run, read_attributes, write_packing
+from jamshape.files.h5md import FileFormatError, copy_run, read_attributes, write_packing
 from jamshape.files.lammps_text import read_any, write_data
 from jamshape.files.meaning import Wanted, require_told
 from jamshape.files.signature import GSD, HDF5, format_of
@@ -82,6 +82,17 @@ def load(
     packing = Packing.read(path, last)
     require_told(path, packing, wanted)
     return packing
+
+
+def packing_of(thing: PackingLike | str | Path, frame: int = -1, **meaning: Any) -> Packing:
+    """Return a packing, or that of a frame of any file with particles; arguments and errors as of `load`."""
+    if isinstance(thing, PackingLike):
+        return public(thing)
+    found = load(thing, frame, **meaning)
+    if not isinstance(found, Packing):
+        msg = f"{thing} holds modes, expected particles"
+        raise FileFormatError(msg)
+    return found
 
 
 @checked

@@ -147,12 +147,27 @@ def make_packing(
         phi_thermal=phi_thermal, n_sweeps=n_sweeps, delta_phi=delta_phi, start=start,
         search=search, minimiser=minimiser, strict=strict,
     )  # fmt: skip
+    return made_or_kept(
+        recipe, file, threads=threads, again=again, seconds=seconds, progress=progress
+    )
+
+
+def made_or_kept(
+    recipe: Recipe,
+    file: str | Path | None,
+    *,
+    threads: int,
+    again: bool,
+    seconds: float | None,
+    progress: bool,
+) -> Packing:
+    """Make a packing, or load it from its file; arguments, errors and warnings as of `make_packing`."""
     require_stated(threads=threads)
     require_given(seconds=seconds)
     with sharing(threads), display(shown=progress) as tell:
         how = How(again, seconds, lambda row: tell(row.told))
         packing = public(made(recipe, how)) if file is None else _kept(file, recipe, how)
-    warn_unless_reached(packing.results)
+    warn_unless_reached(packing.results, stacklevel=4)
     return packing
 
 

@@ -47,11 +47,11 @@ def told_of(start: Packing) -> dict[str, Any]:
     names, results = (*own, "size_ratio", "kinds", "seed"), start.results
     found = {name: results[name] for name in names if name in results}
     # As UTF-8, whatever the locale: names may hold bytes that it cannot decode.
-    name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else _digest(start)
+    name = os.fsencode(named(start.file)).decode(errors="replace") if start.file else digest(start)
     return found | {"n": start.n, "start": name, "phi_start": start.phi}
 
 
-def _digest(start: PackingLike) -> str:
+def digest(start: PackingLike) -> str:
     """Name a packing without a file by its poses, to distinguish it from another one."""
     poses = b"".join(np.ascontiguousarray(x, np.float64).tobytes() for x in start.poses())
     return f"packing {hashlib.blake2b(poses, digest_size=8).hexdigest()}"

@@ -7,12 +7,12 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-from jamshape.checks import require_positive
+from jamshape.checks import require_one_of, require_positive
 from jamshape.landscape import Landscape
 from jamshape.landscape.local_energy_model import LocalEnergyModel
 from jamshape.landscape.newton import least_shift
 from jamshape.minima.descent import History, Minimum, Outcome, Stop, residual_of
-from jamshape.minima.minimise import minimise
+from jamshape.minima.minimise import METHODS, minimise
 from jamshape.packing import State
 
 # A minimum with this residual is jammed.
@@ -98,9 +98,47 @@ class Target:
         """Whether an energy density equals u0 to the accuracy."""
         return abs(u - self.u0) <= self.accuracy * self.u0
 
+    def loosened(self, tolerance: float, accuracy: float) -> Target:
+        """Return the goal of a rough search."""
+        return replace(self, tolerance=tolerance, accuracy=accuracy)
+
+    def find(self, landscape: Landscape, start: State) -> Minimum:
+        """Lead a state to the energy, and minimise it; errors as `extrapolation`."""
+        return find(landscape, start, self)
+
     def strain_above_jamming(self, landscape: Landscape) -> float:
         """Estimate the strain of the box between jamming and u0."""
         return math.sqrt(self.u0 / _stiffness(landscape))
+
+
+@dataclass(frozen=True)
+class FixedBox:
+    """Goal of a minimisation at a fixed box; parameters as of `Target`."""
+
+    tolerance: float = 1e-8
+    method: str = "auto"
+
+    def __post_init__(self) -> None:
+        require_positive(tolerance=self.tolerance)
+        require_one_of("minimiser", self.method, METHODS)
+
+    def is_met(self, u: float) -> bool:
+        """Every energy will do."""
+        del u
+        return True
+
+    def loosened(self, tolerance: float, accuracy: float) -> FixedBox:
+        """Return the goal of a rough minimisation."""
+        del accuracy
+        return replace(self, tolerance=tolerance)
+
+    def find(self, landscape: Landscape, start: State) -> Minimum:
+        """Minimise a state."""
+        return minimise(landscape, start, self.method, Stop(self.tolerance))
+
+
+Goal = Target | FixedBox
+"""What a search for a strict minimum returns to."""
 
 
 def _stiffness(landscape: Landscape) -> float:

@@ -27,7 +27,7 @@ from jamshape.flow.lammps_driver import Sizes
 from jamshape.landscape import Landscape
 from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.packing_summary import summary_of, with_results, write_minimum
-from jamshape.minima import History, Minimum
+from jamshape.minima import History, Minimum, Outcome
 from jamshape.minima.checkpoints import minimum_of, told_minimum
 from jamshape.minima.target import require_reachable
 from jamshape.packing import Packing, State
@@ -37,6 +37,7 @@ from jamshape.protocols.recipe import (
     Adaptive,
     Compressed,
     Dynamics,
+    Given,
     Recipe,
     Steps,
     Thermalisation,
@@ -45,6 +46,7 @@ from jamshape.protocols.stages import (
     Begin,
     Compressing,
     Making,
+    Minimising,
     Retrying,
     Searching,
     Stage,
@@ -155,7 +157,7 @@ def tidy(out: Path) -> None:
 
 def run_file(recipe: Recipe, out: Path) -> Path | None:
     """Name the file of the compression in LAMMPS, if the recipe has one."""
-    if isinstance(recipe.way, Steps):
+    if isinstance(recipe.way, Steps | Given):
         return None
     given = recipe.way.source if isinstance(recipe.way, Compressed) else None
     return given or out.with_name(out.name + ".run.h5")
@@ -164,7 +166,7 @@ def run_file(recipe: Recipe, out: Path) -> Path | None:
 def compresses(recipe: Recipe) -> bool:
     """Whether the recipe has a compression in LAMMPS that is not given."""
     is_given = isinstance(recipe.way, Compressed) and recipe.way.source is not None
-    return not isinstance(recipe.way, Steps) and not is_given
+    return not isinstance(recipe.way, Steps | Given) and not is_given
 
 
 def _after_compression(recipe: Recipe, out: Path, how: How) -> How:
@@ -249,6 +251,8 @@ class Pipeline:
     def _stages(self) -> list[Begin]:
         """List the stages; the last one follows from the minimum."""
         recipe, way = self._recipe, self._recipe.way
+        if isinstance(way, Given):
+            return [Minimising, self._last]
         found: list[Begin] = []
         if isinstance(way, Steps) and way.thermal:
             found += [partial(Compressing, phi=way.thermal.phi), Sweeping]
@@ -261,9 +265,11 @@ class Pipeline:
 
     def _last(self, making: Making, checkpoint: Checkpoint | None) -> Stage | None:
         """Begin a strict search or a second attempt, where there is to be one."""
+        assert making.minimum
+        if making.minimum.outcome is Outcome.UNJAMMED:
+            return None
         if self._recipe.strict:
             return Strengthening(making, checkpoint)
-        assert making.minimum
         needs = self._retry and self._recipe.is_searched and not making.minimum.is_at_rest
         return Retrying(making, checkpoint) if needs else None
 
@@ -347,6 +353,8 @@ class Pipeline:
 
     def _of_compression(self) -> dict[str, Any]:
         way = self._recipe.way
+        if isinstance(way, Given):
+            return {}
         if isinstance(way, Steps):
             return {"acceptance": np.nan}  # replaced after Monte Carlo
         assert self._source

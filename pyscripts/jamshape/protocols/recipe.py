@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
@@ -13,7 +14,7 @@ from jamshape.arrays import FloatArray
 from jamshape.checks import ArgumentError, require_one_of, require_rising, require_stated
 from jamshape.files.h5md import read_packing
 from jamshape.files.vocabulary import ATHERMAL, COMPRESSED, THERMAL
-from jamshape.minima.target import Target, bisection, extrapolation
+from jamshape.minima.target import FixedBox, Goal, Target, bisection, extrapolation
 from jamshape.packing import Packing
 from jamshape.protocols.approach import Approach
 from jamshape.protocols.quasistatic import Quasistatic
@@ -233,6 +234,43 @@ class Compressed:
 
 
 @dataclass(frozen=True)
+class Given:
+    """No way at all: a state of one's own, to be minimised at its box.
+
+    Parameters
+    ----------
+    packing
+        The state.
+    made_from
+        Attributes that describe it.
+    goal
+        Tolerance and minimiser.
+    evaluations
+        Largest number of evaluations of all forces.
+    """
+
+    packing: Packing
+    made_from: Mapping[str, Any]
+    goal: FixedBox
+    evaluations: int = 200_000
+    search: ClassVar[str] = ""
+
+    def start(self, recipe: Recipe) -> Packing:
+        """Return the state."""
+        del recipe
+        return self.packing
+
+    def attributes(self, target: Target | None) -> dict[str, Any]:
+        """Return its identifying attributes."""
+        del target
+        told = {"protocol": "minimise", "evaluations_limit": self.evaluations}
+        return dict(self.made_from) | vars(self.goal) | told
+
+    def require(self, recipe: Recipe) -> None:
+        """Refuse nothing."""
+
+
+@dataclass(frozen=True)
 class Recipe:
     """Ingredients and protocol of a packing.
 
@@ -277,7 +315,7 @@ class Recipe:
     def __post_init__(self) -> None:
         require_stated(n=self.n, seed=self.seed, phi_start=self.phi_start)
         require_one_of("dimension", self.dimension, (2, 3))
-        if self.strict and self.target is None:
+        if self.strict and self.goal is None:
             said = "{u0} does not work with a strict minimum, expected a positive one"
             raise ArgumentError(said, {"u0": 0})
         self.way.require(self)
@@ -285,6 +323,11 @@ class Recipe:
     def start(self) -> Packing:
         """Make the random start; errors as in `random_start.random_packing`."""
         return self.way.start(self)
+
+    @property
+    def goal(self) -> Goal | None:
+        """Target energy, or fixed box; None for the first jammed packing."""
+        return self.way.goal if isinstance(self.way, Given) else self.target
 
     @property
     def is_searched(self) -> bool:

@@ -12,9 +12,10 @@ from typing import Any, Protocol
 
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.landscape import Landscape
-from jamshape.minima import History, Minimum
+from jamshape.minima import History, Minimum, Outcome, Stop, minimise
 from jamshape.minima.checkpoints import minimum_of, search_of, told_minimum, told_search
 from jamshape.minima.target import (
+    Goal,
     Search,
     Target,
     TargetError,
@@ -25,7 +26,7 @@ from jamshape.minima.target import (
 from jamshape.packing import State
 from jamshape.protocols import quasistatic, retry, strict, thermal
 from jamshape.protocols.quasistatic import QuasistaticRun
-from jamshape.protocols.recipe import Recipe, Steps
+from jamshape.protocols.recipe import Given, Recipe, Steps
 from jamshape.protocols.retry import Retry
 from jamshape.protocols.strict import StrictSearch
 from jamshape.protocols.thermal import Thermal, without_overlaps
@@ -33,6 +34,9 @@ from jamshape.recording.driver import Told
 
 MOST_MINIMISATIONS = 20_000
 """Limit of a search: with the steps of 1e-6 of bisection they change phi by 0.04."""
+
+EVALUATIONS = 5000
+"""Evaluations of a minimisation between two marks."""
 
 _ADVANCES = {"extrapolation": extrapolate, "bisection": bisect}
 
@@ -68,6 +72,13 @@ class Making:
         """Target energy."""
         assert self.recipe.target is not None
         return self.recipe.target
+
+    @property
+    def goal(self) -> Goal:
+        """Target energy, or fixed box."""
+        goal = self.recipe.goal
+        assert goal is not None
+        return goal
 
     def told(self, phase: str, text: str, state: State, part: float | None = None) -> Told:
         """Return progress at a state."""
@@ -244,6 +255,49 @@ def _where(search: Search, target: Target, last: float) -> str:
     return f"{text}, about {math.ceil((now - aim) / (before - now))} more of it"
 
 
+class Minimising:
+    """Minimisation at a fixed box, in parts."""
+
+    def __init__(self, making: Making, checkpoint: Checkpoint | None) -> None:
+        self._making, self._found, self._parts = making, None, 0
+        self._history, self._state = History(), making.state
+        if checkpoint is not None:
+            self._history = History.of(checkpoint["history"])
+            self._state, self._parts = checkpoint["state"], checkpoint["parts"]
+
+    _found: Minimum | None
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended."""
+        return self._found is not None
+
+    def advance(self) -> Told:
+        """Minimise for a part of the evaluations."""
+        making = self._making
+        goal, way = making.goal, making.recipe.way
+        assert isinstance(way, Given)
+        left = way.evaluations - self._parts * EVALUATIONS
+        stop = Stop(goal.tolerance, evaluations=min(left, EVALUATIONS))
+        found = minimise(making.landscape, self._state, goal.method, stop, self._history)
+        if found.outcome is Outcome.STALLED and goal.method == "auto":
+            found = minimise(making.landscape, found.state, "newton", stop, self._history)
+        self._state = found.state
+        self._parts += 1
+        if found.outcome is not Outcome.EXHAUSTED or left <= EVALUATIONS:
+            self._found = found
+        text = f"u {found.energy_density:.3e}, residual {found.residual.largest:.1e} of {goal.tolerance:.0e}"
+        return making.told("minimisation", text, found.state)
+
+    def checkpoint(self) -> Checkpoint:
+        """Return the state."""
+        return {"state": self._state, "parts": self._parts, "history": self._history.told()}
+
+    def end(self) -> None:
+        """Hand on the minimum."""
+        self._making.minimum, self._making.state = self._found, self._state
+
+
 class Strengthening:
     """Search for a strict minimum."""
 
@@ -266,7 +320,7 @@ class Strengthening:
     def advance(self) -> Told:
         """Take a step, or check a candidate."""
         search, making = self._search, self._making
-        strict.advance(making.landscape, search, making.target)
+        strict.advance(making.landscape, search, making.goal)
         return making.told("search for a strict minimum", str(search), search.minimum.state)
 
     def checkpoint(self) -> Checkpoint:
@@ -281,9 +335,10 @@ class Strengthening:
     def end(self) -> None:
         """Hand on the minimum and its proof."""
         search, making = self._search, self._making
-        assert search.proof is not None
         making.minimum = search.minimum
-        making.attributes |= search.counts() | search.proof.attributes()
+        making.attributes |= search.counts()
+        if search.proof is not None:  # else it has unjammed, at a fixed box
+            making.attributes |= search.proof.attributes()
 
 
 class Retrying:

@@ -19,7 +19,7 @@ from jamshape.arrays import FloatArray
 from jamshape.contacts import CrossingError
 from jamshape.landscape import Landscape
 from jamshape.minima import Minimum, Outcome, Stop, minimise
-from jamshape.minima.target import Target, find
+from jamshape.minima.target import Goal
 from jamshape.packing import State
 from jamshape.protocols.strict_proof import ModesOffKinks, Proof
 from jamshape.vibration.sliding import Sliding, Step
@@ -113,7 +113,7 @@ def start(landscape: Landscape, state: State) -> StrictSearch:
     return StrictSearch(minimum, _everywhere(landscape, _LONGEST), most)
 
 
-def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Iterator[StrictSearch]:
+def descend(landscape: Landscape, search: StrictSearch, target: Goal) -> Iterator[StrictSearch]:
     """Follow negative curvature until none is left.
 
     Ends where no eigenvalue is below minus its bound and forces balance, and otherwise after a number of
@@ -124,8 +124,8 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
     landscape : Landscape
     search : StrictSearch
         Initial or resumed state.
-    target : Target
-        Energy, and tolerance of force balance.
+    target : Target or FixedBox
+        Energy or fixed box, and tolerance of force balance.
 
     Yields
     ------
@@ -142,10 +142,13 @@ def descend(landscape: Landscape, search: StrictSearch, target: Target) -> Itera
         yield search
 
 
-def advance(landscape: Landscape, search: StrictSearch, target: Target) -> None:
+def advance(landscape: Landscape, search: StrictSearch, target: Goal) -> None:
     """Take a step, or check a candidate; parameters and errors as `descend`."""
     radius = 0.5 * landscape.length
     search.proof = None
+    if search.minimum.outcome is Outcome.UNJAMMED:  # at a fixed box
+        search.done = True
+        return
     ends = search.n_steps >= search.most_steps or search.n_closed >= _MOST_CLOSED
     if ends or search.farthest.max() < _STILL * radius:
         _close(landscape, search, target)
@@ -168,7 +171,7 @@ def advance(landscape: Landscape, search: StrictSearch, target: Target) -> None:
 
 
 def _take(
-    landscape: Landscape, search: StrictSearch, target: Target, way: tuple[Sliding, Step]
+    landscape: Landscape, search: StrictSearch, target: Goal, way: tuple[Sliding, Step]
 ) -> None:
     """Take a step if the energy falls, and adapt the next one."""
     sliding, step = way
@@ -187,8 +190,7 @@ def _take(
         search.farthest = _next_farthest(search, step.moved, _LONGEST * radius)
         search.minimum, search.last = there, step.moved
     elif fell and reach < (_SHORT if settled else _SHORTER) * radius:
-        rough = replace(target, tolerance=_RELAXED, accuracy=1e-3)
-        search.minimum = find(landscape, there.state, rough)
+        search.minimum = target.loosened(_RELAXED, 1e-3).find(landscape, there.state)
         search.farthest, search.last = _everywhere(landscape, _LONGEST), None
         search.n_fallen += 1
     else:
@@ -206,14 +208,17 @@ def _next_farthest(search: StrictSearch, moved: FloatArray, longest: float) -> F
     return np.where(cosine < -_TURNED, search.farthest / _LESS, further)
 
 
-def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
+def _close(landscape: Landscape, search: StrictSearch, target: Goal) -> None:
     """Relax a state that has met its walls at the energy, and check whether it is a minimum."""
-    minimum = find(landscape, search.minimum.state, target)
+    minimum = target.find(landscape, search.minimum.state)
     settled = _settled(landscape, minimum.state)
     is_better = settled.residual.largest < minimum.residual.largest
     if is_better and target.is_met(settled.energy_density):  # still jammed
         minimum = replace(settled, outcome=minimum.outcome)
     search.n_closed += 1
+    if minimum.outcome is Outcome.UNJAMMED:
+        search.minimum = minimum
+        return
     minimum, search.proof = _against_walls(landscape, minimum, target)
     balanced = minimum.residual.largest <= target.tolerance
     if search.proof.n_negative == 0 and balanced:
@@ -226,7 +231,7 @@ def _close(landscape: Landscape, search: StrictSearch, target: Target) -> None:
     search.keeping = search.proof.n_negative > 0
 
 
-def _against_walls(landscape: Landscape, minimum: Minimum, target: Target) -> tuple[Minimum, Proof]:
+def _against_walls(landscape: Landscape, minimum: Minimum, target: Goal) -> tuple[Minimum, Proof]:
     """Close walls that are nearer than digits resolve.
 
     Rounding decides whether such a wall is open or closed; if forces balance equally well, the state with the wall
