@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from jamshape.checks import TimeLimitError
 from jamshape.files.checkpoint import Checkpoint
 from jamshape.files.h5md import read_attributes, read_observables, require_attributes
 from jamshape.files.lock import Lock
@@ -54,7 +55,7 @@ from jamshape.protocols.stages import (
     Sweeping,
 )
 from jamshape.recording.driver import Plan, Row
-from jamshape.recording.recorder import How, record
+from jamshape.recording.recorder import How, record, stopped
 
 __all__ = [
     "Adaptive",
@@ -122,7 +123,10 @@ def made(recipe: Recipe, how: How = How()) -> Packing:  # noqa: B008
     place = TemporaryDirectory(prefix="jamshape-") if compresses(recipe) else nullcontext("")
     with place as folder:
         out = Path(folder, "packing.h5")
-        how = _after_compression(recipe, out, how)
+        try:
+            how = _after_compression(recipe, out, how)
+        except TimeLimitError as error:
+            raise TimeLimitError(stopped("in the compression", how)) from error
         plan = _plan(recipe, run_file(recipe, out), lambda driver: found.append(driver.packing()))
         record(None, plan, how)
     if not found:  # the caller's handler of a signal has let us go on

@@ -129,7 +129,7 @@ def _follow(run: _Run, interrupts: Interrupts, how: How, end: float) -> None:
             continue
         if interrupts.noted is not None:
             return  # raised again outside
-        raise TimeLimitError(_stopped(row, how, content.path if content else None))
+        raise TimeLimitError(stopped(f"at {row.told.text}", how, content.path if content else None))
     if run.finish is None:
         run.store(None)
         return
@@ -138,10 +138,11 @@ def _follow(run: _Run, interrupts: Interrupts, how: How, end: float) -> None:
         content.path.unlink(missing_ok=True)
 
 
-def _stopped(row: Row, how: How, path: Path | None) -> str:
-    said = f"stopped after {how.seconds:.3g} s at {row.told.text}, expected the end"
+def stopped(where: str, how: How, path: Path | None = None) -> str:
+    """Say that the time was up, and how to go on, which needs a file."""
+    said = f"stopped after {how.seconds:.3g} s {where}, expected the end"
     if path is None:
-        return f"{said}; with a file the same call would go on from here"
+        return f"{said}; with a file the same call goes on from there"
     return f"{path}: {said}; the same command resumes"
 
 

@@ -115,10 +115,10 @@ def test_what_is_refused(changes, sentence):
 
 
 def test_what_is_missing_is_named():
-    with pytest.raises(ValueError, match="^alpha of spherocylinders is missing, expected aspect"):
+    with pytest.raises(ValueError, match=r"^alpha of spherocylinders is missing, expected aspect"):
         js.Packing.of("spherocylinder", **RODS)
     with pytest.raises(
-        ValueError, match="^w1 of superellipsoids is missing, expected a/b <= 1, or"
+        ValueError, match=r"^w1 of superellipsoids is missing, expected a/b <= 1, or"
     ):
         js.Packing.of("superellipsoid", **RODS, p=1)
     with pytest.raises(ValueError, match=r"orientation is missing, expected \(1, 4\) quaternions"):
