@@ -3,11 +3,14 @@
 from .checks import NotReachedWarning as NotReachedWarning
 from .front.compressing import compress as compress
 from .front.compressing import slow_compress as slow_compress
+from .front.energies import Energy as Energy
+from .front.energies import energy as energy
 from .front.files import load as load
 from .front.files import save as save
 from .front.making import make_packing as make_packing
 from .front.modes import Modes as Modes
 from .front.modes import modes as modes
+from .front.nonaffine import nonaffine as nonaffine
 from .front.packing import MeasuredPacking as MeasuredPacking
 from .front.pictures import plot as plot
 from .front.recorded import resume as resume
@@ -18,6 +21,7 @@ from .front.run import ShearFile as ShearFile
 from .front.shearing import cyclic_shear as cyclic_shear
 from .front.shearing import quasistatic_shear as quasistatic_shear
 from .front.shearing import shear as shear
+from .measures.nonaffine import Nonaffine as Nonaffine
 from .packing import Box as Box
 from .packing import Packing as Packing
 from .shapes.named import Dimers as Dimers

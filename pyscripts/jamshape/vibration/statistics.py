@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, structural_rank
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import Packing
 from jamshape.vibration.dense_modes import rank_of
-from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
+from jamshape.vibration.hessian import LARGEST_RESIDUAL, Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum
 
 # The gap below the high band is the widest within this fraction of all modes around the rank of H.
@@ -33,6 +33,9 @@ _SHARE = 1e-3
 
 # Bonds weaker than this fraction of the mean force are grazing.
 _GRAZING = 1e-4
+
+# Singular values are computed for up to this number of bonds or coordinates, in half a minute.
+_DENSE = 4000
 
 
 class Components(NamedTuple):
@@ -225,6 +228,45 @@ def count(matrix: DynamicalMatrix, found: Spectrum) -> Counts:
         softest_constraint=float(sigma[rank - 1]) if rank else np.nan,
         largest_of_self_stress=float(sigma[rank]) if rank < len(sigma) else 0.0,
     )
+
+
+class Constraints(NamedTuple):
+    """Rank of the compatibility matrix C of m bonds and n coordinates."""
+
+    n_bonds: int
+    """Number of bonds m."""
+    rank: int
+    n_self_stress: int
+    """Number of states of self stress, m - rank."""
+    n_zero_modes: int
+    """Motions that change no bond length, n - rank: translations, free spins and rattlers among them."""
+    method: str
+    """``svd``: from singular values of K^(1/2) C. ``structure``, above 4000 bonds and coordinates: from the nonzero entries alone,
+    so that the rank is an upper bound, and the other two are lower bounds."""
+    softest: float
+    """Smallest singular value that counts, with rotations times the half length; NaN if unknown."""
+    largest_of_self_stress: float
+    """Largest singular value below it; NaN if unknown."""
+
+
+def constraints(matrix: DynamicalMatrix, units: FloatArray) -> Constraints:
+    """Find the rank of C in any state, by dense singular values up to some thousand bonds.
+
+    The (n,) units multiply its columns, such that displacements and rotations are comparable.
+    """
+    (m, n), D = matrix.compatibility.shape, matrix.coordinates.dimension
+    if min(m, n) > _DENSE:
+        rank = min(int(structural_rank(matrix.compatibility)), n - D)
+        return Constraints(m, rank, m - rank, n - rank, "structure", np.nan, np.nan)
+    sigma = np.zeros(0)
+    if m and n:
+        sigma = scipy.linalg.svdvals(matrix.compatibility.toarray() * units)
+    # Forces of a minimum are a state of self stress up to their residual; those of other states are none.
+    residual = matrix.residual.largest
+    rank = rank_of(sigma, residual if residual <= LARGEST_RESIDUAL else 0.0)
+    softest = float(sigma[rank - 1]) if rank else np.nan
+    largest = float(sigma[rank]) if rank < len(sigma) else 0.0
+    return Constraints(m, rank, m - rank, n - rank, "svd", softest, largest)
 
 
 def bands(matrix: DynamicalMatrix, found: Spectrum) -> list[Band]:
