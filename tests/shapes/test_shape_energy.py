@@ -4,7 +4,19 @@ from functools import partial
 
 import numpy as np
 import pytest
-from every_shape import EPS, ROUNDING, as_vectors, close_to, laws, size_of
+from every_shape import (
+    EPS,
+    MIXTURES,
+    ROUNDING,
+    TYPICAL,
+    as_vectors,
+    close_to,
+    laws,
+    pressed,
+    size_of,
+    tilted,
+)
+from lammps_runs import loaded, state_of
 from slopes import assert_is_slope
 
 import jamshape as js
@@ -140,3 +152,43 @@ def test_sums_over_particles_are_those_of_the_packing(packing):
 
 def own_energy(packing):
     return close_to(Landscape(packing).evaluate(State.of(packing)).energy, ROUNDING)
+
+
+@pytest.mark.lammps
+@pytest.mark.parametrize("make", [pressed, tilted])
+@pytest.mark.parametrize("case", [*TYPICAL, *MIXTURES], ids=str)
+def test_lammps_has_the_same_forces_torques_energies_and_stresses(case, make, tmp_path):
+    packing = make(case).with_(law=js.Interaction(2.5, 2))
+    per_atom, vector, array = 1, 1, 2
+    with loaded(packing, tmp_path, sides="two", k_e=2.5) as session:
+        session.commands(
+            "compute stressed all stress/atom NULL\ncompute each all pe/atom\n"
+            "compute both all reduce sum c_stressed[1] c_each\n"
+            "thermo_style custom step pe pxx pyy pxy c_both[1] c_both[2]\n"
+            "thermo_modify norm no\nrun 0"
+        )
+        found = state_of(session, packing)
+        table = session.lmp.numpy.extract_compute("state", per_atom, array)
+        order = np.argsort(table[:, 0])
+        stress = session.lmp.numpy.extract_compute("stressed", per_atom, array)[order]
+        each = session.lmp.numpy.extract_compute("each", per_atom, vector)[order]
+        U, pxx, pyy, pxy = (session.lmp.get_thermo(name) for name in ("pe", "pxx", "pyy", "pxy"))
+    e = js.energy(packing.sorted_by_id())
+    force, torque = size_of(e.contacts.network)
+    np.testing.assert_allclose(found.force, e.forces, rtol=0, atol=1e3 * ROUNDING * force)
+    np.testing.assert_allclose(
+        found.torque, e.torques, rtol=0, atol=1e3 * ROUNDING * max(force, torque)
+    )
+    assert close_to(e.U, 1e3 * ROUNDING) == U
+    np.testing.assert_allclose(each, e.energies, rtol=0, atol=1e3 * ROUNDING * e.U)
+    scale = np.abs(e.stress).max()
+    # LAMMPS's xy is r_x f_y.
+    for column, (k, l) in enumerate([(0, 0), (1, 1), (2, 2), (1, 0), (2, 0), (2, 1)]):
+        if max(k, l) < packing.dimension:
+            np.testing.assert_allclose(
+                stress[:, column], e.stress[:, k, l], rtol=0, atol=1e3 * ROUNDING * scale
+            )
+    expected = [e.pressure_tensor[place] for place in ((0, 0), (1, 1), (1, 0))]
+    np.testing.assert_allclose(
+        [pxx, pyy, pxy], expected, rtol=0, atol=1e3 * ROUNDING * np.abs(expected).max()
+    )

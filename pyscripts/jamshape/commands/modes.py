@@ -92,7 +92,7 @@ def show_moduli(table: ModeTable) -> None:
         print(f"floppy modes, omitted from moduli: {found.n_floppy}")
     if found.n_unsettled:
         print(f"unsettled modes, also omitted: {found.n_unsettled}")
-    if found.n_negative:
+    if found.n_negative and not table.imbalance:
         print(
             f"a saddle, with {found.n_negative} negative eigenvalues: moduli hold as long as it stays"
         )

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components, structural_rank
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import Packing
 from jamshape.vibration.dense_modes import rank_of
-from jamshape.vibration.hessian import LARGEST_RESIDUAL, Coordinates, DynamicalMatrix
+from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum
 
 # The gap below the high band is the widest within this fraction of all modes around the rank of H.
@@ -261,9 +261,7 @@ def constraints(matrix: DynamicalMatrix, units: FloatArray) -> Constraints:
     sigma = np.zeros(0)
     if m and n:
         sigma = scipy.linalg.svdvals(matrix.compatibility.toarray() * units)
-    # Forces of a minimum are a state of self stress up to their residual; those of other states are none.
-    residual = matrix.residual.largest
-    rank = rank_of(sigma, residual if residual <= LARGEST_RESIDUAL else 0.0)
+    rank = rank_of(sigma, matrix.residual.largest)
     softest = float(sigma[rank - 1]) if rank else np.nan
     largest = float(sigma[rank]) if rank < len(sigma) else 0.0
     return Constraints(m, rank, m - rank, n - rank, "svd", softest, largest)

@@ -13,6 +13,7 @@ from jamshape.packing import State
 from jamshape.protocols.random_start import random_packing
 from jamshape.vibration.hessian import NotAtMinimumError
 
+WANTED = {"hessian": True, "compatibility": True}
 SOFT = js.Interaction(k_e=2.5, sides=1)
 
 
@@ -120,12 +121,27 @@ def test_modes_of_a_state_that_is_no_minimum_say_its_net_forces(packing, moved, 
     assert "minimum" not in repr(js.modes(packing))
     js.save(tmp_path / "moved.h5", moved)
     out = tmp_path / "modes.h5"
-    main(["modes", str(tmp_path / "moved.h5"), "--force", "--out", str(out)])
+    with pytest.raises(SystemExit) as ended:
+        main(["modes", str(tmp_path / "moved.h5"), "--force", "--out", str(out)])
+    assert not ended.value.code
     printed = capsys.readouterr().out
     assert said in printed
     told = json.loads(printed.splitlines()[-1])
     assert (told["at_minimum"], told["residual"]) == (False, residual)
+    assert "a saddle" not in printed
     assert said in repr(js.load(out))
+
+
+def test_modes_of_a_state_that_is_no_minimum_are_those_of_its_hessian(moved):
+    found = js.modes(moved, force=True)
+    names = ("position", "orientation", "diameters", "exponent", "species", "id", "image")
+    held = {name: getattr(moved, name)[~moved.rattlers] for name in names}
+    e = js.energy(js.Packing(**held, box=moved.box), rotation="half_length", **WANTED)
+    expected = np.linalg.eigvalsh(e.hessian.toarray())
+    np.testing.assert_allclose(found.eigenvalues, expected, rtol=0, atol=1e-12 * expected.max())
+    told, known = found.table.attributes, e.compatibility.constraints
+    assert (told["n_bonds"], told["rank"], told["n_self_stress"]) == known[:3]
+    assert known.n_self_stress == 0 < known.rank
 
 
 # --- non-affine displacements --------------------------------------------------------------------
