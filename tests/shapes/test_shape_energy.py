@@ -69,7 +69,11 @@ def test_forces_and_torques_are_slopes_of_u_per_length_and_radian(packing):
             scale = bond * np.linalg.norm(np.column_stack(motion))
             scale *= max(1.0, own.outer_radius.max()) if motion[1].any() else 1.0
             assert_is_slope(
-                along(e, motion), lambda s, m=motion: js.energy(moved(own, m, s)).U, h, scale, size
+                along(e, motion),
+                lambda s, m=motion, p=own: js.energy(moved(p, m, s)).U,
+                h,
+                scale,
+                size,
             )
 
 
@@ -97,6 +101,16 @@ def require_hessian(packing):
         else:
             assert_is_slope(e.hessian @ d, of, h, np.abs(d).sum() * scale, size)
     assert abs(e.hessian - e.hessian.T).max() <= ROUNDING * scale
+
+
+def test_pivots_count_the_rank_of_singular_values(packing, monkeypatch):
+    for own in by_each_law(packing):
+        exact = js.energy(own, compatibility=True).compatibility.constraints
+        with monkeypatch.context() as patch:
+            patch.setattr("jamshape.vibration.statistics._DENSE", 2)
+            found = js.energy(own, compatibility=True).compatibility.constraints
+        assert (exact.method, found.method) == ("svd", "pivots")
+        assert found[:4] == exact[:4]
 
 
 @pytest.mark.parametrize("rotation", ["radian", "half_length", "radius"])

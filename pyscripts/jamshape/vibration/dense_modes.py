@@ -57,9 +57,13 @@ def rank_of(singular_values: FloatArray, residual: float = 0.0) -> int:
     The forces of a minimum are one, up to their residual; those of other states are not.
     """
     largest = singular_values.max(initial=0.0)
+    return int((singular_values > rank_tolerance(residual) * largest).sum())
+
+
+def rank_tolerance(residual: float) -> float:
+    """Return the fraction of the largest singular value of C below which one belongs to a state of self stress."""
     balanced = residual if residual <= LARGEST_RESIDUAL else 0.0
-    tolerance = max(RANK_TOLERANCE, _RESIDUALS * balanced)
-    return int((singular_values > tolerance * largest).sum())
+    return max(RANK_TOLERANCE, _RESIDUALS * balanced)
 
 
 def two_levels(matrix: DynamicalMatrix, *, refine: bool) -> Found:

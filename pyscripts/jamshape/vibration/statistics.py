@@ -5,15 +5,17 @@ Marschall & Teitel 2018, Sec. III D.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.csgraph import connected_components, structural_rank
+import scipy.sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu, svds
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import Packing
-from jamshape.vibration.dense_modes import rank_of
+from jamshape.vibration.dense_modes import rank_of, rank_tolerance
 from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum
 
@@ -34,8 +36,8 @@ _SHARE = 1e-3
 # Bonds weaker than this fraction of the mean force are grazing.
 _GRAZING = 1e-4
 
-# Singular values are computed for up to this number of bonds or coordinates, in half a minute.
-_DENSE = 4000
+# Singular values are computed for up to this number of bonds or coordinates, in a second.
+_DENSE = 1500
 
 
 class Components(NamedTuple):
@@ -241,30 +243,44 @@ class Constraints(NamedTuple):
     n_zero_modes: int
     """Motions that change no bond length, n - rank: translations, free spins and rattlers among them."""
     method: str
-    """``svd``: from singular values of K^(1/2) C. ``structure``, above 4000 bonds and coordinates: from the nonzero entries alone,
-    so that the rank is an upper bound, and the other two are lower bounds."""
-    softest: float
-    """Smallest singular value that counts, with rotations times the half length; NaN if unknown."""
-    largest_of_self_stress: float
-    """Largest singular value below it; NaN if unknown."""
+    """``svd``, all singular values of K^(1/2) C; or ``pivots``, above 1500 bonds and coordinates: their number above the tolerance, by
+    Sylvester's law of inertia, from the signs of the pivots of a sparse factorisation."""
 
 
-def constraints(matrix: DynamicalMatrix, units: FloatArray) -> Constraints:
-    """Find the rank of C in any state, by dense singular values up to some thousand bonds.
+def constraints(weighted: Any, residual: float) -> Constraints:
+    """Find the rank of K^(1/2) C, a sparse (m, n) matrix, in comparable units of displacements and rotations.
 
-    The (n,) units multiply its columns, such that displacements and rotations are comparable.
+    Raises
+    ------
+    ValueError
+        If pivots do not determine it.
     """
-    (m, n), D = matrix.compatibility.shape, matrix.coordinates.dimension
-    if min(m, n) > _DENSE:
-        rank = min(int(structural_rank(matrix.compatibility)), n - D)
-        return Constraints(m, rank, m - rank, n - rank, "structure", np.nan, np.nan)
-    sigma = np.zeros(0)
-    if m and n:
-        sigma = scipy.linalg.svdvals(matrix.compatibility.toarray() * units)
-    rank = rank_of(sigma, matrix.residual.largest)
-    softest = float(sigma[rank - 1]) if rank else np.nan
-    largest = float(sigma[rank]) if rank < len(sigma) else 0.0
-    return Constraints(m, rank, m - rank, n - rank, "svd", softest, largest)
+    m, n = weighted.shape
+    if m == 0 or n == 0:
+        return Constraints(m, 0, m, n, "svd")
+    if min(m, n) <= _DENSE:
+        rank, method = rank_of(scipy.linalg.svdvals(weighted.toarray()), residual), "svd"
+    else:
+        rank, method = _counted(weighted, residual), "pivots"
+    return Constraints(m, rank, m - rank, n - rank, method)
+
+
+def _counted(weighted: Any, residual: float) -> int:
+    """Count the eigenvalues of C C^T (or C^T C) above the squared tolerance, without computing any but the largest."""
+    wide = weighted if weighted.shape[0] <= weighted.shape[1] else weighted.T
+    first = np.random.default_rng(0).normal(size=wide.shape[0])  # the same result each time
+    largest = float(svds(wide, k=1, v0=first, return_singular_vectors=False)[0])
+    shift = (rank_tolerance(residual) * largest) ** 2
+    shifted = (wide @ wide.T - shift * scipy.sparse.identity(wide.shape[0])).tocsc()
+    how = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
+    factors = splu(shifted, **how, options={"SymmetricMode": True})
+    if not np.array_equal(factors.perm_r, factors.perm_c):
+        msg = (
+            f"the rank of {weighted.shape[0]} bonds is not determined by pivots, expected all of them on the diagonal;"
+            " move a particle by a rounding error"
+        )
+        raise ValueError(msg)
+    return int((factors.U.diagonal() > 0).sum())
 
 
 def bands(matrix: DynamicalMatrix, found: Spectrum) -> list[Band]:
