@@ -34,23 +34,23 @@ ROTATIONS = ("radian", "half_length", "radius")
 
 @dataclass(frozen=True, eq=False)
 class Compatibility(Record):
-    """Lengths of the m bonds as functions of n coordinates: H = C^T K C - S.
+    """Lengths of the m bonds as functions of c coordinates: H = C^T K C - S.
 
     Two coupled bonds, of rods side by side, are combined such that K is diagonal; there is one row a bond.
 
     Parameters
     ----------
-    matrix : (m, n) scipy.sparse CSR matrix
+    matrix : (m, c) scipy.sparse CSR matrix
         C: derivatives of the lengths, which grow as two particles separate.
     stiffness : (m,) array of float64, [energy / length^2]
         Diagonal of K.
     force : (m,) array of float64, [energy / length]
         Forces along the bonds, positive for repulsion: ``matrix.T @ force`` are the net forces and torques.
-    prestress : (n, n) scipy.sparse CSR matrix
+    prestress : (c, c) scipy.sparse CSR matrix
         S.
     particles : (m, 2) array of int64
         Rows i <= j of the packing.
-    units : (n,) array of float64
+    units : (c,) array of float64
         Units in which displacements and rotations are comparable: 1, or what makes a rotation a length, as with
         ``rotation="half_length"``.
     residual : float
@@ -120,7 +120,7 @@ class Energy(Record):
         One half of the energy of each contact for each of its two particles.
     coordinates : Coordinates
         Meaning of the rows of the following, ``particle`` and ``kind`` of each.
-    hessian : (n, n) scipy.sparse CSR matrix, or None
+    hessian : (c, c) scipy.sparse CSR matrix, or None
         Second derivatives of U by these coordinates, if requested. In 3D they are symmetric: those with respect to rotation
         vectors at no rotation.
     compatibility : Compatibility or None
@@ -173,7 +173,7 @@ class Energy(Record):
 
     @cached_property
     def hessian_product(self) -> LinearOperator:
-        """(n, n) `scipy.sparse.linalg.LinearOperator`: the Hessian times a vector, without assembling it.
+        """(c, c) `scipy.sparse.linalg.LinearOperator`: the Hessian times a vector, without assembling it.
 
         Errors are those of `jamshape.energy`.
         """
