@@ -3,6 +3,8 @@
 from .checks import NotReachedWarning as NotReachedWarning
 from .front.compressing import compress as compress
 from .front.compressing import slow_compress as slow_compress
+from .front.energies import Energy as Energy
+from .front.energies import energy as energy
 from .front.ensembles import ensemble as ensemble
 from .front.files import load as load
 from .front.files import save as save
@@ -10,6 +12,7 @@ from .front.making import make_packing as make_packing
 from .front.minimising import minimise as minimise
 from .front.modes import Modes as Modes
 from .front.modes import modes as modes
+from .front.nonaffine import nonaffine as nonaffine
 from .front.packing import Packing as Packing
 from .front.pictures import plot as plot
 from .front.recorded import resume as resume
@@ -21,6 +24,7 @@ from .front.run import ShearFile as ShearFile
 from .front.shearing import cyclic_shear as cyclic_shear
 from .front.shearing import quasistatic_shear as quasistatic_shear
 from .front.shearing import shear as shear
+from .measures.nonaffine import Nonaffine as Nonaffine
 from .packing import Box as Box
 from .shapes.named import Dimers as Dimers
 from .shapes.named import Spherocylinders as Spherocylinders

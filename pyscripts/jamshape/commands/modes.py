@@ -70,6 +70,8 @@ def show(table: ModeTable, bands: dict[str, Any]) -> None:
     print(
         f"z = {a['z']:.4f}, residual {a['residual']:.2g}; {a['method']}, {a['wall_seconds']:.3g} s"
     )
+    if table.imbalance:
+        print(table.imbalance)
     if "rank" in a:
         show_bands(table, bands)
     if "why_no_bands" in a:
@@ -90,7 +92,7 @@ def show_moduli(table: ModeTable) -> None:
         print(f"floppy modes, omitted from moduli: {found.n_floppy}")
     if found.n_unsettled:
         print(f"unsettled modes, also omitted: {found.n_unsettled}")
-    if found.n_negative:
+    if found.n_negative and not table.imbalance:
         print(
             f"a saddle, with {found.n_negative} negative eigenvalues: moduli hold as long as it stays"
         )
@@ -149,5 +151,10 @@ def main(options: Namespace) -> None:
     if options.plot:
         file = PackingFile.read(options.packing)
         save_figure(mode_figure(found.told, packing_text(file)), options.plot)
-    told = {"out": options.out, "bands": bands, **table.attributes}
+    told = {
+        "out": options.out,
+        "at_minimum": not table.imbalance,
+        "bands": bands,
+        **table.attributes,
+    }
     report(told | {"redundant": redundant})

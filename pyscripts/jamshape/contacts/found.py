@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from jamshape.arrays import BoolArray, FloatArray, IntArray
-from jamshape.contacts.network import ContactNetwork, find_contacts
+from jamshape.contacts.network import Bonds, ContactNetwork, find_contacts
 from jamshape.contacts.rattlers import Coordination, coordination, find_rattlers
 from jamshape.packing import Packing
 from jamshape.records import Record
@@ -63,6 +63,11 @@ class Contacts(Record):
     def energy(self) -> FloatArray:
         """(M,) elastic energy, [energy]."""
         return self.network.energy
+
+    @property
+    def bonds(self) -> Bonds:
+        """Points of contact with their normals, overlaps, forces and energies."""
+        return self.network.bonds
 
     def __len__(self) -> int:
         return len(self.network.pairs)

@@ -65,6 +65,11 @@ class Bonds:
     on_side: BoolArray
     on_face: BoolArray
 
+    @property
+    def overlap(self) -> FloatArray:
+        """(B,) overlaps 1 - r/d, or 1 - eta^2, to the rounding of lengths in doubles."""
+        return 1 - self.distance / self.reach
+
 
 @dataclass(frozen=True, eq=False)
 class ContactErrors:

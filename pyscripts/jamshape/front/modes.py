@@ -173,6 +173,7 @@ class Modes:
         is_whole = len(self) == a["n_modes"]
         bands = f" ({counts or 'no bands'})" if is_whole else f" of {a['n_modes']}"
         why = f"; {a['why_no_bands']}" if is_whole and "why_no_bands" in a else ""
+        why += f"; {self.table.imbalance}" if self.table.imbalance else ""
         return f"<{len(self)} modes{bands} of {of}: z = {a['z']:.4g}{why}>"
 
     def _repr_html_(self) -> str:
@@ -231,7 +232,8 @@ def modes(
     least_force : float
         Omit contacts weaker than this many mean bond forces; 1e-4 omits grazing contacts.
     force : bool
-        Compute even if the packing is not at a minimum.
+        Compute even if the packing is not at a minimum: second derivatives in that state, with the net forces
+        in the ``repr`` and, as ``residual``, in ``table.attributes``.
 
     Returns
     -------

@@ -188,7 +188,7 @@ class Landscape:
     def curvature(self, state: State, *, extended: bool = False) -> Curvature:
         """Evaluate all second derivatives; arguments and errors as `evaluate`."""
         found = self.derivatives(state, extended=extended)
-        blocks, places = _contracted(found), self._places(found)
+        blocks, places = contracted(found), self._places(found)
         r, D = found["separation"], self.particles.dimension
 
         # The affine strain displaces i relative to j by r_ij.
@@ -301,7 +301,7 @@ class _Places(NamedTuple):
     """(C, v) index of the coordinate, -1 for none."""
 
 
-def _contracted(found: dict[str, NDArray[Any]]) -> FloatArray:
+def contracted(found: dict[str, NDArray[Any]]) -> FloatArray:
     """(C, v, v) second derivatives of the energies of contacts."""
     gradient = found["gradient"]
     bonds = np.einsum("cb,cbi,cbj->cij", found["stiffness"], gradient, gradient)

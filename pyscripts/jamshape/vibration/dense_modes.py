@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from jamshape.arrays import FloatArray, LongArray
 from jamshape.vibration.extended import dense_product
-from jamshape.vibration.hessian import DynamicalMatrix
+from jamshape.vibration.hessian import LARGEST_RESIDUAL, DynamicalMatrix
 from jamshape.vibration.quotients import (
     CLOSE,
     EPS,
@@ -52,10 +52,18 @@ class Found(NamedTuple):
 
 
 def rank_of(singular_values: FloatArray, residual: float = 0.0) -> int:
-    """Count singular values of C that do not belong to states of self stress."""
+    """Count singular values of C that do not belong to states of self stress.
+
+    The forces of a minimum are one, up to their residual; those of other states are not.
+    """
     largest = singular_values.max(initial=0.0)
-    tolerance = max(RANK_TOLERANCE, _RESIDUALS * residual)
-    return int((singular_values > tolerance * largest).sum())
+    return int((singular_values > rank_tolerance(residual) * largest).sum())
+
+
+def rank_tolerance(residual: float) -> float:
+    """Return the fraction of the largest singular value of C below which one belongs to a state of self stress."""
+    balanced = residual if residual <= LARGEST_RESIDUAL else 0.0
+    return max(RANK_TOLERANCE, _RESIDUALS * balanced)
 
 
 def two_levels(matrix: DynamicalMatrix, *, refine: bool) -> Found:

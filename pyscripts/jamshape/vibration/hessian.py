@@ -16,9 +16,10 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import LinearOperator
 
 from jamshape.arrays import FloatArray, IntArray, LongArray
-from jamshape.landscape import Evaluation, Landscape, State
+from jamshape.landscape import Evaluation, Landscape, State, contracted
 from jamshape.minima import Residual, residual_of
 from jamshape.records import Record
 from jamshape.vibration.extended import EPS
@@ -330,13 +331,57 @@ def dynamical_matrix(
     return _matrix(landscape, state, evaluation, parts | {"residual": residual})
 
 
-def matrix_at(landscape: Landscape, state: State, like: DynamicalMatrix) -> DynamicalMatrix:
-    """Assemble the matrix of a nearby state in the coordinates of another one, without checks."""
+def matrix_at(landscape: Landscape, state: State, coordinates: Coordinates) -> DynamicalMatrix:
+    """Assemble the matrix of any state in given coordinates, without checks."""
     evaluation = landscape.evaluate(state)
-    parts = _parts(landscape, state, like.coordinates)
+    parts = _parts(landscape, state, coordinates)
     return _matrix(
         landscape, state, evaluation, parts | {"residual": residual_of(landscape, evaluation)}
     )
+
+
+def all_coordinates(landscape: Landscape, rotation: str | FloatArray = "radian") -> Coordinates:
+    """List displacements and rotations of all particles along the axes of space, particle by particle.
+
+    Parameters
+    ----------
+    landscape : Landscape
+    rotation : str or (N,) array of float64, [length]
+        As for `DynamicalMatrixOptions`, or ``radian``.
+
+    Returns
+    -------
+    Coordinates
+        Those of the landscape: rattlers have some, rotations of discs and spheres none, and rods in space also
+        spin about their axes.
+
+    Raises
+    ------
+    ValueError
+        If the rotation is invalid.
+    """
+    lengths, D = _lengths(landscape, rotation), landscape.particles.dimension
+    particle, kind = np.nonzero(landscape.column >= 0)
+    direction = np.eye(landscape.column.shape[1])[kind]
+    turns = kind >= D
+    direction[turns] /= lengths[particle[turns], None]
+    return Coordinates(particle, kind, direction, len(lengths), D)
+
+
+def hessian_product(landscape: Landscape, state: State, coordinates: Coordinates) -> LinearOperator:
+    """Return the product of the Hessian with vectors, summed over contacts without assembling a matrix.
+
+    Errors are those of `Landscape.evaluate`.
+    """
+    contacts = landscape.derivatives(state, extended=True)
+    blocks, scatter = contracted(contacts), _Scatter(contacts["particles"], coordinates)
+
+    def product(vector: FloatArray) -> FloatArray:
+        moved = scatter.moved(np.ravel(vector))
+        return scatter.vector(np.einsum("cij,cj->ci", blocks, moved))
+
+    n = coordinates.size
+    return LinearOperator((n, n), matvec=product, rmatvec=product, dtype=np.float64)
 
 
 class BondLengths(NamedTuple):
@@ -374,7 +419,7 @@ def _lengths(landscape: Landscape, rotation: str | FloatArray) -> FloatArray:
     """(N,) lengths that scale radians; 0 where nothing rotates."""
     own = landscape.rotation_length
     if isinstance(rotation, str):
-        known = {"half_length": own, "radius": landscape.inner_radius}
+        known = {"half_length": own, "radius": landscape.inner_radius, "radian": np.ones_like(own)}
         if rotation not in known:
             msg = f"rotation is {rotation!r}, expected one of {', '.join(known)}, or lengths"
             raise ValueError(msg)
@@ -473,6 +518,7 @@ class _Scatter:
     def __init__(self, particles: IntArray, coordinates: Coordinates) -> None:
         D, T = coordinates.dimension, coordinates.direction.shape[1] - coordinates.dimension
         separation, turn = np.arange(D), np.arange(D, D + T)
+        self._dimension = D
         self._variable = np.concatenate([separation, turn, separation, turn + T])
         self._sign = np.concatenate([np.ones(D + T), -np.ones(D), np.ones(T)])
         width = D + T
@@ -488,6 +534,13 @@ class _Scatter:
         shape = (len(rows), self._embedding.shape[0])
         flat = (entries.ravel(), (row.ravel(), place.ravel()))
         return _tidy(scipy.sparse.csr_matrix(flat, shape=shape) @ self._embedding)
+
+    def moved(self, vector: FloatArray) -> FloatArray:
+        """(C, v) change of the pairs' variables by (n,) coordinates: the transpose of `vector`."""
+        ends = (self._embedding @ vector)[self._place] * self._sign
+        (first, second), D = np.split(ends, 2, axis=1), self._dimension
+        parts = [first[:, :D] + second[:, :D], first[:, D:], second[:, D:]]
+        return np.concatenate(parts, axis=1)
 
     def vector(self, vectors: FloatArray) -> FloatArray:
         """(n,) sum of (C, v) vectors."""

@@ -196,7 +196,7 @@ def nearer_minimum(
     farthest = float(np.abs(newton).max(initial=0.0))
     part = min(1.0, _SHORT * float(landscape.inner_radius.min()) / max(farthest, 1e-300))
     shift, turn = matrix.coordinates.motion(part * newton)
-    return Nearer(matrix_at(landscape, state.displaced(shift, turn), matrix), part)
+    return Nearer(matrix_at(landscape, state.displaced(shift, turn), matrix.coordinates), part)
 
 
 def state_error(

@@ -5,15 +5,17 @@ Marschall & Teitel 2018, Sec. III D.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu, svds
 
 from jamshape.arrays import FloatArray, IntArray
 from jamshape.packing import Packing
-from jamshape.vibration.dense_modes import rank_of
+from jamshape.vibration.dense_modes import rank_of, rank_tolerance
 from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum
 
@@ -33,6 +35,9 @@ _SHARE = 1e-3
 
 # Bonds weaker than this fraction of the mean force are grazing.
 _GRAZING = 1e-4
+
+# Singular values are computed for up to this number of bonds or coordinates, in a second.
+_DENSE = 1500
 
 
 class Components(NamedTuple):
@@ -225,6 +230,57 @@ def count(matrix: DynamicalMatrix, found: Spectrum) -> Counts:
         softest_constraint=float(sigma[rank - 1]) if rank else np.nan,
         largest_of_self_stress=float(sigma[rank]) if rank < len(sigma) else 0.0,
     )
+
+
+class Constraints(NamedTuple):
+    """Rank of the compatibility matrix C of m bonds and n coordinates."""
+
+    n_bonds: int
+    """Number of bonds m."""
+    rank: int
+    n_self_stress: int
+    """Number of states of self stress, m - rank."""
+    n_zero_modes: int
+    """Motions that change no bond length, n - rank: translations, free spins and rattlers among them."""
+    method: str
+    """``svd``, all singular values of K^(1/2) C; or ``pivots``, above 1500 bonds and coordinates: their number above the tolerance, by
+    Sylvester's law of inertia, from the signs of the pivots of a sparse factorisation."""
+
+
+def constraints(weighted: Any, residual: float) -> Constraints:
+    """Find the rank of K^(1/2) C, a sparse (m, n) matrix, in comparable units of displacements and rotations.
+
+    Raises
+    ------
+    ValueError
+        If pivots do not determine it.
+    """
+    m, n = weighted.shape
+    if m == 0 or n == 0:
+        return Constraints(m, 0, m, n, "svd")
+    if min(m, n) <= _DENSE:
+        rank, method = rank_of(scipy.linalg.svdvals(weighted.toarray()), residual), "svd"
+    else:
+        rank, method = _counted(weighted, residual), "pivots"
+    return Constraints(m, rank, m - rank, n - rank, method)
+
+
+def _counted(weighted: Any, residual: float) -> int:
+    """Count the eigenvalues of C C^T (or C^T C) above the squared tolerance, without computing any but the largest."""
+    wide = weighted if weighted.shape[0] <= weighted.shape[1] else weighted.T
+    first = np.random.default_rng(0).normal(size=wide.shape[0])  # the same result each time
+    largest = float(svds(wide, k=1, v0=first, return_singular_vectors=False)[0])
+    shift = (rank_tolerance(residual) * largest) ** 2
+    shifted = (wide @ wide.T - shift * scipy.sparse.identity(wide.shape[0])).tocsc()
+    how = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
+    factors = splu(shifted, **how, options={"SymmetricMode": True})
+    if not np.array_equal(factors.perm_r, factors.perm_c):
+        msg = (
+            f"the rank of {weighted.shape[0]} bonds is not determined by pivots, expected all of them on the diagonal;"
+            " move a particle by a rounding error"
+        )
+        raise ValueError(msg)
+    return int((factors.U.diagonal() > 0).sum())
 
 
 def bands(matrix: DynamicalMatrix, found: Spectrum) -> list[Band]:

@@ -26,7 +26,7 @@ from jamshape.files.disk import PathLike
 from jamshape.files.hdf5 import FileFormatError
 from jamshape.landscape import Landscape, State
 from jamshape.vibration.elasticity import Moduli, Modulus, moduli
-from jamshape.vibration.hessian import Coordinates, DynamicalMatrix
+from jamshape.vibration.hessian import LARGEST_RESIDUAL, Coordinates, DynamicalMatrix
 from jamshape.vibration.spectrum import Spectrum, state_error
 from jamshape.vibration.statistics import bands, components, count, participation, why_no_bands
 
@@ -105,6 +105,14 @@ class ModeTable:
         """Number of modes of the packing without translations, whether or not they were found."""
         n_translations = self.attributes.get("n_translations", self["is_translation"].sum())
         return int(self.attributes["n_modes"] - n_translations)
+
+    @property
+    def imbalance(self) -> str:
+        """Net forces of a state that is not at a minimum, in words; an empty text at a minimum."""
+        residual = self.attributes["residual"]
+        if residual <= LARGEST_RESIDUAL:
+            return ""
+        return f"not at a minimum: net forces up to {residual:.2g} of the mean bond force"
 
     @property
     def moduli(self) -> Moduli:

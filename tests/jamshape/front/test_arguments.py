@@ -29,6 +29,7 @@ class Nonsense:
 
 
 NEEDED = {"particles": RODS, "packing": scene(), "thing": scene(), "path": "x.h5", "file": "x.h5"}
+NEEDED |= {"first": scene(), "second": scene()}
 FUNCTIONS = {name: getattr(js, name) for name in js.__all__ if inspect.isroutine(getattr(js, name))}
 CONSTRUCTORS = {
     "Kind": js.Kind,

@@ -94,6 +94,8 @@ def made(folder):
         "CyclicShearFile": cyclic(),
         "QuasistaticShearFile": quasistatic(),
         "Event": quasistatic().events(),
+        "Energy": js.energy(packing, hessian=True, compatibility=True),
+        "Nonaffine": js.nonaffine(packing, packing.with_(position=packing.position + 0.1)),
         "Interaction": js.Interaction(2.0, 1),
         "NotReachedWarning": js.NotReachedWarning("try {strict}", {"strict": True}),
     } | {f"shape {name}": shape for name, shape in SHAPES.items()}
@@ -106,7 +108,7 @@ def objects(tmp_path_factory):
 
 NAMES = """Box|Packing|Packing of arrays|its copy|Kind|Particles|Particles mixed|Particles given|Modes|Modes of a file
 ModeTable|DynamicalMatrix|Moduli|Contacts|ContactNetwork|State|Landscape|Recipe|RunFile|RunFile of a file|OnsetFit
-Jamming|ShearFile|CyclicShearFile|QuasistaticShearFile|Event|Interaction|NotReachedWarning""".replace(
+Jamming|ShearFile|CyclicShearFile|QuasistaticShearFile|Event|Energy|Nonaffine|Interaction|NotReachedWarning""".replace(
     "\n", "|"
 ).split("|")
 NAMES += [f"shape {name}" for name in SHAPES]

@@ -64,7 +64,7 @@ def test_matrix_is_the_slope_of_the_forces(name, sides, rotation):
     landscape, state, matrix = forced(pressed_named(name), sides, rotation=rotation)
 
     def gradient(at):
-        return matrix_at(landscape, at, matrix).gradient
+        return matrix_at(landscape, at, matrix.coordinates).gradient
 
     expected = slopes(state, matrix, gradient)
     if state.dimension == 3:  # rotations about different axes do not commute
@@ -91,7 +91,7 @@ def test_rows_of_the_compatibility_are_slopes_of_the_bonds_lengths(name):
     matrix = matrix_of(name, 1e-8)
 
     def lengths(at):
-        there = matrix_at(landscape, at, matrix)
+        there = matrix_at(landscape, at, matrix.coordinates)
         assert there.n_bonds == matrix.n_bonds
         return there.contacts["distance"][there.bonds.contact, there.bonds.slot]
 
@@ -128,7 +128,7 @@ def test_strains_are_second_derivatives():
         return replace(state, position=state.position * factors, cell=cell)
 
     def gradient_and_slope(at):
-        there = matrix_at(landscape, at, matrix)
+        there = matrix_at(landscape, at, matrix.coordinates)
         r = there.contacts["separation"] / (at.edges / state.edges).astype(float)
         slope = -np.einsum("ca,ab,cb->", there.contacts["force"], strain, r)
         return np.append(there.gradient, slope)
