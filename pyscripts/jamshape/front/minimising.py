@@ -77,11 +77,11 @@ def minimise(
     --------
     >>> import jamshape as js
     >>> discs = js.Packing.of(
-    ...     "spherocylinder", position=[[0.2, 0.3], [1.0, 0.2], [0.6, 1.1]], box=[2, 2], alpha=0, size=0.5
+    ...     "spherocylinder", position=[[0.2, 0.3], [1.0, 0.2], [0.6, 1.1]], box=[2, 2], alpha=0
     ... )
     >>> rested = js.minimise(discs, progress=False)
-    >>> rested.results["outcome"], bool(rested.u < discs.u)
-    ('unjammed', True)
+    >>> rested.results["outcome"], discs.u > 0, rested.u
+    ('unjammed', True, 0.0)
     """
     require_stated(tolerance=tolerance, evaluations=evaluations)
     state = packing_of(packing)

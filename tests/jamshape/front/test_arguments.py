@@ -28,7 +28,14 @@ class Nonsense:
     """A type that no function accepts."""
 
 
-NEEDED = {"particles": RODS, "packing": scene(), "thing": scene(), "path": "x.h5", "file": "x.h5"}
+NEEDED = {
+    "particles": RODS,
+    "packing": scene(),
+    "thing": scene(),
+    "path": "x.h5",
+    "file": "x.h5",
+    "seeds": [1],
+}
 NEEDED |= {"first": scene(), "second": scene()}
 FUNCTIONS = {name: getattr(js, name) for name in js.__all__ if inspect.isroutine(getattr(js, name))}
 CONSTRUCTORS = {

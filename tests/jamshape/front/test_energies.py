@@ -36,7 +36,7 @@ def test_a_file_has_the_energy_of_its_packing_under_its_own_law(packing, tmp_pat
             assert pytest.approx(forces(packing, *SOFT).energy, rel=1e-12) == found.U
             assert pytest.approx(forces(packing).energy, rel=1e-3) != found.U
     js.modes(packing).save(tmp_path / "modes.h5")
-    with pytest.raises(ValueError, match=r"modes.h5 holds Modes, expected a packing"):
+    with pytest.raises(ValueError, match=r"modes.h5 holds modes, expected particles"):
         js.energy(tmp_path / "modes.h5")
     with pytest.raises(ValueError, match="rotation is 'degree', expected"):
         js.energy(packing, rotation="degree")
