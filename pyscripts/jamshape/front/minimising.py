@@ -96,8 +96,9 @@ def minimise(
 
 
 def _made_from(state: Packing) -> dict[str, object]:
-    """Describe the state, and tell it from others."""
-    return told_of(state) | {"start_digest": digest(state)}
+    """Describe the state, and tell it from others, wherever its file lies."""
+    name = state.file.name if state.file else "packing"
+    return told_of(state) | {"start": name, "start_digest": digest(state)}
 
 
 def _recipe(state: Packing, way: Given, *, strict: bool) -> Recipe:
