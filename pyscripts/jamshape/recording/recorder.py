@@ -139,7 +139,7 @@ def _follow(run: _Run, interrupts: Interrupts, how: How, end: float) -> None:
 
 
 def stopped(where: str, how: How, path: Path | None = None) -> str:
-    """Say that the time was up, and how to go on, which needs a file."""
+    """Return the message that the time was up; only with a file the run can go on."""
     said = f"stopped after {how.seconds:.3g} s {where}, expected the end"
     if path is None:
         return f"{said}; with a file the same call goes on from there"
