@@ -31,6 +31,7 @@ from jamshape.shapes.solid import Balls, Solid, Superquadric
 from jamshape.shapes.table import shape_named
 
 _LOG, _PARTICLES = "jamshape/", "particles/jamshape/"
+_COLUMNS = "columns/"
 
 _FINE, _COARSE = 3, 1  # levels of meshes, so that files stay small
 _FEW, _MANY = 8, 64  # numbers of types up to which meshes are fine and medium
@@ -43,7 +44,8 @@ def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
     ----------
     path : path-like
     packings : Packing or iterable of Packing
-        Frames, all in 2D or all in 3D; a run from `jamshape.load` is one.
+        Frames, all in 2D or all in 3D; a run from `jamshape.load` is one. Of their other columns, numbers that all
+        frames have are written.
 
     Raises
     ------
@@ -70,11 +72,14 @@ def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
         raise ValueError(msg)
     hoomd = tool("gsd.hoomd", "gsd")
     form = Form()
+    columns = set(frames[0].columns)
     for packing in frames:
         form = form.joined(Form.of(packing))
+        columns &= {name for name, x in packing.columns.items() if x.dtype.kind in "iuf"}
     with replacing(path) as temporary, hoomd.open(str(temporary), "w") as file:
         for packing in frames:
-            file.append(_frame(hoomd, packing, form))
+            held = {name: x for name, x in packing.columns.items() if name in columns}
+            file.append(_frame(hoomd, packing.with_(columns=held), form))
 
 
 def read_gsd(path: PathLike, frame: int = -1) -> Packing:
@@ -127,6 +132,7 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
     level = _FINE if len(species) <= _FEW else _COARSE + (len(species) <= _MANY)
     frame.particles.type_shapes = [_type_shape(_Body.of(packing, i, level)) for i in kinds.first]
     exact = {_PARTICLES + name: x for name, x in particle_fields(packing, rests=form.rests).items()}
+    exact |= {f"{_PARTICLES}{_COLUMNS}{name}": x for name, x in packing.columns.items()}
     of_box = box_fields(packing, rests=form.rests, tilted=form.tilted)
     exact |= {_LOG + name: x for name, x in of_box.items()}
     exact[_LOG + "time"] = np.array([packing.time])
@@ -209,6 +215,8 @@ def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
     }
     try:
         style, time = bytes(found.pop("shape_style")).decode(), float(found.pop("time")[0])
+        columns = [name for name in found if name.startswith(_COLUMNS)]
+        found["columns"] = {name.removeprefix(_COLUMNS): found.pop(name) for name in columns}
         if "law" in found:  # missing in files of 0.1.0
             k_e, sides = found["law"].tolist()
             found["law"] = Interaction(k_e, sides)

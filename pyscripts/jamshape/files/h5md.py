@@ -16,6 +16,8 @@ r"""Packings and runs as H5MD 1.1 files; a packing is a run with one frame.
         position_rest, orientation_rest, box/edges_rest    low parts of these, as more
         doubles of their shapes, in files of states with extended precision (not
         in H5MD)
+        columns/NAME    {step, time, value (T, N) or (T, N, k)}: other columns of the particles, such as
+                        those of a dump, texts as characters (not in H5MD)
         species, id     (N,)
         diameters       (N, 3), the shape columns of LAMMPS (not in H5MD)
         exponent        (N,), for shapes that have one (not in H5MD)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from jamshape.arguments import checked_fields
 from jamshape.arrays import BoolArray, FloatArray, IntArray, LongArray, real_numbers
 from jamshape.packing.box import Box, Lengths, number_of_tilts
+from jamshape.packing.columns import as_columns, kept
 from jamshape.packing.given import as_floats, as_integers
 from jamshape.packing.rotation import UNIT_QUATERNION_TOLERANCE, across, body_axes
 from jamshape.records import Record
@@ -60,6 +62,8 @@ class Packing(Record):
     position_rest, orientation_rest, edges_rest, tilt_rest : arrays as above, of float64, optional
         Low-order parts of position, orientation, edges and tilt in double-double precision; zeros by default.
         See `poses`.
+    columns : mapping of str to (N,) or (N, k) array, optional
+        Other columns of the particles, such as those of a dump, which are kept and written again.
 
     Raises
     ------
@@ -94,6 +98,7 @@ class Packing(Record):
     orientation_rest: FloatArray = field(default_factory=lambda: np.empty(0))
     edges_rest: FloatArray = field(default_factory=lambda: np.empty(0))
     tilt_rest: FloatArray = field(default_factory=lambda: np.empty(0))
+    columns: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(np.atleast_1d(real_numbers("position", self.position)))
@@ -121,6 +126,7 @@ class Packing(Record):
         _check_labels(self)
         _check_shapes(self)
         object.__setattr__(self, "law", _checked_law(self.law))
+        object.__setattr__(self, "columns", as_columns(self.columns, n))
 
     @property
     def n(self) -> int:
@@ -286,10 +292,15 @@ class Packing(Record):
         order = np.argsort(self.id)
         names = ["position", "orientation", "diameters", "exponent", "species", "id", "image"]
         names += ["position_rest", "orientation_rest"]
-        return self.with_(**{name: getattr(self, name)[order] for name in names})
+        columns = {name: column[order] for name, column in self.columns.items()}
+        return self.with_(**{name: getattr(self, name)[order] for name in names}, columns=columns)
 
     def with_(self, **changes: Any) -> Packing:
-        """Return a new packing with the named fields replaced; new poses are exact doubles."""
+        """Return a new packing with the named fields replaced; new poses are exact doubles.
+
+        Other columns are kept, but with new poses, sizes or box only labels such as ``mol``.
+        """
+        changes.setdefault("columns", kept(self.columns, changes))
         for name, rests in _REST_OF.items():
             for rest in rests if name in changes else ():
                 changes.setdefault(rest, np.empty(0))
