@@ -5,6 +5,7 @@ from .front.compressing import compress as compress
 from .front.compressing import slow_compress as slow_compress
 from .front.files import load as load
 from .front.files import save as save
+from .front.frames import frames as frames
 from .front.making import make_packing as make_packing
 from .front.modes import Modes as Modes
 from .front.modes import modes as modes

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jamshape.arrays import FloatArray, IntArray
 from jamshape.exchange.edited import as_edited
 from jamshape.exchange.fields import alike, box_fields, centered, packing_of, particle_fields
 from jamshape.exchange.tools import tool
@@ -106,13 +107,28 @@ def read_gsd(path: PathLike, frame: int = -1) -> Packing:
         If the file cannot be opened.
     """
     hoomd = tool("gsd.hoomd", "gsd")
+    with _opened(hoomd, path) as file:
+        return _packing(path, hoomd, file[row_of(frame, len(file), path)])
+
+
+def read_gsd_clock(path: PathLike) -> tuple[IntArray, FloatArray]:
+    """Read steps (T,) and times (T,) of the frames; errors as `read_gsd`."""
+    with _opened(tool("gsd.hoomd", "gsd"), path) as file:
+        chunks = (("configuration/step", 0), (f"log/{_LOG}time", 0.0))
+        step, time = (
+            [file.file.read_chunk(k, name)[0] if file.file.chunk_exists(k, name) else otherwise
+             for k in range(len(file))]
+            for name, otherwise in chunks
+        )  # fmt: skip
+        return np.array(step, np.int64), np.array(time, np.float64)
+
+
+def _opened(hoomd: Any, path: PathLike) -> Any:
     try:
-        file = hoomd.open(str(path), "r")
+        return hoomd.open(str(path), "r")
     except RuntimeError as error:
         msg = f"{path}: {error}, expected a GSD file; write it with write_gsd"
         raise FileFormatError(msg) from error
-    with file:
-        return _packing(path, hoomd, file[row_of(frame, len(file), path)])
 
 
 def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:

@@ -219,9 +219,9 @@ def read_data(path: PathLike, dimension: int | None = None, shape: str | None = 
     OSError
         If the file cannot be opened.
     """
+    with opened_plain(path) as file:
+        text = file.read().decode(errors="replace").replace("\r\n", "\n")
     try:
-        with opened_plain(path) as file:
-            text = file.read().decode(errors="replace").replace("\r\n", "\n")
         return _packing(path, _data_frame(text), Wanted(dimension, shape))
     except ValueError as error:
         msg = f"{path}: {error}"
@@ -257,10 +257,7 @@ class DumpFile:
         self.path = Path(path)
         self._wanted = Wanted(dimension, shape)
         self._is_told = False
-        try:
-            self._file = opened_plain(path)
-        except ValueError as error:
-            raise FileFormatError(str(error)) from error
+        self._file = opened_plain(path)
         weakref.finalize(self, self._file.close)
         self.index = index_of(self._file)
 
@@ -695,8 +692,9 @@ def _dump_frame(lines: TextIO, *, is_first: bool) -> _Frame:
     box = _dump_bounds(items["BOX BOUNDS"])
     columns, others = _dump_columns(names, rows)
     place = next(names for names in _POSITIONS if set(names) <= set(columns))
-    said = Said(digits=_digits(rows, names, place), is_scaled=place in _POSITIONS[2:])
-    said = said if is_first else Said(is_later=True)
+    said = Said(is_later=True)
+    if is_first:
+        said = Said(digits=_digits(rows, names, place), is_scaled=place in _POSITIONS[2:])
     step, time = int(items["TIMESTEP"][1]), float(items.get("TIME", ["", "0"])[1])
     boundary = items["BOX BOUNDS"][0]
     return _Frame(_placed(columns, place, box), *box, said, step, time, joined(others), boundary)
@@ -732,8 +730,8 @@ def _plain_names(columns: Sequence[str]) -> list[str]:
         if is_ours and number.isdecimal() and 0 < int(number) <= len(of):
             name = of[int(number) - 1]
         is_known = (
-            (not number and name in (*_PROPERTIES, *_EXPONENT, *_WIDTHS)) or name in _PROPERTIES
-        )
+            not number and name in (*_PROPERTIES, *_EXPONENT, *_WIDTHS)
+        ) or name in _PROPERTIES
         found.append(name if is_ours and is_known else column)
     return found
 

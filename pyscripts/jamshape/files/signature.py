@@ -39,7 +39,7 @@ def format_of(path: PathLike) -> str:
 
     Raises
     ------
-    ValueError
+    FileFormatError
         If it is compressed, and damaged or compressed by a program that is missing.
     OSError
         If it cannot be read.

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from jamshape.files.disk import PathLike
+from jamshape.files.disk import FileFormatError, PathLike
 
 GZIP, ZSTD = "gzip", "Zstandard"
 PACKED = {GZIP: b"\x1f\x8b", ZSTD: b"\x28\xb5\x2f\xfd"}
@@ -34,7 +34,7 @@ def opened_plain(path: PathLike) -> IO[bytes]:
 
     Raises
     ------
-    ValueError
+    FileFormatError
         If a compressed file is cut or damaged, or the program for it is missing.
     OSError
         If the file cannot be read.
@@ -70,7 +70,7 @@ def _stream(path: PathLike, file: IO[bytes]) -> Iterator[Any]:
             yield file
     except _DAMAGE as error:
         msg = f"{path}: the compressed file is cut or damaged ({error}), expected a whole one; write it again"
-        raise ValueError(msg) from error
+        raise FileFormatError(msg) from error
 
 
 @contextmanager
@@ -78,7 +78,7 @@ def _zstd(path: PathLike, file: IO[bytes]) -> Iterator[Any]:
     program = shutil.which("zstd")
     if program is None:
         msg = f"{path} is compressed with Zstandard, expected the program zstd to unpack it; install zstd"
-        raise ValueError(msg)
+        raise FileFormatError(msg)
     os.lseek(file.fileno(), 0, os.SEEK_SET)
     command = [program, "-dcq"]
     with subprocess.Popen(

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from jamshape.arguments import checked
-from jamshape.files.h5md import copy_run, read_attributes, write_packing
-from jamshape.files.lammps_text import read_any, write_data
+from jamshape.files.h5md import copy_run, read_attributes, write_packing, write_run
+from jamshape.files.lammps_text import read_any, write_data, write_dump
 from jamshape.files.meaning import Wanted, require_told
 from jamshape.files.signature import GSD, HDF5, format_of
+from jamshape.front.frames import Frames
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.run import Recorded, run_file
@@ -31,7 +32,8 @@ def load(
     Parameters
     ----------
     path : path
-        H5MD of a packing or a run, HDF5 of modes, a LAMMPS dump or data file, or a GSD file.
+        H5MD of a packing or a run, HDF5 of modes, a LAMMPS dump or data file, also compressed (``.gz``, ``.zst``), or
+        a GSD file.
     frame : int, optional
         Frame of a run, a dump or a GSD file to return as a packing, counted from 0 or, if negative, from
         the end. By default a whole run, or the last frame of other files.
@@ -85,15 +87,16 @@ def load(
 
 
 @checked
-def save(path: str | Path, thing: Packing | Recorded | Modes) -> None:
-    """Write a packing, a run or modes; an existing file is replaced only when writing is complete.
+def save(path: str | Path, thing: Packing | Recorded | Frames | Modes) -> None:
+    """Write a packing, a run, frames or modes; an existing file is replaced only when writing is complete.
 
     Parameters
     ----------
     path : path
         The suffix selects the format: ``.h5`` (HDF5, full precision, with results), ``.data`` (LAMMPS data
-        file of one packing, in doubles), ``.gsd`` (HOOMD-blue, OVITO; all frames of a run).
-    thing : Packing, RunFile, ShearFile, QuasistaticShearFile or Modes
+        file of one packing, in doubles), ``.dump`` or ``.lammpstrj`` (LAMMPS dump, in doubles), ``.gsd``
+        (HOOMD-blue, OVITO); these two take all frames of a run.
+    thing : Packing, RunFile, ShearFile, QuasistaticShearFile, Frames or Modes
         A run in ``.h5`` is copied whole; the copy of an unfinished run cannot be resumed.
 
     Raises
@@ -142,10 +145,12 @@ def _save_gsd(path: Path, packings: Packing | Recorded) -> None:
     write_gsd(path, packings)
 
 
-_NAMES = {Packing: "a packing", Recorded: "a run", Modes: "modes"}
+_NAMES = {Packing: "a packing", Recorded: "a run", Modes: "modes", Frames: "frames"}
 _WRITERS: dict[str, dict[type, Callable[[Path, Any], None]]] = {
-    ".h5": {Packing: _save_h5, Recorded: _save_run, Modes: _save_modes},
+    ".h5": {Packing: _save_h5, Recorded: _save_run, Modes: _save_modes, Frames: write_run},
     ".data": {Packing: write_data},
-    ".gsd": {Packing: _save_gsd, Recorded: _save_gsd},
+    ".gsd": {Packing: _save_gsd, Recorded: _save_gsd, Frames: _save_gsd},
+    ".dump": {Packing: write_dump, Recorded: write_dump, Frames: write_dump},
+    ".lammpstrj": {Packing: write_dump, Recorded: write_dump, Frames: write_dump},
 }
 """Content and writer, by suffix."""

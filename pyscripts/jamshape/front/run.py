@@ -28,6 +28,7 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.lock import Lock
 from jamshape.flow.cyclic_shear import QUARTERS
+from jamshape.front.frames import recorded_frames
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import follow, place
 from jamshape.measures.events import Event, stress_drops
@@ -112,7 +113,7 @@ class Recorded:
         return MeasuredPacking.read(self.file, frame)
 
     def __iter__(self) -> Iterator[MeasuredPacking]:
-        return map(self.packing, range(len(self)))
+        return iter(recorded_frames(self.file))
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the pressure; arguments as in `jamshape.plot`."""

@@ -39,9 +39,10 @@ def as_columns(columns: Mapping[str, Any], n: int) -> dict[str, NDArray[Any]]:
 
 def kept(columns: Mapping[str, NDArray[Any]], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return the columns that stay true when fields of a packing change: others describe the state before."""
-    if not _STATE & changes.keys():
+    if not columns or not _STATE & changes.keys():
         return dict(columns)
-    n = len(next((changes[name] for name in ("position", "id") if name in changes), ()))
+    rows = next((changes[name] for name in ("position", "id") if name in changes), ())
+    n = len(np.atleast_1d(np.asarray(rows)))
     return {
         name: column
         for name, column in columns.items()
