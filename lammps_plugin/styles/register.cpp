@@ -15,6 +15,9 @@
 #include "pair_contact.h"
 #include "variable.h"
 
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
 #include <dlfcn.h>
 #include <filesystem>
 #include <mpi.h>

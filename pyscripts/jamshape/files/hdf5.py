@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jamshape.files.disk import FileFormatError as FileFormatError
+from jamshape.files.disk import FileFormatError as FileFormatError  # noqa: PLC0414 - passed on
 from jamshape.files.disk import PathLike, store
 from jamshape.files.frames import MissingFrameError
 from jamshape.files.lock import NO_LOCKS

@@ -170,7 +170,7 @@ def _write_frame(file: TextIO, packing: Packing) -> None:
     if packing.box.is_tilted:
         bounds = np.column_stack([bounds, [*packing.box.tilt.tolist(), 0.0, 0.0][:3]])
         boundary = f"xy xz yz {boundary}"
-    columns = {"id": packing.id, "type": packing.species}
+    columns: dict[str, NDArray[Any]] = {"id": packing.id, "type": packing.species}
     columns |= dict(zip(_POSITION, _padded(packing.position).T, strict=True))
     columns |= dict(zip(_IMAGE, _padded(packing.image).astype(np.int64).T, strict=True))
     columns |= dict(zip(_PROPERTIES, [*packing.quaternions.T, *packing.diameters.T], strict=True))
@@ -411,6 +411,43 @@ def _packing(path: PathLike, frame: _Frame, wanted: Wanted) -> Packing:
     return packing
 
 
+def packing_of_columns(
+    name: str,
+    columns: dict[str, FloatArray],
+    box: tuple[tuple[FloatArray, FloatArray], str],
+    pair: str,
+    wanted: Wanted,
+) -> Packing:
+    """Make a packing from what a dump has.
+
+    Parameters
+    ----------
+    name : str
+        Name of the source in messages.
+    columns : dict of str to (N,) array
+    box : (bounds, tilt), boundary
+        As in a dump.
+    pair : str
+        Name and settings of a pair style of ours on one line, then its coefficients, a line for each pair of types; "" for
+        others.
+    wanted : Wanted
+
+    Raises
+    ------
+    ValueError
+        If they are not those of a packing.
+    """
+    said = Said()
+    style, *rows = pair.splitlines() or [""]
+    shape = style.partition("/")[0]
+    if shape in SHAPES:
+        said = _of_pairs(shape, [row.split() for row in rows], 2, columns)
+        sides = {"sides": 1 if style.endswith("sides one") else 2}
+        said = replace(said, law={**said.law, **sides})
+    (bounds, tilt), boundary = box
+    return _packing(name, _Frame(columns, bounds, tilt, said, boundary=boundary), wanted)
+
+
 def _require_closed(path: PathLike, packing: Packing, frame: _Frame) -> None:
     """Refuse open boundaries that a particle could reach across; a periodic box has the same contacts otherwise."""
     ends = frame.boundary.split()[-3:][: packing.dimension]
@@ -496,8 +533,8 @@ def _data_frame(text: str) -> _Frame:
             raise ValueError(msg)
         columns |= ellipsoids
     said = replace(_said(text, sections, columns), digits=_digits(atom_rows, names))
-    others = {name: columns[name] for name in ("mol", "q") if name in columns}
-    others |= {"mol": _whole(others["mol"])} if "mol" in others else {}
+    others: dict[str, NDArray[Any]] = {"q": columns["q"]} if "q" in columns else {}
+    others |= {"mol": _whole(columns["mol"])} if "mol" in columns else {}
     return _Frame(columns, *_bounds(header), said, others=others)
 
 

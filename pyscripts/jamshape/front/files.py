@@ -15,13 +15,14 @@ from jamshape.front.frames import Frames
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.run import Recorded, run_file
+from jamshape.lammps.living import Living, read_living
 from jamshape.packing import Packing
 from jamshape.vibration.table import holds_modes
 
 
 @checked
 def load(
-    path: str | Path,
+    path: str | Path | Living,
     frame: int | None = None,
     *,
     dimension: int | None = None,
@@ -33,7 +34,7 @@ def load(
     ----------
     path : path
         H5MD of a packing or a run, HDF5 of modes, a LAMMPS dump or data file, also compressed (``.gz``, ``.zst``), or
-        a GSD file.
+        a GSD file; or a LAMMPS instance of this process, ``lammps.lammps`` or `jamshape.lammps.session.Session`.
     frame : int, optional
         Frame of a run, a dump or a GSD file to return as a packing, counted from 0 or, if negative, from
         the end. By default a whole run, or the last frame of other files.
@@ -64,7 +65,10 @@ def load(
     >>> js.load("packing.h5")
     <Packing of 16 spherocylinders in 2D: phi = 0.8..., pressure = ...e-05, u = 1e-08, z = 5..., rattlers = 0, in packing.h5>
     """
-    path, wanted = Path(path), Wanted(dimension, shape)
+    wanted = Wanted(dimension, shape)
+    if isinstance(path, Living):
+        return MeasuredPacking.of(read_living(path, wanted))
+    path = Path(path)
     found = format_of(path)
     last = -1 if frame is None else frame
     if found == GSD:

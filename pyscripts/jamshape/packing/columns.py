@@ -18,7 +18,7 @@ _OWN_LABELS = ("i_", "d_", "i2_", "d2_")  # of fix property/atom
 _STATE = {"position", "orientation", "diameters", "exponent", "box", "id"}
 
 
-def as_columns(columns: Mapping[str, Any], n: int) -> dict[str, NDArray[Any]]:
+def as_columns(columns: Mapping[Any, Any], n: int) -> dict[str, NDArray[Any]]:
     """Return read-only copies of columns (N,) or (N, k) of numbers or texts, or raise a ValueError."""
     found = {}
     for name, values in columns.items():
