@@ -57,6 +57,7 @@ RUN_BY = [
 FILES = [
     Told("README.md", "create_random", "rods.in"),
     Told("docs/how-to/decks.md", "create_random spherocylinder", "rods.in"),
+    Told("docs/how-to/your-own-states.md", "create_random spherocylinder", "own.in"),
 ]
 """Blocks that the page tells its reader to keep in a file."""
 
