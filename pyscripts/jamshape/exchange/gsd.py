@@ -12,6 +12,7 @@ single-precision numbers, these take precedence: see `jamshape.exchange.edited`.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from functools import lru_cache, singledispatch
 from typing import Any, NamedTuple
@@ -77,6 +78,9 @@ def write_gsd(path: PathLike, packings: Packing | Iterable[Packing]) -> None:
     for packing in frames:
         form = form.joined(Form.of(packing))
         columns &= {name for name, x in packing.columns.items() if x.dtype.kind in "iuf"}
+    if texts := {name for p in frames for name, x in p.columns.items() if x.dtype.kind == "U"}:
+        said = f"{path} is a GSD file, which holds numbers: the columns {', '.join(sorted(texts))} are left out"
+        warnings.warn(said, stacklevel=2)
     with replacing(path) as temporary, hoomd.open(str(temporary), "w") as file:
         for packing in frames:
             held = {name: x for name, x in packing.columns.items() if name in columns}

@@ -24,7 +24,7 @@ import os
 import re
 import warnings
 import weakref
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
@@ -295,24 +295,6 @@ class DumpFile:
             raise FileFormatError(msg) from error
         self._wanted, self._is_told = Wanted(packing.dimension, packing.shape_style), True
         return packing
-
-
-def iter_dump(
-    path: PathLike, dimension: int | None = None, shape: str | None = None
-) -> Iterator[Packing]:
-    """Read the frames of a text dump one by one; arguments and errors as `DumpFile`.
-
-    An incomplete last frame raises a FileFormatError after the others.
-    """
-    dump = DumpFile(path, dimension, shape)
-    yield from map(dump.packing, range(len(dump.index.steps)))
-
-
-def read_dump(
-    path: PathLike, dimension: int | None = None, shape: str | None = None
-) -> list[Packing]:
-    """Read all frames of a text dump; see `iter_dump`."""
-    return list(iter_dump(path, dimension, shape))
 
 
 def read_any(

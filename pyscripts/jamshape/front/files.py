@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -67,6 +68,9 @@ def load(
     """
     wanted = Wanted(dimension, shape)
     if isinstance(path, Living):
+        if frame is not None:
+            msg = f"frame is {frame}, expected none for a LAMMPS instance, which has one state; leave it out"
+            raise ValueError(msg)
         return MeasuredPacking.of(read_living(path, wanted))
     path = Path(path)
     found = format_of(path)
@@ -130,6 +134,13 @@ def save(path: str | Path, thing: Packing | Recorded | Frames | Modes) -> None:
     raise ValueError(msg)
 
 
+def _save_data(path: Path, packing: Packing) -> None:
+    if packing.columns:
+        said = f"{path} is a data file, which holds no other columns: {', '.join(packing.columns)} are left out"
+        warnings.warn(said, stacklevel=4)
+    write_data(path, packing)
+
+
 def _save_h5(path: Path, packing: Packing) -> None:
     measured = packing if isinstance(packing, MeasuredPacking) else MeasuredPacking.of(packing)
     write_packing(path, measured, measured.to_store)
@@ -152,7 +163,7 @@ def _save_gsd(path: Path, packings: Packing | Recorded) -> None:
 _NAMES = {Packing: "a packing", Recorded: "a run", Modes: "modes", Frames: "frames"}
 _WRITERS: dict[str, dict[type, Callable[[Path, Any], None]]] = {
     ".h5": {Packing: _save_h5, Recorded: _save_run, Modes: _save_modes, Frames: write_run},
-    ".data": {Packing: write_data},
+    ".data": {Packing: _save_data},
     ".gsd": {Packing: _save_gsd, Recorded: _save_gsd, Frames: _save_gsd},
     ".dump": {Packing: write_dump, Recorded: write_dump, Frames: write_dump},
     ".lammpstrj": {Packing: write_dump, Recorded: write_dump, Frames: write_dump},

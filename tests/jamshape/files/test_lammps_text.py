@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+from dumps import iter_dump, read_dump
 from lammps_runs import run_lmp_well
 from nasty import NASTY, assert_identical, nasty_packing, tilted_box
 
 from jamshape.files.h5md import FileFormatError, write_run
-from jamshape.files.lammps_text import iter_dump, read_any, read_data, read_dump, write_data
+from jamshape.files.lammps_text import read_any, read_data, write_data
 from jamshape.packing import Box
 
 RODS = "spherocylinder"

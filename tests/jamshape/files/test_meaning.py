@@ -5,12 +5,13 @@ import re
 
 import numpy as np
 import pytest
+from dumps import read_dump
 from lammps_runs import run_lmp_well
 
 import jamshape as js
 from jamshape.contacts import find_contacts
 from jamshape.files.h5md import FileFormatError
-from jamshape.files.lammps_text import read_data, read_dump, write_data
+from jamshape.files.lammps_text import read_data, write_data
 from jamshape.packing import Box, Packing
 from jamshape.shapes.shape import Interaction
 from jamshape.shapes.table import SHAPES

@@ -225,7 +225,11 @@ def test_other_columns_are_kept_and_written_again(tmp_path, sequence):
     for name in ("a.dump", "a.lammpstrj", "a.h5", "a.gsd"):
         if name.endswith("gsd"):
             pytest.importorskip("gsd")
-        js.save(tmp_path / name, mixed_up)
+        if name.endswith("gsd"):
+            with pytest.warns(UserWarning, match="the columns element are left out"):
+                js.save(tmp_path / name, mixed_up)
+        else:
+            js.save(tmp_path / name, mixed_up)
         shape = RODS if "." in name and name[2] in "dl" else None
         found = js.load(tmp_path / name, shape=shape).sorted_by_id()
         expected = {
@@ -237,6 +241,8 @@ def test_other_columns_are_kept_and_written_again(tmp_path, sequence):
         for key, column in expected.items():
             assert found.columns[key].dtype.kind == column.dtype.kind
             np.testing.assert_array_equal(found.columns[key], column)
+    with pytest.warns(UserWarning, match="holds no other columns: mol, element, c_energy"):
+        js.save(tmp_path / "a.data", packing)
     moved = packing.with_(position=packing.position + 1e-3)
     assert sorted(moved.columns) == ["element", "mol"]
     assert sorted(packing.with_(law=js.Interaction(2)).columns) == sorted(packing.columns)

@@ -118,6 +118,27 @@ def test_other_particles_are_refused():
             smaller.to_lammps(session)
 
 
+class TwoRanks:
+    """An instance of two processes, as far as it is asked."""
+
+    lmp = None
+
+    def extract_box(self):
+        raise AssertionError
+
+    def extract_setting(self, name):
+        return {"world_size": 2}[name]
+
+
+def test_several_processes_and_frames_are_refused():
+    with pytest.raises(ValueError, match="has 2 processes, expected one: write a data file"):
+        js.load(TwoRanks())
+    with pytest.raises(ValueError, match="frame is -1, expected none for a LAMMPS instance"):
+        js.load(TwoRanks(), -1)
+    with pytest.raises(ValueError, match="path is 3, expected a path or a LAMMPS instance"):
+        js.load(3)
+
+
 def test_an_instance_without_ellipsoids_is_refused():
     with Session() as session:
         with pytest.raises(
