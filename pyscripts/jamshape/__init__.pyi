@@ -8,6 +8,7 @@ from .front.energies import energy as energy
 from .front.ensembles import ensemble as ensemble
 from .front.files import load as load
 from .front.files import save as save
+from .front.frames import frames as frames
 from .front.making import make_packing as make_packing
 from .front.minimising import minimise as minimise
 from .front.modes import Modes as Modes

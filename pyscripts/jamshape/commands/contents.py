@@ -23,10 +23,11 @@ from jamshape.files.h5md import (
     read_packing,
     read_report,
 )
-from jamshape.files.lammps_text import iter_dump, read_data
+from jamshape.files.lammps_text import read_data
 from jamshape.files.meaning import NOTHING, Wanted
 from jamshape.files.outcomes import is_reached, shortfall
 from jamshape.files.signature import DATA, DUMP, GSD, HDF5, REFUSED, RESTART, SIGNATURES, format_of
+from jamshape.front.frames import frames
 from jamshape.front.packing import Packing, public, results_of
 from jamshape.packing import Packing as PackingLike
 from jamshape.vibration.ensembles import TOLD, count_of, of_packing
@@ -220,9 +221,8 @@ def _require_told(told: Mapping[str, Any], wanted: Wanted) -> None:
 
 
 def _dump(path: Path, wanted: Wanted) -> dict[str, Any]:
-    for frames, packing in enumerate(iter_dump(path, *wanted), 1):
-        last, count = packing, frames
-    return _text("LAMMPS dump", last) | {"frames": count}
+    found = frames(path, dimension=wanted.dimension, shape=wanted.shape)
+    return _text("LAMMPS dump", found[-1]) | {"frames": len(found)}
 
 
 def _data(path: Path, wanted: Wanted) -> dict[str, Any]:

@@ -6,19 +6,18 @@ from pathlib import Path
 
 from jamshape.arguments import checked
 from jamshape.checks import RANGES, require_stated
-from jamshape.front.files import packing_of
 from jamshape.front.making import made_or_kept
 from jamshape.front.packing import Packing
+from jamshape.front.reading import Held, packing_of
 from jamshape.front.starts import digest, told_of
 from jamshape.minima.target import FixedBox
-from jamshape.packing import Packing as PackingLike
 from jamshape.protocols.recipe import Given, Recipe
 from jamshape.shapes.particles import Particles
 
 
 @checked
 def minimise(
-    packing: PackingLike | str | Path,
+    packing: Held,
     *,
     tolerance: float = 1e-8,
     minimiser: str = "auto",

@@ -31,6 +31,7 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.lock import Lock
 from jamshape.flow.cyclic_shear import QUARTERS
+from jamshape.front.frames import recorded_frames
 from jamshape.front.packing import Packing
 from jamshape.front.progress import follow, place
 from jamshape.measures.events import Event, stress_drops
@@ -115,7 +116,7 @@ class Recorded:
         return Packing.read(self.file, frame)
 
     def __iter__(self) -> Iterator[Packing]:
-        return map(self.packing, range(len(self)))
+        return iter(recorded_frames(self.file))
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the pressure; arguments as in `jamshape.plot`."""

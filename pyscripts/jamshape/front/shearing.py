@@ -21,6 +21,7 @@ from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.flow.shear import Shear
 from jamshape.flow.slow_shear import SlowShear
 from jamshape.front.progress import place
+from jamshape.front.reading import Held
 from jamshape.front.recorded import recorded
 from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, ShearFile
 from jamshape.front.starts import Asked, Start
@@ -53,7 +54,7 @@ def shear(
     strain: float = 5.0,
     flow: str = "simple",
     seed: int | None = None,
-    start: Packing | str | Path | None = None,
+    start: Held | None = None,
     sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
@@ -86,7 +87,7 @@ def shear(
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
-        Initial packing, or H5MD file whose last frame to start from, at its own packing fraction.
+        Initial packing, or a file that `load` reads, whose last frame to start from, at its own packing fraction.
     sides : int
         Bonds of a side-to-side contact of rods, 1 or 2.
     integrator : str, optional
@@ -171,7 +172,7 @@ def cyclic_shear(
     cycles: int = 20,
     flow: str = "simple",
     seed: int | None = None,
-    start: Packing | str | Path | None = None,
+    start: Held | None = None,
     sides: int = 2,
     integrator: str | None = None,
     dt: float | None = None,
@@ -288,7 +289,7 @@ def quasistatic_shear(
     pressure: float = 0.0,
     tolerance: float = 1e-8,
     seed: int | None = None,
-    start: Packing | str | Path | None = None,
+    start: Held | None = None,
     frames: int = 20,
     file: str | Path | None = None,
     again: bool = False,
@@ -320,7 +321,7 @@ def quasistatic_shear(
     seed : int, optional
         Random seed of the start; 1 by default.
     start : Packing or path, optional
-        Initial packing, or H5MD file whose last frame to start from, at its own packing fraction.
+        Initial packing, or a file that `load` reads, whose last frame to start from, at its own packing fraction.
     frames : int
         Approximate number of snapshots to keep.
     file, again, seconds, progress

@@ -161,6 +161,10 @@ def test_dumps_and_restart_files_of_lammps(jamshape, tiny, tmp_path):
     _, report = info(jamshape, dump, "--shape", "spherocylinder", "--dimension", "2")
     assert (report["kind"], report["frames"], report["n"]) == ("LAMMPS dump", 3, 16)
     assert report["phi"] == pytest.approx(packing.phi, rel=1e-12)
+    packed = tmp_path / "packed.gz"
+    packed.write_bytes(gzip.compress(dump.read_bytes()))
+    _, again = info(jamshape, packed, "--shape", "spherocylinder", "--dimension", "2")
+    assert again == report | {"file": str(packed)}
     lines, report = info(jamshape, restart)
     assert (report["kind"], report["step"], report["dimension"]) == ("LAMMPS restart file", 7, 2)
     assert report["lammps"][-4:].isdigit()
