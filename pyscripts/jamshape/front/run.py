@@ -454,7 +454,7 @@ class EnsembleFile(Recorded):
 
     @property
     def failures(self) -> dict[int, str]:
-        """Why samples failed, or did not reach their goal, by their seeds."""
+        """Reasons for which samples failed, or did not reach their goal, by seed."""
         return {int(seed): why for seed, why in json.loads(self.about["failures"]).items()}
 
     @property

@@ -6,6 +6,7 @@ from exchanged import PLACES, mixed, tilted
 
 import jamshape as js
 from jamshape.contacts import Contacts
+from jamshape.front.packing import public
 from jamshape.lammps.module import one_at_a_time
 from jamshape.lammps.session import Session
 from jamshape.packing import Box
@@ -54,7 +55,7 @@ def test_a_living_state_is_read_with_its_law_and_pushed_back(name, dimension, ma
             image=found.image + 1,
             box=box,
         )
-        js.MeasuredPacking.of(moved).to_lammps(session.lmp)
+        public(moved).to_lammps(session.lmp)
         again = js.load(session.lmp)
         turns = again.image - moved.image
         shifted = again.position + again.box.vectors(turns)
@@ -77,7 +78,7 @@ def test_energy_of_lammps_is_that_of_its_packing():
         with one_at_a_time():
             pe = session.lmp.get_thermo("pe")
         assert pe == pytest.approx(energy, rel=1e-9)
-        turned = js.MeasuredPacking.of(found.with_(orientation=found.orientation + 0.01))
+        turned = public(found.with_(orientation=found.orientation + 0.01))
         turned.to_lammps(session)
         session.commands("run 0")
         with one_at_a_time():
@@ -113,7 +114,7 @@ def test_other_particles_are_refused():
         other = found.with_(id=found.id + 1)
         with pytest.raises(ValueError, match="atoms of other IDs than the packing"):
             other.to_lammps(session)
-        smaller = js.MeasuredPacking.of(mixed("spherocylinder", 2, n=6))
+        smaller = public(mixed("spherocylinder", 2, n=6))
         with pytest.raises(ValueError, match="has 12 atoms in 2D, expected the 6 particles in 2D"):
             smaller.to_lammps(session)
 
