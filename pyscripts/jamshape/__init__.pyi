@@ -25,6 +25,7 @@ from .front.run import ShearFile as ShearFile
 from .front.shearing import cyclic_shear as cyclic_shear
 from .front.shearing import quasistatic_shear as quasistatic_shear
 from .front.shearing import shear as shear
+from .lammps.session import Session as Session
 from .measures.nonaffine import Nonaffine as Nonaffine
 from .packing import Box as Box
 from .shapes.named import Dimers as Dimers
