@@ -328,6 +328,13 @@ def test_the_deck_of_readme_is_the_one_that_is_tested_from_everywhere():
     assert of_readme == of_page
 
 
+def test_twelve_tasks_take_at_most_fifteen_lines_each():
+    blocks = [b for b in ALL_BLOCKS if b.page.endswith("twelve-tasks.md") and b.language == "python"]
+    lines = [len([line for line in b.text.splitlines() if line.strip()]) for b in blocks]
+    assert len(lines) == 1 + 12  # the first makes what is read
+    assert max(lines) <= 15
+
+
 def test_every_command_is_on_its_page():
     page = text_of("docs/how-to/command.md")
     names = re.findall(r"^    jamshape (\w+)", page, re.MULTILINE)
