@@ -329,7 +329,9 @@ def test_the_deck_of_readme_is_the_one_that_is_tested_from_everywhere():
 
 
 def test_twelve_tasks_take_at_most_fifteen_lines_each():
-    blocks = [b for b in ALL_BLOCKS if b.page.endswith("twelve-tasks.md") and b.language == "python"]
+    blocks = [
+        b for b in ALL_BLOCKS if b.page.endswith("twelve-tasks.md") and b.language == "python"
+    ]
     lines = [len([line for line in b.text.splitlines() if line.strip()]) for b in blocks]
     assert len(lines) == 1 + 12  # the first makes what is read
     assert max(lines) <= 15

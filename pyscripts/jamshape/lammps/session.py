@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,6 +127,10 @@ class Session:
 
     def __enter__(self) -> Self:
         return self
+
+    def __reduce__(self) -> NoReturn:
+        msg = "a Session holds a running LAMMPS, which cannot be pickled or copied; take its packing, session.packing()"
+        raise TypeError(msg)
 
     def __exit__(self, *_: object) -> None:
         self.close()
