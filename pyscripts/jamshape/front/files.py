@@ -13,8 +13,10 @@ from jamshape.files.meaning import Wanted, require_told
 from jamshape.files.signature import GSD, HDF5, format_of
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.run import Recorded, run_file
+from jamshape.front.recorded import KINDS, run_file
+from jamshape.front.run import Recorded
 from jamshape.packing import Packing
+from jamshape.recording.driver import KIND
 from jamshape.vibration.table import holds_modes
 
 
@@ -75,7 +77,7 @@ def load(
         return MeasuredPacking.of(read_any(path, last, *wanted), file=path)
     if holds_modes(path):
         return Modes.read(path)
-    if frame is None and "finished" in read_attributes(path):
+    if frame is None and str(read_attributes(path).get(KIND)) in KINDS:
         run = run_file(path)
         require_told(path, run.packing(0), wanted)
         return run
