@@ -51,7 +51,7 @@ def plan(
         return QuasistaticDriver(first, how, frames, Sheared(checkpoint["state"], **counts))
 
     settings = dataclasses.asdict(how) | dict(made_from) | {"frames": frames}
-    return Plan("a quasistatic shear", settings, begin, restore, _ARGUMENTS)
+    return Plan("quasistatic shear", "a quasistatic shear", settings, begin, restore, _ARGUMENTS)
 
 
 class QuasistaticDriver:

@@ -16,9 +16,11 @@ from jamshape.front.frames import Frames
 from jamshape.front.modes import Modes
 from jamshape.front.packing import Packing
 from jamshape.front.reading import packing_of
-from jamshape.front.run import Recorded, run_file
+from jamshape.front.recorded import KINDS, run_file
+from jamshape.front.run import Recorded
 from jamshape.lammps.living import Living
 from jamshape.packing import Packing as PackingLike
+from jamshape.recording.driver import KIND
 from jamshape.vibration.table import holds_modes
 
 
@@ -76,7 +78,7 @@ def load(
         if format_of(path) == HDF5:
             if holds_modes(path):
                 return Modes.read(path)
-            if frame is None and "finished" in read_attributes(path):
+            if frame is None and str(read_attributes(path).get(KIND)) in KINDS:
                 run = run_file(path)
                 require_told(path, run.packing(0), Wanted(dimension, shape))
                 return run

@@ -496,19 +496,3 @@ def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:
     at = place(None, name)
     at.path.write_bytes(content)
     return kind(*at)
-
-
-def run_file(path: Path, folder: Any = None) -> Recorded:
-    """Open a run's file as the class of its kind."""
-    known = read_attributes(path)
-    kind = next((kind for mark, kind in _KINDS.items() if mark in known), RunFile)
-    return kind(path, folder)
-
-
-_KINDS: dict[str, type[Recorded]] = {
-    "gdot": ShearFile,
-    "amplitude": CyclicShearFile,
-    "shear_steps": QuasistaticShearFile,
-    "ensemble_seeds": EnsembleFile,
-}
-"""Classes by an attribute that only their files have."""

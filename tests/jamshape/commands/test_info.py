@@ -81,7 +81,9 @@ def test_a_packing_of_which_nothing_is_known_is_measured(jamshape, tiny, tmp_pat
         assert report["S_2"] == pytest.approx(stored["S2"], rel=1e-12)
 
 
-@pytest.mark.parametrize(("name", "kind"), [("run.h5", "run"), ("slow.h5", "slow run")])
+@pytest.mark.parametrize(
+    ("name", "kind"), [("run.h5", "compression"), ("slow.h5", "slow compression")]
+)
 def test_a_run(jamshape, tiny, name, kind):
     lines, report = info(jamshape, tiny[0] / name)
     said = tiny[1][name].report
@@ -105,7 +107,7 @@ def test_a_run(jamshape, tiny, name, kind):
         ),
         (
             "packing.h5.making.h5",
-            {"stage": "searching"},
+            {"kind": "packing in the making", "finished": False},
             "the command for {folder}/packing.h5, which continues",
         ),
     ],

@@ -36,7 +36,7 @@ def folder(request, tmp_path, monkeypatch):
     first = pressed(dimension=request.param)
     assert len(find_contacts(first).pairs)
     write_packing(tmp_path / "packing.h5", first)
-    told = {"finished": True, "kappa": 1e-6}
+    told = {"kind": "compression", "finished": True, "kappa": 1e-6}
     later = [scaled(first, 1 - 0.01 * k).with_(step=k, time=float(k)) for k in (1, 2)]
     row = (first.step, first.time, {"phi": first.phi, "pressure": 0.1})
     write_content(tmp_path / "run.h5", [first, *later], told, [row])
