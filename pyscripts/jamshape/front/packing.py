@@ -19,6 +19,7 @@ from jamshape.files.disk import named, settled
 from jamshape.files.h5md import read_attributes, read_packing
 from jamshape.files.outcomes import AT_REST, is_reached, shortfall
 from jamshape.packing import Packing
+from jamshape.recording.driver import KIND
 
 _SAME_PHI = 1e-6  # relative; more than any rounding, and than that of boxes in single precision
 
@@ -144,7 +145,7 @@ class MeasuredPacking(Packing):
     @property
     def to_store(self) -> dict[str, Any]:
         """Return the results without attributes of a run: a single frame cannot be continued as a run."""
-        return {k: v for k, v in self.results.items() if k != "finished"}
+        return {k: v for k, v in self.results.items() if k not in {KIND, "finished"}}
 
     @checked
     def to_gsd(self, path: str | Path) -> None:
