@@ -281,7 +281,7 @@ class Packing(Record):
     @property
     def to_store(self) -> dict[str, Any]:
         """Return the results without attributes of a run: a single frame cannot be continued as a run."""
-        return {k: v for k, v in self.results.items() if k != "finished"}
+        return {k: v for k, v in self.results.items() if k not in {"kind", "finished"}}
 
 
 def _check_labels(packing: Packing) -> None:

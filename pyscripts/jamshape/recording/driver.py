@@ -85,7 +85,7 @@ class Plan:
     Parameters
     ----------
     kind
-        Kind of its file, such as ``compression``: the attribute of that name, by which files are told apart.
+        Kind of its file, such as ``compression``: the attribute of that name, which `front.recorded` opens and resumes it by.
     what
         Name in messages, with its article, such as ``a compression``.
     settings

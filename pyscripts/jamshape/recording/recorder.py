@@ -194,7 +194,7 @@ def require_same(content: Content, plan: Plan) -> None:
     advice = "choose another {file:name}, or use {again} to replace it"
     given = {"file": content.path, "again": True}
     stored, path = content.attributes, str(content.path).replace("{", "{{").replace("}", "}}")
-    if stored.get(KIND) != plan.kind:
+    if stored.get(KIND) != plan.kind or "finished" not in stored:
         said = f"{path} does not hold {plan.what}, expected one; {advice}"
         raise ArgumentError(said, given)
     for name, value in plan.settings.items():
