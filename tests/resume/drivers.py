@@ -223,6 +223,10 @@ CASES = DRIVERS | {
         "quasistatic_shear", "dimers",
         {"step": 4e-3, "strain": 0.04, "flow": "pure", "pressure": 1e-3, "frames": 3},
     ),
+    "cyclic quasistatic shear": Case(
+        "quasistatic_shear", "dimers", {"step": 1e-2, "amplitude": 0.06, "cycles": 2, "frames": 3},
+        {"step": 2e-2, "amplitude": 0.05, "cycles": 3},
+    ),
     "quasistatic shear in space": Case(
         "quasistatic_shear", "bodies", {"step": 1e-2, "strain": 0.1, "frames": 3}
     ),

@@ -148,6 +148,10 @@ def _cyclic(run: CyclicShearFile, axes: Axes, color: str) -> None:
 
 def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
     del color
+    if run.cycles:
+        cycles = Cycles(run.strain, run.stress, run.steps_per_cycle)
+        draw_cycles(axes, cycles, PackingFile.read(run.file).system())
+        return
     draw_steps(axes, run.observables, PackingFile.read(run.file).system())
 
 

@@ -74,8 +74,7 @@ def _plan_of(path: Path, stored: Mapping[str, Any]) -> Plan:
     if "flow_steps" in stored:
         plan = implicit_driver.plan(_no_start, implicit_driver.course_of(stored), {})
     elif "shear_steps" in stored:
-        names = [field.name for field in dataclasses.fields(QuasistaticShear)]
-        how = QuasistaticShear(**{name: stored[name] for name in names})
+        how = QuasistaticShear.of(stored)
         plan = quasistatic_driver.plan(_no_start, how, int(stored["frames"]), {})
     elif {"finished", "rows", "frames"} <= stored.keys():
         sizes = lammps_driver.Sizes(int(stored["rows"]), int(stored["frames"]))

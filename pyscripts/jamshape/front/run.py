@@ -28,6 +28,7 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.lock import Lock
 from jamshape.flow.cyclic_shear import QUARTERS
+from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import follow, place
 from jamshape.measures.events import Event, stress_drops
@@ -362,8 +363,23 @@ class QuasistaticShearFile(Recorded):
 
     @property
     def strain(self) -> FloatArray:
-        """(T,) strains since the first minimum."""
+        """(T,) strains since the first minimum, of either sign."""
         return self["strain"]
+
+    @property
+    def cycles(self) -> int:
+        """Number of cycles; 0 without an amplitude."""
+        return int(self.about.get("cycles", 0))
+
+    @property
+    def steps_per_cycle(self) -> int:
+        """Number of steps, and so of rows, of each cycle; 0 without cycles."""
+        return QUARTERS * self._how.quarter if self.cycles else 0
+
+    @property
+    def _how(self) -> QuasistaticShear:
+        """Settings of the run."""
+        return QuasistaticShear.of(self.about)
 
     @property
     def stress(self) -> FloatArray:
@@ -407,8 +423,11 @@ class QuasistaticShearFile(Recorded):
 
     @checked
     def steady(self, after: float | None = None) -> SteadyState:
-        """Average over the steady state, as in `ShearFile.steady`."""
-        return steady_state(self.observables, self.strain, after)
+        """Average over the steady state, as in `ShearFile.steady`, along the strain of either sign; not of cycles."""
+        if self.cycles:
+            msg = f"the shear has {self.cycles} cycles, expected one strain without a turn for a steady state"
+            raise ValueError(msg)
+        return steady_state(self.observables, np.abs(self.strain), after)
 
     def __repr__(self) -> str:
         end = f"strain = {self.strain[-1]:.5g}, phi = {self.phi[-1]:.5g}, stress = {self.stress[-1]:.3g}"
@@ -432,7 +451,7 @@ def run_file(path: Path, folder: Any = None) -> Recorded:
 
 _KINDS: dict[str, type[Recorded]] = {
     "gdot": ShearFile,
-    "amplitude": CyclicShearFile,
     "shear_steps": QuasistaticShearFile,
+    "amplitude": CyclicShearFile,
 }
-"""Classes by an attribute that only their files have."""
+"""Classes by an attribute that, after those before, only their files have."""
