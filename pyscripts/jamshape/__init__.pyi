@@ -5,6 +5,7 @@ from .front.compressing import compress as compress
 from .front.compressing import slow_compress as slow_compress
 from .front.files import load as load
 from .front.files import save as save
+from .front.laddering import ladder as ladder
 from .front.making import make_packing as make_packing
 from .front.modes import Modes as Modes
 from .front.modes import modes as modes
@@ -12,6 +13,7 @@ from .front.packing import MeasuredPacking as MeasuredPacking
 from .front.pictures import plot as plot
 from .front.recorded import resume as resume
 from .front.run import CyclicShearFile as CyclicShearFile
+from .front.run import LadderFile as LadderFile
 from .front.run import QuasistaticShearFile as QuasistaticShearFile
 from .front.run import RunFile as RunFile
 from .front.run import ShearFile as ShearFile

@@ -55,6 +55,7 @@ _STORED = (
     _Stored("slow run", "flow_steps", _SAME_COMMAND),
     _Stored("compression for a packing", "rate", _OTHER_COMMAND),
     _Stored("compression for a packing", "of_packing", _OTHER_COMMAND),
+    _Stored("ladder", "ladder_parameter", _SAME_COMMAND),
     _Stored("quasistatic shear", "shear_steps", _SAME_COMMAND),
     _Stored("cyclic shear", "amplitude", _SAME_COMMAND),
     _Stored("shear", "gdot", _SAME_COMMAND),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jamshape.arguments import ArgumentTypeError, checked
 from jamshape.checks import ArgumentError, said
+from jamshape.drawing.ladder import Rungs, draw_rungs
 from jamshape.drawing.modes import draw_density
 from jamshape.drawing.packing import Look, add_legend, colorings, draw_packing
 from jamshape.drawing.pictures import title_of
@@ -17,7 +18,14 @@ from jamshape.drawing.shear import Cycles, draw_cycles, draw_steps, draw_stress
 from jamshape.files.ensembles import PackingFile
 from jamshape.front.modes import Modes
 from jamshape.front.packing import MeasuredPacking
-from jamshape.front.run import CyclicShearFile, QuasistaticShearFile, Recorded, RunFile, ShearFile
+from jamshape.front.run import (
+    CyclicShearFile,
+    LadderFile,
+    QuasistaticShearFile,
+    Recorded,
+    RunFile,
+    ShearFile,
+)
 from jamshape.measures.runs import read_run
 from jamshape.measures.shears import read_shear
 from jamshape.packing import Packing
@@ -39,7 +47,7 @@ def plot(
 
     Parameters
     ----------
-    thing : Packing, RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile or Modes
+    thing : Packing, RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile, LadderFile or Modes
     axes : matplotlib Axes, optional
         Axes without a projection, for packings in space too; by default a new figure of
         `matplotlib.pyplot`.
@@ -155,6 +163,12 @@ def _quasistatic(run: QuasistaticShearFile, axes: Axes, color: str) -> None:
     draw_steps(axes, run.observables, PackingFile.read(run.file).system())
 
 
+def _ladder(run: LadderFile, axes: Axes, color: str) -> None:
+    del color
+    rungs = Rungs(run.values, run["z"], run.opened, run.closed)
+    draw_rungs(axes, rungs, PackingFile.read(run.file).system())
+
+
 def _modes(modes: Modes, axes: Axes, color: str) -> None:
     del color
     draw_density(axes, modes.told)
@@ -168,5 +182,6 @@ _DRAWN: dict[type, Callable[[Any, Axes, str], None]] = {
     ShearFile: _shear,
     CyclicShearFile: _cyclic,
     QuasistaticShearFile: _quasistatic,
+    LadderFile: _ladder,
     Modes: _modes,
 }

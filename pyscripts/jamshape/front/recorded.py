@@ -16,6 +16,8 @@ from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.front.progress import display
 from jamshape.front.run import Recorded, run_file
 from jamshape.packing import Packing
+from jamshape.protocols import ladder
+from jamshape.protocols.ladder import Ladder
 from jamshape.recording.driver import Plan
 from jamshape.recording.recorder import How, record
 
@@ -36,13 +38,13 @@ def resume(file: str | Path, *, seconds: float | None = None, progress: bool = T
     Parameters
     ----------
     file : path
-        File of `compress`, `slow_compress`, `shear`, `cyclic_shear` or `quasistatic_shear`.
+        File of `compress`, `slow_compress`, `shear`, `cyclic_shear`, `quasistatic_shear` or `ladder`.
     seconds, progress
         See `compress`.
 
     Returns
     -------
-    RunFile, ShearFile, CyclicShearFile or QuasistaticShearFile
+    RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile or LadderFile
 
     Raises
     ------
@@ -76,6 +78,8 @@ def _plan_of(path: Path, stored: Mapping[str, Any]) -> Plan:
     elif "shear_steps" in stored:
         how = QuasistaticShear.of(stored)
         plan = quasistatic_driver.plan(_no_start, how, int(stored["frames"]), {})
+    elif "ladder_parameter" in stored:
+        plan = ladder.plan(_no_start, Ladder.of(stored), {})
     elif {"finished", "rows", "frames"} <= stored.keys():
         sizes = lammps_driver.Sizes(int(stored["rows"]), int(stored["frames"]))
         settings = lammps_driver.settings_of(stored)
@@ -83,8 +87,8 @@ def _plan_of(path: Path, stored: Mapping[str, Any]) -> Plan:
         plan = of.plan(_no_start, settings, sizes, {})
     else:
         msg = (
-            f"{path} holds no run, expected a file of compress, slow_compress, shear, cyclic_shear or"
-            " quasistatic_shear"
+            f"{path} holds no run, expected a file of compress, slow_compress, shear, cyclic_shear,"
+            " quasistatic_shear or ladder"
         )
         raise FileFormatError(msg)
     return dataclasses.replace(plan, settings={})

@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jamshape.arguments import checked
-from jamshape.arrays import BoolArray, FloatArray
-from jamshape.checks import RANGES, NotReachedWarning, require_number
+from jamshape.arrays import BoolArray, FloatArray, IntArray
+from jamshape.checks import RANGES, NotReachedWarning, Range, require_in, require_number
 from jamshape.files.content import add_attributes
 from jamshape.files.disk import named, settled
 from jamshape.files.h5md import (
@@ -28,13 +28,23 @@ from jamshape.files.h5md import (
 )
 from jamshape.files.lock import Lock
 from jamshape.flow.cyclic_shear import QUARTERS
-from jamshape.flow.quasistatic import QuasistaticShear
+from jamshape.flow.quasistatic import QuasistaticShear, sheared
 from jamshape.front.packing import MeasuredPacking
 from jamshape.front.progress import follow, place
+from jamshape.landscape import Landscape, State
+from jamshape.measures.contact_changes import (
+    At,
+    ContactChange,
+    Search,
+    contact_changes,
+    numbers_of_changes,
+)
 from jamshape.measures.events import Event, stress_drops
 from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.steady import SteadyState, steady_state
+from jamshape.packing import Packing
+from jamshape.protocols.ladder import Ladder, lead
 from jamshape.recording.driver import Told
 
 if TYPE_CHECKING:
@@ -43,6 +53,9 @@ if TYPE_CHECKING:
 
 # Forces below this mean bond force have nothing to balance.
 _NO_ENERGY = RANGES["u0"].low
+
+_WITHIN = Range(1e-12, 1.0, "a relative distance")
+_PART_OF_WITHIN = 0.1  # accuracy of states that enclose a change
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +107,16 @@ class Recorded:
     def phi(self) -> FloatArray:
         """(T,) packing fractions."""
         return self["phi"]
+
+    def _changes(self, search: Search, values: FloatArray, first: int = 0) -> list[ContactChange]:
+        """Compare all frames from the first one on, which have these values of the control parameter."""
+        if search.within is not None:
+            require_in("within", search.within, _WITHIN)
+        return contact_changes(self._states(values, first), search)
+
+    def _states(self, values: FloatArray, first: int = 0) -> Iterator[At]:
+        """Read the frames from the first one on, which have these values."""
+        return (At(value, self.packing(first + k)) for k, value in enumerate(values.tolist()))
 
     @property
     def pressure(self) -> FloatArray:
@@ -387,6 +410,31 @@ class QuasistaticShearFile(Recorded):
         return self["stress"]
 
     @checked
+    def contact_changes(
+        self, *, within: float | None = None, step_back: bool = False
+    ) -> list[ContactChange]:
+        """List the contacts that opened and closed between frames, or more closely; see `LadderFile.contact_changes`.
+
+        The control parameter is the strain, and `within` relative to the larger strain of two frames. With `frames` of
+        at least the number of steps, a run keeps the state of each.
+
+        Parameters
+        ----------
+        within : float, optional
+            Largest distance between the two strains that enclose a change.
+        step_back : bool
+            Whether to find out if changes are reversible.
+        """
+        how = self._how
+
+        def lead(start: At, value: float) -> Packing:
+            at, landscape = start.packing, Landscape(start.packing)
+            return sheared(landscape, State.of(at), how, value - start.value).state.packing(at)
+
+        strains = np.array([self.packing(k).time for k in range(1, len(self))])
+        return self._changes(Search(lead, within, step_back=step_back), strains, first=1)
+
+    @checked
     def events(self, least: float = 1e-2) -> list[Event]:
         """List the stress drops.
 
@@ -435,6 +483,131 @@ class QuasistaticShearFile(Recorded):
         return f"<Quasistatic shear of {self._who()}: {steps} steps to {end}{self._where()}>"
 
 
+class LadderFile(Recorded):
+    """A packing led through values of a control parameter, in its H5MD file; parameters as in `Recorded`.
+
+    Row and frame 0 are of the start, and the others of one value each. Rows contain ``u``, ``phi``, ``pressure``, ``z``,
+    ``z_single``, ``rattlers``, ``contacts``, ``bonds`` and ``residual``.
+
+    Examples
+    --------
+    >>> import jamshape as js
+    >>> discs = js.Spherocylinders(alpha=0)
+    >>> packing = js.make_packing(discs, n=16, u0=1e-4, file="dense.h5", progress=False)
+    >>> run = js.ladder(packing, u0=[1e-5, 1e-6], file="ladder.h5", progress=False)
+    >>> run
+    <Ladder of 16 spherocylinders in 2D: 2 of 2 values to u0 = 1e-06, phi = 0.8..., z = ..., in ladder.h5>
+    >>> run.values.shape, len(run), bool((run.phi[1:] < run.phi[:-1]).all())
+    ((3,), 3, True)
+    >>> change = run.contact_changes()[0]
+    >>> change.change, change.before, change.after
+    ('opened', 0.0001, 1e-05)
+    """
+
+    @property
+    def parameter(self) -> str:
+        """Name of the control parameter, ``u0``."""
+        return str(self.about["ladder_parameter"])
+
+    @property
+    def values(self) -> FloatArray:
+        """(T,) values of the control parameter: that of the start, and those asked for."""
+        own = self[_OBSERVABLE_OF[self.parameter]]
+        return np.concatenate([own[:1], self["goal"][1:]])
+
+    @cached_property
+    def _numbers(self) -> IntArray:
+        return np.array(numbers_of_changes(self._states(self.values)))
+
+    @property
+    def opened(self) -> IntArray:
+        """(T,) number of contacts that opened on the way to each state from the one before."""
+        return np.asarray(self._numbers[:, 0])
+
+    @property
+    def closed(self) -> IntArray:
+        """(T,) number of contacts that closed on the way to each state from the one before."""
+        return np.asarray(self._numbers[:, 1])
+
+    @property
+    def reached(self) -> BoolArray:
+        """(T,) whether the value was reached; if not, the state is that of the row before."""
+        return self["reached"] > 0
+
+    @property
+    def at_rest(self) -> BoolArray:
+        """(T,) whether forces balance to the tolerance."""
+        return np.asarray(self["residual"] <= self.about["tolerance"])
+
+    def warn_unless_reached(self) -> None:
+        """Warn if a value was not reached, or forces do not balance there."""
+        wrong = ~(self.reached & self.at_rest)[1:]
+        if wrong.any():
+            values = ", ".join(f"{value:g}" for value in self.values[1:][wrong])
+            said = (
+                f"at {values} no minimum with balanced forces was found, expected one at each of {wrong.size} values;"
+                f" give {{{self.parameter}:name}} more values between, or another start"
+            )
+            warnings.warn(NotReachedWarning(said, {self.parameter: None}), stacklevel=3)
+
+    @checked
+    def contact_changes(
+        self, *, within: float | None = None, step_back: bool = False
+    ) -> list[ContactChange]:
+        """List the contacts that opened and closed from one state to the next.
+
+        Contacts of rattlers are included. Images of a pair are counted, not told apart.
+
+        Parameters
+        ----------
+        within : float, optional
+            Largest relative distance between the two values that enclose a change, such as 1e-6, reached by
+            bisection with minimisations; by default the values of the run enclose them.
+        step_back : bool
+            Whether to find out if changes are reversible: the packing is led back over each interval, and ``returns``
+            says whether it has the same contacts again and no particle moved by more than 1e-3 radii.
+
+        Returns
+        -------
+        list of ContactChange
+            ``before`` and ``after`` (values of the control parameter), ``ids`` of the particles, ``bond`` (2 for the
+            second bond of a side-to-side contact), ``change`` ("opened" or "closed") and ``returns``.
+
+        Raises
+        ------
+        TargetError
+            If no minimum is found between two states.
+
+        Examples
+        --------
+        >>> import jamshape as js
+        >>> discs = js.Spherocylinders(alpha=0)
+        >>> packing = js.make_packing(discs, n=16, u0=1e-4, file="dense.h5", progress=False)
+        >>> run = js.ladder(packing, u0=[1e-5], progress=False)
+        >>> changes = run.contact_changes(within=1e-3)
+        >>> all(0 < change.before / change.after - 1 <= 1e-3 for change in changes)
+        True
+        """
+        how = Ladder.of(self.about)
+        if within is not None:
+            how = replace(how, accuracy=min(how.accuracy, _PART_OF_WITHIN * within))
+
+        def to(start: At, value: float) -> Packing:
+            at, landscape = start.packing, Landscape(start.packing)
+            return lead(landscape, State.of(at), how.to(value)).state.packing(at)
+
+        return self._changes(Search(to, within, True, step_back), self.values)
+
+    def __repr__(self) -> str:
+        done, asked = int(self.about["ladder_done"]), np.size(self.about["ladder_values"])
+        end = f"{self.parameter} = {self.values[-1]:.3g}, phi = {self.phi[-1]:.6g}, z = {self['z'][-1]:.4g}"
+        return f"<Ladder of {self._who()}: {done} of {asked} values to {end}{self._where()}>"
+
+
+_OBSERVABLE_OF = {"u0": "u"}
+"""Observable of a control parameter."""
+
+
 def _brought_along(kind: type[Recorded], name: str, content: bytes) -> Recorded:
     """Restore a pickled run that had no file of its own."""
     at = place(None, name)
@@ -451,6 +624,7 @@ def run_file(path: Path, folder: Any = None) -> Recorded:
 
 _KINDS: dict[str, type[Recorded]] = {
     "gdot": ShearFile,
+    "ladder_parameter": LadderFile,
     "shear_steps": QuasistaticShearFile,
     "amplitude": CyclicShearFile,
 }
