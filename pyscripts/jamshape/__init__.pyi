@@ -9,6 +9,7 @@ from .front.laddering import ladder as ladder
 from .front.making import make_packing as make_packing
 from .front.modes import Modes as Modes
 from .front.modes import modes as modes
+from .front.movies import animate as animate
 from .front.packing import MeasuredPacking as MeasuredPacking
 from .front.pictures import plot as plot
 from .front.recorded import resume as resume

@@ -124,7 +124,8 @@ class Case:
         """Record, resume or load the run in a file."""
         given = dict(self.settings) | {"progress": False} | more
         if isinstance(self.particles, str):
-            given = {self.start: write_start(starts, self.particles)} | given
+            given = {"start": write_start(starts, self.particles)} | given
+            given[self.start] = given.pop("start")
             return getattr(js, self.function)(file=file, **given)
         return getattr(js, self.function)(self.particles, file=file, **given)
 
@@ -194,7 +195,7 @@ DRIVERS = {
     "ladder": Case(
         "ladder", "dimers", {"u0": (1e-4, 1e-5, 1e-6, 3e-6, 1e-5, 1e-4)},
         {"u0": (1e-4, 1e-5), "accuracy": 1e-6, "tolerance": 1e-9},
-        {"u0": tuple(float(u) for k in range(5000) for u in (1e-4, 1e-5))},
+        {"u0": tuple(float(u) for k in range(3000) for u in (1e-4, 1e-5))},
         "packing",
     ),
 }  # fmt: skip

@@ -16,6 +16,7 @@ from jamshape.packing import Packing
 from jamshape.protocols.ladder import Ladder, plan
 
 _ENERGY = RANGES["u0"]._replace(also=())
+_MOST = 7000  # values, which are an attribute of the file
 
 
 @checked
@@ -74,6 +75,9 @@ def ladder(
     require_stated(accuracy=accuracy, tolerance=tolerance)
     if not u0:
         said = "{u0:name} has no values, expected one energy density or more"
+        raise ArgumentError(said, {"u0": u0})
+    if len(u0) > _MOST:
+        said = f"{{u0:name}} has {len(u0)} values, expected at most {_MOST}; divide them over several runs"
         raise ArgumentError(said, {"u0": u0})
     for value in u0:
         require_in("u0", value, _ENERGY)

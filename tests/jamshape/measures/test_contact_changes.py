@@ -143,6 +143,7 @@ def test_wrong_values_are_refused(run, start):
     for values, words in (
         ([], "u0 has no values"),
         ([0.0], "u0 is 0.0"),
+        ([1e-6] * 7001, "u0 has 7001 values, expected at most 7000"),
         ([1e-6, -1.0], "u0 is -1.0"),
         ([1e-6, 1e-2], "u0 is 0.01, whose overlaps"),
     ):
