@@ -47,9 +47,7 @@ def options_of() -> ArgumentParser:
     parser.add_argument(
         "files", type=Path, nargs="+", metavar="FILE", help="H5MD, dumps, data files"
     )
-    parser.add_argument(
-        "--frame", type=int, help="frame; negative counts from the end (-1)"
-    )
+    parser.add_argument("--frame", type=int, help="frame; negative counts from the end (-1)")
     parser.add_argument("--every", type=int, help="show every n-th frame in a movie (1)")
     parser.add_argument("--fps", type=float, help="frames per second of a movie (10)")
     parser.add_argument(

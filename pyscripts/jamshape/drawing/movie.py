@@ -17,6 +17,7 @@ from jamshape.contacts import Contacts
 from jamshape.drawing import plane, space
 from jamshape.drawing.colors import ORDER, Scale, order_of
 from jamshape.drawing.packing import MANY, Look, colorings, shown_at
+from jamshape.drawing.styles import CONTACT
 from jamshape.files.disk import replacing
 
 if TYPE_CHECKING:
@@ -60,7 +61,9 @@ def require_movie(path: Path) -> str:
     given = {"file": path}
     if name is None:
         ends = ", ".join(MOVIES)
-        said = f"{{file}} has the suffix {path.suffix!r}, expected one of {ends}; choose one of them"
+        said = (
+            f"{{file}} has the suffix {path.suffix!r}, expected one of {ends}; choose one of them"
+        )
         raise ArgumentError(said, given)
     if not animation.writers.is_available(name):
         said = "{file} needs ffmpeg, which is not installed; install it, or choose a name that ends in .gif"
@@ -116,7 +119,8 @@ class Movie:
         """
         from matplotlib.animation import writers  # noqa: PLC0415 - slow
 
-        writer: Any = writers[require_movie(path)](fps=self._fps)
+        kind: Any = writers[require_movie(path)]
+        writer = kind(fps=self._fps)
         with replacing(path) as temporary, TemporaryDirectory() as folder:
             made = Path(folder) / f"movie{path.suffix.lower()}"  # writers look at the suffix
             try:
@@ -127,7 +131,8 @@ class Movie:
             shutil.copyfile(made, temporary)
 
     def _repr_html_(self) -> str:
-        return str(self._animation().to_jshtml(fps=self._fps))
+        animation: Any = self._animation()
+        return str(animation.to_jshtml(fps=self._fps))
 
     def _animation(self) -> FuncAnimation:
         from matplotlib.animation import FuncAnimation  # noqa: PLC0415 - slow
@@ -184,7 +189,10 @@ def _figure(view: _View, *, with_bar: bool) -> tuple[Figure, Any]:
     figure = Figure(figsize=tuple(even), dpi=_DPI, layout=None if not with_bar else "constrained")
     share = 1 - _TITLE / even[1]
     axes = figure.add_subplot() if with_bar else figure.add_axes((0, 0, 1, share))
-    limits: dict[str, Any] = {"xlim": (view.low[0], view.high[0]), "ylim": (view.low[1], view.high[1])}
+    limits: dict[str, Any] = {
+        "xlim": (view.low[0], view.high[0]),
+        "ylim": (view.low[1], view.high[1]),
+    }
     axes.set(**limits, aspect="equal")
     axes.set_axis_off()
     return figure, axes
@@ -199,9 +207,9 @@ class _Plane:
         del look
         shown = shown_at(axes, first.found)
         self._dot = shown.dot
-        self._bodies = PolyCollection([], edgecolors="k", lw=shown.line)
+        self._bodies: Any = PolyCollection([], edgecolors="k", lw=shown.line)
         self._spines = LineCollection([], colors="k", lw=1.5 * shown.line)
-        self._points = PolyCollection([], facecolors=plane.CONTACT, lw=0)
+        self._points = PolyCollection([], facecolors=CONTACT, lw=0)
         for part in (self._bodies, self._spines, self._points):
             axes.add_collection(part, autolim=False)
         (self._box,) = axes.plot([], [], color="0.2", lw=1.2, ls="--")
@@ -230,7 +238,7 @@ class _Space:
         self._view = space.view(look.height, look.turn)
         self._level = look.level or (2 if first.found.packing.n < MANY else 1)
         self._back = LineCollection([], colors="0.45", lw=0.8, zorder=1)
-        self._bodies = PolyCollection([], lw=0, antialiaseds=False, zorder=2)
+        self._bodies: Any = PolyCollection([], lw=0, antialiaseds=False, zorder=2)
         self._front = LineCollection([], colors="0.15", lw=0.9, zorder=3)
         for part in (self._back, self._bodies, self._front):
             axes.add_collection(part, autolim=False)

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jamshape.arguments import ArgumentTypeError, checked
-from jamshape.checks import ArgumentError, Range, require_in, require_no_effect, require_one_of, said
+from jamshape.checks import (
+    ArgumentError,
+    Range,
+    require_in,
+    require_no_effect,
+    require_one_of,
+    said,
+)
 from jamshape.contacts import Contacts
 from jamshape.drawing.colors import CHOICES
 from jamshape.drawing.movie import Movie, Shot, require_movie
@@ -105,7 +112,7 @@ def animate(
         require_movie(Path(file))  # before any work
     require_in("fps", fps, _FPS)
     require_one_of("color", color or "kind", CHOICES)
-    shots: Sequence[Shot]
+    shots: Any
     if isinstance(thing, Modes):
         require_no_effect("mode", mode, every=every)
         shots = _swinging(thing, mode, amplitude)
@@ -143,7 +150,9 @@ class _Frames:
 
     def __getitem__(self, k: int) -> Shot:
         row = self._rows[k]
-        packing = self._thing.packing(row) if isinstance(self._thing, Recorded) else self._thing[row]
+        packing = (
+            self._thing.packing(row) if isinstance(self._thing, Recorded) else self._thing[row]
+        )
         if not isinstance(packing, Packing):
             msg = f"{said(packing)} was given, expected a packing in each frame"
             raise ArgumentTypeError(msg)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from jamshape.arguments import checked
@@ -367,12 +368,9 @@ def quasistatic_shear(
     require_given(strain_end=None if strain is None else abs(strain), amplitude=amplitude, cycles=cycles)  # fmt: skip
     asked = Asked(n, phi, seed, dimension)
     of = Start.of(particles, asked, start, usual_phi=0.9, phi_name=_PHI_NAME)
-    end = 0.5 if strain is None else strain
+    how = QuasistaticShear(step, 0.5 if strain is None else strain, flow, pressure, tolerance)
     if amplitude is not None:
-        cyclic = {"amplitude": amplitude, "cycles": 1 if cycles is None else cycles}
-    else:
-        cyclic = {}
-    how = QuasistaticShear(step, end, flow, pressure, tolerance, **cyclic)
+        how = replace(how, amplitude=amplitude, cycles=1 if cycles is None else cycles)
     at = place(file, "aqs.h5")
     plan = quasistatic_driver.plan(lambda: _still(of), how, frames, of.made_from)
     recorded(at.path, plan, again=again, seconds=seconds, progress=progress)

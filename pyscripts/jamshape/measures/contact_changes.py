@@ -149,7 +149,9 @@ def _enclosing(low: At, high: At, search: Search, scale: float) -> Iterator[tupl
 def _changes(low: At, high: At) -> list[ContactChange]:
     """Compare two states."""
     return [
-        ContactChange(low.value, high.value, (i, j), k, OPENED if (i, j, k) in low.bonds else CLOSED)
+        ContactChange(
+            low.value, high.value, (i, j), k, OPENED if (i, j, k) in low.bonds else CLOSED
+        )
         for i, j, k in sorted(low.bonds ^ high.bonds)
     ]
 

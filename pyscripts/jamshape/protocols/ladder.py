@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -159,9 +159,12 @@ class LadderDriver:
     at_mark = True
 
     def __init__(self, first: Packing, how: Ladder, checkpoint: Checkpoint | None = None) -> None:
-        told = checkpoint or {"state": State.of(first), "n_done": 0, "evaluations": 0}
+        told: dict[str, Any] = dict(
+            checkpoint or {"state": State.of(first), "n_done": 0, "evaluations": 0}
+        )
         self._first, self._how, self._landscape = first, how, Landscape(first)
-        self._state, self._n_done = told["state"], told["n_done"]
+        self._state: State = told["state"]
+        self._n_done: int = told["n_done"]
         self._evaluations = told["evaluations"]
 
     @property

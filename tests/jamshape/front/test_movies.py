@@ -145,7 +145,10 @@ def test_what_is_wrong_is_said(run, packing, tmp_path, monkeypatch):
         (lambda: js.animate(run, fps=0), "fps is 0, expected"),
         (lambda: js.animate(run, color="S9"), "color is 'S9'|expected one of kind"),
         (lambda: js.animate(modes), "mode is missing, expected the number of a mode"),
-        (lambda: js.animate(modes, 48), "mode is 48, expected a whole number of a mode from -48 to 47|expected"),
+        (
+            lambda: js.animate(modes, 48),
+            "mode is 48, expected a whole number of a mode from -48 to 47|expected",
+        ),
         (lambda: js.animate(modes, 4, every=2), "every=2 has no effect with mode=4"),
         (lambda: js.animate(js.load(tmp_path / "modes.h5"), 4), "modes were read from a file"),
         (lambda: js.animate([]), "no packings were given"),

@@ -45,7 +45,7 @@ def pair(gap, image=0):
 def test_a_contact_is_found_where_it_opens():
     """Of two discs that are moved apart, at the gap 0, whatever their images; it returns."""
 
-    def lead(start, value):
+    def lead(_, value):
         return pair(value, image=1)
 
     states = [At(-0.011, pair(-0.011)), At(0.03, pair(0.03))]
@@ -65,7 +65,9 @@ def test_a_packing_that_does_not_return_is_told(start):
     shift = np.zeros_like(moved.position)
     shift[0, 0] = 0.3 * start.inner_radius.min()
     other = replace(moved, position=moved.position + shift).packing(start)
-    changes = contact_changes([At(1.0, start), At(2.0, other)], Search(lambda *_: other, step_back=True))
+    changes = contact_changes(
+        [At(1.0, start), At(2.0, other)], Search(lambda *_: other, step_back=True)
+    )
     assert changes
     assert not any(change.returns for change in changes)
 
@@ -132,7 +134,9 @@ def test_values_that_are_not_reached_are_told_and_passed(start, monkeypatch, tmp
         return lead(landscape, state, goal)
 
     monkeypatch.setattr(ladder, "lead", fails_once)
-    with pytest.warns(NotReachedWarning, match="at 1e-06 no minimum with balanced forces was found"):
+    with pytest.warns(
+        NotReachedWarning, match="at 1e-06 no minimum with balanced forces was found"
+    ):
         run = js.ladder(start, u0=(1e-5, 1e-6, 1e-7), file=tmp_path / "l.h5", progress=False)
     assert run.reached.tolist() == [True, True, False, True]
     assert run["u"][2] == run["u"][1]
@@ -149,7 +153,7 @@ def test_wrong_values_are_refused(run, start):
     ):
         with pytest.raises(ValueError, match=words):
             js.ladder(start, u0=values, progress=False)
-    with pytest.raises(ValueError, match="within is 0.0, expected a relative distance"):
+    with pytest.raises(ValueError, match=r"within is 0\.0, expected a relative distance"):
         run.contact_changes(within=0.0)
     with pytest.raises(ValueError, match="expected"):
         js.ladder(start, u0=[1e-6], file=run.file, progress=False)
