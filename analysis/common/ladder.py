@@ -1,4 +1,4 @@
-"""One packing at several energies, a file each, led from one to the next (`protocols.ladder`), up and down from its own.
+"""One packing at several energies, a file each, brought from one to the next (`protocols.ladder`), up and down from its own.
 
 If particles rearrange on the way, each rung reports the fraction of the original contacts.
 """
@@ -19,7 +19,7 @@ from jamshape.landscape import Landscape, State
 from jamshape.measures.packing_summary import write_minimum
 from jamshape.minima.target import Target, TargetError
 from jamshape.packing import Packing
-from jamshape.protocols.ladder import lead
+from jamshape.protocols.ladder import bring
 from jamshape.protocols.make import is_done
 from jamshape.shapes.shape import in_name
 
@@ -103,7 +103,7 @@ def _step(source: Path, stored: dict[str, Any], last: Path, folder: Path, goal: 
     began, start = time.perf_counter(), read_packing(last)
     landscape = Landscape(start)
     try:
-        minimum = lead(landscape, State.of(start), goal)
+        minimum = bring(landscape, State.of(start), goal)
     except TargetError as error:
         return Rung(out, goal.u0, made=False, failure=str(error))
     shared = _shared(read_packing(source), minimum.state.packing(start))

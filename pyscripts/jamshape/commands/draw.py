@@ -30,7 +30,6 @@ from jamshape.files.lammps_text import iter_dump
 from jamshape.files.meaning import Wanted
 from jamshape.files.signature import DUMP, format_of
 from jamshape.front.files import load
-from jamshape.front.modes import Modes
 from jamshape.front.movies import animate
 from jamshape.packing import Packing
 from jamshape.shapes.command_line import add_meaning_options
@@ -95,9 +94,6 @@ def _movie(options: Namespace) -> None:
     else:
         found = load(path, dimension=options.dimension, shape=options.shape)
         frames = [found] if isinstance(found, Packing) else found
-    if isinstance(frames, Modes):
-        msg = f"{path} holds modes, expected a run or packings; use jamshape.animate(jamshape.modes(packing), 7, name)"
-        raise ValueError(msg)
     animate(frames, options.out, color=options.color, **typed(options, "fps", "every"))
     report({"out": options.out, "frames": len(range(0, len(frames), options.every or 1))})
 

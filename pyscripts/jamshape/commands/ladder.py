@@ -1,4 +1,4 @@
-"""Lead a packing of any shape through energies, each state from the one before, and list the contacts that change.
+"""Take a packing of any shape through energies, each state from the one before, and list the contacts that change.
 
     jamshape ladder packing.h5 --u0 1e-6 1e-8 1e-10 --out ladder.h5
 
@@ -31,7 +31,7 @@ def options_of() -> ArgumentParser:
     parser = parser_for(ladder, __doc__)
     within = "list each change between two energies whose relative distance is at most this, by bisection"
     parser.add_argument("--within", type=float, help=within)
-    back = "lead the packing back over each change, to see if it returns"
+    back = "take the packing back over each change, to see if it returns"
     parser.add_argument("--step-back", action="store_true", help=back)
     parser.add_argument("--plot", type=Path, help="figure of z and of the changes against u0")
     return parser

@@ -31,7 +31,7 @@ def ladder(
     seconds: float | None = None,
     progress: bool = True,
 ) -> LadderFile:
-    """Lead a packing through energies, up or down; keep each state, and find which contacts open and close.
+    """Take a packing through energies, up or down; keep each state, and find which contacts open and close.
 
     Parameters
     ----------

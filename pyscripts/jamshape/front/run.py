@@ -44,7 +44,7 @@ from jamshape.measures.jamming import Jamming, Tried, minimised_frames
 from jamshape.measures.onset import OnsetFit, fit_onset
 from jamshape.measures.steady import SteadyState, steady_state
 from jamshape.packing import Packing
-from jamshape.protocols.ladder import Ladder, lead
+from jamshape.protocols.ladder import Ladder, bring
 from jamshape.recording.driver import Told
 
 if TYPE_CHECKING:
@@ -427,12 +427,12 @@ class QuasistaticShearFile(Recorded):
         """
         how = self._how
 
-        def lead(start: At, value: float) -> Packing:
+        def bring(start: At, value: float) -> Packing:
             at, landscape = start.packing, Landscape(start.packing)
             return sheared(landscape, State.of(at), how, value - start.value).state.packing(at)
 
         strains = np.array([self.packing(k).time for k in range(1, len(self))])
-        return self._changes(Search(lead, within, step_back=step_back), strains, first=1)
+        return self._changes(Search(bring, within, step_back=step_back), strains, first=1)
 
     @checked
     def events(self, least: float = 1e-2) -> list[Event]:
@@ -484,7 +484,7 @@ class QuasistaticShearFile(Recorded):
 
 
 class LadderFile(Recorded):
-    """A packing led through values of a control parameter, in its H5MD file; parameters as in `Recorded`.
+    """A packing taken through values of a control parameter, in its H5MD file; parameters as in `Recorded`.
 
     Row and frame 0 are of the start, and the others of one value each. Rows contain ``u``, ``phi``, ``pressure``, ``z``,
     ``z_single``, ``rattlers``, ``contacts``, ``bonds`` and ``residual``.
@@ -564,7 +564,7 @@ class LadderFile(Recorded):
             Largest relative distance between the two values that enclose a change, such as 1e-6, reached by
             bisection with minimisations; by default the values of the run enclose them.
         step_back : bool
-            Whether to find out if changes are reversible: the packing is led back over each interval, and ``returns``
+            Whether to find out if changes are reversible: the packing is taken back over each interval, and ``returns``
             says whether it has the same contacts again and no particle moved by more than 1e-3 radii.
 
         Returns
@@ -594,7 +594,7 @@ class LadderFile(Recorded):
 
         def to(start: At, value: float) -> Packing:
             at, landscape = start.packing, Landscape(start.packing)
-            return lead(landscape, State.of(at), how.to(value)).state.packing(at)
+            return bring(landscape, State.of(at), how.to(value)).state.packing(at)
 
         return self._changes(Search(to, within, True, step_back), self.values)
 

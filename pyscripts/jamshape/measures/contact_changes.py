@@ -1,4 +1,4 @@
-"""Contacts that open and close as a packing is led through values of a control parameter, such as energy or strain.
+"""Contacts that open and close as a packing is taken through values of a control parameter, such as energy or strain.
 
 States are minima at some values; between two of them an event is located by bisection, with further minimisations.
 """
@@ -41,7 +41,7 @@ class ContactChange(NamedTuple):
     change: str
     """"opened" or "closed"."""
     returns: bool | None = None
-    """Whether the packing returns to its state when it is led back over this interval; None unless asked."""
+    """Whether the packing returns to its state when it is taken back over this interval; None unless asked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +67,12 @@ class At:
 
 @dataclass(frozen=True)
 class Search:
-    """How to lead a packing to other values, and how closely to enclose changes.
+    """Way to other values, and distance within which to enclose changes.
 
     Parameters
     ----------
-    lead
-        Leads a state to a value: the minimum there.
+    bring
+        Function of a state and a value that returns the minimum there.
     within
         Largest distance between the two values that enclose a change, relative to them; none by default, for the
         states that there are.
@@ -82,14 +82,14 @@ class Search:
         Whether to find out if changes are reversible.
     """
 
-    lead: Callable[[At, float], Packing]
+    bring: Callable[[At, float], Packing]
     within: float | None = None
     is_logarithmic: bool = False
     step_back: bool = False
 
     def to(self, start: At, value: float) -> At:
-        """Lead a state to a value."""
-        return At(value, self.lead(start, value))
+        """Bring a state to a value."""
+        return At(value, self.bring(start, value))
 
     def between(self, low: At, high: At) -> float:
         """Return the value in the middle of two."""
@@ -163,7 +163,7 @@ def numbers_of_changes(states: Iterable[At]) -> list[tuple[int, int]]:
 
 
 def _returns(start: At, back: At) -> bool:
-    """Whether a state that was led back has the contacts and the places of the one from which it came."""
+    """Whether a state that was taken back has the contacts and the places of the one from which it came."""
     if start.bonds != back.bonds:
         return False
     held = ~find_rattlers(start.packing, find_contacts(start.packing))

@@ -1,4 +1,4 @@
-"""One packing led through values of a control parameter, such as the energy: each state begins from the one before.
+"""One packing taken through values of a control parameter, such as the energy: each state begins from the one before.
 
 Steps in sqrt(u) are small enough for the particles to follow (`target.extrapolation`). Independent of shape and
 dimension; needs no LAMMPS.
@@ -30,8 +30,8 @@ PARAMETERS = ("u0",)
 """Control parameters of a ladder."""
 
 
-def lead(landscape: Landscape, state: State, goal: Target) -> Minimum:
-    """Lead a packing to another energy density, at equal particles.
+def bring(landscape: Landscape, state: State, goal: Target) -> Minimum:
+    """Bring a packing to another energy density, at equal particles.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class Ladder:
         return Target(value, self.accuracy, self.tolerance)
 
     def require_reachable(self, landscape: Landscape) -> None:
-        """Refuse values out of reach, before any is led to.
+        """Refuse values out of reach, before any is tried.
 
         Raises
         ------
@@ -133,7 +133,7 @@ def plan(start: Callable[[], Packing], how: Ladder, made_from: Mapping[str, Any]
 
     def begin() -> LadderDriver:
         packing = start()
-        none = np.zeros_like(packing.image)  # images are of no use where particles are only led
+        none = np.zeros_like(packing.image)  # images are of no use where nothing is followed
         return LadderDriver(packing.with_(step=0, time=0.0, image=none), how)
 
     def restore(first: Packing, checkpoint: Checkpoint) -> LadderDriver:
@@ -177,13 +177,13 @@ class LadderDriver:
         return self._row(math.nan, "start", 0.0, reached=True)
 
     def advance(self) -> Row:
-        """Lead the packing to the next value."""
+        """Bring the packing to the next value."""
         began, before = time.perf_counter(), self._landscape.evaluations
         value = self._how.values[self._n_done]
         # The continuation depends on the state alone, also after reading it from a file.
         self._landscape.forget_pairs()
         try:
-            found = lead(self._landscape, self._state, self._how.to(value))
+            found = bring(self._landscape, self._state, self._how.to(value))
         except TargetError:
             found = None
         if found is not None:

@@ -45,17 +45,17 @@ def pair(gap, image=0):
 def test_a_contact_is_found_where_it_opens():
     """Of two discs that are moved apart, at the gap 0, whatever their images; it returns."""
 
-    def lead(_, value):
+    def bring(_, value):
         return pair(value, image=1)
 
     states = [At(-0.011, pair(-0.011)), At(0.03, pair(0.03))]
-    (wide,) = contact_changes(states, Search(lead))
+    (wide,) = contact_changes(states, Search(bring))
     assert wide == (-0.011, 0.03, (1, 2), 1, "opened", None)
-    (close,) = contact_changes(states, Search(lead, within=1e-9, step_back=True))
+    (close,) = contact_changes(states, Search(bring, within=1e-9, step_back=True))
     assert close.before < 0 <= close.after
     assert close.after - close.before <= 1e-9 * 0.03
     assert close.returns
-    (back,) = contact_changes(states[::-1], Search(lead, within=1e-9))
+    (back,) = contact_changes(states[::-1], Search(bring, within=1e-9))
     assert back.change == "closed"
     assert back.after < 0 <= back.before
 
@@ -125,15 +125,15 @@ def test_values_that_are_not_reached_are_told_and_passed(start, monkeypatch, tmp
     from jamshape.minima.target import TargetError  # noqa: PLC0415
     from jamshape.protocols import ladder  # noqa: PLC0415
 
-    lead = ladder.lead
+    bring = ladder.bring
 
     def fails_once(landscape, state, goal):
         if goal.u0 == 1e-6:
             msg = "no minimum"
             raise TargetError(msg)
-        return lead(landscape, state, goal)
+        return bring(landscape, state, goal)
 
-    monkeypatch.setattr(ladder, "lead", fails_once)
+    monkeypatch.setattr(ladder, "bring", fails_once)
     with pytest.warns(
         NotReachedWarning, match="at 1e-06 no minimum with balanced forces was found"
     ):
