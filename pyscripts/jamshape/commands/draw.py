@@ -64,7 +64,7 @@ def options_of() -> ArgumentParser:
         "refinement of meshes in space, 1 to 4; each makes four triangles of one (3, or 2 for many)"
     )
     parser.add_argument("--level", type=int, choices=range(1, 5), help=finer)
-    parser.add_argument("--dpi", type=int, help=f"dots per inch ({_PIXELS})")
+    parser.add_argument("--dpi", type=int, help=f"dots per inch ({_PIXELS}, of a movie 100)")
     add_meaning_options(parser)
     return parser
 
@@ -82,7 +82,7 @@ def _look(options: Namespace, *, in_space: bool) -> Look:
 
 def _movie(options: Namespace) -> None:
     """Make a movie of a file, and report."""
-    _require_none(options, "frame", "sides", "dpi", "height", "turn", "level")
+    _require_none(options, "frame", "sides", "height", "turn", "level")
     if len(options.files) > 1:
         msg = f"{len(options.files)} files were given for a movie, expected one"
         raise ValueError(msg)
@@ -94,7 +94,7 @@ def _movie(options: Namespace) -> None:
     else:
         found = load(path, dimension=options.dimension, shape=options.shape)
         frames = [found] if isinstance(found, Packing) else found
-    animate(frames, options.out, color=options.color, **typed(options, "fps", "every"))
+    animate(frames, options.out, color=options.color, **typed(options, "fps", "every", "dpi"))
     report({"out": options.out, "frames": len(range(0, len(frames), options.every or 1))})
 
 

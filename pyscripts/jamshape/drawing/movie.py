@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 _INCHES = 4.8  # longer edge of the view
 _TITLE = 0.6  # height of the title
 _BAR = 0.9  # width of a colour bar
-_DPI = 100  # even numbers of pixels, which video formats require
 _CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
 
 FFMPEG, PILLOW = "ffmpeg", "pillow"
@@ -81,12 +80,14 @@ class Movie:
     look : Look
     fps : float
         Frames per second.
+    dpi : int
+        Dots per inch, of a view 4.8 inches long.
     """
 
-    def __init__(self, shots: Sequence[Shot], look: Look, fps: float) -> None:
+    def __init__(self, shots: Sequence[Shot], look: Look, fps: float, dpi: int) -> None:
         self._shots, self._fps = shots, fps
         view, self._scale = _first_look(shots, look)
-        self._figure, axes = _figure(view, with_bar=self._scale is not None)
+        self._figure, axes = _figure(view, dpi, with_bar=self._scale is not None)
         kind = _Plane if shots[0].found.packing.dimension == 2 else _Space
         self._scene = kind(axes, shots[0], look)
         if self._scale:
@@ -124,7 +125,7 @@ class Movie:
         with replacing(path) as temporary, TemporaryDirectory() as folder:
             made = Path(folder) / f"movie{path.suffix.lower()}"  # writers look at the suffix
             try:
-                self._animation().save(made, writer, dpi=_DPI)
+                self._animation().save(made, writer, dpi=self._figure.dpi)
             except CalledProcessError as error:
                 msg = f"ffmpeg did not write {path}, expected one that encodes H.264; choose a name that ends in .gif"
                 raise RuntimeError(msg) from error
@@ -179,14 +180,14 @@ def _bounds(packing: Any, look: Look) -> tuple[FloatArray, FloatArray]:
     return corners.min(axis=0) - pad, corners.max(axis=0) + pad
 
 
-def _figure(view: _View, *, with_bar: bool) -> tuple[Figure, Any]:
+def _figure(view: _View, dpi: int, *, with_bar: bool) -> tuple[Figure, Any]:
     """Make a figure with the proportions of a view."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - not needed where nothing is drawn
 
     edges = view.high - view.low
     inches = _INCHES * edges / edges.max() + [_BAR * with_bar, _TITLE]
-    even = 2 * np.ceil(inches * _DPI / 2) / _DPI
-    figure = Figure(figsize=tuple(even), dpi=_DPI, layout=None if not with_bar else "constrained")
+    even = 2 * np.ceil(inches * dpi / 2) / dpi  # numbers of pixels, which video formats require
+    figure = Figure(figsize=tuple(even), dpi=dpi, layout=None if not with_bar else "constrained")
     share = 1 - _TITLE / even[1]
     axes = figure.add_subplot() if with_bar else figure.add_axes((0, 0, 1, share))
     limits: dict[str, Any] = {

@@ -17,6 +17,7 @@ from jamshape.checks import (
     require_in,
     require_no_effect,
     require_one_of,
+    require_stated,
     said,
 )
 from jamshape.contacts import Contacts
@@ -54,6 +55,7 @@ def animate(
     file: str | Path | None = None,
     *,
     fps: float = 10.0,
+    dpi: int = 100,
     every: int | None = None,
     color: str | None = None,
     amplitude: float | None = None,
@@ -73,6 +75,8 @@ def animate(
         Movie to write: ``.gif`` by Pillow, or ``.mp4``, ``.m4v``, ``.mkv`` and ``.mov`` by ffmpeg.
     fps : float
         Frames per second.
+    dpi : int
+        Dots per inch; the longer edge of the view is 4.8 inches.
     every : int, optional
         Show every n-th frame; all by default.
     color : {"kind", "orientation", "one", "S2", "S4", "C4"}, optional
@@ -111,6 +115,7 @@ def animate(
     if file is not None:
         require_movie(Path(file))  # before any work
     require_in("fps", fps, _FPS)
+    require_stated(dpi=dpi)
     require_one_of("color", color or "kind", CHOICES)
     shots: Any
     if isinstance(thing, Modes):
@@ -122,7 +127,7 @@ def animate(
                 text = f"{{{name}}} has no effect on a {type(thing).__name__}, expected modes; leave it out"
                 raise ArgumentError(text, {name: value})
         shots = _Frames(thing, 1 if every is None else every)
-    movie = Movie(shots, Look(color or "kind"), fps)
+    movie = Movie(shots, Look(color or "kind"), fps, dpi)
     if file is None:
         return movie
     movie.save(Path(file))
