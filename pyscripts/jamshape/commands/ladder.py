@@ -15,6 +15,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
+from jamshape.arrays import IntArray
 from jamshape.checks import require_other_file
 from jamshape.command import report
 from jamshape.commands.signatures import called, parser_for
@@ -44,8 +45,9 @@ def main(options: Namespace) -> None:
     run = called(ladder, options)
     if options.plot:
         _save_plot(run, options.plot)
-    found: dict[str, Any] = {"opened": run.opened.sum(), "closed": run.closed.sum()}
-    found["states"] = [_state(run, k) for k in range(len(run))]
+    changed = {"opened": run.opened, "closed": run.closed}
+    found: dict[str, Any] = {name: values.sum() for name, values in changed.items()}
+    found["states"] = [_state(run, changed, k) for k in range(len(run))]
     if options.within is not None or options.step_back:
         changes = run.contact_changes(within=options.within, step_back=options.step_back)
         if options.step_back:
@@ -54,11 +56,11 @@ def main(options: Namespace) -> None:
     report({"out": options.out, **found})
 
 
-def _state(run: LadderFile, k: int) -> dict[str, Any]:
+def _state(run: LadderFile, changed: dict[str, IntArray], k: int) -> dict[str, Any]:
     """Describe a state, and the changes on the way to it."""
     found = {run.parameter: run.values[k], "reached": run.reached[k]}
     found |= {name: run[name][k] for name in _STATE}
-    return found | {"opened": run.opened[k], "closed": run.closed[k]}
+    return found | {name: values[k] for name, values in changed.items()}
 
 
 def _save_plot(run: LadderFile, path: Path) -> None:

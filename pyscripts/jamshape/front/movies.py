@@ -104,7 +104,7 @@ def animate(
     >>> rods = js.Spherocylinders(alpha=1)
     >>> packing = js.make_packing(rods, n=16, u0=1e-8, file="packing.h5", progress=False)
     >>> js.animate(js.modes(packing), 7, "mode.gif")
-    >>> run = js.quasistatic_shear(start=packing, step=5e-3, strain=0.05, frames=5, file="aqs.h5", progress=False)
+    >>> run = js.quasistatic_shear(start=packing, step=5e-3, strain=0.05, frames=5, file="movie.h5", progress=False)
     >>> js.animate(run, "shear.gif", every=2)
     """
     if isinstance(mode, str | Path):
@@ -143,7 +143,7 @@ class _Frames:
             try:
                 thing = list(thing)
             except TypeError:
-                msg = f"{said(thing)} was given, expected a run, modes or packings in a row"
+                msg = f"thing is {said(thing)}, expected a run, modes or packings in a row"
                 raise ArgumentTypeError(msg) from None
         self._thing, self._rows = thing, range(0, len(thing), every)
         if not self._rows:
@@ -159,7 +159,7 @@ class _Frames:
             self._thing.packing(row) if isinstance(self._thing, Recorded) else self._thing[row]
         )
         if not isinstance(packing, Packing):
-            msg = f"{said(packing)} was given, expected a packing in each frame"
+            msg = f"thing has {said(packing)} in it, expected a packing in each frame"
             raise ArgumentTypeError(msg)
         where = next((of for kind, of in _WHERE.items() if isinstance(self._thing, kind)), _where)
         phi = rf"$\phi={packing.phi:.5f}$"

@@ -17,6 +17,7 @@ import numpy as np
 
 from jamshape.contacts import find_contacts, find_rattlers
 from jamshape.packing import Packing
+from jamshape.records import Record
 
 OPENED, CLOSED = "opened", "closed"
 
@@ -45,7 +46,7 @@ class ContactChange(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class At:
+class At(Record):
     """A state at a value of the control parameter."""
 
     value: float

@@ -93,6 +93,7 @@ def made(folder):
         "ShearFile": sheared(),
         "CyclicShearFile": cyclic(),
         "QuasistaticShearFile": quasistatic(),
+        "LadderFile": js.ladder(packing, u0=[1e-7], progress=False),
         "Event": quasistatic().events(),
         "Interaction": js.Interaction(2.0, 1),
         "NotReachedWarning": js.NotReachedWarning("try {strict}", {"strict": True}),
@@ -106,7 +107,7 @@ def objects(tmp_path_factory):
 
 NAMES = """Box|Packing|MeasuredPacking|its copy|Kind|Particles|Particles mixed|Particles given|Modes|Modes of a file
 ModeTable|DynamicalMatrix|Moduli|Contacts|ContactNetwork|State|Landscape|Recipe|RunFile|RunFile of a file|OnsetFit
-Jamming|ShearFile|CyclicShearFile|QuasistaticShearFile|Event|Interaction|NotReachedWarning""".replace(
+Jamming|ShearFile|CyclicShearFile|QuasistaticShearFile|LadderFile|Event|Interaction|NotReachedWarning""".replace(
     "\n", "|"
 ).split("|")
 NAMES += [f"shape {name}" for name in SHAPES]
