@@ -17,18 +17,21 @@ from jamshape.flow.cyclic_shear import CyclicShear
 from jamshape.flow.motion import Motion
 from jamshape.flow.quasistatic import QuasistaticShear
 from jamshape.flow.shear import Shear
+from jamshape.front.ensemble_file import EnsembleFile
 from jamshape.front.progress import display
 from jamshape.front.run import (
     CyclicShearFile,
-    EnsembleFile,
+    LadderFile,
     QuasistaticShearFile,
     Recorded,
     RunFile,
     ShearFile,
 )
 from jamshape.packing import Packing
+from jamshape.protocols import ladder
 from jamshape.protocols.approach import FOR_A_PACKING
 from jamshape.protocols.ensemble import ENSEMBLE
+from jamshape.protocols.ladder import Ladder
 from jamshape.protocols.make import MAKING
 from jamshape.recording.driver import KIND, Plan
 from jamshape.recording.recorder import How, record
@@ -59,13 +62,13 @@ def resume(file: str | Path, *, seconds: float | None = None, progress: bool = T
     Parameters
     ----------
     file : path
-        File of `compress`, `slow_compress`, `shear`, `cyclic_shear` or `quasistatic_shear`.
+        File of `compress`, `slow_compress`, `shear`, `cyclic_shear`, `quasistatic_shear` or `ladder`.
     seconds, progress
         See `compress`.
 
     Returns
     -------
-    RunFile, ShearFile, CyclicShearFile or QuasistaticShearFile
+    RunFile, ShearFile, CyclicShearFile, QuasistaticShearFile or LadderFile
 
     Raises
     ------
@@ -113,8 +116,8 @@ def kind_of(path: Path) -> Kind:
     if kind := KINDS.get(str(read_attributes(path).get(KIND))):
         return kind
     msg = (
-        f"{path} holds no run, expected a file of compress, slow_compress, shear, cyclic_shear or"
-        " quasistatic_shear"
+        f"{path} holds no run, expected a file of compress, slow_compress, shear, cyclic_shear,"
+        " quasistatic_shear or ladder"
     )
     raise FileFormatError(msg)
 
@@ -137,8 +140,12 @@ def _plan_implicit(stored: Mapping[str, Any]) -> Plan:
 
 
 def _plan_quasistatic(stored: Mapping[str, Any]) -> Plan:
-    how = _of_fields(QuasistaticShear, stored)
+    how = QuasistaticShear.of(stored)
     return quasistatic_driver.plan(_no_start, how, int(stored["frames"]), {})
+
+
+def _plan_ladder(stored: Mapping[str, Any]) -> Plan:
+    return ladder.plan(_no_start, Ladder.of(stored), {})
 
 
 def _of_fields(kind: type[Any], stored: Mapping[str, Any]) -> Any:
@@ -154,6 +161,7 @@ KINDS: dict[str, Kind] = {
     "slow compression": Kind(RunFile, _plan_implicit),
     "slow shear": Kind(ShearFile, _plan_implicit),
     "quasistatic shear": Kind(QuasistaticShearFile, _plan_quasistatic),
+    "ladder": Kind(LadderFile, _plan_ladder),
     ENSEMBLE: Kind(EnsembleFile),
     FOR_A_PACKING: Kind(RunFile),
     MAKING: Kind(RunFile),

@@ -94,6 +94,7 @@ def made(folder):
         "CyclicShearFile": cyclic(),
         "QuasistaticShearFile": quasistatic(),
         "EnsembleFile": js.ensemble(js.Spherocylinders(**RODS), seeds=[1, 2], u0=1e-8, **QUICK),
+        "LadderFile": js.ladder(packing, u0=[1e-7], progress=False),
         "Event": quasistatic().events(),
         "Energy": js.energy(packing, hessian=True, compatibility=True),
         "Nonaffine": js.nonaffine(packing, packing.with_(position=packing.position + 0.1)),
@@ -109,7 +110,7 @@ def objects(tmp_path_factory):
 
 NAMES = """Box|Packing|Packing of arrays|its copy|Kind|Particles|Particles mixed|Particles given|Modes|Modes of a file
 ModeTable|DynamicalMatrix|Moduli|Contacts|ContactNetwork|State|Landscape|Recipe|RunFile|RunFile of a file|OnsetFit
-Jamming|ShearFile|CyclicShearFile|QuasistaticShearFile|EnsembleFile|Event|Energy|Nonaffine|Interaction|NotReachedWarning""".replace(
+Jamming|ShearFile|CyclicShearFile|QuasistaticShearFile|EnsembleFile|LadderFile|Event|Energy|Nonaffine|Interaction|NotReachedWarning""".replace(
     "\n", "|"
 ).split("|")
 NAMES += [f"shape {name}" for name in SHAPES]
