@@ -9,6 +9,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from exchanged import PLACES, mixed, tilted
+from written import FINISHED
 
 import jamshape as js
 from jamshape.files.dump_index import index_of
@@ -80,7 +81,7 @@ def test_one_packing_is_one_frame(tmp_path, sequence):
 
 
 def test_a_recorded_run_iterates_over_the_same_frames(tmp_path, sequence):
-    write_run(tmp_path / "run.h5", sequence, {"finished": True, "kappa": 1e-3})
+    write_run(tmp_path / "run.h5", sequence, FINISHED | {"kappa": 1e-3})
     run = js.load(tmp_path / "run.h5")
     pairs = zip(run, js.frames(tmp_path / "run.h5"), strict=True)
     for k, (one, other) in enumerate(pairs):
