@@ -51,6 +51,7 @@ NOT_RUN = [
 RUN_BY = [
     Told("ARCHITECTURE.md", "checks <-", "tests/house/test_pages.py"),
     Told("docs/how-to/other-tools.md", "", "tests/jamshape/exchange/test_recipes.py"),
+    Told("docs/how-to/python-on-ranks.md", "", "tests/decks/test_python_on_ranks.py"),
     Told("docs/reference/*.md", "Examples\n", "tests/styles/test_style_pages.py"),
 ]
 
