@@ -7,8 +7,8 @@
 The scale `demo` takes minutes on two cores, `small` an hour, and `full`, with the papers' sizes, several hours.
 The last output is agreement.md, a page with every number beside the paper's, the figures, and a list of runs.
 Needs Snakemake and a clone of the repository, whose folder analysis/ has the workflows. The same command resumes
-after a kill. The last line of standard output is one JSON object; the exit code is 0 only if every figure
-exists.
+after a kill, and with --seconds it stops in time. The last line of standard output is one JSON object; the exit code
+is 0 only if every figure exists.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from argparse import ArgumentParser, Namespace
 from collections import Counter
@@ -30,6 +31,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+from jamshape.checks import RANGES, TimeLimitError, require_in
 from jamshape.command import parser_of, report
 from jamshape.front.progress import follow
 from jamshape.recording.driver import Told
@@ -68,6 +70,8 @@ def options_of() -> ArgumentParser:
     parser.add_argument("--figures", nargs="+", default=[], metavar="NAME", help=chosen)
     parser.add_argument("--jobs", type=int, default=cores(), help="processes (all cores)")
     parser.add_argument("--out", type=Path, help="folder (runs/PAPER_SCALE)")
+    late = "stop after this time [s], with exit code 75; the same command resumes"
+    parser.add_argument("--seconds", type=float, help=late)
     parser.add_argument("--dry-run", action="store_true", help="list the jobs without running them")
     return parser
 
@@ -170,6 +174,25 @@ def held(folder: Path) -> Iterator[IO[str]]:
         yield file
 
 
+@contextmanager
+def _ended_after(
+    seconds: float | None, going: subprocess.Popen[str], late: threading.Event
+) -> Iterator[None]:
+    """End Snakemake after a time, as Ctrl-C does; its jobs resume from their own files."""
+
+    def end() -> None:
+        late.set()
+        going.send_signal(signal.SIGINT)
+
+    timer = threading.Timer(seconds or 0.0, end)
+    if seconds is not None:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
 def steps(command: list[str], options: Namespace, lock: IO[str]) -> Iterator[Step]:
     """Run Snakemake, log its output, and yield its progress.
 
@@ -187,8 +210,13 @@ def steps(command: list[str], options: Namespace, lock: IO[str]) -> Iterator[Ste
         env=os.environ | {"PYTHONPATH": python_path()},
     )
     at, failed, failing, last = Step(), 0, False, ""
+    late = threading.Event()
     assert going.stdout is not None
-    with going, (options.out / "snakemake.log").open("a", encoding="utf-8") as log:
+    with (
+        _ended_after(options.seconds, going, late),
+        going,
+        (options.out / "snakemake.log").open("a", encoding="utf-8") as log,
+    ):
         try:
             for line in going.stdout:
                 log.write(line)
@@ -197,7 +225,7 @@ def steps(command: list[str], options: Namespace, lock: IO[str]) -> Iterator[Ste
                     at = Step(int(found[1]), int(found[2]))
                     yield at
                 failing = line.startswith("Error in rule") or (failing and bool(line.strip()))
-                if failing and (found := _OUTPUT.match(line)):
+                if failing and not late.is_set() and (found := _OUTPUT.match(line)):
                     failed += 1
                     yield at._replace(failed=f"{found[1]}: {last_words(options.out, found[1])}")
         except BaseException:
@@ -205,6 +233,12 @@ def steps(command: list[str], options: Namespace, lock: IO[str]) -> Iterator[Ste
             going.send_signal(signal.SIGINT)
             going.wait(_PATIENCE)
             raise
+    if late.is_set():
+        msg = (
+            f"{options.out}: stopped after {options.seconds:.3g} s at {at.done} of {at.of} jobs, expected the end; the"
+            " same command resumes"
+        )
+        raise TimeLimitError(msg)
     if going.returncode and not failed:
         msg = f"Snakemake ended with exit code {going.returncode} with the message: {last}; see {log.name}"
         raise RuntimeError(msg)
@@ -264,6 +298,8 @@ def main(options: Namespace) -> int:
     if options.samples is not None and options.samples < 1:
         msg = f"--samples is {options.samples}, expected at least 1"
         raise ValueError(msg)
+    if options.seconds is not None:
+        require_in("--seconds", options.seconds, RANGES["seconds"])
     workflow = workflow_of(options.paper)
     require_snakemake()
     options.out = options.out or Path("runs") / f"{options.paper}_{options.scale}"

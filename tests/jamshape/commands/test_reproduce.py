@@ -2,6 +2,8 @@
 
 import importlib.util
 import json
+import sys
+import time
 
 import pytest
 
@@ -73,3 +75,31 @@ def test_a_folder_in_which_another_process_works_is_refused(jamshape, tmp_path):
     )
     with reproduce.held(tmp_path):
         pass
+
+
+SLOW = """
+import sys, time
+print("1 of 5 steps (20%) done", flush=True)
+try:
+    time.sleep(60)
+except KeyboardInterrupt:
+    print("Error in rule packing:\\n    output: reports/packing.json, x\\n", flush=True)
+    sys.exit(1)
+"""
+
+
+def test_it_stops_in_time_as_after_ctrl_c(jamshape, monkeypatch, tmp_path, capfd):
+    monkeypatch.setattr(reproduce, "command_of", lambda *_: [sys.executable, "-c", SLOW])
+    out = tmp_path / "new"
+    began = time.monotonic()
+    assert jamshape("reproduce", PAPER, "--seconds", 2, "--out", out).code == 75
+    assert time.monotonic() - began < 30
+    said = capfd.readouterr().err.splitlines()[-1]
+    assert said == (
+        f"jamshape reproduce: {out}: stopped after 2 s at 1 of 5 jobs, expected the end; the same command resumes"
+    )
+
+
+def test_no_time_at_all_is_refused(jamshape, tmp_path):
+    said = jamshape("reproduce", PAPER, "--seconds", -1, "--out", tmp_path / "new").code
+    assert "--seconds is -1" in said
