@@ -12,6 +12,7 @@ single-precision numbers, these take precedence: see `jamshape.exchange.edited`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from functools import lru_cache, singledispatch
 from typing import Any, NamedTuple
@@ -130,7 +131,7 @@ def _frame(hoomd: Any, packing: Packing, form: Form) -> Any:
     of_box = box_fields(packing, rests=form.rests, tilted=form.tilted)
     exact |= {_LOG + name: x for name, x in of_box.items()}
     exact[_LOG + "time"] = np.array([packing.time])
-    exact[_LOG + "law"] = np.array(packing.law, np.float64)
+    exact[_LOG + "law"] = np.array([*np.ravel(packing.law.k_e), packing.law.sides])
     # As numbers: OVITO before 3.17 fails on texts.
     exact[_LOG + "shape_style"] = np.frombuffer(packing.shape_style.encode(), np.uint8)
     frame.log = exact
@@ -210,8 +211,10 @@ def _packing(path: PathLike, hoomd: Any, frame: Any) -> Packing:
     try:
         style, time = bytes(found.pop("shape_style")).decode(), float(found.pop("time")[0])
         if "law" in found:  # missing in files of 0.1.0
-            k_e, sides = found["law"].tolist()
-            found["law"] = Interaction(k_e, sides)
+            *numbers, sides = found["law"].tolist()
+            n = math.isqrt(len(numbers))
+            k_e = np.reshape(numbers, (n, n)) if n > 1 else numbers[0]
+            found["law"] = Interaction.told({"k_e": k_e, "sides": sides})
         packing = packing_of(found, style, int(frame.configuration.step), time)
         return as_edited(packing, _frame(hoomd, packing, Form.of(packing)), frame)
     except (KeyError, TypeError) as error:
