@@ -79,18 +79,20 @@ def stiffness_of(k_e: ArrayLike) -> Stiffness:
     >>> stiffness_of([[1, 2], [2, 4]])
     ((1.0, 2.0), (2.0, 4.0))
     """
-    found = real_numbers("k_e", k_e)
+    try:
+        found = real_numbers("k_e", k_e).astype(np.float64)
+    except ValueError:  # another type
+        found = np.empty(0)
     if found.ndim == 0:
         return float(found)
-    table = found.astype(np.float64)
-    is_square = table.ndim == 2 and table.size > 0 and table.shape[0] == table.shape[1]
-    if not (is_square and (table == table.T).all() and ((table > 0) & (table < np.inf)).all()):
+    is_square = found.ndim == 2 and found.size > 0 and found.shape[0] == found.shape[1]
+    if not (is_square and (found == found.T).all() and ((found > 0) & (found < np.inf)).all()):
         msg = (
-            f"k_e is {said(found.tolist())}, expected a positive number, or a symmetric table of them with a row and a"
-            " column for each species"
+            f"k_e is {said(k_e)}, expected a positive number, or a symmetric table of them with a row and a column for"
+            " each species"
         )
         raise ValueError(msg)
-    return tuple(map(tuple, table.tolist()))
+    return tuple(map(tuple, found.tolist()))
 
 
 def stiffness_text(k_e: Stiffness) -> str:

@@ -149,7 +149,7 @@ def test_a_data_file_with_two_answers_is_refused(rested, tmp_path):
         ([[1, 2], [3, 4]], r"k_e is \[\[1, 2\], \[3, 4\]\], expected a positive number, or a symmetric"),
         ([[1, -2], [-2, 1]], "expected a positive number, or a symmetric table"),
         ([1, 2], "expected a positive number, or a symmetric table"),
-        ([[1, 2], [2]], "rows of different lengths"),
+        ([[1, 2], [2]], "expected a positive number, or a symmetric table"),
         ([[1]], "k_e of the law has 1 rows and columns, expected one for each species up to 2"),
     ],
 )  # fmt: skip
